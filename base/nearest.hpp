@@ -1,0 +1,19 @@
+// "Did you mean …?": the nearest of the names that would have been right.
+// Layer: base.  Thread: non-RT only.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace tandem {
+
+/// The candidate with the smallest edit distance to `name` (case-insensitive, transpositions
+/// count once), or empty when none is near enough to be a slip of the finger.
+[[nodiscard]] std::string nearest(std::string_view name, std::span<const std::string> candidates);
+
+/// "did you mean 'x'?" or, when nothing is near, "known: a, b, c" (at most `most` names).
+[[nodiscard]] std::string suggest(std::string_view name, std::span<const std::string> candidates,
+                                  std::size_t most = 12);
+
+}  // namespace tandem

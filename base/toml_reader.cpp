@@ -1,0 +1,338 @@
+#include "base/toml_reader.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <toml++/toml.h>
+
+#include "base/nearest.hpp"
+
+namespace tandem {
+
+struct TomlTable::Shared {
+  toml::table root;
+  std::string file;
+  Diagnostics diagnostics;
+};
+
+namespace {
+
+const toml::table kEmpty;
+
+std::string kind(const toml::node& node) {
+  std::ostringstream out;
+  out << node.type();
+  return out.str();
+}
+
+std::string number_text(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+}  // namespace
+
+TomlTable::TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path)
+    : shared_(std::move(shared)), table_(table), path_(std::move(path)) {}
+
+std::string TomlTable::dotted(std::string_view key) const {
+  if (key.empty()) return path_;
+  return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
+}
+
+const toml::node* TomlTable::find(std::string_view key) {
+  asked_.emplace(key);
+  return table_->get(key);
+}
+
+const toml::node* TomlTable::require(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr && table_ != &kEmpty) {
+    error(key, "this key is missing", "add it to the table");
+  }
+  return node;
+}
+
+bool TomlTable::has(std::string_view key) const { return table_->contains(key); }
+
+int TomlTable::line() const { return static_cast<int>(table_->source().begin.line); }
+
+int TomlTable::line(std::string_view key) const {
+  const toml::node* node = key.empty() ? nullptr : table_->get(key);
+  return node == nullptr ? line() : static_cast<int>(node->source().begin.line);
+}
+
+void TomlTable::error(std::string_view key, std::string message, std::string hint) {
+  shared_->diagnostics.push_back({.message = std::move(message),
+                                  .hint = std::move(hint),
+                                  .file = shared_->file,
+                                  .line = line(key),
+                                  .key = dotted(key)});
+}
+
+void TomlTable::finish() {
+  const std::vector<std::string> known(asked_.begin(), asked_.end());
+  for (const auto& [key, node] : *table_) {
+    if (asked_.contains(key.str())) continue;
+    error(key.str(), "unknown key", suggest(key.str(), known));
+  }
+}
+
+bool TomlTable::check_number(std::string_view key, const toml::node& node, Range range,
+                             double& out) {
+  if (!node.is_number()) {
+    error(key, "must be a number, not " + kind(node));
+    return false;
+  }
+  const double value = *node.value<double>();
+  if (!std::isfinite(value)) {
+    error(key, "must be finite");
+    return false;
+  }
+  if (value < range.min || (range.open_min && value <= range.min) || value > range.max) {
+    std::string want = range.open_min ? "greater than " + number_text(range.min)
+                                      : "at least " + number_text(range.min);
+    if (range.min <= kAnyNumber.min) want.clear();
+    if (range.max < kAnyNumber.max) {
+      want += (want.empty() ? "" : " and ") + std::string("at most ") + number_text(range.max);
+    }
+    error(key, number_text(value) + " is out of range", "must be " + want);
+    return false;
+  }
+  out = value;
+  return true;
+}
+
+double TomlTable::number(std::string_view key, Range range) {
+  double value = 0.0;
+  if (const toml::node* node = require(key)) check_number(key, *node, range, value);
+  return value;
+}
+
+double TomlTable::number_or(std::string_view key, double value, Range range) {
+  if (const toml::node* node = find(key)) check_number(key, *node, range, value);
+  return value;
+}
+
+std::int64_t TomlTable::integer(std::string_view key, std::int64_t min, std::int64_t max) {
+  return require(key) == nullptr ? 0 : integer_or(key, 0, min, max);
+}
+
+std::int64_t TomlTable::integer_or(std::string_view key, std::int64_t value, std::int64_t min,
+                                   std::int64_t max) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return value;
+  if (!node->is_integer()) {
+    error(key, "must be an integer, not " + kind(*node));
+    return value;
+  }
+  const std::int64_t found = *node->value<std::int64_t>();
+  if (found < min || found > max) {
+    error(key, std::to_string(found) + " is out of range",
+          "must be " + std::to_string(min) + " to " + std::to_string(max));
+    return value;
+  }
+  return found;
+}
+
+bool TomlTable::boolean_or(std::string_view key, bool value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return value;
+  if (!node->is_boolean()) {
+    error(key, "must be true or false, not " + kind(*node));
+    return value;
+  }
+  return *node->value<bool>();
+}
+
+std::string TomlTable::text(std::string_view key) {
+  return require(key) == nullptr ? std::string() : text_or(key, {});
+}
+
+std::string TomlTable::text_or(std::string_view key, std::string value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return value;
+  if (!node->is_string()) {
+    error(key, "must be a text in quotes, not " + kind(*node));
+    return value;
+  }
+  std::string found = *node->value<std::string>();
+  if (found.empty()) error(key, "must not be empty");
+  return found;
+}
+
+std::string TomlTable::choice(std::string_view key, const std::vector<std::string>& allowed) {
+  return require(key) == nullptr ? std::string() : choice_or(key, {}, allowed);
+}
+
+std::string TomlTable::choice_or(std::string_view key, std::string value,
+                                 const std::vector<std::string>& allowed) {
+  const std::string found = text_or(key, value);
+  if (found == value) return value;
+  for (const std::string& one : allowed) {
+    if (found == one) return found;
+  }
+  error(key, "'" + found + "' is not one of the choices", suggest(found, allowed));
+  return value;
+}
+
+std::vector<double> TomlTable::numbers(std::string_view key, std::size_t size, Range range) {
+  if (require(key) == nullptr) return std::vector<double>(size, 0.0);
+  std::vector<double> found = numbers_or(key, {}, range);
+  if (size != 0 && found.size() != size) {
+    error(key, "has " + std::to_string(found.size()) + " numbers",
+          "give exactly " + std::to_string(size));
+    found.resize(size, 0.0);
+  }
+  return found;
+}
+
+std::vector<double> TomlTable::numbers_or(std::string_view key, std::vector<double> value,
+                                          Range range) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return value;
+  const toml::array* array = node->as_array();
+  if (array == nullptr) {
+    error(key, "must be a list of numbers, not " + kind(*node));
+    return value;
+  }
+  std::vector<double> found;
+  for (const toml::node& element : *array) {
+    double number = 0.0;
+    check_number(key, element, range, number);
+    found.push_back(number);
+  }
+  return found;
+}
+
+std::vector<std::string> TomlTable::texts_or(std::string_view key,
+                                             std::vector<std::string> value) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return value;
+  const toml::array* array = node->as_array();
+  if (array == nullptr) {
+    error(key, "must be a list of texts, not " + kind(*node));
+    return value;
+  }
+  std::vector<std::string> found;
+  for (const toml::node& element : *array) {
+    if (!element.is_string()) {
+      error(key, "must hold texts only, not " + kind(element));
+      continue;
+    }
+    found.push_back(*element.value<std::string>());
+  }
+  return found;
+}
+
+std::vector<std::vector<double>> TomlTable::rows(std::string_view key, std::size_t columns) {
+  const toml::node* node = require(key);
+  if (node == nullptr) return {};
+  const toml::array* array = node->as_array();
+  if (array == nullptr) {
+    error(key, "must be a list of lists of numbers, not " + kind(*node));
+    return {};
+  }
+  std::vector<std::vector<double>> found;
+  for (const toml::node& element : *array) {
+    const toml::array* row = element.as_array();
+    if (row == nullptr || row->size() != columns) {
+      error(key, "each row must be a list of " + std::to_string(columns) + " numbers");
+      continue;
+    }
+    std::vector<double>& out = found.emplace_back();
+    for (const toml::node& one : *row) {
+      double number = 0.0;
+      check_number(key, one, kAnyNumber, number);
+      out.push_back(number);
+    }
+  }
+  return found;
+}
+
+TomlTable TomlTable::table(std::string_view key) {
+  require(key);
+  return table_or_empty(key);
+}
+
+TomlTable TomlTable::table_or_empty(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {shared_, &kEmpty, dotted(key)};
+  if (const toml::table* found = node->as_table()) return {shared_, found, dotted(key)};
+  error(key, "must be a table, not " + kind(*node), "write [" + dotted(key) + "]");
+  return {shared_, &kEmpty, dotted(key)};
+}
+
+std::vector<TomlTable> TomlTable::tables(std::string_view key) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return {};
+  const toml::array* array = node->as_array();
+  if (array == nullptr || !array->is_homogeneous<toml::table>()) {
+    error(key, "must be an array of tables", "write [[" + dotted(key) + "]]");
+    return {};
+  }
+  std::vector<TomlTable> found;
+  for (std::size_t i = 0; i < array->size(); ++i) {
+    found.push_back(TomlTable(shared_, array->get(i)->as_table(),
+                              dotted(key) + "[" + std::to_string(i) + "]"));
+  }
+  return found;
+}
+
+std::vector<std::string> TomlTable::table_names() const {
+  std::vector<std::string> names;
+  for (const auto& [key, node] : *table_) {
+    if (node.is_table()) names.emplace_back(key.str());
+  }
+  return names;
+}
+
+std::vector<std::string> TomlTable::keys() const {
+  std::vector<std::string> names;
+  for (const auto& [key, node] : *table_) names.emplace_back(key.str());
+  return names;
+}
+
+Result<TomlDocument> TomlDocument::load(const std::string& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return std::unexpected(Error{"this is a folder", "name a .toml file", file, 0, {}});
+  }
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    return std::unexpected(
+        Error{"cannot read this file", "check the path and its permissions", file, 0, {}});
+  }
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (in.bad()) return std::unexpected(Error{"reading failed", "check the disk", file, 0, {}});
+  return parse(text.str(), file);
+}
+
+Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file) {
+  TomlDocument document;
+  document.shared_ = std::make_shared<TomlTable::Shared>();
+  document.shared_->file = file;
+  try {
+    document.shared_->root = toml::parse(text, file);
+  } catch (const toml::parse_error& e) {
+    return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
+                                 "correct the syntax at this line", file,
+                                 static_cast<int>(e.source().begin.line),
+                                 {}});
+  }
+  return document;
+}
+
+TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}}; }
+const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
+const std::string& TomlDocument::file() const { return shared_->file; }
+
+std::string TomlDocument::folder() const {
+  const std::string folder = std::filesystem::path(shared_->file).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+}  // namespace tandem

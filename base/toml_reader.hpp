@@ -1,0 +1,118 @@
+// Strict reading of TOML: every key is typed, ranged and expected; every error has a line.
+// Layer: base.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+
+namespace toml {
+inline namespace v3 {
+class node;
+class table;
+}  // namespace v3
+}  // namespace toml
+
+namespace tandem {
+
+/// Closed interval that a number must lie in, in the unit of its key.
+struct Range {
+  double min = -std::numeric_limits<double>::max();
+  double max = std::numeric_limits<double>::max();
+  bool open_min = false;  ///< true: `min` itself is refused
+};
+inline constexpr Range kAnyNumber{};
+inline constexpr Range kPositive{0.0, std::numeric_limits<double>::max(), true};
+inline constexpr Range kNotNegative{0.0, std::numeric_limits<double>::max(), false};
+
+/// One table of a TOML file, read key by key.
+///
+/// A getter that meets a missing key without default, a wrong type, a number that is not finite
+/// or out of range, appends an Error (file, line, dotted key, hint) to the document's
+/// diagnostics and returns the default, or an empty value. `finish()` reports the keys that
+/// nobody asked for, with the nearest known one. So one reading finds every error.
+class TomlTable {
+ public:
+  [[nodiscard]] double number(std::string_view key, Range range = kAnyNumber);
+  [[nodiscard]] double number_or(std::string_view key, double value, Range range = kAnyNumber);
+  [[nodiscard]] std::int64_t integer(std::string_view key, std::int64_t min, std::int64_t max);
+  [[nodiscard]] std::int64_t integer_or(std::string_view key, std::int64_t value, std::int64_t min,
+                                        std::int64_t max);
+  [[nodiscard]] bool boolean_or(std::string_view key, bool value);
+  [[nodiscard]] std::string text(std::string_view key);
+  [[nodiscard]] std::string text_or(std::string_view key, std::string value);
+  /// One of `allowed`; anything else is an error that suggests the nearest.
+  [[nodiscard]] std::string choice(std::string_view key, const std::vector<std::string>& allowed);
+  [[nodiscard]] std::string choice_or(std::string_view key, std::string value,
+                                      const std::vector<std::string>& allowed);
+  /// Exactly `size` numbers (any count when `size` is 0).
+  [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t size,
+                                            Range range = kAnyNumber);
+  [[nodiscard]] std::vector<double> numbers_or(std::string_view key, std::vector<double> value,
+                                               Range range = kAnyNumber);
+  [[nodiscard]] std::vector<std::string> texts_or(std::string_view key,
+                                                  std::vector<std::string> value);
+  /// A list of equal-length rows: [[x, y, z], …].
+  [[nodiscard]] std::vector<std::vector<double>> rows(std::string_view key, std::size_t columns);
+
+  [[nodiscard]] bool has(std::string_view key) const;
+  /// The sub-table `key`; an empty one, after an error, when it is missing or no table.
+  [[nodiscard]] TomlTable table(std::string_view key);
+  /// The sub-table `key`; an empty one without error when it is missing.
+  [[nodiscard]] TomlTable table_or_empty(std::string_view key);
+  /// The array of tables [[key]] in the order of the file; empty when it is missing.
+  [[nodiscard]] std::vector<TomlTable> tables(std::string_view key);
+  /// The keys of this table that hold tables, sorted: for [actuator.NAME].
+  [[nodiscard]] std::vector<std::string> table_names() const;
+  /// Every key of this table, sorted; marks none as read. For free-form maps (posture.home).
+  [[nodiscard]] std::vector<std::string> keys() const;
+
+  /// Reports an error of the caller's own at `key` (or at the table when empty).
+  void error(std::string_view key, std::string message, std::string hint = {});
+  /// Reports every key that no getter asked for.
+  void finish();
+
+  [[nodiscard]] const std::string& path() const { return path_; }  ///< dotted, "" for the root
+  [[nodiscard]] int line() const;
+  [[nodiscard]] int line(std::string_view key) const;  ///< of the key's value; else the table's
+
+ private:
+  friend class TomlDocument;
+  struct Shared;  // the parsed document and its diagnostics
+  TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path);
+  const toml::node* find(std::string_view key);
+  const toml::node* require(std::string_view key);
+  bool check_number(std::string_view key, const toml::node& node, Range range, double& out);
+  [[nodiscard]] std::string dotted(std::string_view key) const;
+
+  std::shared_ptr<Shared> shared_;
+  const toml::table* table_;
+  std::string path_;
+  std::set<std::string, std::less<>> asked_;
+};
+
+/// A parsed file. Copies and tables share it.
+class TomlDocument {
+ public:
+  /// Errors: the file cannot be read; the text is no TOML (with line).
+  [[nodiscard]] static Result<TomlDocument> load(const std::string& file);
+  /// The same from memory; `file` only names it in errors.
+  [[nodiscard]] static Result<TomlDocument> parse(std::string_view text, const std::string& file);
+
+  [[nodiscard]] TomlTable root() const;
+  [[nodiscard]] const Diagnostics& diagnostics() const;
+  [[nodiscard]] const std::string& file() const;
+  /// The file's folder, for paths given relative to the file; "." when it has none.
+  [[nodiscard]] std::string folder() const;
+
+ private:
+  std::shared_ptr<TomlTable::Shared> shared_;
+};
+
+}  // namespace tandem

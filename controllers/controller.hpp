@@ -1,0 +1,101 @@
+// The plugin API: what a controller is, and how a shared library offers one. Start here to write
+// a controller; example 03 is a whole one.
+// Layer: controllers.  Thread: configure non-RT; start, update, stop RT.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "base/toml_reader.hpp"
+#include "hal/backend.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+#include "model/kernels.h"
+
+namespace tandem {
+
+/// What a controller may know and ask for when it is configured.
+class ControllerSetup {
+ public:
+  ControllerSetup(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+                  std::int64_t period_ns, TomlTable parameters)
+      : robot(robot), kernels(kernels), period_ns(period_ns), parameters(std::move(parameters)) {}
+
+  const hal::RobotConfig& robot;  ///< joints and sensors in the image's order, postures, limits
+  const tandem_kernels* kernels;  ///< the robot's generated model; null when it has none
+  std::int64_t period_ns;         ///< the cycle's nominal period
+  TomlTable parameters;           ///< [controller.parameters]; unknown keys are reported for you
+
+  /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
+  /// error before anything moves; a joint that nobody claims is held by the loop.
+  void claim(std::size_t joint, hal::ControlMode mode,
+             hal::InteractionMode interaction = hal::InteractionMode::kStiff) {
+    claims_.push_back({joint, mode, interaction});
+  }
+  struct Claim {
+    std::size_t joint;
+    hal::ControlMode mode;
+    hal::InteractionMode interaction;
+  };
+  [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
+
+ private:
+  std::vector<Claim> claims_;
+};
+
+/// A controller. It sees state, command and time; never a driver, a clock or a thread.
+class Controller {
+ public:
+  virtual ~Controller() = default;
+
+  /// Reads parameters, claims joints, allocates all it will ever need.
+  [[nodiscard]] virtual Status configure(ControllerSetup& setup) = 0;
+
+  /// First cycle: seeds references from the measured state, so that nothing jumps.
+  virtual void start(const hal::CycleTime& time, const hal::StateImage& state,
+                     hal::CommandImage& command) noexcept TANDEM_RT = 0;
+
+  /// Each cycle, the first included: writes the references of the claimed joints. Modes are
+  /// already set from the claims.
+  /// @return kOk; kStopped when its task is done; anything else stops the robot (category 1).
+  [[nodiscard]] virtual Code update(const hal::CycleTime& time, const hal::StateImage& state,
+                                    hal::CommandImage& command) noexcept TANDEM_RT = 0;
+
+  /// After the last update.
+  virtual void stop() noexcept TANDEM_RT {}
+
+  /// Everything that update() depends on, for snapshots.
+  virtual void archive(Archive&) {}
+};
+
+/// Raised whenever a plugin built before the change could misbehave after it.
+inline constexpr std::uint32_t kControllerAbi = 1;
+
+/// What `tandem_controller_plugin()` of a shared library returns.
+struct ControllerPlugin {
+  std::uint32_t abi;         ///< kControllerAbi of the headers it was built with
+  const char* compiler;      ///< __VERSION__ of its compiler, for the error message
+  const char* name;          ///< "squat"
+  const char* doc;           ///< one line for `tandem check`
+  Controller* (*create)();   ///< never null
+};
+
+}  // namespace tandem
+
+/// Defines the library's entry point: `TANDEM_CONTROLLER(Squat, "squat", "One line.")`.
+#define TANDEM_CONTROLLER(Class, plugin_name, plugin_doc)                                     \
+  extern "C" __attribute__((visibility("default"))) const ::tandem::ControllerPlugin*         \
+  tandem_controller_plugin() {                                                                \
+    static const ::tandem::ControllerPlugin plugin{::tandem::kControllerAbi, __VERSION__,     \
+                                                   plugin_name, plugin_doc,                   \
+                                                   []() -> ::tandem::Controller* {            \
+                                                     return new Class;                        \
+                                                   }};                                        \
+    return &plugin;                                                                           \
+  }

@@ -1,0 +1,69 @@
+// The contract between the loop and whatever stands for the robot.
+// Layer: hal.  Thread: open/close non-RT; read/write RT.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "hal/image.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::hal {
+
+/// Who paces the cycle.
+enum class Pace : std::uint8_t {
+  kWallClock,       ///< the loop sleeps to absolute wall-clock times
+  kSimulatedClock,  ///< time is the count of cycles; the loop may run at any speed
+  kBus,             ///< read() returns when the bus' cycle comes round
+};
+
+/// Where a backend stands between power-on and power-off.
+enum class Phase : std::uint8_t {
+  kBringUp,     ///< nodes are being configured and drives enabled; commands are not used yet
+  kOperational, ///< every axis follows the command
+  kFault,       ///< latched; `fault_text()` says the cause
+};
+
+/// Exact nominal time of a cycle. `time_ns == cycle * period_ns`.
+struct CycleTime {
+  std::uint64_t cycle = 0;
+  std::int64_t time_ns = 0;
+  std::int64_t period_ns = 1'000'000;
+};
+
+/// A robot: simulated, emulated behind a bus, or real.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+
+  [[nodiscard]] virtual Pace pace() const noexcept = 0;
+  [[nodiscard]] virtual Phase phase() const noexcept = 0;
+  /// The cause of Phase::kFault, or what bring-up waits for ("LHip (node 3): waiting for …").
+  [[nodiscard]] virtual std::string status_text() const = 0;
+
+  /// Advances to cycle `time.cycle`: exchanges SYNC and feedback, and fills `state`.
+  /// A joint whose sample did not arrive keeps the last one and raises its age.
+  /// @return kOk, kTimeout, kBusOff, kDiverged (simulation only), kFault.
+  /// @rt no allocation, lock or throw; bounded by the number of nodes.
+  [[nodiscard]] virtual Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT = 0;
+
+  /// Sends the command that takes effect at the next SYNC. Ignored during bring-up.
+  /// @pre `command` has passed the command limits: finite and in range.
+  [[nodiscard]] virtual Code write(const CommandImage& command,
+                                   const ParameterImage& parameters) noexcept TANDEM_RT = 0;
+
+  /// Asks the drives to stop and disable, category 1: called each cycle until it answers true.
+  [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
+
+  /// Writes or reads everything that the next read() depends on. Simulation only: a backend
+  /// whose robot cannot be rewound answers false.
+  [[nodiscard]] virtual bool archive(Archive& ar) = 0;
+};
+
+}  // namespace tandem::hal

@@ -1,0 +1,190 @@
+// A robot as its robot.toml describes it: joints, actuators, boards, buses, sensors, contact.
+// Plain data, read once, shared by every room. docs/configuration.md documents each key.
+// Layer: hal.  Thread: non-RT to read; immutable afterwards.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/image.hpp"
+
+namespace tandem::hal {
+
+/// [[site]]: a named frame of the model.
+struct SiteConfig {
+  std::string name;
+  std::string link;                     ///< URDF link the frame is fixed to
+  std::array<double, 3> xyz_m{};        ///< origin in the link's frame
+  std::array<double, 3> rpy_rad{};      ///< URDF convention
+  bool wrench = false;                  ///< an external wrench may act here (contact)
+};
+
+/// [model]
+struct ModelConfig {
+  std::string urdf;                     ///< path, resolved against the TOML's folder
+  bool floating_base = false;
+  bool mimic_independent = false;       ///< mimic = "independent"; the default "refuse" is an error
+  std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
+  std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
+  std::vector<SiteConfig> sites;
+};
+
+/// [actuator.NAME]: motor, gear and spring; reflected to the link side but for R, L, K.
+struct ActuatorConfig {
+  std::string name;
+  int order = 2;                        ///< 0 rigid, 1 electrical, 2 mechanical (SEA), 3 both
+  double resistance_ohm = 0.0;
+  double inductance_H = 0.0;
+  double torque_constant_Nm_A = 0.0;    ///< of the motor, before the gear
+  double gear_ratio = 1.0;
+  double inertia_kg_m2 = 0.0;           ///< J
+  double damping_Nms_rad = 0.0;         ///< D, the back-EMF's share N^2 K^2 / R included
+  double spring_Nm_rad = 0.0;           ///< Ks (orders 2, 3)
+  double spring_damping_Nms_rad = 0.0;  ///< Ds (orders 2, 3)
+  double current_limit_A = 0.0;
+  double voltage_limit_V = 0.0;
+  double thermal_resistance_K_W = 1.0;  ///< winding to ambient
+  double thermal_time_constant_s = 60.0;
+};
+
+/// One loop of the firmware. Units follow from its input and output: docs/firmware.md.
+struct PidConfig {
+  PidGains gains;
+  double output_limit = 0.0;            ///< 0: the actuator's own limit
+};
+
+/// [gains.NAME]: the firmware's loops of one kind of joint.
+struct GainsConfig {
+  std::string name;
+  PidConfig position;                   ///< [V/rad, V/(rad s), Vs/rad]
+  PidConfig velocity;                   ///< [Vs/rad, …]
+  PidConfig torque;                     ///< [V/Nm, …]
+  PidConfig current;                    ///< [V/A, …]
+  double position_torque_kff = 0.0;     ///< V per Nm of feed-forward in position mode
+  double stiffness_Nm_rad = 0.0;        ///< impedance mode's defaults
+  double damping_Nms_rad = 0.0;
+};
+
+/// What the loop does when this joint's board dies or faults. IEC 60204-1 names.
+enum class StopCategory : std::uint8_t { kCategory0 = 0, kCategory1 = 1, kHold = 2, kWarn = 3 };
+
+/// [[joint]]
+struct JointConfig {
+  std::string name;                     ///< URDF joint
+  std::string board;
+  int axis = 0;                         ///< on its board, from 0
+  std::string actuator;
+  std::string gains;
+  double min_position_rad = 0.0;        ///< defaults: the URDF's limits
+  double max_position_rad = 0.0;
+  double max_velocity_rad_s = 0.0;
+  double max_torque_Nm = 0.0;           ///< the torque reference's limit
+  double rated_torque_Nm = 0.0;         ///< CiA 402 6076: torques travel as per mille of it
+  double encoder_counts_per_rev = 0.0;  ///< link encoder
+  double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
+  double torque_noise_Nm = 0.0;         ///< standard deviation of the spring torque's measurement
+  StopCategory on_fault = StopCategory::kCategory1;
+};
+
+/// [[bus]]
+struct BusConfig {
+  std::string name;
+  std::string interface;                ///< "can0": the SocketCAN name; unused in process
+  bool fd = true;
+  std::int64_t bitrate = 1'000'000;
+  std::int64_t data_bitrate = 8'000'000;
+};
+
+/// [[board]]
+struct BoardConfig {
+  std::string name;
+  std::string bus;
+  int node_id = 0;                      ///< 1 to 127
+  std::int64_t control_period_ns = 1'000'000;  ///< of its joint controllers
+  int heartbeat_ms = 50;                ///< both ways; time-out is three of them
+  int command_timeout_cycles = 10;      ///< SYNCs without a command until the safe state
+};
+
+enum class SensorType : std::uint8_t { kForceTorque, kImu };
+
+/// [[sensor]]: a node of its own.
+/// force_torque channels: fx fy fz [N] tx ty tz [Nm].
+/// imu channels: qx qy qz qw (sensor to W), wx wy wz [rad/s], ax ay az [m/s^2] specific force,
+/// the last six in the sensor's frame.
+struct SensorConfig {
+  std::string name;
+  SensorType type = SensorType::kForceTorque;
+  std::string bus;
+  int node_id = 0;
+  std::string joint;                    ///< force_torque: measures the wrench through this joint
+  std::string link;                     ///< the frame it is expressed in
+  std::vector<double> noise;            ///< standard deviation per channel; empty: none
+  std::vector<double> bias;             ///< per channel; empty: none
+
+  [[nodiscard]] std::size_t channels() const {
+    return type == SensorType::kForceTorque ? 6 : 10;
+  }
+};
+
+/// [[contact.foot]]: points of a sole that may touch the ground.
+struct FootConfig {
+  std::string site;                     ///< a site with wrench = true
+  std::vector<std::array<double, 3>> points_m;  ///< in the site's frame
+};
+
+/// [contact]: compliant ground at z = height. Per point.
+struct ContactConfig {
+  double height_m = 0.0;
+  double stiffness_N_m = 0.0;
+  double damping_s_m = 0.0;             ///< Fz = k d (1 + damping * d'), never below zero
+  double tangential_stiffness_N_m = 0.0;
+  double tangential_damping_Ns_m = 0.0;
+  double static_friction = 0.0;
+  double sliding_friction = 0.0;
+  double stick_velocity_m_s = 0.01;     ///< regularisation between static and sliding
+  std::vector<FootConfig> feet;
+};
+
+/// [posture.NAME]: positions by joint, in the image's order; joints not named are 0.
+struct PostureConfig {
+  std::string name;
+  double base_height_m = 0.0;           ///< of the base's origin above W's; floating base only
+  std::vector<double> position_rad;
+};
+
+/// The whole robot.toml.
+struct RobotConfig {
+  std::string file;                     ///< the TOML's path
+  std::string name;
+  ModelConfig model;
+  std::vector<ActuatorConfig> actuators;
+  std::vector<GainsConfig> gains;
+  std::vector<BusConfig> buses;
+  std::vector<BoardConfig> boards;
+  std::vector<JointConfig> joints;      ///< the process image's order
+  std::vector<SensorConfig> sensors;    ///< the process image's order
+  ContactConfig contact;
+  std::vector<PostureConfig> postures;
+
+  [[nodiscard]] ImageShape shape() const;
+  /// Index in `joints`, or -1.
+  [[nodiscard]] int joint_index(std::string_view name) const;
+  [[nodiscard]] int sensor_index(std::string_view name) const;
+  [[nodiscard]] const ActuatorConfig& actuator_of(const JointConfig& joint) const;
+  [[nodiscard]] const GainsConfig& gains_of(const JointConfig& joint) const;
+  [[nodiscard]] const BoardConfig* board(std::string_view name) const;
+  [[nodiscard]] const BusConfig* bus(std::string_view name) const;
+  [[nodiscard]] const PostureConfig* posture(std::string_view name) const;
+};
+
+/// Reads and checks a robot.toml by itself (not against its URDF: model/ and apps/ do that).
+/// Errors, all of them at once: unreadable, no TOML, unknown or missing keys, out of range,
+/// a reference to a board, bus, actuator or gains table that does not exist, a joint on two
+/// boards or twice, an axis twice, a node id twice on a bus, a gain of the wrong sign.
+[[nodiscard]] std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file);
+
+}  // namespace tandem::hal

@@ -1,0 +1,44 @@
+#include "base/archive.hpp"
+
+namespace tandem {
+namespace {
+
+struct Counter {
+  int ticks = 0;
+  std::vector<double> values = std::vector<double>(3);
+  void archive(Archive& ar) { ar(ticks, values); }
+};
+
+TEST(Archive, ReadsBackWhatItWrote) {
+  Counter counter{7, {1.0, 2.0, 3.0}};
+  Archive out;
+  out(counter);
+  Archive in(out.bytes());
+  Counter other;
+  in(other);
+  EXPECT_TRUE(in.ok());
+  EXPECT_TRUE(in.at_end());
+  EXPECT_EQ(other.ticks, 7);
+  EXPECT_EQ(other.values, counter.values);
+}
+
+TEST(Archive, RefusesAShapeThatDiffers) {
+  Counter counter;
+  Archive out;
+  out(counter);
+  Archive in(out.bytes());
+  Counter other{0, std::vector<double>(4)};
+  in(other);
+  EXPECT_FALSE(in.ok());
+}
+
+TEST(Archive, RefusesToReadPastTheEnd) {
+  Archive in(std::span<const std::byte>{});
+  int value = 5;
+  in(value);
+  EXPECT_FALSE(in.ok());
+  EXPECT_EQ(value, 5);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,72 @@
+#include "base/toml_reader.hpp"
+
+namespace tandem {
+namespace {
+
+TomlDocument parse(std::string_view text) { return TomlDocument::parse(text, "robot.toml").value(); }
+
+TEST(TomlReader, ReadsWhatIsThere) {
+  const TomlDocument document = parse("mass_kg = 2.5\nname = 'x'\n[a]\nlist = [1, 2.0]\n");
+  TomlTable root = document.root();
+  EXPECT_EQ(root.number("mass_kg", kPositive), 2.5);
+  EXPECT_EQ(root.text("name"), "x");
+  TomlTable a = root.table("a");
+  EXPECT_EQ(a.numbers("list", 2), (std::vector<double>{1.0, 2.0}));
+  a.finish();
+  root.finish();
+  EXPECT_TRUE(document.diagnostics().empty());
+}
+
+TEST(TomlReader, NamesFileLineAndDottedKeyOfAnUnknownKey) {
+  const TomlDocument document = parse("[run]\nduration_s = 1\ndurtion = 2\n");
+  TomlTable root = document.root();
+  TomlTable run = root.table("run");
+  EXPECT_EQ(run.number("duration_s"), 1.0);
+  run.finish();
+  ASSERT_EQ(document.diagnostics().size(), 1U);
+  const Error& error = document.diagnostics().front();
+  EXPECT_EQ(error.file, "robot.toml");
+  EXPECT_EQ(error.line, 3);
+  EXPECT_EQ(error.key, "run.durtion");
+  EXPECT_EQ(error.hint, "did you mean 'duration_s'?");
+}
+
+TEST(TomlReader, RefusesNumbersThatAreNotFiniteOrOutOfRange) {
+  const TomlDocument document = parse("a = nan\nb = inf\nc = -1\nd = 0\ne = 'text'\n");
+  TomlTable root = document.root();
+  (void)root.number("a");
+  (void)root.number("b");
+  (void)root.number("c", kNotNegative);
+  (void)root.number("d", kPositive);
+  (void)root.number("e");
+  (void)root.number("missing");
+  ASSERT_EQ(document.diagnostics().size(), 6U);
+  EXPECT_EQ(document.diagnostics()[0].message, "must be finite");
+  EXPECT_EQ(document.diagnostics()[2].message, "-1 is out of range");
+  EXPECT_EQ(document.diagnostics()[3].hint, "must be greater than 0");
+  EXPECT_EQ(document.diagnostics()[5].message, "this key is missing");
+}
+
+TEST(TomlReader, GivesTheLineOfASyntaxError) {
+  const auto document = TomlDocument::parse("a = 1\nb = = 2\n", "x.toml");
+  ASSERT_FALSE(document.has_value());
+  EXPECT_EQ(document.error().line, 2);
+}
+
+TEST(TomlReader, NamesAFileThatIsNotThere) {
+  const auto document = TomlDocument::load("no/such/file.toml");
+  ASSERT_FALSE(document.has_value());
+  EXPECT_EQ(document.error().file, "no/such/file.toml");
+}
+
+TEST(TomlReader, AMissingTableIsOneErrorOnly) {
+  const TomlDocument document = parse("x = 1\n");
+  TomlTable root = document.root();
+  EXPECT_EQ(root.integer("x", 0, 5), 1);
+  TomlTable missing = root.table("model");
+  (void)missing.number("mass");
+  EXPECT_EQ(document.diagnostics().size(), 1U);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,2 @@
+// The executable whose precompiled header every test reuses.
+int main() { return 0; }
