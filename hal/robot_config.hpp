@@ -51,20 +51,23 @@ struct ActuatorConfig {
   double thermal_time_constant_s = 60.0;
 };
 
-/// One loop of the firmware. Units follow from its input and output: docs/firmware.md.
+/// One loop of the firmware.
 struct PidConfig {
   PidGains gains;
-  double output_limit = 0.0;            ///< 0: the actuator's own limit
+  double output_limit = 0.0;            ///< 0: the joint's or the actuator's own limit
 };
 
-/// [gains.NAME]: the firmware's loops of one kind of joint.
+/// [gains.NAME]: the firmware's loops of one kind of joint. One cascade serves every mode
+/// (docs/firmware.md): position, velocity and impedance give a link torque [Nm], the torque loop
+/// makes it a motor voltage [V], with feed-forward of the motor's resistance and back-EMF.
 struct GainsConfig {
   std::string name;
-  PidConfig position;                   ///< [V/rad, V/(rad s), Vs/rad]
-  PidConfig velocity;                   ///< [Vs/rad, …]
-  PidConfig torque;                     ///< [V/Nm, …]
-  PidConfig current;                    ///< [V/A, …]
-  double position_torque_kff = 0.0;     ///< V per Nm of feed-forward in position mode
+  PidConfig position;                   ///< [Nm/rad, Nm/(rad s), Nms/rad] on link position
+  PidConfig velocity;                   ///< [Nms/rad, Nm/rad, Nms^2/rad] on link velocity
+  PidConfig torque;                     ///< [V/Nm, V/(Nm s), Vs/Nm] on the spring's torque
+  PidConfig current;                    ///< [V/A, V/(A s), Vs/A]
+  double torque_feedforward = 1.0;      ///< share of R / (N K) tau_ref added to the voltage
+  double emf_compensation = 0.0;        ///< share of N K theta' added to the voltage, 0 to 1
   double stiffness_Nm_rad = 0.0;        ///< impedance mode's defaults
   double damping_Nms_rad = 0.0;
 };
@@ -107,6 +110,7 @@ struct BoardConfig {
   std::int64_t control_period_ns = 1'000'000;  ///< of its joint controllers
   int heartbeat_ms = 50;                ///< both ways; time-out is three of them
   int command_timeout_cycles = 10;      ///< SYNCs without a command until the safe state
+  int slow_pdo_every = 1;               ///< motor velocity, current, … every n-th SYNC
 };
 
 enum class SensorType : std::uint8_t { kForceTorque, kImu };
