@@ -57,6 +57,13 @@ struct PidConfig {
   double output_limit = 0.0;            ///< 0: the joint's or the actuator's own limit
 };
 
+/// Which encoder the stiff position loop's proportional and derivative terms act on.
+enum class PositionFeedback : std::uint8_t {
+  kLink = 0,   ///< e = q_ref - q
+  kMotor = 1,  ///< e = q_ref + tau_ff / Ks - theta: collocated, so stable on any load; the
+               ///< integral still acts on the link's error
+};
+
 /// [gains.NAME]: the firmware's loops of one kind of joint. One cascade serves every mode
 /// (docs/firmware.md): position, velocity and impedance give a link torque [Nm], the torque loop
 /// makes it a motor voltage [V], with feed-forward of the motor's resistance and back-EMF.
@@ -66,6 +73,7 @@ struct GainsConfig {
   PidConfig velocity;                   ///< [Nms/rad, Nm/rad, Nms^2/rad] on link velocity
   PidConfig torque;                     ///< [V/Nm, V/(Nm s), Vs/Nm] on the spring's torque
   PidConfig current;                    ///< [V/A, V/(A s), Vs/A]
+  PositionFeedback position_feedback = PositionFeedback::kLink;
   double torque_feedforward = 1.0;      ///< share of R / (N K) tau_ref added to the voltage
   double emf_compensation = 0.0;        ///< share of N K theta' added to the voltage, 0 to 1
   double stiffness_Nm_rad = 0.0;        ///< impedance mode's defaults
