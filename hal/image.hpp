@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tandem {
@@ -212,6 +213,9 @@ inline constexpr std::size_t kPidLoops = 4;
 class ParameterImage {
  public:
   explicit ParameterImage(std::size_t joints) : gains_(joints * kPidLoops), revision_(joints) {}
+  /// The gains that the drives start with (kPidLoops per joint, in PidLoop's order), revision 0.
+  explicit ParameterImage(std::vector<PidGains> gains)
+      : gains_(std::move(gains)), revision_(gains_.size() / kPidLoops) {}
 
   [[nodiscard]] const PidGains& gains(std::size_t joint, PidLoop loop) const noexcept {
     return gains_[joint * kPidLoops + static_cast<std::size_t>(loop)];

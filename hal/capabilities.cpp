@@ -1,0 +1,103 @@
+#include "hal/capabilities.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::hal {
+namespace {
+
+bool any(const PidGains& gains) { return gains.kp != 0.0 || gains.ki != 0.0 || gains.kd != 0.0; }
+
+std::uint8_t bit(Capability capability, bool set) {
+  return set ? static_cast<std::uint8_t>(capability) : std::uint8_t{0};
+}
+
+Capability needed(ControlMode mode) {
+  switch (mode) {
+    case ControlMode::kVelocity: return Capability::kVelocity;
+    case ControlMode::kTorque: return Capability::kTorque;
+    case ControlMode::kOpenLoop: return Capability::kOpenLoop;
+    case ControlMode::kCurrent: return Capability::kCurrent;
+    case ControlMode::kIdle:
+    case ControlMode::kPosition: break;
+  }
+  return Capability::kPosition;
+}
+
+JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint) {
+  const ActuatorConfig& actuator = robot.actuator_of(joint);
+  const GainsConfig& gains = robot.gains_of(joint);
+  JointCapabilities out;
+  out.min_position_rad = joint.min_position_rad;
+  out.max_position_rad = joint.max_position_rad;
+  out.max_velocity_rad_s = joint.max_velocity_rad_s;
+  const bool torque =
+      joint.max_torque_Nm > 0.0 && (any(gains.torque.gains) || gains.torque_feedforward > 0.0);
+  const bool current = actuator.current_limit_A > 0.0 && any(gains.current.gains);
+  out.bits = static_cast<std::uint8_t>(
+      bit(Capability::kPosition, torque && any(gains.position.gains)) |
+      bit(Capability::kVelocity, torque && any(gains.velocity.gains)) |
+      bit(Capability::kTorque, torque) | bit(Capability::kCompliant, torque) |
+      bit(Capability::kOpenLoop, actuator.voltage_limit_V > 0.0) |
+      bit(Capability::kCurrent, current));
+  out.max_voltage_V = actuator.voltage_limit_V;
+  if (current) out.max_current_A = actuator.current_limit_A;
+  if (torque) {
+    out.max_torque_Nm = joint.max_torque_Nm;
+    out.max_stiffness_Nm_rad = std::max(gains.position.gains.kp, gains.stiffness_Nm_rad);
+    const double critical = 2.0 * std::sqrt(out.max_stiffness_Nm_rad * actuator.inertia_kg_m2);
+    out.max_damping_Nms_rad =
+        std::max({critical, gains.position.gains.kd, gains.damping_Nms_rad});
+  }
+  return out;
+}
+
+}  // namespace
+
+const char* to_string(Capability capability) noexcept {
+  switch (capability) {
+    case Capability::kPosition: return "position";
+    case Capability::kVelocity: return "velocity";
+    case Capability::kTorque: return "torque";
+    case Capability::kCompliant: return "compliant";
+    case Capability::kOpenLoop: return "open_loop";
+    case Capability::kCurrent: return "current";
+  }
+  return "?";
+}
+
+bool JointCapabilities::can(ControlMode mode, InteractionMode interaction) const noexcept {
+  if (mode == ControlMode::kIdle) return true;
+  if (!can(needed(mode))) return false;
+  return interaction == InteractionMode::kStiff || can(Capability::kCompliant);
+}
+
+std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot) {
+  std::vector<JointCapabilities> out;
+  for (const JointConfig& joint : robot.joints) out.push_back(capabilities_of(robot, joint));
+  return out;
+}
+
+Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode mode,
+                        InteractionMode interaction) {
+  const JointConfig& config = robot.joints.at(joint);
+  if (capabilities_of(robot, config).can(mode, interaction)) return {};
+  Error error{.message = "this joint has no " + std::string(to_string(mode)) + " control (" +
+                         to_string(interaction) + ")",
+              .hint = "give [gains." + config.gains + "] the loop, or ask for another mode",
+              .file = robot.file,
+              .key = config.name};
+  return std::unexpected(std::move(error));
+}
+
+ParameterImage initial_parameters(const RobotConfig& robot) {
+  std::vector<PidGains> gains;
+  for (const JointConfig& joint : robot.joints) {
+    const GainsConfig& of = robot.gains_of(joint);
+    gains.insert(gains.end(),
+                 {of.position.gains, of.velocity.gains, of.torque.gains, of.current.gains});
+  }
+  return ParameterImage(std::move(gains));
+}
+
+}  // namespace tandem::hal

@@ -1,0 +1,60 @@
+// What each joint can do and how far: read off the robot's configuration, once.
+// Layer: hal.  Thread: non-RT to make; immutable afterwards.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::hal {
+
+/// One thing that a joint may be able to do. Bits of JointCapabilities::bits.
+enum class Capability : std::uint8_t {
+  kPosition = 1 << 0,   ///< its gains table has a position loop and a torque loop under it
+  kVelocity = 1 << 1,   ///< its gains table has a velocity loop and a torque loop under it
+  kTorque = 1 << 2,     ///< its gains table turns a torque into a voltage, and it has a limit
+  kCompliant = 1 << 3,  ///< as kTorque: the virtual spring and damper act through it
+  kOpenLoop = 1 << 4,   ///< its actuator takes a voltage
+  kCurrent = 1 << 5,    ///< its gains table has a current loop, and its actuator a current limit
+};
+[[nodiscard]] const char* to_string(Capability capability) noexcept;
+
+/// A joint's limits, link side, and its capabilities. A limit of a thing that it cannot do is 0.
+struct JointCapabilities {
+  double min_position_rad = 0.0;
+  double max_position_rad = 0.0;
+  double max_velocity_rad_s = 0.0;
+  double max_torque_Nm = 0.0;
+  double max_voltage_V = 0.0;
+  double max_current_A = 0.0;
+  /// Of the virtual spring: the position loop's kp (softer than stiff control), or the
+  /// configured default where that is larger.
+  double max_stiffness_Nm_rad = 0.0;
+  /// Of the virtual damper: critical for the motor's inertia at max_stiffness, or the position
+  /// loop's kd or the configured default where they are larger.
+  double max_damping_Nms_rad = 0.0;
+  std::uint8_t bits = 0;
+
+  [[nodiscard]] bool can(Capability capability) const noexcept {
+    return (bits & static_cast<std::uint8_t>(capability)) != 0;
+  }
+  /// Whether the joint can be put into `mode`. Every joint can be idle.
+  [[nodiscard]] bool can(ControlMode mode, InteractionMode interaction) const noexcept;
+};
+
+/// Of every joint, in the image's order.
+[[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
+
+/// Whether a joint can be put into a mode; asked for every claim at configuration.
+/// @return an Error that names the joint, the mode and the gains table that lacks a loop.
+[[nodiscard]] Status check_capability(const RobotConfig& robot, std::size_t joint,
+                                      ControlMode mode,
+                                      InteractionMode interaction = InteractionMode::kStiff);
+
+/// The gains that bring-up gives the drives, as the parameters at revision 0.
+[[nodiscard]] ParameterImage initial_parameters(const RobotConfig& robot);
+
+}  // namespace tandem::hal

@@ -1,0 +1,80 @@
+// The last gate before the wire: every command is finite, in range and no faster than allowed.
+// Layer: hal.  Thread: RT (made non-RT).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "hal/capabilities.hpp"
+#include "hal/image.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::hal {
+
+/// How often a joint's command had to be changed since the start.
+struct LimitCounters {
+  std::uint32_t not_finite = 0;    ///< a NaN, an infinity or a mode that does not exist
+  std::uint32_t out_of_range = 0;  ///< a reference beyond its limit
+  std::uint32_t too_fast = 0;      ///< a position reference beyond max velocity * period
+};
+
+/// Corrects commands in place, joint by joint: finite check, range limit, rate limit.
+///
+/// - A value that is not finite is replaced by the last good one of its field.
+/// - Position, velocity, torque, voltage, current, stiffness and damping are held within the
+///   joint's limits (JointCapabilities). In velocity mode a reference that leads further beyond
+///   a position limit is zero.
+/// - A position reference moves by at most max velocity * period from the last one. Where the
+///   position loop is not yet closed (other mode, drive not enabled) the last one is the
+///   measured position, so that every start is from where the joint stands. In other modes the
+///   position reference is not used, and set to the measured position.
+class CommandLimits {
+ public:
+  CommandLimits(const RobotConfig& robot, std::int64_t period_ns);
+
+  /// Corrects `command`. `state` is this cycle's.
+  /// @return kNotFinite or kOutOfRange when a joint needed it (the former goes first); a
+  ///         reference that is only too fast is corrected and counted, and kOk.
+  /// @pre   both images have this robot's joints.
+  /// @rt    no allocation, lock or throw; O(joints).
+  [[nodiscard]] Code apply(const StateImage& state, CommandImage& command) noexcept TANDEM_RT;
+
+  /// What apply() answered for each joint in the last cycle.
+  [[nodiscard]] std::span<const Code> codes() const noexcept { return codes_; }
+  [[nodiscard]] std::span<const LimitCounters> counters() const noexcept { return counters_; }
+  [[nodiscard]] std::span<const JointCapabilities> limits() const noexcept { return limits_; }
+
+  void archive(Archive& ar);
+
+ private:
+  /// The references that went to the wire last.
+  struct Last {
+    double position_rad = 0.0;
+    double velocity_rad_s = 0.0;
+    double torque_Nm = 0.0;
+    double voltage_V = 0.0;
+    double current_A = 0.0;
+    double stiffness_Nm_rad = 0.0;
+    double damping_Nms_rad = 0.0;
+    std::int64_t mode = 0;
+    std::int64_t interaction = 0;
+  };
+  void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
+  void position(std::size_t joint, const StateImage& state, CommandImage& command) noexcept
+      TANDEM_RT;
+  void bounded(std::size_t joint, double& value, double& last, double min, double max) noexcept
+      TANDEM_RT;
+
+  double period_s_;
+  std::vector<JointCapabilities> limits_;
+  std::vector<Last> last_;
+  std::vector<LimitCounters> counters_;
+  std::vector<Code> codes_;
+};
+
+}  // namespace tandem::hal
