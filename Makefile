@@ -1,0 +1,40 @@
+# Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
+JOBS ?= $(shell nproc)
+
+.PHONY: demo test unit rtsan fuzz bench clean help
+
+help:
+	@echo "make demo   install what is missing, build, and let COMAN squat (about 5 minutes the first time)"
+	@echo "make test   install what is missing, build everything, run every test"
+	@echo "make clean  remove build/ and runs/"
+
+# Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
+demo:
+	@scripts/install-dependencies demo
+	@cmake --preset demo --log-level=WARNING
+	@cmake --build --preset demo --parallel $(JOBS)
+	@build/release/bin/tandem run config/coman/squat.toml --report
+
+# What CI runs: all tests, the real-time proof, and a minute of each fuzz target.
+test: unit rtsan fuzz
+
+unit:
+	@scripts/install-dependencies test
+	@cmake --preset release --log-level=WARNING
+	@cmake --build --preset release --parallel $(JOBS)
+	@scripts/run-tests build/release $(JOBS)
+
+rtsan:
+	@scripts/install-dependencies test
+	@cmake --preset rtsan --log-level=WARNING
+	@cmake --build --preset rtsan --parallel $(JOBS)
+	@scripts/run-tests build/rtsan $(JOBS)
+
+fuzz:
+	@scripts/install-dependencies test
+	@cmake --preset fuzz --log-level=WARNING
+	@cmake --build --preset fuzz --parallel $(JOBS)
+	@scripts/run-fuzzers build/fuzz $(or $(FUZZ_SECONDS),60)
+
+clean:
+	@rm -rf build runs

@@ -1,0 +1,117 @@
+// The rooms' include rules (docs/architecture.md): a folder may include those that are named
+// for it, and nothing else of ours.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A room, and what it may include besides itself: a room, or one header of a room.
+using Rules = std::map<std::string, std::vector<std::string>>;
+
+const Rules& rules() {
+  static const Rules table{
+      {"base", {}},
+      {"rt", {"base"}},
+      {"model", {"base"}},
+      {"canopen", {"base"}},
+      {"firmware_emu", {"base", "canopen"}},
+      {"hal", {"base"}},
+      {"hal/ethercat-can", {"base", "canopen", "hal"}},
+      {"hal/sim", {"base", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can"}},
+      {"controllers", {"base", "hal", "model/kernels.h"}},
+      {"log", {"base", "hal"}},
+      {"report", {"base", "hal", "log", "model"}},
+      {"runtime",
+       {"base", "rt", "model", "hal", "hal/ethercat-can", "hal/sim", "controllers", "log"}},
+      {"apps",
+       {"base", "rt", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can", "hal/sim",
+        "controllers", "log", "report", "runtime"}},
+  };
+  return table;
+}
+
+/// The innermost room that holds `path` (relative to the root); empty when none does.
+std::string room_of(const std::string& path) {
+  std::string best;
+  for (const auto& [room, allowed] : rules()) {
+    if (path.starts_with(room + "/") && room.size() > best.size()) best = room;
+  }
+  return best;
+}
+
+bool may_include(const std::string& room, const std::string& included) {
+  const std::string target = room_of(included);
+  if (target.empty()) return true;  // a system or library header in quotes
+  if (target == room) return true;
+  const std::vector<std::string>& allowed = rules().at(room);
+  return std::ranges::find(allowed, target) != allowed.end() ||
+         std::ranges::find(allowed, included) != allowed.end();
+}
+
+struct Include {
+  std::string file;  ///< relative to the root
+  int line;
+  std::string included;
+};
+
+/// Every quoted include of a room's own files.
+std::vector<Include> includes_of(const std::string& room) {
+  static const std::regex pattern(R"re(^\s*#\s*include\s+"([^"]+)")re");
+  const fs::path root = TANDEM_SOURCE_DIR;
+  std::vector<Include> found;
+  for (const auto& entry : fs::recursive_directory_iterator(root / room)) {
+    const std::string kind = entry.path().extension().string();
+    const std::string file = fs::relative(entry.path(), root).generic_string();
+    if (kind != ".hpp" && kind != ".cpp" && kind != ".h") continue;
+    if (room_of(file) != room) continue;
+    std::ifstream in(entry.path());
+    std::string text;
+    for (int line = 1; std::getline(in, text); ++line) {
+      std::smatch match;
+      if (std::regex_search(text, match, pattern)) found.push_back({file, line, match[1]});
+    }
+  }
+  return found;
+}
+
+TEST(Architecture, RoomsIncludeOnlyWhatTheirRowAllows) {
+  int checked = 0;
+  for (const auto& [room, allowed] : rules()) {
+    for (const auto& [file, line, included] : includes_of(room)) {
+      ++checked;
+      EXPECT_TRUE(may_include(room, included))
+          << file << ":" << line << " includes \"" << included << "\", which " << room
+          << "/ may not use";
+    }
+  }
+  EXPECT_GT(checked, 20) << "no includes were found: is the source folder right?";
+}
+
+TEST(Architecture, IncludesAreWrittenFromTheRoot) {
+  for (const auto& [room, allowed] : rules()) {
+    for (const auto& [file, line, included] : includes_of(room)) {
+      EXPECT_NE(included.find('/'), std::string::npos)
+          << file << ":" << line << " includes \"" << included
+          << "\": write its path from the repository's root";
+    }
+  }
+}
+
+TEST(Architecture, RuleRefusesARoomAboveAndAcceptsOneBelow) {
+  EXPECT_TRUE(may_include("hal/sim", "firmware_emu/board.hpp"));
+  EXPECT_TRUE(may_include("controllers", "model/kernels.h"));
+  EXPECT_FALSE(may_include("controllers", "model/tree.hpp"));
+  EXPECT_FALSE(may_include("hal", "hal/sim/plant.hpp"));
+  EXPECT_FALSE(may_include("base", "rt/loop.hpp"));
+}
+
+}  // namespace
