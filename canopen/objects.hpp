@@ -1,0 +1,240 @@
+// Names of every COB-ID, object index, mode and bit on the wire. docs/wire.md explains them.
+// Layer: canopen.  Thread: any.
+#pragma once
+
+#include <cstdint>
+
+namespace tandem::canopen {
+
+/// COB-IDs of the pre-defined connection set (CiA 301); add the node id where there is one.
+namespace cob {
+inline constexpr std::uint32_t kNmt = 0x000;
+inline constexpr std::uint32_t kSync = 0x080;
+inline constexpr std::uint32_t kEmergency = 0x080;
+inline constexpr std::uint32_t kSdoResponse = 0x580;  ///< server to client
+inline constexpr std::uint32_t kSdoRequest = 0x600;   ///< client to server
+inline constexpr std::uint32_t kHeartbeat = 0x700;
+inline constexpr std::uint32_t kInvalid = 0x80000000;  ///< bit 31 of a COB-ID object: not in use
+inline constexpr std::uint32_t kIdMask = 0x7FF;
+
+/// Transmit (node to master) PDO `number` of node `id`. @pre 1 <= number <= 4
+[[nodiscard]] constexpr std::uint32_t tpdo(int number, int id) noexcept {
+  return 0x180u + 0x100u * static_cast<std::uint32_t>(number - 1) + static_cast<std::uint32_t>(id);
+}
+/// Receive (master to node) PDO `number` of node `id`. @pre 1 <= number <= 4
+[[nodiscard]] constexpr std::uint32_t rpdo(int number, int id) noexcept {
+  return 0x200u + 0x100u * static_cast<std::uint32_t>(number - 1) + static_cast<std::uint32_t>(id);
+}
+}  // namespace cob
+
+inline constexpr int kMaxNodeId = 127;
+inline constexpr int kMaxAxes = 8;      ///< of one board: CiA 402's index space
+inline constexpr int kPdosPerNode = 4;  ///< each way, of the pre-defined connection set
+
+/// PDO transmission types (sub 2 of 1400.. and 1800..): 1 to 240 mean every n-th SYNC.
+inline constexpr std::uint8_t kSynchronousAcyclic = 0;
+inline constexpr std::uint8_t kEverySync = 1;
+inline constexpr std::uint8_t kEventManufacturer = 254;
+inline constexpr std::uint8_t kEventProfile = 255;
+
+/// Object indices. Those from kErrorCode to kSupportedModes and the manufacturer's per-axis ones
+/// are axis 0's: see of_axis().
+namespace object {
+// CiA 301: communication
+inline constexpr std::uint16_t kDeviceType = 0x1000;         // u32
+inline constexpr std::uint16_t kErrorRegister = 0x1001;      // u8
+inline constexpr std::uint16_t kErrorHistory = 0x1003;       // u8 count, u32[8]
+inline constexpr std::uint16_t kSyncId = 0x1005;             // u32
+inline constexpr std::uint16_t kSyncPeriod = 0x1006;         // u32 [us]
+inline constexpr std::uint16_t kDeviceName = 0x1008;         // string
+inline constexpr std::uint16_t kHardwareVersion = 0x1009;    // string
+inline constexpr std::uint16_t kSoftwareVersion = 0x100A;    // string
+inline constexpr std::uint16_t kEmergencyId = 0x1014;        // u32
+inline constexpr std::uint16_t kHeartbeatConsumer = 0x1016;  // u32[]: node << 16 | time [ms]
+inline constexpr std::uint16_t kHeartbeatProducer = 0x1017;  // u16 [ms]
+inline constexpr std::uint16_t kIdentity = 0x1018;           // u32: vendor, product, revision, serial
+inline constexpr std::uint16_t kErrorBehaviour = 0x1029;     // u8[1]: on a communication error
+inline constexpr std::uint16_t kRpdoParameter = 0x1400;      // + number - 1
+inline constexpr std::uint16_t kRpdoMapping = 0x1600;
+inline constexpr std::uint16_t kTpdoParameter = 0x1800;
+inline constexpr std::uint16_t kTpdoMapping = 0x1A00;
+
+// CiA 402, axis 0
+inline constexpr std::uint16_t kAbortConnectionOption = 0x6007;  // i16
+inline constexpr std::uint16_t kErrorCode = 0x603F;              // u16
+inline constexpr std::uint16_t kControlword = 0x6040;            // u16
+inline constexpr std::uint16_t kStatusword = 0x6041;             // u16
+inline constexpr std::uint16_t kQuickStopOption = 0x605A;        // i16
+inline constexpr std::uint16_t kShutdownOption = 0x605B;         // i16
+inline constexpr std::uint16_t kDisableOption = 0x605C;          // i16
+inline constexpr std::uint16_t kHaltOption = 0x605D;             // i16
+inline constexpr std::uint16_t kFaultReactionOption = 0x605E;    // i16
+inline constexpr std::uint16_t kMode = 0x6060;                   // i8
+inline constexpr std::uint16_t kModeDisplay = 0x6061;            // i8
+inline constexpr std::uint16_t kPosition = 0x6064;               // i32 [link counts]
+inline constexpr std::uint16_t kFollowingErrorWindow = 0x6065;   // u32 [link counts]
+inline constexpr std::uint16_t kFollowingErrorTimeout = 0x6066;  // u16 [ms]
+inline constexpr std::uint16_t kVelocity = 0x606C;               // i32 [link counts/s]
+inline constexpr std::uint16_t kTargetTorque = 0x6071;           // i16 [per mille of rated]
+inline constexpr std::uint16_t kMaxTorque = 0x6072;              // u16 [per mille of rated]
+inline constexpr std::uint16_t kRatedTorque = 0x6076;            // u32 [mNm]
+inline constexpr std::uint16_t kTorque = 0x6077;                 // i16 [per mille of rated]
+inline constexpr std::uint16_t kTargetPosition = 0x607A;         // i32 [link counts]
+inline constexpr std::uint16_t kSoftwareLimits = 0x607D;         // i32: 1 min, 2 max [link counts]
+inline constexpr std::uint16_t kQuickStopDeceleration = 0x6085;  // u32 [link counts/s^2]
+inline constexpr std::uint16_t kEncoderResolution = 0x608F;      // u32: 1 counts, 2 per revolutions
+inline constexpr std::uint16_t kVelocityOffset = 0x60B1;         // i32 [link counts/s]
+inline constexpr std::uint16_t kTorqueOffset = 0x60B2;           // i16 [per mille of rated]
+inline constexpr std::uint16_t kInterpolationPeriod = 0x60C2;    // u8 units, i8 power of ten [s]
+inline constexpr std::uint16_t kFollowingError = 0x60F4;         // i32 [link counts]
+inline constexpr std::uint16_t kTargetVelocity = 0x60FF;         // i32 [link counts/s]
+inline constexpr std::uint16_t kSupportedModes = 0x6502;         // u32
+
+// The manufacturer's, axis 0
+inline constexpr std::uint16_t kMotorPosition = 0x2000;     // i32 [motor counts]
+inline constexpr std::uint16_t kMotorVelocity = 0x2001;     // i32 [motor counts/s]
+inline constexpr std::uint16_t kCurrent = 0x2002;           // i16 [10 mA]
+inline constexpr std::uint16_t kVoltage = 0x2003;           // i16 [10 mV]
+inline constexpr std::uint16_t kTemperature = 0x2004;       // i16 [0.1 degC]
+inline constexpr std::uint16_t kStiffness = 0x2010;         // f32 [Nm/rad]
+inline constexpr std::uint16_t kDamping = 0x2011;           // f32 [Nms/rad]
+inline constexpr std::uint16_t kTargetVoltage = 0x2012;     // i16 [10 mV]
+inline constexpr std::uint16_t kTargetCurrent = 0x2013;     // i16 [10 mA]
+inline constexpr std::uint16_t kPositionGains = 0x2020;     // f32: PidSub
+inline constexpr std::uint16_t kVelocityGains = 0x2021;     // f32: PidSub
+inline constexpr std::uint16_t kTorqueGains = 0x2022;       // f32: PidSub
+inline constexpr std::uint16_t kCurrentGains = 0x2023;      // f32: PidSub
+inline constexpr std::uint16_t kFeedForward = 0x2024;       // f32: FeedForwardSub
+inline constexpr std::uint16_t kLimits = 0x2030;            // f32: LimitSub
+inline constexpr std::uint16_t kI2t = 0x2031;               // f32: I2tSub
+inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: never
+inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link revolution]
+inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
+
+// The manufacturer's, of a sensor node
+inline constexpr std::uint16_t kSensorChannels = 0x2100;  // f32[]: sub 1 to n, SI units
+}  // namespace object
+
+inline constexpr std::uint16_t kAxisStride = 0x800;
+
+/// The index of axis `axis`'s object whose index on axis 0 is `index` (0x2000.. and 0x6000..).
+/// @pre 0 <= axis < kMaxAxes
+[[nodiscard]] constexpr std::uint16_t of_axis(std::uint16_t index, int axis) noexcept {
+  return static_cast<std::uint16_t>(index + kAxisStride * axis);
+}
+
+/// Sub-indices of the gain objects.
+enum PidSub : std::uint8_t { kPidKp = 1, kPidKi, kPidKd, kPidOutputLimit };
+/// Sub-indices of object::kFeedForward.
+enum FeedForwardSub : std::uint8_t {
+  kTorqueToVoltage = 1,  ///< [V/Nm] times the link torque reference
+  kEmfCompensation,      ///< [Vs/rad] times the motor velocity, reflected to the link
+};
+/// Sub-indices of object::kLimits.
+enum LimitSub : std::uint8_t {
+  kVoltageLimit = 1,  ///< [V] of the motor
+  kCurrentLimit,      ///< [A] of the motor, peak
+  kTorqueLimit,       ///< [Nm] of the link torque reference
+  kVelocityLimit,     ///< [rad/s] of the link
+};
+/// Sub-indices of object::kI2t.
+enum I2tSub : std::uint8_t {
+  kContinuousCurrent = 1,  ///< [A] that can be borne for ever
+  kThermalTime,            ///< [s] time constant of the winding
+};
+/// Sub-indices of object::kIdentity.
+enum IdentitySub : std::uint8_t { kVendor = 1, kProduct, kRevision, kSerial };
+
+/// Identity of our emulated nodes (1018). The vendor id is not one that CiA has given out.
+inline constexpr std::uint32_t kTandemVendor = 0x7A4D;
+inline constexpr std::uint32_t kBoardProduct = 0x0402;
+inline constexpr std::uint32_t kSensorProduct = 0x0404;
+inline constexpr std::uint32_t kTandemRevision = 0x00010000;  ///< major 1, minor 0
+inline constexpr std::uint32_t kDriveDeviceType = 0x00020192;   ///< servo drive, profile 402
+inline constexpr std::uint32_t kSensorDeviceType = 0x00020194;  ///< analogue inputs, profile 404
+
+/// Modes of operation (6060). Negative numbers are the manufacturer's.
+enum class Mode : std::int8_t {
+  kVelocityImpedance = -4,  ///< spring and damper about the integrated velocity reference
+  kCurrent = -3,
+  kOpenLoop = -2,           ///< motor voltage
+  kImpedance = -1,          ///< spring and damper about the position reference
+  kNone = 0,
+  kCsp = 8,                 ///< cyclic synchronous position
+  kCsv = 9,                 ///< cyclic synchronous velocity
+  kCst = 10,                ///< cyclic synchronous torque
+};
+
+/// Bits of the controlword (6040).
+namespace controlword {
+inline constexpr std::uint16_t kSwitchOn = 1u << 0;
+inline constexpr std::uint16_t kEnableVoltage = 1u << 1;
+inline constexpr std::uint16_t kQuickStop = 1u << 2;  ///< active low
+inline constexpr std::uint16_t kEnableOperation = 1u << 3;
+inline constexpr std::uint16_t kFaultReset = 1u << 7;  ///< rising edge
+inline constexpr std::uint16_t kHalt = 1u << 8;
+
+// The commands of CiA 402
+inline constexpr std::uint16_t kCommandDisableVoltage = 0x0000;
+inline constexpr std::uint16_t kCommandQuickStop = 0x0002;
+inline constexpr std::uint16_t kCommandShutdown = 0x0006;
+inline constexpr std::uint16_t kCommandSwitchOn = 0x0007;
+inline constexpr std::uint16_t kCommandEnableOperation = 0x000F;
+inline constexpr std::uint16_t kCommandFaultReset = 0x0080;
+}  // namespace controlword
+
+/// Bits of the statusword (6041).
+namespace statusword {
+inline constexpr std::uint16_t kReadyToSwitchOn = 1u << 0;
+inline constexpr std::uint16_t kSwitchedOn = 1u << 1;
+inline constexpr std::uint16_t kOperationEnabled = 1u << 2;
+inline constexpr std::uint16_t kFault = 1u << 3;
+inline constexpr std::uint16_t kVoltageEnabled = 1u << 4;
+inline constexpr std::uint16_t kQuickStop = 1u << 5;  ///< active low
+inline constexpr std::uint16_t kSwitchOnDisabled = 1u << 6;
+inline constexpr std::uint16_t kWarning = 1u << 7;
+inline constexpr std::uint16_t kRemote = 1u << 9;
+inline constexpr std::uint16_t kTargetReached = 1u << 10;
+inline constexpr std::uint16_t kInternalLimit = 1u << 11;
+inline constexpr std::uint16_t kFollowsCommand = 1u << 12;  ///< CSP, CSV, CST and ours
+inline constexpr std::uint16_t kFollowingError = 1u << 13;  ///< CSP
+}  // namespace statusword
+
+/// Emergency and drive error codes (EMCY, 1003, 603F): CiA 301 and 402.
+enum class ErrorCode : std::uint16_t {
+  kNone = 0x0000,
+  kGeneric = 0x1000,
+  kOverCurrent = 0x2310,          ///< continuous over-current
+  kI2t = 0x2350,                  ///< load level fault: I2t, thermal state
+  kVoltage = 0x3100,
+  kDriveTemperature = 0x4310,
+  kSoftware = 0x6000,
+  kParameter = 0x6320,
+  kPositionSensor = 0x7300,
+  kCommunicationOverrun = 0x8110,
+  kHeartbeatLost = 0x8130,        ///< life guard or heartbeat error
+  kBusOffRecovered = 0x8140,
+  kPdoTooShort = 0x8210,          ///< PDO not processed due to length error
+  kPdoTooLong = 0x8220,
+  kSyncLost = 0x8700,             ///< sync controller
+  kCommandTimeout = 0xFF01,       ///< ours: SYNCs came without commands
+  kVelocityControl = 0x8400,      ///< velocity (limit) exceeded
+  kFollowingError = 0x8611,
+  kPositionLimit = 0x8612,        ///< reference or position limit
+};
+
+/// In words ("following error"), for messages; "error" for an unknown code.
+[[nodiscard]] const char* to_string(ErrorCode code) noexcept;
+
+/// Bits of the error register (1001).
+namespace error_register {
+inline constexpr std::uint8_t kGeneric = 1u << 0;
+inline constexpr std::uint8_t kCurrent = 1u << 1;
+inline constexpr std::uint8_t kVoltage = 1u << 2;
+inline constexpr std::uint8_t kTemperature = 1u << 3;
+inline constexpr std::uint8_t kCommunication = 1u << 4;
+inline constexpr std::uint8_t kProfile = 1u << 5;
+inline constexpr std::uint8_t kManufacturer = 1u << 7;
+}  // namespace error_register
+
+}  // namespace tandem::canopen
