@@ -23,9 +23,12 @@ namespace tandem {
 /// What a controller may know and ask for when it is configured.
 class ControllerSetup {
  public:
-  ControllerSetup(const hal::RobotConfig& robot, const tandem_kernels* kernels,
-                  std::int64_t period_ns, TomlTable parameters)
-      : robot(robot), kernels(kernels), period_ns(period_ns), parameters(std::move(parameters)) {}
+  ControllerSetup(const hal::RobotConfig& robot_in, const tandem_kernels* kernels_in,
+                  std::int64_t period_ns_in, TomlTable parameters_in)
+      : robot(robot_in),
+        kernels(kernels_in),
+        period_ns(period_ns_in),
+        parameters(std::move(parameters_in)) {}
 
   const hal::RobotConfig& robot;  ///< joints and sensors in the image's order, postures, limits
   const tandem_kernels* kernels;  ///< the robot's generated model; null when it has none

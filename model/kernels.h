@@ -65,9 +65,9 @@ typedef struct tandem_kernels {
   /* Per site s: pose(12*s) is R (3x3 row-major, site to W) then p (3, in W); twist(6*s) and
    * acceleration(6*s) of the site's origin in W axes, linear (classical, without gravity) then
    * angular. */
-  void (*sites)(const double* q, const double* v, const double* vdot, double* pose, double* twist,
-                double* acceleration);
-  /* J(6*nv) row-major per site, one after another: twist = J v, as in `sites` */
+  void (*site_motion)(const double* q, const double* v, const double* vdot, double* pose,
+                      double* twist, double* acceleration);
+  /* J(6*nv) row-major per site, one after another: twist = J v, as in site_motion */
   void (*site_jacobians)(const double* q, double* J);
   /* Per sensor six: the wrench that the child's side (away from the base) applies to the parent's
    * side through the sensor's joint, force then moment about the sensor frame's origin, in the
