@@ -36,6 +36,19 @@ function(tandem_room name)
   target_link_libraries(tandem_${name} PUBLIC tandem_options ${ROOM_LINKS})
 endfunction()
 
+# tandem_controller(NAME SOURCES … LINKS … [FOLDER dir]): the plugin NAME.so, found by its name
+# in build/lib/controllers (or dir).
+function(tandem_controller name)
+  cmake_parse_arguments(PLUGIN "" "FOLDER" "SOURCES;LINKS" ${ARGN})
+  if(NOT PLUGIN_FOLDER)
+    set(PLUGIN_FOLDER ${PROJECT_BINARY_DIR}/lib/controllers)
+  endif()
+  add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
+  target_link_libraries(controller_${name} PRIVATE tandem_hal ${PLUGIN_LINKS})
+  set_target_properties(controller_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name}
+    CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
+endfunction()
+
 # tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|hil|rt]): one GoogleTest executable,
 # each of its cases a ctest of its own.
 function(tandem_test name)

@@ -1,0 +1,128 @@
+#include "controllers/plugin_loader.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <sstream>
+
+#include "base/nearest.hpp"
+
+namespace tandem {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char kEntry[] = "tandem_controller_plugin";
+
+std::unexpected<Error> refuse(const std::string& name, const std::string& file,
+                              std::string message, std::string hint) {
+  return std::unexpected(Error{.message = std::move(message),
+                               .hint = std::move(hint),
+                               .file = file,
+                               .key = name});
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : ", ") + part;
+  return text.empty() ? "no folder" : text;
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+Result<std::string> find(const std::string& name, const std::vector<std::string>& folders) {
+  if (name.find('/') != std::string::npos) {
+    if (is_file(name)) return name;
+    return refuse(name, name, "there is no such controller library", "check the path");
+  }
+  for (const std::string& folder : folders) {
+    const fs::path path = fs::path(folder) / (name + ".so");
+    if (is_file(path)) return path.string();
+  }
+  return refuse(name, {}, "there is no controller '" + name + "' in " + joined(folders),
+                suggest(name, available_controllers(folders)));
+}
+
+/// A library of another ABI is only asked for its entry's first two members, which never move.
+Status check(const ControllerPlugin& plugin, const std::string& name, const std::string& file) {
+  if (plugin.abi != kControllerAbi) {
+    return refuse(name, file,
+                  "was built for controller ABI " + std::to_string(plugin.abi) +
+                      ", this program has " + std::to_string(kControllerAbi),
+                  "build it again with this version's headers");
+  }
+  if (std::strcmp(plugin.compiler, __VERSION__) != 0) {
+    return refuse(name, file,
+                  "was built by compiler '" + std::string(plugin.compiler) +
+                      "', this program by '" + __VERSION__ + "'",
+                  "build it again with the same compiler");
+  }
+  return {};
+}
+
+}  // namespace
+
+void LoadedController::Close::operator()(void* library) const noexcept { dlclose(library); }
+
+std::vector<std::string> controller_folders() {
+  std::vector<std::string> folders;
+  if (const char* set = std::getenv("TANDEM_CONTROLLERS")) {
+    std::istringstream list(set);
+    for (std::string folder; std::getline(list, folder, ':');) {
+      if (!folder.empty()) folders.push_back(folder);
+    }
+  }
+  std::error_code ignored;
+  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
+  const fs::path prefix = program.parent_path().parent_path();
+  folders.push_back((prefix / "lib/controllers").string());
+  folders.push_back((prefix / "lib/tandem/controllers").string());
+  return folders;
+}
+
+std::vector<std::string> available_controllers(const std::vector<std::string>& folders) {
+  std::vector<std::string> names;
+  for (const std::string& folder : folders) {
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+      if (entry.path().extension() == ".so") names.push_back(entry.path().stem().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+Result<LoadedController> load_controller(const std::string& name,
+                                         const std::vector<std::string>& folders) {
+  const Result<std::string> file = find(name, folders);
+  if (!file) return std::unexpected(file.error());
+
+  LoadedController loaded;
+  loaded.path_ = *file;
+  loaded.library_.reset(dlopen(file->c_str(), RTLD_NOW | RTLD_LOCAL));
+  if (!loaded.library_) {
+    return refuse(name, *file, "cannot be loaded: " + std::string(dlerror()),
+                  "build it again, and link what it uses");
+  }
+  using Entry = const ControllerPlugin* (*)();
+  const auto entry = reinterpret_cast<Entry>(dlsym(loaded.library_.get(), kEntry));
+  if (entry == nullptr) {
+    return refuse(name, *file, "has no entry point " + std::string(kEntry) + "()",
+                  "end its source with TANDEM_CONTROLLER(Class, \"name\", \"One line.\")");
+  }
+  loaded.plugin_ = entry();
+  if (const Status ok = check(*loaded.plugin_, name, *file); !ok) {
+    return std::unexpected(ok.error());
+  }
+  loaded.controller_.reset(loaded.plugin_->create());
+  return loaded;
+}
+
+}  // namespace tandem
