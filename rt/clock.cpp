@@ -1,0 +1,28 @@
+#include "rt/clock.hpp"
+
+#include <cerrno>
+#include <ctime>
+
+#include "rt/stop_signal.hpp"
+
+namespace tandem::rt {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+}  // namespace
+
+std::int64_t WallClock::now_ns() noexcept TANDEM_RT {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * kSecond_ns + now.tv_nsec;
+}
+
+void WallClock::sleep_until(std::int64_t deadline_ns) noexcept {
+  const timespec until{.tv_sec = deadline_ns / kSecond_ns, .tv_nsec = deadline_ns % kSecond_ns};
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+    if (stop_requested()) return;
+  }
+}
+
+}  // namespace tandem::rt

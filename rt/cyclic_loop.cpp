@@ -1,0 +1,92 @@
+#include "rt/cyclic_loop.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+
+#include "base/archive.hpp"
+
+namespace tandem::rt {
+namespace {
+
+std::int64_t grid_step(const LoopConfig& config) {
+  switch (config.pacing) {
+    case Pacing::kWallClock: return config.period_ns;
+    case Pacing::kSimulated:
+      if (config.rate <= 0.0) return 0;
+      return std::max<std::int64_t>(
+          1, std::llround(static_cast<double>(config.period_ns) / config.rate));
+    case Pacing::kExternal: return 0;
+  }
+  return 0;
+}
+
+}  // namespace
+
+CyclicLoop::CyclicLoop(const LoopConfig& config, Clock& clock)
+    : config_(config), clock_(&clock), step_ns_(grid_step(config)) {
+  assert(config.period_ns > 0 && config.rate >= 0.0);
+  assert(1 <= config.stop_late && config.stop_late <= config.stop_window);
+  assert(config.stop_window <= 64);
+}
+
+Tick CyclicLoop::wait() noexcept {
+  Tick tick;
+  if (paced()) {
+    const std::int64_t now_ns = clock_->now_ns();
+    if (!started_) {
+      grid_ns_ = now_ns;
+    } else if (now_ns <= grid_ns_) {
+      late_mask_ <<= 1;
+      clock_->sleep_until(grid_ns_);
+    } else {
+      // The last cycle ran into this grid point: the next one in the future takes its place.
+      const std::int64_t missed = (now_ns - grid_ns_ + step_ns_ - 1) / step_ns_;
+      grid_ns_ += missed * step_ns_;
+      judge(tick, static_cast<std::uint64_t>(missed));
+      clock_->sleep_until(grid_ns_);
+    }
+  }
+  tick.cycle = next_cycle_++;
+  tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
+  begin_ns_ = clock_->now_ns();
+  if (paced()) {
+    if (started_) statistics_.wakeup.record(begin_ns_ - grid_ns_);
+    grid_ns_ += step_ns_;
+  }
+  started_ = true;
+  ++statistics_.cycles;
+  return tick;
+}
+
+void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {
+  ++statistics_.overruns;
+  tick.late = true;
+  if (config_.pacing == Pacing::kWallClock) {  // simulated time cannot be missed, only delayed
+    tick.skipped = missed;
+    statistics_.skipped += missed;
+    next_cycle_ += missed;
+    tick.hold = config_.on_overrun == OverrunPolicy::kHold;
+  }
+  late_mask_ = (late_mask_ << 1) | 1U;
+  if (config_.on_overrun != OverrunPolicy::kStop || config_.pacing != Pacing::kWallClock) return;
+  const std::uint64_t window =
+      config_.stop_window == 64 ? ~std::uint64_t{0}
+                                : (std::uint64_t{1} << config_.stop_window) - 1;
+  tick.stop = std::popcount(late_mask_ & window) >= config_.stop_late;
+}
+
+void CyclicLoop::finish() noexcept TANDEM_RT {
+  statistics_.execution.record(clock_->now_ns() - begin_ns_);
+}
+
+void CyclicLoop::archive(Archive& ar) {
+  ar(next_cycle_);
+  if (ar.reading()) {
+    started_ = false;
+    late_mask_ = 0;
+  }
+}
+
+}  // namespace tandem::rt

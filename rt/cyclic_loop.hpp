@@ -1,0 +1,97 @@
+// The periodic loop's time: when the next cycle starts, which number it has, whether it is late.
+// Layer: rt.  Thread: the loop's own.
+#pragma once
+
+#include <cstdint>
+
+#include "base/realtime.hpp"
+#include "rt/clock.hpp"
+#include "rt/histogram.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::rt {
+
+/// Who makes time pass.
+enum class Pacing : std::uint8_t {
+  kWallClock,  ///< cycle k starts at start + k * period; a missed grid point is a missed cycle
+  kSimulated,  ///< time is the count of cycles; none is ever missed, a slow one delays the rest
+  kExternal,   ///< somebody else blocks until the cycle comes round (a bus): wait() never sleeps
+};
+
+/// What follows a late cycle. In every case it is counted, the loop goes on at the next grid
+/// point, and the phase of the grid stays.
+enum class OverrunPolicy : std::uint8_t {
+  kSkip,  ///< go on; controllers see the time that has passed
+  kHold,  ///< the next cycle repeats the last command instead of running the controllers
+  kStop,  ///< as kSkip, until `stop_late` of the last `stop_window` cycles were late
+};
+
+struct LoopConfig {
+  std::int64_t period_ns = 1'000'000;
+  Pacing pacing = Pacing::kSimulated;
+  double rate = 0.0;           ///< simulated only: times real time; 0 runs as fast as it can
+  OverrunPolicy on_overrun = OverrunPolicy::kSkip;
+  int stop_late = 5;           ///< 1 to stop_window
+  int stop_window = 50;        ///< 1 to 64 cycles
+};
+
+/// One cycle, as wait() announces it.
+struct Tick {
+  std::uint64_t cycle = 0;     ///< number of the cycle
+  std::int64_t time_ns = 0;    ///< cycle * period_ns, exactly
+  std::uint64_t skipped = 0;   ///< wall clock: cycles missed just before this one
+  bool late = false;           ///< the cycle before overran into this one's grid point
+  bool hold = false;           ///< the policy wants the last command repeated
+  bool stop = false;           ///< the policy wants the robot stopped
+};
+
+/// Counts and histograms of one run.
+struct LoopStatistics {
+  std::uint64_t cycles = 0;     ///< started
+  std::uint64_t overruns = 0;   ///< cycles whose work ended after the next grid point
+  std::uint64_t skipped = 0;    ///< grid points without a cycle (wall clock)
+  Histogram wakeup;             ///< from the grid point to the return of wait(); paced runs only
+  Histogram execution;          ///< from the return of wait() to finish()
+};
+
+/// `for (;;) { const Tick tick = loop.wait(); …; loop.finish(); }`
+class CyclicLoop {
+ public:
+  /// @pre config.period_ns > 0, rate >= 0, 1 <= stop_late <= stop_window <= 64.
+  /// The clock must outlive the loop.
+  CyclicLoop(const LoopConfig& config, Clock& clock);
+
+  /// Blocks until the next cycle's start. The first call starts the grid and returns cycle
+  /// `next_cycle()` at once. One sleep and one clock read; no allocation or lock.
+  [[nodiscard]] Tick wait() noexcept;
+  /// The cycle's work is done: takes its execution time. @rt one clock read.
+  void finish() noexcept TANDEM_RT;
+
+  /// The number that the next wait() gives when nothing is late.
+  [[nodiscard]] std::uint64_t next_cycle() const noexcept { return next_cycle_; }
+  [[nodiscard]] const LoopConfig& config() const noexcept { return config_; }
+  [[nodiscard]] const LoopStatistics& statistics() const noexcept { return statistics_; }
+
+  /// The cycle counter, which is all that simulated time is. The grid restarts at the next
+  /// wait(); statistics go on.
+  void archive(Archive& ar);
+
+ private:
+  [[nodiscard]] bool paced() const noexcept { return step_ns_ > 0; }
+  void judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT;
+
+  LoopConfig config_;
+  Clock* clock_;
+  std::int64_t step_ns_ = 0;      // between grid points on the clock; 0: not paced
+  std::int64_t grid_ns_ = 0;      // clock time of the next grid point
+  bool started_ = false;
+  std::uint64_t next_cycle_ = 0;
+  std::int64_t begin_ns_ = 0;     // clock time at which the current cycle began
+  std::uint64_t late_mask_ = 0;   // bit 0: the newest cycle was late
+  LoopStatistics statistics_;
+};
+
+}  // namespace tandem::rt

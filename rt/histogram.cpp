@@ -1,0 +1,48 @@
+#include "rt/histogram.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace tandem::rt {
+
+std::size_t Histogram::bucket_of(std::uint64_t value) noexcept TANDEM_RT {
+  // The bucket is the value's leading 1 and the kLinearBits bits after it.
+  const unsigned width = static_cast<unsigned>(std::bit_width(value));
+  const unsigned shift = width > kLinearBits + 1 ? width - kLinearBits - 1 : 0;
+  return std::min<std::size_t>((std::size_t{shift} << kLinearBits) + (value >> shift),
+                               kBuckets - 1);
+}
+
+std::int64_t Histogram::upper_end(std::size_t bucket) noexcept {
+  constexpr std::size_t kLinear = std::size_t{1} << kLinearBits;
+  if (bucket < 2 * kLinear) return static_cast<std::int64_t>(bucket);
+  const std::size_t shift = (bucket >> kLinearBits) - 1;
+  const std::size_t mantissa = bucket - (shift << kLinearBits);
+  return static_cast<std::int64_t>(((mantissa + 1) << shift) - 1);
+}
+
+void Histogram::record(std::int64_t duration_ns) noexcept TANDEM_RT {
+  const std::int64_t value = std::max<std::int64_t>(duration_ns, 0);
+  ++counts_[bucket_of(static_cast<std::uint64_t>(value))];
+  ++count_;
+  sum_ns_ += value;
+  max_ns_ = std::max(max_ns_, value);
+}
+
+std::int64_t Histogram::percentile_ns(double fraction) const noexcept {
+  const auto wanted =
+      static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
+  std::uint64_t seen = 0;
+  for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
+    seen += counts_[bucket];
+    if (seen >= wanted && seen > 0) return std::min(upper_end(bucket), max_ns_);
+  }
+  return max_ns_;
+}
+
+Percentiles Histogram::percentiles() const noexcept {
+  return {percentile_ns(0.5), percentile_ns(0.99), percentile_ns(0.999), max_ns_};
+}
+
+}  // namespace tandem::rt

@@ -1,0 +1,30 @@
+#include "rt/stop_signal.hpp"
+
+#include <atomic>
+#include <csignal>
+
+namespace tandem::rt {
+namespace {
+
+// A signal handler reaches nothing but a global.
+std::atomic<bool> stop_flag{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void on_stop_signal(int) { stop_flag.store(true, std::memory_order_relaxed); }
+
+}  // namespace
+
+void install_stop_signals() {
+  struct sigaction action {};
+  action.sa_handler = on_stop_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second signal acts as usual
+  sigemptyset(&action.sa_mask);
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+}
+
+bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }
+void request_stop() noexcept { stop_flag.store(true, std::memory_order_relaxed); }
+void clear_stop() noexcept { stop_flag.store(false, std::memory_order_relaxed); }
+
+}  // namespace tandem::rt

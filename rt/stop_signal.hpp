@@ -1,0 +1,22 @@
+// Ctrl-C and SIGTERM as a flag that the loop looks at once per cycle.
+// Layer: rt.  Thread: any.
+#pragma once
+
+#include "base/realtime.hpp"
+
+namespace tandem::rt {
+
+/// From now on the first SIGINT or SIGTERM sets the stop flag; a second one ends the process
+/// the usual way, so that a hung program can still be ended.
+void install_stop_signals();
+
+/// True once a stop was requested, by a signal or by request_stop().
+[[nodiscard]] bool stop_requested() noexcept TANDEM_RT;
+
+/// Sets the flag. Safe in a signal handler.
+void request_stop() noexcept;
+
+/// Clears the flag, before the next run of the same process.
+void clear_stop() noexcept;
+
+}  // namespace tandem::rt

@@ -1,0 +1,31 @@
+#include "rt/stop_signal.hpp"
+
+#include <csignal>
+
+namespace tandem::rt {
+namespace {
+
+TEST(StopSignal, TurnsSigtermAndSigintIntoAFlag) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    clear_stop();
+    install_stop_signals();
+    EXPECT_FALSE(stop_requested());
+    std::raise(signal);
+    EXPECT_TRUE(stop_requested());
+  }
+  clear_stop();
+  EXPECT_FALSE(stop_requested());
+}
+
+TEST(StopSignal, LetsASecondSignalEndAHungProgram) {
+  EXPECT_EXIT(
+      {
+        install_stop_signals();
+        std::raise(SIGTERM);
+        std::raise(SIGTERM);
+      },
+      testing::KilledBySignal(SIGTERM), "");
+}
+
+}  // namespace
+}  // namespace tandem::rt
