@@ -29,6 +29,14 @@ target_compile_options(tandem_options INTERFACE
 target_include_directories(tandem_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_link_libraries(tandem_options INTERFACE Threads::Threads)
 
+# One of clang's or gcc's sanitizers over everything, as the presets rtsan, asan and tsan choose.
+set(TANDEM_SANITIZE "" CACHE STRING "Value of -fsanitize=, such as address,undefined")
+if(TANDEM_SANITIZE)
+  target_compile_options(tandem_options INTERFACE
+    -fsanitize=${TANDEM_SANITIZE} -fno-omit-frame-pointer -g1)
+  target_link_options(tandem_options INTERFACE -fsanitize=${TANDEM_SANITIZE})
+endif()
+
 # tandem_room(NAME SOURCES … LINKS …): the static library tandem_NAME of one folder.
 function(tandem_room name)
   cmake_parse_arguments(ROOM "" "" "SOURCES;LINKS" ${ARGN})
