@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,7 @@ struct SiteConfig {
   std::array<double, 3> xyz_m{};        ///< origin in the link's frame
   std::array<double, 3> rpy_rad{};      ///< URDF convention
   bool wrench = false;                  ///< an external wrench may act here (contact)
+  int line = 0;                         ///< in the TOML, for messages
 };
 
 /// [model]
@@ -90,15 +92,17 @@ struct JointConfig {
   int axis = 0;                         ///< on its board, from 0
   std::string actuator;
   std::string gains;
-  double min_position_rad = 0.0;        ///< defaults: the URDF's limits
-  double max_position_rad = 0.0;
+  double min_position_rad = 0.0;        ///< this and the next three: NaN when the TOML leaves
+  double max_position_rad = 0.0;        ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
   double max_torque_Nm = 0.0;           ///< the torque reference's limit
-  double rated_torque_Nm = 0.0;         ///< CiA 402 6076: torques travel as per mille of it
+  double rated_torque_Nm = 0.0;         ///< CiA 402 6076: torques travel as per mille of it;
+                                        ///< default: max_torque_Nm
   double encoder_counts_per_rev = 0.0;  ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
   double torque_noise_Nm = 0.0;         ///< standard deviation of the spring torque's measurement
   StopCategory on_fault = StopCategory::kCategory1;
+  int line = 0;                         ///< in the TOML, for messages
 };
 
 /// [[bus]]
@@ -136,6 +140,7 @@ struct SensorConfig {
   std::string link;                     ///< the frame it is expressed in
   std::vector<double> noise;            ///< standard deviation per channel; empty: none
   std::vector<double> bias;             ///< per channel; empty: none
+  int line = 0;                         ///< in the TOML, for messages
 
   [[nodiscard]] std::size_t channels() const {
     return type == SensorType::kForceTorque ? 6 : 10;
@@ -166,6 +171,7 @@ struct PostureConfig {
   std::string name;
   double base_height_m = 0.0;           ///< of the base's origin above W's; floating base only
   std::vector<double> position_rad;
+  int line = 0;                         ///< in the TOML, for messages
 };
 
 /// The whole robot.toml.
@@ -198,5 +204,32 @@ struct RobotConfig {
 /// a reference to a board, bus, actuator or gains table that does not exist, a joint on two
 /// boards or twice, an axis twice, a node id twice on a bus, a gain of the wrong sign.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file);
+/// The same from memory; `file` names it in errors and gives the folder of relative paths.
+[[nodiscard]] std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
+                                                                         const std::string& file);
+
+/// A moving joint as the URDF describes it. Infinite where it sets no limit.
+struct JointDescription {
+  std::string name;
+  double min_position_rad;
+  double max_position_rad;
+  double max_velocity_rad_s;
+  double max_torque_Nm;
+};
+
+/// The names in a URDF that a robot.toml may refer to.
+struct RobotDescription {
+  std::vector<JointDescription> moving_joints;  ///< without the locked ones
+  std::vector<std::string> other_joints;        ///< fixed and locked
+  std::vector<std::string> links;
+};
+
+/// Checks the configuration against its URDF and fills the limits that the TOML left to it.
+/// A joint without position limits (continuous) gets what its 32-bit encoder can count.
+/// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested), a
+/// moving joint without [[joint]] or lock, a site or sensor on an unknown link or joint, a limit
+/// that neither gives, a limit beyond the wire's range, a posture beyond the limits.
+[[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
+                                                    const RobotDescription& description);
 
 }  // namespace tandem::hal

@@ -1,0 +1,235 @@
+#include "hal/robot_config.hpp"
+
+#include <filesystem>
+
+#include "hal/robot_config_read.hpp"
+
+namespace tandem::hal {
+namespace {
+
+void read_site(TomlTable table, ModelConfig& model) {
+  SiteConfig site;
+  site.line = table.line();
+  site.name = table.text("name");
+  check_unique(table, model.sites, site.name, "site");
+  site.link = table.text("link");
+  site.xyz_m = vector3(table, "xyz_m", {});
+  site.rpy_rad = vector3(table, "rpy_rad", {});
+  site.wrench = table.boolean_or("wrench", false);
+  table.finish();
+  model.sites.push_back(site);
+}
+
+ModelConfig read_model(TomlTable& root, const std::string& folder) {
+  ModelConfig model;
+  TomlTable table = root.table("model");
+  const std::filesystem::path urdf = table.text("urdf");
+  if (!urdf.empty()) {
+    const auto path = urdf.is_absolute() ? urdf : std::filesystem::path(folder) / urdf;
+    model.urdf = path.lexically_normal().string();
+  }
+  model.floating_base = table.choice("base", {"floating", "fixed"}) == "floating";
+  model.mimic_independent =
+      table.choice_or("mimic", "refuse", {"refuse", "independent"}) == "independent";
+  model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
+  TomlTable lock = table.table_or_empty("lock");
+  for (const std::string& joint : lock.keys()) model.lock.emplace_back(joint, lock.number(joint));
+  lock.finish();
+  table.finish();
+  for (TomlTable& site : root.tables("site")) read_site(site, model);
+  return model;
+}
+
+void read_bus(TomlTable table, RobotConfig& robot) {
+  BusConfig bus;
+  bus.name = table.text("name");
+  check_unique(table, robot.buses, bus.name, "bus");
+  bus.interface = table.text_or("interface", bus.name);
+  bus.fd = table.boolean_or("fd", true);
+  bus.bitrate = table.integer_or("bitrate", bus.bitrate, 10'000, 1'000'000);
+  bus.data_bitrate = table.integer_or("data_bitrate", bus.data_bitrate, 10'000, 12'000'000);
+  if (bus.fd && bus.data_bitrate < bus.bitrate) {
+    table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
+                "raise it, or set fd = false");
+  }
+  table.finish();
+  robot.buses.push_back(bus);
+}
+
+void read_board(TomlTable table, NodeIds& ids, RobotConfig& robot) {
+  BoardConfig board;
+  board.name = table.text("name");
+  check_unique(table, robot.boards, board.name, "board");
+  board.bus = table.text("bus");
+  check_reference(table, "bus", board.bus, robot.buses, "bus");
+  board.node_id = ids.read(table, board.bus);
+  board.control_period_ns =
+      table.integer_or("control_period_ns", board.control_period_ns, 10'000, 100'000'000);
+  board.heartbeat_ms = static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
+  board.command_timeout_cycles =
+      static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
+  board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
+  table.finish();
+  robot.boards.push_back(board);
+}
+
+std::vector<double> read_channels(TomlTable& table, const char* key, std::size_t channels,
+                                  Range range) {
+  std::vector<double> values = table.numbers_or(key, {}, range);
+  if (!values.empty() && values.size() != channels) {
+    table.error(key, "has " + std::to_string(values.size()) + " numbers",
+                "give one for each of the " + std::to_string(channels) + " channels");
+  }
+  return values;
+}
+
+void read_sensor(TomlTable table, NodeIds& ids, RobotConfig& robot) {
+  SensorConfig sensor;
+  sensor.line = table.line();
+  sensor.name = table.text("name");
+  check_unique(table, robot.sensors, sensor.name, "sensor");
+  const bool imu = table.choice("type", {"force_torque", "imu"}) == "imu";
+  sensor.type = imu ? SensorType::kImu : SensorType::kForceTorque;
+  sensor.bus = table.text("bus");
+  check_reference(table, "bus", sensor.bus, robot.buses, "bus");
+  sensor.node_id = ids.read(table, sensor.bus);
+  if (imu && table.has("joint")) {
+    table.error("joint", "an imu measures at a link, not through a joint", "remove this key");
+  }
+  sensor.joint = imu ? table.text_or("joint", {}) : table.text("joint");
+  sensor.link = table.text("link");
+  sensor.noise = read_channels(table, "noise", sensor.channels(), kNotNegative);
+  sensor.bias = read_channels(table, "bias", sensor.channels(), kAnyNumber);
+  table.finish();
+  robot.sensors.push_back(sensor);
+}
+
+FootConfig read_foot(TomlTable table, const RobotConfig& robot) {
+  FootConfig foot;
+  foot.site = table.text("site");
+  check_reference(table, "site", foot.site, robot.model.sites, "site");
+  for (const SiteConfig& site : robot.model.sites) {
+    if (site.name != foot.site || site.wrench) continue;
+    table.error("site", "the site '" + site.name + "' takes no wrench",
+                "set wrench = true in its [[site]]");
+  }
+  for (const FootConfig& other : robot.contact.feet) {
+    if (other.site == foot.site) table.error("site", "two feet have this site", "merge them");
+  }
+  for (const auto& row : table.rows("points_m", 3)) {
+    foot.points_m.push_back({row[0], row[1], row[2]});
+  }
+  if (table.has("points_m") && foot.points_m.empty()) {
+    table.error("points_m", "the sole has no point", "give at least one [x, y, z]");
+  }
+  table.finish();
+  return foot;
+}
+
+void read_contact(TomlTable& root, RobotConfig& robot) {
+  if (!root.has("contact")) return;
+  ContactConfig& c = robot.contact;
+  TomlTable table = root.table("contact");
+  c.height_m = table.number_or("height_m", 0.0);
+  c.stiffness_N_m = table.number("stiffness_N_m", kPositive);
+  c.damping_s_m = table.number("damping_s_m", kNotNegative);
+  c.tangential_stiffness_N_m = table.number("tangential_stiffness_N_m", kPositive);
+  c.tangential_damping_Ns_m = table.number("tangential_damping_Ns_m", kNotNegative);
+  c.sliding_friction = table.number("sliding_friction", kNotNegative);
+  c.static_friction = table.number_or("static_friction", c.sliding_friction, kNotNegative);
+  if (c.static_friction < c.sliding_friction) {
+    table.error("static_friction", "is less than sliding_friction", "raise it or lower the other");
+  }
+  c.stick_velocity_m_s = table.number_or("stick_velocity_m_s", 0.01, kPositive);
+  for (TomlTable& foot : table.tables("foot")) c.feet.push_back(read_foot(foot, robot));
+  if (c.feet.empty()) table.error("", "has no foot", "add [[contact.foot]] or remove [contact]");
+  table.finish();
+}
+
+void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) {
+  PostureConfig posture;
+  posture.name = name;
+  posture.line = table.line();
+  posture.position_rad.assign(robot.joints.size(), 0.0);
+  std::vector<std::string> known = names_of(robot.joints);
+  if (robot.model.floating_base) {
+    known.emplace_back("base_height_m");
+    posture.base_height_m = table.number_or("base_height_m", 0.0);
+  }
+  for (const std::string& key : table.keys()) {
+    if (robot.model.floating_base && key == "base_height_m") continue;
+    const int index = robot.joint_index(key);
+    const double position = table.number_or(key, 0.0);
+    if (index < 0) {
+      table.error(key, "there is no joint '" + key + "'", suggest(key, known));
+    } else {
+      posture.position_rad[static_cast<std::size_t>(index)] = position;
+    }
+  }
+  robot.postures.push_back(posture);
+}
+
+/// A board's axes are numbered from 0 without a gap, and there is at least one.
+void check_boards(TomlTable& root, const RobotConfig& robot) {
+  std::vector<TomlTable> tables = root.tables("board");
+  for (std::size_t i = 0; i < tables.size(); ++i) {
+    const std::string& name = robot.boards[i].name;
+    std::set<int> axes;
+    for (const JointConfig& joint : robot.joints) {
+      if (joint.board == name) axes.insert(joint.axis);
+    }
+    if (axes.empty()) {
+      tables[i].error("name", "no joint is on board '" + name + "'",
+                      "remove the board or name it in a [[joint]]");
+    } else if (*axes.rbegin() + 1 != static_cast<int>(axes.size())) {
+      tables[i].error("name", "the axes of board '" + name + "' have a gap",
+                      "number them from 0 without a gap");
+    }
+  }
+}
+
+/// Reads in the order of the references: what is named before what names it.
+RobotConfig read(const TomlDocument& document) {
+  RobotConfig robot;
+  robot.file = document.file();
+  TomlTable root = document.root();
+  robot.name = root.text("name");
+  robot.model = read_model(root, document.folder());
+  read_drive_tables(root, robot);
+  for (TomlTable& bus : root.tables("bus")) read_bus(bus, robot);
+  NodeIds ids;
+  for (TomlTable& board : root.tables("board")) read_board(board, ids, robot);
+  read_joints(root, robot);
+  check_boards(root, robot);
+  for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, ids, robot);
+  read_contact(root, robot);
+  TomlTable postures = root.table_or_empty("posture");
+  for (const std::string& name : postures.table_names()) {
+    read_posture(postures.table(name), name, robot);
+  }
+  postures.finish();
+  root.finish();
+  return robot;
+}
+
+std::expected<RobotConfig, Diagnostics> finish(Result<TomlDocument> document) {
+  if (!document) return std::unexpected(Diagnostics{document.error()});
+  RobotConfig robot = read(*document);
+  if (document->diagnostics().empty()) return robot;
+  Diagnostics errors = document->diagnostics();
+  std::ranges::stable_sort(errors, {}, &Error::line);
+  return std::unexpected(errors);
+}
+
+}  // namespace
+
+std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file) {
+  return finish(TomlDocument::load(file));
+}
+
+std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
+                                                           const std::string& file) {
+  return finish(TomlDocument::parse(text, file));
+}
+
+}  // namespace tandem::hal

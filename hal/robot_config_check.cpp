@@ -1,0 +1,181 @@
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+#include "hal/robot_config_read.hpp"
+
+namespace tandem::hal {
+namespace {
+
+template <class T>
+const T* find(const std::vector<T>& items, std::string_view name) {
+  const auto found = std::ranges::find(items, name, &T::name);
+  return found == items.end() ? nullptr : &*found;
+}
+
+template <class T>
+int index_of(const std::vector<T>& items, std::string_view name) {
+  const T* item = find(items, name);
+  return item == nullptr ? -1 : static_cast<int>(item - items.data());
+}
+
+}  // namespace
+
+ImageShape RobotConfig::shape() const {
+  ImageShape shape{.joints = joints.size(), .sensor_channels = {}};
+  for (const SensorConfig& sensor : sensors) shape.sensor_channels.push_back(sensor.channels());
+  return shape;
+}
+
+int RobotConfig::joint_index(std::string_view joint) const { return index_of(joints, joint); }
+int RobotConfig::sensor_index(std::string_view sensor) const { return index_of(sensors, sensor); }
+const BoardConfig* RobotConfig::board(std::string_view wanted) const {
+  return find(boards, wanted);
+}
+const BusConfig* RobotConfig::bus(std::string_view wanted) const { return find(buses, wanted); }
+const PostureConfig* RobotConfig::posture(std::string_view wanted) const {
+  return find(postures, wanted);
+}
+
+const ActuatorConfig& RobotConfig::actuator_of(const JointConfig& joint) const {
+  const ActuatorConfig* found = find(actuators, joint.actuator);
+  assert(found != nullptr);  // the reader refuses a joint without one
+  return *found;
+}
+
+const GainsConfig& RobotConfig::gains_of(const JointConfig& joint) const {
+  const GainsConfig* found = find(gains, joint.gains);
+  assert(found != nullptr);
+  return *found;
+}
+
+namespace {
+
+/// Collects the errors of one robot against its description.
+class Completion {
+ public:
+  Completion(RobotConfig& robot, const RobotDescription& description)
+      : robot_(robot), description_(description) {}
+
+  Diagnostics run() {
+    for (JointConfig& joint : robot_.joints) complete(joint);
+    for (const JointDescription& joint : description_.moving_joints) {
+      if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
+      error(0, "joint", "the description's joint '" + joint.name + "' has no [[joint]]",
+            "add one, or fix it with [model.lock] " + joint.name + " = 0.0");
+    }
+    for (const SiteConfig& site : robot_.model.sites) {
+      check_name(site.line, "site." + site.name + ".link", "link", site.link, description_.links);
+    }
+    check_sensors();
+    for (const PostureConfig& posture : robot_.postures) check(posture);
+    return std::move(errors_);
+  }
+
+ private:
+  void error(int line, std::string key, std::string message, std::string hint) {
+    errors_.push_back({std::move(message), std::move(hint), robot_.file, line, std::move(key)});
+  }
+
+  void check_name(int line, const std::string& key, const std::string& kind,
+                  const std::string& name, const std::vector<std::string>& known) {
+    if (std::ranges::find(known, name) != known.end()) return;
+    error(line, key, "the description has no " + kind + " '" + name + "'", suggest(name, known));
+  }
+
+  void check_sensors() {
+    std::vector<std::string> joints = names_of(description_.moving_joints);
+    joints.insert(joints.end(), description_.other_joints.begin(),
+                  description_.other_joints.end());
+    for (const SensorConfig& sensor : robot_.sensors) {
+      const std::string key = "sensor." + sensor.name;
+      check_name(sensor.line, key + ".link", "link", sensor.link, description_.links);
+      if (sensor.type != SensorType::kForceTorque) continue;
+      check_name(sensor.line, key + ".joint", "joint", sensor.joint, joints);
+    }
+  }
+
+  /// Positions travel as 32-bit counts: this is the largest one, with a margin for overshoot.
+  static double countable_rad(const JointConfig& joint) {
+    const double counts = std::max(joint.encoder_counts_per_rev,
+                                   joint.motor_encoder_counts_per_rev);
+    return 0.9 * 2147483647.0 / counts * 2.0 * std::numbers::pi;
+  }
+
+  void fill(double& value, double described, const JointConfig& joint, const std::string& key) {
+    if (!std::isnan(value)) return;
+    value = described;
+    if (std::isfinite(described) && described > 0.0) return;
+    error(joint.line, "joint." + joint.name + "." + key,
+          "neither this file nor the description gives a limit", "set " + key);
+  }
+
+  void complete(JointConfig& joint) {
+    const JointDescription* found = find(description_.moving_joints, joint.name);
+    const std::string key = "joint." + joint.name;
+    if (found == nullptr) {
+      const bool fixed =
+          std::ranges::find(description_.other_joints, joint.name) != description_.other_joints.end();
+      if (fixed) {
+        error(joint.line, key, "the joint '" + joint.name + "' does not move in the description",
+              "remove the [[joint]]");
+      } else {
+        check_name(joint.line, key, "joint", joint.name, names_of(description_.moving_joints));
+      }
+      return;
+    }
+    const double countable = countable_rad(joint);
+    if (std::isnan(joint.min_position_rad)) {
+      joint.min_position_rad = std::max(found->min_position_rad, -countable);
+    }
+    if (std::isnan(joint.max_position_rad)) {
+      joint.max_position_rad = std::min(found->max_position_rad, countable);
+    }
+    check_limits(joint, key, countable);
+    fill(joint.max_velocity_rad_s, found->max_velocity_rad_s, joint, "max_velocity_rad_s");
+    fill(joint.max_torque_Nm, found->max_torque_Nm, joint, "max_torque_Nm");
+    if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
+    if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
+      error(joint.line, key + ".rated_torque_Nm",
+            "max_torque_Nm is more than 32 times the rated torque, the most the wire can say",
+            "raise rated_torque_Nm");
+    }
+  }
+
+  void check_limits(const JointConfig& joint, const std::string& key, double countable) {
+    if (joint.min_position_rad >= joint.max_position_rad) {
+      error(joint.line, key + ".min_position_rad",
+            "with the description's limits the position limits are reversed or equal",
+            "give both min_position_rad and max_position_rad");
+    }
+    if (joint.min_position_rad < -countable || joint.max_position_rad > countable) {
+      error(joint.line, key + ".max_position_rad",
+            "the position limits are more than the encoder's 32 bits can count",
+            "narrow them or lower the counts per revolution");
+    }
+  }
+
+  void check(const PostureConfig& posture) {
+    for (std::size_t i = 0; i < robot_.joints.size(); ++i) {
+      const JointConfig& joint = robot_.joints[i];
+      const double q = posture.position_rad[i];
+      if (!(q < joint.min_position_rad) && !(q > joint.max_position_rad)) continue;
+      error(posture.line, "posture." + posture.name + "." + joint.name,
+            "is beyond the joint's limits " + std::to_string(joint.min_position_rad) + " to " +
+                std::to_string(joint.max_position_rad),
+            "move it inside");
+    }
+  }
+
+  RobotConfig& robot_;
+  const RobotDescription& description_;
+  Diagnostics errors_;
+};
+
+}  // namespace
+
+Diagnostics complete_from_description(RobotConfig& robot, const RobotDescription& description) {
+  return Completion(robot, description).run();
+}
+
+}  // namespace tandem::hal

@@ -1,0 +1,392 @@
+#include "hal/robot_config.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tandem::hal {
+namespace {
+
+const char* const kRobot = R"(name = "leg"
+[model]
+urdf = "leg.urdf"
+base = "floating"
+[model.lock]
+toe = 0.1
+[[site]]
+name = "sole"
+link = "foot"
+xyz_m = [0, 0, -0.1]
+wrench = true
+[actuator.big]
+resistance_ohm = 0.664
+torque_constant_Nm_A = 0.041
+gear_ratio = 100
+inertia_kg_m2 = 0.1387
+damping_Nms_rad = 25.5
+spring_Nm_rad = 395.46
+spring_damping_Nms_rad = 0.198
+current_limit_A = 50
+voltage_limit_V = 40
+[gains.big]
+position = {kp = 200, kd = 5, output_limit = 100}
+torque = {kp = 0.3}
+position_feedback = "motor"
+emf_compensation = 0.9
+[[bus]]
+name = "left"
+interface = "can0"
+[[board]]
+name = "hip_board"
+bus = "left"
+node_id = 3
+[joint_defaults]
+encoder_counts_per_rev = 65536
+motor_encoder_counts_per_rev = 409600
+[[joint]]
+name = "hip"
+board = "hip_board"
+actuator = "big"
+gains = "big"
+min_position_rad = -1.5
+max_position_rad = 1.0
+[[joint]]
+name = "knee"
+board = "hip_board"
+axis = 1
+actuator = "big"
+gains = "big"
+on_fault = "hold"
+max_torque_Nm = 80
+[[sensor]]
+name = "foot_ft"
+type = "force_torque"
+bus = "left"
+node_id = 10
+joint = "ankle"
+link = "foot"
+noise = [1, 1, 1, 0.1, 0.1, 0.1]
+[contact]
+stiffness_N_m = 5e4
+damping_s_m = 10
+tangential_stiffness_N_m = 1e4
+tangential_damping_Ns_m = 10
+static_friction = 0.9
+sliding_friction = 0.8
+[[contact.foot]]
+site = "sole"
+points_m = [[0.1, 0.05, 0], [-0.1, 0.05, 0], [0, -0.05, 0]]
+[posture.home]
+base_height_m = 0.5
+knee = 0.2
+)";
+
+RobotDescription description() {
+  RobotDescription d;
+  d.moving_joints = {{"hip", -2.0, 2.0, 5.0, 100.0}, {"knee", 0.0, 2.0, 6.0, 200.0}};
+  d.other_joints = {"toe", "ankle"};
+  d.links = {"pelvis", "thigh", "shank", "foot"};
+  return d;
+}
+
+/// The robot with `from` (which must occur once) replaced by `to`.
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = kRobot;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  EXPECT_EQ(text.find(from, at + 1), std::string::npos) << from << " occurs twice";
+  return text.replace(at, from.size(), to);
+}
+
+/// Every error of a text, one a line.
+std::string errors_of(const std::string& text) {
+  const auto robot = parse_robot_config(text, "robots/leg.toml");
+  std::string all;
+  if (robot.has_value()) return all;
+  for (const Error& error : robot.error()) all += error.to_string() + "\n";
+  return all;
+}
+
+void expect_error(const std::string& text, const std::string& expected) {
+  EXPECT_EQ(errors_of(text), expected + "\n");
+}
+
+TEST(RobotConfig, IsReadWithItsDefaults) {
+  const auto robot = parse_robot_config(kRobot, "robots/leg.toml");
+  ASSERT_TRUE(robot.has_value()) << errors_of(kRobot);
+  EXPECT_EQ(robot->name, "leg");
+  EXPECT_EQ(robot->model.urdf, "robots/leg.urdf");
+  EXPECT_TRUE(robot->model.floating_base);
+  EXPECT_FALSE(robot->model.mimic_independent);
+  ASSERT_EQ(robot->model.lock.size(), 1u);
+  EXPECT_EQ(robot->model.lock[0], (std::pair<std::string, double>("toe", 0.1)));
+  EXPECT_EQ(robot->model.gravity_m_s2[2], -9.81);
+  ASSERT_EQ(robot->model.sites.size(), 1u);
+  EXPECT_TRUE(robot->model.sites[0].wrench);
+  EXPECT_EQ(robot->model.sites[0].xyz_m[2], -0.1);
+  ASSERT_EQ(robot->joints.size(), 2u);
+  EXPECT_EQ(robot->joint_index("knee"), 1);
+  EXPECT_EQ(robot->joint_index("nose"), -1);
+  const JointConfig& hip = robot->joints[0];
+  EXPECT_EQ(hip.min_position_rad, -1.5);
+  EXPECT_TRUE(std::isnan(hip.max_torque_Nm));
+  EXPECT_EQ(hip.encoder_counts_per_rev, 65536);
+  EXPECT_EQ(hip.on_fault, StopCategory::kCategory1);
+  EXPECT_EQ(robot->joints[1].on_fault, StopCategory::kHold);
+  EXPECT_EQ(robot->actuator_of(hip).order, 2);
+  EXPECT_EQ(robot->actuator_of(hip).spring_Nm_rad, 395.46);
+  EXPECT_EQ(robot->gains_of(hip).position.gains.kp, 200.0);
+  EXPECT_EQ(robot->gains_of(hip).position.output_limit, 100.0);
+  EXPECT_EQ(robot->gains_of(hip).position_feedback, PositionFeedback::kMotor);
+  EXPECT_EQ(robot->gains_of(hip).torque_feedforward, 1.0);
+  EXPECT_EQ(robot->board("hip_board")->control_period_ns, 1'000'000);
+  EXPECT_EQ(robot->bus("left")->data_bitrate, 8'000'000);
+  EXPECT_EQ(robot->shape().sensor_channels, std::vector<std::size_t>{6});
+  EXPECT_EQ(robot->contact.feet[0].points_m[2][1], -0.05);
+  EXPECT_EQ(robot->posture("home")->position_rad, (std::vector<double>{0.0, 0.2}));
+  EXPECT_EQ(robot->posture("away"), nullptr);
+}
+
+TEST(RobotConfig, OfABareModelNeedsNoJoints) {
+  EXPECT_EQ(errors_of("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n"), "");
+}
+
+TEST(RobotConfig, NamesAMissingFile) {
+  const auto robot = read_robot_config("/nonexistent/robot.toml");
+  ASSERT_FALSE(robot.has_value());
+  ASSERT_EQ(robot.error().size(), 1u);
+  EXPECT_EQ(robot.error()[0].file, "/nonexistent/robot.toml");
+}
+
+TEST(RobotConfig, NamesTheLineOfBrokenToml) {
+  const auto robot = parse_robot_config("name = 'leg'\n[model\n", "leg.toml");
+  ASSERT_FALSE(robot.has_value());
+  EXPECT_EQ(robot.error()[0].line, 2);
+}
+
+TEST(RobotConfig, SuggestsTheNearestForAMisspeltKey) {
+  expect_error(with("gear_ratio = 100", "gear_ratio = 100\nvoltage_limt_V = 3"),
+               "robots/leg.toml:16: actuator.big.voltage_limt_V: unknown key "
+               "(did you mean 'voltage_limit_V'?)");
+}
+
+TEST(RobotConfig, RefusesGainsOfTheWrongSign) {
+  expect_error(with("kp = 0.3", "kp = -0.3"),
+               "robots/leg.toml:24: gains.big.torque.kp: this gain has the wrong sign "
+               "(gains are not negative: they act on reference minus measurement)");
+}
+
+TEST(RobotConfig, RefusesAZeroResistance) {
+  expect_error(with("resistance_ohm = 0.664", "resistance_ohm = 0"),
+               "robots/leg.toml:13: actuator.big.resistance_ohm: 0 is out of range "
+               "(must be greater than 0)");
+}
+
+TEST(RobotConfig, RefusesAnElectricalMotorWhoseDampingLacksItsBackEmf) {
+  const std::string text =
+      with("resistance_ohm = 0.664", "order = 3\ninductance_H = 3e-4\nresistance_ohm = 0.064");
+  EXPECT_NE(errors_of(text).find("less than the back-EMF's share"), std::string::npos);
+}
+
+TEST(RobotConfig, RefusesNumbersThatAreNotFinite) {
+  expect_error(with("damping_s_m = 10\n", "damping_s_m = nan\n"),
+               "robots/leg.toml:62: contact.damping_s_m: must be finite");
+}
+
+TEST(RobotConfig, RefusesReversedLimits) {
+  expect_error(with("max_position_rad = 1.0", "max_position_rad = -2.0"),
+               "robots/leg.toml:42: joint[0].min_position_rad: the position limits are reversed or "
+               "equal (min_position_rad must be less than max_position_rad)");
+}
+
+TEST(RobotConfig, RefusesEncodersWithoutCounts) {
+  expect_error(with("\nencoder_counts_per_rev = 65536", "\nencoder_counts_per_rev = 0"),
+               "robots/leg.toml:35: joint_defaults.encoder_counts_per_rev: 0 is out of range "
+               "(must be greater than 0)\n"
+               "robots/leg.toml:37: joint[0].encoder_counts_per_rev: this key is missing "
+               "(add it to the table)\n"
+               "robots/leg.toml:44: joint[1].encoder_counts_per_rev: this key is missing "
+               "(add it to the table)");
+}
+
+TEST(RobotConfig, RefusesNodeIdsOffTheBus) {
+  expect_error(with("node_id = 3", "node_id = 128"),
+               "robots/leg.toml:33: board[0].node_id: 128 is out of range (must be 1 to 127)");
+}
+
+TEST(RobotConfig, RefusesASensorWithABoardsNodeId) {
+  expect_error(with("node_id = 10", "node_id = 3"),
+               "robots/leg.toml:56: sensor[0].node_id: node id 3 is taken on bus 'left' "
+               "(every board and sensor of a bus needs an id of its own)");
+}
+
+TEST(RobotConfig, RefusesAJointOnTwoBoards) {
+  const std::string text =
+      with("[joint_defaults]",
+           "[[board]]\nname = 'other'\nbus = 'left'\nnode_id = 4\n[joint_defaults]") +
+      "[[joint]]\nname = 'hip'\nboard = 'other'\nactuator = 'big'\ngains = 'big'\n";
+  expect_error(text,
+               "robots/leg.toml:78: joint[2].name: the joint 'hip' is on two boards, 'hip_board' "
+               "and 'other' (remove one of the two)");
+}
+
+TEST(RobotConfig, RefusesAnAxisTwice) {
+  expect_error(with("axis = 1", "axis = 0"),
+               "robots/leg.toml:47: joint[1].axis: axis 0 of board 'hip_board' already drives "
+               "joint 'hip' (give each joint of a board an axis of its own)");
+}
+
+TEST(RobotConfig, RefusesAGapInABoardsAxes) {
+  expect_error(with("axis = 1", "axis = 3"),
+               "robots/leg.toml:31: board[0].name: the axes of board 'hip_board' have a gap "
+               "(number them from 0 without a gap)");
+}
+
+TEST(RobotConfig, RefusesABoardWithoutJoint) {
+  const std::string text = with(
+      "[joint_defaults]", "[[board]]\nname = 'other'\nbus = 'left'\nnode_id = 4\n[joint_defaults]");
+  EXPECT_NE(errors_of(text).find("no joint is on board 'other'"), std::string::npos);
+}
+
+TEST(RobotConfig, SuggestsTheNearestForAnUnknownReference) {
+  const std::string text = with("axis = 1\nactuator = \"big\"\ngains = \"big\"",
+                                "axis = 1\nactuator = \"bigg\"\ngains = \"bg\"");
+  EXPECT_EQ(errors_of(text),
+            "robots/leg.toml:48: joint[1].actuator: there is no actuator 'bigg' "
+            "(did you mean 'big'?)\n"
+            "robots/leg.toml:49: joint[1].gains: there is no gains table 'bg' "
+            "(did you mean 'big'?)\n");
+}
+
+TEST(RobotConfig, RefusesAPostureOfAnUnknownJoint) {
+  expect_error(with("knee = 0.2", "kne = 0.2"),
+               "robots/leg.toml:72: posture.home.kne: there is no joint 'kne' "
+               "(did you mean 'knee'?)");
+}
+
+TEST(RobotConfig, RefusesAFootWhoseSiteTakesNoWrench) {
+  EXPECT_NE(errors_of(with("wrench = true", "wrench = false")).find("takes no wrench"),
+            std::string::npos);
+}
+
+TEST(RobotConfig, RefusesNoiseOfTheWrongLength) {
+  EXPECT_NE(errors_of(with("noise = [1, 1, 1, 0.1, 0.1, 0.1]", "noise = [1, 1]"))
+                .find("give one for each of the 6 channels"),
+            std::string::npos);
+}
+
+TEST(RobotConfig, RefusesALockedJointThatIsDriven) {
+  EXPECT_NE(errors_of(with("toe = 0.1", "hip = 0.1")).find("is locked in [model.lock]"),
+            std::string::npos);
+}
+
+TEST(RobotConfig, RefusesAStaticFrictionBelowTheSlidingOne) {
+  EXPECT_NE(errors_of(with("static_friction = 0.9", "static_friction = 0.1"))
+                .find("is less than sliding_friction"),
+            std::string::npos);
+}
+
+TEST(RobotConfig, ReportsAllErrorsInTheFilesOrder) {
+  std::string text = with("node_id = 3", "node_id = 300");
+  text.replace(text.find("base = \"floating\""), 17, "base = \"flotaing\"");
+  const auto robot = parse_robot_config(text, "leg.toml");
+  ASSERT_FALSE(robot.has_value());
+  ASSERT_GE(robot.error().size(), 2u);
+  EXPECT_EQ(robot.error()[0].key, "model.base");
+  EXPECT_EQ(robot.error()[0].hint, "did you mean 'floating'?");
+}
+
+class Completed : public testing::Test {
+ protected:
+  void read(const std::string& text) {
+    auto found = parse_robot_config(text, "leg.toml");
+    ASSERT_TRUE(found.has_value()) << errors_of(text);
+    robot = *found;
+    errors.clear();
+    for (const Error& error : complete_from_description(robot, description_)) {
+      errors += error.to_string() + "\n";
+    }
+  }
+  RobotConfig robot;
+  RobotDescription description_ = description();
+  std::string errors;
+};
+
+TEST_F(Completed, TakesMissingLimitsFromTheDescription) {
+  read(kRobot);
+  EXPECT_EQ(errors, "");
+  EXPECT_EQ(robot.joints[0].max_position_rad, 1.0);
+  EXPECT_EQ(robot.joints[1].max_position_rad, 2.0);
+  EXPECT_EQ(robot.joints[0].max_torque_Nm, 100.0);
+  EXPECT_EQ(robot.joints[0].rated_torque_Nm, 100.0);
+  EXPECT_EQ(robot.joints[1].max_torque_Nm, 80.0);
+  EXPECT_EQ(robot.joints[1].max_velocity_rad_s, 6.0);
+}
+
+TEST_F(Completed, GivesAContinuousJointWhatItsEncoderCounts) {
+  description_.moving_joints[1].max_position_rad = INFINITY;
+  read(kRobot);
+  EXPECT_EQ(errors, "");
+  EXPECT_GT(robot.joints[1].max_position_rad, 1e4);
+  EXPECT_LT(robot.joints[1].max_position_rad / (2 * M_PI) * 409600, 2147483647.0);
+}
+
+TEST_F(Completed, SuggestsTheNearestForAJointThatTheDescriptionLacks) {
+  description_.moving_joints[0].name = "hip_pitch";
+  description_.moving_joints[1].name = "hipp";
+  read(kRobot);
+  EXPECT_EQ(errors.substr(0, errors.find('\n')),
+            "leg.toml:37: joint.hip: the description has no joint 'hip' (did you mean 'hipp'?)");
+}
+
+TEST_F(Completed, RefusesAMovingJointThatNothingDrives) {
+  description_.moving_joints.push_back({"wrist", -1, 1, 1, 1});
+  read(kRobot);
+  EXPECT_EQ(errors,
+            "leg.toml: joint: the description's joint 'wrist' has no [[joint]] "
+            "(add one, or fix it with [model.lock] wrist = 0.0)\n");
+}
+
+TEST_F(Completed, RefusesAJointThatDoesNotMove) {
+  description_.moving_joints.pop_back();
+  description_.other_joints.push_back("knee");
+  read(kRobot);
+  EXPECT_NE(errors.find("'knee' does not move in the description"), std::string::npos);
+}
+
+TEST_F(Completed, RefusesUnknownLinksAndJointsOfSitesAndSensors) {
+  description_.links.back() = "foott";
+  description_.other_joints = {"toe", "ankel"};
+  read(kRobot);
+  EXPECT_NE(errors.find("leg.toml:7: site.sole.link: the description has no link 'foot' "
+                        "(did you mean 'foott'?)"),
+            std::string::npos);
+  EXPECT_NE(errors.find("sensor.foot_ft.joint: the description has no joint 'ankle'"),
+            std::string::npos);
+}
+
+TEST_F(Completed, AsksForALimitThatNobodyGives) {
+  description_.moving_joints[0].max_velocity_rad_s = 0.0;
+  read(kRobot);
+  EXPECT_EQ(errors,
+            "leg.toml:37: joint.hip.max_velocity_rad_s: neither this file nor the description "
+            "gives a limit (set max_velocity_rad_s)\n");
+}
+
+TEST_F(Completed, RefusesLimitsThatTheEncoderCannotCount) {
+  read(with("max_position_rad = 1.0", "max_position_rad = 1e6"));
+  EXPECT_NE(errors.find("more than the encoder's 32 bits can count"), std::string::npos);
+}
+
+TEST_F(Completed, RefusesATorqueThatTheWireCannotSay) {
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nrated_torque_Nm = 1"));
+  EXPECT_NE(errors.find("more than 32 times the rated torque"), std::string::npos);
+}
+
+TEST_F(Completed, RefusesAPostureBeyondTheLimits) {
+  read(with("knee = 0.2", "knee = -0.2"));
+  EXPECT_NE(errors.find("posture.home.knee: is beyond the joint's limits"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::hal
