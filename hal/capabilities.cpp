@@ -41,9 +41,11 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
       bit(Capability::kOpenLoop, actuator.voltage_limit_V > 0.0) |
       bit(Capability::kCurrent, current));
   out.max_voltage_V = actuator.voltage_limit_V;
-  if (current) out.max_current_A = actuator.current_limit_A;
+  out.max_current_A = actuator.current_limit_A;
   if (torque) {
     out.max_torque_Nm = joint.max_torque_Nm;
+    out.stiffness_Nm_rad = gains.stiffness_Nm_rad;
+    out.damping_Nms_rad = gains.damping_Nms_rad;
     out.max_stiffness_Nm_rad = std::max(gains.position.gains.kp, gains.stiffness_Nm_rad);
     const double critical = 2.0 * std::sqrt(out.max_stiffness_Nm_rad * actuator.inertia_kg_m2);
     out.max_damping_Nms_rad =

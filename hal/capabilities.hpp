@@ -22,7 +22,8 @@ enum class Capability : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(Capability capability) noexcept;
 
-/// A joint's limits, link side, and its capabilities. A limit of a thing that it cannot do is 0.
+/// A joint's limits, link side, and its capabilities. Torque and
+/// impedance limits of a joint that cannot do torque control are 0.
 struct JointCapabilities {
   double min_position_rad = 0.0;
   double max_position_rad = 0.0;
@@ -36,6 +37,8 @@ struct JointCapabilities {
   /// Of the virtual damper: critical for the motor's inertia at max_stiffness, or the position
   /// loop's kd or the configured default where they are larger.
   double max_damping_Nms_rad = 0.0;
+  double stiffness_Nm_rad = 0.0;  ///< the gains table's default, when compliant
+  double damping_Nms_rad = 0.0;
   std::uint8_t bits = 0;
 
   [[nodiscard]] bool can(Capability capability) const noexcept {

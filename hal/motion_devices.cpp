@@ -1,0 +1,149 @@
+// PositionControl and VelocityControl: the interfaces that make their own references.
+#include <algorithm>
+
+#include "base/archive.hpp"
+#include "hal/joint_access.hpp"
+#include "hal/joint_devices.hpp"
+
+namespace tandem::hal {
+namespace {
+
+constexpr double kNoUpperLimit = std::numeric_limits<double>::max();
+constexpr double kSmallest = std::numeric_limits<double>::min();
+
+double seconds(const JointAccess& io) noexcept { return static_cast<double>(io.period_ns) * 1e-9; }
+
+}  // namespace
+
+PositionControl::PositionControl(JointAccess& access) : io_(access), motions_(access.joints.size()) {
+  for (std::size_t j = 0; j < motions_.size(); ++j) {
+    motions_[j].speed_rad_s = io_.joints[j].max_velocity_rad_s / 4.0;
+    motions_[j].acceleration_rad_s2 = motions_[j].speed_rad_s / 0.5;
+  }
+}
+
+Code PositionControl::position_move(std::size_t j, double target_rad) noexcept TANDEM_RT {
+  if (j >= motions_.size() || !in_mode(io_, j, ControlMode::kPosition)) return Code::kOutOfRange;
+  const JointCapabilities& limit = io_.joints[j];
+  const Code code = checked(io_, j, target_rad, limit.min_position_rad, limit.max_position_rad);
+  if (code != Code::kOk) return code;
+  Motion& motion = motions_[j];
+  if (motion.phase == kResting) motion.reference = {io_.command.position_rad()[j], 0.0};
+  motion.target_rad = target_rad;
+  motion.phase = kMoving;
+  return Code::kOk;
+}
+
+Code PositionControl::relative_move(std::size_t j, double way_rad) noexcept TANDEM_RT {
+  if (j >= motions_.size()) return Code::kOutOfRange;
+  return position_move(j, io_.command.position_rad()[j] + way_rad);
+}
+
+bool PositionControl::check_motion_done(std::size_t j) const noexcept TANDEM_RT {
+  return j >= motions_.size() || motions_[j].phase == kResting;
+}
+
+bool PositionControl::check_motion_done() const noexcept TANDEM_RT {
+  return std::all_of(motions_.begin(), motions_.end(),
+                     [](const Motion& motion) { return motion.phase == kResting; });
+}
+
+Code PositionControl::set_ref_speed(std::size_t j, double rad_s) noexcept TANDEM_RT {
+  const double max = j < motions_.size() ? io_.joints[j].max_velocity_rad_s : 0.0;
+  const Code code = checked(io_, j, rad_s, kSmallest, max);
+  if (code == Code::kOk) motions_[j].speed_rad_s = rad_s;
+  return code;
+}
+double PositionControl::ref_speed_rad_s(std::size_t j) const noexcept TANDEM_RT {
+  return j < motions_.size() ? motions_[j].speed_rad_s : at({}, j);
+}
+
+Code PositionControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
+  const Code code = checked(io_, j, rad_s2, kSmallest, kNoUpperLimit);
+  if (code == Code::kOk) motions_[j].acceleration_rad_s2 = rad_s2;
+  return code;
+}
+double PositionControl::ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT {
+  return j < motions_.size() ? motions_[j].acceleration_rad_s2 : at({}, j);
+}
+
+Code PositionControl::stop(std::size_t j) noexcept TANDEM_RT {
+  if (j >= motions_.size()) return Code::kOutOfRange;
+  if (motions_[j].phase == kMoving) motions_[j].phase = kBraking;
+  return Code::kOk;
+}
+
+double PositionControl::target_position_rad(std::size_t j) const noexcept TANDEM_RT {
+  if (check_motion_done(j)) return at(std::as_const(io_.command).position_rad(), j);
+  return motions_[j].target_rad;
+}
+
+void PositionControl::advance() noexcept TANDEM_RT {
+  const double dt = seconds(io_);
+  for (std::size_t j = 0; j < motions_.size(); ++j) {
+    Motion& motion = motions_[j];
+    if (motion.phase == kResting) continue;
+    if (!in_mode(io_, j, ControlMode::kPosition)) {  // another mode ends the motion
+      motion.phase = kResting;
+      continue;
+    }
+    Trapezoid& reference = motion.reference;
+    bool done = false;
+    if (motion.phase == kMoving) {
+      done = reference.step(motion.target_rad, motion.speed_rad_s, motion.acceleration_rad_s2, dt);
+    } else {
+      reference.run(0.0, motion.acceleration_rad_s2, dt);
+      motion.target_rad = reference.position_rad;
+      done = reference.velocity_rad_s == 0.0;
+    }
+    io_.command.position_rad()[j] = reference.position_rad;
+    io_.command.velocity_rad_s()[j] = reference.velocity_rad_s;
+    if (done) motion.phase = kResting;
+  }
+}
+
+void PositionControl::archive(Archive& ar) { ar(motions_); }
+
+VelocityControl::VelocityControl(JointAccess& access) : io_(access), ramps_(access.joints.size()) {
+  for (std::size_t j = 0; j < ramps_.size(); ++j) {
+    ramps_[j].acceleration_rad_s2 = io_.joints[j].max_velocity_rad_s / 2.0;
+  }
+}
+
+Code VelocityControl::velocity_move(std::size_t j, double rad_s) noexcept TANDEM_RT {
+  if (j >= ramps_.size() || !in_mode(io_, j, ControlMode::kVelocity)) return Code::kOutOfRange;
+  const double max = io_.joints[j].max_velocity_rad_s;
+  const Code code = checked(io_, j, rad_s, -max, max);
+  if (code == Code::kOk) ramps_[j].target_rad_s = rad_s;
+  return code;
+}
+double VelocityControl::target_velocity_rad_s(std::size_t j) const noexcept TANDEM_RT {
+  return j < ramps_.size() ? ramps_[j].target_rad_s : at({}, j);
+}
+
+Code VelocityControl::set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT {
+  const Code code = checked(io_, j, rad_s2, kSmallest, kNoUpperLimit);
+  if (code == Code::kOk) ramps_[j].acceleration_rad_s2 = rad_s2;
+  return code;
+}
+double VelocityControl::ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT {
+  return j < ramps_.size() ? ramps_[j].acceleration_rad_s2 : at({}, j);
+}
+
+void VelocityControl::advance() noexcept TANDEM_RT {
+  const double dt = seconds(io_);
+  for (std::size_t j = 0; j < ramps_.size(); ++j) {
+    Ramp& ramp = ramps_[j];
+    if (!in_mode(io_, j, ControlMode::kVelocity)) {  // another mode ends the motion
+      ramp.target_rad_s = 0.0;
+      continue;
+    }
+    double& reference = io_.command.velocity_rad_s()[j];
+    const double change = ramp.acceleration_rad_s2 * dt;
+    reference = std::clamp(ramp.target_rad_s, reference - change, reference + change);
+  }
+}
+
+void VelocityControl::archive(Archive& ar) { ar(ramps_); }
+
+}  // namespace tandem::hal
