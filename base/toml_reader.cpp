@@ -18,7 +18,8 @@ struct TomlTable::Shared {
 
 namespace {
 
-const toml::table kEmpty;
+const toml::table kEmpty;   // stands for an optional table that is not there
+const toml::table kBroken;  // stands for a table whose absence or type was reported
 
 std::string kind(const toml::node& node) {
   std::ostringstream out;
@@ -34,8 +35,9 @@ std::string number_text(double value) {
 
 }  // namespace
 
-TomlTable::TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path)
-    : shared_(std::move(shared)), table_(table), path_(std::move(path)) {}
+TomlTable::TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path,
+                     int line)
+    : shared_(std::move(shared)), table_(table), path_(std::move(path)), line_(line) {}
 
 std::string TomlTable::dotted(std::string_view key) const {
   if (key.empty()) return path_;
@@ -49,7 +51,7 @@ const toml::node* TomlTable::find(std::string_view key) {
 
 const toml::node* TomlTable::require(std::string_view key) {
   const toml::node* node = find(key);
-  if (node == nullptr && table_ != &kEmpty) {
+  if (node == nullptr && table_ != &kBroken) {
     error(key, "this key is missing", "add it to the table");
   }
   return node;
@@ -57,7 +59,7 @@ const toml::node* TomlTable::require(std::string_view key) {
 
 bool TomlTable::has(std::string_view key) const { return table_->contains(key); }
 
-int TomlTable::line() const { return static_cast<int>(table_->source().begin.line); }
+int TomlTable::line() const { return line_; }
 
 int TomlTable::line(std::string_view key) const {
   const toml::node* node = key.empty() ? nullptr : table_->get(key);
@@ -253,16 +255,20 @@ std::vector<std::vector<double>> TomlTable::rows(std::string_view key, std::size
 }
 
 TomlTable TomlTable::table(std::string_view key) {
-  require(key);
+  if (require(key) == nullptr) return {shared_, &kBroken, dotted(key), line()};
   return table_or_empty(key);
 }
 
 TomlTable TomlTable::table_or_empty(std::string_view key) {
   const toml::node* node = find(key);
-  if (node == nullptr) return {shared_, &kEmpty, dotted(key)};
-  if (const toml::table* found = node->as_table()) return {shared_, found, dotted(key)};
+  if (node == nullptr) {
+    return {shared_, table_ == &kBroken ? &kBroken : &kEmpty, dotted(key), line()};
+  }
+  if (const toml::table* found = node->as_table()) {
+    return {shared_, found, dotted(key), line(key)};
+  }
   error(key, "must be a table, not " + kind(*node), "write [" + dotted(key) + "]");
-  return {shared_, &kEmpty, dotted(key)};
+  return {shared_, &kBroken, dotted(key), line(key)};
 }
 
 std::vector<TomlTable> TomlTable::tables(std::string_view key) {
@@ -275,8 +281,9 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
   }
   std::vector<TomlTable> found;
   for (std::size_t i = 0; i < array->size(); ++i) {
-    found.push_back(TomlTable(shared_, array->get(i)->as_table(),
-                              dotted(key) + "[" + std::to_string(i) + "]"));
+    const toml::table* table = array->get(i)->as_table();
+    found.push_back(TomlTable(shared_, table, dotted(key) + "[" + std::to_string(i) + "]",
+                              static_cast<int>(table->source().begin.line)));
   }
   return found;
 }
@@ -326,7 +333,7 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   return document;
 }
 
-TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}}; }
+TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}, 1}; }
 const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
 const std::string& TomlDocument::file() const { return shared_->file; }
 

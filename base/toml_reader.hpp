@@ -64,7 +64,8 @@ class TomlTable {
   [[nodiscard]] bool has(std::string_view key) const;
   /// The sub-table `key`; an empty one, after an error, when it is missing or no table.
   [[nodiscard]] TomlTable table(std::string_view key);
-  /// The sub-table `key`; an empty one without error when it is missing.
+  /// The sub-table `key`; an empty one without error when it is missing. A key that is then
+  /// required of it is still an error, at this table's line.
   [[nodiscard]] TomlTable table_or_empty(std::string_view key);
   /// The array of tables [[key]] in the order of the file; empty when it is missing.
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key);
@@ -85,7 +86,7 @@ class TomlTable {
  private:
   friend class TomlDocument;
   struct Shared;  // the parsed document and its diagnostics
-  TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path);
+  TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path, int line);
   const toml::node* find(std::string_view key);
   const toml::node* require(std::string_view key);
   bool check_number(std::string_view key, const toml::node& node, Range range, double& out);
@@ -94,6 +95,7 @@ class TomlTable {
   std::shared_ptr<Shared> shared_;
   const toml::table* table_;
   std::string path_;
+  int line_;  // of the table, or of the one it is missing from
   std::set<std::string, std::less<>> asked_;
 };
 

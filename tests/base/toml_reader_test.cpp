@@ -68,5 +68,15 @@ TEST(TomlReader, AMissingTableIsOneErrorOnly) {
   EXPECT_EQ(document.diagnostics().size(), 1U);
 }
 
+TEST(TomlReader, AKeyRequiredOfAnOptionalTableIsAnErrorAtTheTableAbove) {
+  const TomlDocument document = parse("x = 1\n[controller]\nplugin = 'squat'\n");
+  TomlTable root = document.root();
+  TomlTable parameters = root.table("controller").table_or_empty("parameters");
+  (void)parameters.number("depth_m");
+  ASSERT_EQ(document.diagnostics().size(), 1U);
+  EXPECT_EQ(document.diagnostics()[0].line, 2);
+  EXPECT_EQ(document.diagnostics()[0].key, "controller.parameters.depth_m");
+}
+
 }  // namespace
 }  // namespace tandem
