@@ -53,6 +53,9 @@ struct ActuatorConfig {
   double thermal_time_constant_s = 60.0;
 };
 
+/// What its order lacks ("inductance_H must be positive"), or empty.
+[[nodiscard]] std::string actuator_problem(const ActuatorConfig& actuator);
+
 /// One loop of the firmware.
 struct PidConfig {
   PidGains gains;

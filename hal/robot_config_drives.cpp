@@ -12,27 +12,22 @@ void read_actuator(TomlTable table, const std::string& name, RobotConfig& robot)
   ActuatorConfig a;
   a.name = name;
   a.order = static_cast<int>(table.integer_or("order", 2, 0, 3));
-  const bool electrical = a.order == 1 || a.order == 3;
-  const bool mechanical = a.order >= 2;
   a.resistance_ohm = table.number("resistance_ohm", kPositive);
-  a.inductance_H = electrical ? table.number("inductance_H", kPositive)
-                              : table.number_or("inductance_H", 0.0, kNotNegative);
+  a.inductance_H = table.number_or("inductance_H", 0.0, kNotNegative);
   a.torque_constant_Nm_A = table.number("torque_constant_Nm_A", kPositive);
   a.gear_ratio = table.number("gear_ratio", kPositive);
-  a.inertia_kg_m2 = table.number("inertia_kg_m2", mechanical ? kPositive : kNotNegative);
+  a.inertia_kg_m2 = table.number("inertia_kg_m2", kNotNegative);
   a.damping_Nms_rad = table.number("damping_Nms_rad", kNotNegative);
-  a.spring_Nm_rad = mechanical ? table.number("spring_Nm_rad", kPositive)
-                               : table.number_or("spring_Nm_rad", 0.0, kNotNegative);
+  a.spring_Nm_rad = table.number_or("spring_Nm_rad", 0.0, kNotNegative);
   a.spring_damping_Nms_rad = table.number_or("spring_damping_Nms_rad", 0.0, kNotNegative);
   a.current_limit_A = table.number("current_limit_A", kPositive);
   a.voltage_limit_V = table.number("voltage_limit_V", kPositive);
   a.thermal_resistance_K_W = table.number_or("thermal_resistance_K_W", 1.0, kPositive);
   a.thermal_time_constant_s = table.number_or("thermal_time_constant_s", 60.0, kPositive);
-  const double emf = a.gear_ratio * a.torque_constant_Nm_A;
-  if (electrical && a.resistance_ohm > 0.0 && a.damping_Nms_rad < emf * emf / a.resistance_ohm) {
-    table.error("damping_Nms_rad", "is less than the back-EMF's share N^2 K^2 / R = " +
-                                       std::to_string(emf * emf / a.resistance_ohm),
-                "give the total damping; order 1 and 3 take the back-EMF out of it");
+  const std::string problem = actuator_problem(a);
+  if (!problem.empty()) {
+    table.error("", "of order " + std::to_string(a.order) + ": " + problem,
+                "give it, or another order");
   }
   table.finish();
   robot.actuators.push_back(a);
@@ -155,6 +150,20 @@ void read_joint(TomlTable table, const JointConfig& defaults, RobotConfig& robot
 }
 
 }  // namespace
+
+std::string actuator_problem(const ActuatorConfig& a) {
+  const bool electrical = a.order == 1 || a.order == 3;
+  const bool mechanical = a.order >= 2;
+  if (electrical && a.inductance_H <= 0.0) return "inductance_H must be positive";
+  if (mechanical && a.inertia_kg_m2 <= 0.0) return "inertia_kg_m2 must be positive";
+  if (mechanical && a.spring_Nm_rad <= 0.0) return "spring_Nm_rad must be positive";
+  const double emf = a.gear_ratio * a.torque_constant_Nm_A;
+  if (electrical && a.resistance_ohm > 0.0 && a.damping_Nms_rad < emf * emf / a.resistance_ohm) {
+    return "damping_Nms_rad must include the back-EMF's share N^2 K^2 / R = " +
+           std::to_string(emf * emf / a.resistance_ohm);
+  }
+  return {};
+}
 
 void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   TomlTable actuators = root.table_or_empty("actuator");

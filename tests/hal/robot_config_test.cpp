@@ -185,7 +185,13 @@ TEST(RobotConfig, RefusesAZeroResistance) {
 TEST(RobotConfig, RefusesAnElectricalMotorWhoseDampingLacksItsBackEmf) {
   const std::string text =
       with("resistance_ohm = 0.664", "order = 3\ninductance_H = 3e-4\nresistance_ohm = 0.064");
-  EXPECT_NE(errors_of(text).find("less than the back-EMF's share"), std::string::npos);
+  EXPECT_NE(errors_of(text).find("must include the back-EMF's share"), std::string::npos);
+}
+
+TEST(RobotConfig, RefusesASpringDriveWithoutSpring) {
+  expect_error(with("spring_Nm_rad = 395.46\n", ""),
+               "robots/leg.toml:12: actuator.big: of order 2: spring_Nm_rad must be positive "
+               "(give it, or another order)");
 }
 
 TEST(RobotConfig, RefusesNumbersThatAreNotFinite) {
