@@ -1,0 +1,250 @@
+#include "runtime/experiment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "base/nearest.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using Names = std::vector<std::string>;
+
+template <class Enum>
+Enum read_choice(TomlTable& table, const char* key, const Names& names, Enum value) {
+  const std::string& name = names[static_cast<std::size_t>(value)];
+  const auto found = std::ranges::find(names, table.choice_or(key, name, names));
+  return static_cast<Enum>(found - names.begin());
+}
+
+template <class T>
+void check_reference(TomlTable& table, const char* key, const std::string& name,
+                     const std::vector<T>& items, const std::string& kind) {
+  Names known;
+  for (const T& item : items) known.push_back(item.name);
+  if (name.empty() || std::ranges::find(known, name) != known.end()) return;
+  table.error(key, "the robot has no " + kind + " '" + name + "'", suggest(name, known));
+}
+
+void read_backend(TomlTable table) {
+  const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "dds"});
+  if (backend != "sim") {
+    table.error("backend", "the backend '" + backend + "' is not part of this version",
+                "set backend = \"sim\"");
+  }
+  table.finish();
+}
+
+SimOptions read_sim(TomlTable table) {
+  SimOptions sim;
+  sim.integrator = read_choice(table, "integrator", {"semi_implicit", "rk4"}, sim.integrator);
+  sim.substep_ns = table.integer_or("substep_ns", sim.substep_ns, 1'000, 100'000'000);
+  sim.order = static_cast<int>(table.integer_or("order", -1, 0, 3));
+  sim.noise = table.boolean_or("noise", sim.noise);
+  sim.ground_truth = table.boolean_or("ground_truth", sim.ground_truth);
+  TomlTable hoist = table.table_or_empty("hoist");
+  sim.hoist = hoist.boolean_or("enabled", sim.hoist);
+  sim.hoist_release_s = hoist.number_or("release_s", sim.hoist_release_s, {0.0, 60.0});
+  hoist.finish();
+  table.finish();
+  return sim;
+}
+
+void read_overrun(TomlTable table, rt::LoopConfig& loop) {
+  loop.on_overrun = read_choice(table, "policy", {"skip", "hold", "stop"}, loop.on_overrun);
+  loop.stop_late = static_cast<int>(table.integer_or("n", loop.stop_late, 1, 64));
+  loop.stop_window = static_cast<int>(table.integer_or("m", loop.stop_window, 1, 64));
+  if (loop.stop_late > loop.stop_window) {
+    table.error("n", "is more than m", "the policy stops after n late cycles of the last m");
+  }
+  table.finish();
+}
+
+rt::ThreadConfig read_realtime(TomlTable& root) {
+  rt::ThreadConfig thread;
+  if (!root.has("realtime")) {
+    thread.policy = rt::SchedulingPolicy::kOther;
+    thread.lock_memory = false;
+    return thread;
+  }
+  TomlTable table = root.table("realtime");
+  thread.policy = read_choice(table, "policy", {"other", "fifo", "rr"}, thread.policy);
+  thread.priority = static_cast<int>(table.integer_or("priority", thread.priority, 1, 99));
+  thread.cpu = static_cast<int>(table.integer_or("cpu", thread.cpu, 0, 1023));
+  thread.lock_memory = table.boolean_or("lock_memory", thread.lock_memory);
+  table.finish();
+  return thread;
+}
+
+LogOptions read_log(TomlTable table) {
+  LogOptions log;
+  log.folder = table.text_or("folder", log.folder);
+  log.compression = read_choice(table, "compression", {"none", "lz4", "zstd"}, log.compression);
+  table.finish();
+  return log;
+}
+
+void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers) {
+  for (TomlTable& table : root.tables("controller")) {
+    const std::string plugin = table.text("plugin");
+    const std::string name =
+        table.text_or("name", std::filesystem::path(plugin).stem().string());
+    for (const ControllerSpec& other : controllers) {
+      if (name.empty() || other.name != name) continue;
+      table.error("name", "two controllers are called '" + name + "'", "rename one of them");
+    }
+    controllers.push_back({plugin, name, table.table_or_empty("parameters")});
+    table.finish();
+  }
+  if (controllers.empty()) {
+    root.error("controller", "there is no controller",
+               "add [[controller]] with plugin = \"hold\", for one");
+  }
+}
+
+ReportOptions read_report(TomlTable table) {
+  ReportOptions report;
+  report.hip = table.text_or("hip", {});
+  report.knee = table.text_or("knee", {});
+  report.foot = table.text_or("foot", {});
+  table.finish();
+  return report;
+}
+
+/// What of the experiment can be read without its robot.
+Experiment read(const TomlDocument& document, TomlTable& root) {
+  Experiment e{};
+  e.document = document;
+  e.file = document.file();
+  const std::filesystem::path robot = root.text("robot");
+  if (!robot.empty()) {
+    e.robot_file = (std::filesystem::path(document.folder()) / robot).lexically_normal().string();
+  }
+  e.duration_s = root.number("duration_s", {0.0, 1e6, true});
+  e.seed = static_cast<std::uint64_t>(
+      root.integer_or("seed", 1, 0, std::numeric_limits<std::int64_t>::max()));
+  e.posture = root.text_or("posture", {});
+  e.kernel_variant = root.text_or("kernel_variant", {});
+  e.loop.period_ns = root.integer_or("period_ns", e.loop.period_ns, 10'000, 1'000'000'000);
+  read_backend(root.table_or_empty("hal"));
+  e.sim = read_sim(root.table_or_empty("sim"));
+  read_overrun(root.table_or_empty("overrun"), e.loop);
+  e.thread = read_realtime(root);
+  e.log = read_log(root.table_or_empty("log"));
+  e.report = read_report(root.table_or_empty("report"));
+  read_controllers(root, e.controllers);
+  root.finish();
+  return e;
+}
+
+std::string ns(std::int64_t value) { return std::to_string(value) + " ns"; }
+
+void check_periods(const Experiment& e, TomlTable& root) {
+  const std::int64_t period = e.loop.period_ns;
+  TomlTable sim = root.table_or_empty("sim");
+  if (period % e.sim.substep_ns != 0) {
+    sim.error("substep_ns", ns(e.sim.substep_ns) + " does not divide the period of " + ns(period),
+              "choose a divisor of period_ns");
+  }
+  for (const hal::BoardConfig& board : e.robot.boards) {
+    const std::int64_t control = board.control_period_ns;
+    if (period % control != 0 && control % period != 0) {
+      root.error("period_ns",
+                 ns(period) + " and the control period of board '" + board.name + "', " +
+                     ns(control) + ", do not divide each other",
+                 "make one a multiple of the other");
+    }
+    if (control % e.sim.substep_ns != 0) {
+      sim.error("substep_ns",
+                ns(e.sim.substep_ns) + " does not divide the control period of board '" +
+                    board.name + "', " + ns(control),
+                "choose a common divisor of both");
+    }
+  }
+}
+
+void apply_order(Experiment& e, TomlTable sim) {
+  if (e.sim.order < 0) return;
+  for (hal::ActuatorConfig& actuator : e.robot.actuators) {
+    actuator.order = e.sim.order;
+    const std::string problem = hal::actuator_problem(actuator);
+    if (problem.empty()) continue;
+    sim.error("order", "the actuator '" + actuator.name + "' cannot be of order " +
+                           std::to_string(e.sim.order) + ": " + problem,
+              "complete it in the robot's file, or leave the order to it");
+  }
+}
+
+void remove_noise(hal::RobotConfig& robot) {
+  for (hal::SensorConfig& sensor : robot.sensors) sensor.noise.clear();
+  for (hal::JointConfig& joint : robot.joints) joint.torque_noise_Nm = 0.0;
+}
+
+/// Everything that needs both files.
+void combine(Experiment& e, TomlTable& root) {
+  check_periods(e, root);
+  check_reference(root, "posture", e.posture, e.robot.postures, "posture");
+  if (e.posture.empty() && e.robot.model.floating_base && !root.has("posture")) {
+    root.error("posture", "a robot with a floating base needs a posture to start from",
+               "name a [posture.NAME] of the robot");
+  }
+  if (e.robot.joints.empty()) {
+    root.error("robot", "the robot has no [[joint]], so there is nothing to control",
+               "add joints, boards and a bus to " + e.robot.file);
+  }
+  TomlTable report = root.table_or_empty("report");
+  check_reference(report, "hip", e.report.hip, e.robot.joints, "joint");
+  check_reference(report, "knee", e.report.knee, e.robot.joints, "joint");
+  check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
+  apply_order(e, root.table_or_empty("sim"));
+  if (!e.sim.noise) remove_noise(e.robot);
+}
+
+Diagnostics in_order(Diagnostics errors) {
+  std::ranges::stable_sort(errors, {}, &Error::line);
+  return errors;
+}
+
+}  // namespace
+
+std::uint64_t Experiment::cycles() const {
+  return static_cast<std::uint64_t>(
+      std::llround(duration_s * 1e9 / static_cast<double>(loop.period_ns)));
+}
+
+std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
+  const auto document = TomlDocument::load(file);
+  if (!document) return std::unexpected(Diagnostics{document.error()});
+  TomlTable root = document->root();
+  Experiment e = read(*document, root);
+  Diagnostics robot_errors;
+  if (!e.robot_file.empty()) {
+    if (auto robot = hal::read_robot_config(e.robot_file)) {
+      e.robot = *robot;
+      combine(e, root);
+    } else {
+      robot_errors = robot.error();
+    }
+  }
+  Diagnostics errors = in_order(document->diagnostics());
+  errors.insert(errors.end(), robot_errors.begin(), robot_errors.end());
+  if (!errors.empty()) return std::unexpected(errors);
+  return e;
+}
+
+std::expected<Experiment, Diagnostics> parse_experiment(std::string_view text,
+                                                        const std::string& file,
+                                                        const hal::RobotConfig& robot) {
+  const auto document = TomlDocument::parse(text, file);
+  if (!document) return std::unexpected(Diagnostics{document.error()});
+  TomlTable root = document->root();
+  Experiment e = read(*document, root);
+  e.robot = robot;
+  combine(e, root);
+  if (!document->diagnostics().empty()) return std::unexpected(in_order(document->diagnostics()));
+  return e;
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,296 @@
+#include "runtime/experiment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace tandem::runtime {
+namespace {
+
+const char* const kExperiment = R"(robot = "robot.toml"
+duration_s = 2.5
+posture = "ready"
+[[controller]]
+plugin = "hold"
+[controller.parameters]
+stiffness = 3
+)";
+
+const char* const kRobot = R"(name = "arm"
+[model]
+urdf = "arm.urdf"
+base = "fixed"
+[actuator.motor]
+resistance_ohm = 1.0
+torque_constant_Nm_A = 0.02
+gear_ratio = 20
+inertia_kg_m2 = 0.002
+damping_Nms_rad = 0.17
+spring_Nm_rad = 100
+current_limit_A = 10
+voltage_limit_V = 24
+[gains.motor]
+position = {kp = 6}
+[[bus]]
+name = "arm"
+[[board]]
+name = "board"
+bus = "arm"
+node_id = 1
+[[joint]]
+name = "elbow"
+board = "board"
+actuator = "motor"
+gains = "motor"
+torque_noise_Nm = 0.1
+encoder_counts_per_rev = 65536
+motor_encoder_counts_per_rev = 65536
+[[sensor]]
+name = "wrist_ft"
+type = "force_torque"
+bus = "arm"
+node_id = 2
+joint = "wrist"
+link = "hand"
+noise = [1, 1, 1, 1, 1, 1]
+[posture.ready]
+elbow = 0.5
+)";
+
+hal::RobotConfig robot(const std::string& text = kRobot) {
+  const auto read = hal::parse_robot_config(text, "arm/robot.toml");
+  EXPECT_TRUE(read.has_value());
+  return read.value_or(hal::RobotConfig{});
+}
+
+std::string errors_of(const std::string& text, const hal::RobotConfig& with = robot()) {
+  const auto experiment = parse_experiment(text, "arm/x.toml", with);
+  std::string all;
+  if (experiment.has_value()) return all;
+  for (const Error& error : experiment.error()) all += error.to_string() + "\n";
+  return all;
+}
+
+/// `text` with `from` (which must occur once) replaced by `to`.
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  EXPECT_EQ(text.find(from, at + 1), std::string::npos) << from << " occurs twice";
+  return text.replace(at, from.size(), to);
+}
+
+/// The experiment with `lines` before its first table.
+std::string with(const std::string& lines) {
+  return replaced(kExperiment, "[[controller]]", lines + "\n[[controller]]");
+}
+
+TEST(Experiment, IsReadWithItsDefaults) {
+  const auto e = parse_experiment(kExperiment, "arm/x.toml", robot());
+  ASSERT_TRUE(e.has_value()) << errors_of(kExperiment);
+  EXPECT_EQ(e->robot_file, "arm/robot.toml");
+  EXPECT_EQ(e->duration_s, 2.5);
+  EXPECT_EQ(e->cycles(), 2500u);
+  EXPECT_EQ(e->seed, 1u);
+  EXPECT_EQ(e->posture, "ready");
+  EXPECT_EQ(e->loop.period_ns, 1'000'000);
+  EXPECT_EQ(e->loop.on_overrun, rt::OverrunPolicy::kSkip);
+  EXPECT_EQ(e->thread.policy, rt::SchedulingPolicy::kOther);
+  EXPECT_FALSE(e->thread.lock_memory);
+  EXPECT_EQ(e->sim.integrator, SimIntegrator::kRungeKutta4);
+  EXPECT_TRUE(e->sim.hoist);
+  EXPECT_EQ(e->log.folder, "runs");
+  ASSERT_EQ(e->controllers.size(), 1u);
+  EXPECT_EQ(e->controllers[0].name, "hold");
+  EXPECT_EQ(e->robot.joints[0].torque_noise_Nm, 0.1);
+}
+
+TEST(Experiment, ReadsEveryKey) {
+  const auto e = parse_experiment(with(R"(seed = 7
+period_ns = 2_000_000
+kernel_variant = "baseline"
+[hal]
+backend = "sim"
+[sim]
+integrator = "semi_implicit"
+substep_ns = 250_000
+order = 0
+noise = false
+ground_truth = false
+hoist = {enabled = false, release_s = 0.5}
+[overrun]
+policy = "stop"
+n = 2
+m = 10
+[realtime]
+policy = "rr"
+priority = 42
+cpu = 1
+lock_memory = false
+[log]
+folder = "logs"
+compression = "zstd"
+[report]
+hip = "elbow"
+knee = "elbow"
+foot = "wrist_ft")"),
+                                  "arm/x.toml", robot());
+  ASSERT_TRUE(e.has_value());
+  EXPECT_EQ(e->seed, 7u);
+  EXPECT_EQ(e->cycles(), 1250u);
+  EXPECT_EQ(e->kernel_variant, "baseline");
+  EXPECT_EQ(e->sim.integrator, SimIntegrator::kSemiImplicitEuler);
+  EXPECT_EQ(e->sim.substep_ns, 250'000);
+  EXPECT_EQ(e->robot.actuators[0].order, 0);
+  EXPECT_TRUE(e->robot.sensors[0].noise.empty());
+  EXPECT_EQ(e->robot.joints[0].torque_noise_Nm, 0.0);
+  EXPECT_FALSE(e->sim.ground_truth);
+  EXPECT_FALSE(e->sim.hoist);
+  EXPECT_EQ(e->sim.hoist_release_s, 0.5);
+  EXPECT_EQ(e->loop.on_overrun, rt::OverrunPolicy::kStop);
+  EXPECT_EQ(e->loop.stop_late, 2);
+  EXPECT_EQ(e->loop.stop_window, 10);
+  EXPECT_EQ(e->thread.policy, rt::SchedulingPolicy::kRoundRobin);
+  EXPECT_EQ(e->thread.priority, 42);
+  EXPECT_EQ(e->thread.cpu, 1);
+  EXPECT_FALSE(e->thread.lock_memory);
+  EXPECT_EQ(e->log.folder, "logs");
+  EXPECT_EQ(e->log.compression, LogCompression::kZstd);
+  EXPECT_EQ(e->report.foot, "wrist_ft");
+}
+
+TEST(Experiment, LeavesParametersToTheirController) {
+  auto e = parse_experiment(kExperiment, "arm/x.toml", robot());
+  ASSERT_TRUE(e.has_value());
+  TomlTable& parameters = e->controllers[0].parameters;
+  EXPECT_EQ(parameters.number_or("stiffnes", 1.0), 1.0);
+  parameters.finish();
+  ASSERT_EQ(e->document.diagnostics().size(), 1u);
+  EXPECT_EQ(e->document.diagnostics()[0].to_string(),
+            "arm/x.toml:7: controller[0].parameters.stiffness: unknown key "
+            "(did you mean 'stiffnes'?)");
+}
+
+TEST(Experiment, RefusesAPeriodOfZero) {
+  EXPECT_EQ(errors_of(with("period_ns = 0")),
+            "arm/x.toml:4: period_ns: 0 is out of range (must be 10000 to 1000000000)\n");
+}
+
+TEST(Experiment, RefusesAPeriodThatDoesNotFitABoard) {
+  EXPECT_EQ(errors_of(with("period_ns = 1_500_000")),
+            "arm/x.toml:4: period_ns: 1500000 ns and the control period of board 'board', "
+            "1000000 ns, do not divide each other (make one a multiple of the other)\n");
+}
+
+TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
+  EXPECT_EQ(errors_of(with("[sim]\nsubstep_ns = 300_000")),
+            "arm/x.toml:5: sim.substep_ns: 300000 ns does not divide the period of 1000000 ns "
+            "(choose a divisor of period_ns)\n"
+            "arm/x.toml:5: sim.substep_ns: 300000 ns does not divide the control period of board "
+            "'board', 1000000 ns (choose a common divisor of both)\n");
+}
+
+TEST(Experiment, RefusesABackendOfALaterVersion) {
+  EXPECT_EQ(errors_of(with("[hal]\nbackend = 'can'")),
+            "arm/x.toml:5: hal.backend: the backend 'can' is not part of this version "
+            "(set backend = \"sim\")\n");
+}
+
+TEST(Experiment, SuggestsTheNearestPosture) {
+  EXPECT_EQ(errors_of(replaced(kExperiment, "ready", "reddy")),
+            "arm/x.toml:3: posture: the robot has no posture 'reddy' (did you mean 'ready'?)\n");
+}
+
+TEST(Experiment, AsksForThePostureOfAFloatingRobot) {
+  const hal::RobotConfig floating = robot(replaced(kRobot, "fixed", "floating"));
+  EXPECT_NE(errors_of(replaced(kExperiment, "posture = \"ready\"", ""), floating)
+                .find("needs a posture to start from"),
+            std::string::npos);
+}
+
+TEST(Experiment, SuggestsTheNearestJointAndSensorOfTheReport) {
+  EXPECT_EQ(errors_of(with("[report]\nknee = 'ellbow'\nfoot = 'wristft'")),
+            "arm/x.toml:5: report.knee: the robot has no joint 'ellbow' (did you mean 'elbow'?)\n"
+            "arm/x.toml:6: report.foot: the robot has no sensor 'wristft' "
+            "(did you mean 'wrist_ft'?)\n");
+}
+
+TEST(Experiment, RefusesAnOrderThatTheActuatorsLackDataFor) {
+  EXPECT_EQ(errors_of(with("[sim]\norder = 3")),
+            "arm/x.toml:5: sim.order: the actuator 'motor' cannot be of order 3: inductance_H must "
+            "be positive (complete it in the robot's file, or leave the order to it)\n");
+}
+
+TEST(Experiment, RefusesARunWithoutController) {
+  EXPECT_NE(errors_of("robot = 'robot.toml'\nduration_s = 1\n").find("there is no controller"),
+            std::string::npos);
+}
+
+TEST(Experiment, RefusesTwoControllersOfAName) {
+  EXPECT_NE(errors_of(std::string(kExperiment) + "[[controller]]\nplugin = 'hold'\n")
+                .find("two controllers are called 'hold'"),
+            std::string::npos);
+}
+
+TEST(Experiment, RefusesARobotWithoutJoints) {
+  const hal::RobotConfig bare = robot("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n");
+  EXPECT_NE(errors_of(kExperiment, bare).find("nothing to control"), std::string::npos);
+}
+
+TEST(Experiment, RefusesMoreLateCyclesThanTheWindowHas) {
+  EXPECT_EQ(errors_of(with("[overrun]\nn = 9\nm = 5")),
+            "arm/x.toml:5: overrun.n: is more than m "
+            "(the policy stops after n late cycles of the last m)\n");
+}
+
+TEST(Experiment, SuggestsTheNearestKey) {
+  EXPECT_EQ(errors_of(with("perod_ns = 1000000")),
+            "arm/x.toml:4: perod_ns: unknown key (did you mean 'period_ns'?)\n");
+}
+
+class ExperimentFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() / (std::string("tandem_") + test->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(ExperimentFiles, FindTheRobotBesideThem) {
+  write("robot.toml", kRobot);
+  const auto e = read_experiment(write("x.toml", kExperiment));
+  ASSERT_TRUE(e.has_value());
+  EXPECT_EQ(e->robot.name, "arm");
+}
+
+TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
+  write("robot.toml", replaced(kRobot, "kp = 6", "kp = -6"));
+  const auto e = read_experiment(write("x.toml", with("perod_ns = 1")));
+  ASSERT_FALSE(e.has_value());
+  ASSERT_EQ(e.error().size(), 2u);
+  EXPECT_EQ(e.error()[0].key, "perod_ns");
+  EXPECT_EQ(e.error()[1].key, "gains.motor.position.kp");
+  EXPECT_EQ(e.error()[1].file, (folder_ / "robot.toml").string());
+}
+
+TEST_F(ExperimentFiles, NameAMissingRobot) {
+  const auto e = read_experiment(write("x.toml", kExperiment));
+  ASSERT_FALSE(e.has_value());
+  EXPECT_EQ(e.error()[0].file, (folder_ / "robot.toml").string());
+}
+
+TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
+  const auto e = read_experiment((folder_ / "no.toml").string());
+  ASSERT_FALSE(e.has_value());
+  EXPECT_EQ(e.error()[0].file, (folder_ / "no.toml").string());
+}
+
+}  // namespace
+}  // namespace tandem::runtime
