@@ -42,9 +42,9 @@ static_assert(sizeof(Frame) == 72);
 /// The smallest length that a frame can have to carry `bytes`: above 8 only FD's steps exist.
 /// @pre bytes <= 64
 [[nodiscard]] constexpr std::uint8_t frame_length(std::size_t bytes) noexcept {
-  for (const std::uint8_t step : {12, 16, 20, 24, 32, 48, 64}) {
-    if (bytes <= kClassicFrameBytes) return static_cast<std::uint8_t>(bytes);
-    if (bytes <= step) return step;
+  if (bytes <= kClassicFrameBytes) return static_cast<std::uint8_t>(bytes);
+  for (const int step : {12, 16, 20, 24, 32, 48}) {
+    if (bytes <= static_cast<std::size_t>(step)) return static_cast<std::uint8_t>(step);
   }
   return static_cast<std::uint8_t>(kMaxFrameBytes);
 }

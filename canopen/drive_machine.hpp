@@ -1,0 +1,103 @@
+// The CiA 402 drive state machine: the drive's side, and what the master does about it.
+// Layer: canopen.  Thread: any; an object belongs to one thread.
+#pragma once
+
+#include <cstdint>
+
+#include "base/realtime.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::canopen {
+
+enum class DriveState : std::uint8_t {
+  kNotReadyToSwitchOn = 0,  ///< statusword x0xx 0000
+  kSwitchOnDisabled,        ///< x1xx 0000
+  kReadyToSwitchOn,         ///< x01x 0001
+  kSwitchedOn,              ///< x01x 0011
+  kOperationEnabled,        ///< x01x 0111
+  kQuickStopActive,         ///< x00x 0111
+  kFaultReactionActive,     ///< x0xx 1111
+  kFault,                   ///< x0xx 1000
+};
+[[nodiscard]] const char* to_string(DriveState state) noexcept;
+
+/// The state that a statusword tells; bits 4, 7 to 15 play no part. A pattern of no state (none
+/// is sent by a conforming drive) counts as kNotReadyToSwitchOn.
+[[nodiscard]] DriveState drive_state(std::uint16_t statusword) noexcept TANDEM_RT;
+
+/// The controlword that brings a drive one transition nearer to Operation Enabled, from any state
+/// but a fault; in Fault 0x0000, so that fault reset gets its rising edge.
+[[nodiscard]] std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT;
+
+/// What the drive has to do with its motor.
+enum class DriveMotion : std::uint8_t {
+  kNone,       ///< no torque
+  kFollow,     ///< follow the mode of operation's reference
+  kSlowDown,   ///< come to rest on the slow-down ramp
+  kQuickStop,  ///< come to rest on the quick-stop ramp
+};
+
+/// Option codes, with the profile's defaults.
+struct DriveOptions {
+  std::int16_t quick_stop = 2;         ///< 605A: 0 disable; 1, 2 slow, quick ramp; 5, 6 and stay
+  std::int16_t shutdown = 0;           ///< 605B: 0 disable; 1 slow-down ramp
+  std::int16_t disable_operation = 1;  ///< 605C: 0 disable; 1 slow-down ramp
+  std::int16_t halt = 1;               ///< 605D: 1 slow-down ramp; 2 quick-stop ramp
+  std::int16_t fault_reaction = 2;     ///< 605E: 0 disable; 1, 2 slow, quick ramp
+};
+
+/// What the drive knows when the machine is stepped.
+struct DriveInputs {
+  bool fault = false;            ///< a fault is present now
+  bool at_rest = false;          ///< a ramp has ended; looked at only during one
+  bool internal_limit = false;   ///< statusword bit 11
+  bool follows_command = false;  ///< statusword bit 12, shown in Operation Enabled
+  bool following_error = false;  ///< statusword bit 13
+  bool warning = false;          ///< statusword bit 7
+};
+
+/// The drive's side: transitions 0 to 16, at most one per step.
+class DriveMachine {
+ public:
+  /// Takes the controlword in force, makes the transition that it or the inputs ask for.
+  /// A fault reset is a rising edge of bit 7 and works only when `inputs.fault` is gone.
+  DriveState step(std::uint16_t controlword, const DriveInputs& inputs,
+                  const DriveOptions& options) noexcept TANDEM_RT;
+  /// The loss of the connection, as option code 6007 has it: 2 disable voltage, 3 quick stop.
+  void abort_connection(std::int16_t option, const DriveOptions& options) noexcept TANDEM_RT;
+
+  [[nodiscard]] DriveState state() const noexcept { return state_; }
+  [[nodiscard]] DriveMotion motion() const noexcept { return motion_; }
+  [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
+  /// True in the step that left Fault by a reset.
+  [[nodiscard]] bool fault_was_reset() const noexcept { return fault_was_reset_; }
+
+  /// Power-on again: transition 0.
+  void reset() noexcept { *this = DriveMachine{}; }
+  void archive(Archive& ar);
+
+ private:
+  void follow(std::uint16_t controlword, const DriveInputs& inputs,
+              const DriveOptions& options) noexcept;
+  void from_enabled(std::uint16_t controlword, const DriveInputs& inputs,
+                    const DriveOptions& options) noexcept;
+  void from_quick_stop(std::uint16_t controlword, const DriveInputs& inputs,
+                       const DriveOptions& options) noexcept;
+  void quick_stop(const DriveOptions& options) noexcept;
+  void slow_down_to(DriveState state, std::int16_t option) noexcept;
+  void enter(DriveState state) noexcept;
+  void compose_statusword(const DriveInputs& inputs) noexcept;
+
+  DriveState state_ = DriveState::kNotReadyToSwitchOn;
+  DriveState after_ramp_ = DriveState::kOperationEnabled;  ///< where a ramp in progress leads
+  DriveMotion motion_ = DriveMotion::kNone;
+  bool last_reset_bit_ = true;  ///< a bit that is set from the beginning is no edge
+  bool fault_was_reset_ = false;
+  std::uint16_t statusword_ = 0;
+};
+
+}  // namespace tandem::canopen

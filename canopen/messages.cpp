@@ -1,0 +1,88 @@
+#include "canopen/messages.hpp"
+
+#include <algorithm>
+
+#include "canopen/bytes.hpp"
+
+namespace tandem::canopen {
+
+namespace {
+
+/// The node id of a frame whose COB-ID is `base` + node, or 0.
+std::uint8_t node_of(const Frame& frame, std::uint32_t base) noexcept {
+  if (frame.id <= base || frame.id > base + kMaxNodeId) return 0;
+  return static_cast<std::uint8_t>(frame.id - base);
+}
+
+Frame short_frame(std::uint32_t id, std::uint8_t length) noexcept {
+  Frame frame;
+  frame.id = id;
+  frame.length = length;
+  return frame;
+}
+
+}  // namespace
+
+const char* to_string(NmtState state) noexcept {
+  switch (state) {
+    case NmtState::kBootUp: return "boot-up";
+    case NmtState::kStopped: return "stopped";
+    case NmtState::kOperational: return "operational";
+    case NmtState::kPreOperational: return "pre-operational";
+  }
+  return "unknown";
+}
+
+Frame make_nmt(NmtCommand command, int node) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kNmt, 2);
+  frame.data[0] = static_cast<std::uint8_t>(command);
+  frame.data[1] = static_cast<std::uint8_t>(node);
+  return frame;
+}
+
+std::optional<NmtMessage> parse_nmt(const Frame& frame) noexcept TANDEM_RT {
+  if (frame.id != cob::kNmt || frame.length != 2) return std::nullopt;
+  switch (const auto command = static_cast<NmtCommand>(frame.data[0])) {
+    case NmtCommand::kStart:
+    case NmtCommand::kStop:
+    case NmtCommand::kEnterPreOperational:
+    case NmtCommand::kResetNode:
+    case NmtCommand::kResetCommunication: return NmtMessage{command, frame.data[1]};
+  }
+  return std::nullopt;
+}
+
+Frame make_sync() noexcept TANDEM_RT { return short_frame(cob::kSync, 0); }
+
+Frame make_heartbeat(int node, NmtState state) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kHeartbeat + static_cast<std::uint32_t>(node), 1);
+  frame.data[0] = static_cast<std::uint8_t>(state);
+  return frame;
+}
+
+std::optional<HeartbeatMessage> parse_heartbeat(const Frame& frame) noexcept TANDEM_RT {
+  const std::uint8_t node = node_of(frame, cob::kHeartbeat);
+  if (node == 0 || frame.length != 1) return std::nullopt;
+  return HeartbeatMessage{node, static_cast<NmtState>(frame.data[0] & 0x7F)};
+}
+
+Frame make_emergency(const EmergencyMessage& message) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kEmergency + message.node, 8);
+  put(frame.data.data(), static_cast<std::uint16_t>(message.code));
+  frame.data[2] = message.error_register;
+  std::ranges::copy(message.manufacturer, frame.data.begin() + 3);
+  return frame;
+}
+
+std::optional<EmergencyMessage> parse_emergency(const Frame& frame) noexcept TANDEM_RT {
+  const std::uint8_t node = node_of(frame, cob::kEmergency);
+  if (node == 0 || frame.length != 8) return std::nullopt;
+  EmergencyMessage message;
+  message.node = node;
+  message.code = static_cast<ErrorCode>(get<std::uint16_t>(frame.data.data()));
+  message.error_register = frame.data[2];
+  std::copy_n(frame.data.begin() + 3, message.manufacturer.size(), message.manufacturer.begin());
+  return message;
+}
+
+}  // namespace tandem::canopen

@@ -1,0 +1,65 @@
+// The one-frame messages of CiA 301 as make/parse pairs: NMT, SYNC, heartbeat, emergency.
+// Layer: canopen.  Thread: any.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "base/realtime.hpp"
+#include "canopen/frame.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::canopen {
+
+/// NMT states as the heartbeat carries them.
+enum class NmtState : std::uint8_t {
+  kBootUp = 0,
+  kStopped = 4,
+  kOperational = 5,
+  kPreOperational = 127,
+};
+[[nodiscard]] const char* to_string(NmtState state) noexcept;
+
+enum class NmtCommand : std::uint8_t {
+  kStart = 1,
+  kStop = 2,
+  kEnterPreOperational = 128,
+  kResetNode = 129,
+  kResetCommunication = 130,
+};
+
+/// Frame 000: byte 0 command, byte 1 node id, 0 for every node.
+struct NmtMessage {
+  NmtCommand command = NmtCommand::kStart;
+  std::uint8_t node = 0;
+};
+[[nodiscard]] Frame make_nmt(NmtCommand command, int node) noexcept TANDEM_RT;
+/// Empty when the frame is no NMT command or one of an unknown number.
+[[nodiscard]] std::optional<NmtMessage> parse_nmt(const Frame& frame) noexcept TANDEM_RT;
+
+/// Frame 080 without data.
+[[nodiscard]] Frame make_sync() noexcept TANDEM_RT;
+
+/// Frame 700 + node: byte 0 state. Boot-up is the state 0, sent once.
+struct HeartbeatMessage {
+  std::uint8_t node = 0;
+  NmtState state = NmtState::kBootUp;
+};
+[[nodiscard]] Frame make_heartbeat(int node, NmtState state) noexcept TANDEM_RT;
+[[nodiscard]] std::optional<HeartbeatMessage> parse_heartbeat(const Frame& frame) noexcept
+    TANDEM_RT;
+
+/// Frame 080 + node: bytes 0-1 error code, byte 2 error register, bytes 3-7 the manufacturer's.
+/// Error code 0 says that every error is gone. Ours: byte 3 is the axis, counted from 0.
+struct EmergencyMessage {
+  std::uint8_t node = 0;
+  ErrorCode code = ErrorCode::kNone;
+  std::uint8_t error_register = 0;
+  std::array<std::uint8_t, 5> manufacturer{};
+};
+[[nodiscard]] Frame make_emergency(const EmergencyMessage& message) noexcept TANDEM_RT;
+[[nodiscard]] std::optional<EmergencyMessage> parse_emergency(const Frame& frame) noexcept
+    TANDEM_RT;
+
+}  // namespace tandem::canopen

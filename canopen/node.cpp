@@ -1,0 +1,262 @@
+#include "canopen/node.hpp"
+
+#include <algorithm>
+
+#include "base/archive.hpp"
+#include "canopen/bytes.hpp"
+
+namespace tandem::canopen {
+
+namespace {
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr std::uint32_t kFunctionMask = 0x780;
+
+}  // namespace
+
+Node::Node(const NodeConfig& config, ObjectDictionary& od) : config_(config), sdo_(od, config.id) {
+  add_objects(od);
+}
+
+void Node::add_objects(ObjectDictionary& od) {
+  using namespace object;
+  od.add_value(kDeviceType, 0, config_.device_type);
+  od.add(object::kErrorRegister, 0, error_register_, kReadTpdo);
+  od.add(object::kErrorHistory, 0, history_count_, kReadWrite, {0, 0}, this);
+  for (std::size_t i = 0; i < history_.size(); ++i) {
+    od.add(object::kErrorHistory, static_cast<std::uint8_t>(i + 1), history_[i], kRead);
+  }
+  od.add_value<std::uint32_t>(kSyncId, 0, cob::kSync);
+  od.add(kSyncPeriod, 0, sync_period_us_, kReadWrite);
+  od.add_string(kDeviceName, 0, config_.name);
+  od.add_value<std::uint32_t>(kEmergencyId, 0,
+                              cob::kEmergency + static_cast<std::uint32_t>(config_.id));
+  od.add_value<std::uint8_t>(kHeartbeatConsumer, 0, kHeartbeatConsumers);
+  for (std::size_t i = 0; i < consumers_.size(); ++i) {
+    od.add(kHeartbeatConsumer, static_cast<std::uint8_t>(i + 1), consumers_[i].object, kReadWrite,
+           {0, 0x007FFFFF}, this);
+  }
+  od.add(kHeartbeatProducer, 0, producer_ms_, kReadWrite, {}, this);
+  od.add_value<std::uint8_t>(kIdentity, 0, 4);
+  od.add_value(kIdentity, kVendor, config_.vendor);
+  od.add_value(kIdentity, kProduct, config_.product);
+  od.add_value(kIdentity, kRevision, config_.revision);
+  od.add_value(kIdentity, kSerial, config_.serial);
+  od.add_value<std::uint8_t>(kErrorBehaviour, 0, 1);
+  od.add(kErrorBehaviour, 1, error_behaviour_, kReadWrite, {0, 2});
+  for (int i = 0; i < kPdosPerNode; ++i) {
+    rpdos_[i].add_to(od, PdoDirection::kReceive, i + 1, config_.id);
+    tpdos_[i].add_to(od, PdoDirection::kTransmit, i + 1, config_.id);
+  }
+}
+
+NodeEvents Node::receive(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
+  const auto id = static_cast<std::uint32_t>(config_.id);
+  if (state_ == NmtState::kBootUp) return 0;  // not on the bus yet
+  if (frame.id == cob::kNmt) return on_nmt(frame, out);
+  if (state_ == NmtState::kStopped) {
+    if ((frame.id & kFunctionMask) == cob::kHeartbeat) on_heartbeat(frame);
+    return 0;
+  }
+  if (frame.id == cob::kSync) return on_sync();
+  if (frame.id == cob::kSdoRequest + id) {
+    sdo_.receive(frame, out);
+    return 0;
+  }
+  if ((frame.id & kFunctionMask) == cob::kHeartbeat) {
+    on_heartbeat(frame);
+    return 0;
+  }
+  return state_ == NmtState::kOperational ? on_rpdo(frame, out) : NodeEvents{0};
+}
+
+NodeEvents Node::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
+  if (state_ == NmtState::kBootUp) {  // the boot-up message, then pre-operational by itself
+    out.push(make_heartbeat(config_.id, NmtState::kBootUp));
+    since_heartbeat_ns_ = 0;
+    return enter(NmtState::kPreOperational);
+  }
+  produce_heartbeat(dt_ns, out);
+  const NodeEvents events = watch_heartbeats(dt_ns, out);
+  if (state_ != NmtState::kStopped) sdo_.process(dt_ns, out);
+  if (state_ == NmtState::kOperational) {
+    for (TxPdo& pdo : tpdos_) pdo.process(dt_ns, out);
+  }
+  return events;
+}
+
+void Node::transmit_synchronous(FrameSink& out) noexcept TANDEM_RT {
+  if (state_ != NmtState::kOperational) return;
+  for (TxPdo& pdo : tpdos_) pdo.sync(out);
+}
+
+NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept {
+  const auto message = parse_nmt(frame);
+  if (!message || (message->node != 0 && message->node != config_.id)) return 0;
+  switch (message->command) {
+    case NmtCommand::kStart: return enter(NmtState::kOperational);
+    case NmtCommand::kStop: return enter(NmtState::kStopped);
+    case NmtCommand::kEnterPreOperational: return enter(NmtState::kPreOperational);
+    case NmtCommand::kResetNode:
+    case NmtCommand::kResetCommunication: {
+      NodeEvents events = enter(NmtState::kBootUp);
+      reset_communication();
+      events |= message->command == NmtCommand::kResetNode ? kEventResetNode
+                                                           : kEventResetCommunication;
+      return events | process(0, out);
+    }
+  }
+  return 0;
+}
+
+NodeEvents Node::on_sync() noexcept {
+  applied_rpdos_ = 0;
+  NodeEvents events = kEventSync;
+  if (state_ != NmtState::kOperational) return events;
+  for (int i = 0; i < kPdosPerNode; ++i) {
+    if (!rpdos_[i].sync()) continue;
+    applied_rpdos_ |= static_cast<std::uint8_t>(1u << i);
+    events |= kEventRpdo;
+  }
+  return events;
+}
+
+NodeEvents Node::on_rpdo(const Frame& frame, FrameSink& out) noexcept {
+  for (int i = 0; i < kPdosPerNode; ++i) {
+    switch (rpdos_[i].receive(frame)) {
+      case RxPdo::Taken::kNotMine: continue;
+      case RxPdo::Taken::kLatched: return 0;
+      case RxPdo::Taken::kApplied:
+        applied_rpdos_ |= static_cast<std::uint8_t>(1u << i);
+        return kEventRpdo;
+      case RxPdo::Taken::kTooShort:
+        raise_error(ErrorCode::kPdoTooShort, error_register::kCommunication, 0, out);
+        return 0;
+    }
+  }
+  return 0;
+}
+
+void Node::on_heartbeat(const Frame& frame) noexcept {
+  const auto message = parse_heartbeat(frame);
+  if (!message) return;
+  for (Consumer& consumer : consumers_) {
+    if (consumer.node() != message->node || (consumer.object & 0xFFFF) == 0) continue;
+    consumer.heard = true;
+    consumer.lost = false;
+    consumer.silent_ns = 0;
+  }
+}
+
+NodeEvents Node::watch_heartbeats(std::int64_t dt_ns, FrameSink& out) noexcept {
+  NodeEvents events = 0;
+  for (Consumer& consumer : consumers_) {
+    if (!consumer.heard || consumer.lost) continue;
+    consumer.silent_ns += dt_ns;
+    if (consumer.silent_ns < (consumer.object & 0xFFFF) * kNsPerMs) continue;
+    consumer.lost = true;
+    raise_error(ErrorCode::kHeartbeatLost, error_register::kCommunication, 0, out);
+    events = static_cast<NodeEvents>(events | kEventHeartbeatLost | communication_error());
+  }
+  return events;
+}
+
+NodeEvents Node::communication_error() noexcept {
+  if (error_behaviour_ == 2) return enter(NmtState::kStopped);
+  if (error_behaviour_ == 0 && state_ == NmtState::kOperational) {
+    return enter(NmtState::kPreOperational);
+  }
+  return 0;
+}
+
+NodeEvents Node::enter(NmtState state) noexcept {
+  const NmtState before = state_;
+  state_ = state;
+  if (before == state) return 0;
+  if (state == NmtState::kOperational) {
+    for (RxPdo& pdo : rpdos_) pdo.restart();
+    for (TxPdo& pdo : tpdos_) pdo.restart();
+    return kEventOperational;
+  }
+  if (state != NmtState::kPreOperational) sdo_.reset();
+  return before == NmtState::kOperational ? NodeEvents{kEventLeftOperational} : NodeEvents{0};
+}
+
+void Node::reset_communication() noexcept {
+  applied_rpdos_ = 0;
+  error_register_ = 0;
+  error_behaviour_ = 0;
+  history_count_ = 0;
+  history_.fill(0);
+  producer_ms_ = 0;
+  sync_period_us_ = 0;
+  since_heartbeat_ns_ = 0;
+  consumers_.fill({});
+  for (RxPdo& pdo : rpdos_) pdo.reset();
+  for (TxPdo& pdo : tpdos_) pdo.reset();
+}
+
+void Node::produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept {
+  if (producer_ms_ == 0) return;
+  since_heartbeat_ns_ += dt_ns;
+  const std::int64_t period_ns = producer_ms_ * kNsPerMs;
+  if (since_heartbeat_ns_ < period_ns) return;
+  since_heartbeat_ns_ %= period_ns;
+  out.push(make_heartbeat(config_.id, state_));
+}
+
+void Node::raise_error(ErrorCode code, std::uint8_t error_register, int axis,
+                       FrameSink& out) noexcept TANDEM_RT {
+  error_register_ |= static_cast<std::uint8_t>(error_register | error_register::kGeneric);
+  std::shift_right(history_.begin(), history_.end(), 1);
+  history_[0] = static_cast<std::uint32_t>(code) | (static_cast<std::uint32_t>(axis) << 16);
+  if (history_count_ < kErrorHistory) ++history_count_;
+  if (state_ == NmtState::kStopped || state_ == NmtState::kBootUp) return;
+  out.push(make_emergency({.node = static_cast<std::uint8_t>(config_.id),
+                           .code = code,
+                           .error_register = error_register_,
+                           .manufacturer = {static_cast<std::uint8_t>(axis)}}));
+}
+
+void Node::clear_errors(FrameSink& out) noexcept TANDEM_RT {
+  if (error_register_ == 0) return;
+  error_register_ = 0;
+  if (state_ == NmtState::kStopped || state_ == NmtState::kBootUp) return;
+  out.push(make_emergency({.node = static_cast<std::uint8_t>(config_.id)}));
+}
+
+AbortCode Node::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {
+  if (entry.index != object::kHeartbeatConsumer) return AbortCode::kNone;
+  const auto wanted = get<std::uint32_t>(bytes);
+  const auto node = static_cast<std::uint8_t>(wanted >> 16);
+  if (node == 0 || (wanted & 0xFFFF) == 0) return AbortCode::kNone;
+  if (node > kMaxNodeId) return AbortCode::kRange;
+  for (std::size_t i = 0; i < consumers_.size(); ++i) {  // CiA 301: a node only once
+    const bool active = (consumers_[i].object & 0xFFFF) != 0;
+    if (i + 1 != entry.sub && active && consumers_[i].node() == node) {
+      return AbortCode::kIncompatibleParameter;
+    }
+  }
+  return AbortCode::kNone;
+}
+
+void Node::written(const ObjectEntry& entry) noexcept TANDEM_RT {
+  if (entry.index == object::kErrorHistory) history_.fill(0);
+  if (entry.index == object::kHeartbeatProducer) since_heartbeat_ns_ = 0;
+  if (entry.index == object::kHeartbeatConsumer) {
+    Consumer& consumer = consumers_[entry.sub - 1u];
+    consumer.heard = false;
+    consumer.lost = false;
+    consumer.silent_ns = 0;
+  }
+}
+
+void Node::archive(Archive& ar) {
+  ar(state_, applied_rpdos_, error_register_, error_behaviour_, history_count_, producer_ms_,
+     sync_period_us_, since_heartbeat_ns_, history_, sdo_);
+  for (Consumer& c : consumers_) ar(c.object, c.heard, c.lost, c.silent_ns);
+  for (RxPdo& pdo : rpdos_) ar(pdo);
+  for (TxPdo& pdo : tpdos_) ar(pdo);
+}
+
+}  // namespace tandem::canopen

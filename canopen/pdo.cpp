@@ -1,0 +1,199 @@
+#include "canopen/pdo.hpp"
+
+#include <algorithm>
+
+#include "base/archive.hpp"
+#include "canopen/bytes.hpp"
+
+namespace tandem::canopen {
+
+namespace {
+
+constexpr std::uint32_t kNoRtr = 0x40000000;       // bit 30 of a TPDO's COB-ID
+constexpr std::uint32_t kExtendedId = 0x20000000;  // bit 29: 29-bit identifiers, which we lack
+constexpr std::int64_t kNsPerMs = 1'000'000;
+
+enum ParameterSub : std::uint8_t { kCobId = 1, kType = 2, kInhibit = 3, kEvent = 5 };
+
+}  // namespace
+
+bool Pdo::add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id) {
+  using namespace object;
+  const bool receive = direction == PdoDirection::kReceive;
+  const auto offset = static_cast<std::uint16_t>(number - 1);
+  od_ = &od;
+  direction_ = direction;
+  parameter_index_ = static_cast<std::uint16_t>((receive ? kRpdoParameter : kTpdoParameter) +
+                                                offset);
+  default_cob_id_ = cob::kInvalid |
+                    (receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id) | kNoRtr);
+  reset();
+  const std::uint16_t p = parameter_index_;
+  bool ok = od.add_value<std::uint8_t>(p, 0, receive ? kType : kEvent);
+  ok = od.add(p, kCobId, cob_id_, kReadWrite, {}, this) && ok;
+  ok = od.add(p, kType, type_, kReadWrite, {}, this) && ok;
+  if (!receive) {
+    ok = od.add(p, kInhibit, inhibit_100us_, kReadWrite, {}, this) && ok;
+    ok = od.add(p, kEvent, event_ms_, kReadWrite, {}, this) && ok;
+  }
+  const auto m = static_cast<std::uint16_t>((receive ? kRpdoMapping : kTpdoMapping) + offset);
+  ok = od.add(m, 0, count_, kReadWrite, {}, this) && ok;
+  for (std::size_t i = 0; i < kMaxMappedObjects; ++i) {
+    ok = od.add(m, static_cast<std::uint8_t>(i + 1), mapping_[i], kReadWrite, {}, this) && ok;
+  }
+  return ok;
+}
+
+void Pdo::reset() noexcept {
+  cob_id_ = default_cob_id_;
+  type_ = kEventProfile;
+  inhibit_100us_ = 0;
+  event_ms_ = 0;
+  count_ = 0;
+  mapping_.fill(0);
+  resolve();
+  restart();
+}
+
+AbortCode Pdo::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {
+  return entry.index == parameter_index_ ? check_parameter(entry.sub, bytes)
+                                         : check_mapping(entry.sub, bytes);
+}
+
+AbortCode Pdo::check_parameter(std::uint8_t sub,
+                               const std::uint8_t* bytes) const noexcept TANDEM_RT {
+  if (sub == kCobId) {
+    const auto wanted = get<std::uint32_t>(bytes);
+    if ((wanted & kExtendedId) != 0) return AbortCode::kRange;
+    const bool stays_in_use = in_use() && (wanted & cob::kInvalid) == 0;
+    if (stays_in_use && (wanted & cob::kIdMask) != cob_id()) return AbortCode::kRange;
+  }
+  if (sub == kType && bytes[0] > 240 && bytes[0] < kEventManufacturer) return AbortCode::kRange;
+  if (sub == kInhibit && in_use()) return AbortCode::kUnsupportedAccess;
+  return AbortCode::kNone;
+}
+
+AbortCode Pdo::check_mapping(std::uint8_t sub,
+                             const std::uint8_t* bytes) const noexcept TANDEM_RT {
+  if (in_use()) return AbortCode::kUnsupportedAccess;
+  if (sub != 0) {
+    return count_ != 0 ? AbortCode::kUnsupportedAccess : check_mapped(get<std::uint32_t>(bytes));
+  }
+  if (bytes[0] > kMaxMappedObjects) return AbortCode::kMappingTooLong;
+  std::size_t bits = 0;
+  for (std::size_t i = 0; i < bytes[0]; ++i) {
+    const AbortCode code = check_mapped(mapping_[i]);
+    if (code != AbortCode::kNone) return code;
+    bits += mapping_[i] & 0xFF;
+  }
+  return bits > 8 * kMaxFrameBytes ? AbortCode::kMappingTooLong : AbortCode::kNone;
+}
+
+AbortCode Pdo::check_mapped(std::uint32_t mapped) const noexcept TANDEM_RT {
+  const auto index = static_cast<std::uint16_t>(mapped >> 16);
+  const auto sub = static_cast<std::uint8_t>(mapped >> 8);
+  const ObjectEntry* entry = od_->find(index, sub);
+  if (entry == nullptr) return od_->exists(index, sub);
+  const std::uint8_t wanted = direction_ == PdoDirection::kReceive ? kMapRpdo : kMapTpdo;
+  if ((entry->access & wanted) == 0) return AbortCode::kNotMappable;
+  return (mapped & 0xFF) == 8u * entry->size ? AbortCode::kNone : AbortCode::kNotMappable;
+}
+
+void Pdo::written(const ObjectEntry& entry) noexcept TANDEM_RT {
+  if (entry.index != parameter_index_) {
+    resolve();
+  } else if (entry.sub == kCobId) {
+    restart();
+  }
+}
+
+void Pdo::resolve() noexcept TANDEM_RT {
+  mapped_bytes_ = 0;
+  objects_.fill(nullptr);
+  for (std::size_t i = 0; i < count_; ++i) {
+    objects_[i] = od_->find(static_cast<std::uint16_t>(mapping_[i] >> 16),
+                            static_cast<std::uint8_t>(mapping_[i] >> 8));
+    mapped_bytes_ += objects_[i]->size;
+  }
+}
+
+void Pdo::archive(Archive& ar) {
+  ar(cob_id_, type_, count_, inhibit_100us_, event_ms_, mapping_);
+  if (ar.reading() && ar.ok()) resolve();
+}
+
+RxPdo::Taken RxPdo::receive(const Frame& frame) noexcept TANDEM_RT {
+  if (!in_use() || frame.id != cob_id()) return Taken::kNotMine;
+  if (frame.length < mapped_bytes()) return Taken::kTooShort;
+  if (!synchronous()) {
+    apply(frame.data.data());
+    return Taken::kApplied;
+  }
+  latched_ = frame.data;
+  pending_ = true;
+  return Taken::kLatched;
+}
+
+bool RxPdo::sync() noexcept TANDEM_RT {
+  if (!pending_) return false;
+  apply(latched_.data());
+  pending_ = false;
+  return true;
+}
+
+void RxPdo::apply(const std::uint8_t* bytes) noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    objects_[i]->decode(bytes);
+    bytes += objects_[i]->size;
+  }
+}
+
+void RxPdo::archive(Archive& ar) {
+  Pdo::archive(ar);
+  ar(pending_, latched_);
+}
+
+void TxPdo::sync(FrameSink& out) noexcept TANDEM_RT {
+  if (!in_use() || !synchronous()) return;
+  if (type_ == kSynchronousAcyclic) {
+    if (requested_) send(out);
+    return;
+  }
+  if (++syncs_ >= type_) send(out);
+}
+
+void TxPdo::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
+  if (!in_use() || synchronous()) return;
+  since_sent_ns_ += dt_ns;
+  if (event_ms_ != 0 && since_sent_ns_ >= event_ms_ * kNsPerMs) requested_ = true;
+  if (requested_ && since_sent_ns_ >= inhibit_100us_ * (kNsPerMs / 10)) send(out);
+}
+
+void TxPdo::send(FrameSink& out) noexcept {
+  Frame frame;
+  frame.id = cob_id();
+  frame.length = frame_length(mapped_bytes());
+  if (frame.length > kClassicFrameBytes) frame.flags = kFlagFd | kFlagBrs;
+  std::uint8_t* bytes = frame.data.data();
+  for (std::size_t i = 0; i < count_; ++i) {
+    objects_[i]->encode(bytes);
+    bytes += objects_[i]->size;
+  }
+  out.push(frame);
+  requested_ = false;
+  syncs_ = 0;
+  since_sent_ns_ = 0;
+}
+
+void TxPdo::restart() noexcept TANDEM_RT {
+  requested_ = false;
+  syncs_ = 0;
+  since_sent_ns_ = INT64_MAX / 2;  // the inhibit time counts from a transmission
+}
+
+void TxPdo::archive(Archive& ar) {
+  Pdo::archive(ar);
+  ar(requested_, syncs_, since_sent_ns_);
+}
+
+}  // namespace tandem::canopen
