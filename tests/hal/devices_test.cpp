@@ -1,0 +1,161 @@
+#include "hal/devices.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "hal/trapezoid.hpp"
+#include "tests/hal/fake_backend.hpp"
+
+namespace tandem::hal {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Trapezoid, RestsExactlyAtItsTargetAfterTheClosedFormsTime) {
+  Trapezoid reference;
+  int steps = 0;
+  double fastest = 0.0, last = 0.0;
+  while (!reference.step(1.0, 0.5, 2.0, 1e-3)) {
+    ASSERT_LE(std::abs(reference.velocity_rad_s - last), 2e-3 * (1 + 1e-9));
+    last = reference.velocity_rad_s;
+    fastest = std::max(fastest, last);
+    ASSERT_LE(reference.position_rad, 1.0 + 1e-12);
+    ASSERT_LT(++steps, 10'000);
+  }
+  EXPECT_EQ(reference.position_rad, 1.0);
+  EXPECT_EQ(reference.velocity_rad_s, 0.0);
+  EXPECT_DOUBLE_EQ(fastest, 0.5);
+  EXPECT_NEAR(steps * 1e-3, 1.0 / 0.5 + 0.5 / 2.0, 3e-3);  // L / v + v / a
+}
+
+TEST(Trapezoid, TurnsRoundWithoutAJumpOfVelocity) {
+  Trapezoid reference;
+  for (int i = 0; i < 500; ++i) reference.step(1.0, 0.5, 2.0, 1e-3);
+  EXPECT_GT(reference.velocity_rad_s, 0.4);
+  double last = reference.velocity_rad_s;
+  int steps = 0;
+  while (!reference.step(-0.2, 0.5, 2.0, 1e-3)) {
+    ASSERT_LE(std::abs(reference.velocity_rad_s - last), 2e-3 * (1 + 1e-9));
+    last = reference.velocity_rad_s;
+    ASSERT_GE(reference.position_rad, -0.2 - 1e-12);
+    ASSERT_LT(++steps, 10'000);
+  }
+  EXPECT_EQ(reference.position_rad, -0.2);
+}
+
+class DevicesTest : public testing::Test {
+ protected:
+  void mode(ControlMode mode) { ASSERT_EQ(devices.modes.set_control_mode(0, mode), Code::kOk); }
+
+  RobotConfig robot = test::fake_robot();  // +-1.5 rad, 2 rad/s, 20 Nm, 24 V, 10 A
+  StateImage state{robot.shape()};
+  CommandImage command{robot.shape()};
+  ParameterImage parameters = initial_parameters(robot);
+  Devices devices{robot, state, command, parameters, 1'000'000};
+};
+
+TEST_F(DevicesTest, RefuseWhatIsNotFiniteOrBeyondALimitAndChangeNothing) {
+  mode(ControlMode::kPosition);
+  const CommandImage before = command;
+  EXPECT_EQ(devices.position.position_move(0, kNan), Code::kNotFinite);
+  EXPECT_EQ(devices.position.position_move(0, 1.6), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.relative_move(0, -2.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.set_ref_speed(0, 2.1), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.set_ref_speed(0, 0.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.set_ref_acceleration(0, kNan), Code::kNotFinite);
+  EXPECT_EQ(devices.position_direct.set_position(0, -1.6), Code::kOutOfRange);
+  EXPECT_EQ(devices.impedance.set_impedance(0, {-1.0, 0.0}), Code::kOutOfRange);
+  EXPECT_EQ(devices.impedance.set_impedance(0, {10.0, kNan}), Code::kNotFinite);
+  EXPECT_EQ(devices.impedance.set_impedance_offset(0, 21.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.pid.set_pid(0, PidLoop::kPosition, {1.0, -1.0, 0.0}), Code::kOutOfRange);
+  devices.advance();
+  EXPECT_TRUE(std::ranges::equal(command.bytes(), before.bytes()));
+  EXPECT_EQ(parameters.revision(0), 0U);
+}
+
+TEST_F(DevicesTest, RefuseAReferenceOfAnotherMode) {
+  mode(ControlMode::kPosition);
+  EXPECT_EQ(devices.velocity.velocity_move(0, 0.1), Code::kOutOfRange);
+  EXPECT_EQ(devices.torque.set_ref_torque(0, 1.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.open_loop.set_ref_voltage(0, 1.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.current.set_ref_current(0, 1.0), Code::kOutOfRange);
+  mode(ControlMode::kTorque);
+  EXPECT_EQ(devices.position.position_move(0, 0.1), Code::kOutOfRange);
+  EXPECT_EQ(devices.position_direct.set_position(0, 0.1), Code::kOutOfRange);
+  EXPECT_EQ(devices.torque.set_ref_torque(0, 1.0), Code::kOk);
+}
+
+TEST_F(DevicesTest, AnswerForAJointThatDoesNotExist) {
+  EXPECT_TRUE(std::isnan(devices.encoders.position_rad(3)));
+  EXPECT_EQ(devices.encoders.timestamp_ns(3), -1);
+  EXPECT_EQ(devices.modes.set_control_mode(3, ControlMode::kIdle), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.position_move(3, 0.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.pid.set_pid(3, PidLoop::kTorque, {}), Code::kOutOfRange);
+  EXPECT_TRUE(std::isnan(devices.pid.pid(3, PidLoop::kTorque).kp));
+  EXPECT_EQ(devices.amplifier.status(3), DriveState::kUnknown);
+  EXPECT_EQ(devices.amplifier.reset_fault(3), Code::kOutOfRange);
+}
+
+TEST_F(DevicesTest, SeedReferencesFromTheMeasuredStateOnAModeChange) {
+  state.position_rad()[0] = 0.7;
+  state.torque_Nm()[0] = 3.0;
+  state.voltage_V()[0] = 2.0;
+  state.current_A()[0] = 0.5;
+  command.velocity_rad_s()[0] = 9.0;
+  mode(ControlMode::kPosition);
+  EXPECT_EQ(command.position_rad()[0], 0.7);
+  EXPECT_EQ(command.velocity_rad_s()[0], 0.0);
+  EXPECT_EQ(command.torque_Nm()[0], 0.0);
+  mode(ControlMode::kTorque);
+  EXPECT_EQ(command.torque_Nm()[0], 3.0);
+  mode(ControlMode::kOpenLoop);
+  EXPECT_EQ(command.voltage_V()[0], 2.0);
+  mode(ControlMode::kCurrent);
+  EXPECT_EQ(command.current_A()[0], 0.5);
+}
+
+TEST_F(DevicesTest, GiveTimestampsOfTheSampleNotOfTheCycle) {
+  state.time_ns()[0] = 50'000'000;
+  state.age_cycles()[1] = 3;
+  state.sensor_age_cycles()[0] = 2;
+  EXPECT_EQ(devices.encoders.timestamp_ns(0), 50'000'000);
+  EXPECT_EQ(devices.encoders.timestamp_ns(1), 47'000'000);
+  EXPECT_EQ(devices.force_torque("hand")->timestamp_ns(), 48'000'000);
+}
+
+TEST_F(DevicesTest, FindSensorsByNameAndSuggestTheNearest) {
+  EXPECT_TRUE(devices.force_torque("hand").has_value());
+  EXPECT_TRUE(devices.imu("imu").has_value());
+  EXPECT_FALSE(devices.imu("hand").has_value());
+  EXPECT_EQ(devices.force_torque("hnad").error().hint, "did you mean 'hand'?");
+}
+
+TEST_F(DevicesTest, StartWithTheConfiguredGainsAndImpedance) {
+  EXPECT_EQ(devices.pid.pid(2, PidLoop::kVelocity).ki, 100.0);
+  EXPECT_EQ(devices.impedance.impedance(2).stiffness_Nm_rad, 50.0);
+  EXPECT_EQ(devices.impedance.impedance_limits(2).stiffness_Nm_rad, 200.0);
+}
+
+TEST(Capabilities, AreWhatTheGainsTableHasLoopsFor) {
+  RobotConfig robot = test::fake_robot();
+  robot.gains[0].current = {};
+  robot.gains[0].velocity = {};
+  const JointCapabilities joint = joint_capabilities(robot)[0];
+  EXPECT_TRUE(joint.can(ControlMode::kPosition, InteractionMode::kCompliant));
+  EXPECT_TRUE(joint.can(ControlMode::kIdle, InteractionMode::kStiff));
+  EXPECT_FALSE(joint.can(ControlMode::kCurrent, InteractionMode::kStiff));
+  EXPECT_FALSE(joint.can(ControlMode::kVelocity, InteractionMode::kStiff));
+}
+
+TEST(Capabilities, NameTheJointAndTheGainsTableThatLackALoop) {
+  RobotConfig robot = test::fake_robot();
+  robot.gains[0].current = {};
+  EXPECT_TRUE(check_capability(robot, 1, ControlMode::kTorque).has_value());
+  const Status refused = check_capability(robot, 1, ControlMode::kCurrent);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().key, "elbow");
+  EXPECT_NE(refused.error().hint.find("[gains.arm]"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::hal
