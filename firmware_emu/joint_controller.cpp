@@ -1,0 +1,226 @@
+#include "firmware_emu/joint_controller.hpp"
+
+#include <cmath>
+
+namespace tandem::firmware {
+
+using canopen::Mode;
+
+void JointController::configure(const ControllerConfig& config, double period_s) noexcept
+    TANDEM_RT {
+  config_ = config;
+  period_s_ = period_s;
+  transfer_decay_ =
+      config.transfer_time_s > 0.0 ? std::exp(-period_s / config.transfer_time_s) : 0.0;
+  retuned_ = true;
+}
+
+bool JointController::cascaded() const noexcept {
+  if (action_ == Action::kHold) return true;
+  return action_ == Action::kFollow && mode_ != Mode::kOpenLoop && mode_ != Mode::kCurrent &&
+         mode_ != Mode::kNone;
+}
+
+double JointController::update(Action action, Mode mode, const Reference& reference,
+                               const Measurement& measured) noexcept TANDEM_RT {
+  if (action == Action::kOff) {
+    action_ = Action::kOff;
+    mode_ = mode;
+    terms_ = {};
+    retuned_ = false;
+    return 0.0;
+  }
+  terms_.reference_limited = 0;
+  terms_.torque_saturation = 0;
+  const bool change = action != action_ || (action == Action::kFollow && mode != mode_);
+  double held_V = terms_.voltage_V;
+  if (change) {
+    // An open bridge shows the back-EMF at its terminals: that is the voltage without a current.
+    if (action_ == Action::kOff) {
+      held_V = config_.motor_constant_Nm_A * measured.motor_velocity_rad_s;
+    }
+    begin(action, mode, measured);
+  }
+  Step step;
+  if (cascaded()) {
+    cascade(reference, measured, change, step);
+  } else if (action_ == Action::kFollow && mode_ == Mode::kCurrent) {
+    current_loop(reference.current_A, measured, step);
+  } else if (action_ == Action::kFollow && mode_ == Mode::kOpenLoop) {
+    step.voltage_V = reference.voltage_V;
+  }
+  terms_.transfer_V =
+      change || retuned_ ? held_V - step.voltage_V : terms_.transfer_V * transfer_decay_;
+  retuned_ = false;
+  step.voltage_V += terms_.transfer_V;
+  const Saturation cut = limit_voltage(step.voltage_V, measured);
+  terms_.voltage_saturation = static_cast<std::int32_t>(cut);
+  terms_.voltage_V = step.voltage_V;
+  integrate(step, cut);
+  return step.voltage_V;
+}
+
+void JointController::begin(Action action, Mode mode, const Measurement& measured) noexcept {
+  if (!cascaded()) {  // the cascade starts from the torque that the spring carries now
+    terms_.torque_reference_Nm = measured.torque_Nm;
+    torque_.reset();
+  }
+  action_ = action;
+  mode_ = mode;
+  position_.reset();
+  velocity_.reset();
+  current_.reset();
+  terms_.held_position_rad = measured.link_position_rad;
+}
+
+double JointController::limited_position(double position_rad) noexcept {
+  if (saturate(position_rad, config_.min_position_rad, config_.max_position_rad) !=
+      Saturation::kNone) {
+    terms_.reference_limited = 1;
+  }
+  return position_rad;
+}
+
+double JointController::limited_velocity(double velocity_rad_s, double position_rad) noexcept {
+  const double limit = config_.velocity_limit_rad_s;
+  if (limit > 0.0 && saturate(velocity_rad_s, -limit, limit) != Saturation::kNone) {
+    terms_.reference_limited = 1;
+  }
+  const bool outward = (position_rad >= config_.max_position_rad && velocity_rad_s > 0.0) ||
+                       (position_rad <= config_.min_position_rad && velocity_rad_s < 0.0);
+  if (!outward) return velocity_rad_s;
+  terms_.reference_limited = 1;
+  return 0.0;
+}
+
+JointController::Outer JointController::position_outer(double position_rad,
+                                                       double velocity_rad_s, double torque_Nm,
+                                                       const Measurement& measured) noexcept {
+  const double q_ref = limited_position(position_rad);
+  const double link_error = q_ref - measured.link_position_rad;
+  terms_.position_error_rad = link_error;
+  double error = link_error;
+  double rate = velocity_rad_s - measured.link_velocity_rad_s;
+  if (config_.position_feedback == PositionFeedback::kMotor) {
+    const double deflection =
+        config_.spring_Nm_rad > 0.0 ? torque_Nm / config_.spring_Nm_rad : 0.0;
+    error = q_ref + deflection - measured.motor_position_rad;
+    rate = velocity_rad_s - measured.motor_velocity_rad_s;
+  }
+  return {.torque_Nm = position_.apply(config_.position, error, rate) + torque_Nm,
+          .integrand = link_error,
+          .feedforward_Nm = torque_Nm,
+          .loop = &position_,
+          .config = &config_.position};
+}
+
+JointController::Outer JointController::velocity_outer(const Reference& reference,
+                                                       const Measurement& measured) noexcept {
+  const double v_ref = limited_velocity(reference.velocity_rad_s, measured.link_position_rad);
+  const double error = v_ref - measured.link_velocity_rad_s;
+  return {.torque_Nm = velocity_.apply(config_.velocity, error,
+                                       -measured.link_acceleration_rad_s2) +
+                       reference.torque_Nm,
+          .integrand = error,
+          .feedforward_Nm = reference.torque_Nm,
+          .loop = &velocity_,
+          .config = &config_.velocity};
+}
+
+double JointController::impedance_torque(double position_rad, double velocity_rad_s,
+                                         const Reference& reference,
+                                         const Measurement& measured) noexcept {
+  const double error = limited_position(position_rad) - measured.link_position_rad;
+  terms_.position_error_rad = error;
+  return reference.stiffness_Nm_rad * error +
+         reference.damping_Nms_rad * (velocity_rad_s - measured.link_velocity_rad_s) +
+         reference.torque_Nm;
+}
+
+JointController::Outer JointController::outer_loop(const Reference& reference,
+                                                   const Measurement& measured) noexcept {
+  terms_.position_error_rad = 0.0;
+  if (action_ == Action::kHold) {
+    return position_outer(terms_.held_position_rad, 0.0, reference.torque_Nm, measured);
+  }
+  switch (mode_) {
+    case Mode::kCsp:
+      return position_outer(reference.position_rad, reference.velocity_rad_s,
+                            reference.torque_Nm, measured);
+    case Mode::kCsv: return velocity_outer(reference, measured);
+    case Mode::kImpedance:
+      return {.torque_Nm = impedance_torque(reference.position_rad, reference.velocity_rad_s,
+                                            reference, measured)};
+    case Mode::kVelocityImpedance: {
+      const double v_ref = limited_velocity(reference.velocity_rad_s, terms_.held_position_rad);
+      return {.torque_Nm = impedance_torque(terms_.held_position_rad, v_ref, reference, measured),
+              .integrand = v_ref};
+    }
+    case Mode::kCst:
+    default: return {.torque_Nm = reference.torque_Nm};
+  }
+}
+
+void JointController::cascade(const Reference& reference, const Measurement& measured,
+                              bool change, Step& step) noexcept {
+  const double held_Nm = terms_.torque_reference_Nm;
+  Outer& outer = step.outer;
+  outer = outer_loop(reference, measured);
+  if (change && outer.loop != nullptr && outer.config->ki > 0.0) {
+    outer.torque_Nm = outer.loop->seed(*outer.config, held_Nm - outer.feedforward_Nm) +
+                      outer.feedforward_Nm;
+  }
+  double torque_Nm = outer.torque_Nm;
+  terms_.torque_saturation = static_cast<std::int32_t>(
+      saturate(torque_Nm, -config_.torque_limit_Nm, config_.torque_limit_Nm));
+  terms_.torque_reference_Nm = torque_Nm;
+  step.torque_error_Nm = torque_Nm - measured.torque_Nm;
+  step.voltage_V = config_.torque_to_voltage_V_Nm * torque_Nm +
+                   config_.emf_compensation_Vs_rad * measured.motor_velocity_rad_s +
+                   torque_.apply(config_.torque, step.torque_error_Nm,
+                                 -measured.torque_rate_Nm_s);
+}
+
+void JointController::current_loop(double current_A, const Measurement& measured,
+                                   Step& step) noexcept {
+  if (saturate(current_A, -config_.current_limit_A, config_.current_limit_A) !=
+      Saturation::kNone) {
+    terms_.reference_limited = 1;
+  }
+  step.current_error_A = current_A - measured.current_A;
+  step.voltage_V = config_.resistance_ohm * current_A +
+                   config_.motor_constant_Nm_A * measured.motor_velocity_rad_s +
+                   current_.apply(config_.current, step.current_error_A, 0.0);
+}
+
+// First the current that this voltage would drive, then what the supply can give at all.
+Saturation JointController::limit_voltage(double& voltage_V,
+                                          const Measurement& measured) const noexcept {
+  Saturation cut = Saturation::kNone;
+  if (config_.resistance_ohm > 0.0) {
+    const double emf_V = config_.motor_constant_Nm_A * measured.motor_velocity_rad_s;
+    const double drop_V = config_.resistance_ohm * config_.current_limit_A;
+    cut = saturate(voltage_V, emf_V - drop_V, emf_V + drop_V);
+  }
+  const double supply_V =
+      std::max(0.0, std::min(config_.voltage_limit_V, measured.bus_voltage_V));
+  const Saturation supply_cut = saturate(voltage_V, -supply_V, supply_V);
+  return supply_cut != Saturation::kNone ? supply_cut : cut;
+}
+
+void JointController::integrate(const Step& step, Saturation voltage_cut) noexcept {
+  const Saturation outer_cut = terms_.torque_saturation != 0
+                                   ? static_cast<Saturation>(terms_.torque_saturation)
+                                   : voltage_cut;
+  if (step.outer.loop != nullptr) {
+    step.outer.loop->integrate(*step.outer.config, step.outer.integrand, period_s_, outer_cut);
+  } else if (action_ == Action::kFollow && mode_ == Mode::kVelocityImpedance) {
+    const double move = step.outer.integrand * period_s_;
+    const bool winds_up = static_cast<double>(outer_cut) * move > 0.0;
+    if (!winds_up) terms_.held_position_rad = limited_position(terms_.held_position_rad + move);
+  }
+  torque_.integrate(config_.torque, step.torque_error_Nm, period_s_, voltage_cut);
+  current_.integrate(config_.current, step.current_error_A, period_s_, voltage_cut);
+}
+
+}  // namespace tandem::firmware

@@ -1,0 +1,166 @@
+// The joint controller of a drive: one cascade from any mode's reference to the motor voltage.
+// Layer: firmware_emu.  Thread: RT only.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "base/realtime.hpp"
+#include "canopen/objects.hpp"
+#include "firmware_emu/pid.hpp"
+
+namespace tandem::firmware {
+
+/// Which encoder the stiff position loop's proportional and derivative terms act on.
+enum class PositionFeedback : std::uint8_t {
+  kLink = 0,   ///< e = q_ref - q
+  kMotor = 1,  ///< e = q_ref + tau_ff / Ks - theta, collocated; the integral stays on the link
+};
+
+/// What the controller has to know of its joint. Link side; the motor reflected to the link.
+struct ControllerConfig {
+  Pid::Config position;  ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
+  Pid::Config velocity;  ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
+  Pid::Config torque;    ///< [V/Nm, V/(Nm s), Vs/Nm, V]
+  Pid::Config current;   ///< [V/A, V/(A s), Vs/A, V]
+  double torque_to_voltage_V_Nm = 0.0;   ///< feed-forward, times the torque reference
+  double emf_compensation_Vs_rad = 0.0;  ///< times the motor velocity
+  double resistance_ohm = 0.0;           ///< 0: unknown, the current is not limited by it
+  double motor_constant_Nm_A = 0.0;      ///< N K: also the back-EMF [Vs/rad]
+  double spring_Nm_rad = 0.0;            ///< Ks; 0: rigid
+  double voltage_limit_V = 0.0;
+  double current_limit_A = 0.0;
+  double torque_limit_Nm = 0.0;
+  double velocity_limit_rad_s = 0.0;     ///< of velocity references; 0: none
+  double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
+  double max_position_rad = std::numeric_limits<double>::infinity();
+  double transfer_time_s = 0.02;  ///< in which the voltage step of a mode change decays
+  PositionFeedback position_feedback = PositionFeedback::kLink;
+};
+
+/// What a mode is to follow. A field that the mode does not use is ignored; torque_Nm is the
+/// feed-forward of every mode but CST, where it is the reference.
+struct Reference {
+  double position_rad = 0.0;
+  double velocity_rad_s = 0.0;  ///< reference or feed-forward
+  double torque_Nm = 0.0;
+  double voltage_V = 0.0;
+  double current_A = 0.0;
+  double stiffness_Nm_rad = 0.0;
+  double damping_Nms_rad = 0.0;
+};
+
+/// What the board's sensors and estimators say.
+struct Measurement {
+  double link_position_rad = 0.0;
+  double link_velocity_rad_s = 0.0;
+  double link_acceleration_rad_s2 = 0.0;
+  double motor_position_rad = 0.0;
+  double motor_velocity_rad_s = 0.0;
+  double torque_Nm = 0.0;       ///< of the spring, positive when it drives the link to +
+  double torque_rate_Nm_s = 0.0;
+  double current_A = 0.0;
+  double bus_voltage_V = 0.0;
+};
+
+/// What the bridge is to do.
+enum class Action : std::uint8_t {
+  kOff,     ///< bridge open
+  kFollow,  ///< the mode's reference
+  kHold,    ///< the position where this action began, by the position loop
+  kBrake,   ///< winding shorted through the bridge (0 V): needs neither sensor nor gain
+};
+
+/// The cascade, equation by equation in docs/firmware.md.
+class JointController {
+ public:
+  /// Terms of the last update(), for telemetry.
+  struct Terms {
+    double torque_reference_Nm = 0.0;
+    double voltage_V = 0.0;           ///< after every limit
+    double transfer_V = 0.0;          ///< what is left of a mode change's step
+    double position_error_rad = 0.0;  ///< of the limited reference, on the link
+    double held_position_rad = 0.0;   ///< kHold's, and the integrated one of -4
+    std::int32_t voltage_saturation = 0;  ///< Saturation, by the voltage or current limit
+    std::int32_t torque_saturation = 0;   ///< Saturation, by the torque limit
+    std::int64_t reference_limited = 0;   ///< 1: position or velocity reference was cut
+  };
+
+  /// Takes new settings; the integrals stay, and the voltage goes over to them as in a change
+  /// of mode. @pre every number finite, but the positions.
+  void configure(const ControllerConfig& config, double period_s) noexcept TANDEM_RT;
+
+  /// One control period. A change of `action` or `mode` is made without a step of the voltage:
+  /// integrals are seeded, what is left decays over the transfer time.
+  /// @return motor voltage [V]; 0 when kOff.
+  double update(Action action, canopen::Mode mode, const Reference& reference,
+                const Measurement& measured) noexcept TANDEM_RT;
+
+  [[nodiscard]] const Terms& terms() const noexcept { return terms_; }
+  [[nodiscard]] const Pid& position_loop() const noexcept { return position_; }
+  [[nodiscard]] const Pid& velocity_loop() const noexcept { return velocity_; }
+  [[nodiscard]] const Pid& torque_loop() const noexcept { return torque_; }
+  [[nodiscard]] const Pid& electrical_loop() const noexcept { return current_; }
+  /// True when the last update() had to cut anything.
+  [[nodiscard]] bool limited() const noexcept {
+    return terms_.voltage_saturation != 0 || terms_.torque_saturation != 0 ||
+           terms_.reference_limited != 0;
+  }
+  [[nodiscard]] const ControllerConfig& config() const noexcept { return config_; }
+
+  /// All but the configuration, which the board makes again from its object dictionary.
+  template <class Archive>
+  void archive(Archive& ar) {
+    ar(position_.state, velocity_.state, torque_.state, current_.state);
+    ar(terms_, action_, mode_, retuned_);
+  }
+
+ private:
+  struct Outer {
+    double torque_Nm = 0.0;  ///< before the torque limit
+    double integrand = 0.0;  ///< what the loop's integral, or -4's position, integrates
+    double feedforward_Nm = 0.0;
+    Pid* loop = nullptr;     ///< whose integral it is; none in CST and impedance
+    const Pid::Config* config = nullptr;
+  };
+  /// One update on its way through the cascade.
+  struct Step {
+    double voltage_V = 0.0;
+    double torque_error_Nm = 0.0;
+    double current_error_A = 0.0;
+    Outer outer;
+  };
+
+  [[nodiscard]] bool cascaded() const noexcept;
+  void begin(Action action, canopen::Mode mode, const Measurement& measured) noexcept;
+  [[nodiscard]] Outer outer_loop(const Reference& reference, const Measurement& measured) noexcept;
+  [[nodiscard]] Outer position_outer(double position_rad, double velocity_rad_s, double torque_Nm,
+                                     const Measurement& measured) noexcept;
+  [[nodiscard]] Outer velocity_outer(const Reference& reference,
+                                     const Measurement& measured) noexcept;
+  [[nodiscard]] double impedance_torque(double position_rad, double velocity_rad_s,
+                                        const Reference& reference,
+                                        const Measurement& measured) noexcept;
+  [[nodiscard]] double limited_position(double position_rad) noexcept;
+  [[nodiscard]] double limited_velocity(double velocity_rad_s, double position_rad) noexcept;
+  void cascade(const Reference& reference, const Measurement& measured, bool change,
+               Step& step) noexcept;
+  void current_loop(double current_A, const Measurement& measured, Step& step) noexcept;
+  [[nodiscard]] Saturation limit_voltage(double& voltage_V,
+                                         const Measurement& measured) const noexcept;
+  void integrate(const Step& step, Saturation voltage_cut) noexcept;
+
+  ControllerConfig config_;
+  double period_s_ = 1.0e-3;
+  double transfer_decay_ = 0.0;
+  Pid position_;
+  Pid velocity_;
+  Pid torque_;
+  Pid current_;
+  Terms terms_;
+  Action action_ = Action::kOff;
+  canopen::Mode mode_ = canopen::Mode::kNone;
+  bool retuned_ = false;
+};
+
+}  // namespace tandem::firmware

@@ -1,0 +1,110 @@
+// What an axis must not survive: each cause of a drive fault, with its timer and its way back.
+// Layer: firmware_emu.  Thread: RT only.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "base/realtime.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::firmware {
+
+struct ProtectionConfig {
+  double min_position_rad = -std::numeric_limits<double>::infinity();
+  double max_position_rad = std::numeric_limits<double>::infinity();
+  double position_margin_rad = 0.0;
+  double following_window_rad = 0.0;  ///< 0: not watched
+  double following_timeout_s = 0.0;
+  double continuous_current_A = 0.0;  ///< 0: not watched
+  double thermal_time_s = 1.0;
+  double temperature_limit_C = 0.0;
+  double undervoltage_V = 0.0;        ///< 0: not watched
+};
+
+struct ProtectionInputs {
+  double link_position_rad = 0.0;
+  double link_velocity_rad_s = 0.0;
+  double position_error_rad = 0.0;
+  double current_A = 0.0;
+  double temperature_C = 0.0;
+  double bus_voltage_V = 0.0;
+  bool sensors_valid = true;   ///< every reading is a number
+  bool powered = false;        ///< the bridge is on
+  bool follows_position = false;  ///< CSP: position_error_rad means something
+};
+
+/// Finds the first cause of a fault that is present, and warns before.
+///
+/// I2t is a first-order model of the winding: x' = (i^2 - x) / T, fault at x >= Ic^2, which a
+/// steady current I reaches from cold after T ln(I^2 / (I^2 - Ic^2)).
+class Protection {
+ public:
+  /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.
+  static constexpr double kWarningShare = 0.9;
+  static constexpr double kTemperatureHysteresis_K = 5.0;
+  /// Outward velocity at which leaving the position limits is a fault: a joint that stands beyond
+  /// them, or comes back, may be powered.
+  static constexpr double kOutward_rad_s = 0.02;
+
+  /// @return kNone, or the first of: position sensor, I2t, temperature, under-voltage, following
+  ///         error, position limit.
+  canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
+                            double dt_s) noexcept TANDEM_RT {
+    using canopen::ErrorCode;
+    if (!in.sensors_valid) return ErrorCode::kPositionSensor;
+    state_.heat_A2 += (in.current_A * in.current_A - state_.heat_A2) *
+                      std::min(1.0, dt_s / config.thermal_time_s);
+    hysteresis(state_.overload, load(config), 1.0, kWarningShare);
+    hysteresis(state_.overheated, in.temperature_C, config.temperature_limit_C,
+               config.temperature_limit_C - kTemperatureHysteresis_K);
+    state_.warm = in.temperature_C > kWarningShare * config.temperature_limit_C ? 1 : 0;
+    const bool lags = in.powered && in.follows_position && config.following_window_rad > 0.0 &&
+                      std::abs(in.position_error_rad) > config.following_window_rad;
+    state_.lagging_s = lags ? state_.lagging_s + dt_s : 0.0;
+
+    if (state_.overload != 0) return ErrorCode::kI2t;
+    if (state_.overheated != 0) return ErrorCode::kDriveTemperature;
+    if (in.bus_voltage_V < config.undervoltage_V) return ErrorCode::kVoltage;
+    if (lags && state_.lagging_s > config.following_timeout_s) return ErrorCode::kFollowingError;
+    if (in.powered && leaves_limits(config, in)) return ErrorCode::kPositionLimit;
+    return ErrorCode::kNone;
+  }
+
+  /// I2t as a share of what trips it; 0 when not watched.
+  [[nodiscard]] double load(const ProtectionConfig& config) const noexcept {
+    const double bearable = config.continuous_current_A * config.continuous_current_A;
+    return bearable > 0.0 ? state_.heat_A2 / bearable : 0.0;
+  }
+  [[nodiscard]] bool warning(const ProtectionConfig& config) const noexcept {
+    return state_.warm != 0 || load(config) > kWarningShare;
+  }
+  /// True while the following error is beyond its window, time-out or not.
+  [[nodiscard]] bool lagging() const noexcept { return state_.lagging_s > 0.0; }
+
+ private:
+  struct State {  // wide flags: no padding in a snapshot
+    double heat_A2 = 0.0;
+    double lagging_s = 0.0;
+    std::int64_t overload = 0;
+    std::int64_t overheated = 0;
+    std::int64_t warm = 0;
+  };
+
+  static void hysteresis(std::int64_t& flag, double value, double on, double off) noexcept {
+    if (value >= on) flag = 1;
+    if (value < off) flag = 0;
+  }
+  static bool leaves_limits(const ProtectionConfig& config, const ProtectionInputs& in) noexcept {
+    const double over = in.link_position_rad - config.max_position_rad;
+    const double under = config.min_position_rad - in.link_position_rad;
+    return (over > config.position_margin_rad && in.link_velocity_rad_s > kOutward_rad_s) ||
+           (under > config.position_margin_rad && in.link_velocity_rad_s < -kOutward_rad_s);
+  }
+
+  State state_;
+};
+
+}  // namespace tandem::firmware
