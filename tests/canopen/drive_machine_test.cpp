@@ -1,0 +1,210 @@
+#include "canopen/drive_machine.hpp"
+
+#include "base/archive.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::canopen {
+namespace {
+
+using enum DriveState;
+
+struct Drive : testing::Test {
+  DriveMachine drive;
+  DriveInputs inputs;
+  DriveOptions options;
+
+  DriveState step(int word) {
+    return drive.step(static_cast<std::uint16_t>(word), inputs, options);
+  }
+  void enable() {
+    for (const int word : {0x00, 0x06, 0x07, 0x0F}) step(word);
+    ASSERT_EQ(drive.state(), kOperationEnabled);
+  }
+};
+
+TEST(DriveStates, AreReadFromTheProfilesStatuswords) {
+  EXPECT_EQ(drive_state(0x0000), kNotReadyToSwitchOn);
+  EXPECT_EQ(drive_state(0x0250), kSwitchOnDisabled);
+  EXPECT_EQ(drive_state(0x0231), kReadyToSwitchOn);
+  EXPECT_EQ(drive_state(0x0233), kSwitchedOn);
+  EXPECT_EQ(drive_state(0x1637), kOperationEnabled);
+  EXPECT_EQ(drive_state(0x0217), kQuickStopActive);
+  EXPECT_EQ(drive_state(0x021F), kFaultReactionActive);
+  EXPECT_EQ(drive_state(0x0218), kFault);
+  EXPECT_EQ(drive_state(0x0238), kFault) << "bit 5 plays no part in a fault";
+}
+
+TEST_F(Drive, GoesUpByTransitions0To4WithTheProfilesStatuswords) {
+  EXPECT_EQ(drive.state(), kNotReadyToSwitchOn);
+  EXPECT_EQ(step(0x00), kSwitchOnDisabled);
+  EXPECT_EQ(drive.statusword(), 0x0250);
+  EXPECT_EQ(step(0x06), kReadyToSwitchOn);
+  EXPECT_EQ(drive.statusword(), 0x0231);
+  EXPECT_EQ(step(0x07), kSwitchedOn);
+  EXPECT_EQ(drive.statusword(), 0x0233);
+  EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  EXPECT_EQ(step(0x0F), kOperationEnabled);
+  EXPECT_EQ(drive.statusword(), 0x0237);
+  EXPECT_EQ(drive.motion(), DriveMotion::kFollow);
+}
+
+TEST_F(Drive, EnableOperationFromReadySwitchesOnFirst) {
+  step(0x00);
+  step(0x06);
+  EXPECT_EQ(step(0x0F), kSwitchedOn);
+  EXPECT_EQ(step(0x0F), kOperationEnabled);
+}
+
+TEST_F(Drive, DoesNotSkipShutdown) {
+  step(0x00);
+  EXPECT_EQ(step(0x0F), kSwitchOnDisabled);
+  EXPECT_EQ(step(0x07), kSwitchOnDisabled);
+}
+
+TEST_F(Drive, MakesEveryDownwardTransition) {
+  enable();
+  EXPECT_EQ(step(0x07), kOperationEnabled);  // 5 on the slow-down ramp
+  EXPECT_EQ(drive.motion(), DriveMotion::kSlowDown);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x07), kSwitchedOn);
+  EXPECT_EQ(step(0x06), kReadyToSwitchOn);   // 6
+  EXPECT_EQ(step(0x00), kSwitchOnDisabled);  // 7
+  enable();
+  EXPECT_EQ(step(0x06), kReadyToSwitchOn);   // 8, disabled at once by default
+  EXPECT_EQ(step(0x02), kSwitchOnDisabled);  // 7 by quick stop
+  enable();
+  EXPECT_EQ(step(0x0D), kSwitchOnDisabled);  // 9
+  step(0x06);
+  step(0x07);
+  EXPECT_EQ(step(0x00), kSwitchOnDisabled);  // 10
+  step(0x06);
+  step(0x07);
+  EXPECT_EQ(step(0x0B), kSwitchOnDisabled);  // 10 by quick stop
+}
+
+TEST_F(Drive, ShutdownOnTheRampWhenItsOptionSaysSo) {
+  options.shutdown = 1;
+  enable();
+  EXPECT_EQ(step(0x06), kOperationEnabled);
+  EXPECT_EQ(drive.motion(), DriveMotion::kSlowDown);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x06), kReadyToSwitchOn);
+}
+
+TEST_F(Drive, QuickStopRampsAndThenDisables) {
+  enable();
+  EXPECT_EQ(step(0x02), kQuickStopActive);  // 11
+  EXPECT_EQ(drive.statusword(), 0x0217);
+  EXPECT_EQ(drive.motion(), DriveMotion::kQuickStop);
+  EXPECT_EQ(step(0x0F), kQuickStopActive) << "option 2 does not come back";
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x02), kSwitchOnDisabled);  // 12
+}
+
+TEST_F(Drive, QuickStopOptionsChooseTheRampAndWhereItEnds) {
+  options.quick_stop = 0;
+  enable();
+  EXPECT_EQ(step(0x02), kSwitchOnDisabled);
+  options.quick_stop = 1;
+  enable();
+  step(0x02);
+  EXPECT_EQ(drive.motion(), DriveMotion::kSlowDown);
+  step(0x00);
+  EXPECT_EQ(drive.state(), kSwitchOnDisabled);
+  options.quick_stop = 6;
+  enable();
+  inputs.at_rest = true;
+  step(0x02);
+  EXPECT_EQ(step(0x02), kQuickStopActive) << "option 6 stays";
+  EXPECT_EQ(step(0x0F), kOperationEnabled);  // 16
+}
+
+TEST_F(Drive, AFaultReactsLatchesAndNeedsARisingEdge) {
+  enable();
+  inputs.fault = true;
+  EXPECT_EQ(step(0x0F), kFaultReactionActive);  // 13
+  EXPECT_EQ(drive.statusword(), 0x021F);
+  EXPECT_EQ(drive.motion(), DriveMotion::kQuickStop);
+  EXPECT_EQ(step(0x0F), kFaultReactionActive);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x0F), kFault);  // 14
+  EXPECT_EQ(drive.statusword(), 0x0218);
+  EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  EXPECT_EQ(step(0x80), kFault) << "the cause is still there";
+  inputs.fault = false;
+  EXPECT_EQ(step(0x80), kFault) << "no edge";
+  EXPECT_EQ(step(0x00), kFault);
+  EXPECT_EQ(step(0x80), kSwitchOnDisabled);  // 15
+  EXPECT_TRUE(drive.fault_was_reset());
+  step(0x80);
+  EXPECT_FALSE(drive.fault_was_reset());
+}
+
+TEST_F(Drive, FaultReactionOptionZeroOrNoPowerGoesStraightToFault) {
+  options.fault_reaction = 0;
+  enable();
+  inputs.fault = true;
+  EXPECT_EQ(step(0x0F), kFaultReactionActive);
+  EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  EXPECT_EQ(step(0x0F), kFault);
+}
+
+TEST_F(Drive, AResetBitThatIsSetAtPowerOnIsNoEdge) {
+  inputs.fault = true;
+  step(0x80);
+  inputs.fault = false;
+  step(0x80);
+  EXPECT_EQ(step(0x80), kFault);
+}
+
+TEST_F(Drive, HaltKeepsTheStateAndStopsTheMotion) {
+  enable();
+  EXPECT_EQ(step(0x10F), kOperationEnabled);
+  EXPECT_EQ(drive.motion(), DriveMotion::kSlowDown);
+  EXPECT_EQ(step(0x0F), kOperationEnabled);
+  EXPECT_EQ(drive.motion(), DriveMotion::kFollow);
+}
+
+TEST_F(Drive, ALostConnectionFollowsItsOption) {
+  enable();
+  drive.abort_connection(0, options);
+  EXPECT_EQ(drive.state(), kOperationEnabled);
+  drive.abort_connection(3, options);
+  EXPECT_EQ(drive.state(), kQuickStopActive);
+  step(0x00);
+  enable();
+  drive.abort_connection(2, options);
+  EXPECT_EQ(drive.state(), kSwitchOnDisabled);
+}
+
+TEST_F(Drive, ShowsTheInputsInItsStatusword) {
+  enable();
+  inputs = {.internal_limit = true, .follows_command = true, .following_error = true,
+            .warning = true};
+  step(0x0F);
+  EXPECT_EQ(drive.statusword(), 0x0237 | 0x0080 | 0x0800 | 0x1000 | 0x2000);
+}
+
+TEST_F(Drive, TheMastersControlwordsLeadToOperationEnabled) {
+  std::vector<DriveState> path;
+  for (int i = 0; i < 5; ++i) {
+    path.push_back(step(controlword_towards_enabled(drive_state(drive.statusword()))));
+  }
+  EXPECT_EQ(path, (std::vector<DriveState>{kSwitchOnDisabled, kReadyToSwitchOn, kSwitchedOn,
+                                           kOperationEnabled, kOperationEnabled}));
+}
+
+TEST_F(Drive, ArchiveRestoresARampInProgress) {
+  enable();
+  step(0x07);
+  Archive saved;
+  drive.archive(saved);
+  DriveMachine other;
+  Archive restore(saved.bytes());
+  other.archive(restore);
+  inputs.at_rest = true;
+  EXPECT_EQ(other.step(0x07, inputs, options), kSwitchedOn);
+}
+
+}  // namespace
+}  // namespace tandem::canopen
