@@ -1,0 +1,80 @@
+#include "log/csv.hpp"
+
+#include <charconv>
+#include <ostream>
+
+#include "log/schema.hpp"
+
+namespace tandem::log {
+namespace {
+
+void append_number(std::string& line, double value) {
+  char digits[32];
+  const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
+  line.append(digits, end);
+}
+
+/// The name of element `index`.
+std::string column_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
+  if (field.count == 1) return field.name;
+  if (field.name == "sensor") {
+    std::size_t first = 0;
+    for (const SensorInfo& sensor : info.sensors) {
+      if (index < first + sensor.channels) {
+        return "sensor." + sensor.name + "." + std::to_string(index - first);
+      }
+      first += sensor.channels;
+    }
+  }
+  if (field.count == info.joints.size()) return field.name + "." + info.joints[index];
+  return field.name + "." + std::to_string(index);
+}
+
+Status write_events(const LogFile& log, std::ostream& out) {
+  const auto events = log.events();
+  if (!events) return std::unexpected(events.error());
+  out << "time_s,cycle,kind,joint,code,text\n";
+  for (const auto& [event, text] : *events) {
+    std::string time;
+    append_number(time, static_cast<double>(event.time_ns) * 1e-9);
+    out << time << ',' << event.cycle << ',' << to_string(event.kind) << ',' << event.joint << ','
+        << event.code << ",\"" << text << "\"\n";
+  }
+  return {};
+}
+
+}  // namespace
+
+Status write_csv(const LogFile& log, const std::string& topic, std::size_t every,
+                 std::ostream& out) {
+  if (topic == "/tandem/event") return write_events(log, out);
+  const Topic* found = log.find(topic);
+  std::string line = "time_s";
+  if (found != nullptr) {
+    for (const hal::Field& field : found->layout.fields()) {
+      for (std::size_t i = 0; i < field.count; ++i) {
+        line += "," + column_name(field, i, log.info());
+      }
+    }
+    out << line << "\n";
+  }
+  std::size_t count = 0;
+  Status done = log.for_each(topic, [&](std::int64_t time_ns, std::span<const std::byte> body) {
+    if (count++ % every != 0) return;
+    line.clear();
+    append_number(line, static_cast<double>(time_ns) * 1e-9);
+    for (const hal::Field& field : found->layout.fields()) {
+      for (std::size_t i = 0; i < field.count; ++i) {
+        line += ',';
+        append_number(line, element(field, body, i));
+      }
+    }
+    out << line << "\n";
+  });
+  if (!done) return done;
+  out.flush();
+  if (!out) return fail("writing the CSV failed", "check the space on the disk");
+  return {};
+}
+
+}  // namespace tandem::log

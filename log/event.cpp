@@ -1,0 +1,78 @@
+#include "log/event.hpp"
+
+#include <cstdio>
+
+#include "base/realtime.hpp"
+
+namespace tandem::log {
+
+const char* to_string(EventKind kind) noexcept {
+  switch (kind) {
+    case EventKind::kStarted: return "started";
+    case EventKind::kBringUpDone: return "bring-up done";
+    case EventKind::kControllersDone: return "controllers done";
+    case EventKind::kFault: return "fault";
+    case EventKind::kSensorLost: return "sensor lost";
+    case EventKind::kLimited: return "command limited";
+    case EventKind::kOverrun: return "overrun";
+    case EventKind::kStopRequested: return "stop requested";
+    case EventKind::kShutDown: return "shut down";
+  }
+  return "?";
+}
+
+std::string describe(const Event& event, std::span<const std::string> joints) {
+  std::string text = to_string(event.kind);
+  const bool has_joint = event.joint >= 0 && static_cast<std::size_t>(event.joint) < joints.size();
+  if (has_joint) text += " of " + joints[static_cast<std::size_t>(event.joint)];
+  if (event.code == 0) return text;
+  char code[32];
+  if (event.kind == EventKind::kOverrun) {
+    std::snprintf(code, sizeof code, ": %u cycles skipped", event.code);
+  } else if (event.kind == EventKind::kFault && !has_joint) {
+    std::snprintf(code, sizeof code, ": %s", tandem::to_string(static_cast<Code>(event.code)));
+  } else {
+    std::snprintf(code, sizeof code, " (0x%04X)", event.code);
+  }
+  return text + code;
+}
+
+const std::string& event_schema() {
+  static const std::string text =
+      "uint64 cycle\n"
+      "int64 time_ns\n"
+      "uint32 code  # a drive's CiA 402 error code, the loop's Code, or a count\n"
+      "int32 joint  # index in the image, -1: none\n"
+      "uint8 kind  # EventKind\n"
+      "string text\n";
+  return text;
+}
+
+void encode_event(const Event& event, std::string_view text, Bytes& out) {
+  append(out, event.cycle);
+  append(out, static_cast<std::uint64_t>(event.time_ns));
+  append(out, event.code);
+  append(out, static_cast<std::uint32_t>(event.joint));
+  append(out, static_cast<std::uint8_t>(event.kind));
+  out.insert(out.end(), 3, std::byte{0});  // CDR aligns the string's length to 4
+  append(out, static_cast<std::uint32_t>(text.size() + 1));
+  append(out, std::as_bytes(std::span(text)));
+  out.push_back(std::byte{0});
+}
+
+Result<EventText> decode_event(std::span<const std::byte> body) {
+  ByteReader in(body);
+  EventText found;
+  found.event.cycle = in.number<std::uint64_t>();
+  found.event.time_ns = static_cast<std::int64_t>(in.number<std::uint64_t>());
+  found.event.code = in.number<std::uint32_t>();
+  found.event.joint = static_cast<std::int32_t>(in.number<std::uint32_t>());
+  found.event.kind = static_cast<EventKind>(in.number<std::uint8_t>());
+  in.take(3);
+  found.text = in.text();
+  if (!in.ok() || found.text.empty()) return fail("an event's message is too short");
+  found.text.pop_back();  // CDR strings end with a zero
+  return found;
+}
+
+}  // namespace tandem::log

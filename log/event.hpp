@@ -1,0 +1,55 @@
+// What happened once in a run, as the log's channel /tandem/event carries it.
+// Layer: log.  Thread: made on the RT thread (plain data); encoded off it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+
+#include "base/result.hpp"
+#include "log/bytes.hpp"
+
+namespace tandem::log {
+
+enum class EventKind : std::uint8_t {
+  kStarted = 0,        ///< the first cycle
+  kBringUpDone,        ///< every axis follows the command; controllers start
+  kControllersDone,    ///< the duration is over, or every controller is done
+  kFault,              ///< a joint, the backend or a controller is in fault; the run stops
+  kSensorLost,         ///< a sensor's sample is too old
+  kLimited,            ///< a command was limited for the first time (per joint)
+  kOverrun,            ///< the loop skipped `code` cycles
+  kStopRequested,      ///< from outside: signal or caller
+  kShutDown,           ///< the drives are disabled
+};
+[[nodiscard]] const char* to_string(EventKind kind) noexcept;
+
+/// Plain data: it crosses the ring as bytes.
+struct Event {
+  std::uint64_t cycle = 0;
+  std::int64_t time_ns = 0;
+  std::uint32_t code = 0;   ///< the drive's error code, a Code, a count: as the kind says
+  std::int32_t joint = -1;  ///< index in the image; -1: none
+  EventKind kind = EventKind::kStarted;
+  std::uint8_t padding[7] = {};
+};
+static_assert(std::is_trivially_copyable_v<Event> && sizeof(Event) == 32);
+
+/// One line for people: "fault of LHipMot (0x7310)".
+[[nodiscard]] std::string describe(const Event& event, std::span<const std::string> joints);
+
+/// The channel's ros2msg definition.
+[[nodiscard]] const std::string& event_schema();
+
+/// The event's CDR body (without header), its text last.
+void encode_event(const Event& event, std::string_view text, Bytes& out);
+
+/// An event read back.
+struct EventText {
+  Event event;
+  std::string text;
+};
+[[nodiscard]] Result<EventText> decode_event(std::span<const std::byte> body);
+
+}  // namespace tandem::log

@@ -1,0 +1,65 @@
+#include "log/info.hpp"
+
+#include <cstdlib>
+
+namespace tandem::log {
+namespace {
+
+/// Lines of "name" or "name count".
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
+}
+
+}  // namespace
+
+StringMap to_map(const RunInfo& info) {
+  std::string joints;
+  for (const std::string& joint : info.joints) joints += joint + "\n";
+  std::string sensors;
+  for (const SensorInfo& sensor : info.sensors) {
+    sensors += sensor.name + " " + std::to_string(sensor.channels) + "\n";
+  }
+  return {{"version", info.version},
+          {"robot", info.robot},
+          {"hal", info.hal},
+          {"joints", joints},
+          {"sensors", sensors},
+          {"seed", std::to_string(info.seed)},
+          {"period_ns", std::to_string(info.period_ns)},
+          {"kernel_variant", info.kernel_variant},
+          {"description_hash", info.description_hash}};
+}
+
+RunInfo info_from(const StringMap& map) {
+  RunInfo info;
+  info.version = value_of(map, "version");
+  info.robot = value_of(map, "robot");
+  info.hal = value_of(map, "hal");
+  info.joints = lines_of(value_of(map, "joints"));
+  for (const std::string& line : lines_of(value_of(map, "sensors"))) {
+    const std::size_t space = std::min(line.rfind(' '), line.size());
+    const std::string count = space < line.size() ? line.substr(space + 1) : "0";
+    info.sensors.push_back({line.substr(0, space), std::strtoull(count.c_str(), nullptr, 10)});
+  }
+  info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
+  info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
+  info.kernel_variant = value_of(map, "kernel_variant");
+  info.description_hash = value_of(map, "description_hash");
+  return info;
+}
+
+std::string value_of(const StringMap& map, std::string_view key) {
+  for (const auto& [name, value] : map) {
+    if (name == key) return value;
+  }
+  return {};
+}
+
+}  // namespace tandem::log

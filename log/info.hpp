@@ -1,0 +1,46 @@
+// What a log says about its run besides the messages: who, with which configuration.
+// Layer: log.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "log/mcap_format.hpp"
+
+namespace tandem::log {
+
+/// A sensor's place in the state image.
+struct SensorInfo {
+  std::string name;
+  std::size_t channels = 0;
+};
+
+/// The metadata record "tandem", and "configuration" with the files' texts. Outside the data
+/// hash: equal runs on different machines may differ in it.
+struct RunInfo {
+  std::string version{};           ///< of tandem
+  std::string robot{};
+  std::string hal{};               ///< "sim", …
+  std::vector<std::string> joints{};   ///< the image's order
+  std::vector<SensorInfo> sensors{};   ///< the image's order
+  std::uint64_t seed = 0;
+  std::int64_t period_ns = 0;
+  std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
+  std::string description_hash{};  ///< of what the kernels were made from
+  StringMap configuration{};       ///< path -> text of every file that was read
+};
+
+/// Metadata records' names.
+inline constexpr char kInfoRecord[] = "tandem";
+inline constexpr char kConfigurationRecord[] = "configuration";
+inline constexpr char kResultRecord[] = "result";
+
+[[nodiscard]] StringMap to_map(const RunInfo& info);
+/// What is missing stays empty: another program's log is no error.
+[[nodiscard]] RunInfo info_from(const StringMap& map);
+
+/// The value of `key`, or empty.
+[[nodiscard]] std::string value_of(const StringMap& map, std::string_view key);
+
+}  // namespace tandem::log

@@ -1,0 +1,170 @@
+#include "log/log_file.hpp"
+
+#include <utility>
+
+#include "base/nearest.hpp"
+#include "log/mcap_reader.hpp"
+#include "log/schema.hpp"
+#include "log/sha256.hpp"
+
+namespace tandem::log {
+namespace {
+
+/// A message's channel and time, as the data hash takes them.
+std::array<std::byte, 10> hashed_head(const MessageView& message) {
+  std::array<std::byte, 10> head;
+  store(head.data(), message.channel);
+  store(head.data() + 2, static_cast<std::uint64_t>(message.time_ns));
+  return head;
+}
+
+Topic topic_of(const McapReader& reader, const ChannelRecord& channel) {
+  Topic topic;
+  topic.name = channel.topic;
+  topic.encoding = channel.message_encoding;
+  const auto schema = reader.schemas().find(channel.schema_id);
+  if (schema == reader.schemas().end()) return topic;
+  topic.type = schema->second.name;
+  if (schema->second.encoding != "ros2msg" || topic.encoding != "cdr") return topic;
+  if (auto layout = layout_of(schema->second.text)) topic.layout = std::move(*layout);
+  return topic;
+}
+
+StringMap metadata_of(const McapReader& reader, const std::string& name) {
+  const auto found = reader.metadata().find(name);
+  return found == reader.metadata().end() ? StringMap{} : found->second;
+}
+
+Error at(const std::string& file, std::string message, std::string hint = {}) {
+  return {.message = std::move(message), .hint = std::move(hint), .file = file, .key = {}};
+}
+
+}  // namespace
+
+Result<LogFile> LogFile::open(const std::string& path) {
+  auto reader = McapReader::open(path);
+  if (!reader) return std::unexpected(reader.error());
+  LogFile log;
+  log.path_ = path;
+  std::map<std::uint16_t, Topic> by_channel;
+  Sha256 hash;
+  for (;;) {
+    auto message = reader->next();
+    if (!message) return std::unexpected(message.error());
+    if (!message->has_value()) break;
+    const MessageView& view = **message;
+    auto [topic, added] = by_channel.try_emplace(view.channel);
+    if (added) {
+      topic->second = topic_of(*reader, reader->channels().at(view.channel));
+      topic->second.first_ns = view.time_ns;
+    }
+    topic->second.last_ns = view.time_ns;
+    ++topic->second.messages;
+    hash.update(hashed_head(view));
+    hash.update(view.data);
+  }
+  for (const auto& [id, channel] : reader->channels()) {
+    if (!by_channel.contains(id)) by_channel[id] = topic_of(*reader, channel);
+  }
+  for (auto& [id, topic] : by_channel) log.topics_.push_back(std::move(topic));
+  log.info_ = info_from(metadata_of(*reader, kInfoRecord));
+  log.info_.configuration = metadata_of(*reader, kConfigurationRecord);
+  log.result_ = metadata_of(*reader, kResultRecord);
+  log.truncated_ = reader->truncated();
+  log.data_sha256_ = hash.finish();
+  return log;
+}
+
+const Topic* LogFile::find(std::string_view name) const {
+  for (const Topic& topic : topics_) {
+    if (topic.name == name) return &topic;
+  }
+  return nullptr;
+}
+
+std::uint64_t LogFile::messages() const {
+  std::uint64_t count = 0;
+  for (const Topic& topic : topics_) count += topic.messages;
+  return count;
+}
+
+Result<const Topic*> LogFile::require(const std::string& name) const {
+  if (const Topic* topic = find(name)) return topic;
+  std::vector<std::string> names;
+  for (const Topic& topic : topics_) names.push_back(topic.name);
+  return std::unexpected(at(path_, "has no topic '" + name + "'", suggest(name, names)));
+}
+
+Status LogFile::for_each(
+    const std::string& name,
+    const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const {
+  const auto topic = require(name);
+  if (!topic) return std::unexpected(topic.error());
+  auto reader = McapReader::open(path_);
+  if (!reader) return std::unexpected(reader.error());
+  for (;;) {
+    auto message = reader->next();
+    if (!message) return std::unexpected(message.error());
+    if (!message->has_value()) return {};
+    const MessageView& view = **message;
+    if (reader->channels().at(view.channel).topic != name) continue;
+    const std::size_t expected = (*topic)->layout.bytes();
+    if (view.data.size() < kCdrHeader.size() + expected) {
+      return std::unexpected(at(path_, "a message of " + name + " is shorter than its type"));
+    }
+    visit(view.time_ns, view.data.subspan(kCdrHeader.size()));
+  }
+}
+
+Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& columns,
+                            std::size_t every) const {
+  const auto topic = require(name);
+  if (!topic) return std::unexpected(topic.error());
+  std::vector<const hal::Field*> fields;
+  for (const Column& column : columns) {
+    const hal::Field* field = (*topic)->layout.find(column.field);
+    if (field == nullptr) {
+      std::vector<std::string> names;
+      for (const hal::Field& one : (*topic)->layout.fields()) names.push_back(one.name);
+      return std::unexpected(at(path_, name + " has no field '" + column.field + "'",
+                                suggest(column.field, names)));
+    }
+    if (column.index >= field->count) {
+      return std::unexpected(at(path_, column.field + " of " + name + " has only " +
+                                           std::to_string(field->count) + " elements"));
+    }
+    fields.push_back(field);
+  }
+  Table table;
+  table.columns.resize(columns.size());
+  std::size_t count = 0;
+  const Status done =
+      for_each(name, [&](std::int64_t time_ns, std::span<const std::byte> body) {
+        if (count++ % every != 0) return;
+        table.time_s.push_back(static_cast<double>(time_ns) * 1e-9);
+        for (std::size_t i = 0; i < columns.size(); ++i) {
+          table.columns[i].push_back(element(*fields[i], body, columns[i].index));
+        }
+      });
+  if (!done) return std::unexpected(done.error());
+  return table;
+}
+
+Result<std::vector<EventText>> LogFile::events() const {
+  std::vector<EventText> events;
+  Status decoded;
+  const Status done =
+      for_each("/tandem/event", [&](std::int64_t, std::span<const std::byte> body) {
+        auto event = decode_event(body);
+        if (!event) {
+          decoded = std::unexpected(event.error());
+          return;
+        }
+        events.push_back(std::move(*event));
+      });
+  if (!done) return std::unexpected(done.error());
+  if (!decoded) return std::unexpected(decoded.error());
+  return events;
+}
+
+}  // namespace tandem::log

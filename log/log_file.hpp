@@ -1,0 +1,80 @@
+// A run's log, opened for reading: its information, its topics, and columns of numbers.
+// Start here to read logs. Layer: log.  Thread: one at a time, non-RT.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/image.hpp"
+#include "log/event.hpp"
+#include "log/info.hpp"
+
+namespace tandem::log {
+
+/// A topic of the file.
+struct Topic {
+  std::string name;             ///< "/tandem/state"
+  std::string type;             ///< "tandem/msg/State"
+  std::string encoding;         ///< "cdr"
+  std::uint64_t messages = 0;
+  std::int64_t first_ns = 0;    ///< times of the first and the last message
+  std::int64_t last_ns = 0;
+  hal::Layout layout;           ///< empty when the type is not all fixed-size numbers
+};
+
+/// One number of each message: element `index` of `field`.
+struct Column {
+  std::string field;
+  std::size_t index = 0;
+};
+
+/// Columns over time.
+struct Table {
+  std::vector<double> time_s;
+  std::vector<std::vector<double>> columns;  ///< as asked for
+};
+
+class LogFile {
+ public:
+  /// Reads the whole file once to count. Errors: as McapReader.
+  [[nodiscard]] static Result<LogFile> open(const std::string& path);
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const RunInfo& info() const { return info_; }
+  /// The metadata record "result"; empty when the run was killed.
+  [[nodiscard]] const StringMap& result() const { return result_; }
+  [[nodiscard]] const std::vector<Topic>& topics() const { return topics_; }
+  [[nodiscard]] const Topic* find(std::string_view topic) const;
+  /// True when the run was killed: the data end where its last chunk ended.
+  [[nodiscard]] bool truncated() const { return truncated_; }
+  [[nodiscard]] std::uint64_t messages() const;
+  /// SHA-256 over the messages as they stand in the file, as RecordingResult defines it.
+  [[nodiscard]] const std::string& data_sha256() const { return data_sha256_; }
+
+  /// The columns of every message of `topic`, or of every `every`-th.
+  /// Errors: no such topic, field (the nearest is suggested) or index; damaged data.
+  [[nodiscard]] Result<Table> read(const std::string& topic, const std::vector<Column>& columns,
+                                   std::size_t every = 1) const;
+  [[nodiscard]] Result<std::vector<EventText>> events() const;
+
+  /// Calls `visit(time_ns, CDR body)` for each message of `topic`, in order.
+  [[nodiscard]] Status for_each(
+      const std::string& topic,
+      const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const;
+
+ private:
+  [[nodiscard]] Result<const Topic*> require(const std::string& topic) const;
+
+  std::string path_;
+  RunInfo info_;
+  StringMap result_;
+  std::vector<Topic> topics_;
+  bool truncated_ = false;
+  std::string data_sha256_;
+};
+
+}  // namespace tandem::log

@@ -1,0 +1,177 @@
+#include "log/mcap_reader.hpp"
+
+#include <zlib.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "log/compression.hpp"
+
+namespace tandem::log {
+namespace {
+
+Error file_error(const std::string& path, std::string message, std::string hint) {
+  return {.message = std::move(message), .hint = std::move(hint), .file = path, .key = {}};
+}
+
+StringMap read_map(ByteReader& in) {
+  StringMap map;
+  ByteReader pairs(in.take(in.number<std::uint32_t>()));
+  while (pairs.ok() && pairs.left() > 0) {
+    std::string key = pairs.text();
+    std::string value = pairs.text();
+    map.emplace_back(std::move(key), std::move(value));
+  }
+  return map;
+}
+
+SchemaRecord read_schema(ByteReader& in) {
+  SchemaRecord schema;
+  schema.id = in.number<std::uint16_t>();
+  schema.name = in.text();
+  schema.encoding = in.text();
+  schema.text = in.text();
+  return schema;
+}
+
+ChannelRecord read_channel(ByteReader& in) {
+  ChannelRecord channel;
+  channel.id = in.number<std::uint16_t>();
+  channel.schema_id = in.number<std::uint16_t>();
+  channel.topic = in.text();
+  channel.message_encoding = in.text();
+  (void)read_map(in);
+  return channel;
+}
+
+}  // namespace
+
+std::unexpected<Error> McapReader::damaged(std::string what) const {
+  return std::unexpected(
+      file_error(path_, std::move(what), "the file is damaged; record the run again"));
+}
+
+Result<McapReader> McapReader::open(const std::string& path) {
+  McapReader reader;
+  reader.path_ = path;
+  std::error_code error;
+  reader.left_ = std::filesystem::file_size(path, error);
+  reader.file_ = std::make_unique<std::ifstream>(path, std::ios::binary);
+  if (error || !*reader.file_) {
+    return std::unexpected(
+        file_error(path, "cannot read this log", "check the path and its permissions"));
+  }
+  std::array<std::byte, kMagic.size()> magic{};
+  reader.file_->read(reinterpret_cast<char*>(magic.data()), magic.size());
+  if (!*reader.file_ || magic != kMagic) {
+    return std::unexpected(file_error(path, "this is no MCAP file", "name a log of `tandem run`"));
+  }
+  reader.left_ -= magic.size();
+  return reader;
+}
+
+Result<std::optional<MessageView>> McapReader::next() {
+  for (;;) {
+    auto found = next_in_chunk();
+    if (!found || found->has_value()) return found;
+    if (ended_) return std::nullopt;
+    if (Status read = read_record(); !read) return std::unexpected(read.error());
+  }
+}
+
+Status McapReader::read_record() {
+  std::array<std::byte, kRecordHeaderBytes> head{};
+  std::uint64_t length = 0;
+  if (left_ >= head.size()) {
+    file_->read(reinterpret_cast<char*>(head.data()), head.size());
+    left_ -= head.size();
+    ByteReader in(std::span<const std::byte>(head).subspan(1));
+    length = in.number<std::uint64_t>();
+  } else {
+    ended_ = truncated_ = true;
+    return {};
+  }
+  if (length > left_) {
+    ended_ = truncated_ = true;
+    return {};
+  }
+  record_.resize(static_cast<std::size_t>(length));
+  file_->read(reinterpret_cast<char*>(record_.data()), static_cast<std::streamsize>(length));
+  left_ -= length;
+  if (!*file_) return damaged("reading failed");
+  const auto opcode = static_cast<Opcode>(head[0]);
+  if (opcode == Opcode::kChunk) return open_chunk(record_);
+  return take(opcode, record_);
+}
+
+Status McapReader::take(Opcode opcode, std::span<const std::byte> content) {
+  ByteReader in(content);
+  switch (opcode) {
+    case Opcode::kHeader: profile_ = in.text(); break;
+    case Opcode::kSchema: {
+      SchemaRecord schema = read_schema(in);
+      schemas_[schema.id] = std::move(schema);
+      break;
+    }
+    case Opcode::kChannel: {
+      ChannelRecord channel = read_channel(in);
+      channels_[channel.id] = std::move(channel);
+      break;
+    }
+    case Opcode::kMetadata: {
+      std::string name = in.text();
+      metadata_[std::move(name)] = read_map(in);
+      break;
+    }
+    case Opcode::kDataEnd: ended_ = true; break;
+    default: break;  // indices and what a later version adds
+  }
+  if (!in.ok()) return damaged("a record is shorter than its content");
+  return {};
+}
+
+Status McapReader::open_chunk(std::span<const std::byte> content) {
+  ByteReader in(content);
+  (void)in.number<std::uint64_t>();  // start time
+  (void)in.number<std::uint64_t>();  // end time
+  const auto size = in.number<std::uint64_t>();
+  const auto crc = in.number<std::uint32_t>();
+  const auto compression = compression_of(in.text());
+  const auto records = in.take(in.number<std::uint64_t>());
+  if (!in.ok()) return damaged("a chunk is shorter than its content");
+  if (!compression) return damaged(compression.error().message);
+  if (Status done = decompress(*compression, records, size, chunk_); !done) {
+    return damaged(done.error().message);
+  }
+  chunk_at_ = 0;
+  const auto found = crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size());
+  if (crc != 0 && crc != found) return damaged("a chunk's checksum does not fit");
+  return {};
+}
+
+Result<std::optional<MessageView>> McapReader::next_in_chunk() {
+  while (chunk_at_ < chunk_.size()) {
+    ByteReader in(std::span<const std::byte>(chunk_).subspan(chunk_at_));
+    const auto opcode = static_cast<Opcode>(in.number<std::uint8_t>());
+    const auto content = in.take(in.number<std::uint64_t>());
+    if (!in.ok()) return damaged("a chunk ends in the middle of a record");
+    chunk_at_ += kRecordHeaderBytes + content.size();
+    if (opcode != Opcode::kMessage) {
+      if (Status done = take(opcode, content); !done) return std::unexpected(done.error());
+      continue;
+    }
+    ByteReader body(content);
+    MessageView message;
+    message.channel = body.number<std::uint16_t>();
+    message.sequence = body.number<std::uint32_t>();
+    message.time_ns = static_cast<std::int64_t>(body.number<std::uint64_t>());
+    (void)body.number<std::uint64_t>();  // publish time
+    message.data = body.rest();
+    if (!body.ok()) return damaged("a message is shorter than its head");
+    if (!channels_.contains(message.channel)) return damaged("a message's channel is unknown");
+    return message;
+  }
+  return std::nullopt;
+}
+
+}  // namespace tandem::log

@@ -1,0 +1,77 @@
+// Reads an MCAP file record by record, also one whose writer was killed, and checks what it
+// reads: lengths, checksums, ids.
+// Layer: log.  Thread: one at a time, non-RT.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "base/result.hpp"
+#include "log/bytes.hpp"
+#include "log/mcap_format.hpp"
+
+namespace tandem::log {
+
+struct SchemaRecord {
+  std::uint16_t id = 0;
+  std::string name, encoding, text;
+};
+
+struct ChannelRecord {
+  std::uint16_t id = 0;
+  std::uint16_t schema_id = 0;
+  std::string topic, message_encoding;
+};
+
+/// Valid until the next call of the reader.
+struct MessageView {
+  std::uint16_t channel = 0;
+  std::uint32_t sequence = 0;
+  std::int64_t time_ns = 0;
+  std::span<const std::byte> data;  ///< with its CDR header
+};
+
+class McapReader {
+ public:
+  /// Errors: no such file, or no MCAP.
+  [[nodiscard]] static Result<McapReader> open(const std::string& path);
+
+  /// The next message in the file's order, or none at the end of the data. A file that ends in
+  /// the middle of a record ends there, with truncated() true. Errors: damaged data.
+  [[nodiscard]] Result<std::optional<MessageView>> next();
+
+  /// Those met so far: the first message's are all known once it has been read.
+  [[nodiscard]] const std::map<std::uint16_t, ChannelRecord>& channels() const {
+    return channels_;
+  }
+  [[nodiscard]] const std::map<std::uint16_t, SchemaRecord>& schemas() const { return schemas_; }
+  /// By name. The run's own stand before the first message, its result behind the last.
+  [[nodiscard]] const std::map<std::string, StringMap>& metadata() const { return metadata_; }
+  [[nodiscard]] const std::string& profile() const { return profile_; }
+  /// The end of the data is missing: the run was killed, or is still being written.
+  [[nodiscard]] bool truncated() const { return truncated_; }
+
+ private:
+  [[nodiscard]] Status read_record();
+  [[nodiscard]] Status take(Opcode opcode, std::span<const std::byte> content);
+  [[nodiscard]] Status open_chunk(std::span<const std::byte> content);
+  [[nodiscard]] Result<std::optional<MessageView>> next_in_chunk();
+  [[nodiscard]] std::unexpected<Error> damaged(std::string what) const;
+
+  std::string path_, profile_;
+  std::unique_ptr<std::ifstream> file_;
+  std::uint64_t left_ = 0;  // bytes of the file not read yet
+  bool ended_ = false, truncated_ = false;
+  Bytes record_, chunk_;
+  std::size_t chunk_at_ = 0;
+  std::map<std::uint16_t, SchemaRecord> schemas_;
+  std::map<std::uint16_t, ChannelRecord> channels_;
+  std::map<std::string, StringMap> metadata_;
+};
+
+}  // namespace tandem::log

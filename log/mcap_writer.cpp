@@ -1,0 +1,321 @@
+#include "log/mcap_writer.hpp"
+
+#include <fcntl.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace tandem::log {
+namespace {
+
+constexpr std::uint64_t kSpaceNeeded = 1024 * 1024;  // less on the disk is a full disk
+
+std::uint32_t crc(std::uint32_t before, std::span<const std::byte> bytes) {
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+void append_record(Bytes& out, Opcode opcode, std::span<const std::byte> content) {
+  append(out, static_cast<std::uint8_t>(opcode));
+  append(out, static_cast<std::uint64_t>(content.size()));
+  append(out, content);
+}
+
+void append_map(Bytes& out, const StringMap& map) {
+  Bytes pairs;
+  for (const auto& [key, value] : map) {
+    append(pairs, key);
+    append(pairs, value);
+  }
+  append(out, static_cast<std::uint32_t>(pairs.size()));
+  append(out, pairs);
+}
+
+void append_map(Bytes& out, const std::map<std::uint16_t, std::uint64_t>& map) {
+  append(out, static_cast<std::uint32_t>(map.size() * 10));
+  for (const auto& [key, value] : map) {
+    append(out, key);
+    append(out, value);
+  }
+}
+
+Error open_error(const std::string& path, int error) {
+  std::string hint;
+  switch (error) {
+    case ENOENT: hint = "create the folder first"; break;
+    case EACCES:
+    case EPERM:
+    case EROFS: hint = "choose a folder that you may write to"; break;
+    case ENOSPC: hint = "free some space or choose another folder"; break;
+    default: hint = "choose another path"; break;
+  }
+  return {.message = std::string("cannot write the log: ") + std::strerror(error),
+          .hint = hint,
+          .file = path,
+          .key = {}};
+}
+
+}  // namespace
+
+McapWriter::~McapWriter() {
+  if (file_ >= 0) ::close(file_);
+}
+
+Status McapWriter::open(const std::string& path, const WriterOptions& options) {
+  path_ = path;
+  options_ = options;
+  file_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file_ < 0) return std::unexpected(open_error(path, errno));
+  struct statvfs disk {};
+  if (::fstatvfs(file_, &disk) == 0 && disk.f_blocks > 0 &&
+      disk.f_bavail * disk.f_frsize < kSpaceNeeded) {
+    return std::unexpected(open_error(path, ENOSPC));
+  }
+  chunk_.reserve(options.chunk_bytes + options.chunk_bytes / 4);
+  emit(kMagic);
+  Bytes header;
+  append(header, "ros2");
+  append(header, "tandem");
+  emit_record(Opcode::kHeader, header);
+  if (failed()) return std::unexpected(open_error(path, errno));
+  return {};
+}
+
+void McapWriter::emit(std::span<const std::byte> bytes) {
+  crc_ = crc(crc_, bytes);
+  while (!bytes.empty() && !failed()) {
+    const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno != EINTR) error_ = std::strerror(errno);
+      continue;
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+    offset_ += static_cast<std::uint64_t>(written);
+  }
+}
+
+void McapWriter::emit_record(Opcode opcode, const Bytes& content) {
+  Bytes record;
+  append_record(record, opcode, content);
+  emit(record);
+}
+
+std::uint16_t McapWriter::add_schema(std::string_view name, std::string_view encoding,
+                                     std::string_view text) {
+  const auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
+  Bytes& content = schemas_.emplace_back();
+  append(content, id);
+  append(content, name);
+  append(content, encoding);
+  append(content, text);
+  append_record(chunk_, Opcode::kSchema, content);
+  return id;
+}
+
+std::uint16_t McapWriter::add_channel(std::uint16_t schema, std::string_view topic,
+                                      std::string_view message_encoding,
+                                      const StringMap& metadata) {
+  const auto id = static_cast<std::uint16_t>(channels_.size());
+  Bytes& content = channels_.emplace_back();
+  append(content, id);
+  append(content, schema);
+  append(content, topic);
+  append(content, message_encoding);
+  append_map(content, metadata);
+  append_record(chunk_, Opcode::kChannel, content);
+  index_.emplace_back();
+  sequence_.push_back(0);
+  return id;
+}
+
+void McapWriter::add_metadata(std::string_view name, const StringMap& map) {
+  finish_chunk();
+  Bytes content;
+  append(content, name);
+  append_map(content, map);
+  metadata_.push_back({offset_, kRecordHeaderBytes + content.size(), std::string(name)});
+  emit_record(Opcode::kMetadata, content);
+}
+
+bool McapWriter::write(std::uint16_t channel, std::int64_t time_ns,
+                       std::span<const std::byte> head, std::span<const std::byte> body) {
+  if (failed()) return false;
+  const auto time = static_cast<std::uint64_t>(time_ns);
+  const std::size_t at = chunk_.size();
+  const std::size_t content = kMessageHeaderBytes + head.size() + body.size();
+  chunk_.resize(at + kRecordHeaderBytes + content);
+  std::byte* out = chunk_.data() + at;
+  store(out, static_cast<std::uint8_t>(Opcode::kMessage));
+  store(out + 1, static_cast<std::uint64_t>(content));
+  store(out + 9, channel);
+  store(out + 11, sequence_[channel]++);
+  store(out + 15, time);
+  store(out + 23, time);
+  std::ranges::copy(head, out + 31);
+  std::ranges::copy(body, out + 31 + head.size());
+
+  chunk_start_ = chunk_has_messages_ ? std::min(chunk_start_, time) : time;
+  chunk_end_ = chunk_has_messages_ ? std::max(chunk_end_, time) : time;
+  chunk_has_messages_ = true;
+  index_[channel].push_back({time, at});
+  Statistics& all = statistics_;
+  all.start_time = all.messages == 0 ? time : std::min(all.start_time, time);
+  all.end_time = std::max(all.end_time, time);
+  ++all.messages;
+  ++all.per_channel[channel];
+  const auto span = static_cast<std::uint64_t>(options_.chunk_span_ns);
+  if (chunk_.size() >= options_.chunk_bytes || chunk_end_ - chunk_start_ >= span) finish_chunk();
+  return !failed();
+}
+
+void McapWriter::finish_chunk() {
+  if (chunk_.empty() || failed()) return;
+  std::span<const std::byte> records = chunk_;
+  if (options_.compression != Compression::kNone) {
+    compress(options_.compression, chunk_, compressed_);
+    records = compressed_;
+  }
+  Chunk chunk;
+  chunk.start_time = chunk_has_messages_ ? chunk_start_ : 0;
+  chunk.end_time = chunk_has_messages_ ? chunk_end_ : 0;
+  chunk.offset = offset_;
+  chunk.compressed = records.size();
+  chunk.uncompressed = chunk_.size();
+
+  Bytes head;
+  append(head, chunk.start_time);
+  append(head, chunk.end_time);
+  append(head, chunk.uncompressed);
+  append(head, crc(0, chunk_));
+  append(head, mcap_name(options_.compression));
+  append(head, chunk.compressed);
+  Bytes record;
+  append(record, static_cast<std::uint8_t>(Opcode::kChunk));
+  append(record, static_cast<std::uint64_t>(head.size() + records.size()));
+  append(record, head);
+  emit(record);
+  emit(records);
+  chunk.length = offset_ - chunk.offset;
+  write_indices(chunk);
+  chunks_.push_back(std::move(chunk));
+  chunk_.clear();
+  chunk_has_messages_ = false;
+}
+
+void McapWriter::write_indices(Chunk& chunk) {
+  const std::uint64_t begin = offset_;
+  Bytes records;
+  for (std::uint16_t channel = 0; channel < index_.size(); ++channel) {
+    std::vector<IndexEntry>& entries = index_[channel];
+    if (entries.empty()) continue;
+    chunk.index_offsets[channel] = begin + records.size();
+    Bytes content;
+    append(content, channel);
+    append(content, static_cast<std::uint32_t>(entries.size() * 16));
+    for (const IndexEntry& entry : entries) {
+      append(content, entry.time);
+      append(content, entry.offset);
+    }
+    append_record(records, Opcode::kMessageIndex, content);
+    entries.clear();
+  }
+  emit(records);
+  chunk.index_length = offset_ - begin;
+}
+
+Bytes McapWriter::statistics_content() const {
+  Bytes content;
+  append(content, statistics_.messages);
+  append(content, static_cast<std::uint16_t>(schemas_.size()));
+  append(content, static_cast<std::uint32_t>(channels_.size()));
+  append(content, std::uint32_t{0});  // attachments
+  append(content, static_cast<std::uint32_t>(metadata_.size()));
+  append(content, static_cast<std::uint32_t>(chunks_.size()));
+  append(content, statistics_.start_time);
+  append(content, statistics_.end_time);
+  append_map(content, statistics_.per_channel);
+  return content;
+}
+
+Bytes McapWriter::chunk_index_content(const Chunk& chunk) const {
+  Bytes content;
+  append(content, chunk.start_time);
+  append(content, chunk.end_time);
+  append(content, chunk.offset);
+  append(content, chunk.length);
+  append_map(content, chunk.index_offsets);
+  append(content, chunk.index_length);
+  append(content, mcap_name(options_.compression));
+  append(content, chunk.compressed);
+  append(content, chunk.uncompressed);
+  return content;
+}
+
+void McapWriter::summary_group(Opcode opcode, std::uint64_t start, Bytes& offsets) const {
+  if (offset_ == start) return;
+  Bytes content;
+  append(content, static_cast<std::uint8_t>(opcode));
+  append(content, start);
+  append(content, offset_ - start);
+  append_record(offsets, Opcode::kSummaryOffset, content);
+}
+
+void McapWriter::write_summary() {
+  const std::uint64_t summary_start = offset_;
+  crc_ = 0;
+  Bytes offsets;
+  std::uint64_t start = offset_;
+  for (const Bytes& schema : schemas_) emit_record(Opcode::kSchema, schema);
+  summary_group(Opcode::kSchema, start, offsets);
+  start = offset_;
+  for (const Bytes& channel : channels_) emit_record(Opcode::kChannel, channel);
+  summary_group(Opcode::kChannel, start, offsets);
+  start = offset_;
+  emit_record(Opcode::kStatistics, statistics_content());
+  summary_group(Opcode::kStatistics, start, offsets);
+  start = offset_;
+  for (const Chunk& chunk : chunks_) emit_record(Opcode::kChunkIndex, chunk_index_content(chunk));
+  summary_group(Opcode::kChunkIndex, start, offsets);
+  start = offset_;
+  for (const MetadataPlace& place : metadata_) {
+    Bytes content;
+    append(content, place.offset);
+    append(content, place.length);
+    append(content, place.name);
+    emit_record(Opcode::kMetadataIndex, content);
+  }
+  summary_group(Opcode::kMetadataIndex, start, offsets);
+  const std::uint64_t offset_start = offset_;
+  emit(offsets);
+  // The CRC covers the summary and the footer up to the CRC itself.
+  Bytes footer;
+  append(footer, static_cast<std::uint8_t>(Opcode::kFooter));
+  append(footer, std::uint64_t{20});
+  append(footer, summary_start);
+  append(footer, offset_start);
+  append(footer, crc(crc_, footer));
+  emit(footer);
+  emit(kMagic);
+}
+
+Status McapWriter::close() {
+  finish_chunk();
+  Bytes end;
+  append(end, crc_);
+  emit_record(Opcode::kDataEnd, end);
+  write_summary();
+  const int closed = ::close(file_);
+  file_ = -1;
+  if (closed != 0 && !failed()) error_ = std::strerror(errno);
+  if (!failed()) return {};
+  return std::unexpected(Error{.message = "the log is incomplete: " + error_,
+                               .hint = "it can be read up to where writing failed",
+                               .file = path_,
+                               .key = {}});
+}
+
+}  // namespace tandem::log

@@ -1,0 +1,141 @@
+#include "log/recorder.hpp"
+
+#include <chrono>
+#include <cstring>
+
+#include "log/schema.hpp"
+
+namespace tandem::log {
+namespace {
+
+constexpr Recorder::Channel kEventChannel = 0;
+constexpr auto kPoll = std::chrono::microseconds(500);
+
+}  // namespace
+
+struct Recorder::Slot {
+  std::int64_t time_ns;
+  std::uint32_t bytes;
+  Channel channel;
+};
+
+Recorder::~Recorder() { stop_thread(); }
+
+Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const RunInfo& info,
+                                                 const RecorderOptions& options) {
+  std::unique_ptr<Recorder> recorder(new Recorder);
+  recorder->path_ = path;
+  recorder->joints_ = info.joints;
+  recorder->ring_slots_ = options.ring_slots;
+  McapWriter& writer = recorder->writer_;
+  if (Status opened = writer.open(path, options.writer); !opened) {
+    return std::unexpected(opened.error());
+  }
+  writer.add_metadata(kInfoRecord, to_map(info));
+  writer.add_metadata(kConfigurationRecord, info.configuration);
+  if (writer.failed()) {
+    return std::unexpected(Error{.message = "cannot write the log: " + writer.error(),
+                                 .hint = "free some space or choose another folder",
+                                 .file = path,
+                                 .key = {}});
+  }
+  const std::uint16_t schema =
+      writer.add_schema("tandem/msg/Event", "ros2msg", event_schema());
+  writer.add_channel(schema, "/tandem/event", "cdr");
+  return recorder;
+}
+
+Recorder::Channel Recorder::add_channel(const std::string& topic, const std::string& type,
+                                        const hal::Layout& layout) {
+  largest_ = std::max(largest_, layout.bytes());
+  const std::uint16_t schema = writer_.add_schema(type, "ros2msg", ros2msg_of(layout));
+  return writer_.add_channel(schema, topic, "cdr");
+}
+
+void Recorder::start() {
+  ring_ = std::make_unique<SpscRing>((sizeof(Slot) + largest_ + 7) / 8 * 8, ring_slots_);
+  thread_ = std::thread([this] { run(); });
+}
+
+bool Recorder::push(Channel channel, std::int64_t time_ns,
+                    std::span<const std::byte> image) noexcept TANDEM_RT {
+  const std::span<std::byte> slot = ring_->begin_push();
+  if (slot.empty()) return false;
+  const Slot head{time_ns, static_cast<std::uint32_t>(image.size()), channel};
+  std::memcpy(slot.data(), &head, sizeof head);
+  std::memcpy(slot.data() + sizeof head, image.data(), image.size());
+  ring_->end_push();
+  return true;
+}
+
+bool Recorder::push(const Event& event) noexcept TANDEM_RT {
+  return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
+}
+
+void Recorder::wait_for_space(std::size_t messages) const noexcept {
+  while (ring_->size() + messages > ring_->capacity()) {
+    std::this_thread::sleep_for(kPoll / 10);
+  }
+}
+
+void Recorder::run() {
+  for (;;) {
+    // Read before the ring: what was pushed before closing is then surely seen.
+    const bool last = closing_.load(std::memory_order_acquire);
+    for (auto slot = ring_->front(); !slot.empty(); slot = ring_->front()) {
+      write(slot);
+      ring_->pop();
+    }
+    if (last) return;
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+void Recorder::write(std::span<const std::byte> slot) {
+  Slot head{};
+  std::memcpy(&head, slot.data(), sizeof head);
+  std::span<const std::byte> body = slot.subspan(sizeof head, head.bytes);
+  if (head.channel == kEventChannel) {
+    Event event;
+    std::memcpy(&event, body.data(), sizeof event);
+    event_.clear();
+    encode_event(event, describe(event, joints_), event_);
+    body = event_;
+  }
+  std::array<std::byte, 14> hashed;  // channel, time, CDR header; the body follows
+  store(hashed.data(), head.channel);
+  store(hashed.data() + 2, static_cast<std::uint64_t>(head.time_ns));
+  std::memcpy(hashed.data() + 10, kCdrHeader.data(), kCdrHeader.size());
+  hash_.update(hashed);
+  hash_.update(body);
+  if (!writer_.write(head.channel, head.time_ns, kCdrHeader, body)) {
+    ++lost_;
+    failed_.store(true, std::memory_order_relaxed);
+  }
+}
+
+void Recorder::stop_thread() {
+  closing_.store(true, std::memory_order_release);
+  if (thread_.joinable()) thread_.join();
+}
+
+RecordingResult Recorder::close(const StringMap& extra) {
+  stop_thread();
+  RecordingResult result;
+  result.path = path_;
+  result.messages = writer_.messages();
+  result.dropped = ring_->dropped();
+  result.failed = lost_;
+  result.data_sha256 = hash_.finish();
+  StringMap map{{"data_sha256", result.data_sha256},
+                {"messages", std::to_string(result.messages)},
+                {"dropped", std::to_string(result.dropped)},
+                {"failed", std::to_string(result.failed)}};
+  map.insert(map.end(), extra.begin(), extra.end());
+  writer_.add_metadata(kResultRecord, map);
+  if (const Status closed = writer_.close(); !closed) result.error = closed.error().message;
+  result.bytes = writer_.bytes_written();
+  return result;
+}
+
+}  // namespace tandem::log

@@ -1,0 +1,32 @@
+// SHA-256 of a stream of bytes (FIPS 180-4), by OpenSSL.
+// Layer: log.  Thread: one at a time.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+struct evp_md_ctx_st;
+
+namespace tandem::log {
+
+class Sha256 {
+ public:
+  Sha256();
+
+  void update(std::span<const std::byte> bytes) noexcept;
+  /// 64 hexadecimal digits, lower case. Ends the stream: call it once.
+  [[nodiscard]] std::string finish();
+
+ private:
+  struct Free {
+    void operator()(evp_md_ctx_st* context) const noexcept;
+  };
+  std::unique_ptr<evp_md_ctx_st, Free> context_;
+};
+
+/// Of one block.
+[[nodiscard]] std::string sha256(std::span<const std::byte> bytes);
+
+}  // namespace tandem::log

@@ -1,0 +1,47 @@
+#include "log/event.hpp"
+
+#include "base/realtime.hpp"
+
+namespace tandem::log {
+namespace {
+
+const std::vector<std::string> kJoints{"hip", "knee"};
+
+TEST(Event, SaysWhatHappenedInOneLine) {
+  Event event{.code = 0x7310, .joint = 1, .kind = EventKind::kFault};
+  EXPECT_EQ(describe(event, kJoints), "fault of knee (0x7310)");
+  event = {.code = static_cast<std::uint32_t>(Code::kDiverged), .kind = EventKind::kFault};
+  EXPECT_EQ(describe(event, kJoints), "fault: Diverged");
+  event = {.code = 3, .kind = EventKind::kOverrun};
+  EXPECT_EQ(describe(event, kJoints), "overrun: 3 cycles skipped");
+  event = {.kind = EventKind::kBringUpDone};
+  EXPECT_EQ(describe(event, kJoints), "bring-up done");
+}
+
+TEST(Event, IsEncodedAsPlainCdr) {
+  const Event event{.cycle = 2, .time_ns = 3, .code = 4, .joint = -1, .kind = EventKind::kFault};
+  Bytes body;
+  encode_event(event, "ab", body);
+  const unsigned char expected[] = {2, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0,
+                                    0xFF, 0xFF, 0xFF, 0xFF, 3, 0, 0, 0, 3, 0, 0, 0, 'a', 'b', 0};
+  ASSERT_EQ(body.size(), sizeof expected);
+  for (std::size_t i = 0; i < body.size(); ++i) {
+    EXPECT_EQ(static_cast<unsigned char>(body[i]), expected[i]) << i;
+  }
+  const auto back = decode_event(body);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->event.joint, -1);
+  EXPECT_EQ(back->event.kind, EventKind::kFault);
+  EXPECT_EQ(back->text, "ab");
+}
+
+TEST(Event, RefusesACutMessage) {
+  Bytes body;
+  encode_event({}, "text", body);
+  for (std::size_t size = 0; size < body.size(); ++size) {
+    EXPECT_FALSE(decode_event(std::span(body).first(size))) << size;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::log

@@ -1,0 +1,95 @@
+#include "log/log_file.hpp"
+
+#include <sstream>
+
+#include "log/csv.hpp"
+#include "log/recorder.hpp"
+#include "tests/log/scratch_folder.hpp"
+
+namespace tandem::log {
+namespace {
+
+/// Two joints and one sensor of two channels; three messages.
+class LogFileOfThree : public testing::Test {
+ protected:
+  void SetUp() override {
+    const RunInfo info{
+        .robot = "two", .joints = {"hip", "knee"}, .sensors = {{"imu", 2}}, .period_ns = 1000};
+    auto recorder = Recorder::open(path_, info, {});
+    ASSERT_TRUE(recorder);
+    hal::Layout layout;
+    layout.add("cycle", hal::FieldType::kU64, 1, "");
+    layout.add("position_rad", hal::FieldType::kF64, 2, "");
+    layout.add("sensor", hal::FieldType::kF64, 2, "");
+    const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+    (*recorder)->start();
+    for (std::uint64_t cycle = 0; cycle < 3; ++cycle) {
+      struct {
+        std::uint64_t cycle;
+        double numbers[4];
+      } message{cycle, {0.1, -2.5e-300, 1.0 / 3.0, static_cast<double>(cycle)}};
+      (*recorder)->push(channel, static_cast<std::int64_t>(cycle) * 250'000'000,
+                        std::as_bytes(std::span(&message, 1)));
+    }
+    (*recorder)->push(Event{.cycle = 2, .time_ns = 500'000'000, .kind = EventKind::kShutDown});
+    EXPECT_EQ((*recorder)->close().messages, 4U);
+  }
+
+  LogFile open() const {
+    auto log = LogFile::open(path_);
+    EXPECT_TRUE(log);
+    return std::move(*log);
+  }
+
+  const ScratchFolder folder_;
+  const std::string path_ = folder_ / "run.mcap";
+};
+
+TEST_F(LogFileOfThree, ListsItsTopicsWithCountsAndTimes) {
+  const LogFile log = open();
+  ASSERT_EQ(log.topics().size(), 2U);
+  const Topic* state = log.find("/tandem/state");
+  ASSERT_NE(state, nullptr);
+  EXPECT_EQ(state->type, "tandem/msg/State");
+  EXPECT_EQ(state->messages, 3U);
+  EXPECT_EQ(state->first_ns, 0);
+  EXPECT_EQ(state->last_ns, 500'000'000);
+  EXPECT_EQ(log.messages(), 4U);
+}
+
+TEST_F(LogFileOfThree, SuggestsTheNearestNameOfATopicOrField) {
+  const LogFile log = open();
+  EXPECT_EQ(log.read("/tandem/stat", {}).error().hint, "did you mean '/tandem/state'?");
+  EXPECT_EQ(log.read("/tandem/state", {{"positon_rad", 0}}).error().hint,
+            "did you mean 'position_rad'?");
+  EXPECT_FALSE(log.read("/tandem/state", {{"position_rad", 2}}));
+}
+
+TEST_F(LogFileOfThree, ReadsEverySecondMessage) {
+  const auto table = open().read("/tandem/state", {{"sensor", 1}}, 2);
+  ASSERT_TRUE(table);
+  EXPECT_EQ(table->time_s, (std::vector<double>{0.0, 0.5}));
+  EXPECT_EQ(table->columns[0], (std::vector<double>{0.0, 2.0}));
+}
+
+TEST_F(LogFileOfThree, WritesCsvWithTheNamesOfJointsAndSensors) {
+  std::ostringstream out;
+  const Status done = write_csv(open(), "/tandem/state", 1, out);
+  ASSERT_TRUE(done);
+  EXPECT_EQ(out.str(),
+            "time_s,cycle,position_rad.hip,position_rad.knee,sensor.imu.0,sensor.imu.1\n"
+            "0,0,0.1,-2.5e-300,0.3333333333333333,0\n"
+            "0.25,1,0.1,-2.5e-300,0.3333333333333333,1\n"
+            "0.5,2,0.1,-2.5e-300,0.3333333333333333,2\n");
+}
+
+TEST_F(LogFileOfThree, WritesEventsAsCsv) {
+  std::ostringstream out;
+  ASSERT_TRUE(write_csv(open(), "/tandem/event", 1, out));
+  EXPECT_EQ(out.str(),
+            "time_s,cycle,kind,joint,code,text\n0.5,2,shut down,-1,0,\"shut down\"\n");
+  EXPECT_FALSE(write_csv(open(), "/nothing", 1, out));
+}
+
+}  // namespace
+}  // namespace tandem::log

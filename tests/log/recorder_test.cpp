@@ -1,0 +1,182 @@
+#include "log/recorder.hpp"
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "log/log_file.hpp"
+#include "log/schema.hpp"
+#include "rt/scoped_realtime.hpp"
+#include "tests/log/scratch_folder.hpp"
+
+namespace tandem::log {
+namespace {
+
+hal::StateImage image() { return hal::StateImage({.joints = 3, .sensor_channels = {6}}); }
+
+RunInfo run_info() {
+  return {.version = "test",
+          .robot = "three",
+          .hal = "sim",
+          .joints = {"a", "b", "c"},
+          .sensors = {{"foot", 6}},
+          .seed = 42,
+          .period_ns = 1'000'000,
+          .kernel_variant = "baseline",
+          .description_hash = "00",
+          .configuration = {{"robot.toml", "name = \"three\"\n"}}};
+}
+
+/// A state whose numbers depend on the cycle alone.
+void fill(hal::StateImage& state, std::uint64_t cycle) {
+  state.cycle()[0] = cycle;
+  state.time_ns()[0] = static_cast<std::int64_t>(cycle) * 1'000'000;
+  for (std::size_t j = 0; j < 3; ++j) {
+    state.position_rad()[j] = 0.001 * static_cast<double>(cycle) + static_cast<double>(j);
+  }
+}
+
+/// Records `cycles` states and an event in the middle; the RT part is under the trap.
+RecordingResult record(const std::string& path, std::uint64_t cycles,
+                       const RecorderOptions& options = {}) {
+  auto recorder = Recorder::open(path, run_info(), options);
+  EXPECT_TRUE(recorder) << recorder.error().to_string();
+  hal::StateImage state = image();
+  const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State",
+                                                state.layout());
+  (*recorder)->start();
+  for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
+    (*recorder)->wait_for_space(2);
+    const rt::ScopedRealtime in_cycle;
+    fill(state, cycle);
+    (*recorder)->push(channel, state.time_ns()[0], state.bytes());
+    if (cycle == cycles / 2) {
+      (*recorder)->push(Event{.cycle = cycle,
+                              .time_ns = state.time_ns()[0],
+                              .code = 0x7310,
+                              .joint = 1,
+                              .kind = EventKind::kFault});
+    }
+  }
+  return (*recorder)->close({{"wall_seconds", "1.5"}});
+}
+
+TEST(Recorder, WritesEveryCycleWithoutADropWhenTheLoopMayWait) {
+  const ScratchFolder folder;
+  const RecordingResult result = record(folder / "run.mcap", 20'000, {.ring_slots = 64});
+  EXPECT_EQ(result.messages, 20'001U);
+  EXPECT_EQ(result.dropped, 0U);
+  EXPECT_EQ(result.failed, 0U);
+  EXPECT_EQ(result.error, "");
+  EXPECT_EQ(result.bytes, std::filesystem::file_size(folder / "run.mcap"));
+}
+
+TEST(Recorder, ReadsBackTheSameNumbersNamesAndHash) {
+  const ScratchFolder folder;
+  const RecordingResult result = record(folder / "run.mcap", 1000);
+  const auto log = LogFile::open(folder / "run.mcap");
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_FALSE(log->truncated());
+  EXPECT_EQ(log->data_sha256(), result.data_sha256);
+  EXPECT_EQ(value_of(log->result(), "data_sha256"), result.data_sha256);
+  EXPECT_EQ(value_of(log->result(), "wall_seconds"), "1.5");
+  EXPECT_EQ(log->info().joints, run_info().joints);
+  EXPECT_EQ(log->info().sensors.at(0).channels, 6U);
+  EXPECT_EQ(log->info().seed, 42U);
+  EXPECT_EQ(log->info().configuration, run_info().configuration);
+  const auto table = log->read("/tandem/state", {{"position_rad", 2}, {"cycle", 0}});
+  ASSERT_TRUE(table) << table.error().to_string();
+  ASSERT_EQ(table->time_s.size(), 1000U);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    ASSERT_EQ(table->columns[0][i], 0.001 * static_cast<double>(i) + 2.0);
+    ASSERT_EQ(table->columns[1][i], static_cast<double>(i));
+  }
+  const auto events = log->events();
+  ASSERT_TRUE(events);
+  ASSERT_EQ(events->size(), 1U);
+  EXPECT_EQ(events->at(0).text, "fault of b (0x7310)");
+  EXPECT_EQ(events->at(0).event.cycle, 500U);
+}
+
+TEST(Recorder, HashesTheDataAndNothingElse) {
+  const ScratchFolder folder;
+  const RecordingResult one = record(folder / "one.mcap", 500);
+  const RecordingResult other = record(
+      folder / "other.mcap", 500,
+      {.writer = {.compression = Compression::kZstd, .chunk_bytes = 3000}, .ring_slots = 8});
+  const RecordingResult shorter = record(folder / "shorter.mcap", 499);
+  EXPECT_EQ(one.data_sha256.size(), 64U);
+  EXPECT_EQ(one.data_sha256, other.data_sha256);
+  EXPECT_NE(one.data_sha256, shorter.data_sha256);
+}
+
+TEST(Recorder, DropsAndCountsWhenTheRingIsFull) {
+  const ScratchFolder folder;
+  auto recorder = Recorder::open(folder / "run.mcap", run_info(), {.ring_slots = 4});
+  ASSERT_TRUE(recorder);
+  (*recorder)->start();
+  std::uint64_t pushed = 0;
+  for (int i = 0; i < 200'000; ++i) {
+    if ((*recorder)->push(Event{.time_ns = i})) ++pushed;
+  }
+  const RecordingResult result = (*recorder)->close();
+  EXPECT_GT(result.dropped, 0U);
+  EXPECT_EQ(result.dropped + pushed, 200'000U);
+  EXPECT_EQ(result.messages, pushed);
+}
+
+TEST(Recorder, CountsWhatADiskThatFillsUpLoses) {
+  const ScratchFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {  // its own limit on a file's size stands for the full disk
+    const rlimit limit{300'000, 300'000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    signal(SIGXFSZ, SIG_IGN);
+    const RecordingResult result = record(folder / "run.mcap", 5000);
+    const bool right = result.failed > 0 && !result.error.empty() && result.dropped == 0;
+    _exit(right ? 0 : 1);
+  }
+  int status = 1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  const auto log = LogFile::open(folder / "run.mcap");
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_TRUE(log->truncated());
+  EXPECT_GT(log->messages(), 100U);
+}
+
+TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
+  const ScratchFolder folder;
+  int pipes[2];
+  ASSERT_EQ(pipe(pipes), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    auto recorder = Recorder::open(folder / "run.mcap", run_info(), {});
+    hal::StateImage state = image();
+    const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State",
+                                                  state.layout());
+    (*recorder)->start();
+    for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
+      (*recorder)->wait_for_space(1);
+      fill(state, cycle);
+      (*recorder)->push(channel, state.time_ns()[0], state.bytes());
+    }
+    (*recorder)->wait_for_space(2048);  // the writer has taken everything
+    (void)!write(pipes[1], "x", 1);
+    pause();
+  }
+  char ready = 0;
+  ASSERT_EQ(read(pipes[0], &ready, 1), 1);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  const auto log = LogFile::open(folder / "run.mcap");
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_TRUE(log->truncated());
+  EXPECT_GE(log->messages(), 2800U);  // all but the last 200 ms
+  EXPECT_EQ(log->info().robot, "three");
+}
+
+}  // namespace
+}  // namespace tandem::log
