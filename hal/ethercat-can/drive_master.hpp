@@ -1,0 +1,96 @@
+// The master of every drive and sensor node: bring-up, cyclic exchange, supervision, shut-down.
+// Layer: hal/ethercat-can.  Thread: create() non-RT; the rest the loop's thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "hal/backend.hpp"
+#include "hal/ethercat-can/bus.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::hal::can {
+
+/// Node id under which the master's heartbeat is sent.
+inline constexpr int kMasterNodeId = 127;
+
+/// Brings all nodes to operation at once, then exchanges the process image with them.
+///
+/// One cycle, in this order, from the first cycle to the last:
+/// ```
+/// master.cycle_begin(time);        // SYNC k and the heartbeat go out
+/// …                                // in process: deliver frames, boards sample and answer
+/// code = master.receive(state);    // decodes what has come; goes on with bring-up
+/// code = master.send(command, parameters);
+/// ```
+/// SYNC k is sent at the start of cycle k; boards sample at it and their TPDOs are expected in
+/// the same cycle; the RPDOs that cycle k sends take effect at SYNC k+1. What bring-up, a fault's
+/// reaction and shut_down() have to send they send by themselves, whether send() is called or not.
+///
+/// Bring-up of every node, all in parallel: reset, boot-up, identity (1000, 1018), configuration
+/// by SDO (scales, limits, gains, PDO mapping, heartbeats), NMT start; when all nodes run, each
+/// axis walks to Operation Enabled in CSP with its own measured position as target, so that
+/// nothing moves. A node or axis that does not follow in time ends it with Phase::kFault.
+///
+/// In operation a fault latches per joint, with cause and time, and the stop category of the
+/// joints concerned is carried out: 0 opens every bridge, 1 quick-stops every axis, hold keeps
+/// every healthy axis at its position, warn only tells. CommandImage::fault_reset clears it: the
+/// drive is reset (a board that was lost is configured anew), and enabled at its measured position.
+class DriveMaster {
+ public:
+  /// @param robot  complete: limits filled in from the description.
+  /// @param buses  the master's end of each of robot.buses, in that order; outlive the master.
+  /// Errors: those of make_pdo_layout().
+  [[nodiscard]] static Result<std::unique_ptr<DriveMaster>> create(const RobotConfig& robot,
+                                                                   std::span<Bus* const> buses);
+  ~DriveMaster();
+  DriveMaster(const DriveMaster&) = delete;
+  DriveMaster& operator=(const DriveMaster&) = delete;
+
+  /// Sends SYNC, and the master's heartbeat when it is due. Cycles may be left out (an overrun):
+  /// time-outs go by `time.time_ns`.
+  void cycle_begin(const CycleTime& time) noexcept TANDEM_RT;
+
+  /// Takes every frame that has arrived and fills the whole of `state` but cycle and time.
+  /// A joint whose TPDO did not come keeps its values and ages by a cycle.
+  /// @return kOk; kTimeout (a node missed this cycle, or bring-up still waits); kBusOff; kFault.
+  /// @rt no allocation; O(nodes + frames), at most kMaxFramesPerCycle per bus.
+  Code receive(StateImage& state) noexcept TANDEM_RT;
+
+  /// Operation: encodes the command, clamped to the wire's range, and sends at most one parameter
+  /// per node that has changed. During bring-up: nothing. In a fault: only looks for resets.
+  /// @return kOk, kQueueFull (the bus did not take all), kFault.
+  Code send(const CommandImage& command, const ParameterImage& parameters) noexcept TANDEM_RT;
+
+  /// Category 1: quick stop, then disabled, then NMT pre-operational. Once per cycle instead of
+  /// send(), until it answers true.
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
+
+  [[nodiscard]] Phase phase() const noexcept;
+  /// Share of the bring-up that is done, 0 to 1.
+  [[nodiscard]] double progress() const noexcept;
+  /// What bring-up waits for, or the cause of a fault: names node, board, joint and object.
+  [[nodiscard]] std::string status_text() const;
+  /// Values that a node refused at run time (gains), with the object and why; empty when none.
+  [[nodiscard]] std::string parameter_error() const;
+
+  void archive(Archive& ar);
+
+ private:
+  struct Impl;
+  explicit DriveMaster(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tandem::hal::can

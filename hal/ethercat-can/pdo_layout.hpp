@@ -1,0 +1,93 @@
+// Which field of which axis or sensor sits in which PDO of which node, and where in it.
+// Layer: hal/ethercat-can.  Thread: made non-RT; immutable afterwards.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "canopen/pdo.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::hal::can {
+
+/// What travels cyclically.
+enum class WireField : std::uint8_t {
+  // Command: RPDO, every SYNC
+  kControlword = 0,
+  kMode,
+  kTargetPosition,
+  kVelocityOffset,
+  kTorqueOffset,
+  // Slow command: RPDO, when something in it changed
+  kTargetVoltage,
+  kTargetCurrent,
+  kStiffness,
+  kDamping,
+  // Feedback: TPDO, every SYNC
+  kStatusword,
+  kPosition,
+  kVelocity,
+  kTorque,
+  kMotorPosition,
+  // Slow feedback: TPDO, every n-th SYNC
+  kMotorVelocity,
+  kCurrent,
+  kVoltage,
+  kTemperature,
+  kModeDisplay,
+  kErrorCode,
+  // Sensor: TPDO, every SYNC
+  kSensorChannel,
+};
+
+/// When a PDO is sent.
+enum class PdoGroup : std::uint8_t { kCommand, kSlowCommand, kFeedback, kSlowFeedback, kSensor };
+
+/// One mapped object.
+struct MappedField {
+  WireField field = WireField::kControlword;
+  std::uint8_t axis = 0;     ///< of the node's axes; a sensor's channel, from 0
+  std::uint8_t offset = 0;   ///< of its first byte in the PDO
+  std::uint8_t size = 0;     ///< bytes
+  std::uint16_t index = 0;   ///< of the object, the axis' offset included
+  std::uint8_t sub = 0;
+};
+
+/// One PDO of a node.
+struct PdoPlan {
+  PdoGroup group = PdoGroup::kCommand;
+  canopen::PdoDirection direction = canopen::PdoDirection::kReceive;  ///< as the node sees it
+  int number = 1;              ///< 1 to canopen::kPdosPerNode, of its direction
+  std::uint32_t cob_id = 0;
+  std::uint8_t transmission = canopen::kEverySync;
+  std::uint8_t bytes = 0;      ///< mapped; the frame may be longer
+  std::vector<MappedField> fields;
+};
+
+/// One node: a board with its axes, or a sensor.
+struct NodePlan {
+  std::string name;            ///< of the board or the sensor
+  std::size_t bus = 0;         ///< index in RobotConfig::buses
+  int id = 0;
+  int heartbeat_ms = 50;
+  int board = -1;              ///< index in RobotConfig::boards; -1: a sensor
+  int sensor = -1;             ///< index in RobotConfig::sensors; -1: a board
+  std::vector<std::size_t> joints;  ///< by axis: index in RobotConfig::joints
+  std::vector<PdoPlan> pdos;   ///< commands first, then slow commands, feedback, slow feedback
+};
+
+/// Every node, boards first, in the configuration's order.
+struct PdoLayout {
+  std::vector<NodePlan> nodes;
+};
+
+/// Lays the PDOs of every board and sensor out: an axis' block stays whole, blocks follow one
+/// another in frames of at most 64 bytes, numbers and COB-IDs are the pre-defined ones.
+/// Errors: a classic (not FD) bus, axes of a board with gaps, more axes or channels than a node's
+/// four PDOs each way can carry.
+[[nodiscard]] Result<PdoLayout> make_pdo_layout(const RobotConfig& robot);
+
+}  // namespace tandem::hal::can
