@@ -11,12 +11,11 @@ constexpr double kBrakeFrequency_rad_s = 150.0;  // of a rigid joint's brake on 
 
 Status require_positive(const hal::ActuatorConfig& config, double value, const char* key) {
   if (value > 0.0 && std::isfinite(value)) return {};
-  return std::unexpected(
-      Error{.message = "actuator of order " + std::to_string(config.order) + " needs " +
-                       std::string(key) + " above 0",
-            .hint = "set it, or choose an order that does without",
-            .file = {},
-            .key = "actuator." + config.name + "." + key});
+  return std::unexpected(Error{.message = "actuator of order " + std::to_string(config.order) +
+                                          " needs " + std::string(key) + " above 0",
+                               .hint = "set it, or choose an order that does without",
+                               .file = {},
+                               .key = "actuator." + config.name + "." + key});
 }
 
 double clamp_to(double value, double limit) {
@@ -39,13 +38,13 @@ Result<ActuatorModel> make_actuator(const hal::ActuatorConfig& config) {
     double value;
     const char* key;
   };
-  for (const Need& need :
-       {Need{true, config.resistance_ohm, "resistance_ohm"},
-        Need{true, config.torque_constant_Nm_A, "torque_constant_Nm_A"},
-        Need{true, config.gear_ratio, "gear_ratio"}, Need{true, config.inertia_kg_m2, "inertia_kg_m2"},
-        Need{electrical, config.inductance_H, "inductance_H"},
-        Need{elastic, config.spring_Nm_rad, "spring_Nm_rad"},
-        Need{true, config.thermal_time_constant_s, "thermal_time_constant_s"}}) {
+  for (const Need& need : {Need{true, config.resistance_ohm, "resistance_ohm"},
+                           Need{true, config.torque_constant_Nm_A, "torque_constant_Nm_A"},
+                           Need{true, config.gear_ratio, "gear_ratio"},
+                           Need{true, config.inertia_kg_m2, "inertia_kg_m2"},
+                           Need{electrical, config.inductance_H, "inductance_H"},
+                           Need{elastic, config.spring_Nm_rad, "spring_Nm_rad"},
+                           Need{true, config.thermal_time_constant_s, "thermal_time_constant_s"}}) {
     if (!need.needed) continue;
     if (Status status = require_positive(config, need.value, need.key); !status) {
       return std::unexpected(status.error());
@@ -88,8 +87,7 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   for (const ActuatorModel& model : models_) feeds_through_ |= model.order == 0;
 }
 
-void Actuators::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept
-    TANDEM_RT {
+void Actuators::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
   voltage_[joint] = bridge_on ? clamp_to(voltage_V, models_[joint].voltage_limit_V) : 0.0;
   bridge_[joint] = bridge_on ? 1 : 0;
 }
@@ -111,12 +109,11 @@ double Actuators::current(std::size_t joint, double velocity_rad_s) const noexce
 double Actuators::rigid_brake(std::size_t joint, double q, double qd) const noexcept {
   const double J = models_[joint].inertia_kg_m2;
   return brake_Nm_[joint] -
-         J * kBrakeFrequency_rad_s *
-             (kBrakeFrequency_rad_s * (q - brake_rad_[joint]) + 2.0 * qd);
+         J * kBrakeFrequency_rad_s * (kBrakeFrequency_rad_s * (q - brake_rad_[joint]) + 2.0 * qd);
 }
 
-void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor,
-                         double* torque_Nm, MotorState rate) const noexcept TANDEM_RT {
+void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+                         MotorState rate) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     const double velocity = m.elastic() ? motor.velocity_rad_s[j] : qd[j];
@@ -145,8 +142,8 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
   }
 }
 
-void Actuators::step_semi_implicit(double h_s, MotorStateView rate, MotorState motor) const noexcept
-    TANDEM_RT {
+void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
+                                   MotorState motor) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     if (m.current_is_state()) {

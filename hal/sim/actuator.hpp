@@ -28,16 +28,16 @@ namespace tandem::sim {
 /// no joint pushes itself. Orders 0 and 1 leave J to the model, as armature of the joint.
 struct ActuatorModel {
   int order = 2;
-  double torque_per_A = 0.0;         ///< kt = N K [Nm/A]
-  double back_emf_Vs_rad = 0.0;      ///< ke
-  double friction_Nms_rad = 0.0;     ///< b, what is left with the bridge off (open circuit)
+  double torque_per_A = 0.0;      ///< kt = N K [Nm/A]
+  double back_emf_Vs_rad = 0.0;   ///< ke
+  double friction_Nms_rad = 0.0;  ///< b, what is left with the bridge off (open circuit)
   double resistance_ohm = 0.0;
   double inductance_H = 0.0;
   double inertia_kg_m2 = 0.0;
   double spring_Nm_rad = 0.0;
   double spring_damping_Nms_rad = 0.0;
-  double current_limit_A = 0.0;      ///< 0: none
-  double voltage_limit_V = 0.0;      ///< 0: none
+  double current_limit_A = 0.0;  ///< 0: none
+  double voltage_limit_V = 0.0;  ///< 0: none
   double thermal_resistance_K_W = 0.0;
   double thermal_time_constant_s = 0.0;
 
@@ -93,13 +93,13 @@ class Actuators {
 
   /// One semi-implicit step of length `h_s`: the current implicitly, the velocity, then the
   /// position with the new velocity.
-  void step_semi_implicit(double h_s, MotorStateView rate, MotorState motor) const noexcept
-      TANDEM_RT;
+  void step_semi_implicit(double h_s, MotorStateView rate,
+                          MotorState motor) const noexcept TANDEM_RT;
 
   /// After a step to link state q, qd: clamps currents, copies rigid links to their motors,
   /// computes algebraic currents, and warms the windings for `h_s`.
-  void finish_step(double h_s, const double* q, const double* qd, MotorState motor) noexcept
-      TANDEM_RT;
+  void finish_step(double h_s, const double* q, const double* qd,
+                   MotorState motor) noexcept TANDEM_RT;
 
   [[nodiscard]] std::span<const double> voltage_V() const noexcept { return voltage_; }
   [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }

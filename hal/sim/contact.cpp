@@ -10,6 +10,15 @@ std::unexpected<Error> bad(const char* key, const char* message, const char* hin
   return std::unexpected(Error{.message = message, .hint = hint, .file = {}, .key = key});
 }
 
+// Shortens (x, y) to `length` when it is longer.
+void cut_to(double length, double& x, double& y) {
+  const double square = x * x + y * y;
+  if (square <= length * length) return;
+  const double scale = length / std::sqrt(square);
+  x *= scale;
+  y *= scale;
+}
+
 }  // namespace
 
 Result<Contact> Contact::create(const hal::ContactConfig& config, std::vector<Foot> feet) {
@@ -17,7 +26,8 @@ Result<Contact> Contact::create(const hal::ContactConfig& config, std::vector<Fo
   contact.config_ = config;
   if (feet.empty()) return contact;
   if (!(config.stiffness_N_m > 0.0)) {
-    return bad("contact.stiffness_N_m", "feet need ground of a stiffness above 0", "[N/m] per point");
+    return bad("contact.stiffness_N_m", "feet need ground of a stiffness above 0",
+               "[N/m] per point");
   }
   if (!(config.tangential_stiffness_N_m > 0.0)) {
     return bad("contact.tangential_stiffness_N_m", "feet that stick need a stiffness above 0",
@@ -58,36 +68,28 @@ std::array<double, 3> Contact::force(std::size_t index, const Point& point,
   }
   const double elastic = config_.stiffness_N_m * depth;
   const double normal = std::max(0.0, elastic * (1.0 - config_.damping_s_m * point.vz));
-  // A point that came down since the last sub-step is anchored where it is now.
-  const bool anchored = touching_[index] != 0;
-  double ax = anchored ? anchor_x_[index] : point.px;
-  double ay = anchored ? anchor_y_[index] : point.py;
-
-  const double kt = config_.tangential_stiffness_N_m;
-  const double dt = config_.tangential_damping_Ns_m;
-  double fx = -kt * (point.px - ax) - dt * point.vx;
-  double fy = -kt * (point.py - ay) - dt * point.vy;
   const double speed2 = point.vx * point.vx + point.vy * point.vy;
   const double stick2 = config_.stick_velocity_m_s * config_.stick_velocity_m_s;
-  const double mu = config_.sliding_friction +
-                    (config_.static_friction - config_.sliding_friction) * stick2 /
-                        (stick2 + speed2);
+  const double mu =
+      config_.sliding_friction +
+      (config_.static_friction - config_.sliding_friction) * stick2 / (stick2 + speed2);
   const double cone = mu * normal;
-  const double trial2 = fx * fx + fy * fy;
-  if (trial2 > cone * cone) {
-    const double scale = cone / std::sqrt(trial2);
-    fx *= scale;
-    fy *= scale;
-    ax = point.px + (fx + dt * point.vx) / kt;
-    ay = point.py + (fy + dt * point.vy) / kt;
-  }
+  // A point that came down since the last sub-step is anchored where it is now.
+  const bool anchored = touching_[index] != 0;
+  const double kt = config_.tangential_stiffness_N_m;
+  double fx = anchored ? -kt * (point.px - anchor_x_[index]) : 0.0;
+  double fy = anchored ? -kt * (point.py - anchor_y_[index]) : 0.0;
+  cut_to(cone, fx, fy);
+  const double stretch_x = -fx / kt, stretch_y = -fy / kt;
+  fx -= config_.tangential_damping_Ns_m * point.vx;
+  fy -= config_.tangential_damping_Ns_m * point.vy;
+  cut_to(cone, fx, fy);
   if (move_anchor) {
     touching_[index] = 1;
-    anchor_x_[index] = ax;
-    anchor_y_[index] = ay;
+    anchor_x_[index] = point.px - stretch_x;
+    anchor_y_[index] = point.py - stretch_y;
   }
-  const double sx = point.px - ax, sy = point.py - ay;
-  energy_J_ += 0.5 * (elastic * depth + kt * (sx * sx + sy * sy));
+  energy_J_ += 0.5 * (elastic * depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
   return {fx, fy, normal};
 }
 

@@ -20,16 +20,18 @@ namespace tandem::sim {
 /// Normal, per point at depth d > 0: Fz = k d (1 + c d'), never below zero (Hunt and Crossley
 /// 1975, exponent 1). It is continuous in d and takes out energy whenever d' is not zero.
 ///
-/// Tangential, per point: a spring-damper to an anchor on the ground, F = -kt (p - a) - dt p',
-/// set where the point touched down. Within the cone |F| <= mu Fz the anchor rests: no creep.
-/// Outside, F is cut to the cone and the anchor is dragged so that the spring carries just that
-/// force: the point slides (Cundall and Strack 1979). mu goes from static to sliding friction
-/// with the point's speed s as mu = sliding + (static - sliding) / (1 + (s / stick_velocity)^2).
+/// Tangential, per point: a spring to an anchor on the ground, set where the point touched down,
+/// and a damper, F = -kt (p - a) - dt p'. While the spring's force is within the cone mu Fz the
+/// anchor rests: no creep. Beyond, the anchor is dragged so that the spring carries just mu Fz,
+/// and the sum is cut to the cone: the point slides (an elastoplastic return, after Cundall and
+/// Strack 1979). Both cuts are projections onto a convex set, so no motion gains energy. mu goes
+/// from static to sliding friction with the point's speed s,
+/// mu = sliding + (static - sliding) / (1 + (s / stick_velocity)^2).
 class Contact {
  public:
   struct Foot {
-    std::size_t site = 0;    ///< index in the kernels' sites
-    std::size_t wrench = 0;  ///< index in the kernels' wrenches
+    std::size_t site = 0;                         ///< index in the kernels' sites
+    std::size_t wrench = 0;                       ///< index in the kernels' wrenches
     std::vector<std::array<double, 3>> points_m;  ///< in the site's frame
   };
 
@@ -70,10 +72,10 @@ class Contact {
 
   hal::ContactConfig config_;
   std::vector<Range> feet_;
-  std::vector<double> x_, y_, z_;                // points, site's frame
-  std::vector<double> anchor_x_, anchor_y_;      // W
+  std::vector<double> x_, y_, z_;            // points, site's frame
+  std::vector<double> anchor_x_, anchor_y_;  // W
   std::vector<std::uint8_t> touching_;
-  std::vector<double> wrench_W_;                 // 6 per foot
+  std::vector<double> wrench_W_;  // 6 per foot
   double energy_J_ = 0.0;
 };
 

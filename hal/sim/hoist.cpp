@@ -8,7 +8,7 @@
 namespace tandem::sim {
 namespace {
 
-constexpr double kFrequency_rad_s = 2.0 * std::numbers::pi * 10.0;
+constexpr double kFrequency_rad_s = 2.0 * std::numbers::pi * 40.0;
 
 }  // namespace
 
@@ -37,8 +37,7 @@ void Hoist::advance(std::int64_t step_ns) noexcept TANDEM_RT {
   if (releasing_ == 0 || share_ == 0.0) return;
   elapsed_ns_ = std::min(elapsed_ns_ + step_ns, duration_ns_);
   const double s = static_cast<double>(elapsed_ns_) / static_cast<double>(duration_ns_);
-  share_ = elapsed_ns_ == duration_ns_ ? 0.0
-                                       : 1.0 - s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
+  share_ = elapsed_ns_ == duration_ns_ ? 0.0 : 1.0 - s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
 }
 
 void Hoist::add_wrench(const double* q, const double* v, double* wrench) const noexcept TANDEM_RT {

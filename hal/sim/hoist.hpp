@@ -13,9 +13,10 @@ namespace tandem::sim {
 /// A critically damped 6-D spring from the base to where it stood at the start, with the load
 /// that it carried there compensated, so that nothing moves at the start. A release fades all of
 /// it to zero along a minimum-jerk profile; the robot sinks onto its feet while the hoist yields.
+/// Its frequency is set on the base's apparent inertia, so that no sub-step finds it stiff.
 class Hoist {
  public:
-  /// @param mass_kg, inertia_kg_m2  what hangs on it; sets the spring for 10 Hz
+  /// @param mass_kg, inertia_kg_m2  apparent at the base, with free joints; sets it to 40 Hz
   /// @param pose  (7) of the base: position, quaternion [x y z w]
   /// @param load  (6) force, moment in the base's frame that keep the robot at rest
   void hold(double mass_kg, double inertia_kg_m2, const double* pose, const double* load) noexcept;

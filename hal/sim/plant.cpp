@@ -1,12 +1,10 @@
 #include "hal/sim/plant.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
+#include <cstdio>
 #include <string_view>
 
 #include "base/nearest.hpp"
-#include "hal/sim/rotation.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -86,11 +84,11 @@ Status Plant::map_joints(const PlantConfig& config) {
   for (const PlantJoint& joint : config.joints) {
     const int index = find(all, joint.name);
     if (index < 0 || used[static_cast<std::size_t>(index)] != 0) {
-      return std::unexpected(Error{.message = index < 0 ? "the model has no such joint"
-                                                        : "the joint is listed twice",
-                                   .hint = suggest(joint.name, all),
-                                   .file = {},
-                                   .key = joint.name});
+      return std::unexpected(
+          Error{.message = index < 0 ? "the model has no such joint" : "the joint is listed twice",
+                .hint = suggest(joint.name, all),
+                .file = {},
+                .key = joint.name});
     }
     used[static_cast<std::size_t>(index)] = 1;
     map_.push_back(static_cast<std::size_t>(index));
@@ -115,14 +113,14 @@ Status Plant::place_contact(const PlantConfig& config) {
     const int site = find(sites, foot.site);
     const int wrench = find(wrenches, foot.site);
     if (site < 0 || wrench < 0) {
-      return std::unexpected(Error{.message = "the foot's site cannot take a wrench in the model",
-                                   .hint = site < 0 ? suggest(foot.site, sites)
-                                                    : "set wrench = true in its [[site]]",
-                                   .file = {},
-                                   .key = "contact.foot." + foot.site});
+      return std::unexpected(
+          Error{.message = "the foot's site cannot take a wrench in the model",
+                .hint = site < 0 ? suggest(foot.site, sites) : "set wrench = true in its [[site]]",
+                .file = {},
+                .key = "contact.foot." + foot.site});
     }
-    feet.push_back({static_cast<std::size_t>(site), static_cast<std::size_t>(wrench),
-                    foot.points_m});
+    feet.push_back(
+        {static_cast<std::size_t>(site), static_cast<std::size_t>(wrench), foot.points_m});
   }
   Result<Contact> contact = Contact::create(config.contact, std::move(feet));
   if (!contact) return std::unexpected(contact.error());
@@ -137,7 +135,8 @@ void Plant::start(const PlantConfig& config) {
     q[2] = config.base_height_m;
     q[6] = 1.0;
   }
-  for (std::size_t j = 0; j < map_.size(); ++j) q[base_q_ + map_[j]] = config.joints[j].position_rad;
+  for (std::size_t j = 0; j < map_.size(); ++j)
+    q[base_q_ + map_[j]] = config.joints[j].position_rad;
   set_state(q, v);
 
   // Springs and hoist start with the load that keeps everything at rest.
@@ -156,11 +155,17 @@ void Plant::start(const PlantConfig& config) {
   held_ = config.held ? 1 : 0;
   released_ = config.held ? 0 : 1;
   if (config.held && base_q_ != 0) {
-    std::vector<double> M(std::size_t{kernels_->nv} * kernels_->nv);
-    kernels_->mass_matrix(q.data(), M.data());
-    const std::size_t row = kernels_->nv + 1;
-    const double inertia = (M[3 * row] + M[4 * row] + M[5 * row]) / 3.0;
-    hoist_.hold(kernels_->mass_kg, inertia, q.data(), load.data());
+    // Apparent inertia along each base axis: the acceleration that a unit force adds.
+    std::vector<double> rest(kernels_->nv), moved(kernels_->nv);
+    kernels_->forward_dynamics(q.data(), v.data(), load.data(), wrench_.data(), rest.data());
+    double most[2] = {0.0, 0.0};
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      std::vector<double> pushed = load;
+      pushed[axis] += 1.0;
+      kernels_->forward_dynamics(q.data(), v.data(), pushed.data(), wrench_.data(), moved.data());
+      most[axis / 3] = std::max(most[axis / 3], moved[axis] - rest[axis]);
+    }
+    hoist_.hold(1.0 / most[0], 1.0 / most[1], q.data(), load.data());
   }
 }
 
@@ -179,9 +184,9 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
 void Plant::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
   const std::size_t i = map_[joint];
   actuators_.set_drive(i, voltage_V, bridge_on);
-  if (released_ != 0 || !(bridge_on == actuators_.braked(i))) return;
-  // Between power-on and release a brake works against its drive's bridge.
-  actuators_.set_brake(i, !bridge_on, x_[base_q_ + i], tau_[base_v_ + i]);
+  const bool brake = !bridge_on;  // between power-on and release
+  if (released_ != 0 || actuators_.braked(i) == brake) return;
+  actuators_.set_brake(i, brake, x_[base_q_ + i], tau_[base_v_ + i]);
 }
 
 void Plant::release() noexcept TANDEM_RT {
@@ -207,8 +212,9 @@ JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
 std::string Plant::diverged_text() const {
   if (diverged_ < 0) return {};
   const auto index = static_cast<std::size_t>(diverged_);
-  const std::string who =
-      index < base_v_ ? "the floating base" : "joint " + std::string(kernels_->joint_names[index - base_v_]);
+  const std::string who = index < base_v_
+                              ? "the floating base"
+                              : "joint " + std::string(kernels_->joint_names[index - base_v_]);
   char text[160];
   std::snprintf(text, sizeof text, "%s at %.6f s: rate %g is beyond the plausible %g rad/s or m/s",
                 who.c_str(), static_cast<double>(time_ns_) * 1e-9, diverged_rate_, rate_limit_);

@@ -26,7 +26,7 @@ enum class Integrator : std::uint8_t {
 
 /// One joint of the plant, in the process image's order.
 struct PlantJoint {
-  std::string name;              ///< of the kernels' joint
+  std::string name;  ///< of the kernels' joint
   hal::ActuatorConfig actuator;
   double position_rad = 0.0;     ///< at the start
   double damping_Nms_rad = 0.0;  ///< of the joint itself, on the link side
@@ -36,20 +36,20 @@ struct PlantConfig {
   const tandem_kernels* kernels = nullptr;
   std::vector<PlantJoint> joints;
   hal::ContactConfig contact;
-  double base_height_m = 0.0;    ///< of the floating base at the start, upright at x = y = 0
+  double base_height_m = 0.0;  ///< of the floating base at the start, upright at x = y = 0
   Integrator integrator = Integrator::kSemiImplicitEuler;
   std::int64_t substep_ns = 500'000;
   /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
   bool held = false;
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
-  double rate_limit = 1000.0;    ///< any |v| beyond it [rad/s or m/s] counts as diverged
+  double rate_limit = 1000.0;               ///< any |v| beyond it [rad/s or m/s] counts as diverged
 };
 
 /// What the encoders and the power stage of one joint see. Link side, about the joint's +axis.
 struct JointReading {
   double position_rad, velocity_rad_s;
   double motor_position_rad, motor_velocity_rad_s;
-  double torque_Nm;   ///< on the link: the spring's, or a rigid drive's (J th'' not taken off)
+  double torque_Nm;  ///< on the link: the spring's, or a rigid drive's (J th'' not taken off)
   double current_A, voltage_V, temperature_C;
 };
 
@@ -133,21 +133,21 @@ class Plant {
   Integrator integrator_;
   std::int64_t substep_ns_, release_ns_;
   double rate_limit_;
-  std::size_t base_q_, base_v_;        // 7 and 6, or 0 and 0
-  std::vector<std::size_t> map_;       // joint -> model joint
-  std::vector<double> damping_;        // model order
+  std::size_t base_q_, base_v_;   // 7 and 6, or 0 and 0
+  std::vector<std::size_t> map_;  // joint -> model joint
+  std::vector<double> damping_;   // model order
   Actuators actuators_;
   Contact contact_;
   Hoist hoist_;
 
-  std::vector<double> x_;              // q, v, th, th', i
+  std::vector<double> x_;  // q, v, th, th', i
   std::vector<double> tau_, applied_tau_, vdot_, wrench_, motor_rate_;
-  std::vector<double> pose_, twist_, acceleration_;       // scratch of the sites kernel
-  std::vector<double> stage_, k1_, k2_, k3_, k4_;         // scratch of Runge-Kutta
+  std::vector<double> pose_, twist_, acceleration_;  // scratch of the sites kernel
+  std::vector<double> stage_, k1_, k2_, k3_, k4_;    // scratch of Runge-Kutta
   std::int64_t time_ns_ = 0;
   std::uint8_t held_ = 0, released_ = 0;
-  std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;       // evaluated at the present state
-  std::int32_t diverged_ = -1;         // index in v
+  std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;  // evaluated at the present state
+  std::int32_t diverged_ = -1;                       // index in v
   double diverged_rate_ = 0.0;
 };
 

@@ -11,7 +11,7 @@ namespace tandem::sim {
 void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
   if (contact_.feet() == 0) return;
   kernels_->site_motion(x, x + kernels_->nq, vdot_.data(), pose_.data(), twist_.data(),
-                  acceleration_.data());
+                        acceleration_.data());
   contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
 }
 
