@@ -15,6 +15,12 @@ class NoiseGenerator {
   NoiseGenerator() = default;
   explicit NoiseGenerator(std::uint64_t seed) noexcept : state_(seed) {}
 
+  /// A seed for stream `number` of those that hang on `seed`: neighbours share no numbers.
+  [[nodiscard]] static std::uint64_t stream(std::uint64_t seed, std::uint64_t number) noexcept {
+    NoiseGenerator mixer(seed);
+    return mixer.next() ^ NoiseGenerator(number).next();
+  }
+
   [[nodiscard]] double normal() noexcept TANDEM_RT {
     constexpr double kUnit = 1.0 / 65536.0;
     std::int64_t sum = 0;

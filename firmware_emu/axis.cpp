@@ -1,0 +1,289 @@
+#include "firmware_emu/axis.hpp"
+
+#include <cmath>
+
+#include "canopen/bytes.hpp"
+
+namespace tandem::firmware {
+
+namespace {
+
+using namespace canopen;
+
+constexpr double kRestVelocity_rad_s = 0.05;  // of the motor, reflected to the link
+constexpr double kRestTime_s = 0.02;
+
+bool supported(std::int8_t mode) noexcept {
+  return (mode >= -4 && mode <= 0) || (mode >= 8 && mode <= 10);
+}
+
+/// The object's index as it is on axis 0.
+std::uint16_t on_axis_0(std::uint16_t index) noexcept {
+  const std::uint16_t base = index >= 0x6000 ? 0x6000 : 0x2000;
+  return static_cast<std::uint16_t>(base + (index - base) % kAxisStride);
+}
+
+}  // namespace
+
+Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDictionary& od)
+    : period_s_(static_cast<double>(board.control_period_ns) * 1.0e-9),
+      power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
+      objects_(power_on_),
+      torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
+                     NoiseGenerator::stream(board.seed, static_cast<std::uint64_t>(index))) {
+  objects_.add_to(od, index, *this);
+  apply_settings();
+  take_demands();
+}
+
+void Axis::power_on() noexcept TANDEM_RT {
+  objects_ = power_on_;
+  machine_.reset();
+  protection_ = {};
+  mode_ = Mode::kNone;
+  stopping_s_ = 0.0;
+  resting_s_ = 0.0;
+  apply_settings();
+  take_demands();
+}
+
+void Axis::apply_settings() noexcept {
+  const ControllerConfig config = objects_.controller();
+  controller_.configure(config, period_s_);
+  link_encoder_.set_resolution(objects_.link_counts);
+  motor_encoder_.set_resolution(objects_.motor_counts);
+  link_velocity_.configure(objects_.cutoffs_Hz[kLinkVelocityCutoff - 1], period_s_);
+  motor_velocity_.configure(objects_.cutoffs_Hz[kMotorVelocityCutoff - 1], period_s_);
+  torque_rate_.configure(objects_.cutoffs_Hz[kTorqueRateCutoff - 1], period_s_);
+  protection_config_ = {
+      .min_position_rad = config.min_position_rad,
+      .max_position_rad = config.max_position_rad,
+      .position_margin_rad = objects_.position_margin_rad,
+      .following_window_rad = objects_.following_window == 0xFFFFFFFFU
+                                  ? 0.0
+                                  : objects_.following_window * objects_.rad_per_count(),
+      .following_timeout_s = objects_.following_timeout_ms * 1.0e-3,
+      .continuous_current_A = objects_.i2t[kContinuousCurrent - 1],
+      .thermal_time_s = objects_.i2t[kThermalTime - 1],
+      .temperature_limit_C = objects_.temperature_limit * 0.1,
+      .undervoltage_V = objects_.undervoltage_V};
+  settings_changed_ = false;
+}
+
+void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
+  if (settings_changed_) apply_settings();
+  sensors_valid_ = std::isfinite(sense.spring_torque_Nm) && std::isfinite(sense.current_A) &&
+                   std::isfinite(sense.temperature_C) && std::isfinite(sense.bus_voltage_V) &&
+                   link_encoder_.sample(sense.link_position_rad) &&
+                   motor_encoder_.sample(sense.motor_position_rad);
+  if (!sensors_valid_) return;  // the last good values stay, and a fault follows
+  const double velocity_before = measured_.link_velocity_rad_s;
+  measured_.link_position_rad = link_encoder_.position_rad();
+  measured_.link_velocity_rad_s = link_velocity_.update(measured_.link_position_rad);
+  measured_.link_acceleration_rad_s2 =
+      (measured_.link_velocity_rad_s - velocity_before) / period_s_;
+  measured_.motor_position_rad = motor_encoder_.position_rad();
+  measured_.motor_velocity_rad_s = motor_velocity_.update(measured_.motor_position_rad);
+  measured_.torque_Nm = torque_sensor_.sample(sense.spring_torque_Nm);
+  measured_.torque_rate_Nm_s = torque_rate_.update(measured_.torque_Nm);
+  measured_.current_A = sense.current_A;
+  measured_.bus_voltage_V = sense.bus_voltage_V;
+  temperature_C_ = sense.temperature_C;
+  show_actual();
+}
+
+void Axis::show_actual() noexcept {
+  AxisObjects& o = objects_;
+  o.position = static_cast<std::int32_t>(link_encoder_.counts());
+  o.velocity =
+      clamp_round<std::int32_t>(measured_.link_velocity_rad_s * link_encoder_.counts_per_rad());
+  o.motor_position = static_cast<std::int32_t>(motor_encoder_.counts());
+  o.motor_velocity =
+      clamp_round<std::int32_t>(measured_.motor_velocity_rad_s * motor_encoder_.counts_per_rad());
+  o.torque = clamp_round<std::int16_t>(measured_.torque_Nm * 1.0e3 / o.rated_torque_Nm());
+  o.current = clamp_round<std::int16_t>(measured_.current_A * 100.0);
+  o.temperature = clamp_round<std::int16_t>(temperature_C_ * 10.0);
+}
+
+void Axis::take_demands() noexcept {
+  if (supported(objects_.mode)) {
+    if (objects_.mode != 0) mode_ = static_cast<Mode>(objects_.mode);
+  } else {
+    objects_.mode = static_cast<std::int8_t>(mode_);
+    ++objects_.refused_values;
+  }
+  objects_.mode_display = static_cast<std::int8_t>(mode_);
+  // By PDO these come unchecked.
+  const auto take = [this](float& object, double& value) {
+    if (std::isfinite(object) && object >= 0.0F) {
+      value = object;
+    } else {
+      object = static_cast<float>(value);
+      ++objects_.refused_values;
+    }
+  };
+  take(objects_.stiffness, stiffness_Nm_rad_);
+  take(objects_.damping, damping_Nms_rad_);
+}
+
+ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
+  const bool follows = machine_.motion() == DriveMotion::kFollow && mode_ == Mode::kCsp;
+  const ErrorCode cause = protection_.update(
+      protection_config_,
+      {.link_position_rad = measured_.link_position_rad,
+       .link_velocity_rad_s = measured_.link_velocity_rad_s,
+       .position_error_rad = controller_.terms().position_error_rad,
+       .current_A = measured_.current_A,
+       .temperature_C = temperature_C_,
+       .bus_voltage_V = measured_.bus_voltage_V,
+       .sensors_valid = sensors_valid_,
+       .powered = powered(),
+       .follows_position = follows},
+      period_s_);
+  if (cause != ErrorCode::kNone) return cause;
+  // A lost connection is a fault of an axis that runs, and stays one until it is back.
+  const bool latched = objects_.error_code == static_cast<std::uint16_t>(connection);
+  return powered() || latched ? connection : ErrorCode::kNone;
+}
+
+AxisEvents Axis::supervise(ErrorCode connection) noexcept TANDEM_RT {
+  take_demands();
+  if (connection == ErrorCode::kHeartbeatLost && objects_.abort_option != 1) {
+    machine_.abort_connection(objects_.abort_option, objects_.options);
+    connection = ErrorCode::kNone;
+  }
+  const ErrorCode cause = present_cause(connection);
+  watch_stop();
+  const DriveState before = machine_.state();
+  const DriveState now = machine_.step(
+      objects_.controlword,
+      {.fault = cause != ErrorCode::kNone,
+       .at_rest = resting_s_ >= kRestTime_s || stopping_s_ >= objects_.stop_time_s,
+       .internal_limit = controller_.limited(),
+       .follows_command = mode_ != Mode::kNone,
+       .following_error = protection_.lagging(),
+       .warning = protection_.warning(protection_config_)},
+      objects_.options);
+  objects_.statusword = machine_.statusword();
+
+  AxisEvents events;
+  if (now == DriveState::kFaultReactionActive && before != now) {
+    events.raised = cause;
+    objects_.error_code = static_cast<std::uint16_t>(cause);
+  }
+  if (machine_.fault_was_reset()) {
+    events.reset = true;
+    objects_.error_code = 0;
+  }
+  if (now == DriveState::kOperationEnabled && before != now) seed_references();
+  return events;
+}
+
+// The axis holds where it is until a command says otherwise.
+void Axis::seed_references() noexcept {
+  objects_.target_position = objects_.position;
+  objects_.target_velocity = 0;
+  objects_.velocity_offset = 0;
+}
+
+void Axis::watch_stop() noexcept {
+  const bool stops = machine_.motion() == DriveMotion::kSlowDown ||
+                     machine_.motion() == DriveMotion::kQuickStop;
+  const bool rests = std::abs(measured_.motor_velocity_rad_s) < kRestVelocity_rad_s;
+  stopping_s_ = stops ? stopping_s_ + period_s_ : 0.0;
+  resting_s_ = stops && rests ? resting_s_ + period_s_ : 0.0;
+}
+
+Action Axis::action() const noexcept {
+  switch (machine_.motion()) {
+    case DriveMotion::kNone: return Action::kOff;
+    case DriveMotion::kFollow: return mode_ == Mode::kNone ? Action::kBrake : Action::kFollow;
+    case DriveMotion::kSlowDown: return sensors_valid_ ? Action::kHold : Action::kBrake;
+    case DriveMotion::kQuickStop: return Action::kBrake;
+  }
+  return Action::kOff;
+}
+
+Reference Axis::reference() const noexcept {
+  const AxisObjects& o = objects_;
+  const double rad = link_encoder_.rad_per_count();
+  const double Nm = o.rated_torque_Nm() * 1.0e-3;
+  const bool by_velocity = mode_ == Mode::kCsv || mode_ == Mode::kVelocityImpedance;
+  const std::int64_t velocity =
+      std::int64_t{o.velocity_offset} + (by_velocity ? o.target_velocity : 0);
+  const int torque = o.torque_offset + (mode_ == Mode::kCst ? o.target_torque : 0);
+  return {.position_rad = o.target_position * rad,
+          .velocity_rad_s = static_cast<double>(velocity) * rad,
+          .torque_Nm = torque * Nm,
+          .voltage_V = o.target_voltage * 0.01,
+          .current_A = o.target_current * 0.01,
+          .stiffness_Nm_rad = stiffness_Nm_rad_,
+          .damping_Nms_rad = damping_Nms_rad_};
+}
+
+AxisDrive Axis::control() noexcept TANDEM_RT {
+  const Action doing = action();
+  const double voltage_V = controller_.update(doing, mode_, reference(), measured_);
+  show_controller();
+  return {.voltage_V = voltage_V, .enabled = doing != Action::kOff};
+}
+
+void Axis::show_controller() noexcept {
+  const JointController::Terms& terms = controller_.terms();
+  objects_.voltage = clamp_round<std::int16_t>(terms.voltage_V * 100.0);
+  objects_.following_error =
+      clamp_round<std::int32_t>(terms.position_error_rad * link_encoder_.counts_per_rad());
+  objects_.telemetry = {static_cast<float>(terms.torque_reference_Nm),
+                        static_cast<float>(terms.transfer_V),
+                        static_cast<float>(controller_.position_loop().state.i),
+                        static_cast<float>(controller_.velocity_loop().state.i),
+                        static_cast<float>(controller_.torque_loop().state.i),
+                        static_cast<float>(controller_.electrical_loop().state.i),
+                        static_cast<float>(protection_.load(protection_config_))};
+}
+
+AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {
+  switch (on_axis_0(entry.index)) {
+    case canopen::object::kMode:
+      return supported(static_cast<std::int8_t>(bytes[0])) ? AbortCode::kNone : AbortCode::kRange;
+    case canopen::object::kQuickStopOption:
+      return get<std::int16_t>(bytes) == 3 || get<std::int16_t>(bytes) == 4 ? AbortCode::kRange
+                                                                            : AbortCode::kNone;
+    case canopen::object::kSoftwareLimits: return check_limits(entry, bytes);
+    case canopen::object::kEncoderResolution:
+    case canopen::object::kMotorResolution:
+    case canopen::object::kRatedTorque:  // they give every position and torque its meaning
+      return powered() ? AbortCode::kDeviceState : AbortCode::kNone;
+    default: return AbortCode::kNone;
+  }
+}
+
+AbortCode Axis::check_limits(const ObjectEntry& entry,
+                             const std::uint8_t* bytes) const noexcept {
+  const auto limit = get<std::int32_t>(bytes);
+  const bool inverted =
+      entry.sub == 1 ? limit > objects_.max_position : limit < objects_.min_position;
+  return inverted ? AbortCode::kMaxBelowMin : AbortCode::kNone;
+}
+
+void Axis::written(const ObjectEntry& entry) noexcept TANDEM_RT {
+  switch (on_axis_0(entry.index)) {
+    case canopen::object::kMode:
+    case canopen::object::kQuickStopOption:
+    case canopen::object::kStiffness:
+    case canopen::object::kDamping: return;  // read where they are used
+    default: settings_changed_ = true;
+  }
+}
+
+void Axis::archive(Archive& ar) {
+  bool changed = settings_changed_;
+  ar(objects_, changed);
+  if (ar.reading()) apply_settings();
+  settings_changed_ = changed;
+  ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
+     link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
+     damping_Nms_rad_, stopping_s_, resting_s_, mode_, sensors_valid_);
+}
+
+}  // namespace tandem::firmware

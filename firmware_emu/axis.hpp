@@ -1,0 +1,93 @@
+// One axis of a board: sensors, protections, CiA 402 drive machine and joint controller.
+// Layer: firmware_emu.  Thread: RT; construction non-RT.
+#pragma once
+
+#include <cstdint>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "canopen/drive_machine.hpp"
+#include "canopen/object_dictionary.hpp"
+#include "firmware_emu/axis_objects.hpp"
+#include "firmware_emu/estimator.hpp"
+#include "firmware_emu/joint_controller.hpp"
+#include "firmware_emu/protection.hpp"
+#include "firmware_emu/setup.hpp"
+
+namespace tandem::firmware {
+
+/// What supervise() tells the board.
+struct AxisEvents {
+  canopen::ErrorCode raised = canopen::ErrorCode::kNone;  ///< a fault was latched just now
+  bool reset = false;                                     ///< a fault was cleared just now
+};
+
+/// Stepped once per control period: sample(), supervise(), control(), in this order.
+class Axis final : private canopen::ObjectOwner {
+ public:
+  Axis(const AxisSetup& setup, const BoardSetup& board, int index, canopen::ObjectDictionary& od);
+  Axis(const Axis&) = delete;
+  Axis& operator=(const Axis&) = delete;
+
+  /// Reads the sensors, runs the estimators and shows the results in the actual-value objects.
+  void sample(const AxisSense& sense) noexcept TANDEM_RT;
+  /// Protections, then one step of the drive machine.
+  /// @param connection  kNone, or how the commands were lost
+  AxisEvents supervise(canopen::ErrorCode connection) noexcept TANDEM_RT;
+  /// The controllers: what the bridge does until the next period.
+  [[nodiscard]] AxisDrive control() noexcept TANDEM_RT;
+  /// Objects and state as after power-on; the sensors' noise goes on.
+  void power_on() noexcept TANDEM_RT;
+
+  [[nodiscard]] const AxisObjects& objects() const noexcept { return objects_; }
+  [[nodiscard]] const canopen::DriveMachine& machine() const noexcept { return machine_; }
+  [[nodiscard]] const JointController& controller() const noexcept { return controller_; }
+  [[nodiscard]] const Measurement& measured() const noexcept { return measured_; }
+
+  void archive(Archive& ar);
+
+ private:
+  canopen::AbortCode check(const canopen::ObjectEntry& entry,
+                           const std::uint8_t* bytes) noexcept TANDEM_RT override;
+  void written(const canopen::ObjectEntry& entry) noexcept TANDEM_RT override;
+  [[nodiscard]] canopen::AbortCode check_limits(const canopen::ObjectEntry& entry,
+                                                const std::uint8_t* bytes) const noexcept;
+
+  void apply_settings() noexcept;
+  void show_actual() noexcept;
+  void show_controller() noexcept;
+  void take_demands() noexcept;
+  void seed_references() noexcept;
+  void watch_stop() noexcept;
+  [[nodiscard]] canopen::ErrorCode present_cause(canopen::ErrorCode connection) noexcept;
+  [[nodiscard]] Reference reference() const noexcept;
+  [[nodiscard]] Action action() const noexcept;
+  [[nodiscard]] bool powered() const noexcept {
+    return machine_.motion() != canopen::DriveMotion::kNone;
+  }
+
+  double period_s_;
+  AxisObjects power_on_;
+  AxisObjects objects_;
+  ProtectionConfig protection_config_;
+  JointController controller_;
+  Protection protection_;
+  canopen::DriveMachine machine_;
+  Encoder link_encoder_;
+  Encoder motor_encoder_;
+  NoisySensor torque_sensor_;
+  FilteredDifference link_velocity_;
+  FilteredDifference motor_velocity_;
+  FilteredDifference torque_rate_;
+  Measurement measured_;
+  double temperature_C_ = 0.0;
+  double stiffness_Nm_rad_ = 0.0;  ///< the last one that was a number and not negative
+  double damping_Nms_rad_ = 0.0;
+  double stopping_s_ = 0.0;        ///< since the stop in progress began
+  double resting_s_ = 0.0;         ///< since the motor came to rest in it
+  canopen::Mode mode_ = canopen::Mode::kNone;
+  bool sensors_valid_ = true;
+  bool settings_changed_ = false;
+};
+
+}  // namespace tandem::firmware

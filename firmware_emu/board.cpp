@@ -1,0 +1,246 @@
+#include "firmware_emu/board.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "firmware_emu/wire.hpp"
+
+namespace tandem::firmware {
+
+namespace {
+
+using namespace canopen;
+
+constexpr std::string_view kSoftwareVersion = "tandem firmware 1.0";
+constexpr std::string_view kHardwareVersion = "emulated";
+constexpr std::size_t kBoardEntries = 3;
+constexpr std::int64_t kNsPerUs = 1000;
+
+std::uint8_t register_bits(ErrorCode code) noexcept {
+  namespace bits = canopen::error_register;
+  switch (code) {
+    case ErrorCode::kOverCurrent:
+    case ErrorCode::kI2t: return bits::kCurrent;
+    case ErrorCode::kVoltage: return bits::kVoltage;
+    case ErrorCode::kDriveTemperature: return bits::kTemperature;
+    case ErrorCode::kHeartbeatLost:
+    case ErrorCode::kSyncLost:
+    case ErrorCode::kCommandTimeout: return bits::kCommunication;
+    default: return bits::kProfile;
+  }
+}
+
+Status bad(std::string key, std::string message) {
+  return std::unexpected(Error{.message = std::move(message),
+                               .hint = "correct the board's setup",
+                               .file = {},
+                               .key = std::move(key)});
+}
+
+bool not_negative(const Pid::Config& pid) {
+  const auto good = [](double x) { return std::isfinite(x) && x >= 0.0; };
+  return good(pid.kp) && good(pid.ki) && good(pid.kd) && good(pid.output_limit);
+}
+
+Status check_axis(const AxisSetup& axis, const std::string& key) {
+  const ControllerConfig& c = axis.controller;
+  for (const Pid::Config& pid : {c.position, c.velocity, c.torque, c.current}) {
+    if (!not_negative(pid)) return bad(key, "a gain is negative or not finite");
+  }
+  for (const double value :
+       {c.torque_to_voltage_V_Nm, c.emf_compensation_Vs_rad, c.resistance_ohm,
+        c.motor_constant_Nm_A, c.spring_Nm_rad, c.voltage_limit_V, c.current_limit_A,
+        c.torque_limit_Nm, c.velocity_limit_rad_s, c.transfer_time_s, axis.stiffness_Nm_rad,
+        axis.damping_Nms_rad, axis.torque_noise_Nm, axis.torque_quantum_Nm,
+        axis.link_velocity_cutoff_Hz, axis.motor_velocity_cutoff_Hz, axis.torque_rate_cutoff_Hz,
+        axis.position_margin_rad, axis.following_window_rad, axis.following_timeout_s,
+        axis.continuous_current_A, axis.thermal_time_s, axis.undervoltage_V, axis.stop_time_s}) {
+    if (!std::isfinite(value) || value < 0.0) {
+      return bad(key, "a setting is negative or not finite");
+    }
+  }
+  for (const double value : {axis.link_counts_per_rev, axis.motor_counts_per_rev}) {
+    if (!(value >= 1.0 && value < 4294967296.0)) return bad(key, "an encoder has no resolution");
+  }
+  if (!(axis.rated_torque_Nm >= 1.0e-3) || !std::isfinite(axis.rated_torque_Nm)) {
+    return bad(key, "the rated torque is below 1 mNm");
+  }
+  if (!(c.min_position_rad < c.max_position_rad)) return bad(key, "position limits are inverted");
+  if (!std::isfinite(axis.temperature_limit_C)) return bad(key, "no temperature limit");
+  return {};
+}
+
+}  // namespace
+
+Status check(const BoardSetup& setup) {
+  if (setup.node_id < 1 || setup.node_id > kMaxNodeId) return bad("node_id", "is not 1 to 127");
+  if (setup.axes.empty() || setup.axes.size() > static_cast<std::size_t>(kMaxAxes)) {
+    return bad("axes", "a board has 1 to " + std::to_string(kMaxAxes) + " axes");
+  }
+  if (setup.control_period_ns <= 0) return bad("control_period_ns", "is not positive");
+  if (setup.command_timeout_syncs < 0) return bad("command_timeout_syncs", "is negative");
+  for (std::size_t i = 0; i < setup.axes.size(); ++i) {
+    if (Status status = check_axis(setup.axes[i], "axes[" + std::to_string(i) + "]"); !status) {
+      return status;
+    }
+  }
+  return {};
+}
+
+namespace {
+
+std::vector<std::unique_ptr<Axis>> make_axes(const BoardSetup& setup, ObjectDictionary& od) {
+  std::vector<std::unique_ptr<Axis>> axes;
+  for (std::size_t i = 0; i < setup.axes.size(); ++i) {
+    axes.push_back(std::make_unique<Axis>(setup.axes[i], setup, static_cast<int>(i), od));
+  }
+  return axes;
+}
+
+/// Adds the board's own entries before the node resolves anything.
+std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDictionary& od,
+                                              std::uint32_t& ignored_frames) {
+  od.add_string(canopen::object::kHardwareVersion, 0, kHardwareVersion);
+  od.add_string(canopen::object::kSoftwareVersion, 0, kSoftwareVersion);
+  od.add(object::kIgnoredFrames, 0, ignored_frames, kReadTpdo);
+  return make_axes(setup, od);
+}
+
+}  // namespace
+
+Board::Board(const BoardSetup& setup)
+    : setup_(setup),
+      od_(kNodeObjects + kBoardEntries + setup.axes.size() * kAxisEntries),
+      axes_(make_board(setup_, od_, ignored_frames_)),
+      node_({.id = setup_.node_id,
+             .device_type = kDriveDeviceType,
+             .vendor = setup_.vendor,
+             .product = setup_.product,
+             .revision = setup_.revision,
+             .serial = setup_.serial,
+             .name = setup_.name},
+            od_),
+      sync_period_us_(
+          static_cast<const std::uint32_t*>(od_.find(canopen::object::kSyncPeriod, 0)->data)),
+      outbox_storage_(kOutboxFrames),
+      outbox_(outbox_storage_),
+      commands_(setup.axes.size()),
+      drives_(setup.axes.size()) {}
+
+void Board::receive(const Frame& frame) noexcept TANDEM_RT {
+  if (!is_data_frame(frame)) {
+    ++ignored_frames_;
+    return;
+  }
+  if (lost_ == ErrorCode::kHeartbeatLost) heard_heartbeat(frame);
+  take(node_.receive(frame, outbox_));
+}
+
+void Board::take(NodeEvents events) noexcept {
+  if (events == 0) return;
+  if ((events & kEventSync) != 0) {
+    if (sync_pending_) node_.transmit_synchronous(outbox_);  // no step since the last SYNC
+    sync_pending_ = true;
+    since_sync_ns_ = 0;
+    for (Commands& axis : commands_) {
+      if (axis.syncs_without < 0xFFFF) ++axis.syncs_without;
+    }
+  }
+  if ((events & kEventRpdo) != 0) {
+    for (Commands& axis : commands_) {
+      if ((axis.rpdos & node_.applied_rpdos()) != 0) axis.syncs_without = 0;
+    }
+  }
+  if ((events & kEventOperational) != 0) {
+    lost_ = ErrorCode::kNone;
+    find_command_rpdos();
+  }
+  if ((events & kEventLeftOperational) != 0) lost_ = ErrorCode::kCommandTimeout;
+  if ((events & kEventHeartbeatLost) != 0) lost_ = ErrorCode::kHeartbeatLost;
+  if ((events & kEventResetNode) != 0) {
+    for (const auto& axis : axes_) axis->power_on();
+  }
+}
+
+// A command of an axis is an RPDO with its controlword; without any, every RPDO is one.
+void Board::find_command_rpdos() noexcept {
+  for (std::size_t a = 0; a < commands_.size(); ++a) {
+    const std::uint32_t index = of_axis(canopen::object::kControlword, static_cast<int>(a));
+    std::uint32_t found = 0;
+    for (int n = 0; n < kPdosPerNode; ++n) {
+      const auto mapping = static_cast<std::uint16_t>(canopen::object::kRpdoMapping + n);
+      const auto count = od_.value<std::uint8_t>(mapping, 0);
+      for (std::uint8_t sub = 1; sub <= count; ++sub) {
+        if (od_.value<std::uint32_t>(mapping, sub) >> 16 == index) found |= 1U << n;
+      }
+    }
+    commands_[a] = {.syncs_without = 0, .rpdos = found != 0 ? found : ~0U};
+  }
+}
+
+void Board::heard_heartbeat(const Frame& frame) noexcept {
+  const auto heartbeat = parse_heartbeat(frame);
+  if (!heartbeat) return;
+  for (std::uint8_t sub = 1; sub <= kHeartbeatConsumers; ++sub) {
+    const auto consumer = od_.value<std::uint32_t>(canopen::object::kHeartbeatConsumer, sub);
+    if ((consumer >> 16) != heartbeat->node) continue;
+    // It is back; commands are again when the node is started again.
+    lost_ = node_.state() == NmtState::kOperational ? ErrorCode::kNone
+                                                    : ErrorCode::kCommandTimeout;
+  }
+}
+
+ErrorCode Board::connection(std::size_t axis) const noexcept {
+  if (lost_ != ErrorCode::kNone) return lost_;
+  const std::uint32_t allowed = axes_[axis]->objects().command_timeout;
+  if (allowed == 0) return ErrorCode::kNone;
+  if (commands_[axis].syncs_without > allowed) return ErrorCode::kCommandTimeout;
+  const std::int64_t period_ns = *sync_period_us_ * kNsPerUs;
+  const bool silent = period_ns > 0 && since_sync_ns_ > (allowed + 1) * period_ns;
+  return silent ? ErrorCode::kSyncLost : ErrorCode::kNone;
+}
+
+void Board::supervise(std::size_t axis) noexcept {
+  const AxisEvents events = axes_[axis]->supervise(connection(axis));
+  // The node itself has told of a lost heartbeat.
+  if (events.raised != ErrorCode::kNone && events.raised != ErrorCode::kHeartbeatLost) {
+    node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis),
+                      outbox_);
+  }
+  if (!events.reset) return;
+  const bool all_clear =
+      std::ranges::all_of(axes_, [](const auto& one) { return one->objects().error_code == 0; });
+  if (all_clear) node_.clear_errors(outbox_);
+}
+
+void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,
+                 std::span<AxisDrive> drive) noexcept TANDEM_RT {
+  take(node_.process(dt_ns, outbox_));
+  const bool due = until_control_ns_ <= 0;
+  if (due) {
+    until_control_ns_ = setup_.control_period_ns;
+    for (std::size_t a = 0; a < axes_.size(); ++a) {
+      axes_[a]->sample(sense[a]);
+      supervise(a);
+    }
+  }
+  if (sync_pending_) node_.transmit_synchronous(outbox_);
+  sync_pending_ = false;
+  if (due) {
+    for (std::size_t a = 0; a < axes_.size(); ++a) drives_[a] = axes_[a]->control();
+  }
+  std::ranges::copy(drives_, drive.begin());
+  until_control_ns_ -= dt_ns;
+  since_sync_ns_ += dt_ns;
+}
+
+void Board::archive(Archive& ar) {
+  ar(od_, node_);
+  for (const auto& axis : axes_) axis->archive(ar);
+  ar(commands_, ignored_frames_, until_control_ns_, since_sync_ns_, lost_, sync_pending_);
+  for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled);
+  archive_outbox(ar, outbox_, kOutboxFrames);
+}
+
+}  // namespace tandem::firmware

@@ -1,0 +1,103 @@
+#include "firmware_emu/sensor_board.hpp"
+
+#include <cmath>
+#include <string_view>
+
+#include "firmware_emu/wire.hpp"
+
+namespace tandem::firmware {
+
+namespace {
+
+using namespace canopen;
+
+constexpr std::string_view kSoftwareVersion = "tandem sensor firmware 1.0";
+constexpr std::size_t kSensorEntries = 2;
+
+Status bad(std::string key, std::string message) {
+  return std::unexpected(Error{.message = std::move(message),
+                               .hint = "correct the sensor's setup",
+                               .file = {},
+                               .key = std::move(key)});
+}
+
+std::vector<NoisySensor> make_sensors(const SensorSetup& setup) {
+  std::vector<NoisySensor> sensors;
+  for (std::size_t i = 0; i < setup.channels; ++i) {
+    const double noise = setup.noise.empty() ? 0.0 : setup.noise[i];
+    const double bias = setup.bias.empty() ? 0.0 : setup.bias[i];
+    sensors.emplace_back(NoisySensor::Config{.noise = noise, .bias = bias},
+                         NoiseGenerator::stream(setup.seed, i));
+  }
+  return sensors;
+}
+
+/// Adds the channels before the node resolves anything.
+std::vector<NoisySensor> make_board(const SensorSetup& setup, ObjectDictionary& od,
+                                    std::vector<float>& values) {
+  od.add_string(canopen::object::kSoftwareVersion, 0, kSoftwareVersion);
+  od.add_value(canopen::object::kSensorChannels, 0, static_cast<std::uint8_t>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    od.add(canopen::object::kSensorChannels, static_cast<std::uint8_t>(i + 1), values[i],
+           kReadTpdo);
+  }
+  return make_sensors(setup);
+}
+
+}  // namespace
+
+Status check(const SensorSetup& setup) {
+  if (setup.node_id < 1 || setup.node_id > kMaxNodeId) return bad("node_id", "is not 1 to 127");
+  if (setup.channels < 1 || setup.channels > kMaxChannels) {
+    return bad("channels", "a sensor has 1 to " + std::to_string(kMaxChannels) + " channels");
+  }
+  for (const auto& [key, values] : {std::pair{"noise", &setup.noise}, {"bias", &setup.bias}}) {
+    if (!values->empty() && values->size() != setup.channels) {
+      return bad(key, "needs one number per channel, or none");
+    }
+    for (const double value : *values) {
+      if (!std::isfinite(value)) return bad(key, "is not finite");
+    }
+  }
+  for (const double value : setup.noise) {
+    if (value < 0.0) return bad("noise", "is negative");
+  }
+  return {};
+}
+
+SensorBoard::SensorBoard(const SensorSetup& setup)
+    : setup_(setup),
+      od_(kNodeObjects + kSensorEntries + setup.channels),
+      values_(setup.channels),
+      sensors_(make_board(setup_, od_, values_)),
+      node_({.id = setup_.node_id,
+             .device_type = kSensorDeviceType,
+             .product = kSensorProduct,
+             .serial = setup_.serial,
+             .name = setup_.name},
+            od_),
+      outbox_storage_(kSensorOutboxFrames),
+      outbox_(outbox_storage_) {}
+
+void SensorBoard::receive(const Frame& frame) noexcept TANDEM_RT {
+  if (!is_data_frame(frame)) return;
+  if ((node_.receive(frame, outbox_) & kEventSync) != 0) sync_pending_ = true;
+}
+
+void SensorBoard::step(std::int64_t dt_ns, std::span<const double> truth) noexcept TANDEM_RT {
+  node_.process(dt_ns, outbox_);
+  if (!sync_pending_) return;
+  sync_pending_ = false;
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    const auto value = static_cast<float>(sensors_[i].sample(truth[i]));
+    if (std::isfinite(value)) values_[i] = value;
+  }
+  node_.transmit_synchronous(outbox_);
+}
+
+void SensorBoard::archive(Archive& ar) {
+  ar(od_, values_, sensors_, node_, sync_pending_);
+  archive_outbox(ar, outbox_, kSensorOutboxFrames);
+}
+
+}  // namespace tandem::firmware

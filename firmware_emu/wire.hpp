@@ -1,0 +1,20 @@
+// What boards and sensor nodes share at their end of the wire.
+// Layer: firmware_emu.  Thread: RT, but for the archive.
+#pragma once
+
+#include <cstddef>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "canopen/frame.hpp"
+
+namespace tandem::firmware {
+
+/// Whether `frame` is a data frame that CAN or CAN FD could have carried: an 11-bit identifier,
+/// a length that exists, neither a remote request nor a driver's error frame.
+[[nodiscard]] bool is_data_frame(const canopen::Frame& frame) noexcept TANDEM_RT;
+
+/// Archives the frames that wait in `outbox`, of which there are at most `capacity`.
+void archive_outbox(Archive& ar, canopen::FrameSink& outbox, std::size_t capacity);
+
+}  // namespace tandem::firmware
