@@ -53,6 +53,9 @@ function(tandem_controller name)
   endif()
   add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
   target_link_libraries(controller_${name} PRIVATE tandem_hal ${PLUGIN_LINKS})
+  # Nothing undefined that the loader would find missing, nothing exported but the entry point.
+  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL
+    $<$<NOT:$<BOOL:${TANDEM_SANITIZE}>>:-Wl,--no-undefined>)
   set_target_properties(controller_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name}
     CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
 endfunction()

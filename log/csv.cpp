@@ -1,8 +1,10 @@
 #include "log/csv.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <ostream>
 
+#include "base/nearest.hpp"
 #include "log/schema.hpp"
 
 namespace tandem::log {
@@ -43,30 +45,53 @@ Status write_events(const LogFile& log, std::ostream& out) {
   return {};
 }
 
+/// The topic's fields that `names` asks for; all when it asks for none.
+Result<std::vector<const hal::Field*>> choose(const Topic* topic,
+                                              std::span<const std::string> names) {
+  std::vector<const hal::Field*> chosen;
+  if (topic == nullptr) return chosen;  // for_each() says so
+  std::vector<std::string> known;
+  for (const hal::Field& field : topic->layout.fields()) {
+    known.push_back(field.name);
+    if (names.empty() || std::ranges::find(names, field.name) != names.end()) {
+      chosen.push_back(&field);
+    }
+  }
+  for (const std::string& name : names) {
+    if (std::ranges::find(known, name) != known.end()) continue;
+    return fail("the topic '" + topic->name + "' has no field '" + name + "'",
+                suggest(name, known));
+  }
+  return chosen;
+}
+
+std::string header(const std::vector<const hal::Field*>& fields, const RunInfo& info) {
+  std::string line = "time_s";
+  for (const hal::Field* field : fields) {
+    for (std::size_t i = 0; i < field->count; ++i) line += "," + column_name(*field, i, info);
+  }
+  return line;
+}
+
 }  // namespace
 
 Status write_csv(const LogFile& log, const std::string& topic, std::size_t every,
-                 std::ostream& out) {
+                 std::ostream& out, std::span<const std::string> fields) {
   if (topic == "/tandem/event") return write_events(log, out);
   const Topic* found = log.find(topic);
-  std::string line = "time_s";
-  if (found != nullptr) {
-    for (const hal::Field& field : found->layout.fields()) {
-      for (std::size_t i = 0; i < field.count; ++i) {
-        line += "," + column_name(field, i, log.info());
-      }
-    }
-    out << line << "\n";
-  }
+  const auto chosen = choose(found, fields);
+  if (!chosen) return std::unexpected(chosen.error());
+  if (found != nullptr) out << header(*chosen, log.info()) << "\n";
+  std::string line;
   std::size_t count = 0;
   Status done = log.for_each(topic, [&](std::int64_t time_ns, std::span<const std::byte> body) {
     if (count++ % every != 0) return;
     line.clear();
     append_number(line, static_cast<double>(time_ns) * 1e-9);
-    for (const hal::Field& field : found->layout.fields()) {
-      for (std::size_t i = 0; i < field.count; ++i) {
+    for (const hal::Field* field : *chosen) {
+      for (std::size_t i = 0; i < field->count; ++i) {
         line += ',';
-        append_number(line, element(field, body, i));
+        append_number(line, element(*field, body, i));
       }
     }
     out << line << "\n";

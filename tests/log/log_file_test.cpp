@@ -83,6 +83,17 @@ TEST_F(LogFileOfThree, WritesCsvWithTheNamesOfJointsAndSensors) {
             "0.5,2,0.1,-2.5e-300,0.3333333333333333,2\n");
 }
 
+TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {
+  std::ostringstream out;
+  const std::vector<std::string> fields{"position_rad"};
+  ASSERT_TRUE(write_csv(open(), "/tandem/state", 2, out, fields));
+  EXPECT_EQ(out.str(),
+            "time_s,position_rad.hip,position_rad.knee\n0,0.1,-2.5e-300\n0.5,0.1,-2.5e-300\n");
+  const std::vector<std::string> misspelt{"positon_rad"};
+  EXPECT_EQ(write_csv(open(), "/tandem/state", 1, out, misspelt).error().hint,
+            "did you mean 'position_rad'?");
+}
+
 TEST_F(LogFileOfThree, WritesEventsAsCsv) {
   std::ostringstream out;
   ASSERT_TRUE(write_csv(open(), "/tandem/event", 1, out));

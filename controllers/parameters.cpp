@@ -1,0 +1,52 @@
+#include "controllers/parameters.hpp"
+
+#include <algorithm>
+
+#include "base/nearest.hpp"
+
+namespace tandem {
+
+std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
+  std::vector<std::string> names;
+  for (const hal::JointConfig& joint : robot.joints) names.push_back(joint.name);
+  return names;
+}
+
+std::vector<std::size_t> joints_parameter(ControllerSetup& setup) {
+  const std::vector<std::string> known = joint_names(setup.robot);
+  std::vector<std::size_t> joints;
+  for (const std::string& name : setup.parameters.texts_or("joints", known)) {
+    const int index = setup.robot.joint_index(name);
+    if (index < 0) {
+      setup.parameters.error("joints", "the robot has no joint '" + name + "'",
+                             suggest(name, known));
+    } else if (std::ranges::find(joints, static_cast<std::size_t>(index)) != joints.end()) {
+      setup.parameters.error("joints", "joint '" + name + "' stands twice", "name it once");
+    } else {
+      joints.push_back(static_cast<std::size_t>(index));
+    }
+  }
+  return joints;
+}
+
+const hal::PostureConfig* posture_parameter(ControllerSetup& setup) {
+  const std::string name = setup.parameters.text_or("posture", "");
+  if (name.empty()) return nullptr;
+  const hal::PostureConfig* posture = setup.robot.posture(name);
+  if (posture == nullptr) {
+    std::vector<std::string> known;
+    for (const hal::PostureConfig& one : setup.robot.postures) known.push_back(one.name);
+    setup.parameters.error("posture", "the robot has no posture '" + name + "'",
+                           suggest(name, known));
+  }
+  return posture;
+}
+
+Status claim(ControllerSetup& setup, std::size_t joint, hal::ControlMode mode,
+             hal::InteractionMode interaction) {
+  const Status able = hal::check_capability(setup.robot, joint, mode, interaction);
+  if (able) setup.claim(joint, mode, interaction);
+  return able;
+}
+
+}  // namespace tandem

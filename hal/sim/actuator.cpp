@@ -1,0 +1,187 @@
+#include "hal/sim/actuator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace tandem::sim {
+namespace {
+
+constexpr double kBrakeFrequency_rad_s = 150.0;  // of a rigid joint's brake on its armature
+
+Status require_positive(const hal::ActuatorConfig& config, double value, const char* key) {
+  if (value > 0.0 && std::isfinite(value)) return {};
+  return std::unexpected(Error{.message = "actuator of order " + std::to_string(config.order) +
+                                          " needs " + std::string(key) + " above 0",
+                               .hint = "set it, or choose an order that does without",
+                               .file = {},
+                               .key = "actuator." + config.name + "." + key});
+}
+
+double clamp_to(double value, double limit) {
+  return limit > 0.0 ? std::clamp(value, -limit, limit) : value;
+}
+
+}  // namespace
+
+Result<ActuatorModel> make_actuator(const hal::ActuatorConfig& config) {
+  if (config.order < 0 || config.order > 3) {
+    return std::unexpected(Error{.message = "the order of an actuator is 0, 1, 2 or 3",
+                                 .hint = "0 rigid, 1 electrical, 2 mechanical, 3 both",
+                                 .file = {},
+                                 .key = "actuator." + config.name + ".order"});
+  }
+  const bool elastic = config.order >= 2;
+  const bool electrical = (config.order & 1) != 0;
+  struct Need {
+    bool needed;
+    double value;
+    const char* key;
+  };
+  for (const Need& need : {Need{true, config.resistance_ohm, "resistance_ohm"},
+                           Need{true, config.torque_constant_Nm_A, "torque_constant_Nm_A"},
+                           Need{true, config.gear_ratio, "gear_ratio"},
+                           Need{true, config.inertia_kg_m2, "inertia_kg_m2"},
+                           Need{electrical, config.inductance_H, "inductance_H"},
+                           Need{elastic, config.spring_Nm_rad, "spring_Nm_rad"},
+                           Need{true, config.thermal_time_constant_s, "thermal_time_constant_s"}}) {
+    if (!need.needed) continue;
+    if (Status status = require_positive(config, need.value, need.key); !status) {
+      return std::unexpected(status.error());
+    }
+  }
+  ActuatorModel model;
+  model.order = config.order;
+  model.torque_per_A = config.gear_ratio * config.torque_constant_Nm_A;
+  model.resistance_ohm = config.resistance_ohm;
+  const double emf = std::min(model.torque_per_A,
+                              config.damping_Nms_rad * model.resistance_ohm / model.torque_per_A);
+  model.back_emf_Vs_rad = emf;
+  model.friction_Nms_rad =
+      std::max(0.0, config.damping_Nms_rad - model.torque_per_A * emf / model.resistance_ohm);
+  model.inductance_H = config.inductance_H;
+  model.inertia_kg_m2 = config.inertia_kg_m2;
+  model.spring_Nm_rad = config.spring_Nm_rad;
+  model.spring_damping_Nms_rad = config.spring_damping_Nms_rad;
+  model.current_limit_A = config.current_limit_A;
+  model.voltage_limit_V = config.voltage_limit_V;
+  model.thermal_resistance_K_W = config.thermal_resistance_K_W;
+  model.thermal_time_constant_s = config.thermal_time_constant_s;
+  return model;
+}
+
+double armature(const hal::ActuatorConfig& config) {
+  return config.order < 2 ? config.inertia_kg_m2 : 0.0;
+}
+
+Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
+    : models_(std::move(models)), ambient_C_(ambient_C) {
+  const std::size_t n = models_.size();
+  voltage_.assign(n, 0.0);
+  brake_rad_.assign(n, 0.0);
+  brake_Nm_.assign(n, 0.0);
+  temperature_.assign(n, ambient_C);
+  bridge_.assign(n, 0);
+  braked_.assign(n, 0);
+  cooling_.assign(n, 1.0);
+  for (const ActuatorModel& model : models_) feeds_through_ |= model.order == 0;
+}
+
+void Actuators::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
+  voltage_[joint] = bridge_on ? clamp_to(voltage_V, models_[joint].voltage_limit_V) : 0.0;
+  bridge_[joint] = bridge_on ? 1 : 0;
+}
+
+void Actuators::set_brake(std::size_t joint, bool engaged, double position_rad,
+                          double load_Nm) noexcept TANDEM_RT {
+  braked_[joint] = engaged ? 1 : 0;
+  brake_rad_[joint] = position_rad;
+  brake_Nm_[joint] = load_Nm;
+}
+
+double Actuators::current(std::size_t joint, double velocity_rad_s) const noexcept {
+  if (bridge_[joint] == 0) return 0.0;
+  const ActuatorModel& m = models_[joint];
+  const double i = (voltage_[joint] - m.back_emf_Vs_rad * velocity_rad_s) / m.resistance_ohm;
+  return clamp_to(i, m.current_limit_A);
+}
+
+double Actuators::rigid_brake(std::size_t joint, double q, double qd) const noexcept {
+  const double J = models_[joint].inertia_kg_m2;
+  return brake_Nm_[joint] -
+         J * kBrakeFrequency_rad_s * (kBrakeFrequency_rad_s * (q - brake_rad_[joint]) + 2.0 * qd);
+}
+
+void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+                         MotorState rate) const noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    const double velocity = m.elastic() ? motor.velocity_rad_s[j] : qd[j];
+    double i = 0.0;
+    rate.current_A[j] = 0.0;
+    if (!m.current_is_state()) {
+      i = current(j, velocity);
+    } else if (bridge_[j] != 0) {
+      i = motor.current_A[j];
+      rate.current_A[j] =
+          (voltage_[j] - m.resistance_ohm * i - m.back_emf_Vs_rad * velocity) / m.inductance_H;
+    }
+    const double drive = m.torque_per_A * i - m.friction_Nms_rad * velocity;
+    if (!m.elastic()) {
+      rate.position_rad[j] = 0.0;
+      rate.velocity_rad_s[j] = 0.0;
+      torque_Nm[j] = braked_[j] != 0 ? rigid_brake(j, q[j], qd[j]) : drive;
+      continue;
+    }
+    const double spring = m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
+                          m.spring_damping_Nms_rad * (velocity - qd[j]);
+    torque_Nm[j] = spring;
+    const bool held = braked_[j] != 0;
+    rate.position_rad[j] = held ? 0.0 : velocity;
+    rate.velocity_rad_s[j] = held ? 0.0 : (drive - spring) / m.inertia_kg_m2;
+  }
+}
+
+void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
+                                   MotorState motor) const noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    if (m.current_is_state()) {
+      motor.current_A[j] +=
+          h_s * rate.current_A[j] / (1.0 + h_s * m.resistance_ohm / m.inductance_H);
+    }
+    if (m.elastic() && braked_[j] == 0) {
+      motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
+      motor.position_rad[j] += h_s * motor.velocity_rad_s[j];
+    }
+  }
+}
+
+void Actuators::finish_step(double h_s, const double* q, const double* qd,
+                            MotorState motor) noexcept TANDEM_RT {
+  if (h_s != cooling_h_s_) {
+    cooling_h_s_ = h_s;
+    for (std::size_t j = 0; j < models_.size(); ++j) {
+      cooling_[j] = std::exp(-h_s / models_[j].thermal_time_constant_s);
+    }
+  }
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    const ActuatorModel& m = models_[j];
+    if (!m.elastic()) {
+      motor.position_rad[j] = q[j];
+      motor.velocity_rad_s[j] = qd[j];
+    } else if (braked_[j] != 0) {
+      motor.velocity_rad_s[j] = 0.0;
+    }
+    double& i = motor.current_A[j];
+    if (!m.current_is_state()) {
+      i = current(j, motor.velocity_rad_s[j]);
+    } else {
+      i = bridge_[j] != 0 ? clamp_to(i, m.current_limit_A) : 0.0;
+    }
+    const double warm = ambient_C_ + m.thermal_resistance_K_W * m.resistance_ohm * i * i;
+    temperature_[j] = warm + (temperature_[j] - warm) * cooling_[j];
+  }
+}
+
+}  // namespace tandem::sim

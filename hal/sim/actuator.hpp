@@ -1,0 +1,122 @@
+// Motors, gears and series springs of every joint: torque on the link, and the motor's own state.
+// Layer: hal/sim.  Thread: create non-RT; evaluate and step RT.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::sim {
+
+/// One actuator's constants, derived from its configuration. Everything is on the link side.
+///
+///   order 0  rigid:      i = (V - ke q') / R                 tau = kt i - b q'
+///   order 1  electrical: L i' = V - R i - ke q'              tau = kt i - b q'
+///   order 2  mechanical: i = (V - ke th') / R                tau = Ks (th - q) + Ds (th' - q')
+///                        J th'' = kt i - b th' - tau
+///   order 3  both:       L i' = V - R i - ke th', the rest as order 2
+///
+/// With kt = N K. The configured D is friction and back-EMF together, D = b + kt ke / R, so
+/// b = D - N^2 K^2 / R; order 2 is then J th'' = (N K / R) V - D th' - tau. Where a data sheet's
+/// D is below N^2 K^2 / R, ke is lowered to D R / (N K) and b is 0: D is what the sheet says and
+/// no joint pushes itself. Orders 0 and 1 leave J to the model, as armature of the joint.
+struct ActuatorModel {
+  int order = 2;
+  double torque_per_A = 0.0;      ///< kt = N K [Nm/A]
+  double back_emf_Vs_rad = 0.0;   ///< ke
+  double friction_Nms_rad = 0.0;  ///< b, what is left with the bridge off (open circuit)
+  double resistance_ohm = 0.0;
+  double inductance_H = 0.0;
+  double inertia_kg_m2 = 0.0;
+  double spring_Nm_rad = 0.0;
+  double spring_damping_Nms_rad = 0.0;
+  double current_limit_A = 0.0;  ///< 0: none
+  double voltage_limit_V = 0.0;  ///< 0: none
+  double thermal_resistance_K_W = 0.0;
+  double thermal_time_constant_s = 0.0;
+
+  [[nodiscard]] bool elastic() const noexcept { return order >= 2; }
+  [[nodiscard]] bool current_is_state() const noexcept { return (order & 1) != 0; }
+};
+
+/// Errors: an order other than 0 to 3, a constant its order needs that is not positive.
+[[nodiscard]] Result<ActuatorModel> make_actuator(const hal::ActuatorConfig& config);
+
+/// The armature a joint with this actuator has in the multibody model [kg m2]: J when the gear
+/// is rigid, 0 when a spring separates motor and link.
+[[nodiscard]] double armature(const hal::ActuatorConfig& config);
+
+/// The motors' part of the plant's state and its derivative, one block of three arrays each.
+struct MotorState {
+  double* position_rad;    ///< (n) th; of a rigid joint a copy of q
+  double* velocity_rad_s;  ///< (n) th'
+  double* current_A;       ///< (n) i
+};
+struct MotorStateView {
+  const double* position_rad;
+  const double* velocity_rad_s;
+  const double* current_A;
+};
+
+/// All joints' actuators. Arrays are in the model's joint order. What the drives apply (voltage,
+/// bridge, brake) is held between calls; motor position, velocity and current live in the plant.
+class Actuators {
+ public:
+  explicit Actuators(std::vector<ActuatorModel> models, double ambient_C = 25.0);
+
+  [[nodiscard]] std::size_t size() const noexcept { return models_.size(); }
+  [[nodiscard]] const ActuatorModel& model(std::size_t joint) const noexcept {
+    return models_[joint];
+  }
+  /// True when a voltage acts on the link at once (order 0), without a state in between.
+  [[nodiscard]] bool feeds_through() const noexcept { return feeds_through_; }
+
+  /// What the power stage does from now on. `voltage_V` is saturated. With the bridge off the
+  /// winding is open: no current, no back-EMF damping.
+  void set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT;
+
+  /// Holds the rotor where it is (rigid joints: by a stiff spring about `position_rad` with
+  /// `load_Nm` compensated), or lets it go.
+  void set_brake(std::size_t joint, bool engaged, double position_rad,
+                 double load_Nm) noexcept TANDEM_RT;
+  [[nodiscard]] bool braked(std::size_t joint) const noexcept { return braked_[joint] != 0; }
+
+  /// Torque on the links `torque_Nm` (n) and the motor state's rate of change.
+  void evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+                MotorState rate) const noexcept TANDEM_RT;
+
+  /// One semi-implicit step of length `h_s`: the current implicitly, the velocity, then the
+  /// position with the new velocity.
+  void step_semi_implicit(double h_s, MotorStateView rate,
+                          MotorState motor) const noexcept TANDEM_RT;
+
+  /// After a step to link state q, qd: clamps currents, copies rigid links to their motors,
+  /// computes algebraic currents, and warms the windings for `h_s`.
+  void finish_step(double h_s, const double* q, const double* qd,
+                   MotorState motor) noexcept TANDEM_RT;
+
+  [[nodiscard]] std::span<const double> voltage_V() const noexcept { return voltage_; }
+  [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }
+
+  void archive(Archive& ar) { ar(voltage_, bridge_, braked_, brake_rad_, brake_Nm_, temperature_); }
+
+ private:
+  [[nodiscard]] double current(std::size_t joint, double velocity_rad_s) const noexcept;
+  [[nodiscard]] double rigid_brake(std::size_t joint, double q, double qd) const noexcept;
+
+  std::vector<ActuatorModel> models_;
+  std::vector<double> voltage_, brake_rad_, brake_Nm_, temperature_;
+  std::vector<std::uint8_t> bridge_, braked_;
+  std::vector<double> cooling_;  // exp(-h / time constant) of the last step length
+  double cooling_h_s_ = 0.0;
+  double ambient_C_;
+  bool feeds_through_ = false;
+};
+
+}  // namespace tandem::sim

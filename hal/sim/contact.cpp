@@ -1,0 +1,136 @@
+#include "hal/sim/contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::sim {
+namespace {
+
+std::unexpected<Error> bad(const char* key, const char* message, const char* hint) {
+  return std::unexpected(Error{.message = message, .hint = hint, .file = {}, .key = key});
+}
+
+// Shortens (x, y) to `length` when it is longer.
+void cut_to(double length, double& x, double& y) {
+  const double square = x * x + y * y;
+  if (square <= length * length) return;
+  const double scale = length / std::sqrt(square);
+  x *= scale;
+  y *= scale;
+}
+
+}  // namespace
+
+Result<Contact> Contact::create(const hal::ContactConfig& config, std::vector<Foot> feet) {
+  Contact contact;
+  contact.config_ = config;
+  if (feet.empty()) return contact;
+  if (!(config.stiffness_N_m > 0.0)) {
+    return bad("contact.stiffness_N_m", "feet need ground of a stiffness above 0",
+               "[N/m] per point");
+  }
+  if (!(config.tangential_stiffness_N_m > 0.0)) {
+    return bad("contact.tangential_stiffness_N_m", "feet that stick need a stiffness above 0",
+               "[N/m] per point");
+  }
+  if (!(config.damping_s_m >= 0.0) || !(config.tangential_damping_Ns_m >= 0.0)) {
+    return bad("contact.damping_s_m", "damping cannot be negative", "0 or more");
+  }
+  if (!(config.sliding_friction >= 0.0) || !(config.static_friction >= config.sliding_friction)) {
+    return bad("contact.static_friction", "static friction is below sliding friction",
+               "both are 0 or more, static the larger");
+  }
+  if (!(config.stick_velocity_m_s > 0.0)) {
+    return bad("contact.stick_velocity_m_s", "has to be above 0", "0.01 is usual");
+  }
+  for (const Foot& foot : feet) {
+    const std::size_t begin = contact.x_.size();
+    for (const std::array<double, 3>& point : foot.points_m) {
+      contact.x_.push_back(point[0]);
+      contact.y_.push_back(point[1]);
+      contact.z_.push_back(point[2]);
+    }
+    contact.feet_.push_back({foot.site, foot.wrench, begin, contact.x_.size()});
+  }
+  contact.anchor_x_.assign(contact.points(), 0.0);
+  contact.anchor_y_.assign(contact.points(), 0.0);
+  contact.touching_.assign(contact.points(), 0);
+  contact.wrench_W_.assign(6 * contact.feet(), 0.0);
+  return contact;
+}
+
+std::array<double, 3> Contact::force(std::size_t index, const Point& point,
+                                     bool move_anchor) noexcept {
+  const double depth = config_.height_m - point.pz;
+  if (!(depth > 0.0)) {
+    if (move_anchor) touching_[index] = 0;
+    return {};
+  }
+  const double elastic = config_.stiffness_N_m * depth;
+  const double normal = std::max(0.0, elastic * (1.0 - config_.damping_s_m * point.vz));
+  const double speed2 = point.vx * point.vx + point.vy * point.vy;
+  const double stick2 = config_.stick_velocity_m_s * config_.stick_velocity_m_s;
+  const double mu =
+      config_.sliding_friction +
+      (config_.static_friction - config_.sliding_friction) * stick2 / (stick2 + speed2);
+  const double cone = mu * normal;
+  // A point that came down since the last sub-step is anchored where it is now.
+  const bool anchored = touching_[index] != 0;
+  const double kt = config_.tangential_stiffness_N_m;
+  double fx = anchored ? -kt * (point.px - anchor_x_[index]) : 0.0;
+  double fy = anchored ? -kt * (point.py - anchor_y_[index]) : 0.0;
+  cut_to(cone, fx, fy);
+  const double stretch_x = -fx / kt, stretch_y = -fy / kt;
+  fx -= config_.tangential_damping_Ns_m * point.vx;
+  fy -= config_.tangential_damping_Ns_m * point.vy;
+  cut_to(cone, fx, fy);
+  if (move_anchor) {
+    touching_[index] = 1;
+    anchor_x_[index] = point.px - stretch_x;
+    anchor_y_[index] = point.py - stretch_y;
+  }
+  energy_J_ += 0.5 * (elastic * depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
+  return {fx, fy, normal};
+}
+
+void Contact::evaluate(const double* pose, const double* twist, bool move_anchors,
+                       double* wrench) noexcept TANDEM_RT {
+  energy_J_ = 0.0;
+  for (std::size_t f = 0; f < feet_.size(); ++f) {
+    const Range& foot = feet_[f];
+    const double* R = pose + 12 * foot.site;
+    const double* p = R + 9;
+    const double* v = twist + 6 * foot.site;
+    const double* w = v + 3;
+    double F[3] = {0.0, 0.0, 0.0};
+    double M[3] = {0.0, 0.0, 0.0};  // W axes, about the site's origin
+    for (std::size_t i = foot.begin; i < foot.end; ++i) {
+      const double x = R[0] * x_[i] + R[1] * y_[i] + R[2] * z_[i];
+      const double y = R[3] * x_[i] + R[4] * y_[i] + R[5] * z_[i];
+      const double z = R[6] * x_[i] + R[7] * y_[i] + R[8] * z_[i];
+      const Point point{p[0] + x,
+                        p[1] + y,
+                        p[2] + z,
+                        v[0] + w[1] * z - w[2] * y,
+                        v[1] + w[2] * x - w[0] * z,
+                        v[2] + w[0] * y - w[1] * x};
+      const std::array<double, 3> force_W = force(i, point, move_anchors);
+      F[0] += force_W[0];
+      F[1] += force_W[1];
+      F[2] += force_W[2];
+      M[0] += y * force_W[2] - z * force_W[1];
+      M[1] += z * force_W[0] - x * force_W[2];
+      M[2] += x * force_W[1] - y * force_W[0];
+    }
+    double* out = wrench + 6 * foot.wrench;
+    double* out_W = wrench_W_.data() + 6 * f;
+    for (int axis = 0; axis < 3; ++axis) {
+      out[axis] = R[axis] * F[0] + R[3 + axis] * F[1] + R[6 + axis] * F[2];
+      out[3 + axis] = R[axis] * M[0] + R[3 + axis] * M[1] + R[6 + axis] * M[2];
+      out_W[axis] = F[axis];
+      out_W[3 + axis] = M[axis];
+    }
+  }
+}
+
+}  // namespace tandem::sim

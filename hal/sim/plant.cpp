@@ -1,0 +1,239 @@
+#include "hal/sim/plant.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <string_view>
+
+#include "base/nearest.hpp"
+
+namespace tandem::sim {
+namespace {
+
+std::vector<std::string> names(const char* const* first, std::uint32_t count) {
+  return {first, first + count};
+}
+
+int find(const std::vector<std::string>& all, std::string_view name) {
+  const auto found = std::find(all.begin(), all.end(), name);
+  return found == all.end() ? -1 : static_cast<int>(found - all.begin());
+}
+
+std::vector<ActuatorModel> in_model_order(const PlantConfig& config) {
+  std::vector<ActuatorModel> models(config.joints.size());
+  const std::vector<std::string> all = names(config.kernels->joint_names, config.kernels->joints);
+  for (const PlantJoint& joint : config.joints) {
+    models[static_cast<std::size_t>(find(all, joint.name))] = *make_actuator(joint.actuator);
+  }
+  return models;
+}
+
+Status check(const PlantConfig& config) {
+  if (config.kernels == nullptr || config.kernels->abi != TANDEM_KERNELS_ABI) {
+    return fail("the robot's kernels were built for another version", "build them again");
+  }
+  if (config.substep_ns <= 0) {
+    return fail("the plant's sub-step has to be above 0 ns", "500000 is usual");
+  }
+  if (!(config.rate_limit > 0.0)) {
+    return fail("the plausible rate has to be above 0", "1000 is usual");
+  }
+  for (const PlantJoint& joint : config.joints) {
+    if (Result<ActuatorModel> model = make_actuator(joint.actuator); !model) {
+      return std::unexpected(model.error());
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Plant> Plant::create(const PlantConfig& config) {
+  if (Status status = check(config); !status) return std::unexpected(status.error());
+  Plant plant(config);
+  if (Status status = plant.map_joints(config); !status) return std::unexpected(status.error());
+  plant.actuators_ = Actuators(in_model_order(config));
+  if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
+  plant.start(config);
+  return plant;
+}
+
+Plant::Plant(const PlantConfig& config)
+    : kernels_(config.kernels),
+      integrator_(config.integrator),
+      substep_ns_(config.substep_ns),
+      release_ns_(config.release_ns),
+      rate_limit_(config.rate_limit),
+      base_q_(config.kernels->floating_base != 0 ? 7 : 0),
+      base_v_(config.kernels->floating_base != 0 ? 6 : 0),
+      actuators_({}) {
+  const std::size_t n = kernels_->joints;
+  const std::size_t size = kernels_->nq + kernels_->nv + 3 * n;
+  for (auto* block : {&x_, &stage_, &k1_, &k2_, &k3_, &k4_}) block->assign(size, 0.0);
+  for (auto* block : {&tau_, &applied_tau_, &vdot_}) block->assign(kernels_->nv, 0.0);
+  wrench_.assign(6 * kernels_->wrenches, 0.0);
+  motor_rate_.assign(3 * n, 0.0);
+  pose_.assign(12 * kernels_->sites, 0.0);
+  twist_.assign(6 * kernels_->sites, 0.0);
+  acceleration_.assign(6 * kernels_->sites, 0.0);
+  damping_.assign(n, 0.0);
+}
+
+Status Plant::map_joints(const PlantConfig& config) {
+  const std::vector<std::string> all = names(kernels_->joint_names, kernels_->joints);
+  std::vector<std::uint8_t> used(all.size(), 0);
+  for (const PlantJoint& joint : config.joints) {
+    const int index = find(all, joint.name);
+    if (index < 0 || used[static_cast<std::size_t>(index)] != 0) {
+      return std::unexpected(
+          Error{.message = index < 0 ? "the model has no such joint" : "the joint is listed twice",
+                .hint = suggest(joint.name, all),
+                .file = {},
+                .key = joint.name});
+    }
+    used[static_cast<std::size_t>(index)] = 1;
+    map_.push_back(static_cast<std::size_t>(index));
+    damping_[static_cast<std::size_t>(index)] = joint.damping_Nms_rad;
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (used[i] == 0) {
+      return std::unexpected(Error{.message = "the model's joint has no actuator",
+                                   .hint = "add a [[joint]], or lock it under [model.lock]",
+                                   .file = {},
+                                   .key = all[i]});
+    }
+  }
+  return {};
+}
+
+Status Plant::place_contact(const PlantConfig& config) {
+  const std::vector<std::string> sites = names(kernels_->site_names, kernels_->sites);
+  const std::vector<std::string> wrenches = names(kernels_->wrench_names, kernels_->wrenches);
+  std::vector<Contact::Foot> feet;
+  for (const hal::FootConfig& foot : config.contact.feet) {
+    const int site = find(sites, foot.site);
+    const int wrench = find(wrenches, foot.site);
+    if (site < 0 || wrench < 0) {
+      return std::unexpected(
+          Error{.message = "the foot's site cannot take a wrench in the model",
+                .hint = site < 0 ? suggest(foot.site, sites) : "set wrench = true in its [[site]]",
+                .file = {},
+                .key = "contact.foot." + foot.site});
+    }
+    feet.push_back(
+        {static_cast<std::size_t>(site), static_cast<std::size_t>(wrench), foot.points_m});
+  }
+  Result<Contact> contact = Contact::create(config.contact, std::move(feet));
+  if (!contact) return std::unexpected(contact.error());
+  contact_ = std::move(*contact);
+  return {};
+}
+
+void Plant::start(const PlantConfig& config) {
+  std::vector<double> q(kernels_->nq, 0.0);
+  const std::vector<double> v(kernels_->nv, 0.0);
+  if (base_q_ != 0) {
+    q[2] = config.base_height_m;
+    q[6] = 1.0;
+  }
+  for (std::size_t j = 0; j < map_.size(); ++j)
+    q[base_q_ + map_[j]] = config.joints[j].position_rad;
+  set_state(q, v);
+
+  // Springs and hoist start with the load that keeps everything at rest.
+  touch_ground(x_.data(), true);
+  std::vector<double> load(kernels_->nv, 0.0);
+  kernels_->inverse_dynamics(q.data(), v.data(), v.data(), wrench_.data(), load.data());
+  const MotorState at_start = motor(x_.data());
+  for (std::size_t i = 0; i < map_.size(); ++i) {
+    const double joint_load = load[base_v_ + i];
+    const ActuatorModel& model = actuators_.model(i);
+    if (config.held && model.elastic()) {
+      at_start.position_rad[i] += joint_load / model.spring_Nm_rad;
+    }
+    actuators_.set_brake(i, config.held, q[base_q_ + i], joint_load);
+  }
+  held_ = config.held ? 1 : 0;
+  released_ = config.held ? 0 : 1;
+  if (config.held && base_q_ != 0) {
+    // Apparent inertia along each base axis: the acceleration that a unit force adds.
+    std::vector<double> rest(kernels_->nv), moved(kernels_->nv);
+    kernels_->forward_dynamics(q.data(), v.data(), load.data(), wrench_.data(), rest.data());
+    double most[2] = {0.0, 0.0};
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      std::vector<double> pushed = load;
+      pushed[axis] += 1.0;
+      kernels_->forward_dynamics(q.data(), v.data(), pushed.data(), wrench_.data(), moved.data());
+      most[axis / 3] = std::max(most[axis / 3], moved[axis] - rest[axis]);
+    }
+    hoist_.hold(1.0 / most[0], 1.0 / most[1], q.data(), load.data());
+  }
+}
+
+void Plant::set_state(std::span<const double> q, std::span<const double> v) noexcept {
+  std::fill(x_.begin(), x_.end(), 0.0);
+  std::copy(q.begin(), q.end(), x_.begin());
+  std::copy(v.begin(), v.end(), x_.begin() + kernels_->nq);
+  const MotorState motors = motor(x_.data());
+  for (std::size_t i = 0; i < map_.size(); ++i) {
+    motors.position_rad[i] = q[base_q_ + i];
+    motors.velocity_rad_s[i] = v[base_v_ + i];
+  }
+  contact_fresh_ = vdot_fresh_ = 0;
+}
+
+void Plant::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
+  const std::size_t i = map_[joint];
+  actuators_.set_drive(i, voltage_V, bridge_on);
+  const bool brake = !bridge_on;  // between power-on and release
+  if (released_ != 0 || actuators_.braked(i) == brake) return;
+  actuators_.set_brake(i, brake, x_[base_q_ + i], tau_[base_v_ + i]);
+}
+
+void Plant::release() noexcept TANDEM_RT {
+  if (released_ != 0) return;
+  released_ = 1;
+  hoist_.release(release_ns_);
+  for (std::size_t i = 0; i < map_.size(); ++i) actuators_.set_brake(i, false, 0.0, 0.0);
+}
+
+JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
+  const std::size_t i = map_[joint];
+  const MotorStateView motors = motor(x_.data());
+  return {x_[base_q_ + i],
+          v()[base_v_ + i],
+          motors.position_rad[i],
+          motors.velocity_rad_s[i],
+          tau_[base_v_ + i] + damping_[i] * v()[base_v_ + i],
+          motors.current_A[i],
+          actuators_.voltage_V()[i],
+          actuators_.temperature_C()[i]};
+}
+
+std::string Plant::diverged_text() const {
+  if (diverged_ < 0) return {};
+  const auto index = static_cast<std::size_t>(diverged_);
+  const std::string who = index < base_v_
+                              ? "the floating base"
+                              : "joint " + std::string(kernels_->joint_names[index - base_v_]);
+  char text[160];
+  std::snprintf(text, sizeof text, "%s at %.6f s: rate %g is beyond the plausible %g rad/s or m/s",
+                who.c_str(), static_cast<double>(time_ns_) * 1e-9, diverged_rate_, rate_limit_);
+  return text;
+}
+
+void Plant::archive(Archive& ar) {
+  ar(actuators_, contact_, hoist_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_, pose_,
+     twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_, diverged_rate_);
+}
+
+MotorState Plant::motor(double* x) const noexcept {
+  double* th = x + kernels_->nq + kernels_->nv;
+  return {th, th + map_.size(), th + 2 * map_.size()};
+}
+
+MotorStateView Plant::motor(const double* x) const noexcept {
+  const double* th = x + kernels_->nq + kernels_->nv;
+  return {th, th + map_.size(), th + 2 * map_.size()};
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,154 @@
+// The simulated body: generated multibody dynamics, actuators, ground contact and hoist, advanced
+// in fixed sub-steps. Start here to read the simulation; docs/simulation.md has the equations.
+// Layer: hal/sim.  Thread: create non-RT; the rest RT.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "hal/robot_config.hpp"
+#include "hal/sim/actuator.hpp"
+#include "hal/sim/contact.hpp"
+#include "hal/sim/hoist.hpp"
+#include "model/kernels.h"
+
+namespace tandem::sim {
+
+enum class Integrator : std::uint8_t {
+  kSemiImplicitEuler,  ///< order 1, one evaluation a sub-step; positions move with new velocities
+  kRungeKutta4,        ///< order 4, four evaluations a sub-step
+};
+
+/// One joint of the plant, in the process image's order.
+struct PlantJoint {
+  std::string name;  ///< of the kernels' joint
+  hal::ActuatorConfig actuator;
+  double position_rad = 0.0;     ///< at the start
+  double damping_Nms_rad = 0.0;  ///< of the joint itself, on the link side
+};
+
+struct PlantConfig {
+  const tandem_kernels* kernels = nullptr;
+  std::vector<PlantJoint> joints;
+  hal::ContactConfig contact;
+  double base_height_m = 0.0;  ///< of the floating base at the start, upright at x = y = 0
+  Integrator integrator = Integrator::kSemiImplicitEuler;
+  std::int64_t substep_ns = 500'000;
+  /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
+  bool held = false;
+  std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
+  double rate_limit = 1000.0;               ///< any |v| beyond it [rad/s or m/s] counts as diverged
+};
+
+/// What the encoders and the power stage of one joint see. Link side, about the joint's +axis.
+struct JointReading {
+  double position_rad, velocity_rad_s;
+  double motor_position_rad, motor_velocity_rad_s;
+  double torque_Nm;  ///< on the link: the spring's, or a rigid drive's (J th'' not taken off)
+  double current_A, voltage_V, temperature_C;
+};
+
+/// The plant's state, as a table:
+///
+///   q       (nq)  [p_W, quaternion xyzw of the base, joints] or [joints]
+///   v       (nv)  [linear, angular of the base in its own frame, joint rates]
+///   th      (n)   motor positions on the link side
+///   th'     (n)   motor velocities
+///   i       (n)   winding currents
+///   T       (n)   winding temperatures                     (in Actuators)
+///   anchors       of the contact points                    (in Contact)
+///   hoist         how far it is released                   (in Hoist)
+///
+/// Inputs, held over a sub-step: voltage, bridge and brake of every joint. Joints are numbered
+/// as in PlantConfig; inside, and in q() and v(), they stand in the kernels' order.
+class Plant {
+ public:
+  /// Errors: kernels of another ABI, a joint the kernels lack or that has no [[joint]], a foot
+  /// that is no wrench site, a bad actuator or contact, a sub-step that is not positive.
+  [[nodiscard]] static Result<Plant> create(const PlantConfig& config);
+
+  /// What joint `joint`'s drive applies from now on.
+  void set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT;
+  /// Opens the brakes for good and starts to let the base down. Further calls do nothing.
+  void release() noexcept TANDEM_RT;
+  [[nodiscard]] bool released() const noexcept { return released_ != 0 && !hoist_.holding(); }
+
+  /// Advances by `duration_ns`, in sub-steps of the configured length (the last may be shorter).
+  /// @return kOk; kDiverged when a rate is not finite or beyond the limit; then the plant stands
+  ///         still and diverged_text() says which joint and when.
+  [[nodiscard]] Code advance(std::int64_t duration_ns) noexcept TANDEM_RT;
+
+  /// Evaluates forces and accelerations at the present state, for sensors. Cheap when nothing
+  /// changed since; the next sub-step reuses it.
+  void evaluate() noexcept TANDEM_RT;
+
+  /// @pre evaluate() since the last advance(), for torque_Nm.
+  [[nodiscard]] JointReading joint(std::size_t joint) const noexcept TANDEM_RT;
+  [[nodiscard]] std::size_t joints() const noexcept { return map_.size(); }
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }
+
+  // Views for sensors, truth and tests. Those that are forces need evaluate().
+  [[nodiscard]] const tandem_kernels& kernels() const noexcept { return *kernels_; }
+  [[nodiscard]] const double* q() const noexcept { return x_.data(); }
+  [[nodiscard]] const double* v() const noexcept { return x_.data() + kernels_->nq; }
+  [[nodiscard]] const double* vdot() const noexcept { return vdot_.data(); }
+  [[nodiscard]] const double* tau() const noexcept { return tau_.data(); }
+  [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
+  [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
+  [[nodiscard]] const Contact& contact() const noexcept { return contact_; }
+  [[nodiscard]] const Actuators& actuators() const noexcept { return actuators_; }
+  /// Index of joint `joint` among the kernels' joints.
+  [[nodiscard]] std::size_t model_index(std::size_t joint) const noexcept { return map_[joint]; }
+
+  /// Puts the plant into a state of choice (tests, start of a run): joints in the kernels' order,
+  /// motors at rest with their springs relaxed.
+  void set_state(std::span<const double> q, std::span<const double> v) noexcept;
+
+  /// "joint LKneeSag at 1.2345 s: …"; empty while all is well.
+  [[nodiscard]] std::string diverged_text() const;
+
+  void archive(Archive& ar);
+
+ private:
+  explicit Plant(const PlantConfig& config);
+  Status map_joints(const PlantConfig& config);
+  Status place_contact(const PlantConfig& config);
+  void start(const PlantConfig& config);
+
+  void touch_ground(const double* x, bool move_anchors) noexcept;
+  void rates(const double* x, MotorState motor_rate) noexcept;
+  void step_semi_implicit(double h_s) noexcept;
+  void step_runge_kutta(double h_s) noexcept;
+  void state_rate(const double* x, double* rate) noexcept;
+  [[nodiscard]] bool plausible() noexcept;
+  [[nodiscard]] MotorState motor(double* x) const noexcept;
+  [[nodiscard]] MotorStateView motor(const double* x) const noexcept;
+
+  const tandem_kernels* kernels_;
+  Integrator integrator_;
+  std::int64_t substep_ns_, release_ns_;
+  double rate_limit_;
+  std::size_t base_q_, base_v_;   // 7 and 6, or 0 and 0
+  std::vector<std::size_t> map_;  // joint -> model joint
+  std::vector<double> damping_;   // model order
+  Actuators actuators_;
+  Contact contact_;
+  Hoist hoist_;
+
+  std::vector<double> x_;  // q, v, th, th', i
+  std::vector<double> tau_, applied_tau_, vdot_, wrench_, motor_rate_;
+  std::vector<double> pose_, twist_, acceleration_;  // scratch of the sites kernel
+  std::vector<double> stage_, k1_, k2_, k3_, k4_;    // scratch of Runge-Kutta
+  std::int64_t time_ns_ = 0;
+  std::uint8_t held_ = 0, released_ = 0;
+  std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;  // evaluated at the present state
+  std::int32_t diverged_ = -1;                       // index in v
+  double diverged_rate_ = 0.0;
+};
+
+}  // namespace tandem::sim

@@ -1,0 +1,129 @@
+// How the plant advances: forces, accelerations and the two integrators.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "hal/sim/plant.hpp"
+#include "hal/sim/rotation.hpp"
+
+namespace tandem::sim {
+
+void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
+  if (contact_.feet() == 0) return;
+  kernels_->site_motion(x, x + kernels_->nq, vdot_.data(), pose_.data(), twist_.data(),
+                        acceleration_.data());
+  contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
+}
+
+void Plant::rates(const double* x, MotorState motor_rate) noexcept {
+  const double* q = x;
+  const double* v = x + kernels_->nq;
+  actuators_.evaluate(q + base_q_, v + base_v_, motor(x), tau_.data() + base_v_, motor_rate);
+  for (std::size_t i = 0; i < map_.size(); ++i) {
+    tau_[base_v_ + i] -= damping_[i] * v[base_v_ + i];
+  }
+  if (base_v_ != 0) {
+    std::fill_n(tau_.begin(), 6, 0.0);
+    hoist_.add_wrench(q, v, tau_.data());
+  }
+  // The same state with the same torques (elastic joints between two cycles): nothing to do.
+  const std::size_t bytes = tau_.size() * sizeof(double);
+  if (vdot_fresh_ != 0 && std::memcmp(tau_.data(), applied_tau_.data(), bytes) == 0) return;
+  kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+  applied_tau_ = tau_;
+}
+
+void Plant::evaluate() noexcept TANDEM_RT {
+  if (contact_fresh_ == 0) touch_ground(x_.data(), true);
+  contact_fresh_ = 1;
+  const std::size_t n = map_.size();
+  double* rate = motor_rate_.data();
+  rates(x_.data(), {rate, rate + n, rate + 2 * n});
+  vdot_fresh_ = 1;
+}
+
+Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
+  while (duration_ns > 0) {
+    if (diverged_ >= 0) return Code::kDiverged;
+    const std::int64_t step_ns = std::min(duration_ns, substep_ns_);
+    const double h_s = static_cast<double>(step_ns) * 1e-9;
+    evaluate();
+    if (integrator_ == Integrator::kRungeKutta4) {
+      step_runge_kutta(h_s);
+    } else {
+      step_semi_implicit(h_s);
+    }
+    contact_fresh_ = vdot_fresh_ = 0;
+    actuators_.finish_step(h_s, q() + base_q_, v() + base_v_, motor(x_.data()));
+    hoist_.advance(step_ns);
+    time_ns_ += step_ns;
+    duration_ns -= step_ns;
+    if (!plausible()) return Code::kDiverged;
+  }
+  return Code::kOk;
+}
+
+void Plant::step_semi_implicit(double h_s) noexcept {
+  double* q = x_.data();
+  double* v = q + kernels_->nq;
+  for (std::size_t i = 0; i < kernels_->nv; ++i) v[i] += h_s * vdot_[i];
+  if (base_q_ != 0) {
+    const Mat3 R = rotation_of(q + 3);
+    const Vec3 velocity_W = rotate(R.data(), v);
+    for (std::size_t i = 0; i < 3; ++i) q[i] += h_s * velocity_W[i];
+    turn_quaternion(q + 3, v + 3, h_s);
+  }
+  for (std::size_t i = 0; i < map_.size(); ++i) q[base_q_ + i] += h_s * v[base_v_ + i];
+  const std::size_t n = map_.size();
+  const double* rate = motor_rate_.data();
+  actuators_.step_semi_implicit(h_s, {rate, rate + n, rate + 2 * n}, motor(x_.data()));
+}
+
+/// The whole state's rate of change at `x`, forces given. A quaternion off unit length turns as
+/// its normalised self would, which keeps its length and the integrator's order.
+void Plant::state_rate(const double* x, double* rate) noexcept {
+  rates(x, motor(rate));
+  const double* v = x + kernels_->nq;
+  if (base_q_ != 0) {
+    const Mat3 R = rotation_of(x + 3);
+    const Vec3 velocity_W = rotate(R.data(), v);
+    std::copy(velocity_W.begin(), velocity_W.end(), rate);
+    const double half_w[4] = {0.5 * v[3], 0.5 * v[4], 0.5 * v[5], 0.0};
+    const std::array<double, 4> turn = quaternion_product(x + 3, half_w);
+    std::copy(turn.begin(), turn.end(), rate + 3);
+  }
+  std::copy_n(v + base_v_, map_.size(), rate + base_q_);
+  std::copy(vdot_.begin(), vdot_.end(), rate + kernels_->nq);
+}
+
+void Plant::step_runge_kutta(double h_s) noexcept {
+  const std::size_t size = x_.size();
+  const auto stage = [&](const std::vector<double>& k, double h, std::vector<double>& rate) {
+    for (std::size_t i = 0; i < size; ++i) stage_[i] = x_[i] + h * k[i];
+    if (base_q_ != 0) normalise_quaternion(stage_.data() + 3);
+    touch_ground(stage_.data(), false);
+    state_rate(stage_.data(), rate.data());
+  };
+  state_rate(x_.data(), k1_.data());  // forces of evaluate() still stand
+  vdot_fresh_ = 0;
+  stage(k1_, 0.5 * h_s, k2_);
+  stage(k2_, 0.5 * h_s, k3_);
+  stage(k3_, h_s, k4_);
+  for (std::size_t i = 0; i < size; ++i) {
+    x_[i] += h_s / 6.0 * (k1_[i] + 2.0 * k2_[i] + 2.0 * k3_[i] + k4_[i]);
+  }
+  if (base_q_ != 0) normalise_quaternion(x_.data() + 3);
+}
+
+bool Plant::plausible() noexcept {
+  const double* v = x_.data() + kernels_->nq;
+  for (std::size_t i = 0; i < kernels_->nv; ++i) {
+    if (std::abs(v[i]) <= rate_limit_) continue;  // false for NaN too
+    diverged_ = static_cast<std::int32_t>(i);
+    diverged_rate_ = v[i];
+    return false;
+  }
+  return true;
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,58 @@
+// Figures as data: curves, reference lines, labels with units. gnuplot.hpp draws them.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tandem::report {
+
+/// What a curve is, which decides how it looks.
+enum class CurveStyle : std::uint8_t {
+  kMeasured,    ///< solid, blue
+  kReference,   ///< dashed, orange: what was asked for
+  kComputed,    ///< dashed, green: what a model says
+  kSecond,      ///< solid, purple: the other side, or the other log
+  kThird,       ///< solid, grey
+  kStick,       ///< solid with round joints, blue
+  kStickSecond, ///< the same, dark grey
+  kStickThird,  ///< the same, light grey
+};
+
+struct Curve {
+  std::string label;  ///< in the key; empty: none
+  CurveStyle style = CurveStyle::kMeasured;
+  std::vector<double> x;
+  std::vector<double> y;  ///< as long as x; a NaN interrupts the line
+};
+
+/// A text centred at a point.
+struct Note {
+  std::string text;
+  double x = 0.0;
+  double y = 0.0;
+};
+
+/// A horizontal line across the plot, with its label in the key.
+struct Level {
+  std::string label;
+  double y = 0.0;
+};
+
+struct Figure {
+  std::string name;     ///< file name without ending
+  std::string title;
+  std::string x_label;  ///< with unit
+  std::string y_label;  ///< with unit
+  std::vector<Curve> curves;
+  std::vector<Level> levels;
+  std::vector<Note> notes;
+  bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
+};
+
+/// The curve with at most `most` points: the extremes of each run of samples are kept, so that
+/// no peak is lost.
+[[nodiscard]] Curve decimated(const Curve& curve, std::size_t most);
+
+}  // namespace tandem::report

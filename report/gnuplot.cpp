@@ -1,0 +1,249 @@
+#include "report/gnuplot.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+extern char** environ;
+
+namespace tandem::report {
+namespace {
+
+/// Points of a curve in a picture: more cannot be seen and make the page heavy.
+constexpr std::size_t kMostPoints = 1600;
+
+const char kSettings[] = R"(set encoding utf8
+set border 3 lw 1 lc rgb '#5b6470'
+set tics nomirror out scale 0.6 textcolor rgb '#3a424c'
+set tmargin 5
+set grid lw 1 lc rgb '#e3e7ec' lt 1 dt solid
+set xlabel textcolor rgb '#3a424c'
+set ylabel textcolor rgb '#3a424c'
+set style line 1 lw 2.4 lc rgb '#1f5fa8' dt solid
+set style line 2 lw 2.0 lc rgb '#e07b00' dt (9,5)
+set style line 3 lw 2.0 lc rgb '#1b8a5a' dt (9,5)
+set style line 4 lw 2.0 lc rgb '#8e4aa8' dt solid
+set style line 5 lw 1.6 lc rgb '#8a939e' dt solid
+set style line 6 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
+set style line 7 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
+set style line 8 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
+set style line 9 lw 1.8 lc rgb "#3a424c" dt (3,4)
+set key at graph 0, graph 1.085 left top horizontal reverse Left samplen 2.6 width 1 maxrows 1
+)";
+
+int line_style(CurveStyle style) { return static_cast<int>(style) + 1; }
+
+/// A gnuplot text in double quotes, without enhanced markup.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c == '\n' ? ' ' : c;
+  }
+  return out + "\"";
+}
+
+std::string block_name(std::size_t figure, std::size_t curve) {
+  return fmt::format("$f{}c{}", figure, curve);
+}
+
+/// The curve's samples as a datablock; a gap is an empty line.
+std::string data_block(const std::string& name, const Curve& curve) {
+  std::string out = name + " << EOD\n";
+  for (std::size_t i = 0; i < curve.x.size(); ++i) {
+    const bool gap = !std::isfinite(curve.x[i]) || !std::isfinite(curve.y[i]);
+    out += gap ? "\n" : fmt::format("{:.6g} {:.6g}\n", curve.x[i], curve.y[i]);
+  }
+  return out + "EOD\n";
+}
+
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  void include(double value) {
+    if (!std::isfinite(value)) return;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  /// A margin of `share` on both sides; at least something when all values are equal.
+  void widen(double share) {
+    if (!(low <= high)) low = high = 0.0;
+    const double margin = std::max((high - low) * share, 1e-6 + 1e-3 * std::abs(high));
+    low -= margin;
+    high += margin;
+  }
+};
+
+/// Ranges of both axes. With equal axes the room beside the figure is shared on both sides.
+std::string ranges(const Figure& figure) {
+  Extent x;
+  Extent y;
+  for (const Curve& curve : figure.curves) {
+    for (const double value : curve.x) x.include(value);
+    for (const double value : curve.y) y.include(value);
+  }
+  for (const Level& level : figure.levels) y.include(level.y);
+  for (const Note& note : figure.notes) y.include(note.y);
+  y.widen(0.08);
+  if (figure.equal_axes) {
+    constexpr double kAspect = 2.1;  // of the plots' drawing area, width by height
+    const double missing = kAspect * (y.high - y.low) - (x.high - x.low);
+    x.low -= std::max(0.5 * missing, 0.1);
+    x.high += std::max(0.5 * missing, 0.1);
+  } else {
+    x.widen(0.0);
+  }
+  return fmt::format("set xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\n", x.low, x.high,
+                     y.low, y.high);
+}
+
+std::string plot_command(const Figure& figure, std::size_t index) {
+  std::string out;
+  for (std::size_t i = 0; i < figure.curves.size(); ++i) {
+    const Curve& curve = figure.curves[i];
+    const bool stick = curve.style >= CurveStyle::kStick;
+    const std::string title =
+        curve.label.empty() ? "notitle" : "title " + quoted(curve.label) + " noenhanced";
+    out += fmt::format("{}{} using 1:2 with {} ls {} {}", out.empty() ? "plot " : ", ",
+                       block_name(index, i), stick ? "linespoints" : "lines",
+                       line_style(curve.style), title);
+  }
+  for (const Level& level : figure.levels) {
+    out += fmt::format("{}{:.9g} with lines ls 9 title {} noenhanced",
+                       out.empty() ? "plot " : ", ", level.y, quoted(level.label));
+  }
+  return out + "\n";
+}
+
+/// Everything of one figure but terminal and output.
+std::string body(const Figure& figure, std::size_t index) {
+  std::string out = "unset label\n" + ranges(figure);
+  out += fmt::format("set label 1 {} at graph 0, graph 1.145 left font ',15' "
+                     "textcolor rgb '#1d242c' noenhanced\n",
+                     quoted(figure.title));
+  for (std::size_t i = 0; i < figure.notes.size(); ++i) {
+    const Note& note = figure.notes[i];
+    out += fmt::format("set label {} {} at {:.6g},{:.6g} center textcolor rgb '#3a424c' "
+                       "noenhanced\n",
+                       i + 2, quoted(note.text), note.x, note.y);
+  }
+  out += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n",
+                     quoted(figure.x_label), quoted(figure.y_label));
+  out += figure.equal_axes ? "set size ratio -1\nset format x ''\n"
+                           : "set size noratio\nset format x\n";
+  return out + plot_command(figure, index);
+}
+
+Status write_all(int pipe, const std::string& text) {
+  std::size_t done = 0;
+  while (done < text.size()) {
+    const ssize_t n = write(pipe, text.data() + done, text.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return fail("gnuplot stopped reading its script");
+    done += static_cast<std::size_t>(n);
+  }
+  return {};
+}
+
+/// Runs gnuplot on `script`; what it says on standard error goes to the file `complaints`.
+Status run_gnuplot(const std::string& script, const std::string& complaints) {
+  int pipe_ends[2];
+  if (pipe2(pipe_ends, O_CLOEXEC) != 0) return fail("no pipe: " + std::string(strerror(errno)));
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, pipe_ends[0], 0);
+  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 2, complaints.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                   0644);
+  char program[] = "gnuplot";
+  char from_standard_input[] = "-";
+  char* arguments[] = {program, from_standard_input, nullptr};
+  pid_t child = 0;
+  const int spawned = posix_spawnp(&child, program, &actions, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(pipe_ends[0]);
+  if (spawned != 0) {
+    close(pipe_ends[1]);
+    return fail("gnuplot could not be started: " + std::string(strerror(spawned)),
+                "install it: apt-get install gnuplot-nox");
+  }
+  const auto former = std::signal(SIGPIPE, SIG_IGN);
+  const Status written = write_all(pipe_ends[1], script);
+  close(pipe_ends[1]);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  std::signal(SIGPIPE, former);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
+    return fail("gnuplot could not be started", "install it: apt-get install gnuplot-nox");
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return fail("gnuplot failed");
+  return written;
+}
+
+std::string read_text(const std::string& file) {
+  std::string text;
+  if (std::FILE* in = std::fopen(file.c_str(), "rb")) {
+    char buffer[512];
+    for (std::size_t n = 0; (n = std::fread(buffer, 1, sizeof buffer, in)) > 0;) {
+      text.append(buffer, n);
+    }
+    std::fclose(in);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string gnuplot_script(std::span<const Figure> figures, const std::string& folder) {
+  std::string out = kSettings;
+  for (std::size_t f = 0; f < figures.size(); ++f) {
+    for (std::size_t c = 0; c < figures[f].curves.size(); ++c) {
+      out += data_block(block_name(f, c), decimated(figures[f].curves[c], kMostPoints));
+    }
+  }
+  for (std::size_t f = 0; f < figures.size(); ++f) {
+    const std::string drawing = body(figures[f], f);
+    const std::string path = folder + "/" + figures[f].name;
+    out += "set terminal svg size 760,430 dynamic rounded font 'DejaVu Sans,13' background "
+           "rgb '#ffffff'\n";
+    out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".svg"), drawing);
+    out += "set terminal pngcairo size 1520,860 fontscale 1.45 linewidth 1.7 rounded "
+           "font 'DejaVu Sans,13'\n";
+    out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".png"), drawing);
+  }
+  const std::size_t rows = (figures.size() + 1) / 2;
+  out += fmt::format(
+      "set terminal pngcairo size 1800,{} fontscale 1.15 linewidth 1.4 rounded "
+      "font 'DejaVu Sans,13'\n",
+      std::max<std::size_t>(rows, 1) * 560);
+  out += fmt::format("set output {}\n", quoted(folder + "/overview.png"));
+  out += fmt::format("set multiplot layout {},2 margins 0.06,0.985,{:.3f},{:.3f} "
+                     "spacing 0.08,{:.3f}\n",
+                     std::max<std::size_t>(rows, 1), 0.14 / static_cast<double>(rows),
+                     1.0 - 0.16 / static_cast<double>(rows), 0.30 / static_cast<double>(rows));
+  for (std::size_t f = 0; f < figures.size(); ++f) out += body(figures[f], f);
+  return out + "unset multiplot\nunset output\n";
+}
+
+Status draw(std::span<const Figure> figures, const std::string& folder) {
+  if (figures.empty()) return fail("there is nothing to draw");
+  const std::string complaints = folder + "/gnuplot.err";
+  Status drawn = run_gnuplot(gnuplot_script(figures, folder), complaints);
+  if (!drawn && drawn.error().hint.empty()) drawn.error().hint = read_text(complaints);
+  std::error_code ignored;
+  std::filesystem::remove(complaints, ignored);
+  return drawn;
+}
+
+}  // namespace tandem::report

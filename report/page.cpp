@@ -1,0 +1,119 @@
+#include "report/page.hpp"
+
+#include <fmt/core.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+namespace tandem::report {
+namespace {
+
+const char kStyle[] = R"(
+:root { --ink: #1d242c; --soft: #5b6470; --line: #e3e7ec; --blue: #1f5fa8; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #f5f7f9; color: var(--ink);
+       font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif; }
+main { max-width: 1180px; margin: 0 auto; padding: 32px 20px 64px; }
+h1 { font-size: 26px; margin: 0 0 4px; }
+h2 { font-size: 18px; margin: 36px 0 8px; }
+p { margin: 0 0 16px; color: var(--soft); }
+.card { background: #fff; border: 1px solid var(--line); border-radius: 8px; padding: 14px; }
+.figures { display: grid; gap: 16px; grid-template-columns: repeat(auto-fit, minmax(480px, 1fr)); }
+.figures svg { width: 100%; height: auto; display: block; }
+dl { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 10px 24px;
+     margin: 0; }
+dt { color: var(--soft); font-size: 13px; }
+dd { margin: 0; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+th, td { text-align: right; padding: 4px 10px; border-bottom: 1px solid var(--line); }
+th:first-child, td:first-child { text-align: left; }
+th { color: var(--soft); font-weight: 600; }
+@media (max-width: 560px) { .figures { grid-template-columns: 1fr; } }
+@media print { body { background: #fff; } .card { break-inside: avoid; } }
+)";
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+Error file_error(const std::string& message, const std::string& file) {
+  return {.message = message + ": " + std::strerror(errno),
+          .hint = "check the folder's permissions and the disk's free space",
+          .file = file,
+          .key = {}};
+}
+
+/// The SVG element of a file, with identifiers made unique: several stand in one page.
+Result<std::string> inline_svg(const std::string& file, const std::string& name) {
+  errno = 0;
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) return std::unexpected(file_error("cannot read the drawing", file));
+  std::string svg = text.str();
+  svg.erase(0, svg.find("<svg"));
+  for (const char* id : {"gnuplot_plot_", "gnuplot_canvas", "gpDot", "gpPt", "greybox", "textbox"}) {
+    const std::string unique = name + "_" + id;
+    for (std::size_t at = 0; (at = svg.find(id, at)) != std::string::npos; at += unique.size()) {
+      svg.replace(at, std::strlen(id), unique);
+    }
+  }
+  return svg;
+}
+
+std::string html_table(const PageTable& table) {
+  std::string out = fmt::format("<h2>{}</h2>\n<p>{}</p>\n<div class=\"card\"><table>\n<tr>",
+                                escaped(table.title), escaped(table.caption));
+  for (const std::string& cell : table.header) out += "<th>" + escaped(cell) + "</th>";
+  out += "</tr>\n";
+  for (const auto& row : table.rows) {
+    out += "<tr>";
+    for (const std::string& cell : row) out += "<td>" + escaped(cell) + "</td>";
+    out += "</tr>\n";
+  }
+  return out + "</table></div>\n";
+}
+
+}  // namespace
+
+Status write_page(const Page& page, std::span<const Figure> figures, const std::string& folder) {
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p>{2}</p>\n",
+      escaped(page.title), kStyle, escaped(page.lead));
+  html += "<div class=\"figures\">\n";
+  for (const Figure& figure : figures) {
+    const Result<std::string> svg = inline_svg(folder + "/" + figure.name + ".svg", figure.name);
+    if (!svg) return std::unexpected(svg.error());
+    html += "<figure class=\"card\" style=\"margin:0\">" + *svg + "</figure>\n";
+  }
+  html += "</div>\n<h2>Run</h2>\n<div class=\"card\"><dl>\n";
+  for (const auto& [name, value] : page.facts) {
+    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", escaped(name), escaped(value));
+  }
+  html += "</dl></div>\n";
+  for (const PageTable& table : page.tables) html += html_table(table);
+  html += "</main>\n</body>\n</html>\n";
+
+  const std::string file = folder + "/report.html";
+  errno = 0;
+  std::ofstream out(file, std::ios::binary);
+  out << html << std::flush;
+  if (!out) return std::unexpected(file_error("cannot write the report", file));
+  return {};
+}
+
+}  // namespace tandem::report

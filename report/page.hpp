@@ -1,0 +1,37 @@
+// The report's page: one HTML file that needs nothing beside it.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.hpp"
+#include "report/figure.hpp"
+
+namespace tandem::report {
+
+/// Name and value, in the order of the page.
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+struct PageTable {
+  std::string title;
+  std::string caption;  ///< what the columns mean
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;  ///< the first column is text, the others numbers
+};
+
+struct Page {
+  std::string title;
+  std::string lead;  ///< one sentence under the title
+  Facts facts;
+  std::vector<PageTable> tables;
+};
+
+/// Writes `folder`/report.html with the figures' SVG files (from draw()) inlined.
+/// Errors: an SVG file or the page cannot be read or written.
+[[nodiscard]] Status write_page(const Page& page, std::span<const Figure> figures,
+                                const std::string& folder);
+
+}  // namespace tandem::report

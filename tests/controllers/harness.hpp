@@ -1,0 +1,91 @@
+// Runs a bundled controller as the runtime does, against joints that follow perfectly.
+// Layer: tests.  Thread: one.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controllers/plugin_loader.hpp"
+#include "rt/scoped_realtime.hpp"
+
+namespace tandem::test {
+
+inline std::vector<std::string> bundled_folder() {
+  return {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"};
+}
+
+class Harness {
+ public:
+  Harness(hal::RobotConfig config, const std::string& plugin, const std::string& parameters,
+          const tandem_kernels* kernels = nullptr)
+      : robot(std::move(config)),
+        state(robot.shape()),
+        command(robot.shape()),
+        loaded_(load_controller(plugin, bundled_folder())),
+        document(TomlDocument::parse(parameters, "experiment.toml").value()),
+        setup(robot, kernels, time.period_ns, document.root()) {
+    if (!loaded_) {
+      ADD_FAILURE() << loaded_.error().to_string();
+      return;
+    }
+    configured = controller().configure(setup);
+    setup.parameters.finish();
+  }
+
+  [[nodiscard]] Controller& controller() { return **loaded_; }
+  /// The first problem that the configuration met, or empty.
+  [[nodiscard]] std::string problem() const {
+    if (!document.diagnostics().empty()) return document.diagnostics().front().to_string();
+    return configured ? "" : configured.error().to_string();
+  }
+
+  void start() {
+    for (const auto& claim : setup.claims()) {
+      command.mode()[claim.joint] = static_cast<std::int8_t>(claim.mode);
+      command.interaction()[claim.joint] = static_cast<std::uint8_t>(claim.interaction);
+    }
+    const rt::ScopedRealtime in_the_cycle;
+    controller().start(time, state, command);
+  }
+  /// One cycle; positions in the state then are those commanded.
+  Code step() {
+    state.cycle()[0] = time.cycle;
+    state.time_ns()[0] = time.time_ns;
+    Code code = Code::kOk;
+    {
+      const rt::ScopedRealtime in_the_cycle;
+      code = controller().update(time, state, command);
+    }
+    for (const auto& claim : setup.claims()) {
+      if (claim.mode != hal::ControlMode::kPosition) continue;
+      state.position_rad()[claim.joint] = command.position_rad()[claim.joint];
+    }
+    ++time.cycle;
+    time.time_ns += time.period_ns;
+    return code;
+  }
+  Code run(double seconds) {
+    Code code = Code::kOk;
+    const auto cycles = static_cast<int>(seconds * 1e9 / static_cast<double>(time.period_ns) + 0.5);
+    for (int i = 0; i < cycles && code == Code::kOk; ++i) code = step();
+    return code;
+  }
+
+  hal::RobotConfig robot;
+  hal::CycleTime time;
+  hal::StateImage state;
+  hal::CommandImage command;
+
+ private:
+  Result<LoadedController> loaded_;
+
+ public:
+  TomlDocument document;
+  ControllerSetup setup;
+  Status configured;
+};
+
+}  // namespace tandem::test

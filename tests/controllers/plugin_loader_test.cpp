@@ -1,0 +1,77 @@
+#include "controllers/plugin_loader.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/controllers/harness.hpp"
+
+namespace tandem {
+namespace {
+
+const std::vector<std::string> kBroken{std::string(TANDEM_BINARY_DIR) + "/tests/broken_plugins"};
+
+TEST(PluginLoader, OpensABundledControllerByItsName) {
+  const auto loaded = load_controller("hold", test::bundled_folder());
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().to_string();
+  EXPECT_STREQ(loaded->plugin().name, "hold");
+  EXPECT_EQ(loaded->path(), test::bundled_folder()[0] + "/hold.so");
+}
+
+TEST(PluginLoader, OpensALibraryByItsPath) {
+  EXPECT_TRUE(load_controller(test::bundled_folder()[0] + "/hold.so", {}).has_value());
+}
+
+TEST(PluginLoader, NamesTheFoldersSearchedAndTheNearestController) {
+  const auto loaded = load_controller("hodl", test::bundled_folder());
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().message,
+            "there is no controller 'hodl' in " + test::bundled_folder()[0]);
+  EXPECT_EQ(loaded.error().hint, "did you mean 'hold'?");
+}
+
+TEST(PluginLoader, NamesAPathThatDoesNotExist) {
+  const auto loaded = load_controller("no/such.so", {});
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().file, "no/such.so");
+}
+
+TEST(PluginLoader, RefusesALibraryWithoutItsEntryPoint) {
+  const auto loaded = load_controller("no_entry", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().message, "has no entry point tandem_controller_plugin()");
+}
+
+TEST(PluginLoader, RefusesALibraryOfAnotherAbi) {
+  const auto loaded = load_controller("other_abi", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().message, "was built for controller ABI 999, this program has " +
+                                        std::to_string(kControllerAbi));
+}
+
+TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {
+  const auto loaded = load_controller("other_compiler", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_NE(loaded.error().message.find("another age"), std::string::npos);
+}
+
+TEST(PluginLoader, RefusesAFileThatIsNoLibrary) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "no_library";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "text.so") << "this is no library";
+  const auto loaded = load_controller("text", {folder.string()});
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_TRUE(loaded.error().message.starts_with("cannot be loaded")) << loaded.error().message;
+}
+
+TEST(PluginLoader, LooksIntoTheEnvironmentsFoldersFirst) {
+  setenv("TANDEM_CONTROLLERS", "/first:/second", 1);
+  const std::vector<std::string> folders = controller_folders();
+  unsetenv("TANDEM_CONTROLLERS");
+  ASSERT_EQ(folders.size(), 4U);
+  EXPECT_EQ(folders[0], "/first");
+  EXPECT_EQ(folders[1], "/second");
+  EXPECT_TRUE(folders[2].ends_with("/lib/controllers")) << folders[2];
+}
+
+}  // namespace
+}  // namespace tandem

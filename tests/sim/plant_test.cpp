@@ -1,0 +1,297 @@
+#include "hal/sim/plant.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "tests/sim/hand_kernels.hpp"
+
+namespace tandem::sim {
+namespace {
+
+using test::block_kernels;
+using test::kG;
+using test::pendulum_kernels;
+
+hal::ActuatorConfig coman(int order) {
+  hal::ActuatorConfig c;
+  c.name = "coman";
+  c.order = order;
+  c.resistance_ohm = 0.664;
+  c.inductance_H = 0.32e-3;
+  c.torque_constant_Nm_A = 0.041;
+  c.gear_ratio = 100.0;
+  c.inertia_kg_m2 = 0.139;
+  c.damping_Nms_rad = 25.5;
+  c.spring_Nm_rad = 395.46;
+  c.spring_damping_Nms_rad = 0.198;
+  c.voltage_limit_V = 40.0;
+  c.current_limit_A = 50.0;
+  return c;
+}
+
+PlantConfig pendulum(const tandem_kernels* kernels, int order, double start_rad) {
+  PlantConfig config;
+  config.kernels = kernels;
+  config.joints = {{"swing", coman(order), start_rad, 0.0}};
+  return config;
+}
+
+Plant make(const PlantConfig& config) {
+  Result<Plant> plant = Plant::create(config);
+  EXPECT_TRUE(plant) << plant.error().to_string();
+  return std::move(*plant);
+}
+
+std::vector<double> state(const Plant& plant) {
+  std::vector<double> x(plant.q(), plant.q() + plant.kernels().nq);
+  x.insert(x.end(), plant.v(), plant.v() + plant.kernels().nv);
+  return x;
+}
+
+double distance(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, std::abs(a[i] - b[i]));
+  return most;
+}
+
+// Error exponent from a step and its half against a step of a sixteenth with order 4.
+template <class Prepare>
+double order_of(PlantConfig config, Integrator integrator, std::int64_t step_ns, Prepare prepare) {
+  const auto run = [&](Integrator which, std::int64_t step) {
+    config.integrator = which;
+    config.substep_ns = step;
+    Plant plant = make(config);
+    prepare(plant);
+    EXPECT_EQ(plant.advance(512'000'000), Code::kOk);
+    return state(plant);
+  };
+  const std::vector<double> exact = run(Integrator::kRungeKutta4, step_ns / 16);
+  return std::log2(distance(run(integrator, step_ns), exact) /
+                   distance(run(integrator, step_ns / 2), exact));
+}
+
+TEST(Plant, IntegratorsConvergeWithTheirOrderOnAnElasticPendulum) {
+  const auto prepare = [](Plant& plant) {
+    plant.set_state(std::array{1.0}, std::array{0.5});
+    plant.set_drive(0, 12.0, true);
+  };
+  for (const int order : {0, 2}) {
+    const PlantConfig config =
+        pendulum(order == 0 ? pendulum_kernels<139>() : pendulum_kernels<0>(), order, 0.0);
+    EXPECT_NEAR(order_of(config, Integrator::kRungeKutta4, 1'600'000, prepare), 4.0, 0.25);
+    EXPECT_NEAR(order_of(config, Integrator::kSemiImplicitEuler, 200'000, prepare), 1.0, 0.1);
+  }
+}
+
+TEST(Plant, IntegratorsConvergeWithTheirOrderOnATumblingBlock) {
+  PlantConfig config;
+  config.kernels = block_kernels<0>();
+  const auto prepare = [](Plant& plant) {
+    plant.set_state(std::array{0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0},
+                    std::array{0.5, 0.0, 1.0, 3.0, -2.0, 4.0});
+  };
+  EXPECT_NEAR(order_of(config, Integrator::kRungeKutta4, 8'000'000, prepare), 4.0, 0.25);
+  EXPECT_NEAR(order_of(config, Integrator::kSemiImplicitEuler, 500'000, prepare), 1.0, 0.1);
+}
+
+TEST(Plant, FreeFlightKeepsMomentumAndFallsOnAParabola) {
+  PlantConfig config;
+  config.kernels = block_kernels<0>();
+  config.integrator = Integrator::kRungeKutta4;
+  Plant plant = make(config);
+  plant.set_state(std::array{0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 1.0},
+                  std::array{1.0, 0.0, 2.0, 3.0, -2.0, 4.0});
+  ASSERT_EQ(plant.advance(1'000'000'000), Code::kOk);
+  EXPECT_NEAR(plant.q()[0], 1.0, 1e-9);
+  EXPECT_NEAR(plant.q()[1], 0.0, 1e-9);
+  EXPECT_NEAR(plant.q()[2], 10.0 + 2.0 - 0.5 * kG, 1e-9);
+  const double* q = plant.q();
+  EXPECT_NEAR(q[3] * q[3] + q[4] * q[4] + q[5] * q[5] + q[6] * q[6], 1.0, 1e-15);
+  double R[9];
+  test::block::rotation(q, R);
+  const double* w = plant.v() + 3;
+  const double body[3] = {0.1 * w[0], 0.2 * w[1], 0.25 * w[2]};
+  double L[3];
+  test::block::turn(R, body, L);
+  const double start[3] = {0.3, -0.4, 1.0};
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(L[i], start[i], 1e-8);
+}
+
+TEST(Plant, PassivePendulumKeepsItsEnergy) {
+  PlantConfig config = pendulum(pendulum_kernels<0>(), 0, 1.2);
+  config.joints[0].actuator.damping_Nms_rad = 0.0;  // bridge off and no friction: a free joint
+  for (const auto& [integrator, bound] : {std::pair{Integrator::kRungeKutta4, 1e-9},
+                                          std::pair{Integrator::kSemiImplicitEuler, 2e-2}}) {
+    config.integrator = integrator;
+    Plant plant = make(config);
+    const auto energy = [&] {
+      return 0.5 * test::pendulum::kInertia * plant.v()[0] * plant.v()[0] +
+             test::kPendulumMass * kG * test::kPendulumLength * (1.0 - std::cos(plant.q()[0]));
+    };
+    const double start = energy();
+    ASSERT_EQ(plant.advance(20'000'000'000), Code::kOk);
+    EXPECT_NEAR(energy(), start, bound * start);
+  }
+}
+
+TEST(Plant, RigidActuatorsFeelTheirRotorAsArmature) {
+  // Weightless pendulum of 0.5 kg m2 with 0.139 of armature, 10 V: an exponential.
+  Plant plant = make(pendulum(pendulum_kernels<139, 0>(), 0, 0.0));
+  plant.set_drive(0, 10.0, true);
+  ASSERT_EQ(plant.advance(40'000'000), Code::kOk);
+  plant.evaluate();
+  const double J = 0.639, kt_R = 4.1 / 0.664, D = 25.5;
+  const double exact = kt_R * 10.0 / D * (1.0 - std::exp(-D / J * 0.04));
+  EXPECT_NEAR(plant.joint(0).velocity_rad_s, exact, 0.02 * exact);  // Euler at 0.5 ms
+  EXPECT_EQ(plant.joint(0).motor_position_rad, plant.joint(0).position_rad);
+  EXPECT_EQ(plant.joint(0).motor_velocity_rad_s, plant.joint(0).velocity_rad_s);
+}
+
+TEST(Plant, JointDampingSlowsTheLinkAndIsNoSpringTorque) {
+  PlantConfig config = pendulum(pendulum_kernels<0, 0>(), 2, 0.0);
+  config.joints[0].damping_Nms_rad = 3.0;
+  Plant plant = make(config);
+  plant.set_state(std::array{0.0}, std::array{2.0});
+  plant.evaluate();
+  EXPECT_NEAR(plant.vdot()[0], -3.0 * 2.0 / test::pendulum::kInertia, 1e-12);
+  EXPECT_NEAR(plant.joint(0).torque_Nm, 0.0, 1e-12);
+}
+
+TEST(Plant, StepsAreTheSameHoweverTheTimeIsCut) {
+  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+    for (const int order : {0, 3}) {
+      PlantConfig config = pendulum(pendulum_kernels<0>(), order, 0.7);
+      config.integrator = integrator;
+      Plant whole = make(config), cut = make(config);
+      for (Plant* plant : {&whole, &cut}) plant->set_drive(0, 5.0, true);
+      ASSERT_EQ(whole.advance(10'000'000), Code::kOk);
+      for (int k = 0; k < 20; ++k) {
+        cut.evaluate();  // sensors look at it in between
+        ASSERT_EQ(cut.advance(500'000), Code::kOk);
+      }
+      EXPECT_EQ(state(whole), state(cut));
+    }
+  }
+}
+
+TEST(Plant, SnapshotGivesTheSameBytesAgain) {
+  PlantConfig config;
+  config.kernels = block_kernels<10>();
+  config.contact.stiffness_N_m = config.contact.tangential_stiffness_N_m = 20'000.0;
+  config.contact.damping_s_m = 3.0;
+  config.contact.tangential_damping_Ns_m = 50.0;
+  config.contact.static_friction = config.contact.sliding_friction = 0.1;
+  config.contact.feet = {{"left", {{0.2, 0.0, 0.0}, {-0.2, 0.0, 0.0}}},
+                         {"right", {{0.2, 0.0, 0.0}, {-0.2, 0.0, 0.0}}}};
+  config.base_height_m = 0.07;
+  Plant plant = make(config);
+  ASSERT_EQ(plant.advance(150'000'000), Code::kOk);
+  plant.evaluate();
+  Archive saved;
+  plant.archive(saved);
+  const auto run_on = [&] {
+    EXPECT_EQ(plant.advance(333'000'000), Code::kOk);
+    Archive end;
+    plant.archive(end);
+    return std::vector<std::byte>(end.bytes().begin(), end.bytes().end());
+  };
+  const std::vector<std::byte> first = run_on();
+  Archive restore(saved.bytes());
+  plant.archive(restore);
+  ASSERT_TRUE(restore.ok());
+  EXPECT_TRUE(restore.at_end());
+  EXPECT_EQ(run_on(), first);
+}
+
+TEST(Plant, DivergenceStopsItAndNamesJointAndTime) {
+  PlantConfig config = pendulum(pendulum_kernels<0>(), 2, 0.5);
+  config.joints[0].actuator.spring_Nm_rad = 4e8;  // far too stiff for the sub-step
+  Plant plant = make(config);
+  EXPECT_EQ(plant.diverged_text(), "");
+  plant.set_state(std::array{0.5}, std::array{0.1});
+  ASSERT_EQ(plant.advance(1'000'000'000), Code::kDiverged);
+  const std::int64_t stopped = plant.time_ns();
+  EXPECT_LT(stopped, 1'000'000'000);
+  EXPECT_EQ(plant.advance(1'000'000), Code::kDiverged);
+  EXPECT_EQ(plant.time_ns(), stopped);
+  char time[32];
+  std::snprintf(time, sizeof time, "at %.6f s", static_cast<double>(stopped) * 1e-9);
+  EXPECT_NE(plant.diverged_text().find("joint swing"), std::string::npos);
+  EXPECT_NE(plant.diverged_text().find(time), std::string::npos) << plant.diverged_text();
+}
+
+TEST(Plant, NotANumberCountsAsDiverged) {
+  Plant plant = make(pendulum(pendulum_kernels<0>(), 2, 0.5));
+  plant.set_state(std::array{std::numeric_limits<double>::quiet_NaN()}, std::array{0.0});
+  EXPECT_EQ(plant.advance(1'000'000), Code::kDiverged);
+}
+
+TEST(Plant, HeldJointStartsAtRestUnderGravityAndStaysThere) {
+  for (const int order : {0, 1, 2, 3}) {
+    PlantConfig config =
+        pendulum(order < 2 ? pendulum_kernels<139>() : pendulum_kernels<0>(), order, 1.0);
+    config.held = true;
+    Plant plant = make(config);
+    ASSERT_EQ(plant.advance(2'000'000'000), Code::kOk);
+    EXPECT_NEAR(plant.q()[0], 1.0, 1e-9) << "order " << order;
+    plant.evaluate();
+    const double load = test::kPendulumMass * kG * test::kPendulumLength * std::sin(1.0);
+    EXPECT_NEAR(plant.joint(0).torque_Nm, load, 1e-6 * load) << "order " << order;
+    plant.set_drive(0, 0.0, true);  // the bridge opens the brake: nothing holds it any more
+    ASSERT_EQ(plant.advance(200'000'000), Code::kOk);
+    EXPECT_LT(plant.q()[0], 1.0 - 1e-3) << "order " << order;
+  }
+}
+
+TEST(Plant, HoistHoldsThenLetsDownSmoothly) {
+  PlantConfig config;
+  config.kernels = block_kernels<0>();
+  config.contact.stiffness_N_m = config.contact.tangential_stiffness_N_m = 20'000.0;
+  config.contact.damping_s_m = 3.0;
+  config.contact.tangential_damping_Ns_m = 50.0;
+  config.contact.static_friction = config.contact.sliding_friction = 0.9;
+  config.contact.feet = {{"left", {{0.2, 0.0, 0.0}, {-0.2, 0.0, 0.0}}},
+                         {"right", {{0.2, 0.0, 0.0}, {-0.2, 0.0, 0.0}}}};
+  config.base_height_m = 0.051;  // 1 mm above the ground
+  config.held = true;
+  Plant plant = make(config);
+  ASSERT_EQ(plant.advance(500'000'000), Code::kOk);
+  EXPECT_NEAR(plant.q()[2], 0.051, 1e-12);
+  EXPECT_FALSE(plant.released());
+  plant.release();
+  double fastest = 0.0;
+  for (int k = 0; k < 1000; ++k) {
+    EXPECT_EQ(plant.released(), false);
+    ASSERT_EQ(plant.advance(1'000'000), Code::kOk);
+    fastest = std::max(fastest, std::abs(plant.v()[2]));
+  }
+  EXPECT_TRUE(plant.released());
+  EXPECT_LT(fastest, 0.05);
+  ASSERT_EQ(plant.advance(1'000'000'000), Code::kOk);
+  EXPECT_NEAR(plant.q()[2], 0.05 - test::kBlockMass * kG / 80'000.0, 1e-9);
+}
+
+TEST(Plant, ConfigurationErrorsNameTheJointOrSite) {
+  PlantConfig config = pendulum(pendulum_kernels<0>(), 2, 0.0);
+  config.joints[0].name = "swng";
+  Result<Plant> plant = Plant::create(config);
+  ASSERT_FALSE(plant);
+  EXPECT_NE(plant.error().to_string().find("swing"), std::string::npos);
+  config.joints.clear();
+  plant = Plant::create(config);
+  ASSERT_FALSE(plant);
+  EXPECT_EQ(plant.error().key, "swing");
+  config = pendulum(pendulum_kernels<0>(), 2, 0.0);
+  config.contact.feet = {{"tip", {{0.0, 0.0, 0.0}}}};
+  plant = Plant::create(config);
+  ASSERT_FALSE(plant);
+  EXPECT_EQ(plant.error().key, "contact.foot.tip");
+  config = pendulum(pendulum_kernels<0>(), 2, 0.0);
+  config.substep_ns = 0;
+  EXPECT_FALSE(Plant::create(config));
+}
+
+}  // namespace
+}  // namespace tandem::sim
