@@ -41,6 +41,8 @@ class Contact {
                                               std::vector<Foot> feet);
 
   [[nodiscard]] std::size_t feet() const noexcept { return feet_.size(); }
+  /// Index of foot `foot`'s sole among the kernels' sites.
+  [[nodiscard]] std::size_t site(std::size_t foot) const noexcept { return feet_[foot].site; }
   [[nodiscard]] std::size_t points() const noexcept { return x_.size(); }
 
   /// Fills the feet's entries of `wrench`: force then moment about the site's origin, in the

@@ -26,7 +26,8 @@ class Hoist {
   void advance(std::int64_t step_ns) noexcept TANDEM_RT;
 
   [[nodiscard]] bool holding() const noexcept { return share_ > 0.0; }
-  [[nodiscard]] bool releasing() const noexcept { return releasing_ != 0; }
+  /// Of the whole hoist that still acts, 1 to 0.
+  [[nodiscard]] double share() const noexcept { return share_; }
 
   /// Adds the hoist's force and moment on the base, in the base's frame, to `wrench` (6).
   /// @param q  (7) base pose;  @param v  (6) base velocity in the base's frame
@@ -40,7 +41,7 @@ class Hoist {
   std::array<double, 7> pose_{};
   std::array<double, 6> load_{};
   std::array<double, 2> stiffness_{}, damping_{};  // linear, angular
-  double share_ = 0.0;                             // of the whole hoist, 1 to 0
+  double share_ = 0.0;
   std::int64_t elapsed_ns_ = 0, duration_ns_ = 0;
   std::uint8_t releasing_ = 0;
 };

@@ -78,6 +78,9 @@ class Plant {
   void release() noexcept TANDEM_RT;
   [[nodiscard]] bool released() const noexcept { return released_ != 0 && !hoist_.holding(); }
 
+  /// 1: the hoist holds the base, 0: it is free.
+  [[nodiscard]] double hoist_share() const noexcept { return hoist_.share(); }
+
   /// Advances by `duration_ns`, in sub-steps of the configured length (the last may be shorter).
   /// @return kOk; kDiverged when a rate is not finite or beyond the limit; then the plant stands
   ///         still and diverged_text() says which joint and when.
@@ -109,6 +112,7 @@ class Plant {
   /// motors at rest with their springs relaxed.
   void set_state(std::span<const double> q, std::span<const double> v) noexcept;
 
+  [[nodiscard]] bool diverged() const noexcept { return diverged_ >= 0; }
   /// "joint LKneeSag at 1.2345 s: …"; empty while all is well.
   [[nodiscard]] std::string diverged_text() const;
 

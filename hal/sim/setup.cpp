@@ -1,0 +1,125 @@
+#include "hal/sim/setup.hpp"
+
+#include <algorithm>
+
+#include "hal/sim/actuator.hpp"
+#include "hal/sim/sensors.hpp"
+
+namespace tandem::sim {
+namespace {
+
+// Boards and sensors draw from generators of their own, so that adding one changes no other.
+std::uint64_t seed_of(std::uint64_t seed, std::uint64_t kind, std::size_t index) {
+  return (seed * 0x9E3779B97F4A7C15U) ^ (kind << 32) ^ (index + 1);
+}
+
+firmware::Pid::Config pid(const hal::PidConfig& config, double limit) {
+  return {.kp = config.gains.kp,
+          .ki = config.gains.ki,
+          .kd = config.gains.kd,
+          .output_limit = config.output_limit > 0.0 ? config.output_limit : limit};
+}
+
+firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
+  const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
+  const hal::GainsConfig& gains = robot.gains_of(joint);
+  const double motor_constant = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+  firmware::AxisSetup axis;
+  axis.link_counts_per_rev = joint.encoder_counts_per_rev;
+  axis.motor_counts_per_rev = joint.motor_encoder_counts_per_rev;
+  axis.rated_torque_Nm = joint.rated_torque_Nm;
+  axis.stiffness_Nm_rad = gains.stiffness_Nm_rad;
+  axis.damping_Nms_rad = gains.damping_Nms_rad;
+  axis.torque_noise_Nm = joint.torque_noise_Nm;
+  firmware::ControllerConfig& c = axis.controller;
+  c.position = pid(gains.position, joint.max_torque_Nm);
+  c.velocity = pid(gains.velocity, joint.max_torque_Nm);
+  c.torque = pid(gains.torque, actuator.voltage_limit_V);
+  c.current = pid(gains.current, actuator.voltage_limit_V);
+  c.torque_to_voltage_V_Nm = gains.torque_feedforward * actuator.resistance_ohm / motor_constant;
+  c.emf_compensation_Vs_rad = gains.emf_compensation * motor_constant;
+  c.resistance_ohm = actuator.resistance_ohm;
+  c.motor_constant_Nm_A = motor_constant;
+  c.spring_Nm_rad = actuator.order >= 2 ? actuator.spring_Nm_rad : 0.0;
+  c.voltage_limit_V = actuator.voltage_limit_V;
+  c.current_limit_A = actuator.current_limit_A;
+  c.torque_limit_Nm = joint.max_torque_Nm;
+  c.velocity_limit_rad_s = joint.max_velocity_rad_s;
+  c.min_position_rad = joint.min_position_rad;
+  c.max_position_rad = joint.max_position_rad;
+  c.position_feedback = gains.position_feedback == hal::PositionFeedback::kMotor
+                            ? firmware::PositionFeedback::kMotor
+                            : firmware::PositionFeedback::kLink;
+  return axis;
+}
+
+}  // namespace
+
+model::ModelSpec model_spec(const hal::RobotConfig& robot) {
+  model::ModelSpec spec;
+  spec.robot = robot.name;
+  spec.urdf = robot.model.urdf;
+  spec.floating_base = robot.model.floating_base;
+  spec.mimic_independent = robot.model.mimic_independent;
+  spec.lock = robot.model.lock;
+  spec.gravity_m_s2 = robot.model.gravity_m_s2;
+  for (const hal::SiteConfig& site : robot.model.sites) {
+    spec.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench});
+  }
+  for (const hal::SensorConfig& sensor : robot.sensors) {
+    if (sensor.type == hal::SensorType::kForceTorque) {
+      spec.sensors.push_back({sensor.name, sensor.joint, sensor.link});
+      continue;
+    }
+    const std::string site = imu_site(robot, sensor);
+    const bool known = std::ranges::any_of(
+        spec.sites, [&](const model::SiteSpec& other) { return other.name == site; });
+    if (!known) spec.sites.push_back({.name = site, .link = sensor.link});
+  }
+  for (const hal::JointConfig& joint : robot.joints) {
+    const double inertia = armature(robot.actuator_of(joint));
+    if (inertia > 0.0) spec.armature.emplace_back(joint.name, inertia);
+  }
+  return spec;
+}
+
+std::vector<std::size_t> joints_of(const hal::RobotConfig& robot, const hal::BoardConfig& board) {
+  std::vector<std::size_t> joints;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    if (robot.joints[j].board == board.name) joints.push_back(j);
+  }
+  std::ranges::sort(joints, {}, [&](std::size_t j) { return robot.joints[j].axis; });
+  return joints;
+}
+
+firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t index,
+                                 std::uint64_t seed) {
+  const hal::BoardConfig& config = robot.boards[index];
+  firmware::BoardSetup board;
+  board.node_id = config.node_id;
+  board.name = config.name;
+  board.serial = static_cast<std::uint32_t>(index + 1);
+  board.control_period_ns = config.control_period_ns;
+  board.command_timeout_syncs = config.command_timeout_cycles;
+  board.seed = seed_of(seed, 1, index);
+  for (const std::size_t joint : joints_of(robot, config)) {
+    board.axes.push_back(axis_setup(robot, robot.joints[joint]));
+  }
+  return board;
+}
+
+firmware::SensorSetup sensor_setup(const hal::RobotConfig& robot, std::size_t index,
+                                   std::uint64_t seed) {
+  const hal::SensorConfig& config = robot.sensors[index];
+  firmware::SensorSetup sensor;
+  sensor.node_id = config.node_id;
+  sensor.name = config.name;
+  sensor.serial = static_cast<std::uint32_t>(index + 1);
+  sensor.channels = config.channels();
+  sensor.noise = config.noise;
+  sensor.bias = config.bias;
+  sensor.seed = seed_of(seed, 2, index);
+  return sensor;
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,31 @@
+// What a robot.toml means for its model and for its boards' firmware.
+// Layer: hal/sim.  Thread: non-RT.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "firmware_emu/setup.hpp"
+#include "hal/robot_config.hpp"
+#include "model/model_spec.hpp"
+
+namespace tandem::sim {
+
+/// What the robot's kernels are generated from: its sites, its sensors (an IMU is a site, see
+/// imu_site), and the rotors of rigid actuators as armature.
+[[nodiscard]] model::ModelSpec model_spec(const hal::RobotConfig& robot);
+
+/// Indices in `robot.joints` of a board's axes, by axis.
+[[nodiscard]] std::vector<std::size_t> joints_of(const hal::RobotConfig& robot,
+                                                 const hal::BoardConfig& board);
+
+/// The power-on values of board `index`. The drive master writes the same values again by SDO.
+/// @param seed  of the run; every board draws its own numbers from it
+[[nodiscard]] firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t index,
+                                               std::uint64_t seed);
+
+/// The same of sensor `index`.
+[[nodiscard]] firmware::SensorSetup sensor_setup(const hal::RobotConfig& robot, std::size_t index,
+                                                 std::uint64_t seed);
+
+}  // namespace tandem::sim

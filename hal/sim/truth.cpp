@@ -1,0 +1,35 @@
+#include "hal/sim/truth.hpp"
+
+#include <algorithm>
+
+namespace tandem::sim {
+
+void TruthFiller::fill(const Plant& plant, const hal::CycleTime& time,
+                       hal::TruthImage& truth) noexcept TANDEM_RT {
+  truth.cycle()[0] = time.cycle;
+  truth.time_ns()[0] = time.time_ns;
+  truth.base_quaternion()[3] = 1.0;
+  if (plant.kernels().floating_base != 0) {
+    std::copy_n(plant.q(), 3, truth.base_position_m().data());
+    std::copy_n(plant.q() + 3, 4, truth.base_quaternion().data());
+    std::copy_n(plant.v(), 6, truth.base_velocity().data());
+  }
+  plant.kernels().center_of_mass(plant.q(), plant.v(), truth.center_of_mass_m().data(),
+                                 com_velocity_.data(), com_jacobian_.data());
+  for (std::size_t j = 0; j < plant.joints(); ++j) {
+    const JointReading joint = plant.joint(j);
+    truth.position_rad()[j] = joint.position_rad;
+    truth.velocity_rad_s()[j] = joint.velocity_rad_s;
+    truth.torque_Nm()[j] = joint.torque_Nm;
+  }
+  const Contact& contact = plant.contact();
+  for (std::size_t f = 0; f < contact.feet(); ++f) {
+    std::copy_n(plant.pose() + 12 * contact.site(f) + 9, 3, truth.foot_position_m().data() + 3 * f);
+    const double* wrench = contact.wrench_W().data() + 6 * f;
+    std::copy_n(wrench, 3, truth.foot_force_N().data() + 3 * f);
+    std::copy_n(wrench + 3, 3, truth.foot_moment_Nm().data() + 3 * f);
+  }
+  truth.hoist_share()[0] = plant.hoist_share();
+}
+
+}  // namespace tandem::sim
