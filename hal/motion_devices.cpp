@@ -15,7 +15,8 @@ double seconds(const JointAccess& io) noexcept { return static_cast<double>(io.p
 
 }  // namespace
 
-PositionControl::PositionControl(JointAccess& access) : io_(access), motions_(access.joints.size()) {
+PositionControl::PositionControl(JointAccess& access)
+    : io_(access), motions_(access.joints.size()) {
   for (std::size_t j = 0; j < motions_.size(); ++j) {
     motions_[j].speed_rad_s = io_.joints[j].max_velocity_rad_s / 4.0;
     motions_[j].acceleration_rad_s2 = motions_[j].speed_rad_s / 0.5;

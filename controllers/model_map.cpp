@@ -1,0 +1,55 @@
+#include "controllers/model_map.hpp"
+
+#include <algorithm>
+
+#include "base/nearest.hpp"
+
+namespace tandem {
+namespace {
+
+std::vector<std::string> names_of(const char* const* names, std::size_t count) {
+  return {names, names + count};
+}
+
+}  // namespace
+
+Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kernels* kernels) {
+  if (kernels == nullptr) {
+    return fail("this controller needs the robot's generated model",
+                "run `tandem model build` with " + robot.file);
+  }
+  const std::vector<std::string> model = names_of(kernels->joint_names, kernels->joints);
+  ModelMap map;
+  map.base_ = kernels->floating_base != 0 ? 6 : 0;
+  for (const hal::JointConfig& joint : robot.joints) {
+    const auto found = std::ranges::find(model, joint.name);
+    if (found == model.end()) {
+      return fail("the model of " + std::string(kernels->robot) + " has no joint '" + joint.name +
+                      "'",
+                  suggest(joint.name, model));
+    }
+    map.index_.push_back(static_cast<std::size_t>(found - model.begin()));
+  }
+  for (const std::string& name : model) {
+    if (robot.joint_index(name) < 0) {
+      return fail("joint '" + name + "' of the model is not driven",
+                  "give it a [[joint]] in " + robot.file + ", or lock it in [model.lock]");
+    }
+  }
+  return map;
+}
+
+void ModelMap::positions_to_q(std::span<const double> image, std::span<double> q) const noexcept
+    TANDEM_RT {
+  for (std::size_t j = 0; j < index_.size(); ++j) q[q_index(j)] = image[j];
+}
+
+Result<std::size_t> site_index(const tandem_kernels& kernels, const std::string& name) {
+  const std::vector<std::string> sites = names_of(kernels.site_names, kernels.sites);
+  const auto found = std::ranges::find(sites, name);
+  if (found != sites.end()) return static_cast<std::size_t>(found - sites.begin());
+  return fail("the model of " + std::string(kernels.robot) + " has no site '" + name + "'",
+              suggest(name, sites));
+}
+
+}  // namespace tandem

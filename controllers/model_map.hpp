@@ -1,0 +1,44 @@
+// Between the image's order of joints and the model's, by name.
+// Layer: controllers.  Thread: non-RT to make; then any.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "hal/robot_config.hpp"
+#include "model/kernels.h"
+
+namespace tandem {
+
+/// Where each joint of the image stands in q, v and tau of the kernels.
+class ModelMap {
+ public:
+  /// Errors: there are no kernels; a joint of one side that the other lacks.
+  [[nodiscard]] static Result<ModelMap> make(const hal::RobotConfig& robot,
+                                             const tandem_kernels* kernels);
+
+  [[nodiscard]] std::size_t joints() const noexcept { return index_.size(); }
+  /// Index in v and tau of the image's joint `j`.
+  [[nodiscard]] std::size_t v_index(std::size_t j) const noexcept { return index_[j] + base_; }
+  /// Index in q of the image's joint `j`.
+  [[nodiscard]] std::size_t q_index(std::size_t j) const noexcept {
+    return index_[j] + (base_ == 0 ? 0 : 7);
+  }
+  /// Writes the joints' part of q from values in the image's order.
+  void positions_to_q(std::span<const double> image, std::span<double> q) const noexcept
+      TANDEM_RT;
+
+ private:
+  std::vector<std::size_t> index_;  // per joint of the image, in the model's joints
+  std::size_t base_ = 0;            // 6 for a floating base
+};
+
+/// Index of a site by its name. Errors: no such site (with the nearest).
+[[nodiscard]] Result<std::size_t> site_index(const tandem_kernels& kernels,
+                                             const std::string& name);
+
+}  // namespace tandem

@@ -1,0 +1,197 @@
+// squat: both feet stay, the centre of mass stays over them, the base goes down and up again.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "controllers/controller.hpp"
+#include "controllers/min_jerk.hpp"
+#include "controllers/parameters.hpp"
+#include "controllers/stance.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr int kWalkSteps = 200;   // of the way down, checked at configuration
+constexpr int kFirstSolve = 50;   // Newton steps to the first configuration
+constexpr int kCycleSolve = 4;    // and at most in a cycle; one is enough as a rule
+
+std::string metres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f m", value);
+  return text;
+}
+
+/// When and how far.
+struct Plan {
+  double depth_m = 0.0;
+  double period_s = 0.0;
+  double cycles = 0.0;
+  double start_s = 0.0;
+  double approach_s = 0.0;
+  double settle_s = -1.0;  ///< negative: until the run ends
+
+  /// How far down the base is [m], and how fast it goes down [m/s], `t_s` after the start.
+  struct Way {
+    double down_m = 0.0;
+    double rate_m_s = 0.0;
+  };
+  [[nodiscard]] Way at(double t_s) const noexcept TANDEM_RT {
+    const double since = t_s - start_s;
+    if (since <= 0.0 || since >= cycles * period_s) return {};
+    const double half = period_s / 2.0;
+    const double phase = std::fmod(since, period_s);
+    const bool down = phase < half;
+    const MinJerk profile = min_jerk((down ? phase : period_s - phase) / half);
+    return {depth_m * profile.s, (down ? depth_m : -depth_m) * profile.ds / half};
+  }
+  [[nodiscard]] double peak_rate_m_s() const { return kMinJerkPeak * depth_m / (period_s / 2.0); }
+  [[nodiscard]] bool over(double t_s) const noexcept TANDEM_RT {
+    return settle_s >= 0.0 && t_s >= start_s + cycles * period_s + settle_s;
+  }
+};
+
+class Squat : public Controller {
+ public:
+  Status configure(ControllerSetup& setup) override {
+    read(setup.parameters);
+    const hal::PostureConfig* posture = posture_parameter(setup);
+    const std::string left = setup.parameters.text_or("left_sole", "l_sole");
+    const std::string right = setup.parameters.text_or("right_sole", "r_sole");
+    Result<Stance> stance = Stance::make(setup.robot, setup.kernels, left, right);
+    if (!stance) return std::unexpected(stance.error());
+    for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
+      const Status claimed = claim(setup, j, hal::ControlMode::kPosition);
+      if (!claimed) return claimed;
+    }
+    period_s_ = static_cast<double>(setup.period_ns) * 1e-9;
+    measured_.assign(setup.robot.joints.size(), 0.0);
+    last_v_.assign(setup.kernels->nv, 0.0);
+    vdot_.assign(setup.kernels->nv, 0.0);
+    stance_.emplace(std::move(*stance));
+    if (posture == nullptr && !setup.robot.postures.empty()) posture = &setup.robot.postures[0];
+    walk(setup, posture == nullptr ? measured_ : posture->position_rad);
+    return {};
+  }
+
+  void start(const hal::CycleTime& time, const hal::StateImage& state,
+             hal::CommandImage&) noexcept TANDEM_RT override {
+    start_ns_ = time.time_ns;
+    std::ranges::copy(state.position_rad(), measured_.begin());
+    height_m_ = stance_->place(state.position_rad());
+    standing_ = stance_->solve(height_m_, kFirstSolve).converged;
+    std::ranges::fill(last_v_, 0.0);
+  }
+
+  Code update(const hal::CycleTime& time, const hal::StateImage&,
+              hal::CommandImage& command) noexcept TANDEM_RT override {
+    if (standing_ == 0) return Code::kFault;
+    const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    const Plan::Way way = plan_.at(t_s);
+    stance_->predict(period_s_);
+    if (!stance_->solve(height_m_ - way.down_m, kCycleSolve).converged) return Code::kFault;
+    stance_->move(-way.rate_m_s);
+    const std::span<const double> v = stance_->v();
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      vdot_[i] = (v[i] - last_v_[i]) / period_s_;
+      last_v_[i] = v[i];
+    }
+    stance_->carry(vdot_);
+    write(min_jerk(t_s / plan_.approach_s), command);
+    return plan_.over(t_s) ? Code::kStopped : Code::kOk;
+  }
+
+  void archive(Archive& ar) override {
+    ar(start_ns_, height_m_, standing_, measured_, last_v_);
+    if (stance_) stance_->archive(ar);
+  }
+
+ private:
+  void read(TomlTable& parameters) {
+    plan_.depth_m = parameters.number("depth_m", kPositive);
+    plan_.period_s = parameters.number("period_s", kPositive);
+    plan_.cycles = static_cast<double>(parameters.integer_or("cycles", 1, 1, 1'000'000));
+    plan_.approach_s = parameters.number_or("approach_s", 1.0, kPositive);
+    plan_.start_s = parameters.number_or("start_s", plan_.approach_s, kPositive);
+    if (parameters.has("settle_s")) plan_.settle_s = parameters.number("settle_s", kNotNegative);
+    if (plan_.start_s < plan_.approach_s) {
+      parameters.error("start_s", "the squat would start before the start posture is reached",
+                       "give approach_s or more");
+    }
+  }
+
+  /// References between the measured and the start posture, then those of the squat.
+  void write(const MinJerk& approach, hal::CommandImage& command) const noexcept TANDEM_RT {
+    const ModelMap& map = stance_->map();
+    for (std::size_t j = 0; j < map.joints(); ++j) {
+      const double way = stance_->q()[map.q_index(j)] - measured_[j];
+      command.position_rad()[j] = measured_[j] + way * approach.s;
+      command.velocity_rad_s()[j] =
+          way * approach.ds / plan_.approach_s + stance_->v()[map.v_index(j)] * approach.s;
+      command.torque_Nm()[j] = stance_->tau()[map.v_index(j)] * approach.s;
+    }
+  }
+
+  /// Goes down the whole way before anything moves.
+  void walk(ControllerSetup& setup, std::span<const double> posture) {
+    if (!(plan_.depth_m > 0.0) || !(plan_.period_s > 0.0)) return;  // reported by read()
+    const double top = stance_->place(posture);
+    double reached = 0.0;
+    for (int i = 0; i <= kWalkSteps; ++i) {
+      const double down = plan_.depth_m * i / kWalkSteps;
+      const Stance::Solution solution = stance_->solve(top - down, kFirstSolve);
+      const std::string problem =
+          solution.converged ? beyond_limits(setup.robot)
+                             : "the feet cannot stay where they are with the mass over them";
+      if (problem.empty()) {
+        reached = down;
+        continue;
+      }
+      if (i == 0) {
+        setup.parameters.error("posture", "the robot cannot stand like this: " + problem,
+                               "choose a posture with both soles on the ground, knees bent");
+      } else {
+        setup.parameters.error("depth_m",
+                               "only " + metres(reached) + " can be reached; beyond, " + problem,
+                               "give at most " + metres(std::floor(reached * 1e3) * 1e-3));
+      }
+      return;
+    }
+  }
+
+  /// What the configuration at hand would break, moving at the squat's largest speed.
+  [[nodiscard]] std::string beyond_limits(const hal::RobotConfig& robot) {
+    stance_->move(-plan_.peak_rate_m_s());
+    std::ranges::fill(vdot_, 0.0);
+    stance_->carry(vdot_);
+    const ModelMap& map = stance_->map();
+    for (std::size_t j = 0; j < map.joints(); ++j) {
+      const hal::JointConfig& joint = robot.joints[j];
+      const double q = stance_->q()[map.q_index(j)];
+      if (q < joint.min_position_rad || q > joint.max_position_rad) {
+        return "joint '" + joint.name + "' leaves its limits";
+      }
+      if (std::abs(stance_->v()[map.v_index(j)]) > joint.max_velocity_rad_s) {
+        return "joint '" + joint.name + "' is too slow for this period";
+      }
+      if (std::abs(stance_->tau()[map.v_index(j)]) > joint.max_torque_Nm) {
+        return "joint '" + joint.name + "' is too weak";
+      }
+    }
+    return {};
+  }
+
+  Plan plan_;
+  std::optional<Stance> stance_;
+  double period_s_ = 0.0;
+  std::int64_t start_ns_ = 0;
+  double height_m_ = 0.0;      // of the base above the soles at the start
+  std::int64_t standing_ = 0;  // whether the start posture was found
+  std::vector<double> measured_, last_v_, vdot_;
+};
+
+}  // namespace
+}  // namespace tandem
+
+TANDEM_CONTROLLER(tandem::Squat, "squat",
+                  "Squats on both feet with the centre of mass over them.")
