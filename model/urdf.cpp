@@ -1,0 +1,276 @@
+#include "model/urdf.hpp"
+
+#include <console_bridge/console.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <sstream>
+
+#include "base/nearest.hpp"
+#include "model/urdf_inertia.hpp"
+#include "model/urdf_outline.hpp"
+
+namespace tandem::model {
+namespace {
+
+/// Collects what urdfdom would print. The hook is global, hence the mutex.
+class ConsoleCapture : public console_bridge::OutputHandler {
+ public:
+  ConsoleCapture() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
+  ~ConsoleCapture() override { console_bridge::restorePreviousOutputHandler(); }
+  ConsoleCapture(const ConsoleCapture&) = delete;
+  ConsoleCapture& operator=(const ConsoleCapture&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
+    text_ += (text_.empty() ? "" : "; ") + text;
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  std::lock_guard<std::mutex> lock_;
+  std::string text_;
+};
+
+Result<urdf::ModelInterfaceSharedPtr> parse_with_urdfdom(const std::string& text) {
+  ConsoleCapture console;
+  try {
+    if (auto model = urdf::parseURDF(text)) return model;
+  } catch (const std::exception& e) {
+    return fail(std::string("the URDF library refuses the description: ") + e.what());
+  }
+  return fail("the URDF library refuses the description: " + console.text());
+}
+
+/// Sets what is within rounding of 0 or +-1 to it, so that right angles stay exact.
+double exact(double x) {
+  constexpr double kRounding = 1e-15;
+  if (std::abs(x) < kRounding) return 0.0;
+  return std::abs(std::abs(x) - 1.0) < kRounding ? std::copysign(1.0, x) : x;
+}
+
+Eigen::Matrix3d rotation(const urdf::Rotation& r) {
+  double x = 0.0, y = 0.0, z = 0.0, w = 1.0;
+  r.getQuaternion(x, y, z, w);
+  return Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix().unaryExpr(&exact);
+}
+
+Eigen::Vector3d vector(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+Placement placement(const urdf::Pose& pose) {
+  return {rotation(pose.rotation), vector(pose.position)};
+}
+
+Inertia inertia_of(const urdf::Link& link) {
+  if (link.inertial == nullptr) return {};
+  const urdf::Inertial& i = *link.inertial;
+  Eigen::Matrix3d about_com;
+  about_com << i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz;
+  return placement(i.origin) * Inertia{i.mass, Eigen::Vector3d::Zero(), about_com};
+}
+
+bool moves(const urdf::Joint& joint) { return joint.type != urdf::Joint::FIXED; }
+
+Eigen::Vector3d axis_of(const urdf::Joint& joint) {
+  return vector(joint.axis).stableNormalized().unaryExpr(&exact);
+}
+
+/// Where the child of a locked joint stands in the joint's frame.
+Placement displacement(const urdf::Joint& joint, double position) {
+  const Eigen::Vector3d axis = axis_of(joint);
+  if (joint.type == urdf::Joint::PRISMATIC) {
+    return {Eigen::Matrix3d::Identity(), axis * position};
+  }
+  return {Eigen::AngleAxisd(position, axis).toRotationMatrix().unaryExpr(&exact),
+          Eigen::Vector3d::Zero()};
+}
+
+/// Turns urdfdom's model into a Tree, depth first.
+class Builder {
+ public:
+  Builder(const Outline& outline, const UrdfOptions& options, const std::string& file)
+      : outline_(outline), options_(options) {
+    out_.tree.name = outline.robot;
+    out_.tree.file = file;
+    out_.tree.floating_base = options.floating_base;
+    out_.warnings = outline.warnings;
+  }
+
+  std::expected<UrdfModel, Diagnostics> run(const urdf::ModelInterface& model) {
+    check_locks(model);
+    check_mimics();
+    if (!errors_.empty()) return std::unexpected(errors_);
+    add_all(*model.getRoot());
+    check_inertias(out_.tree, outline_, errors_, out_.warnings);
+    if (!errors_.empty()) return std::unexpected(errors_);
+    return std::move(out_);
+  }
+
+ private:
+  void error(int line, std::string key, std::string message, std::string hint) {
+    errors_.push_back(
+        {std::move(message), std::move(hint), out_.tree.file, line, std::move(key)});
+  }
+
+  const double* lock_of(const std::string& joint) const {
+    const auto found = std::ranges::find(options_.lock, joint,
+                                         &std::pair<std::string, double>::first);
+    return found == options_.lock.end() ? nullptr : &found->second;
+  }
+
+  void check_locks(const urdf::ModelInterface& model) {
+    for (const auto& [name, position] : options_.lock) {
+      const std::string key = "joint " + name;
+      const auto joint = model.getJoint(name);
+      if (joint == nullptr) {
+        std::vector<std::string> known;
+        for (const auto& [one, line] : outline_.joint_lines) known.push_back(one);
+        error(0, key, "there is no joint '" + name + "' to lock", suggest(name, known));
+        continue;
+      }
+      const int line = outline_.joint_lines.at(name);
+      if (!moves(*joint)) error(line, key, "a fixed joint is locked", "remove it from [model.lock]");
+      if (!std::isfinite(position)) error(line, key, "is locked at a position that is not finite", "");
+      const bool bounded = moves(*joint) && joint->type != urdf::Joint::CONTINUOUS;
+      if (bounded && (position < joint->limits->lower || position > joint->limits->upper)) {
+        error(line, key, "is locked at " + std::to_string(position) + ", beyond its limits " +
+              std::to_string(joint->limits->lower) + " to " +
+              std::to_string(joint->limits->upper), "lock it within them");
+      }
+    }
+  }
+
+  void check_mimics() {
+    for (const OutlineJoint& joint : outline_.joints) {
+      if (joint.mimic.empty() || options_.mimic_independent) continue;
+      if (joint.type == "fixed" || lock_of(joint.name) != nullptr) continue;
+      error(joint.line, "joint " + joint.name,
+            "mimics joint '" + joint.mimic + "', which is not supported yet",
+            "lock it in [model.lock], or treat it as a joint of its own by mimic = "
+            "\"independent\" in [model]");
+    }
+  }
+
+  /// Depth first with a stack of our own: the deepest chain is the file's choice.
+  void add_all(const urdf::Link& root) {
+    struct Pending {
+      const urdf::Link* link;
+      int parent;
+    };
+    std::vector<Pending> stack{{&root, -1}};
+    while (!stack.empty()) {
+      const Pending next = stack.back();
+      stack.pop_back();
+      const int index = static_cast<int>(out_.tree.links.size());
+      add(*next.link, next.parent);
+      auto joints = next.link->child_joints;
+      std::ranges::sort(joints, std::greater{}, [](const auto& joint) { return joint->name; });
+      for (const auto& joint : joints) {
+        const auto child = std::ranges::find(next.link->child_links, joint->child_link_name,
+                                             [](const auto& link) { return link->name; });
+        stack.push_back({child->get(), index});
+      }
+    }
+  }
+
+  void add(const urdf::Link& source, int parent) {
+    Tree& tree = out_.tree;
+    Link link;
+    link.name = source.name;
+    link.inertia = inertia_of(source);
+    link.parent = parent;
+    if (parent < 0) {
+      tree.bodies.push_back({source.name, {}});
+    } else {
+      const urdf::Joint& joint = *source.parent_joint;
+      const Link& above = tree.links[static_cast<std::size_t>(parent)];
+      link.joint = joint.name;
+      const Placement seat = above.in_body * placement(joint.parent_to_joint_origin_transform);
+      if (const double* position = lock_of(joint.name)) {
+        link.body = above.body;
+        link.in_body = seat * displacement(joint, *position);
+      } else if (!moves(joint)) {
+        link.body = above.body;
+        link.in_body = seat;
+      } else {
+        link.moving = static_cast<int>(tree.joints.size());
+        link.body = link.moving + 1;
+        tree.joints.push_back(moving_joint(joint, above.body, seat));
+        tree.bodies.push_back({source.name, {}});
+      }
+    }
+    Body& body = tree.bodies[static_cast<std::size_t>(link.body)];
+    body.inertia = body.inertia + link.in_body * link.inertia;
+    tree.links.push_back(link);
+  }
+
+  Joint moving_joint(const urdf::Joint& source, int parent, const Placement& seat) const {
+    Joint joint;
+    joint.name = source.name;
+    joint.parent = parent;
+    joint.axis = axis_of(source);
+    joint.in_parent = seat;
+    joint.line = outline_.joint_lines.at(source.name);
+    joint.type = source.type == urdf::Joint::PRISMATIC    ? JointType::kPrismatic
+                 : source.type == urdf::Joint::CONTINUOUS ? JointType::kContinuous
+                                                          : JointType::kRevolute;
+    if (source.limits == nullptr) return joint;
+    if (joint.type != JointType::kContinuous) {
+      joint.lower = source.limits->lower;
+      joint.upper = source.limits->upper;
+    }
+    joint.velocity = source.limits->velocity;
+    joint.effort = source.limits->effort;
+    return joint;
+  }
+
+  const Outline& outline_;
+  const UrdfOptions& options_;
+  UrdfModel out_;
+  Diagnostics errors_;
+};
+
+Diagnostics one_error(std::string message, std::string hint, const std::string& file) {
+  return {Error{std::move(message), std::move(hint), file, 0, {}}};
+}
+
+}  // namespace
+
+std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const std::string& file,
+                                                 const UrdfOptions& options) {
+  Outline outline = outline_urdf(text, file);
+  if (outline.errors.empty()) check_topology(outline, file);
+  if (!outline.errors.empty()) {
+    std::ranges::stable_sort(outline.errors, {}, &Error::line);
+    return std::unexpected(outline.errors);
+  }
+  const auto model = parse_with_urdfdom(outline.text);
+  if (!model) return std::unexpected(one_error(model.error().message, {}, file));
+  return Builder(outline, options, file).run(**model);
+}
+
+std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
+                                                const UrdfOptions& options) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return std::unexpected(one_error("this is a folder", "name a .urdf file", file));
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  if (!in || (text << in.rdbuf(), in.bad())) {
+    return std::unexpected(one_error("cannot read this description",
+                                     "check the path and its permissions", file));
+  }
+  return parse_urdf(text.str(), file, options);
+}
+
+}  // namespace tandem::model

@@ -1,0 +1,117 @@
+#include "model/urdf_inertia.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "model/urdf.hpp"
+
+namespace tandem::model {
+namespace {
+
+constexpr double kDefiniteTolerance = 1e-12;  // of the largest principal moment
+constexpr double kTriangleTolerance = 1e-6;   // rounding of the description's own digits
+
+std::string moments_text(const Eigen::Vector3d& moments) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%.4g, %.4g, %.4g kg m^2", moments[0], moments[1], moments[2]);
+  return text;
+}
+
+/// What is impossible about an inertia, or empty.
+std::string problem(const Inertia& inertia) {
+  const Eigen::Matrix3d& I = inertia.about_com_kg_m2;
+  if (!I.allFinite() || !inertia.com_m.allFinite() || !std::isfinite(inertia.mass_kg)) {
+    return "the mass or inertia is too large to be computed with";
+  }
+  if (inertia.mass_kg == 0.0) return I.isZero(0.0) ? "" : "there is an inertia without mass";
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(I, Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d moments = solver.eigenvalues();  // ascending
+  if (!(moments[0] > kDefiniteTolerance * std::abs(moments[2]))) {
+    return "the inertia is not positive definite: principal moments " + moments_text(moments);
+  }
+  if (moments[0] + moments[1] < moments[2] * (1.0 - kTriangleTolerance)) {
+    return "the inertia breaks the triangle inequality: principal moments " +
+           moments_text(moments);
+  }
+  return {};
+}
+
+class Checker {
+ public:
+  Checker(const Tree& tree, const Outline& outline, Diagnostics& errors, Diagnostics& warnings)
+      : tree_(tree), outline_(outline), errors_(errors), warnings_(warnings) {}
+
+  void run() {
+    const std::size_t before = errors_.size();
+    for (const Link& link : tree_.links) check_link(link);
+    if (errors_.size() > before) return;
+    for (std::size_t i = 0; i < tree_.bodies.size(); ++i) check_body(i);
+    check_carried_mass();
+  }
+
+ private:
+  void check_link(const Link& link) {
+    const std::string found = problem(link.inertia);
+    if (found.empty()) return;
+    const double whole = tree_.bodies[static_cast<std::size_t>(link.body)].inertia.mass_kg;
+    Error report{found, {}, tree_.file, line_of(link.name), "link " + link.name};
+    if (std::isfinite(whole) && link.inertia.mass_kg < kNegligibleMassShare * whole) {
+      report.hint = "used as it is, for it has less than 1 % of its body's mass";
+      warnings_.push_back(report);
+    } else {
+      report.hint = "check the six moments, their signs and their reference point";
+      errors_.push_back(report);
+    }
+  }
+
+  /// A body's links one by one are possible or negligible; their sum must be possible too.
+  void check_body(std::size_t index) {
+    const Body& body = tree_.bodies[index];
+    const bool fixed_to_world = index == 0 && !tree_.floating_base;
+    const std::string found = problem(body.inertia);
+    if (fixed_to_world || found.empty()) return;
+    errors_.push_back({"with all that is fixed to it, " + found,
+                       "correct the inertias of its links", tree_.file, line_of(body.name),
+                       "link " + body.name});
+  }
+
+  void check_carried_mass() {
+    std::vector<double> carried;
+    for (const Body& body : tree_.bodies) carried.push_back(body.inertia.mass_kg);
+    for (std::size_t i = tree_.joints.size(); i > 0; --i) {
+      carried[static_cast<std::size_t>(tree_.joints[i - 1].parent)] += carried[i];
+    }
+    for (std::size_t i = 0; i < tree_.joints.size(); ++i) {
+      if (carried[i + 1] > 0.0) continue;
+      const Joint& joint = tree_.joints[i];
+      errors_.push_back({"the joint moves nothing that has mass",
+                         "give link '" + tree_.bodies[i + 1].name + "' mass and inertia, lock the "
+                         "joint or make it fixed",
+                         tree_.file, joint.line, "joint " + joint.name});
+    }
+    const Body& base = tree_.bodies[0];
+    if (!tree_.floating_base || base.inertia.mass_kg > 0.0) return;
+    errors_.push_back({"the floating base has no mass",
+                       "give it mass and inertia, or set base = \"fixed\" in robot.toml",
+                       tree_.file, line_of(base.name), "link " + base.name});
+  }
+
+  int line_of(const std::string& link) const {
+    const auto found = outline_.link_lines.find(link);
+    return found == outline_.link_lines.end() ? 0 : found->second;
+  }
+
+  const Tree& tree_;
+  const Outline& outline_;
+  Diagnostics& errors_;
+  Diagnostics& warnings_;
+};
+
+}  // namespace
+
+void check_inertias(const Tree& tree, const Outline& outline, Diagnostics& errors,
+                    Diagnostics& warnings) {
+  Checker(tree, outline, errors, warnings).run();
+}
+
+}  // namespace tandem::model

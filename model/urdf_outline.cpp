@@ -1,0 +1,302 @@
+#include "model/urdf_outline.hpp"
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "base/nearest.hpp"
+
+namespace tandem::model {
+namespace {
+
+using tinyxml2::XMLElement;
+
+constexpr std::size_t kMostLinks = 10'000;
+constexpr double kLargestNumber = 1e30;  // so that no product of a few overflows
+
+enum class Needed : bool { kNo, kYes };
+
+/// Walks the XML once, collects what matters and reports what is wrong with it.
+class Reader {
+ public:
+  Reader(const std::string& file) : file_(file) {}
+
+  Outline run(std::string_view text) {
+    if (text.find('\0') != std::string_view::npos) {
+      error(0, "", "the file holds a zero byte, so it is no XML", "name a URDF text file");
+      return std::move(out_);
+    }
+    if (document_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+      report_xml_error();
+      return std::move(out_);
+    }
+    const XMLElement* robot = document_.RootElement();
+    if (robot == nullptr || std::string_view(robot->Name()) != "robot") {
+      const std::string found = robot == nullptr ? "" : robot->Name();
+      error(robot == nullptr ? 0 : robot->GetLineNum(), found, "the root element is not <robot>",
+            "name a URDF; expand xacro and convert SDF first");
+      return std::move(out_);
+    }
+    read_robot(*robot);
+    return std::move(out_);
+  }
+
+ private:
+  void error(int line, std::string key, std::string message, std::string hint = {}) {
+    out_.errors.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
+  }
+
+  void report_xml_error() {
+    switch (document_.ErrorID()) {
+      case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
+        return error(0, "", "the file is empty", "restore it from its source");
+      case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED:
+        return error(document_.ErrorLineNum(), "", "elements are nested too deep");
+      default:
+        error(document_.ErrorLineNum(), "", "not well-formed XML: an element is not closed or "
+              "is misspelt", "correct it at or after this line; the file may have been cut off");
+    }
+  }
+
+  void read_robot(const XMLElement& robot) {
+    out_.robot = name_of(robot, "name", "robot");
+    tinyxml2::XMLElement* reduced = reduced_.NewElement("robot");
+    reduced->SetAttribute("name", "robot");
+    reduced_.InsertEndChild(reduced);
+    for (const XMLElement* e = robot.FirstChildElement(); e != nullptr;
+         e = e->NextSiblingElement()) {
+      const std::string_view name = e->Name();
+      if (name == "link") {
+        read_link(*e, *reduced);
+      } else if (name == "joint") {
+        read_joint(*e, *reduced);
+      } else {
+        check_unknown(*e);
+      }
+    }
+    if (out_.links.empty()) error(robot.GetLineNum(), "", "the robot has no link");
+    if (out_.links.size() > kMostLinks) {
+      error(robot.GetLineNum(), "", "the robot has more than 10000 links");
+    }
+    tinyxml2::XMLPrinter printer(nullptr, true);
+    reduced_.Print(&printer);
+    out_.text = printer.CStr();
+  }
+
+  /// Elements that others use are passed over; a misspelt <link> or <joint> is an error.
+  void check_unknown(const XMLElement& e) {
+    static const std::vector<std::string> kOthers{"material", "transmission", "gazebo", "sensor",
+                                                  "mujoco",   "camera",       "plugin"};
+    const std::string name = e.Name();
+    if (std::ranges::find(kOthers, name) != kOthers.end()) return;
+    if (name.starts_with("xacro:")) {
+      return error(e.GetLineNum(), name, "this file is xacro, not URDF", "expand it with xacro");
+    }
+    const std::vector<std::string> ours{"link", "joint"};
+    if (const std::string meant = nearest(name, ours); !meant.empty() && name.size() <= 6) {
+      return error(e.GetLineNum(), name, "unknown element <" + name + ">",
+                   "did you mean <" + meant + ">?");
+    }
+    out_.warnings.push_back({"the element <" + name + "> is not used", {}, file_, e.GetLineNum(),
+                             name});
+  }
+
+  std::string attribute(const XMLElement& e, const char* name, const std::string& key,
+                        Needed needed) {
+    const char* value = e.Attribute(name);
+    if (value != nullptr && *value != '\0') return value;
+    if (needed == Needed::kYes) {
+      error(e.GetLineNum(), key,
+            std::string("<") + e.Name() + "> has no attribute '" + name + "'", "add it");
+    }
+    return {};
+  }
+
+  /// An attribute that names something: no blanks around it, no control characters in it.
+  std::string name_of(const XMLElement& e, const char* attribute_name, const std::string& key) {
+    const std::string name = attribute(e, attribute_name, key, Needed::kYes);
+    const bool odd = std::ranges::any_of(name, [](unsigned char c) { return c < 32 || c == 127; });
+    if (name.empty() || (!odd && name.front() != ' ' && name.back() != ' ')) return name;
+    error(e.GetLineNum(), key,
+          std::string("'") + attribute_name + "' of <" + e.Name() +
+              "> has blanks around it or control characters in it",
+          "remove them");
+    return {};
+  }
+
+  /// The only child so named, or null; two are an error, and none is when it is needed.
+  const XMLElement* child(const XMLElement& e, const char* name, const std::string& key,
+                          Needed needed) {
+    const XMLElement* found = e.FirstChildElement(name);
+    if (found == nullptr) {
+      if (needed == Needed::kYes) {
+        error(e.GetLineNum(), key, std::string("<") + e.Name() + "> has no <" + name + ">",
+              "add it");
+      }
+      return nullptr;
+    }
+    if (const XMLElement* second = found->NextSiblingElement(name)) {
+      error(second->GetLineNum(), key,
+            std::string("<") + e.Name() + "> has two <" + name + ">", "remove one of them");
+    }
+    return found;
+  }
+
+  /// Reads `count` finite numbers of an attribute; empty when they are not there.
+  std::vector<double> numbers(const XMLElement* e, const char* name, std::size_t count,
+                              const std::string& key, Needed needed) {
+    if (e == nullptr) return {};
+    const std::string text = attribute(*e, name, key, needed);
+    if (text.empty()) return {};
+    std::vector<double> found;
+    std::size_t at = 0;
+    constexpr const char* kSpace = " \t\r\n";
+    while ((at = text.find_first_not_of(kSpace, at)) != std::string::npos) {
+      const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
+      double value = 0.0;
+      if (!number(*e, name, text.substr(at, end - at), key, value)) return {};
+      found.push_back(value);
+      at = end;
+    }
+    if (found.size() == count) return found;
+    error(e->GetLineNum(), key,
+          std::string("'") + name + "' has " + std::to_string(found.size()) + " numbers",
+          "give " + std::to_string(count));
+    return {};
+  }
+
+  bool number(const XMLElement& e, const char* name, const std::string& word,
+              const std::string& key, double& value) {
+    const char* begin = word.data() + (word.front() == '+' ? 1 : 0);
+    const char* end = word.data() + word.size();
+    const auto [stop, failure] = std::from_chars(begin, end, value);
+    const std::string where = std::string("'") + name + "' of <" + e.Name() + ">";
+    if (failure == std::errc::invalid_argument || stop != end) {
+      error(e.GetLineNum(), key, where + " is no number: '" + word + "'", "write it as 1.5e-3");
+      return false;
+    }
+    if (failure != std::errc{} || !(std::abs(value) <= kLargestNumber)) {
+      error(e.GetLineNum(), key, where + " is not finite or far out of range: " + word,
+            "give a finite number below 1e30");
+      return false;
+    }
+    return true;
+  }
+
+  void check_unique(std::map<std::string, int>& lines, const std::string& name,
+                    const XMLElement& e, const std::string& key) {
+    const auto [at, fresh] = lines.emplace(name, e.GetLineNum());
+    if (fresh || name.empty()) return;
+    error(e.GetLineNum(), key,
+          std::string("there is another ") + e.Name() + " of this name at line " +
+              std::to_string(at->second),
+          "rename or remove one of them");
+  }
+
+  void check_origin(const XMLElement& e, const std::string& key) {
+    const XMLElement* origin = child(e, "origin", key, Needed::kNo);
+    (void)numbers(origin, "xyz", 3, key, Needed::kNo);
+    (void)numbers(origin, "rpy", 3, key, Needed::kNo);
+  }
+
+  void read_link(const XMLElement& e, XMLElement& reduced) {
+    const std::string name = name_of(e, "name", "link");
+    const std::string key = "link " + name;
+    check_unique(out_.link_lines, name, e, key);
+    out_.links.push_back({name, e.GetLineNum()});
+    XMLElement* copy = reduced_.NewElement("link");
+    copy->SetAttribute("name", name.c_str());
+    reduced.InsertEndChild(copy);
+    const XMLElement* inertial = child(e, "inertial", key, Needed::kNo);
+    if (inertial == nullptr) return;
+    check_origin(*inertial, key);
+    const XMLElement* mass = child(*inertial, "mass", key, Needed::kYes);
+    const std::vector<double> kg = numbers(mass, "value", 1, key, Needed::kYes);
+    if (!kg.empty() && kg[0] < 0.0) {
+      error(mass->GetLineNum(), key, "the mass is negative", "masses are zero or positive");
+    }
+    const XMLElement* inertia = child(*inertial, "inertia", key, Needed::kYes);
+    for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
+      (void)numbers(inertia, moment, 1, key, Needed::kYes);
+    }
+    copy->InsertEndChild(inertial->DeepClone(&reduced_));
+  }
+
+  void read_joint(const XMLElement& e, XMLElement& reduced) {
+    OutlineJoint joint;
+    joint.line = e.GetLineNum();
+    joint.name = name_of(e, "name", "joint");
+    const std::string key = "joint " + joint.name;
+    check_unique(out_.joint_lines, joint.name, e, key);
+    joint.type = attribute(e, "type", key, Needed::kYes);
+    check_type(joint, key);
+    const XMLElement* parent = child(e, "parent", key, Needed::kYes);
+    if (parent != nullptr) joint.parent = name_of(*parent, "link", key);
+    const XMLElement* child_link = child(e, "child", key, Needed::kYes);
+    if (child_link != nullptr) joint.child = name_of(*child_link, "link", key);
+    check_origin(e, key);
+    if (joint.type != "fixed") check_motion(e, joint, key);
+    if (const XMLElement* mimic = child(e, "mimic", key, Needed::kNo)) {
+      joint.mimic = name_of(*mimic, "joint", key);
+    }
+    out_.joints.push_back(joint);
+    XMLElement* copy = reduced_.NewElement("joint");
+    copy->SetAttribute("name", joint.name.c_str());
+    copy->SetAttribute("type", joint.type.c_str());
+    reduced.InsertEndChild(copy);
+    for (const char* part : {"parent", "child", "origin", "axis", "limit"}) {
+      const XMLElement* found = e.FirstChildElement(part);
+      if (found != nullptr) copy->InsertEndChild(found->DeepClone(&reduced_));
+    }
+  }
+
+  void check_type(const OutlineJoint& joint, const std::string& key) {
+    static const std::vector<std::string> kTypes{"revolute", "continuous", "prismatic", "fixed"};
+    if (joint.type.empty() || std::ranges::find(kTypes, joint.type) != kTypes.end()) return;
+    if (joint.type == "floating" || joint.type == "planar") {
+      return error(joint.line, key, "joints of type '" + joint.type + "' are not supported",
+                   joint.type == "floating"
+                       ? "remove the joint and set base = \"floating\" in robot.toml"
+                       : "build it of two prismatic and one revolute joint");
+    }
+    error(joint.line, key, "unknown joint type '" + joint.type + "'", suggest(joint.type, kTypes));
+  }
+
+  void check_motion(const XMLElement& e, const OutlineJoint& joint, const std::string& key) {
+    const std::vector<double> axis =
+        numbers(child(e, "axis", key, Needed::kNo), "xyz", 3, key, Needed::kYes);
+    if (!axis.empty() && std::hypot(axis[0], axis[1], axis[2]) < 1e-6) {
+      error(joint.line, key, "the axis has no length", "give a direction, for example 0 0 1");
+    }
+    const bool bounded = joint.type != "continuous";
+    const XMLElement* limit = child(e, "limit", key, bounded ? Needed::kYes : Needed::kNo);
+    const std::vector<double> lower = numbers(limit, "lower", 1, key, Needed::kNo);
+    const std::vector<double> upper = numbers(limit, "upper", 1, key, Needed::kNo);
+    const double from = lower.empty() ? 0.0 : lower[0];
+    const double to = upper.empty() ? 0.0 : upper[0];
+    if (bounded && from > to) {
+      error(limit->GetLineNum(), key, "the limits are reversed", "lower must not be above upper");
+    }
+    for (const char* name : {"velocity", "effort"}) {
+      const std::vector<double> most = numbers(limit, name, 1, key, Needed::kYes);
+      if (most.empty() || most[0] >= 0.0) continue;
+      error(limit->GetLineNum(), key, std::string("the limit of ") + name + " is negative",
+            "give its absolute value");
+    }
+  }
+
+  const std::string& file_;
+  tinyxml2::XMLDocument document_;
+  tinyxml2::XMLDocument reduced_;
+  Outline out_;
+};
+
+}  // namespace
+
+Outline outline_urdf(std::string_view text, const std::string& file) {
+  return Reader(file).run(text);
+}
+
+}  // namespace tandem::model

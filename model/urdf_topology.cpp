@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <map>
+
+#include "base/nearest.hpp"
+#include "model/urdf_outline.hpp"
+
+namespace tandem::model {
+namespace {
+
+class Topology {
+ public:
+  Topology(Outline& outline, const std::string& file) : outline_(outline), file_(file) {}
+
+  void run() {
+    for (const OutlineJoint& joint : outline_.joints) check_ends(joint);
+    if (!outline_.errors.empty()) return;  // what follows would only repeat it
+    for (const OutlineJoint& joint : outline_.joints) add(joint);
+    if (!outline_.errors.empty()) return;
+    check_roots();
+    check_loops();
+  }
+
+ private:
+  void error(int line, std::string key, std::string message, std::string hint) {
+    outline_.errors.push_back(
+        {std::move(message), std::move(hint), file_, line, std::move(key)});
+  }
+
+  void check_ends(const OutlineJoint& joint) {
+    const std::string key = "joint " + joint.name;
+    for (const auto& [role, link] : {std::pair("parent", joint.parent),
+                                     std::pair("child", joint.child)}) {
+      if (link.empty() || outline_.link_lines.contains(link)) continue;
+      error(joint.line, key, std::string("there is no link '") + link + "', its " + role,
+            suggest(link, names(outline_.link_lines)));
+    }
+    if (joint.mimic.empty() || outline_.joint_lines.contains(joint.mimic)) return;
+    error(joint.line, key, "there is no joint '" + joint.mimic + "' to mimic",
+          suggest(joint.mimic, names(outline_.joint_lines)));
+  }
+
+  static std::vector<std::string> names(const std::map<std::string, int>& lines) {
+    std::vector<std::string> found;
+    for (const auto& [name, line] : lines) found.push_back(name);
+    return found;
+  }
+
+  void add(const OutlineJoint& joint) {
+    const auto [at, fresh] = leads_to_.emplace(joint.child, &joint);
+    if (fresh) return;
+    error(joint.line, "link " + joint.child,
+          "has two parents, by the joints '" + at->second->name + "' and '" + joint.name +
+              "': the description has a loop",
+          "closed loops are not supported; remove one of the joints");
+  }
+
+  void check_roots() {
+    const OutlineLink* root = nullptr;
+    for (const OutlineLink& link : outline_.links) {
+      if (leads_to_.contains(link.name)) continue;
+      if (root != nullptr) {
+        error(link.line, "link " + link.name,
+              "no joint leads to it, nor to '" + root->name + "': the robot has two roots",
+              "connect it by a joint or remove it");
+      } else {
+        root = &link;
+      }
+    }
+  }
+
+  /// Every link has at most one parent by now, so a link from which no root is reached hangs on
+  /// a ring.
+  void check_loops() {
+    std::map<std::string, int> seen_by;  // link -> the walk (from 1) that first met it
+    int walk = 0;
+    for (const OutlineLink& link : outline_.links) {
+      ++walk;
+      std::string at = link.name;
+      while (seen_by.emplace(at, walk).second && leads_to_.contains(at)) {
+        at = leads_to_.at(at)->parent;
+      }
+      if (seen_by.at(at) != walk || !leads_to_.contains(at)) continue;
+      report_loop(at);
+    }
+  }
+
+  void report_loop(const std::string& start) {
+    std::string ring = start;
+    std::string at = start;
+    int shown = 0;
+    do {
+      at = leads_to_.at(at)->parent;
+      if (++shown <= 8) ring += " <- " + at;
+    } while (at != start);
+    const OutlineJoint& joint = *leads_to_.at(start);
+    error(joint.line, "joint " + joint.name, "the links make a loop: " + ring,
+          "every link must hang on one root");
+  }
+
+  Outline& outline_;
+  const std::string& file_;
+  std::map<std::string, const OutlineJoint*> leads_to_;  // child link -> its joint
+};
+
+}  // namespace
+
+void check_topology(Outline& outline, const std::string& file) { Topology(outline, file).run(); }
+
+}  // namespace tandem::model

@@ -1,0 +1,86 @@
+#include "tests/model/urdf_fixture.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tandem::model {
+namespace {
+
+struct Known {
+  std::string file;
+  bool floating;
+  double mass_kg;
+  std::vector<std::string> joints;
+};
+
+std::vector<Known> known_robots() {
+  std::ifstream in(TANDEM_SOURCE_DIR "/tests/data/robots/joint_order.txt");
+  std::vector<Known> robots;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with('#')) continue;
+    std::istringstream words(line);
+    Known robot;
+    std::string base;
+    words >> robot.file >> base >> robot.mass_kg;
+    robot.floating = base == "floating";
+    for (std::string joint; words >> joint;) robot.joints.push_back(joint);
+    robots.push_back(robot);
+  }
+  return robots;
+}
+
+void PrintTo(const Known& robot, std::ostream* out) { *out << robot.file; }
+
+class PublicRobot : public testing::TestWithParam<Known> {};
+
+TEST_P(PublicRobot, HasTheJointOrderAndMassOfPinocchio) {
+  const Known& known = GetParam();
+  const auto model = read_urdf(TANDEM_SOURCE_DIR "/" + known.file,
+                               {.floating_base = known.floating, .mimic_independent = true});
+  ASSERT_TRUE(model.has_value()) << to_text(model.error());
+  std::vector<std::string> joints;
+  for (const Joint& joint : model->tree.joints) joints.push_back(joint.name);
+  EXPECT_EQ(joints, known.joints);
+  double mass = 0.0;  // what is fixed to the world does not count
+  for (std::size_t i = known.floating ? 0 : 1; i < model->tree.bodies.size(); ++i) {
+    mass += model->tree.bodies[i].inertia.mass_kg;
+  }
+  EXPECT_NEAR(mass, known.mass_kg, 1e-12 * known.mass_kg);
+}
+
+TEST_P(PublicRobot, HasUnitAxesAndOrthonormalFrames) {
+  const auto model = read_urdf(TANDEM_SOURCE_DIR "/" + GetParam().file,
+                               {.floating_base = GetParam().floating, .mimic_independent = true});
+  ASSERT_TRUE(model.has_value());
+  for (const Joint& joint : model->tree.joints) {
+    EXPECT_NEAR(joint.axis.norm(), 1.0, 4e-16) << joint.name;
+    const Eigen::Matrix3d& R = joint.in_parent.R;
+    EXPECT_LT((R.transpose() * R - Eigen::Matrix3d::Identity()).norm(), 1e-14) << joint.name;
+    EXPECT_GT(R.determinant(), 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, PublicRobot, testing::ValuesIn(known_robots()),
+                         [](const auto& robot) {
+                           return std::filesystem::path(robot.param.file).stem().string();
+                         });
+
+TEST(PublicRobots, AreEight) { EXPECT_EQ(known_robots().size(), 8u); }
+
+TEST(PublicRobots, WarnOfAnymalsCamerasAndHatch) {
+  const auto model = read_urdf(TANDEM_SOURCE_DIR "/tests/data/robots/anymal_c.urdf",
+                               {.floating_base = true});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->warnings.size(), 5u) << to_text(model->warnings);
+}
+
+TEST(PublicRobots, RefuseThePandasMimicFingerByDefault) {
+  const auto model = read_urdf(TANDEM_SOURCE_DIR "/config/panda/panda.urdf", {});
+  ASSERT_FALSE(model.has_value());
+  EXPECT_EQ(model.error()[0].key, "joint panda_finger_joint2");
+  EXPECT_GT(model.error()[0].line, 0);
+}
+
+}  // namespace
+}  // namespace tandem::model

@@ -1,0 +1,295 @@
+#include "tests/model/urdf_fixture.hpp"
+
+#include <cmath>
+
+namespace tandem::model {
+namespace {
+
+TEST(Urdf, BecomesATreeOfBodies) {
+  const auto model = parse_urdf(kRobot, "arm.urdf", {});
+  ASSERT_TRUE(model.has_value()) << errors_of(kRobot);
+  const Tree& tree = model->tree;
+  EXPECT_TRUE(model->warnings.empty()) << to_text(model->warnings);
+  EXPECT_EQ(tree.name, "arm");
+  EXPECT_FALSE(tree.floating_base);
+  ASSERT_EQ(tree.joints.size(), 2u);
+  const Joint& shoulder = tree.joints[0];
+  EXPECT_EQ(shoulder.name, "shoulder");
+  EXPECT_EQ(shoulder.type, JointType::kRevolute);
+  EXPECT_EQ(shoulder.parent, 0);
+  EXPECT_EQ(shoulder.axis, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(shoulder.in_parent.p, Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(shoulder.lower, -1.0);
+  EXPECT_EQ(shoulder.upper, 2.0);
+  EXPECT_EQ(shoulder.velocity, 3.0);
+  EXPECT_EQ(shoulder.effort, 4.0);
+  EXPECT_EQ(shoulder.line, 23);
+  const Joint& slide = tree.joints[1];
+  EXPECT_EQ(slide.type, JointType::kPrismatic);
+  EXPECT_EQ(slide.parent, 1);
+  Eigen::Matrix3d quarter_turn;
+  quarter_turn << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  EXPECT_EQ(slide.in_parent.R, quarter_turn) << "right angles are exact";
+  ASSERT_EQ(tree.bodies.size(), 3u);
+  EXPECT_EQ(tree.bodies[0].inertia.mass_kg, 0.0);
+  EXPECT_EQ(tree.bodies[1].inertia.com_m, Eigen::Vector3d(0, 0, -0.5));
+  EXPECT_EQ(tree.link_index("tip"), 4);
+  EXPECT_EQ(tree.child_link_index("bolt"), 3);
+}
+
+TEST(Urdf, MergesWhatIsFixedIntoItsBody) {
+  const auto model = parse_urdf(kRobot, "arm.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  const Tree& tree = model->tree;
+  const Inertia& merged = tree.bodies[2].inertia;  // 1 kg at 0, 3 kg at 0.2 m along z
+  EXPECT_EQ(merged.mass_kg, 4.0);
+  EXPECT_NEAR(merged.com_m.z(), 0.15, 1e-15);
+  EXPECT_NEAR(merged.about_com_kg_m2(0, 0), 0.04 + 0.75 * 0.04, 1e-15);
+  EXPECT_NEAR(merged.about_com_kg_m2(2, 2), 0.04, 1e-15);
+  const Link& tip = tree.links[4];
+  EXPECT_EQ(tip.body, 2);
+  EXPECT_EQ(tip.moving, -1);
+  EXPECT_NEAR(tip.in_body.p.z(), 0.3, 1e-15);
+}
+
+TEST(Urdf, LocksAJointAtItsPosition) {
+  const auto model = parse_urdf(kRobot, "arm.urdf", {.lock = {{"slide", 0.25}}});
+  ASSERT_TRUE(model.has_value());
+  const Tree& tree = model->tree;
+  ASSERT_EQ(tree.joints.size(), 1u);
+  EXPECT_EQ(tree.bodies[1].inertia.mass_kg, 6.0);
+  const Placement& lower = tree.links[2].in_body;
+  EXPECT_NEAR((lower.p - Eigen::Vector3d(0, -0.25, -1)).norm(), 0.0, 1e-15);
+  const auto turned = parse_urdf(kRobot, "arm.urdf", {.lock = {{"shoulder", M_PI / 2}}});
+  ASSERT_TRUE(turned.has_value());
+  Eigen::Matrix3d about_y;
+  about_y << 0, 0, 1, 0, 1, 0, -1, 0, 0;
+  EXPECT_EQ(turned->tree.links[1].in_body.R, about_y);
+}
+
+TEST(Urdf, GivesAContinuousJointNoLimits) {
+  const auto model =
+      parse_urdf(replaced(with("shoulder\" type=\"revolute", "shoulder\" type=\"continuous"),
+                          "<limit lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"/>", ""),
+                 "arm.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->tree.joints[0].type, JointType::kContinuous);
+  EXPECT_TRUE(std::isinf(model->tree.joints[0].upper));
+  EXPECT_TRUE(std::isinf(model->tree.joints[0].velocity));
+}
+
+TEST(Urdf, OrdersChildrenByTheirJointsNames) {
+  const char* const kTwins = R"(<robot name="twins"><link name="base"/><link name="a"><inertial>
+    <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+    <link name="b"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+    <joint name="z" type="continuous"><parent link="base"/><child link="a"/></joint>
+    <joint name="y" type="continuous"><parent link="base"/><child link="b"/></joint></robot>)";
+  const auto model = parse_urdf(kTwins, "twins.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(model->tree.joints[0].name, "y");
+  EXPECT_EQ(model->tree.joints[1].name, "z");
+  EXPECT_EQ(model->tree.joints[1].axis, Eigen::Vector3d(1, 0, 0)) << "URDF's default axis";
+}
+
+// --- what cannot be read ---
+
+TEST(Urdf, NamesAMissingFile) {
+  const auto model = read_urdf("no/such.urdf", {});
+  ASSERT_FALSE(model.has_value());
+  EXPECT_EQ(to_text(model.error()),
+            "no/such.urdf: cannot read this description (check the path and its permissions)\n");
+}
+
+TEST(Urdf, RefusesAFolder) {
+  EXPECT_FALSE(read_urdf(TANDEM_SOURCE_DIR, {}).has_value());
+}
+
+TEST(Urdf, RefusesAFileCutInHalf) {
+  const std::string half = std::string(kRobot).substr(0, std::string(kRobot).size() / 2);
+  EXPECT_NE(errors_of(half).find("not well-formed XML"), std::string::npos);
+  EXPECT_NE(errors_of(half).find("may have been cut off"), std::string::npos);
+  const auto model = parse_urdf(half, "arm.urdf", {});
+  EXPECT_GT(model.error()[0].line, 0);
+}
+
+TEST(Urdf, RefusesAnyFileCutAnywhere) {
+  const std::string whole = kRobot;
+  for (std::size_t size = 0; size + 10 < whole.size(); size += 7) {
+    EXPECT_NE(errors_of(whole.substr(0, size)), "") << "cut after " << size << " bytes";
+  }
+}
+
+TEST(Urdf, RefusesAnEmptyFile) { expect_error("", "arm.urdf: the file is empty "
+                                                   "(restore it from its source)"); }
+
+TEST(Urdf, RefusesAnotherRoot) {
+  expect_error("<sdf/>", "arm.urdf:1: sdf: the root element is not <robot> "
+                         "(name a URDF; expand xacro and convert SDF first)");
+}
+
+TEST(Urdf, RefusesAZeroByte) {
+  EXPECT_NE(errors_of(std::string("<robot\0/>", 9)).find("zero byte"), std::string::npos);
+}
+
+TEST(Urdf, RefusesXacro) {
+  EXPECT_NE(errors_of("<robot name='x'><xacro:macro/></robot>").find("expand it with xacro"),
+            std::string::npos);
+}
+
+TEST(Urdf, SuggestsTheElementThatWasMeant) {
+  expect_error(with("<link name=\"post\"/>", "<link name=\"post\"/><lnik name=\"x\"/>"),
+               "arm.urdf:2: lnik: unknown element <lnik> (did you mean <link>?)");
+}
+
+TEST(Urdf, WarnsOfAnElementThatItDoesNotKnow) {
+  const auto model = parse_urdf(with("<link name=\"post\"/>", "<link name=\"post\"/><soft_body/>"),
+                                "arm.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(to_text(model->warnings), "arm.urdf:2: soft_body: the element <soft_body> is not used\n");
+}
+
+TEST(Urdf, RefusesARobotWithoutLinks) {
+  EXPECT_NE(errors_of("<robot name='x'/>").find("the robot has no link"), std::string::npos);
+}
+
+// --- names, attributes, numbers ---
+
+TEST(Urdf, RefusesTwoLinksOfAName) {
+  EXPECT_NE(errors_of(with("<link name=\"tip\"/>", "<link name=\"tip\"/><link name=\"upper\"/>"))
+                .find("arm.urdf:22: link upper: there is another link of this name at line 3"),
+            std::string::npos);
+}
+
+TEST(Urdf, RefusesTwoJointsOfAName) {
+  EXPECT_NE(errors_of(with("joint name=\"end\"", "joint name=\"bolt\""))
+                .find("joint bolt: there is another joint of this name at line 37"),
+            std::string::npos);
+}
+
+TEST(Urdf, NamesAMissingAttribute) {
+  expect_error(with("<mass value=\"2\"/>", "<mass/>"),
+               "arm.urdf:6: link upper: <mass> has no attribute 'value' (add it)");
+}
+
+TEST(Urdf, NamesAMissingElement) {
+  expect_error(with("<child link=\"tip\"/>", ""),
+               "arm.urdf:42: joint end: <joint> has no <child> (add it)");
+  EXPECT_NE(errors_of(with("<limit lower=\"0\" upper=\"0.5\" velocity=\"1\" effort=\"10\"/>", ""))
+                .find("joint slide: <joint> has no <limit>"),
+            std::string::npos);
+}
+
+TEST(Urdf, RefusesAnElementTwice) {
+  expect_error(with("<mass value=\"2\"/>", "<mass value=\"2\"/><mass value=\"3\"/>"),
+               "arm.urdf:6: link upper: <inertial> has two <mass> (remove one of them)");
+}
+
+TEST(Urdf, RefusesNumbersThatAreNone) {
+  expect_error(with("<mass value=\"2\"/>", "<mass value=\"2kg\"/>"),
+               "arm.urdf:6: link upper: 'value' of <mass> is no number: '2kg' "
+               "(write it as 1.5e-3)");
+  EXPECT_NE(errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"0 0\"")).find("'xyz' has 2 numbers (give 3)"),
+            std::string::npos);
+}
+
+TEST(Urdf, RefusesNumbersThatAreNotFinite) {
+  for (const char* bad : {"nan", "inf", "-inf", "1e999", "NaN"}) {
+    const std::string errors = errors_of(with("<axis xyz=\"0 2 0\"/>",
+                                              std::string("<axis xyz=\"0 ") + bad + " 0\"/>"));
+    EXPECT_NE(errors.find("arm.urdf:27: joint shoulder: 'xyz' of <axis> is not finite"),
+              std::string::npos)
+        << errors;
+  }
+}
+
+TEST(Urdf, RefusesAnAxisWithoutLength) {
+  EXPECT_NE(errors_of(with("<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 0 0\"/>"))
+                .find("the axis has no length"),
+            std::string::npos);
+}
+
+TEST(Urdf, RefusesReversedLimits) {
+  expect_error(with("lower=\"-1\" upper=\"2\"", "lower=\"2\" upper=\"-1\""),
+               "arm.urdf:28: joint shoulder: the limits are reversed "
+               "(lower must not be above upper)");
+}
+
+TEST(Urdf, RefusesANegativeLimitOfEffort) {
+  EXPECT_NE(errors_of(with("effort=\"4\"", "effort=\"-4\"")).find("limit of effort is negative"),
+            std::string::npos);
+}
+
+// --- joints ---
+
+TEST(Urdf, RefusesFloatingAndPlanarJoints) {
+  EXPECT_NE(errors_of(with("shoulder\" type=\"revolute", "shoulder\" type=\"floating"))
+                .find("set base = \"floating\" in robot.toml"),
+            std::string::npos);
+  EXPECT_NE(errors_of(with("shoulder\" type=\"revolute", "shoulder\" type=\"planar"))
+                .find("joints of type 'planar' are not supported"),
+            std::string::npos);
+}
+
+TEST(Urdf, SuggestsTheNearestJointType) {
+  EXPECT_NE(errors_of(with("shoulder\" type=\"revolute", "shoulder\" type=\"revolut"))
+                .find("unknown joint type 'revolut' (did you mean 'revolute'?)"),
+            std::string::npos);
+}
+
+TEST(Urdf, RefusesAMimicUnlessItIsIndependentOrLocked) {
+  const std::string mimic =
+      with("effort=\"10\"/>", "effort=\"10\"/>\n    <mimic joint=\"shoulder\"/>");
+  EXPECT_EQ(errors_of(mimic),
+            "arm.urdf:30: joint slide: mimics joint 'shoulder', which is not supported yet "
+            "(lock it in [model.lock], or treat it as a joint of its own by mimic = "
+            "\"independent\" in [model])\n");
+  EXPECT_EQ(errors_of(mimic, {.mimic_independent = true}), "");
+  EXPECT_EQ(errors_of(mimic, {.lock = {{"slide", 0.0}}}), "");
+}
+
+TEST(Urdf, SuggestsTheNearestLinkOfAJoint) {
+  expect_error(with("<child link=\"tip\"/>", "<child link=\"tipp\"/>"),
+               "arm.urdf:42: joint end: there is no link 'tipp', its child (did you mean 'tip'?)");
+}
+
+TEST(Urdf, RefusesALinkWithTwoParents) {
+  expect_error(with("<child link=\"tip\"/>", "<child link=\"upper\"/>"),
+               "arm.urdf:42: link upper: has two parents, by the joints 'shoulder' and 'end': "
+               "the description has a loop (closed loops are not supported; remove one of the "
+               "joints)");
+}
+
+TEST(Urdf, RefusesALoop) {
+  const std::string errors = errors_of(with("<parent link=\"post\"/>", "<parent link=\"tip\"/>"));
+  EXPECT_NE(errors.find("the links make a loop: "), std::string::npos) << errors;
+  EXPECT_NE(errors.find("upper <- tip <- weight <- lower <- upper"), std::string::npos) << errors;
+}
+
+TEST(Urdf, RefusesTwoRoots) {
+  expect_error(with("<link name=\"tip\"/>", "<link name=\"tip\"/>\n<link name=\"lost\"/>"),
+               "arm.urdf:23: link lost: no joint leads to it, nor to 'post': the robot has two "
+               "roots (connect it by a joint or remove it)");
+}
+
+TEST(Urdf, RefusesALockThatCannotBe) {
+  expect_error(kRobot, "arm.urdf: joint slid: there is no joint 'slid' to lock "
+                       "(did you mean 'slide'?)", {.lock = {{"slid", 0.0}}});
+  EXPECT_NE(errors_of(kRobot, {.lock = {{"bolt", 0.0}}}).find("a fixed joint is locked"),
+            std::string::npos);
+  EXPECT_NE(errors_of(kRobot, {.lock = {{"slide", 0.7}}}).find("beyond its limits"),
+            std::string::npos);
+}
+
+TEST(Urdf, ReportsSeveralErrorsInTheFilesOrder) {
+  const std::string text = replaced(with("<mass value=\"2\"/>", "<mass value=\"x\"/>"),
+                                    "<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 0\"/>");
+  const auto model = parse_urdf(text, "arm.urdf", {});
+  ASSERT_FALSE(model.has_value());
+  ASSERT_EQ(model.error().size(), 2u);
+  EXPECT_EQ(model.error()[0].line, 6);
+  EXPECT_EQ(model.error()[1].line, 27);
+}
+
+}  // namespace
+}  // namespace tandem::model
