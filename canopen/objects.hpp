@@ -105,6 +105,8 @@ inline constexpr std::uint16_t kVelocityGains = 0x2021;     // f32: PidSub
 inline constexpr std::uint16_t kTorqueGains = 0x2022;       // f32: PidSub
 inline constexpr std::uint16_t kCurrentGains = 0x2023;      // f32: PidSub
 inline constexpr std::uint16_t kFeedForward = 0x2024;       // f32: FeedForwardSub
+inline constexpr std::uint16_t kPositionFeedback = 0x2025;  // u8: 0 link encoder, 1 motor's
+inline constexpr std::uint16_t kMotorData = 0x2026;         // f32: MotorDataSub
 inline constexpr std::uint16_t kLimits = 0x2030;            // f32: LimitSub
 inline constexpr std::uint16_t kI2t = 0x2031;               // f32: I2tSub
 inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: never
@@ -129,6 +131,12 @@ enum PidSub : std::uint8_t { kPidKp = 1, kPidKi, kPidKd, kPidOutputLimit };
 enum FeedForwardSub : std::uint8_t {
   kTorqueToVoltage = 1,  ///< [V/Nm] times the link torque reference
   kEmfCompensation,      ///< [Vs/rad] times the motor velocity, reflected to the link
+};
+/// Sub-indices of object::kMotorData.
+enum MotorDataSub : std::uint8_t {
+  kMotorResistance = 1,    ///< [ohm]
+  kMotorTorqueConstant,    ///< N K [Nm/A] at the link, also [Vs/rad]
+  kMotorSpring,            ///< [Nm/rad]; 0: rigid
 };
 /// Sub-indices of object::kLimits.
 enum LimitSub : std::uint8_t {

@@ -75,8 +75,8 @@ struct NodePlan {
   int heartbeat_ms = 50;
   int board = -1;              ///< index in RobotConfig::boards; -1: a sensor
   int sensor = -1;             ///< index in RobotConfig::sensors; -1: a board
-  std::vector<std::size_t> joints;  ///< by axis: index in RobotConfig::joints
-  std::vector<PdoPlan> pdos;   ///< commands first, then slow commands, feedback, slow feedback
+  std::vector<std::size_t> joints{};  ///< by axis: index in RobotConfig::joints
+  std::vector<PdoPlan> pdos{};  ///< commands first, then slow commands, feedback, slow feedback
 };
 
 /// Every node, boards first, in the configuration's order.

@@ -1,0 +1,161 @@
+#include "hal/ethercat-can/axis_codec.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "base/archive.hpp"
+#include "canopen/bytes.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::clamp_round;
+using canopen::get;
+using canopen::Mode;
+using canopen::put;
+
+namespace {
+
+/// A gain on the wire: a number, whatever the caller computed.
+float real32(double value) noexcept {
+  constexpr double kMax = 3.4e38;
+  if (!(value == value)) return 0.0F;
+  return static_cast<float>(value > kMax ? kMax : value < -kMax ? -kMax : value);
+}
+
+}  // namespace
+
+AxisScale AxisScale::of(const JointConfig& joint) {
+  constexpr double kRadPerRev = 2.0 * std::numbers::pi;
+  // As the drive has them: 608F, 2033 and 6076 are integers.
+  const auto counts = clamp_round<std::uint32_t>(joint.encoder_counts_per_rev);
+  const auto motor_counts = clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev);
+  const auto rated_mNm = clamp_round<std::uint32_t>(1000.0 * joint.rated_torque_Nm);
+  return {.counts_per_rad = counts / kRadPerRev,
+          .motor_counts_per_rad = motor_counts / kRadPerRev,
+          .mille_per_Nm = 1.0e6 / rated_mNm};
+}
+
+void RawFeedback::take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+  switch (field) {
+    case WireField::kStatusword: statusword = get<std::uint16_t>(bytes); break;
+    case WireField::kPosition: position = get<std::int32_t>(bytes); break;
+    case WireField::kVelocity: velocity = get<std::int32_t>(bytes); break;
+    case WireField::kTorque: torque = get<std::int16_t>(bytes); break;
+    case WireField::kMotorPosition: motor_position = get<std::int32_t>(bytes); break;
+    case WireField::kMotorVelocity: motor_velocity = get<std::int32_t>(bytes); break;
+    case WireField::kCurrent: current = get<std::int16_t>(bytes); break;
+    case WireField::kVoltage: voltage = get<std::int16_t>(bytes); break;
+    case WireField::kTemperature: temperature = get<std::int16_t>(bytes); break;
+    case WireField::kModeDisplay: mode_display = get<std::int8_t>(bytes); break;
+    case WireField::kErrorCode: error_code = get<std::uint16_t>(bytes); break;
+    default: break;  // the others travel the other way
+  }
+}
+
+void RawCommand::give(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT {
+  switch (field) {
+    case WireField::kControlword: put(bytes, controlword); break;
+    case WireField::kMode: put(bytes, mode); break;
+    case WireField::kTargetPosition: put(bytes, target_position); break;
+    case WireField::kVelocityOffset: put(bytes, velocity_offset); break;
+    case WireField::kTorqueOffset: put(bytes, torque_offset); break;
+    case WireField::kTargetVoltage: put(bytes, target_voltage); break;
+    case WireField::kTargetCurrent: put(bytes, target_current); break;
+    case WireField::kStiffness: put(bytes, stiffness); break;
+    case WireField::kDamping: put(bytes, damping); break;
+    default: break;  // the others travel the other way
+  }
+}
+
+Mode wire_mode(ControlMode mode, InteractionMode interaction) noexcept TANDEM_RT {
+  const bool compliant = interaction == InteractionMode::kCompliant;
+  switch (mode) {
+    case ControlMode::kIdle: return Mode::kNone;
+    case ControlMode::kPosition: return compliant ? Mode::kImpedance : Mode::kCsp;
+    case ControlMode::kVelocity: return compliant ? Mode::kVelocityImpedance : Mode::kCsv;
+    case ControlMode::kTorque: return Mode::kCst;
+    case ControlMode::kOpenLoop: return Mode::kOpenLoop;
+    case ControlMode::kCurrent: return Mode::kCurrent;
+  }
+  return Mode::kNone;
+}
+
+std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TANDEM_RT {
+  constexpr auto kStiff = InteractionMode::kStiff;
+  switch (static_cast<Mode>(mode)) {
+    case Mode::kCsp: return {ControlMode::kPosition, kStiff};
+    case Mode::kImpedance: return {ControlMode::kPosition, InteractionMode::kCompliant};
+    case Mode::kCsv: return {ControlMode::kVelocity, kStiff};
+    case Mode::kVelocityImpedance: return {ControlMode::kVelocity, InteractionMode::kCompliant};
+    case Mode::kCst: return {ControlMode::kTorque, kStiff};
+    case Mode::kOpenLoop: return {ControlMode::kOpenLoop, kStiff};
+    case Mode::kCurrent: return {ControlMode::kCurrent, kStiff};
+    case Mode::kNone: break;
+  }
+  return {ControlMode::kIdle, kStiff};
+}
+
+DriveState image_state(canopen::DriveState state) noexcept TANDEM_RT {
+  using Wire = canopen::DriveState;
+  switch (state) {
+    case Wire::kNotReadyToSwitchOn: return DriveState::kNotReadyToSwitchOn;
+    case Wire::kSwitchOnDisabled: return DriveState::kSwitchOnDisabled;
+    case Wire::kReadyToSwitchOn: return DriveState::kReadyToSwitchOn;
+    case Wire::kSwitchedOn: return DriveState::kSwitchedOn;
+    case Wire::kOperationEnabled: return DriveState::kOperationEnabled;
+    case Wire::kQuickStopActive: return DriveState::kQuickStopActive;
+    case Wire::kFaultReactionActive: return DriveState::kFaultReactionActive;
+    case Wire::kFault: return DriveState::kFault;
+  }
+  return DriveState::kUnknown;
+}
+
+void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
+                    RawCommand& raw) noexcept TANDEM_RT {
+  const auto mode = static_cast<ControlMode>(command.mode()[joint]);
+  const auto interaction = static_cast<InteractionMode>(command.interaction()[joint]);
+  const Mode wire = wire_mode(mode, interaction);
+  if (wire != Mode::kNone) raw.mode = static_cast<std::int8_t>(wire);
+  raw.target_position =
+      clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad);
+  raw.velocity_offset =
+      clamp_round<std::int32_t>(command.velocity_rad_s()[joint] * scale.counts_per_rad);
+  raw.torque_offset = clamp_round<std::int16_t>(command.torque_Nm()[joint] * scale.mille_per_Nm);
+  raw.target_voltage = clamp_round<std::int16_t>(command.voltage_V()[joint] / kVoltPerUnit);
+  raw.target_current = clamp_round<std::int16_t>(command.current_A()[joint] / kAmperePerUnit);
+  raw.stiffness = real32(command.stiffness_Nm_rad()[joint]);
+  raw.damping = real32(command.damping_Nms_rad()[joint]);
+}
+
+void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t joint,
+                     StateImage& state) noexcept TANDEM_RT {
+  const double rad = 1.0 / scale.counts_per_rad;
+  const double motor_rad = 1.0 / scale.motor_counts_per_rad;
+  state.position_rad()[joint] = raw.position * rad;
+  state.velocity_rad_s()[joint] = raw.velocity * rad;
+  state.torque_Nm()[joint] = raw.torque / scale.mille_per_Nm;
+  state.motor_position_rad()[joint] = raw.motor_position * motor_rad;
+  state.motor_velocity_rad_s()[joint] = raw.motor_velocity * motor_rad;
+  state.current_A()[joint] = raw.current * kAmperePerUnit;
+  state.voltage_V()[joint] = raw.voltage * kVoltPerUnit;
+  state.temperature_C()[joint] = raw.temperature * kKelvinPerUnit;
+  state.statusword()[joint] = raw.statusword;
+  const auto drive = canopen::drive_state(raw.statusword);
+  state.drive_state()[joint] = static_cast<std::uint8_t>(image_state(drive));
+  auto [mode, interaction] = image_mode(raw.mode_display);
+  if (drive != canopen::DriveState::kOperationEnabled) mode = ControlMode::kIdle;
+  state.mode()[joint] = static_cast<std::int8_t>(mode);
+  state.interaction()[joint] = static_cast<std::uint8_t>(interaction);
+}
+
+void RawFeedback::archive(Archive& ar) {
+  ar(position, velocity, motor_position, motor_velocity, statusword, error_code, torque, current,
+     voltage, temperature, mode_display);
+}
+
+void RawCommand::archive(Archive& ar) {
+  ar(target_position, velocity_offset, stiffness, damping, controlword, torque_offset,
+     target_voltage, target_current, mode);
+}
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,84 @@
+// One axis between the image's SI units and the wire's integers. Clamped, never wrapped.
+// Layer: hal/ethercat-can.  Thread: any.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include "base/realtime.hpp"
+#include "canopen/drive_machine.hpp"
+#include "canopen/objects.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::hal::can {
+
+/// Factors of one joint's wire units.
+struct AxisScale {
+  double counts_per_rad = 1.0;        ///< link encoder, 608F / 2 pi
+  double motor_counts_per_rad = 1.0;  ///< motor encoder reflected to the link, 2033 / 2 pi
+  double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076)
+
+  [[nodiscard]] static AxisScale of(const JointConfig& joint);
+};
+
+inline constexpr double kAmperePerUnit = 0.01;
+inline constexpr double kVoltPerUnit = 0.01;
+inline constexpr double kKelvinPerUnit = 0.1;
+
+/// What a drive said last, as on the wire.
+struct RawFeedback {
+  std::int32_t position = 0;
+  std::int32_t velocity = 0;
+  std::int32_t motor_position = 0;
+  std::int32_t motor_velocity = 0;
+  std::uint16_t statusword = 0;
+  std::uint16_t error_code = 0;
+  std::int16_t torque = 0;
+  std::int16_t current = 0;
+  std::int16_t voltage = 0;
+  std::int16_t temperature = 0;
+  std::int8_t mode_display = 0;
+
+  void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT;
+  void archive(Archive& ar);
+};
+
+/// What a drive is told, as on the wire.
+struct RawCommand {
+  std::int32_t target_position = 0;
+  std::int32_t velocity_offset = 0;
+  float stiffness = 0.0F;
+  float damping = 0.0F;
+  std::uint16_t controlword = 0;
+  std::int16_t torque_offset = 0;
+  std::int16_t target_voltage = 0;
+  std::int16_t target_current = 0;
+  std::int8_t mode = 0;
+
+  void give(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT;
+  void archive(Archive& ar);
+};
+
+/// The mode of operation for what the image asks; kNone for kIdle.
+[[nodiscard]] canopen::Mode wire_mode(ControlMode mode, InteractionMode interaction) noexcept
+    TANDEM_RT;
+/// The way back, for the mode display; kIdle for a mode that is none of ours.
+[[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept
+    TANDEM_RT;
+/// The image's number of a drive state.
+[[nodiscard]] DriveState image_state(canopen::DriveState state) noexcept TANDEM_RT;
+
+/// Everything but the controlword: references, feed-forward and mode (kIdle: the mode stays).
+void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
+                    RawCommand& raw) noexcept TANDEM_RT;
+/// The drive's values into the image, but acceleration, fault and age.
+void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t joint,
+                     StateImage& state) noexcept TANDEM_RT;
+
+}  // namespace tandem::hal::can

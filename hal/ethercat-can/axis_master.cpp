@@ -1,0 +1,203 @@
+#include "hal/ethercat-can/axis_master.hpp"
+
+#include "base/archive.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::ErrorCode;
+using WireState = canopen::DriveState;
+namespace controlword = canopen::controlword;
+
+void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
+  if (!fresh) {
+    ++age_cycles_;
+    return;
+  }
+  const std::int64_t elapsed_ns = now_ns - sample_ns_;
+  if (heard_ && elapsed_ns > 0) {
+    const double change = static_cast<double>(feedback_.velocity) - previous_velocity_;
+    acceleration_rad_s2_ =
+        change / scale_.counts_per_rad * 1.0e9 / static_cast<double>(elapsed_ns);
+  }
+  previous_velocity_ = feedback_.velocity;
+  sample_ns_ = now_ns;
+  heard_ = true;
+  age_cycles_ = 0;
+}
+
+bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
+  if (!heard_) return false;
+  const WireState state = drive();
+  const bool faulted = state == WireState::kFault || state == WireState::kFaultReactionActive;
+  if (trouble_ != AxisTrouble::kNone) {
+    // The error code may come later than the statusword: it travels in the slow PDO.
+    const bool vague = fault_code_ == static_cast<std::uint16_t>(ErrorCode::kGeneric);
+    if (trouble_ == AxisTrouble::kDriveFault && faulted && vague && feedback_.error_code != 0) {
+      fault_code_ = feedback_.error_code;
+    }
+    return false;
+  }
+  if (faulted && goal_ != Goal::kReset && goal_ != Goal::kBringUp) {
+    const std::uint16_t code =
+        feedback_.error_code != 0 ? feedback_.error_code : emergency_code_;
+    latch(AxisTrouble::kDriveFault,
+          code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+    return true;
+  }
+  if (was_enabled_ && state != WireState::kOperationEnabled &&
+      (goal_ == Goal::kFollow || goal_ == Goal::kHold)) {
+    latch(AxisTrouble::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+    return true;
+  }
+  return false;
+}
+
+void AxisMaster::latch(AxisTrouble trouble, std::uint16_t code,
+                       std::int64_t now_ns) noexcept TANDEM_RT {
+  trouble_ = trouble;
+  fault_code_ = code;
+  trouble_ns_ = now_ns;
+}
+
+void AxisMaster::set_goal(Goal goal, std::int64_t now_ns) noexcept TANDEM_RT {
+  if (goal == goal_) return;
+  const bool goes_on =
+      (goal_ == Goal::kBringUp || goal_ == Goal::kEnable) && goal == Goal::kFollow;
+  if (!goes_on) was_enabled_ = false;
+  if (goal == Goal::kHold) {
+    was_enabled_ = enabled();
+    seed();
+  }
+  if (goal == Goal::kReset || goal == Goal::kBringUp) emergency_code_ = 0;
+  goal_ = goal;
+  since_ns_ = now_ns;
+  reset_cycles_ = 0;
+}
+
+bool AxisMaster::command(const CommandImage* image, std::size_t joint,
+                         std::int64_t now_ns) noexcept TANDEM_RT {
+  switch (goal_) {
+    case Goal::kNothing: raw_.controlword = controlword::kCommandDisableVoltage; return false;
+    case Goal::kQuickStop: raw_.controlword = controlword::kCommandQuickStop; return false;
+    case Goal::kHold:
+      // A drive that is not enabled stays as it is: holding must not switch anything on.
+      raw_.controlword = was_enabled_ ? controlword::kCommandEnableOperation
+                                      : controlword::kCommandDisableVoltage;
+      return false;
+    case Goal::kBringUp: walk_up(true); return enable_is_late(now_ns);
+    case Goal::kEnable: walk_up(false); return enable_is_late(now_ns);
+    case Goal::kReset:
+      raw_.controlword = reset_controlword();
+      return reset_is_late(now_ns);
+    case Goal::kFollow:
+      if (image != nullptr) follow(*image, joint, now_ns);
+      return enable_is_late(now_ns);
+  }
+  return false;
+}
+
+void AxisMaster::follow(const CommandImage& image, std::size_t joint,
+                        std::int64_t now_ns) noexcept {
+  if (static_cast<ControlMode>(image.mode()[joint]) == ControlMode::kIdle) {
+    raw_.controlword = controlword::kCommandShutdown;
+    was_enabled_ = false;
+    since_ns_ = now_ns;  // the time to be enabled again counts from the end of idling
+    return;
+  }
+  if (was_enabled_ || enabled()) {
+    was_enabled_ = true;
+    raw_.controlword = controlword::kCommandEnableOperation;
+    encode_command(scale_, image, joint, raw_);
+    return;
+  }
+  walk_up(false);
+}
+
+/// One transition nearer to Operation Enabled, with the measured position as target.
+void AxisMaster::walk_up(bool clears_faults) noexcept {
+  const WireState state = drive();
+  if (!heard_) {
+    raw_.controlword = controlword::kCommandDisableVoltage;
+    return;
+  }
+  if (enabled()) {
+    was_enabled_ = true;
+  } else {
+    seed();  // until the drive follows; from then on the target stands
+  }
+  if (state == WireState::kFault && clears_faults) {
+    raw_.controlword = reset_controlword();
+  } else if (state == WireState::kQuickStopActive) {
+    raw_.controlword = controlword::kCommandQuickStop;  // the ramp ends by itself (605A = 2)
+  } else {
+    raw_.controlword = canopen::controlword_towards_enabled(state);
+  }
+}
+
+/// Bit 7 off and on in turns: whenever the drive looks, there is an edge to come.
+std::uint16_t AxisMaster::reset_controlword() noexcept {
+  const bool set = (reset_cycles_++ / kResetToggleCycles) % 2 == 1;
+  return set ? controlword::kCommandFaultReset : controlword::kCommandDisableVoltage;
+}
+
+void AxisMaster::seed() noexcept {
+  raw_.mode = static_cast<std::int8_t>(canopen::Mode::kCsp);
+  raw_.target_position = feedback_.position;
+  raw_.velocity_offset = 0;
+  raw_.torque_offset = 0;
+  raw_.target_voltage = 0;
+  raw_.target_current = 0;
+}
+
+bool AxisMaster::enable_is_late(std::int64_t now_ns) noexcept {
+  const bool late = !was_enabled_ && !enabled() && trouble_ == AxisTrouble::kNone &&
+                    now_ns - since_ns_ >= kEnableTimeoutNs;
+  if (!late) return false;
+  const bool fault = drive() == WireState::kFault;
+  const std::uint16_t code = feedback_.error_code;
+  latch(fault ? AxisTrouble::kDriveFault : AxisTrouble::kNotEnabled,
+        fault && code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+  return true;
+}
+
+bool AxisMaster::reset_is_late(std::int64_t now_ns) noexcept {
+  if (drive() != WireState::kFault && drive() != WireState::kFaultReactionActive) return false;
+  return now_ns - since_ns_ >= kResetTimeoutNs;
+}
+
+bool AxisMaster::off() const noexcept {
+  switch (drive()) {
+    case WireState::kOperationEnabled:
+    case WireState::kQuickStopActive:
+    case WireState::kFaultReactionActive: return !heard_;
+    default: return true;
+  }
+}
+
+void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDEM_RT {
+  if (heard_) {
+    decode_feedback(scale_, feedback_, joint, state);
+  } else {
+    state.drive_state()[joint] = static_cast<std::uint8_t>(DriveState::kUnknown);
+    state.mode()[joint] = static_cast<std::int8_t>(ControlMode::kIdle);
+  }
+  state.acceleration_rad_s2()[joint] = acceleration_rad_s2_;
+  state.age_cycles()[joint] = age_cycles_;
+  state.fault()[joint] = trouble_ != AxisTrouble::kNone ? fault_code_ : 0u;
+}
+
+void AxisMaster::forget() noexcept TANDEM_RT {
+  feedback_ = {};
+  heard_ = false;
+  was_enabled_ = false;
+  emergency_code_ = 0;
+  acceleration_rad_s2_ = 0.0;
+}
+
+void AxisMaster::archive(Archive& ar) {
+  ar(feedback_, raw_, goal_, trouble_, heard_, was_enabled_, fault_code_, emergency_code_,
+     age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
+     acceleration_rad_s2_);
+}
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,118 @@
+// The master's view of one axis: walks the drive machine up, latches faults, resets them.
+// Layer: hal/ethercat-can.  Thread: the loop's.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "base/realtime.hpp"
+#include "canopen/drive_machine.hpp"
+#include "hal/ethercat-can/axis_codec.hpp"
+#include "hal/image.hpp"
+
+namespace tandem::hal::can {
+
+/// Why an axis does not follow its command.
+enum class AxisTrouble : std::uint8_t {
+  kNone = 0,
+  kDriveFault,   ///< the drive says so; the code is CiA 402's error code
+  kNotEnabled,   ///< it did not reach Operation Enabled in time
+  kLeftEnabled,  ///< it left Operation Enabled by itself
+  kNodeLost,     ///< its board is not in operation any more
+};
+
+class AxisMaster {
+ public:
+  /// What the axis is to do. Every goal but kFollow makes its own command.
+  enum class Goal : std::uint8_t {
+    kNothing,    ///< disable voltage: the bridge stays open
+    kBringUp,    ///< the same as kEnable, and a fault from before this master's time is cleared
+    kEnable,     ///< walk to Operation Enabled, hold the measured position
+    kFollow,     ///< the command image
+    kHold,       ///< keep the position that it has (stop category 2)
+    kQuickStop,  ///< stop category 1
+    kReset,      ///< clear the drive's fault; then it waits, disabled
+  };
+
+  static constexpr std::int64_t kEnableTimeoutNs = 2'000'000'000;
+  static constexpr std::int64_t kResetTimeoutNs = 1'000'000'000;
+  /// A fault reset's bit 7 changes every so many cycles, so that a board that looks seldom sees it.
+  static constexpr std::uint32_t kResetToggleCycles = 4;
+
+  /// @param stiffness, damping  of the impedance mode until a command says otherwise
+  AxisMaster(const AxisScale& scale, double stiffness_Nm_rad, double damping_Nms_rad) noexcept
+      : scale_(scale) {
+    raw_.stiffness = static_cast<float>(stiffness_Nm_rad);
+    raw_.damping = static_cast<float>(damping_Nms_rad);
+  }
+
+  /// A field of a TPDO.
+  void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+    feedback_.take(field, bytes);
+  }
+  /// The axis' error code from an emergency of its board.
+  void on_emergency(std::uint16_t code) noexcept TANDEM_RT { emergency_code_ = code; }
+  /// Once per cycle, after its frames. `fresh`: a feedback TPDO came in this cycle.
+  void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Looks for a fault in what was received. @return true when it is a new one.
+  bool check(std::int64_t now_ns) noexcept TANDEM_RT;
+  void latch(AxisTrouble trouble, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
+
+  void set_goal(Goal goal, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Makes the raw command of the goal; kFollow takes it from the image.
+  /// @return true when a reset or a re-enabling has just failed and was latched.
+  bool command(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept
+      TANDEM_RT;
+
+  /// The joint's fields of the image.
+  void fill(StateImage& state, std::size_t joint) const noexcept TANDEM_RT;
+
+  [[nodiscard]] const RawCommand& raw() const noexcept { return raw_; }
+  [[nodiscard]] const RawFeedback& feedback() const noexcept { return feedback_; }
+  [[nodiscard]] Goal goal() const noexcept { return goal_; }
+  [[nodiscard]] bool heard() const noexcept { return heard_; }
+  [[nodiscard]] std::uint32_t age_cycles() const noexcept { return age_cycles_; }
+  [[nodiscard]] canopen::DriveState drive() const noexcept {
+    return canopen::drive_state(feedback_.statusword);
+  }
+  [[nodiscard]] bool enabled() const noexcept {
+    return heard_ && drive() == canopen::DriveState::kOperationEnabled;
+  }
+  /// True when no torque can come from the drive any more.
+  [[nodiscard]] bool off() const noexcept;
+  [[nodiscard]] AxisTrouble trouble() const noexcept { return trouble_; }
+  [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
+  [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
+  void clear_trouble() noexcept { trouble_ = AxisTrouble::kNone; }
+  /// The node is configured anew: nothing of what was heard holds any more.
+  void forget() noexcept TANDEM_RT;
+
+  void archive(Archive& ar);
+
+ private:
+  void follow(const CommandImage& image, std::size_t joint, std::int64_t now_ns) noexcept;
+  void walk_up(bool clears_faults) noexcept;
+  [[nodiscard]] std::uint16_t reset_controlword() noexcept;
+  void seed() noexcept;
+  bool enable_is_late(std::int64_t now_ns) noexcept;
+  bool reset_is_late(std::int64_t now_ns) noexcept;
+
+  AxisScale scale_;
+  RawFeedback feedback_;
+  RawCommand raw_;
+  Goal goal_ = Goal::kNothing;
+  AxisTrouble trouble_ = AxisTrouble::kNone;
+  bool heard_ = false;
+  bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
+  std::uint16_t fault_code_ = 0;
+  std::uint16_t emergency_code_ = 0;
+  std::uint32_t age_cycles_ = 0;
+  std::uint32_t reset_cycles_ = 0;
+  std::int32_t previous_velocity_ = 0;
+  std::int64_t sample_ns_ = 0;
+  std::int64_t trouble_ns_ = 0;
+  std::int64_t since_ns_ = 0;  ///< when the goal, or the wish to be enabled, began
+  double acceleration_rad_s2_ = 0.0;
+};
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,367 @@
+#include "hal/ethercat-can/drive_master.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include "base/archive.hpp"
+#include "canopen/bytes.hpp"
+#include "canopen/messages.hpp"
+#include "hal/ethercat-can/drive_master_impl.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::Frame;
+using canopen::PdoDirection;
+
+namespace {
+
+constexpr std::size_t kChunk = 64;  // frames taken from a bus at once
+/// A sensor has no time-out of its own in the configuration.
+constexpr int kSensorTimeoutCycles = 10;
+/// Items of one axis' parameters: kp, ki, kd of each loop.
+constexpr std::size_t kItemsPerLoop = 3;
+constexpr std::size_t kItemsPerAxis = kPidLoops * kItemsPerLoop;
+
+double& item(PidGains& gains, std::size_t which) noexcept {
+  return which == 0 ? gains.kp : which == 1 ? gains.ki : gains.kd;
+}
+
+}  // namespace
+
+DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
+    : plan(std::move(node_plan)),
+      master(plan.id, plan.heartbeat_ms, std::move(steps)),
+      timeout_cycles(timeout),
+      frames(plan.pdos.size()),
+      sent(plan.pdos.size()) {
+  tpdos.fill(-1);
+  for (std::size_t p = 0; p < plan.pdos.size(); ++p) {
+    const PdoPlan& pdo = plan.pdos[p];
+    if (pdo.direction == PdoDirection::kTransmit) tpdos[pdo.number - 1] = static_cast<int>(p);
+    frames[p].id = pdo.cob_id;
+    frames[p].length = canopen::frame_length(pdo.bytes);
+    if (frames[p].length > canopen::kClassicFrameBytes) {
+      frames[p].flags = canopen::kFlagFd | canopen::kFlagBrs;
+    }
+    if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
+  }
+}
+
+DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
+                        std::span<Bus* const> buses)
+    : robot(robot_config),
+      joint_node(robot.joints.size()),
+      joint_fresh(robot.joints.size()),
+      sent_revision(robot.joints.size()) {
+  const std::size_t frames = 16 + layout.nodes.size() * 8;
+  for (Bus* bus : buses) ports.emplace_back(*bus, frames);
+  for (const JointConfig& joint : robot.joints) {
+    const GainsConfig& gains = robot.gains_of(joint);
+    axes.emplace_back(AxisScale::of(joint), gains.stiffness_Nm_rad, gains.damping_Nms_rad);
+    for (const PidConfig* loop :
+         {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
+      sent_gains.push_back(loop->gains);
+    }
+  }
+  for (NodePlan& plan : layout.nodes) {
+    Port& port = ports[plan.bus];
+    const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
+    port.heartbeat_ns = port.heartbeat_ns == 0 ? heartbeat_ns
+                                               : std::min(port.heartbeat_ns, heartbeat_ns);
+    port.nodes[static_cast<std::size_t>(plan.id)] = static_cast<std::int16_t>(nodes.size());
+    for (const std::size_t joint : plan.joints) joint_node[joint] = nodes.size();
+    auto steps = make_configuration(robot, plan);
+    const int timeout = plan.board < 0
+                            ? kSensorTimeoutCycles
+                            : robot.boards[static_cast<std::size_t>(plan.board)]
+                                  .command_timeout_cycles;
+    nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+  }
+}
+
+void DriveMaster::Impl::begin(const CycleTime& time) noexcept {
+  dt_ns = begun ? time.time_ns - now_ns : time.period_ns;
+  now_ns = time.time_ns;
+  if (!begun) {
+    for (Node& node : nodes) node.master.restart(now_ns);
+    for (Port& port : ports) port.next_heartbeat_ns = now_ns;
+    begun = true;
+  }
+  for (Port& port : ports) {
+    port.sink.push(canopen::make_sync());
+    if (port.heartbeat_ns == 0 || now_ns < port.next_heartbeat_ns) continue;
+    port.sink.push(canopen::make_heartbeat(kMasterNodeId, canopen::NmtState::kOperational));
+    const std::int64_t behind_ns = now_ns - port.next_heartbeat_ns;
+    port.next_heartbeat_ns += (behind_ns / port.heartbeat_ns + 1) * port.heartbeat_ns;
+  }
+}
+
+void DriveMaster::Impl::take_frames(Port& port) noexcept {
+  std::array<Frame, kChunk> frames;
+  for (std::size_t taken = 0; taken < kMaxFramesPerCycle;) {
+    const std::size_t count = port.bus->receive(frames);
+    for (std::size_t i = 0; i < count; ++i) dispatch(port, frames[i]);
+    taken += count;
+    if (count < frames.size()) return;
+  }
+}
+
+void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept {
+  using namespace canopen;
+  if (frame.id > cob::kIdMask || (frame.flags & (kFlagRtr | kFlagError)) != 0) return;
+  const std::int16_t index = port.nodes[frame.id & 0x7F];
+  if (index < 0) return;
+  Node& node = nodes[static_cast<std::size_t>(index)];
+  const std::uint32_t function = frame.id & 0x780;
+  switch (function) {
+    case cob::kEmergency: on_emergency(node, frame); break;
+    case 0x180:
+    case 0x280:
+    case 0x380:
+    case 0x480: on_tpdo(node, static_cast<int>(function >> 8), frame); break;
+    case cob::kSdoResponse: node.master.on_sdo(frame, port.sink); break;
+    case cob::kHeartbeat:
+      if (const auto message = parse_heartbeat(frame)) {
+        node.master.on_heartbeat(message->state, now_ns);
+      }
+      break;
+    default: break;
+  }
+}
+
+void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame) noexcept {
+  const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
+  const bool listening = node.master.running() ||
+                         node.master.stage() == NodeMaster::Stage::kStarting;
+  if (p < 0 || !listening) return;
+  const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
+  if (frame.length < pdo.bytes) return;
+  for (const MappedField& field : pdo.fields) {
+    const std::uint8_t* bytes = frame.data.data() + field.offset;
+    if (field.field == WireField::kSensorChannel) {
+      node.channels[field.axis] = canopen::get<float>(bytes);
+      ++node.fields_heard;
+      continue;
+    }
+    const std::size_t joint = node.plan.joints[field.axis];
+    axes[joint].take(field.field, bytes);
+    if (field.field == WireField::kStatusword) {
+      ++node.fields_heard;
+      joint_fresh[joint] = 1;
+    }
+  }
+}
+
+void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept {
+  const auto message = canopen::parse_emergency(frame);
+  if (!message) return;
+  const auto code = static_cast<std::uint16_t>(message->code);
+  for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
+    if (code == 0 || message->manufacturer[0] == axis) {
+      axes[node.plan.joints[axis]].on_emergency(code);
+    }
+  }
+}
+
+void DriveMaster::Impl::process_nodes() noexcept {
+  for (Node& node : nodes) {
+    node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
+    const std::size_t expected =
+        node.plan.board >= 0 ? node.plan.joints.size() : node.channels.size();
+    const bool complete = node.fields_heard >= expected;
+    node.fields_heard = 0;
+    node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
+    if (!node.master.running() || node.timeout_cycles == 0) continue;
+    if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
+      node.master.fail(NodeTrouble::kFeedbackLost, now_ns);
+    }
+  }
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    axes[joint].received(joint_fresh[joint] != 0, now_ns);
+    joint_fresh[joint] = 0;
+  }
+}
+
+void DriveMaster::Impl::fill(StateImage& state) noexcept {
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) axes[joint].fill(state, joint);
+  for (const Node& node : nodes) {
+    if (node.plan.sensor < 0) continue;
+    const auto sensor = static_cast<std::size_t>(node.plan.sensor);
+    const std::span<double> values = state.sensor_values(sensor);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<double>(node.channels[i]);
+    }
+    state.sensor_age_cycles()[sensor] = node.silent_cycles;
+  }
+}
+
+void DriveMaster::Impl::write_pdos() noexcept {
+  for (Node& node : nodes) {
+    if (!node.master.running()) continue;
+    for (std::size_t p = 0; p < node.plan.pdos.size(); ++p) {
+      const PdoPlan& pdo = node.plan.pdos[p];
+      if (pdo.direction != PdoDirection::kReceive) continue;
+      Frame frame = node.frames[p];
+      for (const MappedField& field : pdo.fields) {
+        axes[node.plan.joints[field.axis]].raw().give(field.field,
+                                                      frame.data.data() + field.offset);
+      }
+      const bool due = pdo.group == PdoGroup::kCommand || node.sent[p] == 0 ||
+                       frame.data != node.frames[p].data;
+      if (!due || !ports[node.plan.bus].sink.push(frame)) continue;
+      node.frames[p] = frame;
+      node.sent[p] = 1;
+    }
+  }
+}
+
+void DriveMaster::Impl::send_parameters(const ParameterImage& parameters) noexcept {
+  for (Node& node : nodes) {
+    if (node.plan.board >= 0 && node.master.running()) send_parameter(node, parameters);
+  }
+}
+
+/// Finishes the transfer under way, then starts the next item that differs from what the drive has.
+void DriveMaster::Impl::send_parameter(Node& node, const ParameterImage& parameters) noexcept {
+  canopen::SdoClient& sdo = node.master.sdo();
+  if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
+  if (node.sending >= 0 && sdo.status() == canopen::SdoClient::Status::kAborted) {
+    refused_node = static_cast<std::int32_t>(&node - nodes.data());
+    refused_step = {.sub = sdo.sub(), .index = sdo.index(),
+                    .axis = static_cast<std::int8_t>(static_cast<std::size_t>(node.sending) /
+                                                     kItemsPerAxis)};
+    refused_code = sdo.abort_code();
+  }
+  node.sending = -1;
+  const std::size_t items = node.plan.joints.size() * kItemsPerAxis;
+  for (std::size_t i = 0; i < items; ++i) {
+    const std::size_t now = (node.next_item + i) % items;
+    const std::size_t axis = now / kItemsPerAxis;
+    const std::size_t joint = node.plan.joints[axis];
+    if (parameters.revision(joint) == sent_revision[joint]) continue;
+    const auto loop = static_cast<PidLoop>(now % kItemsPerAxis / kItemsPerLoop);
+    const std::size_t which = now % kItemsPerLoop;
+    PidGains wanted = parameters.gains(joint, loop);
+    PidGains& sent = sent_gains[joint * kPidLoops + static_cast<std::size_t>(loop)];
+    if (item(wanted, which) == item(sent, which)) continue;
+    const SdoStep step = write_step(
+        canopen::of_axis(gains_object(loop), static_cast<int>(axis)),
+        static_cast<std::uint8_t>(which + 1), static_cast<float>(item(wanted, which)));
+    sdo.download(step.index, step.sub, step.value(), ports[node.plan.bus].sink);
+    item(sent, which) = item(wanted, which);
+    node.sending = static_cast<std::int16_t>(now);
+    node.next_item = now;
+    return;
+  }
+  for (const std::size_t joint : node.plan.joints) {
+    sent_revision[joint] = parameters.revision(joint);
+  }
+}
+
+bool DriveMaster::Impl::flush() noexcept {
+  bool all = true;
+  for (Port& port : ports) {
+    const auto frames = port.sink.frames();
+    if (!frames.empty()) all = port.bus->send(frames) == frames.size() && all;
+    port.sink.clear();
+  }
+  return all;
+}
+
+Code DriveMaster::Impl::receive_code() const noexcept {
+  for (const Port& port : ports) {
+    if (port.bus->state() == BusState::kBusOff) return Code::kBusOff;
+  }
+  if (stage == Stage::kFaulted || stage == Stage::kFailed) return Code::kFault;
+  if (stage != Stage::kRunning) return Code::kOk;
+  const bool silent = std::ranges::any_of(nodes, [](const Node& n) { return n.silent_cycles > 0; });
+  return silent ? Code::kTimeout : Code::kOk;
+}
+
+DriveMaster::DriveMaster(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+DriveMaster::~DriveMaster() = default;
+
+Result<std::unique_ptr<DriveMaster>> DriveMaster::create(const RobotConfig& robot,
+                                                         std::span<Bus* const> buses) {
+  if (buses.size() != robot.buses.size()) {
+    return fail("the drive master was given " + std::to_string(buses.size()) + " buses for " +
+                    std::to_string(robot.buses.size()) + " [[bus]] tables",
+                "give one bus end per table, in the tables' order");
+  }
+  auto layout = make_pdo_layout(robot);
+  if (!layout) return std::unexpected(layout.error());
+  return std::unique_ptr<DriveMaster>(
+      new DriveMaster(std::make_unique<Impl>(robot, std::move(*layout), buses)));
+}
+
+void DriveMaster::cycle_begin(const CycleTime& time) noexcept TANDEM_RT {
+  impl_->begin(time);
+  (void)impl_->flush();
+}
+
+Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  for (Impl::Port& port : m.ports) m.take_frames(port);
+  m.process_nodes();
+  if (!m.shutting_down) {
+    m.advance();
+    if (m.stage != Impl::Stage::kRunning) {
+      m.make_commands(nullptr);
+      m.write_pdos();
+    }
+  }
+  (void)m.flush();
+  m.fill(state);
+  return m.receive_code();
+}
+
+Code DriveMaster::send(const CommandImage& command,
+                       const ParameterImage& parameters) noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  if (m.shutting_down) return Code::kOk;
+  if (m.stage == Impl::Stage::kFailed) return Code::kFault;
+  if (m.stage == Impl::Stage::kBooting || m.stage == Impl::Stage::kEnabling) return Code::kOk;
+  m.take_resets(command);
+  if (m.stage == Impl::Stage::kFaulted) return Code::kFault;
+  m.make_commands(&command);
+  m.write_pdos();
+  m.send_parameters(parameters);
+  const bool taken = m.flush();
+  if (m.stage == Impl::Stage::kFaulted) return Code::kFault;
+  return taken ? Code::kOk : Code::kQueueFull;
+}
+
+bool DriveMaster::shut_down() noexcept TANDEM_RT {
+  const bool done = impl_->shut_down();
+  (void)impl_->flush();
+  return done;
+}
+
+Phase DriveMaster::phase() const noexcept {
+  switch (impl_->stage) {
+    case Impl::Stage::kBooting:
+    case Impl::Stage::kEnabling: return Phase::kBringUp;
+    case Impl::Stage::kRunning: return Phase::kOperational;
+    case Impl::Stage::kFaulted:
+    case Impl::Stage::kFailed: return Phase::kFault;
+  }
+  return Phase::kFault;
+}
+
+double DriveMaster::progress() const noexcept { return impl_->progress(); }
+std::string DriveMaster::status_text() const { return impl_->status(); }
+std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
+void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
+
+void DriveMaster::Impl::archive(Archive& ar) {
+  ar(stage, reaction, begun, shutting_down, now_ns, dt_ns, shut_down_since_ns, refused_node,
+     refused_step, refused_code, axes, sent_revision);
+  for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
+  for (Port& port : ports) ar(port.next_heartbeat_ns);
+  for (Node& node : nodes) {
+    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.recovering,
+       node.sending, node.next_item);
+  }
+}
+
+}  // namespace tandem::hal::can

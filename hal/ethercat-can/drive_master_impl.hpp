@@ -1,0 +1,121 @@
+// The drive master's parts. Private to drive_master*.cpp.
+// Layer: hal/ethercat-can.  Thread: the loop's.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "canopen/frame.hpp"
+#include "hal/ethercat-can/axis_master.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/node_master.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
+
+namespace tandem::hal::can {
+
+/// Most frames that one receive() takes from a bus; the rest waits for the next cycle.
+inline constexpr std::size_t kMaxFramesPerCycle = 512;
+
+struct DriveMaster::Impl {
+  enum class Stage : std::uint8_t {
+    kBooting,   ///< nodes are configured and started
+    kEnabling,  ///< axes walk to Operation Enabled for the first time
+    kRunning,
+    kFaulted,   ///< the reaction is carried out; resets lead back to kRunning
+    kFailed,    ///< bring-up failed, for good
+  };
+  /// One bus: what goes out, who is on it.
+  struct Port {
+    Port(Bus& end, std::size_t capacity) : bus(&end), storage(capacity), sink(storage) {
+      nodes.fill(-1);
+    }
+    Bus* bus;
+    std::vector<canopen::Frame> storage;
+    canopen::FrameSink sink;
+    std::array<std::int16_t, canopen::kMaxNodeId + 1> nodes{};  ///< by id: index in `nodes`
+    std::int64_t heartbeat_ns = 0;
+    std::int64_t next_heartbeat_ns = 0;
+  };
+  struct Node {
+    Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
+    NodePlan plan;
+    NodeMaster master;
+    int timeout_cycles;   ///< without feedback; 0: never
+    std::array<int, canopen::kPdosPerNode> tpdos{};  ///< by number - 1: index in plan.pdos, or -1
+    std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
+    std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
+    std::vector<float> channels;                     ///< a sensor's
+    std::uint32_t fields_heard = 0;                  ///< this cycle's axes, or sensor channels
+    std::uint32_t silent_cycles = 0;
+    bool recovering = false;                         ///< a lost node that is configured anew
+    // Parameters at run time
+    std::int16_t sending = -1;                       ///< item under way: see parameter_items
+    std::size_t next_item = 0;
+  };
+
+  Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
+
+  // Exchange: drive_master.cpp
+  void begin(const CycleTime& time) noexcept;
+  void take_frames(Port& port) noexcept;
+  void dispatch(Port& port, const canopen::Frame& frame) noexcept;
+  void on_tpdo(Node& node, int number, const canopen::Frame& frame) noexcept;
+  void on_emergency(Node& node, const canopen::Frame& frame) noexcept;
+  void process_nodes() noexcept;
+  void fill(StateImage& state) noexcept;
+  void write_pdos() noexcept;
+  void send_parameters(const ParameterImage& parameters) noexcept;
+  void send_parameter(Node& node, const ParameterImage& parameters) noexcept;
+  [[nodiscard]] bool flush() noexcept;
+  [[nodiscard]] Code receive_code() const noexcept;
+
+  // Stages: drive_master_stages.cpp
+  void advance() noexcept;
+  void boot() noexcept;
+  void watch() noexcept;
+  void react(StopCategory category) noexcept;
+  void recover() noexcept;
+  void take_resets(const CommandImage& command) noexcept;
+  void set_goals(AxisMaster::Goal goal) noexcept;
+  void fail() noexcept;
+  void make_commands(const CommandImage* image) noexcept;
+  [[nodiscard]] bool all_enabled() const noexcept;
+  [[nodiscard]] bool shut_down() noexcept;
+  [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }
+
+  // Texts: drive_master_text.cpp
+  [[nodiscard]] std::string status() const;
+  [[nodiscard]] std::string node_text(const Node& node) const;
+  [[nodiscard]] std::string step_text(const Node& node, const SdoStep& step) const;
+  [[nodiscard]] std::string axis_text(std::size_t joint) const;
+  [[nodiscard]] std::string joint_name(std::size_t joint) const;
+  [[nodiscard]] std::string refused_text() const;
+  [[nodiscard]] double progress() const noexcept;
+
+  void archive(Archive& ar);
+
+  RobotConfig robot;
+  std::vector<Port> ports;
+  std::vector<Node> nodes;
+  std::vector<AxisMaster> axes;          ///< by joint
+  std::vector<std::size_t> joint_node;   ///< by joint: index in nodes
+  std::vector<std::uint8_t> joint_fresh; ///< by joint: feedback came in this cycle
+  std::vector<PidGains> sent_gains;      ///< by joint and loop: what the drive has
+  std::vector<std::uint32_t> sent_revision;
+
+  Stage stage = Stage::kBooting;
+  StopCategory reaction = StopCategory::kWarn;
+  bool begun = false;
+  bool shutting_down = false;
+  std::int64_t now_ns = 0;
+  std::int64_t dt_ns = 0;
+  std::int64_t shut_down_since_ns = 0;
+  // The last value that a node refused at run time
+  std::int32_t refused_node = -1;
+  SdoStep refused_step;
+  canopen::AbortCode refused_code = canopen::AbortCode::kNone;
+};
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,214 @@
+#include <algorithm>
+
+#include "canopen/messages.hpp"
+#include "hal/ethercat-can/drive_master_impl.hpp"
+
+namespace tandem::hal::can {
+
+using Goal = AxisMaster::Goal;
+using NodeStage = NodeMaster::Stage;
+
+namespace {
+
+/// How long shut_down() waits for the drives to come to rest.
+constexpr std::int64_t kShutDownNs = 3'000'000'000;
+constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kHeartbeatLost);
+
+}  // namespace
+
+void DriveMaster::Impl::advance() noexcept {
+  switch (stage) {
+    case Stage::kBooting: boot(); break;
+    case Stage::kEnabling:
+      if (std::ranges::any_of(nodes, [](const Node& n) { return !n.master.running(); })) {
+        fail();
+      } else if (all_enabled()) {
+        set_goals(Goal::kFollow);
+        stage = Stage::kRunning;
+      }
+      break;
+    case Stage::kRunning:
+      watch();
+      recover();
+      break;
+    case Stage::kFaulted:
+      watch();
+      recover();
+      if (std::ranges::any_of(axes, [](const AxisMaster& axis) {
+            return axis.trouble() != AxisTrouble::kNone || axis.goal() == Goal::kReset;
+          })) {
+        break;
+      }
+      set_goals(Goal::kEnable);  // every fault is reset: all axes again, where they are
+      if (all_enabled()) {
+        set_goals(Goal::kFollow);
+        reaction = StopCategory::kWarn;
+        stage = Stage::kRunning;
+      }
+      break;
+    case Stage::kFailed: break;
+  }
+}
+
+void DriveMaster::Impl::boot() noexcept {
+  bool all_ready = true;
+  bool all_running = true;
+  for (const Node& node : nodes) {
+    const NodeStage at = node.master.stage();
+    if (at == NodeStage::kDown) return fail();
+    all_ready = all_ready && at == NodeStage::kReady;
+    all_running = all_running && at == NodeStage::kRunning;
+  }
+  if (all_ready) {
+    for (Node& node : nodes) node.master.start(now_ns, ports[node.plan.bus].sink);
+  } else if (all_running) {
+    set_goals(Goal::kBringUp);
+    stage = Stage::kEnabling;
+  }
+}
+
+/// Finds what went wrong since the last cycle, and carries the worst stop category out.
+void DriveMaster::Impl::watch() noexcept {
+  StopCategory worst = StopCategory::kWarn;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    AxisMaster& axis = axes[joint];
+    const Node& node = node_of(joint);
+    bool is_new = false;
+    if (node.master.stage() == NodeStage::kDown && axis.trouble() != AxisTrouble::kNodeLost) {
+      axis.latch(AxisTrouble::kNodeLost, kNodeLostCode, now_ns);
+      axis.set_goal(Goal::kNothing, now_ns);
+      is_new = true;
+    } else {
+      is_new = axis.check(now_ns);
+    }
+    if (is_new) worst = std::min(worst, robot.joints[joint].on_fault);
+  }
+  if (worst != StopCategory::kWarn) react(worst);
+}
+
+void DriveMaster::Impl::react(StopCategory category) noexcept {
+  reaction = std::min(reaction, category);  // the lower the number, the harder the stop
+  stage = Stage::kFaulted;
+  const Goal goal = reaction == StopCategory::kCategory0   ? Goal::kNothing
+                    : reaction == StopCategory::kCategory1 ? Goal::kQuickStop
+                                                           : Goal::kHold;
+  for (AxisMaster& axis : axes) {
+    const bool healthy = axis.trouble() == AxisTrouble::kNone;
+    axis.set_goal(healthy ? goal : Goal::kNothing, now_ns);
+  }
+}
+
+/// Goes on with what take_resets() began: drives that are reset, nodes that are configured anew.
+void DriveMaster::Impl::recover() noexcept {
+  for (Node& node : nodes) {
+    const bool sensor_lost =
+        node.plan.sensor >= 0 && node.master.stage() == NodeStage::kDown;
+    if (sensor_lost) {  // it moves nothing: it may come back by itself
+      node.master.restart(now_ns);
+      node.recovering = true;
+    }
+    if (!node.recovering) continue;
+    if (node.master.stage() == NodeStage::kReady) {
+      node.master.start(now_ns, ports[node.plan.bus].sink);
+    } else if (node.master.running()) {
+      node.recovering = false;
+      std::ranges::fill(node.sent, std::uint8_t{0});
+    } else if (node.master.stage() == NodeStage::kDown) {
+      node.recovering = false;  // a new reset may try again
+    }
+  }
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    AxisMaster& axis = axes[joint];
+    if (axis.trouble() == AxisTrouble::kNodeLost) {
+      if (node_of(joint).master.running() && axis.heard()) axis.clear_trouble();
+    } else if (axis.goal() == Goal::kReset) {
+      using canopen::DriveState;
+      const bool faulted = axis.drive() == DriveState::kFault ||
+                           axis.drive() == DriveState::kFaultReactionActive;
+      if (faulted) continue;
+      axis.clear_trouble();
+      axis.set_goal(Goal::kNothing, now_ns);
+    }
+    const bool idle_alone = stage == Stage::kRunning && axis.goal() == Goal::kNothing &&
+                            axis.trouble() == AxisTrouble::kNone;
+    if (idle_alone) axis.set_goal(Goal::kEnable, now_ns);
+    if (stage == Stage::kRunning && axis.goal() == Goal::kEnable && axis.enabled()) {
+      axis.set_goal(Goal::kFollow, now_ns);
+    }
+  }
+}
+
+void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept {
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    AxisMaster& axis = axes[joint];
+    if (command.fault_reset()[joint] == 0 || axis.trouble() == AxisTrouble::kNone) continue;
+    if (axis.trouble() != AxisTrouble::kNodeLost) {
+      axis.set_goal(Goal::kReset, now_ns);
+      continue;
+    }
+    Node& node = node_of(joint);
+    if (node.recovering || node.master.stage() != NodeStage::kDown) continue;
+    node.recovering = true;
+    node.sending = -1;
+    node.master.restart(now_ns);
+    for (const std::size_t lost : node.plan.joints) {
+      axes[lost].forget();
+      // The configuration goes back to the file's gains; what was set since is sent again.
+      const GainsConfig& gains = robot.gains_of(robot.joints[lost]);
+      sent_gains[lost * kPidLoops + 0] = gains.position.gains;
+      sent_gains[lost * kPidLoops + 1] = gains.velocity.gains;
+      sent_gains[lost * kPidLoops + 2] = gains.torque.gains;
+      sent_gains[lost * kPidLoops + 3] = gains.current.gains;
+      sent_revision[lost] = 0;
+    }
+  }
+}
+
+void DriveMaster::Impl::set_goals(Goal goal) noexcept {
+  for (AxisMaster& axis : axes) axis.set_goal(goal, now_ns);
+}
+
+void DriveMaster::Impl::fail() noexcept {
+  stage = Stage::kFailed;
+  set_goals(Goal::kNothing);
+}
+
+void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept {
+  StopCategory worst = StopCategory::kWarn;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    AxisMaster& axis = axes[joint];
+    if (!axis.command(image, joint, now_ns)) continue;
+    if (axis.goal() == Goal::kReset) {  // the cause is still there: stays latched
+      axis.set_goal(Goal::kNothing, now_ns);
+    } else {
+      worst = std::min(worst, robot.joints[joint].on_fault);
+      if (stage == Stage::kEnabling) return fail();
+    }
+  }
+  if (worst != StopCategory::kWarn) react(worst);
+}
+
+bool DriveMaster::Impl::all_enabled() const noexcept {
+  return std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.enabled(); });
+}
+
+bool DriveMaster::Impl::shut_down() noexcept {
+  if (!shutting_down) {
+    shutting_down = true;
+    shut_down_since_ns = now_ns;
+    set_goals(Goal::kQuickStop);
+  }
+  const bool at_rest = std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.off(); });
+  const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
+  if (done) set_goals(Goal::kNothing);
+  make_commands(nullptr);
+  write_pdos();
+  if (!done) return false;
+  for (Node& node : nodes) {
+    ports[node.plan.bus].sink.push(
+        canopen::make_nmt(canopen::NmtCommand::kEnterPreOperational, node.plan.id));
+  }
+  return true;
+}
+
+}  // namespace tandem::hal::can

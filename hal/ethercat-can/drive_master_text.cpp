@@ -1,0 +1,174 @@
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "hal/ethercat-can/drive_master_impl.hpp"
+
+namespace tandem::hal::can {
+
+using NodeStage = NodeMaster::Stage;
+
+namespace {
+
+/// Share of the bring-up that the configuration of the nodes makes; the rest is the enabling.
+constexpr double kConfigurationShare = 0.9;
+constexpr std::size_t kMostCauses = 8;  // named in one text
+
+const char* label(const NodePlan& plan) { return plan.board >= 0 ? "board" : "sensor"; }
+
+/// The value of a step of 1 to 4 bytes as a number, for messages about identity.
+std::uint32_t number(const SdoStep& step) {
+  return canopen::get<std::uint32_t>(step.bytes.data());
+}
+
+const char* identity_name(const SdoStep& step) {
+  if (step.index == canopen::object::kDeviceType) return "device type";
+  return step.sub == canopen::kVendor ? "vendor id" : "product code";
+}
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+}  // namespace
+
+std::string DriveMaster::Impl::joint_name(std::size_t joint) const {
+  const Node& node = nodes[joint_node[joint]];
+  return fmt::format("joint {} (board {}, node {}, axis {})", robot.joints[joint].name,
+                     node.plan.name, node.plan.id, robot.joints[joint].axis);
+}
+
+/// "object 2820:01 of joint LHip (board …)".
+std::string DriveMaster::Impl::step_text(const Node& node, const SdoStep& step) const {
+  const bool of_joint =
+      step.axis >= 0 && static_cast<std::size_t>(step.axis) < node.plan.joints.size();
+  return fmt::format("object {:04X}:{:02X} of {}", step.index, step.sub,
+                     of_joint ? joint_name(node.plan.joints[static_cast<std::size_t>(step.axis)])
+                              : fmt::format("{} {} (node {})", label(node.plan), node.plan.name,
+                                            node.plan.id));
+}
+
+std::string DriveMaster::Impl::node_text(const Node& node) const {
+  const NodeMaster& m = node.master;
+  const std::string who = fmt::format("{} {} (node {}, bus {})", label(node.plan), node.plan.name,
+                                      node.plan.id, robot.buses[node.plan.bus].name);
+  const double limit_s = seconds(NodeMaster::kBootTimeoutNs);
+  switch (m.trouble()) {
+    case NodeTrouble::kNone: break;
+    case NodeTrouble::kNoBootUp:
+      return fmt::format("{}: no boot-up message within {:.0f} s; is it powered and connected, "
+                         "and is its node id {}?", who, limit_s, node.plan.id);
+    case NodeTrouble::kWrongIdentity: {
+      const SdoStep& step = m.steps()[m.step()];
+      return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}", who,
+                         identity_name(step), step.index, step.sub, m.read_value(), number(step));
+    }
+    case NodeTrouble::kSdoAbort: {
+      const SdoStep& step = m.steps()[m.step()];
+      return fmt::format("{} of {} failed: {} (abort code 0x{:08X})",
+                         step.check ? "reading" : "writing", step_text(node, step),
+                         canopen::to_string(m.abort_code()),
+                         static_cast<std::uint32_t>(m.abort_code()));
+    }
+    case NodeTrouble::kNotOperational:
+      return fmt::format("{}: stays {} after NMT start", who, canopen::to_string(m.nmt_state()));
+    case NodeTrouble::kRebooted:
+      return fmt::format("{}: booted again by itself at {:.3f} s", who,
+                         seconds(m.trouble_time_ns()));
+    case NodeTrouble::kHeartbeatLost:
+      return fmt::format("{}: heartbeat lost at {:.3f} s (none for {} ms)", who,
+                         seconds(m.trouble_time_ns()), kHeartbeatPeriods * node.plan.heartbeat_ms);
+    case NodeTrouble::kLeftOperational:
+      return fmt::format("{}: went to {} by itself at {:.3f} s", who,
+                         canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));
+    case NodeTrouble::kFeedbackLost:
+      return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who,
+                         node.timeout_cycles, seconds(m.trouble_time_ns()));
+  }
+  switch (m.stage()) {
+    case NodeStage::kWaitBootUp: return who + ": waiting for its boot-up message";
+    case NodeStage::kConfigure:
+      return fmt::format("{}: configuring, object {} of {}", who, m.step() + 1, m.steps().size());
+    case NodeStage::kReady: return who + ": configured";
+    case NodeStage::kStarting: return who + ": waiting for operational";
+    default: return {};
+  }
+}
+
+std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
+  const AxisMaster& axis = axes[joint];
+  const double at_s = seconds(axis.trouble_time_ns());
+  switch (axis.trouble()) {
+    case AxisTrouble::kNone: return {};
+    case AxisTrouble::kDriveFault:
+      return fmt::format("{}: {} (error code 0x{:04X}) at {:.3f} s", joint_name(joint),
+                         canopen::to_string(static_cast<canopen::ErrorCode>(axis.fault_code())),
+                         axis.fault_code(), at_s);
+    case AxisTrouble::kNotEnabled:
+      return fmt::format("{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
+                         "0x{:04X}", joint_name(joint), canopen::to_string(axis.drive()),
+                         canopen::of_axis(canopen::object::kStatusword, robot.joints[joint].axis),
+                         axis.feedback().statusword, axis.raw().controlword);
+    case AxisTrouble::kLeftEnabled:
+      return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
+                         joint_name(joint), canopen::to_string(axis.drive()), at_s);
+    case AxisTrouble::kNodeLost: {
+      const std::string cause = node_text(nodes[joint_node[joint]]);
+      return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,
+                         cause.empty() ? "" : ": ", cause);
+    }
+  }
+  return {};
+}
+
+std::string DriveMaster::Impl::status() const {
+  std::vector<std::string> causes;
+  if (stage != Stage::kBooting && stage != Stage::kEnabling) {
+    for (std::size_t j = 0; j < axes.size(); ++j) {
+      if (std::string text = axis_text(j); !text.empty()) causes.push_back(std::move(text));
+    }
+  }
+  for (const Node& node : nodes) {
+    const bool told = !causes.empty() && node.plan.board >= 0;
+    const bool waits = stage == Stage::kBooting && node.master.stage() != NodeStage::kReady;
+    if (told || (!waits && node.master.trouble() == NodeTrouble::kNone)) continue;
+    if (stage == Stage::kFailed && node.master.trouble() == NodeTrouble::kNone) continue;
+    if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
+  }
+  for (std::size_t j = 0; stage == Stage::kEnabling && j < axes.size(); ++j) {
+    if (axes[j].enabled()) continue;
+    causes.push_back(fmt::format("{}: waiting for 'operation enabled', is in '{}'", joint_name(j),
+                                 canopen::to_string(axes[j].drive())));
+  }
+  if (causes.empty()) return stage == Stage::kFaulted ? "enabling every axis again" : "";
+  std::string text;
+  for (std::size_t i = 0; i < std::min(causes.size(), kMostCauses); ++i) {
+    text += (i == 0 ? "" : "\n") + causes[i];
+  }
+  if (causes.size() > kMostCauses) {
+    text += fmt::format("\nand {} more", causes.size() - kMostCauses);
+  }
+  return text;
+}
+
+std::string DriveMaster::Impl::refused_text() const {
+  if (refused_node < 0) return {};
+  return fmt::format("{}: {} (abort code 0x{:08X})",
+                     step_text(nodes[static_cast<std::size_t>(refused_node)], refused_step),
+                     canopen::to_string(refused_code), static_cast<std::uint32_t>(refused_code));
+}
+
+double DriveMaster::Impl::progress() const noexcept {
+  if (stage == Stage::kRunning || stage == Stage::kFaulted) return 1.0;
+  std::size_t done = 0;
+  std::size_t all = 0;
+  for (const Node& node : nodes) {
+    all += node.master.steps().size();
+    done += node.master.step();
+  }
+  const auto enabled = std::ranges::count_if(axes, &AxisMaster::enabled);
+  const double configured = all == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(all);
+  const double up = axes.empty() ? 1.0
+                                 : static_cast<double>(enabled) / static_cast<double>(axes.size());
+  return kConfigurationShare * configured + (1.0 - kConfigurationShare) * up;
+}
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,104 @@
+// The master's view of one node: its way from reset to operation, and its heartbeat after that.
+// Layer: hal/ethercat-can.  Thread: construction non-RT; the rest the loop's thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "canopen/messages.hpp"
+#include "canopen/sdo.hpp"
+#include "hal/ethercat-can/sdo_sequence.hpp"
+
+namespace tandem::hal::can {
+
+/// Why a node is not, or no longer, in operation.
+enum class NodeTrouble : std::uint8_t {
+  kNone = 0,
+  kNoBootUp,        ///< it never said that it is there
+  kWrongIdentity,   ///< a check step read something else
+  kSdoAbort,        ///< a configuration step was refused, or not answered
+  kNotOperational,  ///< it did not follow NMT start
+  kRebooted,        ///< it booted again by itself
+  kHeartbeatLost,
+  kLeftOperational,  ///< its heartbeat says another NMT state
+  kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
+};
+
+/// Non-blocking: frames and time in, frames out, at most one SDO request per call.
+class NodeMaster {
+ public:
+  enum class Stage : std::uint8_t {
+    kWaitBootUp,
+    kConfigure,
+    kReady,     ///< configured; start() lets it run
+    kStarting,  ///< NMT start is sent
+    kRunning,
+    kDown,      ///< trouble() says why
+  };
+
+  static constexpr std::int64_t kBootTimeoutNs = 3'000'000'000;
+  static constexpr std::int64_t kResetEveryNs = 500'000'000;
+  static constexpr std::int64_t kSdoAnswerNs = 100'000'000;
+  static constexpr int kSdoTries = 3;
+  static constexpr std::int64_t kStartTimeoutNs = 1'000'000'000;
+  static constexpr int kReboots = 3;
+
+  NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps);
+
+  /// Begins, or begins again, with a reset of the node.
+  void restart(std::int64_t now_ns) noexcept TANDEM_RT;
+  void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;
+  void on_sdo(const canopen::Frame& frame, canopen::FrameSink& out) noexcept TANDEM_RT;
+  /// Once per cycle, after the cycle's frames.
+  void process(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept
+      TANDEM_RT;
+  /// NMT start. @pre stage() == kReady
+  void start(std::int64_t now_ns, canopen::FrameSink& out) noexcept TANDEM_RT;
+  /// Takes it out of operation with this trouble; nothing is sent.
+  void fail(NodeTrouble trouble, std::int64_t now_ns) noexcept TANDEM_RT;
+
+  /// The client for transfers at run time. @pre stage() == kRunning
+  [[nodiscard]] canopen::SdoClient& sdo() noexcept { return sdo_; }
+
+  [[nodiscard]] Stage stage() const noexcept { return stage_; }
+  [[nodiscard]] bool running() const noexcept { return stage_ == Stage::kRunning; }
+  [[nodiscard]] NodeTrouble trouble() const noexcept { return trouble_; }
+  [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
+  [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return nmt_; }
+  [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return abort_code_; }
+  /// What the failed check read.
+  [[nodiscard]] std::uint32_t read_value() const noexcept { return read_value_; }
+  [[nodiscard]] std::size_t step() const noexcept { return step_; }
+  [[nodiscard]] const std::vector<SdoStep>& steps() const noexcept { return steps_; }
+
+  void archive(Archive& ar);
+
+ private:
+  void configure(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept;
+  void step_answered(std::int64_t now_ns) noexcept;
+  void request(canopen::FrameSink& out) noexcept;
+  void watch_heartbeat(std::int64_t now_ns) noexcept;
+  void enter(Stage stage, std::int64_t now_ns) noexcept;
+
+  int id_;
+  std::int64_t heartbeat_timeout_ns_;
+  std::vector<SdoStep> steps_;
+
+  Stage stage_ = Stage::kWaitBootUp;
+  NodeTrouble trouble_ = NodeTrouble::kNone;
+  canopen::NmtState nmt_ = canopen::NmtState::kBootUp;
+  bool requested_ = false;  ///< the step's request is out
+  int tries_ = 0;
+  int reboots_ = 0;
+  std::size_t step_ = 0;
+  std::int64_t since_ns_ = 0;       ///< when the stage began
+  std::int64_t next_reset_ns_ = 0;
+  std::int64_t heard_ns_ = 0;       ///< last heartbeat
+  std::int64_t trouble_ns_ = 0;
+  canopen::AbortCode abort_code_ = canopen::AbortCode::kNone;
+  std::uint32_t read_value_ = 0;
+  canopen::SdoClient sdo_;
+};
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,144 @@
+#include "hal/ethercat-can/sdo_sequence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "canopen/objects.hpp"
+#include "hal/ethercat-can/axis_codec.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+
+namespace tandem::hal::can {
+
+namespace {
+
+using namespace canopen;
+namespace object = canopen::object;
+using Steps = std::vector<SdoStep>;
+
+float real32(double value) { return static_cast<float>(value); }
+
+void add_identity(Steps& steps, bool board) {
+  const auto check = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value) {
+    SdoStep step = write_step(index, sub, value);
+    step.check = true;
+    steps.push_back(step);
+  };
+  check(object::kDeviceType, 0, board ? kDriveDeviceType : kSensorDeviceType);
+  check(object::kIdentity, kVendor, kTandemVendor);
+  check(object::kIdentity, kProduct, board ? kBoardProduct : kSensorProduct);
+}
+
+/// CiA 301's procedure: out of use, no entries, the entries, their number, in use.
+void add_pdo(Steps& steps, const PdoPlan& pdo) {
+  const bool receive = pdo.direction == PdoDirection::kReceive;
+  const auto offset = static_cast<std::uint16_t>(pdo.number - 1);
+  const auto parameter = static_cast<std::uint16_t>(
+      (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
+  const auto mapping = static_cast<std::uint16_t>(
+      (receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
+  steps.push_back(write_step(parameter, 1, pdo.cob_id | cob::kInvalid));
+  steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
+  std::uint8_t count = 0;
+  for (const MappedField& field : pdo.fields) {
+    steps.push_back(write_step(mapping, ++count, mapping_entry(field.index, field.sub,
+                                                               field.size)));
+  }
+  steps.push_back(write_step(mapping, 0, count));
+  steps.push_back(write_step(parameter, 2, pdo.transmission));
+  steps.push_back(write_step(parameter, 1, pdo.cob_id));
+}
+
+/// Adds steps for the objects of one axis.
+class AxisSteps {
+ public:
+  AxisSteps(Steps& steps, int axis) : steps_(steps), axis_(axis) {}
+  template <class T>
+  void operator()(std::uint16_t index, std::uint8_t sub, T value) {
+    steps_.push_back(write_step(of_axis(index, axis_), sub, value, axis_));
+  }
+
+ private:
+  Steps& steps_;
+  int axis_;
+};
+
+void add_scales(AxisSteps& add, const JointConfig& joint) {
+  const AxisScale scale = AxisScale::of(joint);
+  const double rated_Nm = joint.rated_torque_Nm;
+  add(object::kEncoderResolution, 1, clamp_round<std::uint32_t>(joint.encoder_counts_per_rev));
+  add(object::kMotorResolution, 0,
+      clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
+  add(object::kRatedTorque, 0, clamp_round<std::uint32_t>(1000.0 * rated_Nm));
+  add(object::kMaxTorque, 0, clamp_round<std::uint16_t>(1000.0 * joint.max_torque_Nm / rated_Nm));
+  add(object::kSoftwareLimits, 1,
+      clamp_round<std::int32_t>(joint.min_position_rad * scale.counts_per_rad));
+  add(object::kSoftwareLimits, 2,
+      clamp_round<std::int32_t>(joint.max_position_rad * scale.counts_per_rad));
+}
+
+void add_loops(AxisSteps& add, const ActuatorConfig& motor, const GainsConfig& gains) {
+  const auto loop = [&](std::uint16_t index, const PidConfig& pid) {
+    add(index, kPidKp, real32(pid.gains.kp));
+    add(index, kPidKi, real32(pid.gains.ki));
+    add(index, kPidKd, real32(pid.gains.kd));
+    add(index, kPidOutputLimit, real32(pid.output_limit));
+  };
+  loop(object::kPositionGains, gains.position);
+  loop(object::kVelocityGains, gains.velocity);
+  loop(object::kTorqueGains, gains.torque);
+  loop(object::kCurrentGains, gains.current);
+  const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
+  const double voltage_per_Nm = constant_Nm_A > 0.0 ? motor.resistance_ohm / constant_Nm_A : 0.0;
+  add(object::kFeedForward, kTorqueToVoltage, real32(gains.torque_feedforward * voltage_per_Nm));
+  add(object::kFeedForward, kEmfCompensation, real32(gains.emf_compensation * constant_Nm_A));
+  add(object::kPositionFeedback, 0, static_cast<std::uint8_t>(gains.position_feedback));
+  add(object::kMotorData, kMotorResistance, real32(motor.resistance_ohm));
+  add(object::kMotorData, kMotorTorqueConstant, real32(constant_Nm_A));
+  const bool elastic = motor.order >= 2;
+  add(object::kMotorData, kMotorSpring, real32(elastic ? motor.spring_Nm_rad : 0.0));
+  add(object::kStiffness, 0, real32(gains.stiffness_Nm_rad));
+  add(object::kDamping, 0, real32(gains.damping_Nms_rad));
+}
+
+void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
+  const JointConfig& joint = robot.joints[node.joints[axis]];
+  const ActuatorConfig& motor = robot.actuator_of(joint);
+  AxisSteps add(steps, static_cast<int>(axis));
+  add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
+  add_scales(add, joint);
+  add_loops(add, motor, robot.gains_of(joint));
+  add(object::kLimits, kVoltageLimit, real32(motor.voltage_limit_V));
+  add(object::kLimits, kCurrentLimit, real32(motor.current_limit_A));
+  add(object::kLimits, kTorqueLimit, real32(joint.max_torque_Nm));
+  add(object::kLimits, kVelocityLimit, real32(joint.max_velocity_rad_s));
+  const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
+  add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
+}
+
+}  // namespace
+
+std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan& node) {
+  Steps steps;
+  add_identity(steps, node.board >= 0);
+  for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo);
+  for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
+  const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
+  steps.push_back(write_step(object::kHeartbeatConsumer, 1,
+                             static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));
+  steps.push_back(write_step(object::kHeartbeatProducer, 0,
+                             clamp_round<std::uint16_t>(node.heartbeat_ms)));
+  return steps;
+}
+
+std::uint16_t gains_object(PidLoop loop) noexcept {
+  switch (loop) {
+    case PidLoop::kPosition: return object::kPositionGains;
+    case PidLoop::kVelocity: return object::kVelocityGains;
+    case PidLoop::kTorque: return object::kTorqueGains;
+    case PidLoop::kCurrent: return object::kCurrentGains;
+  }
+  return object::kPositionGains;
+}
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,50 @@
+// What the master reads and writes by SDO to make a node ready, as a list made beforehand.
+// Layer: hal/ethercat-can.  Thread: made non-RT; immutable afterwards.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "canopen/bytes.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::hal::can {
+
+/// One transfer of 1 to 4 bytes.
+struct SdoStep {
+  bool check = false;        ///< true: upload, and compare with `bytes`
+  std::uint8_t sub = 0;
+  std::uint16_t index = 0;
+  std::int8_t axis = -1;     ///< for messages; -1: the node's own object
+  std::uint8_t size = 0;
+  std::array<std::uint8_t, 4> bytes{};
+
+  [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
+    return {bytes.data(), size};
+  }
+};
+
+template <class T>
+[[nodiscard]] SdoStep write_step(std::uint16_t index, std::uint8_t sub, T value, int axis = -1) {
+  SdoStep step{.sub = sub,
+               .index = index,
+               .axis = static_cast<std::int8_t>(axis),
+               .size = static_cast<std::uint8_t>(sizeof(T))};
+  canopen::put(step.bytes.data(), value);
+  return step;
+}
+
+/// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent.
+[[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,
+                                                      const NodePlan& node);
+
+/// The object of a loop's gains on axis 0 (2020 to 2023).
+[[nodiscard]] std::uint16_t gains_object(PidLoop loop) noexcept;
+
+/// How many of a heartbeat's periods may pass without it.
+inline constexpr int kHeartbeatPeriods = 3;
+
+}  // namespace tandem::hal::can
