@@ -85,8 +85,7 @@ class Completion {
 
   void check_sensors() {
     std::vector<std::string> joints = names_of(description_.moving_joints);
-    joints.insert(joints.end(), description_.other_joints.begin(),
-                  description_.other_joints.end());
+    joints.insert(joints.end(), description_.other_joints.begin(), description_.other_joints.end());
     for (const SensorConfig& sensor : robot_.sensors) {
       const std::string key = "sensor." + sensor.name;
       check_name(sensor.line, key + ".link", "link", sensor.link, description_.links);
@@ -97,8 +96,8 @@ class Completion {
 
   /// Positions travel as 32-bit counts: this is the largest one, with a margin for overshoot.
   static double countable_rad(const JointConfig& joint) {
-    const double counts = std::max(joint.encoder_counts_per_rev,
-                                   joint.motor_encoder_counts_per_rev);
+    const double counts =
+        std::max(joint.encoder_counts_per_rev, joint.motor_encoder_counts_per_rev);
     return 0.9 * 2147483647.0 / counts * 2.0 * std::numbers::pi;
   }
 
@@ -114,8 +113,8 @@ class Completion {
     const JointDescription* found = find(description_.moving_joints, joint.name);
     const std::string key = "joint." + joint.name;
     if (found == nullptr) {
-      const bool fixed =
-          std::ranges::find(description_.other_joints, joint.name) != description_.other_joints.end();
+      const bool fixed = std::ranges::find(description_.other_joints, joint.name) !=
+                         description_.other_joints.end();
       if (fixed) {
         error(joint.line, key, "the joint '" + joint.name + "' does not move in the description",
               "remove the [[joint]]");

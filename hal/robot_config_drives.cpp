@@ -113,8 +113,9 @@ void check_seat(TomlTable& table, const JointConfig& joint, const RobotConfig& r
                             "' and '" + joint.board + "'",
                   "remove one of the two");
     } else if (!joint.board.empty() && other.board == joint.board && other.axis == joint.axis) {
-      table.error("axis", "axis " + std::to_string(joint.axis) + " of board '" + joint.board +
-                              "' already drives joint '" + other.name + "'",
+      table.error("axis",
+                  "axis " + std::to_string(joint.axis) + " of board '" + joint.board +
+                      "' already drives joint '" + other.name + "'",
                   "give each joint of a board an axis of its own");
     }
   }
@@ -141,8 +142,7 @@ void read_joint(TomlTable table, const JointConfig& defaults, RobotConfig& robot
       number_or_default(table, "encoder_counts_per_rev", joint.encoder_counts_per_rev);
   joint.motor_encoder_counts_per_rev =
       number_or_default(table, "motor_encoder_counts_per_rev", joint.motor_encoder_counts_per_rev);
-  joint.torque_noise_Nm =
-      table.number_or("torque_noise_Nm", joint.torque_noise_Nm, kNotNegative);
+  joint.torque_noise_Nm = table.number_or("torque_noise_Nm", joint.torque_noise_Nm, kNotNegative);
   joint.on_fault = read_stop_category(table, joint.on_fault);
   check_seat(table, joint, robot);
   table.finish();

@@ -47,7 +47,7 @@ void check_reference(TomlTable& table, std::string_view key, const std::string& 
 }
 
 inline std::array<double, 3> vector3(TomlTable& table, std::string_view key,
-                              std::array<double, 3> value) {
+                                     std::array<double, 3> value) {
   if (!table.has(key)) return value;
   const std::vector<double> found = table.numbers(key, 3);
   return {found[0], found[1], found[2]};

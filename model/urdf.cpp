@@ -117,13 +117,12 @@ class Builder {
 
  private:
   void error(int line, std::string key, std::string message, std::string hint) {
-    errors_.push_back(
-        {std::move(message), std::move(hint), out_.tree.file, line, std::move(key)});
+    errors_.push_back({std::move(message), std::move(hint), out_.tree.file, line, std::move(key)});
   }
 
   const double* lock_of(const std::string& joint) const {
-    const auto found = std::ranges::find(options_.lock, joint,
-                                         &std::pair<std::string, double>::first);
+    const auto found =
+        std::ranges::find(options_.lock, joint, &std::pair<std::string, double>::first);
     return found == options_.lock.end() ? nullptr : &found->second;
   }
 
@@ -138,13 +137,17 @@ class Builder {
         continue;
       }
       const int line = outline_.joint_lines.at(name);
-      if (!moves(*joint)) error(line, key, "a fixed joint is locked", "remove it from [model.lock]");
-      if (!std::isfinite(position)) error(line, key, "is locked at a position that is not finite", "");
+      if (!moves(*joint))
+        error(line, key, "a fixed joint is locked", "remove it from [model.lock]");
+      if (!std::isfinite(position))
+        error(line, key, "is locked at a position that is not finite", "");
       const bool bounded = moves(*joint) && joint->type != urdf::Joint::CONTINUOUS;
       if (bounded && (position < joint->limits->lower || position > joint->limits->upper)) {
-        error(line, key, "is locked at " + std::to_string(position) + ", beyond its limits " +
-              std::to_string(joint->limits->lower) + " to " +
-              std::to_string(joint->limits->upper), "lock it within them");
+        error(line, key,
+              "is locked at " + std::to_string(position) + ", beyond its limits " +
+                  std::to_string(joint->limits->lower) + " to " +
+                  std::to_string(joint->limits->upper),
+              "lock it within them");
       }
     }
   }
@@ -267,8 +270,8 @@ std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   if (!in || (text << in.rdbuf(), in.bad())) {
-    return std::unexpected(one_error("cannot read this description",
-                                     "check the path and its permissions", file));
+    return std::unexpected(
+        one_error("cannot read this description", "check the path and its permissions", file));
   }
   return parse_urdf(text.str(), file, options);
 }

@@ -30,8 +30,7 @@ std::string problem(const Inertia& inertia) {
     return "the inertia is not positive definite: principal moments " + moments_text(moments);
   }
   if (moments[0] + moments[1] < moments[2] * (1.0 - kTriangleTolerance)) {
-    return "the inertia breaks the triangle inequality: principal moments " +
-           moments_text(moments);
+    return "the inertia breaks the triangle inequality: principal moments " + moments_text(moments);
   }
   return {};
 }
@@ -85,8 +84,9 @@ class Checker {
       if (carried[i + 1] > 0.0) continue;
       const Joint& joint = tree_.joints[i];
       errors_.push_back({"the joint moves nothing that has mass",
-                         "give link '" + tree_.bodies[i + 1].name + "' mass and inertia, lock the "
-                         "joint or make it fixed",
+                         "give link '" + tree_.bodies[i + 1].name +
+                             "' mass and inertia, lock the "
+                             "joint or make it fixed",
                          tree_.file, joint.line, "joint " + joint.name});
     }
     const Body& base = tree_.bodies[0];

@@ -55,8 +55,10 @@ class Reader {
       case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED:
         return error(document_.ErrorLineNum(), "", "elements are nested too deep");
       default:
-        error(document_.ErrorLineNum(), "", "not well-formed XML: an element is not closed or "
-              "is misspelt", "correct it at or after this line; the file may have been cut off");
+        error(document_.ErrorLineNum(), "",
+              "not well-formed XML: an element is not closed or "
+              "is misspelt",
+              "correct it at or after this line; the file may have been cut off");
     }
   }
 
@@ -99,8 +101,8 @@ class Reader {
       return error(e.GetLineNum(), name, "unknown element <" + name + ">",
                    "did you mean <" + meant + ">?");
     }
-    out_.warnings.push_back({"the element <" + name + "> is not used", {}, file_, e.GetLineNum(),
-                             name});
+    out_.warnings.push_back(
+        {"the element <" + name + "> is not used", {}, file_, e.GetLineNum(), name});
   }
 
   std::string attribute(const XMLElement& e, const char* name, const std::string& key,
@@ -108,8 +110,8 @@ class Reader {
     const char* value = e.Attribute(name);
     if (value != nullptr && *value != '\0') return value;
     if (needed == Needed::kYes) {
-      error(e.GetLineNum(), key,
-            std::string("<") + e.Name() + "> has no attribute '" + name + "'", "add it");
+      error(e.GetLineNum(), key, std::string("<") + e.Name() + "> has no attribute '" + name + "'",
+            "add it");
     }
     return {};
   }
@@ -138,8 +140,8 @@ class Reader {
       return nullptr;
     }
     if (const XMLElement* second = found->NextSiblingElement(name)) {
-      error(second->GetLineNum(), key,
-            std::string("<") + e.Name() + "> has two <" + name + ">", "remove one of them");
+      error(second->GetLineNum(), key, std::string("<") + e.Name() + "> has two <" + name + ">",
+            "remove one of them");
     }
     return found;
   }
@@ -185,8 +187,8 @@ class Reader {
     return true;
   }
 
-  void check_unique(std::map<std::string, int>& lines, const std::string& name,
-                    const XMLElement& e, const std::string& key) {
+  void check_unique(std::map<std::string, int>& lines, const std::string& name, const XMLElement& e,
+                    const std::string& key) {
     const auto [at, fresh] = lines.emplace(name, e.GetLineNum());
     if (fresh || name.empty()) return;
     error(e.GetLineNum(), key,

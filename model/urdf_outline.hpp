@@ -35,7 +35,7 @@ struct Outline {
   Diagnostics errors;
   Diagnostics warnings;
 
-  std::map<std::string, int> link_lines;   ///< of the first link of each name
+  std::map<std::string, int> link_lines;  ///< of the first link of each name
   std::map<std::string, int> joint_lines;
 };
 

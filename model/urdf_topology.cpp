@@ -22,14 +22,13 @@ class Topology {
 
  private:
   void error(int line, std::string key, std::string message, std::string hint) {
-    outline_.errors.push_back(
-        {std::move(message), std::move(hint), file_, line, std::move(key)});
+    outline_.errors.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
   }
 
   void check_ends(const OutlineJoint& joint) {
     const std::string key = "joint " + joint.name;
-    for (const auto& [role, link] : {std::pair("parent", joint.parent),
-                                     std::pair("child", joint.child)}) {
+    for (const auto& [role, link] :
+         {std::pair("parent", joint.parent), std::pair("child", joint.child)}) {
       if (link.empty() || outline_.link_lines.contains(link)) continue;
       error(joint.line, key, std::string("there is no link '") + link + "', its " + role,
             suggest(link, names(outline_.link_lines)));

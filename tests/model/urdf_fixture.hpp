@@ -82,7 +82,7 @@ inline std::string errors_of(const std::string& text, const UrdfOptions& options
 }
 
 inline void expect_error(const std::string& text, const std::string& expected,
-                  const UrdfOptions& options = {}) {
+                         const UrdfOptions& options = {}) {
   EXPECT_EQ(errors_of(text, options), expected + "\n");
 }
 

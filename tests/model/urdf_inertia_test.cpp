@@ -51,18 +51,19 @@ TEST(UrdfInertia, RefusesABodyThatItsNegligibleLinksMakeImpossible) {
 }
 
 TEST(UrdfInertia, MergesDummiesOfNoMassAtAll) {
-  EXPECT_EQ(errors_of(with("<link name=\"tip\"/>",
-                           "<link name=\"tip\"><inertial><mass value=\"1e-6\"/><inertia ixx=\"0\" "
-                           "ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/></inertial></link>")),
-            "");
+  EXPECT_EQ(
+      errors_of(with("<link name=\"tip\"/>",
+                     "<link name=\"tip\"><inertial><mass value=\"1e-6\"/><inertia ixx=\"0\" "
+                     "ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/></inertial></link>")),
+      "");
 }
 
 TEST(UrdfInertia, RefusesAMovingJointThatCarriesNoMass) {
-  expect_error(replaced(with("joint name=\"end\" type=\"fixed\"",
-                             "joint name=\"end\" type=\"continuous\""),
-                        "<origin xyz=\"0 0 0.1\"/>", ""),
-               "arm.urdf:42: joint end: the joint moves nothing that has mass "
-               "(give link 'tip' mass and inertia, lock the joint or make it fixed)");
+  expect_error(
+      replaced(with("joint name=\"end\" type=\"fixed\"", "joint name=\"end\" type=\"continuous\""),
+               "<origin xyz=\"0 0 0.1\"/>", ""),
+      "arm.urdf:42: joint end: the joint moves nothing that has mass "
+      "(give link 'tip' mass and inertia, lock the joint or make it fixed)");
 }
 
 TEST(UrdfInertia, AcceptsAMasslessLinkBetweenMovingJoints) {

@@ -69,8 +69,8 @@ INSTANTIATE_TEST_SUITE_P(All, PublicRobot, testing::ValuesIn(known_robots()),
 TEST(PublicRobots, AreEight) { EXPECT_EQ(known_robots().size(), 8u); }
 
 TEST(PublicRobots, WarnOfAnymalsCamerasAndHatch) {
-  const auto model = read_urdf(TANDEM_SOURCE_DIR "/tests/data/robots/anymal_c.urdf",
-                               {.floating_base = true});
+  const auto model =
+      read_urdf(TANDEM_SOURCE_DIR "/tests/data/robots/anymal_c.urdf", {.floating_base = true});
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(model->warnings.size(), 5u) << to_text(model->warnings);
 }

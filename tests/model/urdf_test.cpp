@@ -101,9 +101,7 @@ TEST(Urdf, NamesAMissingFile) {
             "no/such.urdf: cannot read this description (check the path and its permissions)\n");
 }
 
-TEST(Urdf, RefusesAFolder) {
-  EXPECT_FALSE(read_urdf(TANDEM_SOURCE_DIR, {}).has_value());
-}
+TEST(Urdf, RefusesAFolder) { EXPECT_FALSE(read_urdf(TANDEM_SOURCE_DIR, {}).has_value()); }
 
 TEST(Urdf, RefusesAFileCutInHalf) {
   const std::string half = std::string(kRobot).substr(0, std::string(kRobot).size() / 2);
@@ -120,12 +118,16 @@ TEST(Urdf, RefusesAnyFileCutAnywhere) {
   }
 }
 
-TEST(Urdf, RefusesAnEmptyFile) { expect_error("", "arm.urdf: the file is empty "
-                                                   "(restore it from its source)"); }
+TEST(Urdf, RefusesAnEmptyFile) {
+  expect_error("",
+               "arm.urdf: the file is empty "
+               "(restore it from its source)");
+}
 
 TEST(Urdf, RefusesAnotherRoot) {
-  expect_error("<sdf/>", "arm.urdf:1: sdf: the root element is not <robot> "
-                         "(name a URDF; expand xacro and convert SDF first)");
+  expect_error("<sdf/>",
+               "arm.urdf:1: sdf: the root element is not <robot> "
+               "(name a URDF; expand xacro and convert SDF first)");
 }
 
 TEST(Urdf, RefusesAZeroByte) {
@@ -146,7 +148,8 @@ TEST(Urdf, WarnsOfAnElementThatItDoesNotKnow) {
   const auto model = parse_urdf(with("<link name=\"post\"/>", "<link name=\"post\"/><soft_body/>"),
                                 "arm.urdf", {});
   ASSERT_TRUE(model.has_value());
-  EXPECT_EQ(to_text(model->warnings), "arm.urdf:2: soft_body: the element <soft_body> is not used\n");
+  EXPECT_EQ(to_text(model->warnings),
+            "arm.urdf:2: soft_body: the element <soft_body> is not used\n");
 }
 
 TEST(Urdf, RefusesARobotWithoutLinks) {
@@ -195,8 +198,8 @@ TEST(Urdf, RefusesNumbersThatAreNone) {
 
 TEST(Urdf, RefusesNumbersThatAreNotFinite) {
   for (const char* bad : {"nan", "inf", "-inf", "1e999", "NaN"}) {
-    const std::string errors = errors_of(with("<axis xyz=\"0 2 0\"/>",
-                                              std::string("<axis xyz=\"0 ") + bad + " 0\"/>"));
+    const std::string errors =
+        errors_of(with("<axis xyz=\"0 2 0\"/>", std::string("<axis xyz=\"0 ") + bad + " 0\"/>"));
     EXPECT_NE(errors.find("arm.urdf:27: joint shoulder: 'xyz' of <axis> is not finite"),
               std::string::npos)
         << errors;
@@ -273,8 +276,10 @@ TEST(Urdf, RefusesTwoRoots) {
 }
 
 TEST(Urdf, RefusesALockThatCannotBe) {
-  expect_error(kRobot, "arm.urdf: joint slid: there is no joint 'slid' to lock "
-                       "(did you mean 'slide'?)", {.lock = {{"slid", 0.0}}});
+  expect_error(kRobot,
+               "arm.urdf: joint slid: there is no joint 'slid' to lock "
+               "(did you mean 'slide'?)",
+               {.lock = {{"slid", 0.0}}});
   EXPECT_NE(errors_of(kRobot, {.lock = {{"bolt", 0.0}}}).find("a fixed joint is locked"),
             std::string::npos);
   EXPECT_NE(errors_of(kRobot, {.lock = {{"slide", 0.7}}}).find("beyond its limits"),
