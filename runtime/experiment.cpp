@@ -89,8 +89,7 @@ LogOptions read_log(TomlTable table) {
 void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers) {
   for (TomlTable& table : root.tables("controller")) {
     const std::string plugin = table.text("plugin");
-    const std::string name =
-        table.text_or("name", std::filesystem::path(plugin).stem().string());
+    const std::string name = table.text_or("name", std::filesystem::path(plugin).stem().string());
     for (const ControllerSpec& other : controllers) {
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
@@ -171,8 +170,9 @@ void apply_order(Experiment& e, TomlTable sim) {
     actuator.order = e.sim.order;
     const std::string problem = hal::actuator_problem(actuator);
     if (problem.empty()) continue;
-    sim.error("order", "the actuator '" + actuator.name + "' cannot be of order " +
-                           std::to_string(e.sim.order) + ": " + problem,
+    sim.error("order",
+              "the actuator '" + actuator.name + "' cannot be of order " +
+                  std::to_string(e.sim.order) + ": " + problem,
               "complete it in the robot's file, or leave the order to it");
   }
 }
@@ -214,6 +214,37 @@ std::uint64_t Experiment::cycles() const {
       std::llround(duration_s * 1e9 / static_cast<double>(loop.period_ns)));
 }
 
+sim::SimRobotConfig Experiment::sim_robot_config() const {
+  return {.period_ns = loop.period_ns,
+          .integrator = sim.integrator,
+          .substep_ns = sim.substep_ns,
+          .posture = posture,
+          .hold = sim.hoist,
+          .release_ns = std::llround(sim.hoist_release_s * 1e9),
+          .seed = seed,
+          .truth = sim.ground_truth};
+}
+
+std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
+  auto found =
+      model::read_urdf(robot.model.urdf, {.floating_base = robot.model.floating_base,
+                                          .mimic_independent = robot.model.mimic_independent,
+                                          .lock = robot.model.lock});
+  if (!found) return found;
+  hal::RobotDescription description;
+  for (const model::Joint& joint : found->tree.joints) {
+    description.moving_joints.push_back(
+        {joint.name, joint.lower, joint.upper, joint.velocity, joint.effort});
+  }
+  for (const model::Link& link : found->tree.links) {
+    description.links.push_back(link.name);
+    if (link.moving < 0 && !link.joint.empty()) description.other_joints.push_back(link.joint);
+  }
+  Diagnostics errors = hal::complete_from_description(robot, description);
+  if (!errors.empty()) return std::unexpected(std::move(errors));
+  return found;
+}
+
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
   const auto document = TomlDocument::load(file);
   if (!document) return std::unexpected(Diagnostics{document.error()});
@@ -224,6 +255,12 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
     if (auto robot = hal::read_robot_config(e.robot_file)) {
       e.robot = *robot;
       combine(e, root);
+      auto description = complete_robot(e.robot);
+      if (description) {
+        e.warnings = description->warnings;
+      } else {
+        robot_errors = description.error();
+      }
     } else {
       robot_errors = robot.error();
     }

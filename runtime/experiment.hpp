@@ -12,6 +12,8 @@
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
 #include "hal/robot_config.hpp"
+#include "hal/sim/sim_robot.hpp"
+#include "model/urdf.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 
@@ -20,69 +22,76 @@ namespace tandem::runtime {
 /// [hal] backend. "can" and "dds" are known names that this version refuses.
 enum class BackendKind : std::uint8_t { kSim };
 
-enum class SimIntegrator : std::uint8_t { kSemiImplicitEuler, kRungeKutta4 };
-
 /// [sim]. Its `order` and `noise` are already applied to Experiment::robot.
 struct SimOptions {
-  SimIntegrator integrator = SimIntegrator::kRungeKutta4;
-  std::int64_t substep_ns = 500'000;   ///< divides the period and every board's control period
-  int order = -1;                      ///< 0 to 3 for every actuator; -1: as robot.toml says
-  bool noise = true;                   ///< false: sensors and torque measurement without noise
-  bool ground_truth = true;            ///< log the plant's true state beside the measured one
-  bool hoist = true;                   ///< hold base and joints until every drive is enabled
-  double hoist_release_s = 1.0;        ///< then let the base down over this time
+  sim::Integrator integrator = sim::Integrator::kSemiImplicitEuler;
+  std::int64_t substep_ns = 500'000;  ///< divides the period and every board's control period
+  int order = -1;                     ///< 0 to 3 for every actuator; -1: as robot.toml says
+  bool noise = true;                  ///< false: sensors and torque measurement without noise
+  bool ground_truth = true;           ///< log the plant's true state beside the measured one
+  bool hoist = true;                  ///< hold base and joints until every drive is enabled
+  double hoist_release_s = 1.0;       ///< then let the base down over this time
 };
 
 /// [log]
 enum class LogCompression : std::uint8_t { kNone, kLz4, kZstd };
 struct LogOptions {
-  std::string folder = "runs";         ///< relative to the working directory
+  std::string folder = "runs";  ///< relative to the working directory
   LogCompression compression = LogCompression::kNone;
 };
 
 /// [report]: what the four plots show. Empty: the report chooses.
 struct ReportOptions {
-  std::string hip;                     ///< joint
-  std::string knee;                    ///< joint
-  std::string foot;                    ///< force/torque sensor
+  std::string hip;   ///< joint
+  std::string knee;  ///< joint
+  std::string foot;  ///< force/torque sensor
 };
 
 /// [[controller]]
 struct ControllerSpec {
-  std::string plugin;                  ///< "squat", or a path to a shared library
-  std::string name;                    ///< unique; default: the plugin's
-  TomlTable parameters;                ///< for ControllerSetup; its errors go to `document`
+  std::string plugin;    ///< "squat", or a path to a shared library
+  std::string name;      ///< unique; default: the plugin's
+  TomlTable parameters;  ///< for ControllerSetup; its errors go to `document`
 };
 
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
-  std::string file;                    ///< the TOML's path
-  std::string robot_file;              ///< resolved against the TOML's folder
-  hal::RobotConfig robot;              ///< not yet completed from its description
-  double duration_s = 0.0;             ///< that controllers run, after the bring-up
+  std::string file;         ///< the TOML's path
+  std::string robot_file;   ///< resolved against the TOML's folder
+  hal::RobotConfig robot;   ///< completed from its description
+  Diagnostics warnings;     ///< what was tolerated in the description
+  double duration_s = 0.0;  ///< that controllers run, after the bring-up
   std::uint64_t seed = 1;
-  std::string posture;                 ///< where the robot starts; empty: every joint at 0
-  std::string kernel_variant;          ///< empty: the best that this CPU runs
+  std::string posture;         ///< where the robot starts; empty: every joint at 0
+  std::string kernel_variant;  ///< empty: the best that this CPU runs
   BackendKind backend = BackendKind::kSim;
   SimOptions sim;
-  rt::LoopConfig loop;                 ///< period and [overrun]; the caller sets pacing and rate
-  rt::ThreadConfig thread;             ///< [realtime]; nothing is asked for without that table
+  rt::LoopConfig loop;      ///< period and [overrun]; the caller sets pacing and rate
+  rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   LogOptions log;
   ReportOptions report;
   std::vector<ControllerSpec> controllers;
-  TomlDocument document;               ///< its diagnostics() grow while controllers read parameters
+  TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 
   /// Cycles that controllers run: duration over period, rounded.
   [[nodiscard]] std::uint64_t cycles() const;
+  /// How to simulate it, with the seed and the period as they are now.
+  [[nodiscard]] sim::SimRobotConfig sim_robot_config() const;
 };
 
-/// Reads an experiment and its robot. Errors, all of both files at once: as TOML's and
-/// read_robot_config()'s; a period of 0; periods and sub-step that do not divide; an unknown
-/// posture, joint or sensor; a backend that this version lacks; no controller, or two of a name.
+/// Reads an experiment, its robot and the robot's description. Errors, all of the files at once:
+/// as TOML's, read_robot_config()'s and complete_robot()'s; a period of 0; periods and sub-step
+/// that do not divide; an unknown posture, joint or sensor; a backend that this version lacks; no
+/// controller, or two of a name.
 [[nodiscard]] std::expected<Experiment, Diagnostics> read_experiment(const std::string& file);
 
-/// The same from memory, for a robot at hand: `robot = …` of the text is not followed.
+/// The same from memory, for a robot at hand: `robot = …` of the text is not followed, and the
+/// robot stays as it is.
 [[nodiscard]] std::expected<Experiment, Diagnostics> parse_experiment(
     std::string_view text, const std::string& file, const hal::RobotConfig& robot);
+
+/// Reads the robot's URDF and fills from it what robot.toml left out. Errors: read_urdf()'s and
+/// complete_from_description()'s. The answer holds the tree and what was tolerated in it.
+[[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);
 
 }  // namespace tandem::runtime

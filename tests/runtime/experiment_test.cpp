@@ -58,6 +58,14 @@ noise = [1, 1, 1, 1, 1, 1]
 elbow = 0.5
 )";
 
+const char* const kUrdf = R"(<robot name="arm"><link name="base"/><link name="upper"><inertial>
+<mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<link name="hand"/>
+<joint name="elbow" type="revolute"><parent link="base"/><child link="upper"/>
+<limit lower="-1" upper="2" velocity="3" effort="4"/></joint>
+<joint name="wrist" type="fixed"><parent link="upper"/><child link="hand"/></joint></robot>
+)";
+
 hal::RobotConfig robot(const std::string& text = kRobot) {
   const auto read = hal::parse_robot_config(text, "arm/robot.toml");
   EXPECT_TRUE(read.has_value());
@@ -97,7 +105,7 @@ TEST(Experiment, IsReadWithItsDefaults) {
   EXPECT_EQ(e->loop.on_overrun, rt::OverrunPolicy::kSkip);
   EXPECT_EQ(e->thread.policy, rt::SchedulingPolicy::kOther);
   EXPECT_FALSE(e->thread.lock_memory);
-  EXPECT_EQ(e->sim.integrator, SimIntegrator::kRungeKutta4);
+  EXPECT_EQ(e->sim.integrator, sim::Integrator::kSemiImplicitEuler);
   EXPECT_TRUE(e->sim.hoist);
   EXPECT_EQ(e->log.folder, "runs");
   ASSERT_EQ(e->controllers.size(), 1u);
@@ -112,7 +120,7 @@ kernel_variant = "baseline"
 [hal]
 backend = "sim"
 [sim]
-integrator = "semi_implicit"
+integrator = "rk4"
 substep_ns = 250_000
 order = 0
 noise = false
@@ -139,14 +147,22 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->seed, 7u);
   EXPECT_EQ(e->cycles(), 1250u);
   EXPECT_EQ(e->kernel_variant, "baseline");
-  EXPECT_EQ(e->sim.integrator, SimIntegrator::kSemiImplicitEuler);
+  EXPECT_EQ(e->sim.integrator, sim::Integrator::kRungeKutta4);
   EXPECT_EQ(e->sim.substep_ns, 250'000);
   EXPECT_EQ(e->robot.actuators[0].order, 0);
   EXPECT_TRUE(e->robot.sensors[0].noise.empty());
   EXPECT_EQ(e->robot.joints[0].torque_noise_Nm, 0.0);
   EXPECT_FALSE(e->sim.ground_truth);
   EXPECT_FALSE(e->sim.hoist);
-  EXPECT_EQ(e->sim.hoist_release_s, 0.5);
+  const sim::SimRobotConfig robot_config = e->sim_robot_config();
+  EXPECT_EQ(robot_config.period_ns, 2'000'000);
+  EXPECT_EQ(robot_config.integrator, sim::Integrator::kRungeKutta4);
+  EXPECT_EQ(robot_config.substep_ns, 250'000);
+  EXPECT_EQ(robot_config.posture, "ready");
+  EXPECT_FALSE(robot_config.hold);
+  EXPECT_EQ(robot_config.release_ns, 500'000'000);
+  EXPECT_EQ(robot_config.seed, 7u);
+  EXPECT_FALSE(robot_config.truth);
   EXPECT_EQ(e->loop.on_overrun, rt::OverrunPolicy::kStop);
   EXPECT_EQ(e->loop.stop_late, 2);
   EXPECT_EQ(e->loop.stop_window, 10);
@@ -265,9 +281,28 @@ class ExperimentFiles : public testing::Test {
 
 TEST_F(ExperimentFiles, FindTheRobotBesideThem) {
   write("robot.toml", kRobot);
+  write("arm.urdf", kUrdf);
   const auto e = read_experiment(write("x.toml", kExperiment));
-  ASSERT_TRUE(e.has_value());
+  ASSERT_TRUE(e.has_value()) << e.error()[0].to_string();
   EXPECT_EQ(e->robot.name, "arm");
+  EXPECT_EQ(e->robot.joints[0].max_position_rad, 2.0) << "from the description";
+}
+
+TEST_F(ExperimentFiles, NameAMissingDescription) {
+  write("robot.toml", kRobot);
+  const auto e = read_experiment(write("x.toml", kExperiment));
+  ASSERT_FALSE(e.has_value());
+  EXPECT_EQ(e.error()[0].file, (folder_ / "arm.urdf").string());
+}
+
+TEST_F(ExperimentFiles, SuggestTheDescriptionsJoint) {
+  write("robot.toml", kRobot);
+  write("arm.urdf", replaced(kUrdf, "\"elbow\"", "\"ellbow\""));
+  const auto e = read_experiment(write("x.toml", kExperiment));
+  ASSERT_FALSE(e.has_value());
+  EXPECT_EQ(e.error()[0].to_string(), (folder_ / "robot.toml").string() +
+                                          ":21: joint.elbow: the description has no joint "
+                                          "'elbow' (did you mean 'ellbow'?)");
 }
 
 TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
@@ -291,6 +326,26 @@ TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
   ASSERT_FALSE(e.has_value());
   EXPECT_EQ(e.error()[0].file, (folder_ / "no.toml").string());
 }
+
+class BundledRobot : public testing::TestWithParam<const char*> {};
+
+TEST_P(BundledRobot, IsCompleteWithItsDescription) {
+  const std::string file = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam() + "/robot.toml";
+  auto bundled = hal::read_robot_config(file);
+  ASSERT_TRUE(bundled.has_value()) << bundled.error()[0].to_string();
+  const auto description = complete_robot(*bundled);
+  ASSERT_TRUE(description.has_value()) << description.error()[0].to_string();
+  EXPECT_TRUE(description->warnings.empty());
+  EXPECT_EQ(description->tree.joints.size(), bundled->joints.size());
+  for (const hal::JointConfig& joint : bundled->joints) {
+    EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
+    EXPECT_GT(joint.max_torque_Nm, 0.0) << joint.name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BundledRobot,
+                         testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum"),
+                         [](const auto& robot) { return std::string(robot.param); });
 
 }  // namespace
 }  // namespace tandem::runtime
