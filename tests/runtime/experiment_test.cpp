@@ -301,7 +301,7 @@ TEST_F(ExperimentFiles, SuggestTheDescriptionsJoint) {
   const auto e = read_experiment(write("x.toml", kExperiment));
   ASSERT_FALSE(e.has_value());
   EXPECT_EQ(e.error()[0].to_string(), (folder_ / "robot.toml").string() +
-                                          ":21: joint.elbow: the description has no joint "
+                                          ":22: joint.elbow: the description has no joint "
                                           "'elbow' (did you mean 'ellbow'?)");
 }
 
