@@ -1,0 +1,43 @@
+#include "model/dynamics.hpp"
+
+namespace tandem::model {
+
+KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
+  const int sites = static_cast<int>(m.sites.size());
+  const KernelArray q{"q", m.nq()};
+  const KernelArray v{"v", m.nv()};
+  const KernelArray vdot{"vdot", m.nv()};
+  const KernelArray tau{"tau", m.nv()};
+  const KernelArray wrench{"wrench", 6 * m.wrenches};
+  switch (kernel) {
+    case Kernel::kForwardDynamics: return {"forward_dynamics", {q, v, tau, wrench}, {vdot}};
+    case Kernel::kInverseDynamics: return {"inverse_dynamics", {q, v, vdot, wrench}, {tau}};
+    case Kernel::kMassMatrix: return {"mass_matrix", {q}, {{"M", m.nv() * m.nv()}}};
+    case Kernel::kBias: return {"bias", {q, v}, {{"h", m.nv()}}};
+    case Kernel::kCenterOfMass:
+      return {"center_of_mass", {q, v}, {{"c", 3}, {"cdot", 3}, {"J", 3 * m.nv()}}};
+    case Kernel::kCentroidalMomentum: return {"centroidal_momentum", {q, v}, {{"h", 6}}};
+    case Kernel::kEnergy: return {"energy", {q, v}, {{"kinetic_potential", 2}}};
+    case Kernel::kSites:
+      return {"sites",
+              {q, v, vdot},
+              {{"pose", 12 * sites}, {"twist", 6 * sites}, {"acceleration", 6 * sites}}};
+    case Kernel::kSiteJacobians: return {"site_jacobians", {q}, {{"J", 6 * sites * m.nv()}}};
+    case Kernel::kSensorWrenches:
+      return {"sensor_wrenches",
+              {q, v, vdot, wrench},
+              {{"out", 6 * static_cast<int>(m.sensors.size())}}};
+  }
+  return {};
+}
+
+std::vector<std::vector<double>> evaluate_kernel(Kernel kernel, const Mechanism& m,
+                                                 const std::vector<std::vector<double>>& in) {
+  std::vector<std::vector<double>> out;
+  for (const KernelArray& array : kernel_shape(kernel, m).outputs)
+    out.emplace_back(static_cast<std::size_t>(array.size), 0.0);
+  run_kernel<double>(kernel, m, in, out);
+  return out;
+}
+
+}  // namespace tandem::model
