@@ -110,9 +110,4 @@ class Graph {
 [[nodiscard]] std::vector<double> evaluate(const Graph& graph, std::span<const Expr> outputs,
                                            std::span<const std::vector<double>> inputs);
 
-/// The outputs written again into `target` with fewer operations: a*b + a*c becomes a*(b + c)
-/// where the products have no other use. Repeats until nothing more is found.
-[[nodiscard]] std::vector<Expr> factorise(const Graph& graph, std::span<const Expr> outputs,
-                                          Graph& target);
-
 }  // namespace tandem::model

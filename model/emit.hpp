@@ -1,0 +1,38 @@
+// Expressions written as C++: straight-line functions of bounded size over one workspace.
+// Layer: model.  Thread: non-RT.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "model/dynamics.hpp"
+#include "model/expression.hpp"
+
+namespace tandem::model {
+
+/// A kernel as expressions of its inputs.
+struct TracedKernel {
+  KernelShape shape;
+  std::vector<Expr> outputs;  ///< the output arrays, one after another
+};
+
+/// Runs the kernel's algorithm over expressions in `graph`.
+[[nodiscard]] TracedKernel trace_kernel(Kernel kernel, const Mechanism& m, Graph& graph);
+
+/// A kernel as C++. `entry` calls every function of `parts` in order; they share a workspace on
+/// the stack, because compilers take far more than twice as long for a function twice as long.
+struct EmittedKernel {
+  std::string name;
+  std::string parameters;          ///< "const double* q, …" of the entry
+  std::string entry;               ///< definition
+  std::vector<std::string> parts;  ///< definitions
+  std::vector<std::string> declarations;  ///< of the parts
+  std::vector<std::uint32_t> sizes;       ///< operations of each part
+  OperationCount count;
+};
+
+/// @param part_operations  a part is closed once it holds this many additions and products.
+[[nodiscard]] EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
+                                        std::uint32_t part_operations);
+
+}  // namespace tandem::model

@@ -1,0 +1,146 @@
+#include "model/generate.hpp"
+
+#include <fmt/format.h>
+
+#include "model/emit.hpp"
+#include "model/kernel_sources.hpp"
+
+namespace tandem::model {
+namespace {
+
+// Operations of one function, and of one source file: gcc's time and memory grow with the
+// square of a function's length, and files are compiled side by side.
+constexpr std::uint32_t kPartOperations = 500;
+constexpr std::uint32_t kFileOperations = 3000;
+
+constexpr std::string_view kBanner =
+    "// Made by `tandem model build`: change the robot's description instead.\n";
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + "\"";
+}
+
+std::string name_table(const std::string& name, const std::vector<std::string>& values) {
+  std::string text = fmt::format("const char* const {}[] = {{", name);
+  for (const std::string& value : values) text += quoted(value) + ", ";
+  return text + "nullptr};\n";
+}
+
+std::string count_table(const std::vector<KernelCount>& counts) {
+  std::string text = "const tandem_kernel_count counts[] = {\n";
+  for (const auto& [kernel, c] : counts)
+    text += fmt::format("    {{\"{}\", {}, {}, {}, {}, {}}},\n", kernel, c.add, c.mul, c.div,
+                        c.sqrt, c.sincos);
+  return text + "};\n";
+}
+
+// The entries of one variant and its table.
+std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
+                           const std::vector<EmittedKernel>& kernels) {
+  std::string text{kBanner};
+  text += "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\nnamespace {\n\n";
+  text += kTrigSource;
+  text += "\n";
+  for (const EmittedKernel& kernel : kernels) text += kernel.entry + "\n";
+  text += name_table("joints", m.joint_names) + name_table("sites_", m.site_names) +
+          name_table("wrenches", m.wrench_names) + name_table("sensors", m.sensor_names) +
+          count_table(result.counts) + "\n}  // namespace\n\n";
+  text += "extern const tandem_kernels table = {\n";
+  text += fmt::format("    TANDEM_KERNELS_ABI, {}, {},\n    \"{}\",\n    TANDEM_VARIANT_NAME,\n",
+                      m.floating_base ? 1 : 0, quoted(result.robot), result.hash);
+  text += fmt::format("    {}, {}, {}, {}, {}, {},\n", m.nq(), m.nv(), m.joint_count(),
+                      m.sites.size(), m.wrenches, m.sensors.size());
+  text += "    joints, sites_, wrenches, sensors,\n";
+  text += fmt::format("    {:.17g}, {{{:.17g}, {:.17g}, {:.17g}}},\n    counts, {},\n", m.mass_kg,
+                      m.gravity[0], m.gravity[1], m.gravity[2], result.counts.size());
+  for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + ",\n";
+  return text + "};\n\n}  // namespace TANDEM_VARIANT\n";
+}
+
+std::string parts_header(const std::vector<EmittedKernel>& kernels) {
+  std::string text{kBanner};
+  text += "#pragma once\n#include \"kernels.h\"\n\nnamespace TANDEM_VARIANT {\n";
+  for (const EmittedKernel& kernel : kernels)
+    for (const std::string& declaration : kernel.declarations) text += declaration;
+  return text + "}  // namespace TANDEM_VARIANT\n";
+}
+
+// The parts, gathered into files of about the same length.
+void add_part_files(const std::vector<EmittedKernel>& kernels, GeneratedKernels& result) {
+  std::string body;
+  std::uint32_t operations = 0;
+  int number = 0;
+  const auto close = [&] {
+    if (body.empty()) return;
+    result.sources.push_back({fmt::format("part_{:02}.cpp", number++),
+                              std::string(kBanner) +
+                                  "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\n\n" + body +
+                                  "}  // namespace TANDEM_VARIANT\n",
+                              true});
+    body.clear();
+    operations = 0;
+  };
+  for (const EmittedKernel& kernel : kernels)
+    for (std::size_t part = 0; part < kernel.parts.size(); ++part) {
+      if (operations + kernel.sizes[part] > kFileOperations) close();
+      body += kernel.parts[part] + "\n";
+      operations += kernel.sizes[part];
+    }
+  close();
+}
+
+constexpr std::string_view kLibrarySource = R"(#include "kernels.h"
+
+namespace baseline { extern const tandem_kernels table; }
+#ifdef TANDEM_HAS_X86_64_V3
+namespace x86_64_v3 { extern const tandem_kernels table; }
+#endif
+
+static bool same(const char* a, const char* b) {
+  while (*a != '\0' && *a == *b) ++a, ++b;
+  return *a == *b;
+}
+
+extern "C" __attribute__((visibility("default"))) const tandem_kernels* tandem_kernels_get(
+    const char* variant) {
+#ifdef TANDEM_HAS_X86_64_V3
+  __builtin_cpu_init();
+  const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+                  __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+  if (v3 && (variant == nullptr || same(variant, "x86-64-v3"))) return &x86_64_v3::table;
+#endif
+  if (variant == nullptr || same(variant, "baseline")) return &baseline::table;
+  return nullptr;
+}
+)";
+
+}  // namespace
+
+Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spec) {
+  const Result<Mechanism> mechanism = make_mechanism(tree, spec);
+  if (!mechanism) return std::unexpected(mechanism.error());
+  GeneratedKernels result;
+  result.robot = spec.robot;
+  result.hash = description_hash(tree, spec);
+  std::vector<EmittedKernel> kernels;
+  for (int k = 0; k < kKernels; ++k) {
+    Graph graph;
+    const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
+    kernels.push_back(emit_kernel(graph, kernel, kPartOperations));
+    result.counts.push_back({kernels.back().name, kernels.back().count});
+  }
+  result.headers.push_back({"kernels.h", std::string(kKernelsHeader), false});
+  result.headers.push_back({"parts.h", parts_header(kernels), false});
+  add_part_files(kernels, result);
+  result.sources.push_back({"variant.cpp", variant_source(*mechanism, result, kernels), true});
+  result.sources.push_back(
+      {"library.cpp", std::string(kBanner) + std::string(kLibrarySource), false});
+  return result;
+}
+
+}  // namespace tandem::model

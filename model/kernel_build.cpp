@@ -1,0 +1,237 @@
+#include "model/kernel_build.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <mutex>
+#include <thread>
+
+#include "model/hash.hpp"
+#include "model/kernel_sources.hpp"
+#include "model/process.hpp"
+
+namespace tandem::model {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Variant {
+  std::string name;       // "x86-64-v3"
+  std::string space;      // its C++ namespace
+  std::vector<std::string> flags;
+};
+
+std::vector<Variant> variants() {
+  std::vector<Variant> list{{"baseline", "baseline", {"-ffp-contract=off"}}};
+#if defined(__x86_64__)
+  list.push_back({"x86-64-v3", "x86_64_v3", {"-march=x86-64-v3", "-ffp-contract=fast"}});
+#endif
+  return list;
+}
+
+// One file to compile.
+struct Job {
+  std::string source;
+  std::string object;
+  std::vector<std::string> command;
+  std::string stamp;  // hash of all that the object depends on
+};
+
+std::string read_file(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Status write_if_changed(const fs::path& path, const std::string& text) {
+  if (fs::exists(path) && read_file(path) == text) return {};
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (file) return {};
+  return fail("cannot write " + path.string(), "check the folder's permissions and free space");
+}
+
+std::vector<std::string> compiler_command(const BuildOptions& options) {
+  std::vector<std::string> command;
+  if (!kDefaultLauncher.empty() && program_exists(std::string(kDefaultLauncher)))
+    command.emplace_back(kDefaultLauncher);
+  const char* from_environment = std::getenv("CXX");
+  if (!options.compiler.empty()) {
+    command.push_back(options.compiler);
+  } else if (from_environment != nullptr && *from_environment != '\0') {
+    command.emplace_back(from_environment);
+  } else {
+    command.emplace_back(kDefaultCompiler);
+  }
+  return command;
+}
+
+Job make_job(const SourceFile& source, const Variant* variant, const std::string& headers,
+             const std::vector<std::string>& compiler) {
+  Job job;
+  job.source = source.name;
+  job.object = fs::path(source.name).stem().string() + (variant ? "_" + variant->space : "") + ".o";
+  job.command = compiler;
+  for (const char* flag : {"-std=c++17", "-O2", "-fPIC", "-fvisibility=hidden", "-w"})
+    job.command.emplace_back(flag);
+  if (variant != nullptr) {
+    job.command.insert(job.command.end(), variant->flags.begin(), variant->flags.end());
+    job.command.push_back("-DTANDEM_VARIANT=" + variant->space);
+    job.command.push_back("-DTANDEM_VARIANT_NAME=\"" + variant->name + "\"");
+  } else if (variants().size() > 1) {
+    job.command.emplace_back("-DTANDEM_HAS_X86_64_V3");
+  }
+  for (const std::string& word : {std::string("-c"), job.source, std::string("-o"), job.object})
+    job.command.push_back(word);
+  std::string all = headers + source.text;
+  for (const std::string& word : job.command) all += word + '\0';
+  job.stamp = sha256_hex(all);
+  return job;
+}
+
+std::vector<Job> make_jobs(const GeneratedKernels& generated,
+                           const std::vector<std::string>& compiler) {
+  std::string headers;
+  for (const SourceFile& header : generated.headers) headers += header.text;
+  std::vector<Job> jobs;
+  const std::vector<Variant> all = variants();
+  for (const SourceFile& source : generated.sources) {
+    if (!source.per_variant) jobs.push_back(make_job(source, nullptr, headers, compiler));
+    for (const Variant& variant : all)
+      if (source.per_variant) jobs.push_back(make_job(source, &variant, headers, compiler));
+  }
+  return jobs;
+}
+
+Error compile_error(const fs::path& directory, const std::string& what) {
+  const fs::path log = directory / (what + ".log");
+  std::string text = read_file(log);
+  if (text.size() > 400) text = text.substr(0, 400) + "…";
+  Error error;
+  error.message = "compiling the kernels failed at " + what + ": " + text;
+  error.hint = "the compiler's whole output is in " + log.string();
+  error.file = log.string();
+  return error;
+}
+
+// Compiles `jobs`, some at a time. The progress callback runs on the calling thread.
+Status compile(const std::vector<Job>& jobs, const fs::path& directory,
+               const BuildOptions& options) {
+  const int hardware = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const int wanted = options.jobs > 0 ? options.jobs : hardware;
+  const int workers = std::min(wanted, static_cast<int>(jobs.size()));
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::size_t> done;
+  std::size_t failed = jobs.size();
+  const auto work = [&] {
+    for (std::size_t i = next++; i < jobs.size(); i = next++) {
+      const Job& job = jobs[i];
+      const bool ok = run_program(job.command, directory, directory / (job.object + ".log"));
+      if (ok) std::ofstream(directory / (job.object + ".stamp")) << job.stamp;
+      const std::lock_guard lock(mutex);
+      if (!ok) {
+        failed = std::min(failed, i);
+        next = jobs.size();
+      }
+      done.push_back(i);
+      changed.notify_one();
+    }
+    const std::lock_guard lock(mutex);
+    done.push_back(jobs.size());  // this worker is through
+    changed.notify_one();
+  };
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < workers; ++i) threads.emplace_back(work);
+  int finished = 0;
+  int through = 0;
+  std::unique_lock lock(mutex);
+  for (std::size_t seen = 0; through < workers; ++seen) {
+    changed.wait(lock, [&] { return done.size() > seen; });
+    if (done[seen] == jobs.size()) {
+      ++through;
+    } else if (options.progress) {
+      options.progress(++finished, static_cast<int>(jobs.size()) + 1, jobs[done[seen]].object);
+    }
+  }
+  if (failed < jobs.size())
+    return std::unexpected(compile_error(directory, jobs[failed].object));
+  return {};
+}
+
+Status link(const std::vector<Job>& jobs, const std::vector<std::string>& compiler,
+            const fs::path& directory, const fs::path& library, const std::string& stamp) {
+  const fs::path fresh = directory / "library.so";  // renamed: a running program keeps the old one
+  std::vector<std::string> command = compiler;
+  for (const char* word : {"-shared", "-o", "library.so"}) command.emplace_back(word);
+  for (const Job& job : jobs) command.push_back(job.object);
+  if (!run_program(command, directory, directory / "link.log"))
+    return std::unexpected(compile_error(directory, "link"));
+  std::error_code code;
+  fs::rename(fresh, library, code);
+  if (code) return fail("cannot write " + library.string() + ": " + code.message());
+  return write_if_changed(directory / "library.stamp", stamp);
+}
+
+}  // namespace
+
+std::string library_path(const std::string& directory, const std::string& robot) {
+  return (fs::path(directory) / (robot + "_kernels.so")).string();
+}
+
+Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
+                                  const BuildOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const Result<GeneratedKernels> generated = generate_kernels(tree, spec);
+  if (!generated) return std::unexpected(generated.error());
+  const fs::path library = fs::absolute(options.library);
+  const fs::path directory = library.string() + ".build";
+  std::error_code code;
+  fs::create_directories(directory, code);
+  if (code)
+    return fail("cannot make the folder " + directory.string() + ": " + code.message(),
+                "choose another path for the kernel library");
+  const std::vector<std::string> compiler = compiler_command(options);
+  if (!program_exists(compiler.back()))
+    return fail("no C++ compiler '" + compiler.back() + "'",
+                "install g++ (apt install g++), or set CXX to a compiler");
+
+  BuildReport report{options.library, generated->hash, false, 0, 0.0, generated->counts};
+  const std::vector<Job> jobs = make_jobs(*generated, compiler);
+  std::string all;
+  for (const Job& job : jobs) all += job.stamp;
+  const std::string stamp = sha256_hex(all);
+  if (fs::exists(library) && read_file(directory / "library.stamp") == stamp) {
+    report.was_up_to_date = true;
+    return report;
+  }
+  for (const auto* files : {&generated->headers, &generated->sources})
+    for (const SourceFile& file : *files)
+      if (Status status = write_if_changed(directory / file.name, file.text); !status)
+        return std::unexpected(status.error());
+  std::vector<Job> stale;
+  for (const Job& job : jobs)
+    if (!fs::exists(directory / job.object) ||
+        read_file(directory / (job.object + ".stamp")) != job.stamp)
+      stale.push_back(job);
+  if (Status status = compile(stale, directory, options); !status)
+    return std::unexpected(status.error());
+  if (Status status = link(jobs, compiler, directory, library, stamp); !status)
+    return std::unexpected(status.error());
+  if (options.progress)
+    options.progress(static_cast<int>(stale.size()) + 1, static_cast<int>(stale.size()) + 1,
+                     library.filename().string());
+  report.compiled = static_cast<int>(stale.size());
+  report.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace tandem::model

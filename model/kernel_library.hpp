@@ -1,0 +1,40 @@
+// A robot's kernel library, loaded and checked.
+// Layer: model.  Thread: non-RT to load; the kernels run on any thread.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.hpp"
+#include "model/kernels.h"
+
+namespace tandem::model {
+
+/// Keeps the library loaded as long as a copy lives.
+class KernelLibrary {
+ public:
+  KernelLibrary() = default;
+  [[nodiscard]] const tandem_kernels& operator*() const { return *kernels_; }
+  [[nodiscard]] const tandem_kernels* operator->() const { return kernels_; }
+  [[nodiscard]] const tandem_kernels* get() const { return kernels_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  friend Result<KernelLibrary> load_kernels(const std::string&, const std::string&,
+                                            const std::string&);
+  std::shared_ptr<void> handle_;
+  const tandem_kernels* kernels_ = nullptr;
+  std::string path_;
+};
+
+/// Loads a library.
+///
+/// @param hash     what description_hash() says of the robot; empty: not compared.
+/// @param variant  "baseline", "x86-64-v3"; empty: the best that this CPU runs.
+/// Errors, with what to do next: the file is missing or no kernel library; it was made for
+/// another ABI or from another description; this CPU or library lacks the variant.
+[[nodiscard]] Result<KernelLibrary> load_kernels(const std::string& path,
+                                                 const std::string& hash = {},
+                                                 const std::string& variant = {});
+
+}  // namespace tandem::model
