@@ -1,0 +1,183 @@
+// gravity_compensation: carries the robot's weight, so that a hand can move it.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <optional>
+
+#include "controllers/controller.hpp"
+#include "controllers/min_jerk.hpp"
+#include "controllers/model_map.hpp"
+#include "controllers/parameters.hpp"
+#include "controllers/support.hpp"
+
+namespace tandem {
+namespace {
+
+/// Parameters: mode ("compliant": a virtual spring and damper about the start posture, "torque":
+/// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (the robot's), ramp_s (1),
+/// left_sole and right_sole ("l_sole", "r_sole"; floating base only).
+///
+/// tau = h(q, 0) for a fixed base. A floating base is taken to stand on both feet, turned as its
+/// IMU says (the site of the sensor's name), or upright when it has none.
+class GravityCompensation : public Controller {
+ public:
+  Status configure(ControllerSetup& setup) override {
+    Result<ModelMap> map = ModelMap::make(setup.robot, setup.kernels);
+    if (!map) return std::unexpected(map.error());
+    map_ = std::move(*map);
+    kernels_ = setup.kernels;
+    ramp_s_ = setup.parameters.number_or("ramp_s", 1.0, kPositive);
+    compliant_ = setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) ==
+                 "compliant";
+    if (const Status feet = find_feet(setup); !feet) return feet;
+    if (const Status joints = claim_joints(setup); !joints) return joints;
+    q_.assign(kernels_->nq, 0.0);
+    rest_.assign(kernels_->nv, 0.0);
+    tau_.assign(kernels_->nv, 0.0);
+    pose_.assign(12 * kernels_->sites, 0.0);
+    twist_.assign(6 * kernels_->sites, 0.0);
+    acceleration_.assign(6 * kernels_->sites, 0.0);
+    J_.assign(6 * kernels_->nv * kernels_->sites, 0.0);
+    return {};
+  }
+
+  void start(const hal::CycleTime& time, const hal::StateImage& state,
+             hal::CommandImage&) noexcept TANDEM_RT override {
+    start_ns_ = time.time_ns;
+    for (Joint& joint : joints_) {
+      joint.position_rad = state.position_rad()[joint.index];
+      joint.torque_Nm = state.torque_Nm()[joint.index];
+    }
+  }
+
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
+              hal::CommandImage& command) noexcept TANDEM_RT override {
+    weigh(state);
+    const double since_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    const double share = min_jerk(since_s / ramp_s_).s;
+    for (const Joint& joint : joints_) {
+      const std::size_t j = joint.index;
+      const double weight = tau_[map_.v_index(j)];
+      command.position_rad()[j] = joint.position_rad;
+      command.velocity_rad_s()[j] = 0.0;
+      command.stiffness_Nm_rad()[j] = joint.stiffness_Nm_rad;
+      command.damping_Nms_rad()[j] = joint.damping_Nms_rad;
+      // From the torque that was measured (torque control), or from none (the spring holds).
+      const double from = compliant_ ? 0.0 : joint.torque_Nm;
+      command.torque_Nm()[j] = from + (weight - from) * share;
+    }
+    return Code::kOk;
+  }
+
+  void archive(Archive& ar) override { ar(start_ns_, joints_); }
+
+ private:
+  struct Joint {
+    std::size_t index = 0;
+    double stiffness_Nm_rad = 0.0;
+    double damping_Nms_rad = 0.0;
+    double position_rad = 0.0;  // at the start
+    double torque_Nm = 0.0;     // at the start
+  };
+
+  Status find_feet(ControllerSetup& setup) {
+    if (kernels_->floating_base == 0) return {};
+    const Result<std::size_t> left =
+        site_index(*kernels_, setup.parameters.text_or("left_sole", "l_sole"));
+    if (!left) return std::unexpected(left.error());
+    const Result<std::size_t> right =
+        site_index(*kernels_, setup.parameters.text_or("right_sole", "r_sole"));
+    if (!right) return std::unexpected(right.error());
+    feet_ = {*left, *right};
+    for (std::size_t i = 0; i < setup.robot.sensors.size(); ++i) {
+      const hal::SensorConfig& sensor = setup.robot.sensors[i];
+      if (sensor.type != hal::SensorType::kImu) continue;
+      if (const Result<std::size_t> site = site_index(*kernels_, sensor.name)) {
+        imu_ = Imu{i, *site};
+      }
+    }
+    return {};
+  }
+
+  Status claim_joints(ControllerSetup& setup) {
+    const std::vector<hal::JointCapabilities> limits = hal::joint_capabilities(setup.robot);
+    // Negative: the key is missing, each joint has its own.
+    const double stiffness = setup.parameters.number_or("stiffness_Nm_rad", -1.0, kNotNegative);
+    const double damping = setup.parameters.number_or("damping_Nms_rad", -1.0, kNotNegative);
+    for (const std::size_t j : joints_parameter(setup)) {
+      const Status claimed =
+          compliant_ ? claim(setup, j, hal::ControlMode::kPosition,
+                             hal::InteractionMode::kCompliant)
+                     : claim(setup, j, hal::ControlMode::kTorque);
+      if (!claimed) return claimed;
+      Joint joint{.index = j,
+                  .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,
+                  .damping_Nms_rad = damping < 0.0 ? limits[j].damping_Nms_rad : damping};
+      joints_.push_back(joint);
+      if (joint.stiffness_Nm_rad > limits[j].max_stiffness_Nm_rad) {
+        setup.parameters.error("stiffness_Nm_rad",
+                               "is too much for joint '" + setup.robot.joints[j].name + "'",
+                               "give at most its position loop's kp");
+      }
+      if (joint.damping_Nms_rad > limits[j].max_damping_Nms_rad) {
+        setup.parameters.error("damping_Nms_rad",
+                               "is too much for joint '" + setup.robot.joints[j].name + "'");
+      }
+    }
+    return {};
+  }
+
+  /// The torques that hold the measured posture, in tau_.
+  void weigh(const hal::StateImage& state) noexcept TANDEM_RT {
+    map_.positions_to_q(state.position_rad(), q_);
+    if (kernels_->floating_base == 0) {
+      kernels_->bias(q_.data(), rest_.data(), tau_.data());
+      return;
+    }
+    q_[3] = q_[4] = q_[5] = 0.0;
+    q_[6] = 1.0;
+    if (imu_) turn_base(state.sensor_values(imu_->sensor));
+    kernels_->bias(q_.data(), rest_.data(), tau_.data());
+    locate();
+    kernels_->site_jacobians(q_.data(), J_.data());
+    carry_on_both_feet(*kernels_, feet_, q_, pose_, J_, tau_);
+  }
+
+  void locate() noexcept TANDEM_RT {
+    kernels_->site_motion(q_.data(), rest_.data(), rest_.data(), pose_.data(), twist_.data(),
+                          acceleration_.data());
+  }
+
+  /// The base's orientation from the IMU's: R_WB = R_WS R_BS^T.
+  void turn_base(std::span<const double> imu) noexcept TANDEM_RT {
+    locate();  // with the base along W, so that the site's pose is R_BS
+    using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const Eigen::Matrix3d base_imu = Eigen::Map<const RowMajor3>(&pose_[12 * imu_->site]);
+    const Eigen::Quaterniond world_imu(imu[3], imu[0], imu[1], imu[2]);
+    const Eigen::Quaterniond world_base =
+        (world_imu * Eigen::Quaterniond(base_imu).conjugate()).normalized();
+    q_[3] = world_base.x();
+    q_[4] = world_base.y();
+    q_[5] = world_base.z();
+    q_[6] = world_base.w();
+  }
+
+  struct Imu {
+    std::size_t sensor = 0;
+    std::size_t site = 0;
+  };
+  const tandem_kernels* kernels_ = nullptr;
+  ModelMap map_;
+  Feet feet_;
+  std::optional<Imu> imu_;
+  bool compliant_ = true;
+  double ramp_s_ = 1.0;
+  std::int64_t start_ns_ = 0;
+  std::vector<Joint> joints_;
+  std::vector<double> q_, rest_, tau_, pose_, twist_, acceleration_, J_;
+};
+
+}  // namespace
+}  // namespace tandem
+
+TANDEM_CONTROLLER(tandem::GravityCompensation, "gravity_compensation",
+                  "Carries the robot's weight, so that a hand can move it.")

@@ -1,0 +1,147 @@
+// joint_trajectory: leads joints through way-points at given times.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "controllers/controller.hpp"
+#include "controllers/parameters.hpp"
+#include "controllers/segment.hpp"
+
+namespace tandem {
+namespace {
+
+constexpr int kSamples = 50;  // of a segment, when its limits are checked
+
+/// Parameters: joints (all), interpolation ("min_jerk": rests at every way-point, "quintic": runs
+/// through them), stop_at_end (false), [[waypoint]] time_s, position_rad (one per joint).
+class JointTrajectory : public Controller {
+ public:
+  Status configure(ControllerSetup& setup) override {
+    TomlTable& parameters = setup.parameters;
+    through_ = parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic"}) ==
+               "quintic";
+    stop_at_end_ = parameters.boolean_or("stop_at_end", false);
+    joints_ = joints_parameter(setup);
+    for (const std::size_t joint : joints_) {
+      const Status claimed = claim(setup, joint, hal::ControlMode::kPosition);
+      if (!claimed) return claimed;
+    }
+    std::vector<TomlTable> tables = parameters.tables("waypoint");
+    if (tables.empty()) {
+      parameters.error("", "there is no way-point", "add [[controller.parameters.waypoint]]");
+    }
+    times_s_.assign(1, 0.0);
+    points_.assign(joints_.size(), Motion{});  // the measured positions, at the start
+    for (TomlTable& table : tables) read_waypoint(setup, table);
+    set_velocities();
+    for (std::size_t i = 1; i + 1 < times_s_.size(); ++i) check_segment(setup, tables[i], i);
+    return {};
+  }
+
+  void start(const hal::CycleTime& time, const hal::StateImage& state,
+             hal::CommandImage&) noexcept TANDEM_RT override {
+    start_ns_ = time.time_ns;
+    segment_ = 0;
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      points_[k].position = state.position_rad()[joints_[k]];
+    }
+  }
+
+  Code update(const hal::CycleTime& time, const hal::StateImage&,
+              hal::CommandImage& command) noexcept TANDEM_RT override {
+    const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    const std::size_t last = times_s_.size() - 1;
+    while (segment_ < last && t_s >= times_s_[segment_ + 1]) ++segment_;
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const Motion now = segment_ == last ? Motion{point(last, k).position, 0.0, 0.0}
+                                          : at(segment_, k, t_s - times_s_[segment_]);
+      command.position_rad()[joints_[k]] = now.position;
+      command.velocity_rad_s()[joints_[k]] = now.velocity;
+    }
+    return segment_ == last && stop_at_end_ ? Code::kStopped : Code::kOk;
+  }
+
+  void archive(Archive& ar) override { ar(start_ns_, segment_, points_); }
+
+ private:
+  void read_waypoint(ControllerSetup& setup, TomlTable& table) {
+    const double time_s = table.number("time_s", kPositive);
+    const std::vector<double> positions = table.numbers("position_rad", joints_.size());
+    table.finish();
+    if (time_s <= times_s_.back()) {
+      table.error("time_s", "is not later than the way-point before", "sort them by time");
+    }
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
+      if (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad) {
+        table.error("position_rad", "joint '" + joint.name + "' leaves its limits",
+                    "stay within " + std::to_string(joint.min_position_rad) + " and " +
+                        std::to_string(joint.max_position_rad));
+      }
+      points_.push_back({positions[k], 0.0, 0.0});
+    }
+    times_s_.push_back(time_s);
+  }
+
+  /// Through a way-point a joint runs as fast as between its neighbours, or rests where it turns.
+  void set_velocities() {
+    for (std::size_t i = 1; through_ && i + 1 < times_s_.size(); ++i) {
+      for (std::size_t k = 0; k < joints_.size(); ++k) {
+        const double before = point(i, k).position - point(i - 1, k).position;
+        const double after = point(i + 1, k).position - point(i, k).position;
+        // The start is not known yet: the first way-point is where the joints rest.
+        const bool turns = i == 1 || before * after <= 0.0;
+        point(i, k).velocity =
+            turns ? 0.0 : (before + after) / (times_s_[i + 1] - times_s_[i - 1]);
+      }
+    }
+  }
+
+  void check_segment(ControllerSetup& setup, TomlTable& end, std::size_t segment) {
+    const double duration = times_s_[segment + 1] - times_s_[segment];
+    if (!(duration > 0.0)) return;  // reported already
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
+      double fastest = 0.0;
+      bool inside = true;
+      for (int i = 0; i <= kSamples; ++i) {
+        const Motion now = at(segment, k, duration * i / kSamples);
+        fastest = std::max(fastest, std::abs(now.velocity));
+        inside = inside && now.position >= joint.min_position_rad &&
+                 now.position <= joint.max_position_rad;
+      }
+      if (fastest > joint.max_velocity_rad_s) {
+        char text[96];
+        std::snprintf(text, sizeof text, "would need %.3g rad/s on the way, its limit is %.3g",
+                      fastest, joint.max_velocity_rad_s);
+        end.error("time_s", "joint '" + joint.name + "' " + text, "give it more time");
+      }
+      if (!inside) {
+        end.error("position_rad", "joint '" + joint.name + "' leaves its limits on the way",
+                  "use interpolation = \"min_jerk\", or another way-point");
+      }
+    }
+  }
+
+  [[nodiscard]] Motion& point(std::size_t i, std::size_t k) noexcept {
+    return points_[i * joints_.size() + k];
+  }
+  [[nodiscard]] Motion at(std::size_t segment, std::size_t k, double t_s) noexcept TANDEM_RT {
+    const double duration = times_s_[segment + 1] - times_s_[segment];
+    return quintic(point(segment, k), point(segment + 1, k), duration, t_s);
+  }
+
+  bool through_ = false;
+  bool stop_at_end_ = false;
+  std::vector<std::size_t> joints_;
+  std::vector<double> times_s_;   // of every point, the start at 0 first
+  std::vector<Motion> points_;    // per time, per joint
+  std::int64_t start_ns_ = 0;
+  std::size_t segment_ = 0;
+};
+
+}  // namespace
+}  // namespace tandem
+
+TANDEM_CONTROLLER(tandem::JointTrajectory, "joint_trajectory",
+                  "Leads joints through way-points at given times.")

@@ -1,0 +1,129 @@
+#include "controllers/segment.hpp"
+#include "controllers/min_jerk.hpp"
+#include "tests/controllers/harness.hpp"
+#include "tests/hal/fake_backend.hpp"
+
+namespace tandem {
+namespace {
+
+const char* const kTwo = R"(joints = ['shoulder', 'wrist']
+[[waypoint]]
+time_s = 1.0
+position_rad = [0.5, -0.5]
+[[waypoint]]
+time_s = 2.0
+position_rad = [1.0, 0.5]
+[[waypoint]]
+time_s = 3.0
+position_rad = [1.2, 0.0]
+)";
+
+TEST(Quintic, MeetsBothEndsAndIsItsOwnDerivative) {
+  const Motion from{0.3, -0.4, 0.0}, to{1.0, 0.7, 0.0};
+  const Motion first = quintic(from, to, 2.0, 0.0), last = quintic(from, to, 2.0, 2.0);
+  EXPECT_NEAR(first.position, 0.3, 1e-12);
+  EXPECT_NEAR(first.velocity, -0.4, 1e-12);
+  EXPECT_NEAR(last.position, 1.0, 1e-12);
+  EXPECT_NEAR(last.velocity, 0.7, 1e-12);
+  EXPECT_NEAR(first.acceleration, 0.0, 1e-12);
+  EXPECT_NEAR(last.acceleration, 0.0, 1e-12);
+  const double h = 1e-6;
+  for (const double t : {0.2, 0.9, 1.7}) {
+    const Motion before = quintic(from, to, 2.0, t - h), after = quintic(from, to, 2.0, t + h);
+    const Motion now = quintic(from, to, 2.0, t);
+    EXPECT_NEAR(now.velocity, (after.position - before.position) / (2 * h), 1e-8);
+    EXPECT_NEAR(now.acceleration, (after.velocity - before.velocity) / (2 * h), 1e-7);
+  }
+}
+
+TEST(Quintic, IsTheMinimumJerkProfileBetweenRests) {
+  for (const double t : {0.1, 0.5, 0.8}) {
+    EXPECT_NEAR(quintic({}, {2.0, 0.0, 0.0}, 1.0, t).position, 2.0 * min_jerk(t).s, 1e-12);
+  }
+}
+
+TEST(JointTrajectory, ReachesEveryWayPointInTimeAndRestsThere) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory", kTwo);
+  ASSERT_EQ(run.problem(), "");
+  run.state.position_rad()[0] = 0.1;
+  run.start();
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.position_rad()[0], 0.1);
+  ASSERT_EQ(run.run(1.0), Code::kOk);
+  EXPECT_NEAR(run.command.position_rad()[0], 0.5, 1e-9);
+  EXPECT_NEAR(run.command.velocity_rad_s()[0], 0.0, 1e-9);
+  ASSERT_EQ(run.run(1.0), Code::kOk);
+  EXPECT_NEAR(run.command.position_rad()[2], 0.5, 1e-9);
+  ASSERT_EQ(run.run(2.0), Code::kOk);
+  EXPECT_EQ(run.command.position_rad()[0], 1.2);
+  EXPECT_EQ(run.command.position_rad()[2], 0.0);
+  EXPECT_EQ(run.setup.claims().size(), 2U);
+}
+
+TEST(JointTrajectory, RunsThroughWayPointsWithoutAJumpOfVelocity) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory",
+                    std::string("interpolation = 'quintic'\nstop_at_end = true\n") + kTwo);
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  double last_position = 0.0, last_velocity = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    ASSERT_EQ(run.step(), Code::kOk);
+    const double position = run.command.position_rad()[0];
+    const double velocity = run.command.velocity_rad_s()[0];
+    ASSERT_NEAR(velocity, last_velocity, 0.02) << i;
+    if (i > 0) { ASSERT_NEAR(velocity, (position - last_position) * 1e3, 0.01) << i; }
+    if (i == 2000) {  // (1.2 - 0.5) / 2 s on the way
+      EXPECT_NEAR(position, 1.0, 1e-9);
+      EXPECT_NEAR(velocity, 0.35, 1e-9);
+    }
+    last_position = position;
+    last_velocity = velocity;
+  }
+  EXPECT_EQ(run.step(), Code::kStopped);
+  EXPECT_EQ(run.command.position_rad()[0], 1.2);
+}
+
+std::string problem_of(const std::string& text) {
+  return test::Harness(hal::test::fake_robot(), "joint_trajectory", text).problem();
+}
+
+TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
+  EXPECT_EQ(problem_of("joints = ['wrist']\n"),
+            "experiment.toml:1: there is no way-point (add [[controller.parameters.waypoint]])");
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1.7]\n"),
+            "experiment.toml:4: waypoint[0].position_rad: joint 'wrist' leaves its limits (stay "
+            "within -1.500000 and 1.500000)");
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1, 2]\n"),
+            "experiment.toml:4: waypoint[0].position_rad: has 2 numbers (give exactly 1)");
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
+                       "[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"),
+            "experiment.toml:6: waypoint[1].time_s: is not later than the way-point before (sort "
+            "them by time)");
+  EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
+                       "[[waypoint]]\ntime_s = 1.5\nposition_rad = [1.0]\n"),
+            "experiment.toml:6: waypoint[1].time_s: joint 'wrist' would need 3.75 rad/s on the "
+            "way, its limit is 2 (give it more time)");
+  EXPECT_EQ(problem_of("interpolation = 'qintic'\n"),
+            "experiment.toml:1: interpolation: 'qintic' is not one of the choices (did you mean "
+            "'quintic'?)");
+}
+
+TEST(JointTrajectory, GoesOnFromASnapshot) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory", kTwo);
+  run.state.position_rad()[0] = 0.1;
+  run.start();
+  run.run(1.5);
+  Archive saved;
+  run.controller().archive(saved);
+  test::Harness other(hal::test::fake_robot(), "joint_trajectory", kTwo);
+  Archive restored(saved.bytes());
+  other.controller().archive(restored);
+  ASSERT_TRUE(restored.ok() && restored.at_end());
+  other.time = run.time;
+  run.run(0.3);
+  other.run(0.3);
+  EXPECT_EQ(other.command.position_rad()[0], run.command.position_rad()[0]);
+}
+
+}  // namespace
+}  // namespace tandem
