@@ -1,0 +1,29 @@
+// Where a run stands, for whoever watches it from another thread.
+// Layer: runtime.  Thread: written by the loop, read by any.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace tandem::runtime {
+
+enum class RunPhase : std::uint8_t {
+  kBringUp,   ///< the backend configures and enables its drives
+  kRunning,   ///< controllers run
+  kHolding,   ///< a joint with stop category "hold" is in fault: every joint stays where it is
+  kShutDown,  ///< the drives stop and are disabled
+  kDone,
+};
+[[nodiscard]] const char* to_string(RunPhase phase) noexcept;
+
+/// Each value is current by itself; together they may be of neighbouring cycles.
+struct Progress {
+  std::atomic<RunPhase> phase{RunPhase::kBringUp};
+  std::atomic<std::uint64_t> cycles{0};          ///< done, all phases
+  std::atomic<std::uint64_t> running_cycles{0};  ///< of the phase kRunning
+  std::atomic<std::uint64_t> total_cycles{0};    ///< that kRunning will have; 0: until stopped
+  std::atomic<std::uint64_t> overruns{0};
+  std::atomic<std::uint64_t> dropped{0};         ///< messages the log lost
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,139 @@
+// Construction, snapshots and results of RobotCycle: everything outside of the cycle itself.
+#include <cstdio>
+
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+
+const char* to_string(Stage stage) noexcept {
+  switch (stage) {
+    case Stage::kRead: return "read";
+    case Stage::kCheck: return "check";
+    case Stage::kUpdate: return "update";
+    case Stage::kLimit: return "limit";
+    case Stage::kWrite: return "write";
+    case Stage::kHandOver: return "hand over";
+  }
+  return "?";
+}
+
+const char* to_string(RunPhase phase) noexcept {
+  switch (phase) {
+    case RunPhase::kBringUp: return "bring-up";
+    case RunPhase::kRunning: return "running";
+    case RunPhase::kHolding: return "holding";
+    case RunPhase::kShutDown: return "shut-down";
+    case RunPhase::kDone: return "done";
+  }
+  return "?";
+}
+
+RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
+    : robot_(&parts.robot),
+      backend_(&parts.backend),
+      controllers_(&parts.controllers),
+      clock_(&parts.clock),
+      recorder_(parts.recorder),
+      truth_(parts.truth),
+      config_(config),
+      loop_(config.loop, parts.clock),
+      state_(parts.robot.shape()),
+      command_(parts.robot.shape()),
+      parameters_(hal::initial_parameters(parts.robot)),
+      limits_(parts.robot, config.loop.period_ns),
+      statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet()),
+      joint_faulted_(parts.robot.joints.size()),
+      sensor_lost_(parts.robot.sensors.size()),
+      joint_limited_(parts.robot.joints.size()) {
+  progress_.total_cycles = config.running_cycles;
+  if (recorder_ == nullptr) return;
+  state_channel_ = recorder_->add_channel("/tandem/state", "tandem/msg/State", state_.layout());
+  command_channel_ =
+      recorder_->add_channel("/tandem/command", "tandem/msg/Command", command_.layout());
+  if (truth_ != nullptr) {
+    truth_channel_ = recorder_->add_channel("/tandem/truth", "tandem/msg/Truth", truth_->layout());
+  }
+  recorder_->start();
+}
+
+void RobotCycle::archive(Archive& ar) {
+  loop_.archive(ar);
+  state_.archive(ar);
+  command_.archive(ar);
+  parameters_.archive(ar);
+  limits_.archive(ar);
+  statistics_.archive(ar);
+  controllers_->archive(ar);
+  ar(time_, phase_, started_, disable_, joint_fault_, read_code_, phase_began_, ran_);
+  ar(joint_faulted_, sensor_lost_, joint_limited_, faults_, fault_count_);
+}
+
+Result<std::vector<std::byte>> RobotCycle::save() {
+  Archive ar;
+  archive(ar);
+  if (!backend_->archive(ar)) {
+    return fail("this robot cannot be saved", "snapshots need a simulated robot");
+  }
+  return std::vector<std::byte>(ar.bytes().begin(), ar.bytes().end());
+}
+
+Status RobotCycle::restore(std::span<const std::byte> snapshot) {
+  Archive ar(snapshot);
+  archive(ar);
+  if (!backend_->archive(ar)) {
+    return fail("this robot cannot be rewound", "snapshots need a simulated robot");
+  }
+  if (ar.ok() && ar.at_end()) return {};
+  return fail("the snapshot is of another robot or experiment",
+              "restore it with the configuration that it was saved with");
+}
+
+Fault RobotCycle::tell(const FaultRecord& record) const {
+  Fault fault{.time_s = static_cast<double>(record.time_ns) * 1e-9, .joint = {}, .text = {}};
+  const auto index = static_cast<std::size_t>(record.index);
+  const char* code = tandem::to_string(static_cast<Code>(record.code));
+  char number[16];
+  std::snprintf(number, sizeof number, "0x%04X", record.code);
+  switch (record.source) {
+    case FaultSource::kDrive:
+      fault.joint = robot_->joints[index].name;
+      fault.text = "the drive reports error " + std::string(number);
+      break;
+    case FaultSource::kJointLost:
+      fault.joint = robot_->joints[index].name;
+      fault.text = "no feedback for " + std::to_string(record.code) + " cycles";
+      break;
+    case FaultSource::kSensorLost:
+      fault.joint = robot_->sensors[index].name;
+      fault.text = "no sample for " + std::to_string(record.code) + " cycles";
+      break;
+    case FaultSource::kBackend:
+      fault.text = backend_->status_text();
+      if (fault.text.empty()) fault.text = "the robot answered " + std::string(code);
+      break;
+    case FaultSource::kController:
+      fault.joint = controllers_->name(index);
+      fault.text = "the controller gave up: " + std::string(code);
+      break;
+    case FaultSource::kCommand:
+      fault.joint = robot_->joints[index].name;
+      fault.text = "a controller's command was not a finite number";
+      break;
+    case FaultSource::kOverrun:
+      fault.text = std::to_string(config_.loop.stop_late) + " of the last " +
+                   std::to_string(config_.loop.stop_window) + " cycles were late";
+      break;
+    case FaultSource::kBringUp:
+      fault.text = "the drives were not enabled in time: " + backend_->status_text();
+      break;
+  }
+  return fault;
+}
+
+std::vector<Fault> RobotCycle::faults() const {
+  std::vector<Fault> out;
+  for (std::size_t i = 0; i < fault_count_; ++i) out.push_back(tell(faults_[i]));
+  return out;
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,76 @@
+#include "runtime/run_statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::runtime {
+
+RunStatistics::RunStatistics(std::size_t joints, std::size_t feet)
+    : errors_(joints), feet_(feet) {}
+
+void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
+                         const hal::TruthImage* truth) noexcept TANDEM_RT {
+  const auto mode = command.mode();
+  const auto wanted = command.position_rad();
+  const auto measured = state.position_rad();
+  for (std::size_t j = 0; j < errors_.size(); ++j) {
+    if (mode[j] != static_cast<std::int8_t>(hal::ControlMode::kPosition)) continue;
+    const double error = wanted[j] - measured[j];
+    errors_[j].square_sum += error * error;
+    errors_[j].max = std::max(errors_[j].max, std::abs(error));
+    ++errors_[j].count;
+  }
+  if (truth != nullptr && truth->hoist_share()[0] <= 0.0) take_ground(*truth);
+}
+
+void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT {
+  for (std::size_t f = 0; f < feet_.size(); ++f) {
+    const double* at = &truth.foot_position_m()[3 * f];
+    const double force_N = truth.foot_force_N()[3 * f + 2];
+    Foot& foot = feet_[f];
+    force_sum_N_ += force_N;
+    if (force_N > 0.0 && foot.touching == 0) {
+      foot.anchor_x = at[0];
+      foot.anchor_y = at[1];
+    }
+    foot.touching = force_N > 0.0 ? 1 : 0;
+    if (foot.touching == 0) continue;
+    slip_m_ = std::max(slip_m_, std::hypot(at[0] - foot.anchor_x, at[1] - foot.anchor_y));
+  }
+  const double height_m = truth.base_position_m()[2];
+  min_height_m_ = free_cycles_ == 0 ? height_m : std::min(min_height_m_, height_m);
+  max_height_m_ = free_cycles_ == 0 ? height_m : std::max(max_height_m_, height_m);
+  // The angle of the base's z axis: its W components are the rotation matrix's last column.
+  const auto quaternion = truth.base_quaternion();
+  const double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
+  const double zx = 2.0 * (x * z + w * y);
+  const double zy = 2.0 * (y * z - w * x);
+  const double zz = 1.0 - 2.0 * (x * x + y * y);
+  tilt_rad_ = std::atan2(std::hypot(zx, zy), zz);
+  ++free_cycles_;
+}
+
+std::vector<TrackingError> RunStatistics::tracking() const {
+  std::vector<TrackingError> out;
+  for (const Error& one : errors_) {
+    const double count = static_cast<double>(std::max<std::uint64_t>(one.count, 1));
+    out.push_back({std::sqrt(one.square_sum / count), one.max});
+  }
+  return out;
+}
+
+std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
+  if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
+  return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_};
+}
+
+std::optional<BaseFigures> RunStatistics::base() const {
+  if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
+  return BaseFigures{min_height_m_, max_height_m_, tilt_rad_};
+}
+
+void RunStatistics::archive(Archive& ar) {
+  ar(errors_, feet_, free_cycles_, force_sum_N_, slip_m_, min_height_m_, max_height_m_, tilt_rad_);
+}
+
+}  // namespace tandem::runtime

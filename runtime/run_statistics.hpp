@@ -1,0 +1,70 @@
+// Figures of a run, gathered in the cycle: tracking of each joint, forces on the ground, the
+// base. Plain sums, no heap.
+// Layer: runtime.  Thread: made non-RT; take() RT; results when the loop has stopped.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "hal/image.hpp"
+#include "hal/truth.hpp"
+
+namespace tandem::runtime {
+
+/// Reference minus measured position of one joint, over the cycles in position control.
+struct TrackingError {
+  double rms_rad = 0.0;
+  double max_rad = 0.0;  ///< of the absolute value
+};
+
+/// From the plant's truth, over the cycles in which the base was free.
+struct GroundFigures {
+  double weight_N = 0.0;               ///< mass times gravity, from the model
+  double mean_vertical_force_N = 0.0;  ///< of all feet together
+  double max_foot_slip_m = 0.0;        ///< horizontal way of a foot since it touched down
+};
+struct BaseFigures {
+  double min_height_m = 0.0;  ///< of the base's origin above W's
+  double max_height_m = 0.0;
+  double final_tilt_rad = 0.0;  ///< angle between the base's z axis and W's
+};
+
+class RunStatistics {
+ public:
+  /// @param feet  of the truth image; 0 without one.
+  RunStatistics(std::size_t joints, std::size_t feet);
+
+  /// A cycle in which the controllers ran. `truth` may be null.
+  void take(const hal::StateImage& state, const hal::CommandImage& command,
+            const hal::TruthImage* truth) noexcept TANDEM_RT;
+
+  [[nodiscard]] std::vector<TrackingError> tracking() const;
+  /// Empty when there was no truth, no foot, or no cycle with a free base.
+  [[nodiscard]] std::optional<GroundFigures> ground(double weight_N) const;
+  [[nodiscard]] std::optional<BaseFigures> base() const;
+
+  void archive(Archive& ar);
+
+ private:
+  struct Error {
+    double square_sum = 0.0;
+    double max = 0.0;
+    std::uint64_t count = 0;
+  };
+  struct Foot {
+    double anchor_x = 0.0, anchor_y = 0.0;  // where it touched down
+    std::uint64_t touching = 0;
+  };
+  void take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT;
+
+  std::vector<Error> errors_;
+  std::vector<Foot> feet_;
+  std::uint64_t free_cycles_ = 0;
+  double force_sum_N_ = 0.0, slip_m_ = 0.0;
+  double min_height_m_ = 0.0, max_height_m_ = 0.0, tilt_rad_ = 0.0;
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,132 @@
+#include "runtime/controller_host.hpp"
+
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/test_controllers.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::ControlMode;
+using test::parameters;
+using test::Sine;
+
+class ControllerHostOfFake : public testing::Test {
+ protected:
+  Status add(const std::string& name, std::vector<std::size_t> joints,
+             ControlMode mode = ControlMode::kPosition) {
+    auto controller = std::make_unique<Sine>(std::move(joints), mode);
+    last_ = controller.get();
+    return host_.add(name, std::move(controller), parameters());
+  }
+  std::int8_t mode(std::size_t joint) const { return command_.mode()[joint]; }
+
+  const hal::RobotConfig robot_ = hal::test::fake_robot();
+  ControllerHost host_{robot_, nullptr, 1'000'000};
+  hal::StateImage state_{robot_.shape()};
+  hal::CommandImage command_{robot_.shape()};
+  Sine* last_ = nullptr;
+};
+
+TEST_F(ControllerHostOfFake, RefusesTwoControllersOnOneJointAndNamesBoth) {
+  ASSERT_TRUE(add("left", {0, 1}));
+  const Status added = add("right", {2, 1});
+  ASSERT_FALSE(added);
+  EXPECT_EQ(added.error().key, "elbow");
+  EXPECT_EQ(added.error().message, "is claimed by the controllers 'left' and 'right'");
+  EXPECT_EQ(host_.size(), 1U);
+}
+
+TEST_F(ControllerHostOfFake, RefusesAJointClaimedTwiceByOneController) {
+  EXPECT_FALSE(add("left", {1, 1}));
+}
+
+TEST_F(ControllerHostOfFake, RefusesAJointThatDoesNotExist) {
+  const Status added = add("left", {3});
+  ASSERT_FALSE(added);
+  EXPECT_NE(added.error().message.find("joint number 3 of 3"), std::string::npos);
+}
+
+TEST_F(ControllerHostOfFake, RefusesAModeThatTheJointLacks) {
+  hal::RobotConfig robot = robot_;
+  robot.gains[0].current = {};
+  ControllerHost host(robot, nullptr, 1'000'000);
+  const std::vector<std::size_t> joints{1};
+  const Status added = host.add(
+      "left", std::make_unique<Sine>(joints, ControlMode::kCurrent), parameters());
+  ASSERT_FALSE(added);
+  EXPECT_EQ(added.error().key, "elbow");
+}
+
+TEST_F(ControllerHostOfFake, ReportsParametersThatTheControllerDoesNotKnow) {
+  const auto document = TomlDocument::parse("amplitude_rd = 0.1", "x.toml");
+  ASSERT_TRUE(host_.add("left", std::make_unique<Sine>(std::vector<std::size_t>{0}),
+                        document->root()));
+  ASSERT_EQ(document->diagnostics().size(), 1U);
+  EXPECT_EQ(document->diagnostics()[0].key, "amplitude_rd");
+  EXPECT_EQ(document->diagnostics()[0].hint, "did you mean 'amplitude_rad'?");
+}
+
+TEST_F(ControllerHostOfFake, HoldsJointsThatNobodyClaimedWhereTheyAre) {
+  ASSERT_TRUE(add("one", {1}, ControlMode::kTorque));
+  state_.position_rad()[0] = 0.3;
+  state_.position_rad()[2] = -0.4;
+  host_.start({}, state_, command_);
+  EXPECT_EQ(mode(0), static_cast<int>(ControlMode::kPosition));
+  EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kTorque));
+  EXPECT_EQ(mode(2), static_cast<int>(ControlMode::kPosition));
+  state_.position_rad()[0] = 0.35;  // pushed away: the reference stays
+  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
+  EXPECT_EQ(command_.position_rad()[0], 0.3);
+  EXPECT_EQ(command_.position_rad()[2], -0.4);
+}
+
+TEST_F(ControllerHostOfFake, GivesCompliantJointsTheirDefaultStiffness) {
+  ASSERT_TRUE(add("one", {1}));
+  host_.start({}, state_, command_);
+  EXPECT_EQ(command_.stiffness_Nm_rad()[1], 50.0);
+  EXPECT_EQ(command_.damping_Nms_rad()[1], 15.0);
+}
+
+TEST_F(ControllerHostOfFake, IsDoneWhenEveryControllerIs) {
+  ASSERT_TRUE(add("one", {0}));
+  Sine* one = last_;
+  ASSERT_TRUE(add("two", {1}));
+  Sine* two = last_;
+  host_.start({}, state_, command_);
+  one->answer = Code::kStopped;
+  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
+  EXPECT_EQ(host_.update({}, state_, command_), Code::kOk);
+  EXPECT_EQ(one->updates, 1);  // a controller that is done is not called again
+  two->answer = Code::kStopped;
+  EXPECT_EQ(host_.update({}, state_, command_), Code::kStopped);
+}
+
+TEST_F(ControllerHostOfFake, NamesTheControllerThatGaveUp) {
+  ASSERT_TRUE(add("one", {0}));
+  ASSERT_TRUE(add("two", {1}));
+  last_->answer = Code::kNotFinite;
+  host_.start({}, state_, command_);
+  EXPECT_EQ(host_.update({}, state_, command_), Code::kNotFinite);
+  EXPECT_EQ(host_.name(host_.culprit()), "two");
+}
+
+TEST_F(ControllerHostOfFake, HoldKeepsAPositionReferenceAndItsFeedForward) {
+  command_.mode()[0] = static_cast<std::int8_t>(ControlMode::kPosition);
+  command_.position_rad()[0] = 0.5;
+  command_.torque_Nm()[0] = 7.0;
+  command_.velocity_rad_s()[0] = 1.0;
+  command_.mode()[1] = static_cast<std::int8_t>(ControlMode::kTorque);
+  command_.torque_Nm()[1] = 9.0;
+  state_.position_rad()[0] = 0.45;
+  state_.position_rad()[1] = -0.2;
+  host_.hold(state_, command_);
+  EXPECT_EQ(command_.position_rad()[0], 0.5);
+  EXPECT_EQ(command_.torque_Nm()[0], 7.0);
+  EXPECT_EQ(command_.velocity_rad_s()[0], 0.0);
+  EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kPosition));
+  EXPECT_EQ(command_.position_rad()[1], -0.2);
+  EXPECT_EQ(command_.torque_Nm()[1], 0.0);
+}
+
+}  // namespace
+}  // namespace tandem::runtime

@@ -1,0 +1,92 @@
+// A robot whose joints follow their references with one time constant: enough for the loop, and
+// as clean of heap and locks as a real backend. Faults can be injected.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "hal/backend.hpp"
+#include "hal/robot_config.hpp"
+#include "hal/truth.hpp"
+
+namespace tandem::runtime::test {
+
+class FirstOrderRobot final : public hal::Backend {
+ public:
+  static constexpr double kShare = 0.05;  // of the error made good in a cycle
+
+  explicit FirstOrderRobot(const hal::RobotConfig& robot, std::size_t feet = 0)
+      : truth(robot.joints.size(), feet),
+        position_(robot.joints.size(), 0.1),
+        velocity_(robot.joints.size()),
+        command_(robot.shape()) {}
+
+  // What a test may change between two cycles.
+  std::uint64_t bring_up_cycles = 20;
+  std::uint64_t shut_down_cycles = 3;
+  Code answer = Code::kOk;             // of read()
+  int faulted_joint = -1, lost_joint = -1, lost_sensor = -1;
+  bool latch_on_fault = false;         // phase() turns kFault with a joint
+  hal::TruthImage truth;               // its feet and base are the test's to set
+  std::uint64_t idle_writes = 0;       // commands with every joint idle
+
+  hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
+  hal::Phase phase() const noexcept override {
+    if (cycles_ < bring_up_cycles) return hal::Phase::kBringUp;
+    if (latch_on_fault && faulted_joint >= 0) return hal::Phase::kFault;
+    return hal::Phase::kOperational;
+  }
+  std::string status_text() const override {
+    return cycles_ < bring_up_cycles ? "elbow (node 2): waiting for 6041" : "the bus is cut";
+  }
+
+  Code read(const hal::CycleTime& time, hal::StateImage& state) noexcept override {
+    ++cycles_;
+    const double dt = static_cast<double>(time.period_ns) * 1e-9;
+    for (std::size_t j = 0; j < position_.size(); ++j) {
+      const double before = position_[j];
+      if (command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
+        position_[j] += kShare * (command_.position_rad()[j] - position_[j]);
+      }
+      velocity_[j] = (position_[j] - before) / dt;
+      const bool lost = lost_joint == static_cast<int>(j);
+      state.age_cycles()[j] = lost ? state.age_cycles()[j] + 1 : 0;
+      if (lost) continue;
+      state.position_rad()[j] = position_[j];
+      state.velocity_rad_s()[j] = velocity_[j];
+      state.mode()[j] = command_.mode()[j];
+      const bool faulted = faulted_joint == static_cast<int>(j);
+      state.fault()[j] = faulted ? 0x7310 : 0;
+      state.drive_state()[j] = static_cast<std::uint8_t>(
+          faulted ? hal::DriveState::kFault : hal::DriveState::kOperationEnabled);
+    }
+    for (std::size_t s = 0; s < state.sensor_age_cycles().size(); ++s) {
+      const bool lost = lost_sensor == static_cast<int>(s);
+      state.sensor_age_cycles()[s] = lost ? state.sensor_age_cycles()[s] + 1 : 0;
+    }
+    truth.cycle()[0] = time.cycle;
+    truth.time_ns()[0] = time.time_ns;
+    return answer;
+  }
+  Code write(const hal::CommandImage& command, const hal::ParameterImage&) noexcept override {
+    command_.assign(command);
+    bool idle = true;
+    for (const std::int8_t mode : command.mode()) idle = idle && mode == 0;
+    if (idle) ++idle_writes;
+    return Code::kOk;
+  }
+  bool shut_down() noexcept override { return ++shutting_down_ >= shut_down_cycles; }
+  bool archive(Archive& ar) override {
+    ar(position_, velocity_, command_, truth, cycles_, shutting_down_);
+    return can_rewind;
+  }
+  bool can_rewind = true;
+
+ private:
+  std::vector<double> position_, velocity_;
+  hal::CommandImage command_;
+  std::uint64_t cycles_ = 0, shutting_down_ = 0;
+};
+
+}  // namespace tandem::runtime::test

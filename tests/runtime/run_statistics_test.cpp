@@ -1,0 +1,85 @@
+#include "runtime/run_statistics.hpp"
+
+#include <cmath>
+
+namespace tandem::runtime {
+namespace {
+
+constexpr auto kPosition = static_cast<std::int8_t>(hal::ControlMode::kPosition);
+
+class RunStatisticsOfTwo : public testing::Test {
+ protected:
+  void take(double wanted, double measured) {
+    command_.mode()[0] = kPosition;
+    command_.position_rad()[0] = wanted;
+    state_.position_rad()[0] = measured;
+    statistics_.take(state_, command_, &truth_);
+  }
+  void foot(std::size_t index, double x, double force_N) {
+    truth_.foot_position_m()[3 * index] = x;
+    truth_.foot_force_N()[3 * index + 2] = force_N;
+  }
+
+  hal::StateImage state_{{.joints = 2, .sensor_channels = {}}};
+  hal::CommandImage command_{{.joints = 2, .sensor_channels = {}}};
+  hal::TruthImage truth_{2, 2};
+  RunStatistics statistics_{2, 2};
+};
+
+TEST_F(RunStatisticsOfTwo, GivesRmsAndMaximumOfTheTrackingError) {
+  take(0.0, 0.3);
+  take(0.0, -0.4);
+  const auto tracking = statistics_.tracking();
+  EXPECT_DOUBLE_EQ(tracking[0].rms_rad, std::sqrt((0.09 + 0.16) / 2.0));
+  EXPECT_DOUBLE_EQ(tracking[0].max_rad, 0.4);
+  EXPECT_EQ(tracking[1].rms_rad, 0.0);  // never in position control
+}
+
+TEST_F(RunStatisticsOfTwo, GivesTheMeanForceOfBothFeetOnceTheBaseIsFree) {
+  truth_.base_quaternion()[3] = 1.0;
+  truth_.hoist_share()[0] = 0.5;
+  foot(0, 0.0, 1000.0);
+  take(0, 0);
+  EXPECT_FALSE(statistics_.ground(1.0));
+  truth_.hoist_share()[0] = 0.0;
+  foot(0, 0.0, 100.0);
+  foot(1, 0.0, 200.0);
+  take(0, 0);
+  foot(0, 0.0, 150.0);
+  take(0, 0);
+  EXPECT_DOUBLE_EQ(statistics_.ground(320.0)->mean_vertical_force_N, 325.0);
+  EXPECT_EQ(statistics_.ground(320.0)->weight_N, 320.0);
+}
+
+TEST_F(RunStatisticsOfTwo, MeasuresSlipFromWhereAFootTouchedDown) {
+  foot(0, 0.10, 50.0);
+  take(0, 0);
+  foot(0, 0.12, 50.0);
+  take(0, 0);
+  EXPECT_NEAR(statistics_.ground(1)->max_foot_slip_m, 0.02, 1e-15);
+  foot(0, 0.50, 0.0);  // a step through the air
+  take(0, 0);
+  foot(0, 0.60, 50.0);
+  take(0, 0);
+  EXPECT_NEAR(statistics_.ground(1)->max_foot_slip_m, 0.02, 1e-15);
+}
+
+TEST_F(RunStatisticsOfTwo, GivesTheBasesHeightsAndItsLastTilt) {
+  const double angle = 0.2;  // about x
+  truth_.base_quaternion()[3] = 1.0;
+  for (const double height : {0.9, 0.7, 0.8}) {
+    truth_.base_position_m()[2] = height;
+    take(0, 0);
+  }
+  truth_.base_quaternion()[0] = std::sin(angle / 2);
+  truth_.base_quaternion()[3] = std::cos(angle / 2);
+  take(0, 0);
+  const auto base = statistics_.base();
+  ASSERT_TRUE(base);
+  EXPECT_EQ(base->min_height_m, 0.7);
+  EXPECT_EQ(base->max_height_m, 0.9);
+  EXPECT_NEAR(base->final_tilt_rad, angle, 1e-15);
+}
+
+}  // namespace
+}  // namespace tandem::runtime

@@ -1,0 +1,64 @@
+// Controllers for tests of the loop: one that moves joints on a sine, and one that misbehaves.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "controllers/controller.hpp"
+
+namespace tandem::runtime::test {
+
+/// Moves its joints by 0.2 rad, 1 Hz, about where they stood.
+class Sine : public Controller {
+ public:
+  explicit Sine(std::vector<std::size_t> joints, hal::ControlMode mode = hal::ControlMode::kPosition)
+      : joints_(std::move(joints)), mode_(mode), middle_(joints_.size()) {}
+
+  Status configure(ControllerSetup& setup) override {
+    amplitude_rad_ = setup.parameters.number_or("amplitude_rad", 0.2, kPositive);
+    for (const std::size_t joint : joints_) setup.claim(joint, mode_);
+    return {};
+  }
+  void start(const hal::CycleTime& time, const hal::StateImage& state,
+             hal::CommandImage&) noexcept override {
+    began_ns_ = time.time_ns;
+    for (std::size_t i = 0; i < joints_.size(); ++i) middle_[i] = state.position_rad()[joints_[i]];
+  }
+  Code update(const hal::CycleTime& time, const hal::StateImage&,
+              hal::CommandImage& command) noexcept override {
+    ++updates;
+    if (allocates) last_words_ = std::make_unique<int>(updates);
+    if (answer != Code::kOk) return answer;
+    const double t = static_cast<double>(time.time_ns - began_ns_) * 1e-9;
+    for (std::size_t i = 0; i < joints_.size(); ++i) {
+      command.position_rad()[joints_[i]] = middle_[i] + amplitude_rad_ * std::sin(6.283 * t);
+      if (not_finite) {
+        command.position_rad()[joints_[i]] = std::numeric_limits<double>::quiet_NaN();
+      }
+    }
+    return Code::kOk;
+  }
+  void stop() noexcept override { ++stops; }
+  void archive(Archive& ar) override { ar(began_ns_, middle_); }
+
+  Code answer = Code::kOk;
+  bool not_finite = false, allocates = false;
+  int updates = 0, stops = 0;
+
+ private:
+  std::vector<std::size_t> joints_;
+  hal::ControlMode mode_;
+  double amplitude_rad_ = 0.0;
+  std::int64_t began_ns_ = 0;
+  std::vector<double> middle_;
+  std::unique_ptr<int> last_words_;
+};
+
+/// Parameters without a file.
+inline TomlTable parameters(const std::string& text = "") {
+  return TomlDocument::parse(text, "x.toml")->root();
+}
+
+}  // namespace tandem::runtime::test
