@@ -146,11 +146,12 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
   return powered() || latched ? connection : ErrorCode::kNone;
 }
 
-AxisEvents Axis::supervise(ErrorCode connection) noexcept TANDEM_RT {
+AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept TANDEM_RT {
   take_demands();
-  if (connection == ErrorCode::kHeartbeatLost && objects_.abort_option != 1) {
+  if (heartbeat_lost && objects_.abort_option == 1) {
+    connection = ErrorCode::kHeartbeatLost;
+  } else if (heartbeat_lost) {
     machine_.abort_connection(objects_.abort_option, objects_.options);
-    connection = ErrorCode::kNone;
   }
   const ErrorCode cause = present_cause(connection);
   watch_stop();

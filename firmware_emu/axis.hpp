@@ -32,8 +32,9 @@ class Axis final : private canopen::ObjectOwner {
   /// Reads the sensors, runs the estimators and shows the results in the actual-value objects.
   void sample(const AxisSense& sense) noexcept TANDEM_RT;
   /// Protections, then one step of the drive machine.
-  /// @param connection  kNone, or how the commands were lost
-  AxisEvents supervise(canopen::ErrorCode connection) noexcept TANDEM_RT;
+  /// @param connection      kNone, or how the commands were lost
+  /// @param heartbeat_lost  the master's; the reaction is 6007's
+  AxisEvents supervise(canopen::ErrorCode connection, bool heartbeat_lost) noexcept TANDEM_RT;
   /// The controllers: what the bridge does until the next period.
   [[nodiscard]] AxisDrive control() noexcept TANDEM_RT;
   /// Objects and state as after power-on; the sensors' noise goes on.

@@ -133,7 +133,7 @@ void Board::receive(const Frame& frame) noexcept TANDEM_RT {
     ++ignored_frames_;
     return;
   }
-  if (lost_ == ErrorCode::kHeartbeatLost) heard_heartbeat(frame);
+  if (heartbeat_lost_) heard_heartbeat(frame);
   take(node_.receive(frame, outbox_));
 }
 
@@ -153,11 +153,12 @@ void Board::take(NodeEvents events) noexcept {
     }
   }
   if ((events & kEventOperational) != 0) {
-    lost_ = ErrorCode::kNone;
+    offline_ = false;
+    heartbeat_lost_ = false;
     find_command_rpdos();
   }
-  if ((events & kEventLeftOperational) != 0) lost_ = ErrorCode::kCommandTimeout;
-  if ((events & kEventHeartbeatLost) != 0) lost_ = ErrorCode::kHeartbeatLost;
+  if ((events & kEventLeftOperational) != 0) offline_ = true;
+  if ((events & kEventHeartbeatLost) != 0) heartbeat_lost_ = true;
   if ((events & kEventResetNode) != 0) {
     for (const auto& axis : axes_) axis->power_on();
   }
@@ -184,15 +185,12 @@ void Board::heard_heartbeat(const Frame& frame) noexcept {
   if (!heartbeat) return;
   for (std::uint8_t sub = 1; sub <= kHeartbeatConsumers; ++sub) {
     const auto consumer = od_.value<std::uint32_t>(canopen::object::kHeartbeatConsumer, sub);
-    if ((consumer >> 16) != heartbeat->node) continue;
-    // It is back; commands are again when the node is started again.
-    lost_ = node_.state() == NmtState::kOperational ? ErrorCode::kNone
-                                                    : ErrorCode::kCommandTimeout;
+    if ((consumer >> 16) == heartbeat->node) heartbeat_lost_ = false;
   }
 }
 
 ErrorCode Board::connection(std::size_t axis) const noexcept {
-  if (lost_ != ErrorCode::kNone) return lost_;
+  if (offline_ && !heartbeat_lost_) return ErrorCode::kCommandTimeout;
   const std::uint32_t allowed = axes_[axis]->objects().command_timeout;
   if (allowed == 0) return ErrorCode::kNone;
   if (commands_[axis].syncs_without > allowed) return ErrorCode::kCommandTimeout;
@@ -202,7 +200,7 @@ ErrorCode Board::connection(std::size_t axis) const noexcept {
 }
 
 void Board::supervise(std::size_t axis) noexcept {
-  const AxisEvents events = axes_[axis]->supervise(connection(axis));
+  const AxisEvents events = axes_[axis]->supervise(connection(axis), heartbeat_lost_);
   // The node itself has told of a lost heartbeat.
   if (events.raised != ErrorCode::kNone && events.raised != ErrorCode::kHeartbeatLost) {
     node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis),
@@ -238,7 +236,8 @@ void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,
 void Board::archive(Archive& ar) {
   ar(od_, node_);
   for (const auto& axis : axes_) axis->archive(ar);
-  ar(commands_, ignored_frames_, until_control_ns_, since_sync_ns_, lost_, sync_pending_);
+  ar(commands_, ignored_frames_, until_control_ns_, since_sync_ns_, offline_, heartbeat_lost_,
+     sync_pending_);
   for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled);
   archive_outbox(ar, outbox_, kOutboxFrames);
 }

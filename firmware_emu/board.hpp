@@ -101,7 +101,8 @@ class Board {
   std::uint32_t ignored_frames_ = 0;
   std::int64_t until_control_ns_ = 0;
   std::int64_t since_sync_ns_ = 0;
-  canopen::ErrorCode lost_ = canopen::ErrorCode::kNone;  ///< how the master was lost
+  bool offline_ = true;          ///< not operational: no command can come
+  bool heartbeat_lost_ = false;  ///< the master's
   bool sync_pending_ = false;
 };
 

@@ -1,0 +1,205 @@
+// Every transition of the CiA 402 machine, as the axis makes it with its bridge.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "rig.hpp"
+
+namespace tandem::firmware::testing {
+namespace {
+
+using canopen::DriveState;
+
+struct Drive : ::testing::Test {
+  Drive() { rig.start(); }
+  void order(std::uint16_t word, int cycles = 3) {
+    rig.commands[0].controlword = word;
+    rig.cycles(cycles);
+  }
+  [[nodiscard]] DriveState state() const { return rig.state(); }
+  [[nodiscard]] bool bridge() const { return rig.drives[0].enabled; }
+  Rig rig;
+};
+
+TEST_F(Drive, StartsDisabledByItself) {  // 0, 1
+  order(0x00);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(rig.statusword() & 0x4F, 0x40);
+}
+
+TEST_F(Drive, GoesUpAndDownOneStateAtATime) {  // 2, 3, 6, 7
+  order(0x06);
+  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  EXPECT_EQ(rig.statusword() & 0x6F, 0x21);
+  order(0x07);
+  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(rig.statusword() & 0x6F, 0x23);
+  EXPECT_FALSE(bridge());
+  order(0x06);
+  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  order(0x00);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+}
+
+TEST_F(Drive, GoesFromSwitchedOnToDisabledOnDisableVoltageAndQuickStop) {  // 10
+  order(0x06);
+  order(0x07);
+  order(0x02);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  order(0x06);
+  order(0x07);
+  order(0x00);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+}
+
+TEST_F(Drive, ClosesTheBridgeInOperationEnabledOnly) {  // 4
+  order(0x06);
+  order(0x07);
+  order(0x0F);
+  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(rig.statusword() & 0x6F, 0x27);
+  EXPECT_TRUE(bridge());
+}
+
+TEST_F(Drive, OpensTheBridgeAtOnceOnDisableVoltage) {  // 9
+  rig.enable();
+  order(0x00, 1);  // takes effect at the next SYNC
+  order(0x00, 1);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_FALSE(bridge());
+  EXPECT_EQ(rig.drives[0].voltage_V, 0.0);
+}
+
+TEST_F(Drive, OpensTheBridgeAtOnceOnShutdown) {  // 8, option 605B = 0
+  rig.enable();
+  order(0x06, 2);
+  EXPECT_EQ(state(), DriveState::kReadyToSwitchOn);
+  EXPECT_FALSE(bridge());
+}
+
+TEST_F(Drive, ComesToRestBeforeItDisablesOperation) {  // 5, option 605C = 1
+  rig.enable(-2);
+  ASSERT_EQ(rig.write<std::int16_t>(0x2012, 0, 2000), 0U);
+  rig.cycles(30);
+  ASSERT_GT(rig.joints[0].w, 0.3);
+  order(0x07, 4);
+  EXPECT_EQ(state(), DriveState::kOperationEnabled);  // still stopping
+  EXPECT_TRUE(bridge());
+  order(0x07, 1100);
+  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+  EXPECT_FALSE(bridge());
+}
+
+TEST_F(Drive, DisablesOperationAtOnceByOption) {  // 5, option 605C = 0
+  ASSERT_EQ(rig.write<std::int16_t>(0x605C, 0, 0), 0U);
+  rig.enable();
+  order(0x07, 2);
+  EXPECT_EQ(state(), DriveState::kSwitchedOn);
+}
+
+TEST_F(Drive, BrakesOnQuickStopThenDisables) {  // 11, 12, option 605A = 2
+  rig.enable(-2);
+  ASSERT_EQ(rig.write<std::int16_t>(0x2012, 0, 2000), 0U);
+  rig.cycles(30);
+  order(0x02, 3);
+  EXPECT_EQ(state(), DriveState::kQuickStopActive);
+  EXPECT_TRUE(bridge());
+  order(0x02, 1100);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_FALSE(bridge());
+}
+
+TEST_F(Drive, StaysInQuickStopByOptionAndComesBack) {  // 16, option 605A = 6
+  ASSERT_EQ(rig.write<std::int16_t>(0x605A, 0, 6), 0U);
+  rig.enable();
+  order(0x02, 2000);
+  EXPECT_EQ(state(), DriveState::kQuickStopActive);
+  EXPECT_EQ(rig.drives[0].voltage_V, 0.0);
+  order(0x0F, 3);
+  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+}
+
+TEST_F(Drive, DisablesAtOnceOnQuickStopByOption) {  // 11 with option 605A = 0
+  ASSERT_EQ(rig.write<std::int16_t>(0x605A, 0, 0), 0U);
+  rig.enable();
+  order(0x02, 2);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+}
+
+TEST_F(Drive, HoldsOnHaltAndGoesOnAfterwards) {
+  rig.enable(10);
+  rig.commands[0].torque_offset = 100;
+  rig.cycles(200);
+  order(0x10F, 500);
+  EXPECT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_NEAR(rig.joints[0].w, 0.0, 0.02);
+  rig.joints[0].q += 0.001;
+  order(0x0F, 3000);
+  EXPECT_NEAR(rig.joints[0].torque(), 5.0, 0.2);
+}
+
+TEST_F(Drive, ReactsToAFaultThenWaitsForTheResetEdge) {  // 13, 14, 15
+  rig.enable();
+  rig.joints[0].temperature_C = 200.0;
+  rig.cycle();
+  EXPECT_EQ(state(), DriveState::kFaultReactionActive);
+  EXPECT_TRUE(bridge());
+  rig.cycles(1100);
+  EXPECT_EQ(state(), DriveState::kFault);
+  EXPECT_FALSE(bridge());
+  rig.joints[0].temperature_C = 25.0;
+  order(0x0F, 10);
+  EXPECT_EQ(state(), DriveState::kFault);
+  order(0x80, 3);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(rig.error(), 0);
+}
+
+TEST_F(Drive, OpensTheBridgeAtOnceOnAFaultByOption) {  // 14, option 605E = 0
+  ASSERT_EQ(rig.write<std::int16_t>(0x605E, 0, 0), 0U);
+  rig.enable();
+  rig.joints[0].temperature_C = 200.0;
+  rig.cycles(2);
+  EXPECT_EQ(state(), DriveState::kFault);
+  EXPECT_FALSE(bridge());
+}
+
+TEST_F(Drive, SeedsTheReferenceWhereItIsWhenItIsEnabled) {
+  rig.joints[0].q = rig.joints[0].th = 0.4;
+  rig.enable();
+  rig.commands[0].controlword = 0x00;
+  rig.cycles(3);
+  rig.commands[0].position = Rig::counts(-1.0);  // stale, from before
+  for (const int word : {0x06, 0x07}) order(static_cast<std::uint16_t>(word));
+  rig.commands[0].controlword = 0x0F;
+  rig.cycle();
+  rig.send_commands = false;
+  rig.cycle();
+  ASSERT_EQ(state(), DriveState::kOperationEnabled);
+  EXPECT_EQ(rig.object<std::int32_t>(0x607A), Rig::counts(0.4));
+  EXPECT_LT(std::abs(rig.drives[0].voltage_V), 0.2);  // the stale reference would ask for 40 V
+}
+
+TEST_F(Drive, ShowsTheModeInForceAndRefusesOthers) {
+  rig.commands[0].mode = 10;
+  rig.cycles(2);
+  EXPECT_EQ(rig.object<std::int8_t>(0x6061), 10);
+  rig.commands[0].mode = 6;  // homing: not ours
+  rig.cycles(2);
+  EXPECT_EQ(rig.object<std::int8_t>(0x6061), 10);
+  EXPECT_GE(rig.object<std::uint32_t>(0x2041), 1U);
+  EXPECT_EQ(rig.write<std::int8_t>(0x6060, 0, 1), 0x06090030U);
+}
+
+TEST_F(Drive, LeavesNoTraceOfTheSessionAfterAnNmtReset) {
+  rig.enable();
+  ASSERT_EQ(rig.write(0x2020, 1, 123.0F), 0U);
+  rig.nmt(129);
+  rig.cycles(2);
+  EXPECT_FALSE(bridge());
+  EXPECT_EQ(rig.object<float>(0x2020, 1), 400.0F);
+  EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
+}
+
+}  // namespace
+}  // namespace tandem::firmware::testing

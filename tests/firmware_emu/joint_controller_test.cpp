@@ -1,0 +1,304 @@
+#include "firmware_emu/joint_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace tandem::firmware {
+namespace {
+
+using canopen::Mode;
+
+constexpr double kDt = 1.0e-3;
+
+ControllerConfig config() {
+  return {.position = {.kp = 100.0, .ki = 50.0, .kd = 4.0},
+          .velocity = {.kp = 20.0, .ki = 30.0, .kd = 0.5},
+          .torque = {.kp = 0.2, .ki = 3.0, .kd = 0.01},
+          .current = {.kp = 0.3, .ki = 40.0},
+          .torque_to_voltage_V_Nm = 0.16,
+          .emf_compensation_Vs_rad = 3.0,
+          .resistance_ohm = 0.5,
+          .motor_constant_Nm_A = 4.0,
+          .spring_Nm_rad = 500.0,
+          .voltage_limit_V = 40.0,
+          .current_limit_A = 50.0,
+          .torque_limit_Nm = 60.0,
+          .velocity_limit_rad_s = 5.0,
+          .min_position_rad = -1.0,
+          .max_position_rad = 1.5,
+          .transfer_time_s = 0.0};  // the laws themselves: no transfer
+}
+
+Measurement measured() {
+  return {.link_position_rad = 0.3,
+          .link_velocity_rad_s = 0.2,
+          .link_acceleration_rad_s2 = 1.5,
+          .motor_position_rad = 0.31,
+          .motor_velocity_rad_s = 0.25,
+          .torque_Nm = 5.0,
+          .torque_rate_Nm_s = 7.0,
+          .current_A = 1.2,
+          .bus_voltage_V = 48.0};
+}
+
+Reference reference() {
+  return {.position_rad = 0.4,
+          .velocity_rad_s = 0.5,
+          .torque_Nm = 2.0,
+          .voltage_V = 6.0,
+          .current_A = 3.0,
+          .stiffness_Nm_rad = 80.0,
+          .damping_Nms_rad = 6.0};
+}
+
+/// A controller in its steady action and mode, its integrals at zero.
+JointController settled(const ControllerConfig& c, Mode mode, const Measurement& m,
+                        const Reference& r) {
+  ControllerConfig quiet = c;
+  for (Pid::Config* pid : {&quiet.position, &quiet.velocity, &quiet.torque, &quiet.current}) {
+    pid->ki = 0.0;
+  }
+  JointController controller;
+  controller.configure(quiet, kDt);
+  controller.update(Action::kFollow, mode, r, m);
+  controller.update(Action::kFollow, mode, r, m);
+  controller.configure(c, kDt);
+  controller.update(Action::kFollow, mode, r, m);
+  return controller;
+}
+
+/// V = ff tau_ref + emf th' + kp (tau_ref - tau) + I - kd dtau/dt
+double cascade(const ControllerConfig& c, double torque_ref, const Measurement& m, double I) {
+  return c.torque_to_voltage_V_Nm * torque_ref +
+         c.emf_compensation_Vs_rad * m.motor_velocity_rad_s +
+         c.torque.kp * (torque_ref - m.torque_Nm) + I - c.torque.kd * m.torque_rate_Nm_s;
+}
+
+void expect_law(Mode mode, const ControllerConfig& c, double torque_ref, double outer_I = 0.0) {
+  JointController controller = settled(c, mode, measured(), reference());
+  const double I = controller.torque_loop().state.i;
+  const double V = controller.update(Action::kFollow, mode, reference(), measured());
+  EXPECT_NEAR(controller.terms().torque_reference_Nm, torque_ref + outer_I, 1.0e-12);
+  EXPECT_NEAR(V, cascade(c, torque_ref + outer_I, measured(), I), 1.0e-12);
+  EXPECT_NE(I, 0.0);
+}
+
+TEST(JointController, ObeysThePositionLawOnTheLink) {
+  // 100 * 0.1 + 4 * 0.3 + 50 * 0.1 * dt + 2
+  expect_law(Mode::kCsp, config(), 100.0 * 0.1 + 4.0 * 0.3 + 2.0, 50.0 * 0.1 * kDt);
+}
+
+TEST(JointController, ObeysThePositionLawOnTheMotorWithTheIntegralOnTheLink) {
+  ControllerConfig c = config();
+  c.position_feedback = PositionFeedback::kMotor;
+  expect_law(Mode::kCsp, c, 100.0 * (0.4 + 2.0 / 500.0 - 0.31) + 4.0 * (0.5 - 0.25) + 2.0,
+             50.0 * 0.1 * kDt);
+}
+
+TEST(JointController, ObeysTheVelocityLaw) {
+  expect_law(Mode::kCsv, config(), 20.0 * 0.3 - 0.5 * 1.5 + 2.0, 30.0 * 0.3 * kDt);
+}
+
+TEST(JointController, ObeysTheTorqueLaw) { expect_law(Mode::kCst, config(), 2.0); }
+
+TEST(JointController, ObeysTheImpedanceLaw) {
+  expect_law(Mode::kImpedance, config(), 80.0 * 0.1 + 6.0 * 0.3 + 2.0);
+}
+
+TEST(JointController, ObeysTheVelocityImpedanceLawAboutItsIntegratedReference) {
+  JointController controller =
+      settled(config(), Mode::kVelocityImpedance, measured(), reference());
+  const double held = controller.terms().held_position_rad;
+  EXPECT_NEAR(held, 0.3 + 3 * 0.5 * kDt, 1.0e-12);  // from where the joint was, three periods
+  controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
+  EXPECT_NEAR(controller.terms().torque_reference_Nm, 80.0 * (held - 0.3) + 6.0 * 0.3 + 2.0,
+              1.0e-12);
+}
+
+TEST(JointController, GivesTheVoltageItIsTold) {
+  JointController controller = settled(config(), Mode::kOpenLoop, measured(), reference());
+  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, reference(), measured()),
+                   6.0);
+}
+
+TEST(JointController, ObeysTheCurrentLaw) {
+  JointController controller = settled(config(), Mode::kCurrent, measured(), reference());
+  const double I = controller.electrical_loop().state.i;
+  EXPECT_NEAR(I, 40.0 * 1.8 * kDt, 1.0e-12);
+  EXPECT_NEAR(controller.update(Action::kFollow, Mode::kCurrent, reference(), measured()),
+              0.5 * 3.0 + 4.0 * 0.25 + 0.3 * 1.8 + I, 1.0e-12);
+}
+
+TEST(JointController, ShortsTheWindingInBrakeAndOpensTheBridgeInOff) {
+  JointController controller = settled(config(), Mode::kCst, measured(), reference());
+  EXPECT_DOUBLE_EQ(controller.update(Action::kBrake, Mode::kCst, reference(), measured()),
+                   controller.terms().voltage_V);
+  EXPECT_DOUBLE_EQ(controller.update(Action::kBrake, Mode::kCst, reference(), measured()), 0.0);
+  EXPECT_DOUBLE_EQ(controller.update(Action::kOff, Mode::kCst, reference(), measured()), 0.0);
+}
+
+TEST(JointController, LimitsTheVoltageToTheSupplyAndToItsSetting) {
+  const ControllerConfig c = config();
+  Reference r = reference();
+  r.voltage_V = 100.0;
+  Measurement m = measured();
+  m.motor_velocity_rad_s = 6.0;  // the current is no limit here: 24 + 25 V
+  JointController controller = settled(c, Mode::kOpenLoop, m, r);
+  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, r, m), 40.0);
+  EXPECT_EQ(controller.terms().voltage_saturation, 1);
+  m.bus_voltage_V = 30.0;
+  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kOpenLoop, r, m), 30.0);
+  EXPECT_TRUE(controller.limited());
+}
+
+TEST(JointController, LimitsTheCurrentThatTheVoltageWouldDrive) {
+  ControllerConfig c = config();
+  c.current_limit_A = 10.0;
+  Reference r = reference();
+  r.voltage_V = -30.0;
+  const Measurement m = measured();
+  JointController controller = settled(c, Mode::kOpenLoop, m, r);
+  const double V = controller.update(Action::kFollow, Mode::kOpenLoop, r, m);
+  EXPECT_NEAR((V - 4.0 * m.motor_velocity_rad_s) / 0.5, -10.0, 1.0e-12);
+  EXPECT_EQ(controller.terms().voltage_saturation, -1);
+}
+
+TEST(JointController, LimitsTheTorqueReference) {
+  Reference r = reference();
+  r.torque_Nm = -500.0;
+  JointController controller = settled(config(), Mode::kCst, measured(), r);
+  EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, -60.0);
+  EXPECT_EQ(controller.terms().torque_saturation, -1);
+}
+
+TEST(JointController, KeepsReferencesWithinPositionAndVelocityLimits) {
+  Reference r = reference();
+  r.position_rad = 3.0;
+  r.velocity_rad_s = 9.0;
+  Measurement m = measured();
+  JointController position = settled(config(), Mode::kCsp, m, r);
+  EXPECT_DOUBLE_EQ(position.terms().position_error_rad, 1.5 - 0.3);
+  EXPECT_TRUE(position.limited());
+  JointController velocity = settled(config(), Mode::kCsv, m, r);
+  EXPECT_DOUBLE_EQ(velocity.velocity_loop().state.p, 20.0 * (5.0 - 0.2));
+  m.link_position_rad = 1.5;  // at the limit: outward no more, inward yes
+  velocity = settled(config(), Mode::kCsv, m, r);
+  EXPECT_DOUBLE_EQ(velocity.velocity_loop().state.p, 20.0 * (0.0 - 0.2));
+  r.velocity_rad_s = -2.0;
+  velocity = settled(config(), Mode::kCsv, m, r);
+  EXPECT_DOUBLE_EQ(velocity.velocity_loop().state.p, 20.0 * (-2.0 - 0.2));
+}
+
+TEST(JointController, WindsUpNoIntegralOfTheCascadeAgainstTheVoltage) {
+  ControllerConfig c = config();
+  c.voltage_limit_V = 5.0;
+  Reference r = reference();
+  r.position_rad = 1.4;
+  JointController controller = settled(c, Mode::kCsp, measured(), r);
+  const double position_I = controller.position_loop().state.i;
+  const double torque_I = controller.torque_loop().state.i;
+  for (int k = 0; k < 2000; ++k) controller.update(Action::kFollow, Mode::kCsp, r, measured());
+  EXPECT_EQ(controller.terms().voltage_saturation, 1);
+  EXPECT_DOUBLE_EQ(controller.position_loop().state.i, position_I);
+  EXPECT_DOUBLE_EQ(controller.torque_loop().state.i, torque_I);
+}
+
+TEST(JointController, WindsUpNoIntegralAgainstTheTorqueLimit) {
+  ControllerConfig c = config();
+  c.torque_limit_Nm = 3.0;
+  JointController controller = settled(c, Mode::kCsp, measured(), reference());
+  const double I = controller.position_loop().state.i;
+  for (int k = 0; k < 2000; ++k) {
+    controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+  }
+  EXPECT_DOUBLE_EQ(controller.position_loop().state.i, I);
+  EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, 3.0);
+}
+
+TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
+  ControllerConfig c = config();
+  c.torque_limit_Nm = 10.0;
+  JointController controller =
+      settled(c, Mode::kVelocityImpedance, measured(), reference());
+  for (int k = 0; k < 20000; ++k) {
+    controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
+  }
+  EXPECT_LT(80.0 * (controller.terms().held_position_rad - 0.3), 10.0);
+}
+
+TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
+  ControllerConfig c = config();
+  c.transfer_time_s = 0.02;
+  const Mode modes[] = {Mode::kCsp,     Mode::kCsv,      Mode::kCst, Mode::kImpedance,
+                        Mode::kCurrent, Mode::kOpenLoop, Mode::kVelocityImpedance};
+  for (const Mode from : modes) {
+    for (const Mode to : modes) {
+      if (from == to) continue;
+      JointController controller;
+      controller.configure(c, kDt);
+      double before = 0.0;
+      for (int k = 0; k < 100; ++k) {
+        before = controller.update(Action::kFollow, from, reference(), measured());
+      }
+      EXPECT_NEAR(controller.update(Action::kFollow, to, reference(), measured()), before, 1e-12)
+          << static_cast<int>(from) << " to " << static_cast<int>(to);
+      for (int k = 0; k < 400; ++k) {
+        controller.update(Action::kFollow, to, reference(), measured());
+      }
+      EXPECT_NEAR(controller.terms().transfer_V, 0.0, 1.0e-7);  // and it decays: exp(-20)
+    }
+  }
+}
+
+TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
+  ControllerConfig c = config();
+  c.transfer_time_s = 0.02;
+  JointController controller;
+  controller.configure(c, kDt);
+  controller.update(Action::kFollow, Mode::kCst, reference(), measured());
+  const double held = controller.terms().torque_reference_Nm;
+  controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+  EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, held);
+  EXPECT_NEAR(controller.position_loop().state.i, held - 2.0 - 100.0 * 0.1 - 4.0 * 0.3 +
+                                                      50.0 * 0.1 * kDt, 1.0e-12);
+}
+
+TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
+  ControllerConfig c = config();
+  c.transfer_time_s = 0.02;
+  JointController controller;
+  controller.configure(c, kDt);
+  controller.update(Action::kOff, Mode::kCsp, reference(), measured());
+  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kCsp, reference(), measured()),
+                   4.0 * 0.25);  // no current
+  EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, 5.0);  // what the spring carries
+}
+
+TEST(JointController, TakesNewGainsWithoutAStepOfTheVoltage) {
+  ControllerConfig c = config();
+  c.transfer_time_s = 0.02;
+  JointController controller;
+  controller.configure(c, kDt);
+  double before = 0.0;
+  for (int k = 0; k < 200; ++k) {
+    before = controller.update(Action::kFollow, Mode::kImpedance, reference(), measured());
+  }
+  c.torque.kp = 0.9;
+  controller.configure(c, kDt);
+  EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kImpedance, reference(), measured()),
+                   before);
+  EXPECT_NE(controller.terms().transfer_V, 0.0);
+}
+
+TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
+  JointController controller = settled(config(), Mode::kCst, measured(), reference());
+  controller.update(Action::kHold, Mode::kCst, reference(), measured());
+  Measurement moved = measured();
+  moved.link_position_rad += 0.05;
+  controller.update(Action::kHold, Mode::kCst, reference(), moved);
+  EXPECT_NEAR(controller.terms().position_error_rad, -0.05, 1.0e-15);
+}
+
+}  // namespace
+}  // namespace tandem::firmware

@@ -1,0 +1,307 @@
+// Every protection: error code, EMCY, reaction, and the way back.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "rig.hpp"
+
+namespace tandem::firmware::testing {
+namespace {
+
+using canopen::DriveState;
+
+struct Guard : ::testing::Test {
+  Rig rig;
+
+  void start(const BoardSetup& setup) {
+    rig_owner = std::make_unique<Rig>(setup);
+    rig_owner->start();
+  }
+  /// Cycles until the axis has a fault. @return how many it took, `most` when it has none
+  static int until_fault(Rig& r, int most) {
+    for (int k = 0; k < most; ++k) {
+      if (r.error() != 0) return k;
+      r.cycle();
+    }
+    return most;
+  }
+  /// One EMCY with this code and these bits beside the generic one, and a motor without current
+  /// in the end.
+  static void expect_fault(Rig& r, std::uint16_t code, std::uint8_t bits) {
+    EXPECT_EQ(r.error(), code);
+    const auto emergencies = r.frames_of(0x085);
+    ASSERT_FALSE(emergencies.empty());
+    const canopen::Frame& e = emergencies.front();
+    EXPECT_EQ(e.data[0] | (e.data[1] << 8), code);
+    EXPECT_EQ(e.data[2] & (bits | 1), bits | 1);
+    r.cycles(1100);
+    EXPECT_EQ(r.state(), DriveState::kFault);
+    EXPECT_FALSE(r.drives[0].enabled);
+  }
+  static bool reset(Rig& r) {
+    r.commands[0].controlword = 0x00;
+    r.cycles(3);
+    r.commands[0].controlword = 0x80;
+    r.cycles(3);
+    return r.state() == DriveState::kSwitchOnDisabled;
+  }
+  std::unique_ptr<Rig> rig_owner;
+};
+
+TEST_F(Guard, StopsOnAFollowingErrorAfterItsTime) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].following_window_rad = 0.1;
+  setup.axes[0].following_timeout_s = 0.05;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable();
+  r.commands[0].position = Rig::counts(0.5);  // the link stands still
+  const int taken = until_fault(r, 200);
+  EXPECT_NEAR(taken, 53, 2);  // 1 until the command is in force, 1 until the error shows
+  EXPECT_EQ(r.object<std::uint16_t>(0x6041) & 0x2000, 0);
+  expect_fault(r, 0x8611, 0x20);
+  EXPECT_TRUE(reset(r));
+}
+
+TEST_F(Guard, TellsOfAFollowingErrorBeforeItIsAFault) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].following_window_rad = 0.1;
+  setup.axes[0].following_timeout_s = 0.05;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable();
+  r.commands[0].position = Rig::counts(0.5);
+  r.cycles(20);
+  EXPECT_NE(r.statusword() & 0x2000, 0);
+  EXPECT_EQ(r.error(), 0);
+  r.commands[0].position = 0;
+  r.cycles(500);
+  EXPECT_EQ(r.error(), 0);
+}
+
+TEST_F(Guard, StopsAJointThatLeavesItsPositionLimits) {
+  rig.joints[0].link_inertia = 0.2;
+  rig.start();
+  rig.enable(10);
+  rig.commands[0].torque_offset = 200;  // 10 Nm, outward
+  ASSERT_LT(until_fault(rig, 3000), 3000);
+  EXPECT_GT(rig.joints[0].q, 2.1);  // limit and margin
+  EXPECT_LT(rig.joints[0].q, 2.2);
+  expect_fault(rig, 0x8612, 0x20);
+  EXPECT_TRUE(reset(rig));
+  rig.cycles(4000);  // it rolls out, and may then come back under power
+  rig.commands[0].torque_offset = 0;
+  rig.enable(8);
+  const std::int32_t from = rig.commands[0].position;
+  for (int k = 0; k < 4000; ++k) {
+    rig.commands[0].position = from - from * std::min(k, 3000) / 3000;
+    rig.cycle();
+  }
+  EXPECT_EQ(rig.error(), 0);
+  EXPECT_NEAR(rig.joints[0].q, 0.0, 0.05);
+}
+
+TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].continuous_current_A = 5.0;
+  setup.axes[0].thermal_time_s = 2.0;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable(-3);
+  r.joints[0].Ks = 1.0e5;  // holds the motor
+  ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 1000), 0U);  // 10 A
+  const double expected_s = 2.0 * std::log(100.0 / (100.0 - 25.0));
+  r.cycles(static_cast<int>(0.95 * expected_s * 1000.0));
+  EXPECT_EQ(r.error(), 0);
+  EXPECT_NE(r.statusword() & 0x0080, 0);
+  const int rest = until_fault(r, 1000);
+  EXPECT_NEAR(rest, 0.05 * expected_s * 1000.0, 30.0);
+  expect_fault(r, 0x2350, 0x02);
+}
+
+TEST_F(Guard, ResetsI2tOnlyWhenTheWindingHasCooled) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].continuous_current_A = 5.0;
+  setup.axes[0].thermal_time_s = 20.0;
+  setup.axes[0].stop_time_s = 0.01;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable(-3);
+  r.joints[0].Ks = 1.0e5;
+  ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 2000), 0U);
+  ASSERT_LT(until_fault(r, 5000), 5000);
+  EXPECT_FALSE(reset(r));
+  r.cycles(2600);  // 20 s * ln(1 / 0.9) = 2.1 s, and what the stop added
+  EXPECT_TRUE(reset(r));
+}
+
+TEST_F(Guard, StopsOnOverTemperatureUntilItHasCooled) {
+  rig.start();
+  rig.enable();
+  rig.joints[0].temperature_C = 110.0;
+  rig.cycles(2);
+  EXPECT_NE(rig.statusword() & 0x0080, 0);  // warning from 90 %
+  EXPECT_EQ(rig.error(), 0);
+  rig.joints[0].temperature_C = 120.0;
+  ASSERT_LT(until_fault(rig, 3), 3);
+  expect_fault(rig, 0x4310, 0x08);
+  rig.joints[0].temperature_C = 117.0;
+  EXPECT_FALSE(reset(rig));
+  rig.joints[0].temperature_C = 114.0;
+  EXPECT_TRUE(reset(rig));
+}
+
+TEST_F(Guard, StopsOnUnderVoltage) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].undervoltage_V = 24.0;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable();
+  r.joints[0].bus_V = 20.0;
+  ASSERT_LT(until_fault(r, 3), 3);
+  expect_fault(r, 0x3100, 0x04);
+  EXPECT_FALSE(reset(r));
+  r.joints[0].bus_V = 40.0;
+  EXPECT_TRUE(reset(r));
+}
+
+TEST_F(Guard, StopsOnASensorThatGivesNoNumber) {
+  rig.start();
+  rig.enable();
+  rig.joints[0].link_inertia = 0.2;
+  rig.tamper = [](std::vector<AxisSense>& sense) {
+    sense[0].link_position_rad = std::numeric_limits<double>::quiet_NaN();
+  };
+  ASSERT_LT(until_fault(rig, 3), 3);
+  expect_fault(rig, 0x7300, 0x20);
+  EXPECT_FALSE(reset(rig));
+  rig.tamper = nullptr;
+  EXPECT_TRUE(reset(rig));
+}
+
+TEST_F(Guard, StopsInEveryModeWhenSyncsComeWithoutCommands) {
+  for (const int mode : {8, 9, 10, -1, -2, -3, -4}) {
+    Rig r;
+    r.start();
+    r.enable(static_cast<std::int8_t>(mode));
+    ASSERT_EQ(r.state(), DriveState::kOperationEnabled) << mode;
+    r.send_commands = false;
+    const int taken = until_fault(r, 100);
+    EXPECT_EQ(taken, 12) << mode;  // the last command is in force at the first, then 2032 = 10
+    expect_fault(r, 0xFF01, 0x10);
+    r.seen.clear();
+    r.cycles(10);
+    EXPECT_TRUE(r.frames_of(0x085).empty());  // told once
+    r.send_commands = true;
+    EXPECT_TRUE(reset(r)) << mode;
+  }
+}
+
+TEST_F(Guard, DoesNotResetACommandTimeoutWithoutCommands) {
+  rig.start();
+  rig.enable();
+  rig.send_commands = false;
+  ASSERT_LT(until_fault(rig, 100), 100);
+  rig.cycles(1100);
+  for (const int word : {0x00, 0x80}) {
+    ASSERT_EQ(rig.write(0x6040, 0, static_cast<std::uint16_t>(word)), 0U);
+    rig.cycles(3);
+  }
+  EXPECT_EQ(rig.state(), DriveState::kFault);
+}
+
+TEST_F(Guard, StopsWhenSyncItselfStays) {
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1006, 0, 1000), 0U);  // 1 ms
+  rig.start();
+  rig.enable();
+  rig.send_sync = false;
+  const int taken = until_fault(rig, 100);
+  EXPECT_NEAR(taken, 12, 1);
+  expect_fault(rig, 0x8700, 0x10);
+}
+
+/// The master's heartbeat: node 127, 50 ms.
+void heartbeat(Rig& r) { r.send(0x77F, {0x05}); }
+
+TEST_F(Guard, StopsWhenTheMastersHeartbeatStays) {
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1016, 1, 0x007F0032), 0U);
+  rig.start();
+  heartbeat(rig);
+  rig.enable();
+  for (int k = 0; k < 10; ++k) {
+    heartbeat(rig);
+    rig.cycles(30);
+  }
+  EXPECT_EQ(rig.error(), 0);
+  const int taken = until_fault(rig, 100);
+  EXPECT_NEAR(taken, 20, 2);  // 50 ms after the last one
+  expect_fault(rig, 0x8130, 0x10);
+  int told = 0;
+  for (const canopen::Frame& e : rig.frames_of(0x085)) told += e.data[1] == 0x81 ? 1 : 0;
+  EXPECT_EQ(told, 1);
+  heartbeat(rig);
+  rig.nmt(1);
+  heartbeat(rig);
+  EXPECT_TRUE(reset(rig));
+}
+
+TEST_F(Guard, DisablesWithoutAFaultOnALostHeartbeatByOption) {
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1016, 1, 0x007F0032), 0U);
+  ASSERT_EQ(rig.write<std::int16_t>(0x6007, 0, 2), 0U);
+  rig.start();
+  heartbeat(rig);
+  rig.enable();
+  rig.cycles(60);
+  EXPECT_EQ(rig.error(), 0);
+  EXPECT_FALSE(rig.drives[0].enabled);
+}
+
+TEST_F(Guard, StopsWhenTheMasterTakesTheNodeOutOfOperation) {
+  rig.start();
+  rig.enable();
+  rig.nmt(128);
+  ASSERT_LT(until_fault(rig, 3), 3);
+  EXPECT_EQ(rig.error(), 0xFF01);
+}
+
+TEST_F(Guard, ClearsTheEmergencyWhenTheLastFaultIsReset) {
+  rig.start();
+  rig.enable();
+  rig.joints[0].temperature_C = 200.0;
+  rig.cycles(1200);
+  rig.joints[0].temperature_C = 25.0;
+  rig.seen.clear();
+  ASSERT_TRUE(reset(rig));
+  const auto emergencies = rig.frames_of(0x085);
+  ASSERT_EQ(emergencies.size(), 1U);
+  for (int byte = 0; byte < 8; ++byte) EXPECT_EQ(emergencies[0].data[byte], 0) << byte;
+}
+
+TEST_F(Guard, DoesNotBumpTheJointWhenAFaultIsResetAndTheDriveEnabledAgain) {
+  rig.joints[0].link_inertia = 0.5;
+  rig.joints[0].load_Nm = -8.0;
+  rig.start();
+  rig.enable();
+  rig.cycles(2000);
+  rig.joints[0].temperature_C = 200.0;
+  rig.cycles(100);
+  rig.joints[0].temperature_C = 25.0;
+  rig.joints[0].v = rig.joints[0].w = 0.0;
+  rig.cycles(1100);
+  ASSERT_TRUE(reset(rig));
+  rig.joints[0].v = rig.joints[0].w = 0.0;
+  rig.joints[0].load_Nm = 0.0;
+  rig.joints[0].th = rig.joints[0].q;
+  const double before = rig.joints[0].q;
+  rig.enable();
+  rig.cycles(5);
+  EXPECT_NEAR(rig.joints[0].q, before, 1.0e-3);
+  EXPECT_LT(std::abs(rig.drives[0].voltage_V), 1.0);
+}
+
+}  // namespace
+}  // namespace tandem::firmware::testing
