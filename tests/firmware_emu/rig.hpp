@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "firmware_emu/board.hpp"
+#include "rt/scoped_realtime.hpp"
 
 namespace tandem::firmware::testing {
 
@@ -56,9 +57,9 @@ inline AxisSetup axis_setup() {
   axis.stiffness_Nm_rad = 100.0;
   axis.damping_Nms_rad = 5.0;
   axis.controller = {.position = {.kp = 400.0, .ki = 400.0, .kd = 40.0},
-                     .velocity = {.kp = 40.0, .ki = 100.0},
-                     .torque = {.kp = 0.2, .ki = 2.0},
-                     .current = {.kp = 0.3, .ki = 50.0},
+                     .velocity = {.kp = 5.0, .ki = 20.0},
+                     .torque = {.kp = 0.2, .ki = 2.0, .kd = 0.01},
+                     .current = {.kp = 0.5, .ki = 200.0},
                      .torque_to_voltage_V_Nm = 0.664 / 4.1,
                      .emf_compensation_Vs_rad = 0.9 * 4.1,
                      .resistance_ohm = 0.664,
@@ -102,7 +103,14 @@ class Rig {
         drives(setup.axes.size()), senses(setup.axes.size()), id(setup.node_id) {}
 
   void send(std::uint32_t cob, const std::vector<std::uint8_t>& bytes) {
-    board.receive(canopen::make_frame(cob, bytes));
+    give(canopen::make_frame(cob, bytes));
+  }
+  /// Every call of the board is in the trap: an allocation, a lock or a system call is a failure.
+  void give(const canopen::Frame& frame) {
+    {
+      const rt::ScopedRealtime cycle;
+      board.receive(frame);
+    }
     collect();
   }
   void nmt(std::uint8_t command) { send(0x000, {command, static_cast<std::uint8_t>(id)}); }
@@ -189,7 +197,10 @@ class Rig {
   void step() {
     for (std::size_t a = 0; a < joints.size(); ++a) senses[a] = joints[a].sense();
     if (tamper) tamper(senses);
-    board.step(1'000'000, senses, drives);
+    {
+      const rt::ScopedRealtime cycle;
+      board.step(1'000'000, senses, drives);
+    }
     for (std::size_t a = 0; a < joints.size(); ++a) joints[a].advance(drives[a], 1.0e-3);
     collect();
   }
