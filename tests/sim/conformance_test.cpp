@@ -1,0 +1,27 @@
+// The conformance suite on the in-process robot, nothing disabled.
+#include "tests/hal/conformance.hpp"
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::hal::test {
+namespace {
+
+template <int order>
+ConformanceRobot make_swing() {
+  ConformanceRobot made;
+  made.robot = tandem::test::swing_robot(order);
+  auto backend = sim::SimRobot::create(made.robot, tandem::test::swing_kernels(order), {});
+  EXPECT_TRUE(backend.has_value()) << backend.error().to_string();
+  made.provoke_fault = [raw = backend->get()](std::size_t j) { raw->unplug_encoder(j, 3); };
+  made.backend = std::move(*backend);
+  return made;
+}
+
+INSTANTIATE_TEST_SUITE_P(SimRobot, BackendConformance,
+                         testing::Values(ConformanceCase{"rigid", make_swing<0>},
+                                         ConformanceCase{"electrical", make_swing<1>},
+                                         ConformanceCase{"elastic", make_swing<2>},
+                                         ConformanceCase{"both", make_swing<3>}),
+                         [](const auto& made) { return made.param.name; });
+
+}  // namespace
+}  // namespace tandem::hal::test

@@ -1,0 +1,237 @@
+#include "hal/sim/sim_robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/capabilities.hpp"
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::sim {
+namespace {
+
+using test::swing_kernels;
+using test::swing_robot;
+
+// A robot in its loop, which holds the position that it finds.
+struct Loop {
+  explicit Loop(const hal::RobotConfig& config, SimRobotConfig sim = {.posture = "up"},
+                int order = 2)
+      : robot(config),
+        state(config.shape()),
+        command(config.shape()),
+        parameters(hal::initial_parameters(config)) {
+    auto made = SimRobot::create(config, swing_kernels(order), sim);
+    EXPECT_TRUE(made.has_value()) << made.error().to_string();
+    sim_robot = std::move(*made);
+    time.period_ns = sim.period_ns;
+  }
+  void step() {
+    time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
+    read = sim_robot->read(time, state);
+    if (sim_robot->phase() != hal::Phase::kOperational) {
+      command.position_rad()[0] = state.position_rad()[0];
+      command.mode()[0] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
+    }
+    written = sim_robot->write(command, parameters);
+    ++time.cycle;
+  }
+  void run(int cycles) {
+    for (int i = 0; i < cycles; ++i) step();
+  }
+  void bring_up() {
+    for (int i = 0; i < 5000 && sim_robot->phase() != hal::Phase::kOperational; ++i) step();
+    ASSERT_EQ(sim_robot->phase(), hal::Phase::kOperational) << sim_robot->status_text();
+  }
+  std::vector<std::byte> bytes() {
+    Archive ar;
+    EXPECT_TRUE(sim_robot->archive(ar));
+    ar(state, command, time);
+    return {ar.bytes().begin(), ar.bytes().end()};
+  }
+
+  hal::RobotConfig robot;
+  hal::StateImage state;
+  hal::CommandImage command;
+  hal::ParameterImage parameters;
+  hal::CycleTime time;
+  std::unique_ptr<SimRobot> sim_robot;
+  Code read = Code::kOk, written = Code::kOk;
+};
+
+TEST(SimRobot, PowersOnHeldAndThenHoldsByItself) {
+  for (const int order : {0, 1, 2, 3}) {
+    Loop loop(swing_robot(order), {.posture = "up"}, order);
+    double lowest = 1.0;
+    for (int i = 0; i < 5000 && loop.sim_robot->phase() != hal::Phase::kOperational; ++i) {
+      loop.step();
+      lowest = std::min(lowest, loop.sim_robot->truth().position_rad()[0]);
+    }
+    ASSERT_EQ(loop.sim_robot->phase(), hal::Phase::kOperational) << loop.sim_robot->status_text();
+    EXPECT_GT(lowest, 0.47) << "order " << order;
+    loop.run(5000);
+    EXPECT_EQ(loop.read, Code::kOk);
+    EXPECT_NEAR(loop.state.position_rad()[0], loop.command.position_rad()[0], 1e-3)
+        << "order " << order;
+  }
+}
+
+TEST(SimRobot, MeasuresWhatIsTrueWithinQuantisationAndNoise) {
+  Loop loop(swing_robot());
+  loop.bring_up();
+  loop.command.position_rad()[0] += 0.1;
+  for (int i = 0; i < 1000; ++i) {
+    loop.step();
+    const hal::TruthImage& truth = loop.sim_robot->truth();
+    ASSERT_EQ(truth.cycle()[0], loop.state.cycle()[0]);
+    ASSERT_NEAR(loop.state.position_rad()[0], truth.position_rad()[0], 2.5e-5);
+    // 2 Nm of noise's bound 0.06, and a per mille of 50 Nm on the wire
+    ASSERT_NEAR(loop.state.torque_Nm()[0], truth.torque_Nm()[0], 0.06 + 0.05);
+  }
+  EXPECT_GT(loop.sim_robot->truth().position_rad()[0], 0.55);
+}
+
+TEST(SimRobot, StateFieldsAreEachTheirOwn) {
+  // Against a velocity in the position's place, an acceleration in the velocity's, and the like.
+  Loop loop(swing_robot());
+  loop.bring_up();
+  loop.run(1000);
+  double way = 0.0, change = 0.0;
+  const double from = loop.state.position_rad()[0];
+  const double start_rate = loop.state.velocity_rad_s()[0];
+  for (int i = 0; i < 400; ++i) {
+    loop.command.position_rad()[0] += 0.0005;
+    loop.step();
+    way += loop.state.velocity_rad_s()[0] * 1e-3;
+    change += loop.state.acceleration_rad_s2()[0] * 1e-3;
+    const JointReading joint = loop.sim_robot->plant().joint(0);
+    ASSERT_NEAR(loop.state.motor_position_rad()[0], joint.motor_position_rad, 1e-5);
+    ASSERT_NEAR(loop.state.current_A()[0], joint.current_A, 0.2);
+    ASSERT_NEAR(loop.state.temperature_C()[0], joint.temperature_C, 0.11);
+  }
+  const double moved = loop.state.position_rad()[0] - from;
+  EXPECT_GT(moved, 0.1);
+  EXPECT_NEAR(way, moved, 0.02 * moved);
+  EXPECT_NEAR(change, loop.state.velocity_rad_s()[0] - start_rate, 0.05);
+}
+
+TEST(SimRobot, ImuTravelsThroughItsNode) {
+  Loop loop(swing_robot());
+  loop.bring_up();
+  loop.run(3000);
+  const auto imu = loop.state.sensor_values(0);
+  const double angle = loop.sim_robot->truth().position_rad()[0];
+  EXPECT_NEAR(imu[1], std::sin(angle / 2.0), 1e-6);
+  EXPECT_NEAR(imu[3], std::cos(angle / 2.0), 1e-6);
+  EXPECT_NEAR(imu[7], -9.81 * std::sin(angle), 0.1);
+  EXPECT_NEAR(imu[9], 9.81 * std::cos(angle), 0.1);
+}
+
+TEST(SimRobot, SnapshotGivesTheSameBytesAgain) {
+  for (const int at : {0, 3, 57, 400, 1500}) {  // bring-up, and in motion
+    Loop loop(swing_robot());
+    loop.run(at);
+    const auto on = [&] {
+      for (int i = 0; i < 700; ++i) {
+        loop.command.position_rad()[0] += 1e-4;
+        loop.step();
+      }
+      return loop.bytes();
+    };
+    const std::vector<std::byte> saved = loop.bytes();
+    const std::vector<std::byte> first = on();
+    Archive restore(saved);
+    ASSERT_TRUE(loop.sim_robot->archive(restore));
+    restore(loop.state, loop.command, loop.time);
+    ASSERT_TRUE(restore.ok());
+    ASSERT_TRUE(restore.at_end());
+    ASSERT_EQ(loop.bytes(), saved) << "cycle " << at;
+    EXPECT_EQ(on(), first) << "cycle " << at;
+  }
+}
+
+TEST(SimRobot, SnapshotGoesOnInAnotherProcessesRobot) {
+  Loop loop(swing_robot()), other(swing_robot());
+  loop.run(900);
+  other.run(17);
+  Archive restore(loop.bytes());
+  ASSERT_TRUE(other.sim_robot->archive(restore));
+  restore(other.state, other.command, other.time);
+  ASSERT_TRUE(restore.ok() && restore.at_end());
+  loop.run(500);
+  other.run(500);
+  EXPECT_EQ(loop.bytes(), other.bytes());
+}
+
+TEST(SimRobot, RunsDependOnTheSeedAlone) {
+  const auto run = [](std::uint64_t seed) {
+    Loop loop(swing_robot(), {.posture = "up", .seed = seed});
+    loop.run(800);
+    return std::vector<std::byte>(loop.state.bytes().begin(), loop.state.bytes().end());
+  };
+  EXPECT_EQ(run(1), run(1));
+  EXPECT_NE(run(1), run(2));
+}
+
+TEST(SimRobot, FasterBoardsRunBetweenTheCycles) {
+  Loop loop(swing_robot(2, "250_000"));
+  loop.bring_up();
+  loop.command.position_rad()[0] += 0.05;
+  loop.run(4000);
+  EXPECT_EQ(loop.read, Code::kOk);
+  EXPECT_NEAR(loop.sim_robot->truth().position_rad()[0], loop.command.position_rad()[0], 2e-3);
+}
+
+TEST(SimRobot, AnUnpluggedEncoderIsThatJointsFault) {
+  Loop loop(swing_robot());
+  loop.bring_up();
+  loop.sim_robot->unplug_encoder(0, 5);
+  loop.run(20);
+  EXPECT_NE(loop.state.fault()[0], 0U);
+  EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
+  EXPECT_NE(loop.sim_robot->status_text().find("swing"), std::string::npos)
+      << loop.sim_robot->status_text();
+}
+
+TEST(SimRobot, ACutCableLeavesTheBoardInItsSafeState) {
+  Loop loop(swing_robot());
+  loop.bring_up();
+  loop.sim_robot->connect_bus(0, false);
+  loop.run(1000);
+  EXPECT_GT(loop.state.age_cycles()[0], 900U);
+  EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
+  EXPECT_EQ(loop.sim_robot->plant().joint(0).voltage_V, 0.0);
+}
+
+TEST(SimRobot, DivergenceIsAFaultThatNamesJointAndTime) {
+  hal::RobotConfig robot = swing_robot();
+  robot.actuators[0].spring_Nm_rad = 5e7;
+  Loop loop(robot);
+  for (int i = 0; i < 5000 && loop.read != Code::kDiverged; ++i) loop.step();
+  ASSERT_EQ(loop.read, Code::kDiverged);
+  EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
+  const std::string text = loop.sim_robot->status_text();
+  EXPECT_NE(text.find("joint swing at "), std::string::npos) << text;
+}
+
+TEST(SimRobot, StagesAreReportedInOrder) {
+  Loop loop(swing_robot());
+  std::vector<Stage> stages;
+  loop.sim_robot->set_stage_hook(
+      [](void* context, Stage stage) {
+        static_cast<std::vector<Stage>*>(context)->push_back(stage);
+      },
+      &stages);
+  loop.run(1);
+  EXPECT_EQ(stages, (std::vector<Stage>{Stage::kPlant, Stage::kMasterSync, Stage::kSense,
+                                        Stage::kBoards, Stage::kMasterDecode, Stage::kTruth}));
+}
+
+TEST(SimRobot, AnUnknownPostureSuggestsTheNearest) {
+  const auto made =
+      SimRobot::create(swing_robot(), swing_kernels(2), SimRobotConfig{.posture = "upp"});
+  ASSERT_FALSE(made.has_value());
+  EXPECT_NE(made.error().to_string().find("up"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::sim
