@@ -6,7 +6,7 @@
 //   sensors 0 "left_ft", 1 "right_ft": 0.02 m above the soles, between block and massless sole.
 //   Gravity is tilted by `tilt_deg` about -y, so that the ground is an incline falling to +x.
 // Pendulum: fixed base, one joint about +y through W's origin, 2 kg at 0.5 m, hanging at q = 0;
-//   site 0 "tip" at the mass, axes as the link.
+//   site 0 "tip" at the mass, axes as the link; sensor 0 "root" at the joint, axes as the link.
 #pragma once
 
 #include <cmath>
@@ -214,6 +214,25 @@ inline void site_motion(const double* q, const double* v, const double* vdot, do
   for (int i = 0; i < 6; ++i) twist[i] = T[i];
   for (int i = 0; i < 6; ++i) acceleration[i] = A[i];
 }
+inline void center_of_mass(const double* q, const double* v, double* c, double* cdot, double* J) {
+  const double s = std::sin(q[0]), k = std::cos(q[0]), l = kPendulumLength;
+  const double at[3] = {-l * s, 0, -l * k}, slope[3] = {-l * k, 0, l * s};
+  for (int i = 0; i < 3; ++i) {
+    c[i] = at[i];
+    J[i] = slope[i];
+    cdot[i] = slope[i] * v[0];
+  }
+}
+template <int gravity_cm>
+void sensor_wrenches(const double* q, const double* v, const double* vdot, const double*,
+                     double* out) {
+  const double l = kPendulumLength, g = gravity_cm * 0.01;
+  const double x = kPendulumMass * (g * std::sin(q[0]) + l * vdot[0]);
+  const double z = kPendulumMass * (-g * std::cos(q[0]) - l * v[0] * v[0]);
+  const double wrench[6] = {x, 0.0, z, 0.0, -l * x, 0.0};
+  for (int i = 0; i < 6; ++i) out[i] = wrench[i];
+}
+inline constexpr const char* kSensors[] = {"root"};
 inline constexpr const char* kJoints[] = {"swing"};
 inline constexpr const char* kSites[] = {"tip"};
 
@@ -232,7 +251,11 @@ const tandem_kernels* pendulum_kernels() {
     k.gravity_m_s2[2] = -gravity_cm * 0.01;
     k.forward_dynamics = pendulum::forward_dynamics<armature_g, gravity_cm>;
     k.inverse_dynamics = pendulum::inverse_dynamics<armature_g, gravity_cm>;
+    k.sensors = 1;
+    k.sensor_names = pendulum::kSensors;
+    k.sensor_wrenches = pendulum::sensor_wrenches<gravity_cm>;
     k.site_motion = pendulum::site_motion;
+    k.center_of_mass = pendulum::center_of_mass;
     return k;
   }();
   return &kernels;

@@ -1,4 +1,5 @@
-// A robot of one joint around the hand-written pendulum: a board, an IMU at its tip, one bus.
+// A robot of one joint around the hand-written pendulum: a board, an IMU at its tip, a force/torque
+// sensor in its joint, one bus.
 #pragma once
 
 #include <string>
@@ -11,6 +12,8 @@ namespace tandem::test {
 
 inline hal::RobotConfig swing_robot(int order = 2,
                                     const std::string& control_period = "1_000_000") {
+  // A rigid drive's torque follows its voltage at once: a proportional loop would be algebraic.
+  const std::string torque = order < 2 ? "kp = 0.0, ki = 5.0" : "kp = 0.4, ki = 2.0, kd = 0.008";
   const std::string text = R"(
 name = "swing"
 [model]
@@ -32,8 +35,8 @@ voltage_limit_V = 40
 [gains.motor]
 position_feedback = "motor"
 position = { kp = 600.0, ki = 300.0, kd = 25.5 }
-velocity = { kp = 40.0, ki = 100.0 }
-torque = { kp = 0.2, ki = 2.0 }
+velocity = { kp = 20.0, ki = 60.0 }
+torque = { )" + torque + R"( }
 current = { kp = 0.5, ki = 200.0 }
 torque_feedforward = 1.0
 emf_compensation = 0.9
@@ -72,6 +75,13 @@ bus = "line"
 node_id = 20
 link = "mass"
 noise = [0, 0, 0, 0, 0.001, 0.001, 0.001, 0.01, 0.01, 0.01]
+[[sensor]]
+name = "root"
+type = "force_torque"
+bus = "line"
+node_id = 21
+joint = "swing"
+link = "mass"
 [posture.up]
 swing = 0.5
 )";
