@@ -83,7 +83,10 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept {
   dt_ns = begun ? time.time_ns - now_ns : time.period_ns;
   now_ns = time.time_ns;
   if (!begun) {
-    for (Node& node : nodes) node.master.restart(now_ns);
+    for (Node& node : nodes) {
+      node.master.set_sync_period(time.period_ns);
+      node.master.restart(now_ns);
+    }
     for (Port& port : ports) port.next_heartbeat_ns = now_ns;
     begun = true;
   }

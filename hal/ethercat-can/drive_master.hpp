@@ -64,7 +64,7 @@ class DriveMaster {
 
   /// Takes every frame that has arrived and fills the whole of `state` but cycle and time.
   /// A joint whose TPDO did not come keeps its values and ages by a cycle.
-  /// @return kOk; kTimeout (a node missed this cycle, or bring-up still waits); kBusOff; kFault.
+  /// @return kOk; kTimeout (in operation: a node missed this cycle); kBusOff; kFault.
   /// @rt no allocation; O(nodes + frames), at most kMaxFramesPerCycle per bus.
   Code receive(StateImage& state) noexcept TANDEM_RT;
 

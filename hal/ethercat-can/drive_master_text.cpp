@@ -63,7 +63,7 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     }
     case NodeTrouble::kSdoAbort: {
       const SdoStep& step = m.steps()[m.step()];
-      return fmt::format("{} of {} failed: {} (abort code 0x{:08X})",
+      return fmt::format("{} {} failed: {} (abort code 0x{:08X})",
                          step.check ? "reading" : "writing", step_text(node, step),
                          canopen::to_string(m.abort_code()),
                          static_cast<std::uint32_t>(m.abort_code()));
@@ -128,9 +128,10 @@ std::string DriveMaster::Impl::status() const {
   }
   for (const Node& node : nodes) {
     const bool told = !causes.empty() && node.plan.board >= 0;
-    const bool waits = stage == Stage::kBooting && node.master.stage() != NodeStage::kReady;
-    if (told || (!waits && node.master.trouble() == NodeTrouble::kNone)) continue;
-    if (stage == Stage::kFailed && node.master.trouble() == NodeTrouble::kNone) continue;
+    const bool waits = stage == Stage::kBooting ? node.master.stage() != NodeStage::kReady
+                                                : !node.master.running();
+    const bool troubled = node.master.trouble() != NodeTrouble::kNone;
+    if (told || (!troubled && (!waits || stage == Stage::kFailed))) continue;
     if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
   }
   for (std::size_t j = 0; stage == Stage::kEnabling && j < axes.size(); ++j) {
@@ -141,7 +142,8 @@ std::string DriveMaster::Impl::status() const {
   if (causes.empty()) return stage == Stage::kFaulted ? "enabling every axis again" : "";
   std::string text;
   for (std::size_t i = 0; i < std::min(causes.size(), kMostCauses); ++i) {
-    text += (i == 0 ? "" : "\n") + causes[i];
+    if (i > 0) text += '\n';
+    text += causes[i];
   }
   if (causes.size() > kMostCauses) {
     text += fmt::format("\nand {} more", causes.size() - kMostCauses);

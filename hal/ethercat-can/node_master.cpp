@@ -18,6 +18,14 @@ NodeMaster::NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps)
       steps_(std::move(steps)),
       sdo_(id) {}
 
+void NodeMaster::set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT {
+  for (SdoStep& step : steps_) {
+    if (step.index != canopen::object::kSyncPeriod) continue;
+    canopen::put(step.bytes.data(), canopen::clamp_round<std::uint32_t>(
+                                        static_cast<double>(period_ns) / 1000.0));
+  }
+}
+
 void NodeMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   enter(Stage::kWaitBootUp, now_ns);
   trouble_ = NodeTrouble::kNone;

@@ -46,6 +46,8 @@ class NodeMaster {
 
   NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps);
 
+  /// The value for object 1006. Before the first restart().
+  void set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT;
   /// Begins, or begins again, with a reset of the node.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;
   void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;

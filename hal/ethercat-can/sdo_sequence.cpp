@@ -1,8 +1,7 @@
 #include "hal/ethercat-can/sdo_sequence.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <limits>
 
 #include "canopen/objects.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
@@ -71,23 +70,26 @@ void add_scales(AxisSteps& add, const JointConfig& joint) {
       clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
   add(object::kRatedTorque, 0, clamp_round<std::uint32_t>(1000.0 * rated_Nm));
   add(object::kMaxTorque, 0, clamp_round<std::uint16_t>(1000.0 * joint.max_torque_Nm / rated_Nm));
+  // By way of "no upper limit", so that no order of old and new limits is refused.
+  add(object::kSoftwareLimits, 2, std::numeric_limits<std::int32_t>::max());
   add(object::kSoftwareLimits, 1,
       clamp_round<std::int32_t>(joint.min_position_rad * scale.counts_per_rad));
   add(object::kSoftwareLimits, 2,
       clamp_round<std::int32_t>(joint.max_position_rad * scale.counts_per_rad));
 }
 
-void add_loops(AxisSteps& add, const ActuatorConfig& motor, const GainsConfig& gains) {
-  const auto loop = [&](std::uint16_t index, const PidConfig& pid) {
+void add_loops(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor,
+               const GainsConfig& gains) {
+  const auto loop = [&](std::uint16_t index, const PidConfig& pid, double own_limit) {
     add(index, kPidKp, real32(pid.gains.kp));
     add(index, kPidKi, real32(pid.gains.ki));
     add(index, kPidKd, real32(pid.gains.kd));
-    add(index, kPidOutputLimit, real32(pid.output_limit));
+    add(index, kPidOutputLimit, real32(pid.output_limit > 0.0 ? pid.output_limit : own_limit));
   };
-  loop(object::kPositionGains, gains.position);
-  loop(object::kVelocityGains, gains.velocity);
-  loop(object::kTorqueGains, gains.torque);
-  loop(object::kCurrentGains, gains.current);
+  loop(object::kPositionGains, gains.position, joint.max_torque_Nm);
+  loop(object::kVelocityGains, gains.velocity, joint.max_torque_Nm);
+  loop(object::kTorqueGains, gains.torque, motor.voltage_limit_V);
+  loop(object::kCurrentGains, gains.current, motor.voltage_limit_V);
   const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
   const double voltage_per_Nm = constant_Nm_A > 0.0 ? motor.resistance_ohm / constant_Nm_A : 0.0;
   add(object::kFeedForward, kTorqueToVoltage, real32(gains.torque_feedforward * voltage_per_Nm));
@@ -107,7 +109,7 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   AxisSteps add(steps, static_cast<int>(axis));
   add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
   add_scales(add, joint);
-  add_loops(add, motor, robot.gains_of(joint));
+  add_loops(add, joint, motor, robot.gains_of(joint));
   add(object::kLimits, kVoltageLimit, real32(motor.voltage_limit_V));
   add(object::kLimits, kCurrentLimit, real32(motor.current_limit_A));
   add(object::kLimits, kTorqueLimit, real32(joint.max_torque_Nm));
@@ -123,6 +125,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   add_identity(steps, node.board >= 0);
   for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo);
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
+  steps.push_back(write_step(object::kSyncPeriod, 0, std::uint32_t{0}));
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
   steps.push_back(write_step(object::kHeartbeatConsumer, 1,
                              static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));

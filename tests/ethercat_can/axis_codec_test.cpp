@@ -1,0 +1,130 @@
+#include "hal/ethercat-can/axis_codec.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace tandem::hal::can {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// 100 counts a degree, 1000 motor counts a degree, 50 Nm rated.
+AxisScale scale() {
+  JointConfig joint;
+  joint.encoder_counts_per_rev = 36000.0;
+  joint.motor_encoder_counts_per_rev = 360000.0;
+  joint.rated_torque_Nm = 50.0;
+  return AxisScale::of(joint);
+}
+
+struct Codec : ::testing::Test {
+  CommandImage command{ImageShape{.joints = 1, .sensor_channels = {}}};
+  StateImage state{ImageShape{.joints = 1, .sensor_channels = {}}};
+  RawCommand raw;
+
+  void SetUp() override {
+    command.mode()[0] = static_cast<std::int8_t>(ControlMode::kPosition);
+  }
+};
+
+TEST_F(Codec, CommandsBecomeCountsAndPerMille) {
+  command.position_rad()[0] = -kPi / 2;
+  command.velocity_rad_s()[0] = kPi / 180.0;
+  command.torque_Nm()[0] = -12.5;
+  command.voltage_V()[0] = 24.0;
+  command.current_A()[0] = -0.014;
+  command.stiffness_Nm_rad()[0] = 300.0;
+  encode_command(scale(), command, 0, raw);
+  EXPECT_EQ(raw.mode, 8);
+  EXPECT_EQ(raw.target_position, -9000);
+  EXPECT_EQ(raw.velocity_offset, 100);
+  EXPECT_EQ(raw.torque_offset, -250);
+  EXPECT_EQ(raw.target_voltage, 2400);
+  EXPECT_EQ(raw.target_current, -1);
+  EXPECT_EQ(raw.stiffness, 300.0F);
+}
+
+TEST_F(Codec, CommandsAreClampedAndNeverWrapped) {
+  command.position_rad()[0] = 1.0e9;
+  command.velocity_rad_s()[0] = -std::numeric_limits<double>::infinity();
+  command.torque_Nm()[0] = 1.0e9;
+  command.current_A()[0] = std::nan("");
+  command.stiffness_Nm_rad()[0] = 1.0e300;
+  encode_command(scale(), command, 0, raw);
+  EXPECT_EQ(raw.target_position, std::numeric_limits<std::int32_t>::max());
+  EXPECT_EQ(raw.velocity_offset, std::numeric_limits<std::int32_t>::min());
+  EXPECT_EQ(raw.torque_offset, 32767);
+  EXPECT_EQ(raw.target_current, 0);
+  EXPECT_TRUE(std::isfinite(raw.stiffness));
+}
+
+TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
+  encode_command(scale(), command, 0, raw);
+  command.mode()[0] = static_cast<std::int8_t>(ControlMode::kIdle);
+  encode_command(scale(), command, 0, raw);
+  EXPECT_EQ(raw.mode, 8);
+}
+
+TEST_F(Codec, FeedbackFromLiteralBytes) {
+  RawFeedback feedback;
+  const std::array<std::uint8_t, 2> status{0x37, 0x12};
+  const std::array<std::uint8_t, 4> position{0xD8, 0xDC, 0xFF, 0xFF};  // -9000
+  const std::array<std::uint8_t, 4> velocity{0x64, 0x00, 0x00, 0x00};  // 100
+  const std::array<std::uint8_t, 2> torque{0x06, 0xFF};                // -250
+  const std::array<std::uint8_t, 4> motor{0x10, 0x27, 0x00, 0x00};     // 10000
+  const std::array<std::uint8_t, 2> current{0x9C, 0xFF};               // -100
+  const std::array<std::uint8_t, 2> voltage{0x60, 0x09};               // 2400
+  const std::array<std::uint8_t, 2> temperature{0x6E, 0x01};           // 366
+  const std::array<std::uint8_t, 1> mode{0xFF};                        // -1
+  feedback.take(WireField::kStatusword, status.data());
+  feedback.take(WireField::kPosition, position.data());
+  feedback.take(WireField::kVelocity, velocity.data());
+  feedback.take(WireField::kTorque, torque.data());
+  feedback.take(WireField::kMotorPosition, motor.data());
+  feedback.take(WireField::kCurrent, current.data());
+  feedback.take(WireField::kVoltage, voltage.data());
+  feedback.take(WireField::kTemperature, temperature.data());
+  feedback.take(WireField::kModeDisplay, mode.data());
+  decode_feedback(scale(), feedback, 0, state);
+  EXPECT_DOUBLE_EQ(state.position_rad()[0], -kPi / 2);
+  EXPECT_DOUBLE_EQ(state.velocity_rad_s()[0], kPi / 180.0);
+  EXPECT_DOUBLE_EQ(state.torque_Nm()[0], -12.5);
+  EXPECT_DOUBLE_EQ(state.motor_position_rad()[0], 10.0 * kPi / 180.0);
+  EXPECT_DOUBLE_EQ(state.current_A()[0], -1.0);
+  EXPECT_DOUBLE_EQ(state.voltage_V()[0], 24.0);
+  EXPECT_DOUBLE_EQ(state.temperature_C()[0], 36.6);
+  EXPECT_EQ(state.statusword()[0], 0x1237);
+  EXPECT_EQ(state.drive_state()[0], static_cast<int>(DriveState::kOperationEnabled));
+  EXPECT_EQ(state.mode()[0], static_cast<int>(ControlMode::kPosition));
+  EXPECT_EQ(state.interaction()[0], static_cast<int>(InteractionMode::kCompliant));
+}
+
+TEST_F(Codec, CommandToLiteralBytes) {
+  RawCommand out;
+  out.controlword = 0x000F;
+  out.mode = -1;
+  out.target_position = -9000;
+  out.torque_offset = -250;
+  out.stiffness = 1.0F;
+  std::array<std::uint8_t, 16> bytes{};
+  out.give(WireField::kControlword, &bytes[0]);
+  out.give(WireField::kMode, &bytes[2]);
+  out.give(WireField::kTargetPosition, &bytes[3]);
+  out.give(WireField::kTorqueOffset, &bytes[7]);
+  out.give(WireField::kStiffness, &bytes[9]);
+  EXPECT_EQ(bytes, (std::array<std::uint8_t, 16>{0x0F, 0x00, 0xFF, 0xD8, 0xDC, 0xFF, 0xFF, 0x06,
+                                                 0xFF, 0x00, 0x00, 0x80, 0x3F}));
+}
+
+TEST_F(Codec, ADriveThatIsNotEnabledIsIdle) {
+  RawFeedback feedback;
+  feedback.statusword = 0x0233;
+  feedback.mode_display = 8;
+  decode_feedback(scale(), feedback, 0, state);
+  EXPECT_EQ(state.mode()[0], static_cast<int>(ControlMode::kIdle));
+  EXPECT_EQ(state.drive_state()[0], static_cast<int>(DriveState::kSwitchedOn));
+}
+
+}  // namespace
+}  // namespace tandem::hal::can

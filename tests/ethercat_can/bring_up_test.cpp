@@ -1,0 +1,138 @@
+#include "canopen/messages.hpp"
+#include "tests/ethercat_can/rig.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using testing::Rig;
+using testing::robot_config;
+
+TEST(BringUp, EnablesThreeBoardsOfTwoAxesWithoutMovingAJoint) {
+  Rig rig;
+  for (std::size_t j = 0; j < 6; ++j) rig.position_rad[j] = 0.1 * static_cast<double>(j);
+  double progress = 0.0;
+  while (rig.master->phase() == Phase::kBringUp && rig.cycle < 5000) {
+    (void)rig.step();
+    EXPECT_GE(rig.master->progress(), progress) << "progress goes forward";
+    progress = rig.master->progress();
+  }
+  ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+  EXPECT_EQ(progress, 1.0);
+  EXPECT_LT(rig.cycle, 600u) << "nodes are configured in parallel, one object a cycle";
+  for (std::size_t j = 0; j < 6; ++j) {
+    EXPECT_EQ(rig.state.drive_state()[j], static_cast<int>(DriveState::kOperationEnabled));
+    const firmware::AxisObjects& axis = rig.axis(j).objects();
+    EXPECT_EQ(axis.target_position, axis.position) << "the drive holds where it is";
+  }
+  EXPECT_EQ(rig.master->status_text(), "");
+}
+
+TEST(BringUp, ConfiguresScalesLimitsGainsAndHeartbeats) {
+  Rig rig;
+  rig.bring_up();
+  const firmware::AxisObjects& axis = rig.axis(3).objects();
+  EXPECT_EQ(axis.link_counts, 36000u);
+  EXPECT_EQ(axis.motor_counts, 360000u);
+  EXPECT_EQ(axis.rated_torque_mNm, 50000u);
+  EXPECT_EQ(axis.max_torque, 2000);
+  EXPECT_EQ(axis.min_position, -11459);  // -2 rad
+  EXPECT_EQ(axis.max_position, 11459);
+  EXPECT_EQ(axis.gains[0], (std::array<float, 4>{400.0F, 10.0F, 40.0F, 100.0F}));
+  EXPECT_EQ(axis.gains[2], (std::array<float, 4>{0.2F, 2.0F, 0.0F, 40.0F}));
+  EXPECT_EQ(axis.feed_forward[0], 0.125F);  // R / (N K) = 0.5 / 4
+  EXPECT_EQ(axis.motor_data, (std::array<float, 3>{0.5F, 4.0F, 400.0F}));
+  EXPECT_EQ(axis.command_timeout, 10);
+  const canopen::ObjectDictionary& od = rig.boards[1]->dictionary();
+  EXPECT_EQ(od.value<std::uint32_t>(0x1016, 1), 0x007F0096u) << "the master, 150 ms";
+  EXPECT_EQ(od.value<std::uint16_t>(0x1017, 0), 50);
+  EXPECT_EQ(od.value<std::uint32_t>(0x1006, 0), 1000u) << "SYNC period in us";
+}
+
+TEST(BringUp, NamesABoardThatDoesNotAnswer) {
+  Rig rig;
+  rig.present[1] = false;
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.master->status_text(),
+            "board board_1 (node 11, bus legs): no boot-up message within 3 s; is it powered and "
+            "connected, and is its node id 11?");
+}
+
+TEST(BringUp, NamesEveryBoardThatDoesNotAnswer) {
+  Rig rig;
+  rig.present[0] = false;
+  rig.sensor_present = false;
+  rig.leave(Phase::kBringUp);
+  const std::string text = rig.master->status_text();
+  EXPECT_NE(text.find("board board_0 (node 10"), std::string::npos) << text;
+  EXPECT_NE(text.find("sensor foot (node 40, bus arms)"), std::string::npos) << text;
+  EXPECT_EQ(text.find("board_1"), std::string::npos) << text;
+}
+
+TEST(BringUp, WaitsForABoardThatIsPoweredLate) {
+  Rig rig;
+  rig.present[2] = false;
+  rig.steps(1500);
+  EXPECT_EQ(rig.master->phase(), Phase::kBringUp);
+  EXPECT_EQ(rig.master->status_text(),
+            "board board_2 (node 12, bus legs): waiting for its boot-up message");
+  rig.present[2] = true;
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+}
+
+TEST(BringUp, NamesAWrongIdentity) {
+  Rig rig(robot_config(), [](firmware::BoardSetup& setup, std::size_t b) {
+    if (b == 2) setup.product = 0x0403;
+  });
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.master->status_text(),
+            "board board_2 (node 12, bus legs): wrong product code: object 1018:02 is 0x403 "
+            "instead of 0x402");
+}
+
+TEST(BringUp, NamesTheObjectAndTheJointOfAnSdoAbort) {
+  RobotConfig robot = robot_config();
+  robot.joints[3].min_position_rad = 2.0;  // above the maximum: 607D is refused
+  robot.joints[3].max_position_rad = -2.0;
+  Rig rig(robot);
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.master->status_text(),
+            "writing object 687D:02 of joint Joint3 (board board_1, node 11, axis 1) failed: "
+            "maximum is less than minimum (abort code 0x06090036)");
+}
+
+TEST(BringUp, NamesTheDriveThatIsNotEnabled) {
+  Rig rig;
+  rig.bus_V = 40.0;
+  rig.position_rad[4] = std::nan("");  // the encoder is not connected
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  const std::string text = rig.master->status_text();
+  EXPECT_EQ(text.find("joint Joint4 (board board_2, node 12, axis 0): position sensor "
+                      "(error code 0x7300)"), 0u) << text;
+}
+
+TEST(BringUp, StartsANodeAgainThatRebootsDuringConfiguration) {
+  Rig rig;
+  rig.steps(40);
+  const std::array reset{canopen::make_nmt(canopen::NmtCommand::kResetNode, 11)};
+  (void)rig.legs.master().send(reset);  // as a brown-out would
+  rig.leave(Phase::kBringUp);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+}
+
+TEST(BringUp, RefusesABusThatIsNotFd) {
+  RobotConfig robot = robot_config();
+  robot.buses[0].fd = false;
+  LoopbackBus bus;
+  const std::array<Bus*, 2> ends{&bus.master(), &bus.master()};
+  const auto master = DriveMaster::create(robot, ends);
+  ASSERT_FALSE(master);
+  EXPECT_EQ(master.error().key, "board 'board_0'");
+}
+
+}  // namespace
+}  // namespace tandem::hal::can

@@ -1,0 +1,76 @@
+#include "hal/ethercat-can/loopback.hpp"
+
+#include <array>
+
+#include "base/archive.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using canopen::Frame;
+
+std::vector<std::uint32_t> ids(std::span<const Frame> frames) {
+  std::vector<std::uint32_t> out;
+  for (const Frame& frame : frames) out.push_back(frame.id);
+  return out;
+}
+
+TEST(Loopback, KeepsTheOrderAndTheDirection) {
+  LoopbackBus bus;
+  const std::array<Frame, 2> sync_and_command{Frame{.id = 0x80}, Frame{.id = 0x205}};
+  EXPECT_EQ(bus.master().send(sync_and_command), 2u);
+  const std::array<Frame, 1> answer{Frame{.id = 0x185}};
+  EXPECT_EQ(bus.boards().send(answer), 1u);
+  EXPECT_EQ(ids(bus.to_boards()), (std::vector<std::uint32_t>{0x80, 0x205}));
+  std::array<Frame, 4> in;
+  ASSERT_EQ(bus.master().receive(in), 1u);
+  EXPECT_EQ(in[0].id, 0x185u);
+  ASSERT_EQ(bus.boards().receive(in), 2u);
+  EXPECT_EQ(in[1].id, 0x205u);
+  EXPECT_EQ(bus.boards().receive(in), 0u);
+  EXPECT_EQ(bus.passed(), 3u);
+}
+
+TEST(Loopback, DropsAndCountsBeyondItsCapacity) {
+  LoopbackBus bus(3);
+  std::array<Frame, 4> frames;
+  EXPECT_EQ(bus.master().send(frames), 3u);
+  EXPECT_EQ(bus.dropped(), 1u);
+}
+
+TEST(Loopback, ReusesTheRoomOfWhatWasTaken) {
+  LoopbackBus bus(3);
+  const std::array<Frame, 3> first{Frame{.id = 1}, Frame{.id = 2}, Frame{.id = 3}};
+  const std::array<Frame, 2> second{Frame{.id = 4}, Frame{.id = 5}};
+  std::array<Frame, 2> two;
+  ASSERT_EQ(bus.master().send(first), 3u);
+  ASSERT_EQ(bus.boards().receive(two), 2u);
+  EXPECT_EQ(bus.master().send(second), 2u);
+  EXPECT_EQ(ids(bus.to_boards()), (std::vector<std::uint32_t>{3, 4, 5}));
+}
+
+TEST(Loopback, ACutCableLosesWhatIsSent) {
+  LoopbackBus bus;
+  bus.set_connected(false);
+  const std::array<Frame, 1> frame{Frame{.id = 0x80}};
+  EXPECT_EQ(bus.master().send(frame), 0u);
+  EXPECT_TRUE(bus.to_boards().empty());
+  EXPECT_EQ(bus.dropped(), 1u);
+}
+
+TEST(Loopback, ArchivesTheFramesInFlight) {
+  LoopbackBus bus;
+  const std::array<Frame, 2> frames{Frame{.id = 0x80}, Frame{.id = 0x205, .length = 1}};
+  (void)bus.master().send(frames);
+  Archive saved;
+  bus.archive(saved);
+  bus.clear_to_boards();
+  Archive restore(saved.bytes());
+  bus.archive(restore);
+  ASSERT_TRUE(restore.ok() && restore.at_end());
+  ASSERT_EQ(bus.to_boards().size(), 2u);
+  EXPECT_EQ(bus.to_boards()[1], frames[1]);
+}
+
+}  // namespace
+}  // namespace tandem::hal::can

@@ -1,0 +1,176 @@
+#include "hal/ethercat-can/sdo_sequence.hpp"
+
+#include "hal/ethercat-can/node_master.hpp"
+#include "tests/ethercat_can/rig.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using canopen::Frame;
+using testing::robot_config;
+
+Frame wire(std::uint32_t id, std::initializer_list<int> bytes) {
+  Frame frame;
+  frame.id = id;
+  frame.length = static_cast<std::uint8_t>(bytes.size());
+  std::size_t i = 0;
+  for (const int byte : bytes) frame.data[i++] = static_cast<std::uint8_t>(byte);
+  return frame;
+}
+
+const SdoStep* find(const std::vector<SdoStep>& steps, int index, int sub, bool last = false) {
+  const SdoStep* found = nullptr;
+  for (const SdoStep& step : steps) {
+    if (step.index != index || step.sub != sub) continue;
+    if (found == nullptr || last) found = &step;
+  }
+  return found;
+}
+
+TEST(SdoSequence, MapsAPdoByTheStandardsProcedure) {
+  const RobotConfig robot = robot_config();
+  const auto layout = make_pdo_layout(robot);
+  ASSERT_TRUE(layout);
+  const auto steps = make_configuration(robot, layout->nodes[0]);
+  std::vector<std::pair<int, int>> order;
+  std::vector<std::uint32_t> cob_ids;
+  for (const SdoStep& step : steps) {
+    if (step.index != 0x1400 && step.index != 0x1600) continue;
+    order.emplace_back(step.index, step.sub);
+    if (step.index == 0x1400 && step.sub == 1) {
+      cob_ids.push_back(canopen::get<std::uint32_t>(step.bytes.data()));
+    }
+  }
+  ASSERT_EQ(order.size(), 15u);
+  EXPECT_EQ(order[0], (std::pair{0x1400, 1}));
+  EXPECT_EQ(order[1], (std::pair{0x1600, 0}));
+  EXPECT_EQ(order[2], (std::pair{0x1600, 1}));
+  EXPECT_EQ(order[12], (std::pair{0x1600, 0}));
+  EXPECT_EQ(order[13], (std::pair{0x1400, 2}));
+  EXPECT_EQ(order[14], (std::pair{0x1400, 1}));
+  EXPECT_EQ(cob_ids, (std::vector<std::uint32_t>{0x8000020A, 0x0000020A}));
+  EXPECT_EQ(find(steps, 0x1600, 3)->bytes, (std::array<std::uint8_t, 4>{0x20, 0x00, 0x7A, 0x60}));
+}
+
+TEST(SdoSequence, WritesTheSecondAxis800Higher) {
+  const RobotConfig robot = robot_config();
+  const auto layout = make_pdo_layout(robot);
+  ASSERT_TRUE(layout);
+  const auto steps = make_configuration(robot, layout->nodes[0]);
+  const SdoStep* rated = find(steps, 0x6876, 0);
+  ASSERT_NE(rated, nullptr);
+  EXPECT_EQ(rated->bytes, (std::array<std::uint8_t, 4>{0x50, 0xC3, 0x00, 0x00}));  // 50000 mNm
+  EXPECT_EQ(rated->axis, 1);
+  const SdoStep* kp = find(steps, 0x2820, 1);
+  ASSERT_NE(kp, nullptr);
+  EXPECT_EQ(kp->bytes, (std::array<std::uint8_t, 4>{0x00, 0x00, 0xC8, 0x43}));  // 400.0
+}
+
+/// A node that is played by the test, frame by frame.
+struct ScriptedNode : ::testing::Test {
+  std::vector<SdoStep> steps = {[] {
+                                  SdoStep step = write_step(0x1018, 2, std::uint32_t{0x402});
+                                  step.check = true;
+                                  return step;
+                                }(),
+                                write_step(0x1017, 0, std::uint16_t{50})};
+  NodeMaster node{5, 50, steps};
+  std::array<Frame, 8> storage{};
+  canopen::FrameSink sink{storage};
+  std::int64_t now_ns = 0;
+
+  void SetUp() override { node.restart(0); }
+  std::vector<Frame> wait(int ms) {
+    sink.clear();
+    now_ns += ms * 1'000'000LL;
+    node.process(now_ns, ms * 1'000'000LL, sink);
+    return {sink.frames().begin(), sink.frames().end()};
+  }
+  void boot() { node.on_heartbeat(canopen::NmtState::kBootUp, now_ns); }
+  void answer(std::initializer_list<int> bytes) { node.on_sdo(wire(0x585, bytes), sink); }
+  void configure() {
+    boot();
+    (void)wait(1);
+    answer({0x43, 0x18, 0x10, 0x02, 0x02, 0x04, 0, 0});
+    (void)wait(1);
+    answer({0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0});
+    (void)wait(1);
+  }
+};
+
+TEST_F(ScriptedNode, IsResetReadWrittenAndStarted) {
+  EXPECT_EQ(wait(0), std::vector<Frame>{wire(0x000, {0x81, 0x05})});
+  boot();
+  EXPECT_EQ(wait(1), std::vector<Frame>{wire(0x605, {0x40, 0x18, 0x10, 0x02, 0, 0, 0, 0})});
+  EXPECT_TRUE(wait(1).empty()) << "no answer yet";
+  answer({0x43, 0x18, 0x10, 0x02, 0x02, 0x04, 0, 0});
+  EXPECT_EQ(wait(1), std::vector<Frame>{wire(0x605, {0x2B, 0x17, 0x10, 0x00, 50, 0, 0, 0})});
+  answer({0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0});
+  EXPECT_TRUE(wait(1).empty());
+  EXPECT_EQ(node.stage(), NodeMaster::Stage::kReady);
+  node.start(now_ns, sink);
+  EXPECT_EQ(sink.frames().back(), wire(0x000, {0x01, 0x05}));
+  node.on_heartbeat(canopen::NmtState::kOperational, now_ns);
+  EXPECT_TRUE(node.running());
+}
+
+TEST_F(ScriptedNode, IsResetAgainEveryHalfSecondUntilItBoots) {
+  (void)wait(0);
+  EXPECT_TRUE(wait(499).empty());
+  EXPECT_EQ(wait(1).size(), 1u);
+  (void)wait(2500);
+  EXPECT_EQ(node.trouble(), NodeTrouble::kNoBootUp);
+}
+
+TEST_F(ScriptedNode, IsAskedThreeTimesBeforeTheSdoTimesOut) {
+  boot();
+  (void)wait(1);
+  int requests = 0;
+  for (int ms = 0; ms < 400; ++ms) {
+    for (const Frame& frame : wait(1)) requests += frame.data[0] == 0x40 ? 1 : 0;
+  }
+  EXPECT_EQ(requests, 2) << "besides the first";
+  EXPECT_EQ(node.trouble(), NodeTrouble::kSdoAbort);
+  EXPECT_EQ(node.abort_code(), canopen::AbortCode::kTimeout);
+}
+
+TEST_F(ScriptedNode, IsRefusedWithAnotherIdentity) {
+  boot();
+  (void)wait(1);
+  answer({0x43, 0x18, 0x10, 0x02, 0x03, 0x04, 0, 0});
+  (void)wait(1);
+  EXPECT_EQ(node.trouble(), NodeTrouble::kWrongIdentity);
+  EXPECT_EQ(node.read_value(), 0x403u);
+}
+
+TEST_F(ScriptedNode, ThatDoesNotStartIsReported) {
+  configure();
+  ASSERT_EQ(node.stage(), NodeMaster::Stage::kReady);
+  node.start(now_ns, sink);
+  for (int ms = 0; ms < 1100; ms += 50) {
+    node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
+    (void)wait(50);
+  }
+  EXPECT_EQ(node.trouble(), NodeTrouble::kNotOperational);
+}
+
+TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
+  configure();
+  node.start(now_ns, sink);
+  node.on_heartbeat(canopen::NmtState::kOperational, now_ns);
+  node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
+  EXPECT_EQ(node.trouble(), NodeTrouble::kLeftOperational);
+}
+
+TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
+  boot();
+  for (int i = 0; i < 3; ++i) {
+    boot();
+    EXPECT_EQ(node.stage(), NodeMaster::Stage::kConfigure);
+  }
+  boot();
+  EXPECT_EQ(node.trouble(), NodeTrouble::kRebooted);
+}
+
+}  // namespace
+}  // namespace tandem::hal::can
