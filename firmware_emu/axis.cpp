@@ -47,7 +47,7 @@ void Axis::power_on() noexcept TANDEM_RT {
   take_demands();
 }
 
-void Axis::apply_settings() noexcept {
+void Axis::apply_settings() noexcept TANDEM_RT {
   const ControllerConfig config = objects_.controller();
   controller_.configure(config, period_s_);
   link_encoder_.set_resolution(objects_.link_counts);

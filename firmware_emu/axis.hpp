@@ -54,7 +54,7 @@ class Axis final : private canopen::ObjectOwner {
   [[nodiscard]] canopen::AbortCode check_limits(const canopen::ObjectEntry& entry,
                                                 const std::uint8_t* bytes) const noexcept;
 
-  void apply_settings() noexcept;
+  void apply_settings() noexcept TANDEM_RT;
   void show_actual() noexcept;
   void show_controller() noexcept;
   void take_demands() noexcept;

@@ -25,7 +25,7 @@ std::array<float, 4> gains_of(const Pid::Config& pid) {
   return {real32(pid.kp), real32(pid.ki), real32(pid.kd), real32(pid.output_limit)};
 }
 
-Pid::Config pid_of(const std::array<float, 4>& gains) noexcept {
+Pid::Config pid_of(const std::array<float, 4>& gains) noexcept TANDEM_RT {
   return {.kp = gains[0], .ki = gains[1], .kd = gains[2], .output_limit = gains[3]};
 }
 
@@ -75,11 +75,11 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   return o;
 }
 
-double AxisObjects::rad_per_count() const noexcept {
+double AxisObjects::rad_per_count() const noexcept TANDEM_RT {
   return 2.0 * std::numbers::pi / link_counts;
 }
 
-ControllerConfig AxisObjects::controller() const noexcept {
+ControllerConfig AxisObjects::controller() const noexcept TANDEM_RT {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const bool below = min_position == std::numeric_limits<std::int32_t>::min();
   const bool above = max_position == std::numeric_limits<std::int32_t>::max();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/realtime.hpp"
 #include "canopen/drive_machine.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
@@ -33,7 +34,11 @@ enum MotorDataSub : std::uint8_t {
   kMotorConstant,   ///< N K [Nm/A], also [Vs/rad], at the link
   kSpring,          ///< Ks [Nm/rad]; 0: rigid
 };
-enum EstimatorSub : std::uint8_t { kLinkVelocityCutoff = 1, kMotorVelocityCutoff, kTorqueRateCutoff };
+enum EstimatorSub : std::uint8_t {
+  kLinkVelocityCutoff = 1,
+  kMotorVelocityCutoff,
+  kTorqueRateCutoff,
+};
 enum TelemetrySub : std::uint8_t {
   kTorqueReference = 1,  ///< [Nm] into the torque loop, limited
   kTransferVoltage,      ///< [V] what is left of a mode change's step
@@ -111,9 +116,11 @@ struct AxisObjects {
   bool add_to(canopen::ObjectDictionary& od, int axis, canopen::ObjectOwner& owner);
 
   /// What the controller makes of the objects. @pre positions in counts of link_counts
-  [[nodiscard]] ControllerConfig controller() const noexcept;
-  [[nodiscard]] double rad_per_count() const noexcept;
-  [[nodiscard]] double rated_torque_Nm() const noexcept { return rated_torque_mNm * 1.0e-3; }
+  [[nodiscard]] ControllerConfig controller() const noexcept TANDEM_RT;
+  [[nodiscard]] double rad_per_count() const noexcept TANDEM_RT;
+  [[nodiscard]] double rated_torque_Nm() const noexcept TANDEM_RT {
+    return rated_torque_mNm * 1.0e-3;
+  }
 
  private:
   bool add_profile(canopen::ObjectDictionary& od, int axis, canopen::ObjectOwner& owner);

@@ -27,7 +27,7 @@ inline constexpr std::size_t kOutboxFrames = 64;
 /// Frames and the pins' truth in, frames and motor voltages out. One cycle at time t:
 ///
 /// ```
-/// for (const Frame& frame : what_the_bus_carries) board.receive(frame);   // the SYNC is among them
+/// for (const Frame& frame : what_the_bus_carries) board.receive(frame);  // SYNC among them
 /// board.step(dt_ns, sense_at_t, drive);        // drive: holds from t on
 /// for (const Frame& frame : board.outgoing()) bus.send(frame);
 /// board.clear_outgoing();

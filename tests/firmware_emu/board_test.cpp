@@ -120,7 +120,8 @@ TEST(Board, RefusesSettingsThatAreNoNumberOrOfTheWrongSign) {
   rig.start();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
-  for (const int object : {0x2020, 0x2021, 0x2022, 0x2023, 0x2024, 0x2030, 0x2031, 0x2026, 0x2027}) {
+  for (const int object : {0x2020, 0x2021, 0x2022, 0x2023, 0x2024, 0x2030, 0x2031,
+                           0x2026, 0x2027}) {
     const auto index = static_cast<std::uint16_t>(object);
     const float before = rig.object<float>(index, 1);
     EXPECT_EQ(rig.write(index, 1, nan), 0x06090030U) << std::hex << index;
