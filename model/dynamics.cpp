@@ -18,8 +18,8 @@ KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
       return {"center_of_mass", {q, v}, {{"c", 3}, {"cdot", 3}, {"J", 3 * m.nv()}}};
     case Kernel::kCentroidalMomentum: return {"centroidal_momentum", {q, v}, {{"h", 6}}};
     case Kernel::kEnergy: return {"energy", {q, v}, {{"kinetic_potential", 2}}};
-    case Kernel::kSites:
-      return {"sites",
+    case Kernel::kSiteMotion:
+      return {"site_motion",
               {q, v, vdot},
               {{"pose", 12 * sites}, {"twist", 6 * sites}, {"acceleration", 6 * sites}}};
     case Kernel::kSiteJacobians: return {"site_jacobians", {q}, {{"J", 6 * sites * m.nv()}}};

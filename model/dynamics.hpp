@@ -19,7 +19,7 @@ enum class Kernel : std::uint8_t {
   kCenterOfMass,
   kCentroidalMomentum,
   kEnergy,
-  kSites,
+  kSiteMotion,
   kSiteJacobians,
   kSensorWrenches,
 };
@@ -56,7 +56,7 @@ void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector
       return CenterOfMass<S>(m, i(0), i(1), o(0), o(1), o(2)).run();
     case Kernel::kCentroidalMomentum: return centroidal_momentum<S>(m, i(0), i(1), o(0));
     case Kernel::kEnergy: return energy<S>(m, i(0), i(1), o(0));
-    case Kernel::kSites: return sites<S>(m, i(0), i(1), i(2), o(0), o(1), o(2));
+    case Kernel::kSiteMotion: return site_motion<S>(m, i(0), i(1), i(2), o(0), o(1), o(2));
     case Kernel::kSiteJacobians: return site_jacobians<S>(m, i(0), o(0));
     case Kernel::kSensorWrenches:
       return SensorWrenches<S>(m, i(0), i(1), i(2), i(3), o(0)).run();

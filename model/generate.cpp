@@ -47,7 +47,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
   text += kTrigSource;
   text += "\n";
   for (const EmittedKernel& kernel : kernels) text += kernel.entry + "\n";
-  text += name_table("joints", m.joint_names) + name_table("sites_", m.site_names) +
+  text += name_table("joints", m.joint_names) + name_table("sites", m.site_names) +
           name_table("wrenches", m.wrench_names) + name_table("sensors", m.sensor_names) +
           count_table(result.counts) + "\n}  // namespace\n\n";
   text += "extern const tandem_kernels table = {\n";
@@ -55,7 +55,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
                       m.floating_base ? 1 : 0, quoted(result.robot), result.hash);
   text += fmt::format("    {}, {}, {}, {}, {}, {},\n", m.nq(), m.nv(), m.joint_count(),
                       m.sites.size(), m.wrenches, m.sensors.size());
-  text += "    joints, sites_, wrenches, sensors,\n";
+  text += "    joints, sites, wrenches, sensors,\n";
   text += fmt::format("    {:.17g}, {{{:.17g}, {:.17g}, {:.17g}}},\n    counts, {},\n", m.mass_kg,
                       m.gravity[0], m.gravity[1], m.gravity[2], result.counts.size());
   for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + ",\n";

@@ -34,9 +34,9 @@ template <class S>
 /// Poses (12 per site: R row-major, p), twists and classical accelerations (6 per site, of the
 /// site's origin in world axes, linear first, without gravity).
 template <class S>
-void sites(const Mechanism& m, std::span<const S> q, std::span<const S> v,
-           std::span<const S> vdot, std::span<S> pose, std::span<S> twist,
-           std::span<S> acceleration) {
+void site_motion(const Mechanism& m, std::span<const S> q, std::span<const S> v,
+                 std::span<const S> vdot, std::span<S> pose, std::span<S> twist,
+                 std::span<S> acceleration) {
   const std::vector<BodyPose<S>> poses = body_poses(m, q);
   std::vector<BodyMotion<S>> motions{base_motion(m, q, v, vdot, false)};
   std::vector<Vec3<S>> velocities(1, Vec3<S>{S(0.0), S(0.0), S(0.0)});
