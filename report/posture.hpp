@@ -1,0 +1,33 @@
+// The robot as a stick figure in its sagittal plane, from the description's tree.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/robot_config.hpp"
+#include "model/tree.hpp"
+#include "report/figure.hpp"
+
+namespace tandem::report {
+
+/// One moment of a run. Joints stand in the process image's order.
+struct PostureSample {
+  std::string label;                           ///< "lowest, 3.50 s"
+  model::Placement base;                       ///< of the root link in W
+  std::vector<double> position_rad;
+};
+
+/// The side view, x to the right and z up, of several moments beside each other: legs (what
+/// carries a contact's site) blue, the trunk dark, everything else light.
+/// @pre every joint of the tree is one of the robot's.
+[[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
+                                    std::span<const PostureSample> samples);
+
+/// Placement in W of every body's frame, in the tree's order.
+[[nodiscard]] std::vector<model::Placement> body_placements(const model::Tree& tree,
+                                                            const hal::RobotConfig& robot,
+                                                            const PostureSample& sample);
+
+}  // namespace tandem::report

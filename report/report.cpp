@@ -1,0 +1,109 @@
+#include "report/report.hpp"
+
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <numbers>
+
+#include "report/gnuplot.hpp"
+#include "report/page.hpp"
+#include "report/run_figures.hpp"
+
+namespace tandem::report {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+void add_facts(const RunData& run, const std::string& side, Facts& facts) {
+  facts.emplace_back("log" + side, run.path + (run.truncated ? " (its run was killed)" : ""));
+  facts.emplace_back("robot" + side, fmt::format("{}, {} joints", run.info.robot,
+                                                 run.info.joints.size()));
+  facts.emplace_back("backend" + side, run.info.hal);
+  facts.emplace_back("seed" + side, std::to_string(run.info.seed));
+  facts.emplace_back("period" + side,
+                     fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
+  facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", run.time_s.back()));
+  facts.emplace_back("kernels" + side, run.info.kernel_variant);
+  facts.emplace_back("tandem" + side, run.info.version);
+  for (const auto& [key, value] : run.result) {
+    if (key != "data_sha256") facts.emplace_back(key + side, value);
+  }
+  facts.emplace_back("data sha256" + side, run.data_sha256);
+}
+
+PageTable tracking_table(const RunData& run, const std::string& side) {
+  PageTable table{"Tracking" + side,
+                  "Reference minus measured link position of the joints under position control, "
+                  "and the largest measured torque. The worst first.",
+                  {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
+                  {}};
+  for (const Tracking& one : run.tracking()) {
+    table.rows.push_back({one.joint, fmt::format("{:.4f}", one.rms_rad * kDegrees),
+                          fmt::format("{:.4f}", one.max_rad * kDegrees),
+                          fmt::format("{:.2f}", one.max_torque_Nm)});
+  }
+  return table;
+}
+
+Status create(const std::string& folder) {
+  std::error_code problem;
+  std::filesystem::create_directories(folder, problem);
+  if (!problem) return {};
+  return std::unexpected(Error{"cannot create the report's folder: " + problem.message(),
+                               "name a folder that can be written with -o", folder, 0, {}});
+}
+
+Page page_of(const RunData& run, const RunData* other) {
+  Page page;
+  page.title = other == nullptr ? fmt::format("{}: {}", run.info.robot,
+                                              std::filesystem::path(run.path).stem().string())
+                                : fmt::format("{}: two runs", run.info.robot);
+  page.lead = "Time 0 is the first cycle of the controllers, after the drives' bring-up.";
+  add_facts(run, other == nullptr ? "" : " A", page.facts);
+  page.tables.push_back(tracking_table(run, other == nullptr ? "" : " A"));
+  if (other == nullptr) return page;
+  page.lead += " A is " + run.path + ", B is " + other->path + ".";
+  add_facts(*other, " B", page.facts);
+  page.tables.push_back(tracking_table(*other, " B"));
+  return page;
+}
+
+}  // namespace
+
+Result<ReportFiles> make_report(const std::string& log, const std::string& other,
+                                const std::string& folder, const FindKernels& find_kernels) {
+  const Result<RunData> run = read_run(log);
+  if (!run) return std::unexpected(run.error());
+  Result<RunData> second = other.empty() ? Result<RunData>(RunData{}) : read_run(other);
+  if (!second) return std::unexpected(second.error());
+  const RunData* over = other.empty() ? nullptr : &*second;
+  if (over != nullptr && over->info.joints != run->info.joints) {
+    return std::unexpected(Error{"the two logs are of different robots",
+                                 "lay runs of one robot over each other", other, 0, {}});
+  }
+  if (const Status s = create(folder); !s) return std::unexpected(s.error());
+
+  ReportFiles files;
+  const tandem_kernels* kernels = find_kernels(*run);
+  if (kernels == nullptr) {
+    files.remarks.push_back("no inverse dynamics: there is no kernel library that fits this log");
+  } else if (kernels->floating_base != 0 && run->base.empty()) {
+    files.remarks.push_back("no inverse dynamics: the log lacks the base's motion (no truth)");
+    kernels = nullptr;
+  }
+  const std::vector<Figure> figures = figures_of(*run, over, kernels);
+  if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
+  if (const Status s = write_page(page_of(*run, over), figures, folder); !s) {
+    return std::unexpected(s.error());
+  }
+  files.page = folder + "/report.html";
+  for (const Figure& figure : figures) files.images.push_back(folder + "/" + figure.name + ".png");
+  files.images.push_back(folder + "/overview.png");
+  for (const Figure& figure : figures) {
+    std::error_code ignored;  // its drawing stands in the page
+    std::filesystem::remove(folder + "/" + figure.name + ".svg", ignored);
+  }
+  return files;
+}
+
+}  // namespace tandem::report

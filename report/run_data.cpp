@@ -1,0 +1,228 @@
+#include "report/run_data.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/toml_reader.hpp"
+#include "model/urdf.hpp"
+
+namespace tandem::report {
+namespace {
+
+const char kState[] = "/tandem/state";
+const char kCommand[] = "/tandem/command";
+const char kTruth[] = "/tandem/truth";
+
+std::unexpected<Error> log_error(const RunData& run, std::string message, std::string hint) {
+  return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
+}
+
+/// The robot's and the experiment's files, from the texts that the log carries.
+Status read_configuration(RunData& run) {
+  bool found = false;
+  for (const auto& [file, text] : run.info.configuration) {
+    if (!file.ends_with(".toml")) continue;
+    const Result<TomlDocument> document = TomlDocument::parse(text, file);
+    if (!document) return std::unexpected(document.error());
+    TomlTable root = document->root();
+    if (root.has("model")) {
+      auto robot = hal::parse_robot_config(text, file);
+      if (!robot) return std::unexpected(robot.error().front());
+      run.robot = std::move(*robot);
+      found = true;
+    } else {
+      TomlTable report = root.table_or_empty("report");
+      run.hip = report.text_or("hip", {});
+      run.knee = report.text_or("knee", {});
+      run.foot = report.text_or("foot", {});
+    }
+  }
+  if (found) return {};
+  return log_error(run, "this log does not carry its robot's configuration",
+                   "report needs a log that `tandem run` has written");
+}
+
+Status read_description(RunData& run) {
+  const hal::ModelConfig& m = run.robot.model;
+  const std::string text = log::value_of(run.info.configuration, m.urdf);
+  if (text.empty()) {
+    return log_error(run, "this log does not carry the description " + m.urdf,
+                     "report needs a log that `tandem run` has written");
+  }
+  auto description = model::parse_urdf(text, m.urdf, {m.floating_base, m.mimic_independent, m.lock});
+  if (!description) return std::unexpected(description.error().front());
+  run.tree = std::move(description->tree);
+  return {};
+}
+
+/// All elements of some fields as columns to ask for.
+std::vector<log::Column> columns_of(const log::LogFile& file, const std::string& topic,
+                                    std::initializer_list<const char*> fields) {
+  std::vector<log::Column> columns;
+  const log::Topic* found = file.find(topic);
+  for (const char* name : fields) {
+    const hal::Field* field = found == nullptr ? nullptr : found->layout.find(name);
+    const std::size_t count = field == nullptr ? 1 : field->count;  // the reader names what lacks
+    for (std::size_t i = 0; i < count; ++i) columns.push_back({name, i});
+  }
+  return columns;
+}
+
+/// Moves `count` columns from `from` on.
+Columns take(log::Table& table, std::size_t from, std::size_t count) {
+  const auto begin = table.columns.begin() + static_cast<std::ptrdiff_t>(from);
+  return {std::make_move_iterator(begin),
+          std::make_move_iterator(begin + static_cast<std::ptrdiff_t>(count))};
+}
+
+/// Drops the rows of `table` outside [begin_s, end_s].
+void crop(log::Table& table, double begin_s, double end_s) {
+  const auto first = std::ranges::lower_bound(table.time_s, begin_s) - table.time_s.begin();
+  const auto last = std::ranges::upper_bound(table.time_s, end_s) - table.time_s.begin();
+  const auto cut = [first, last](std::vector<double>& values) {
+    values.assign(values.begin() + first, values.begin() + last);
+  };
+  cut(table.time_s);
+  for (std::vector<double>& column : table.columns) cut(column);
+}
+
+struct Window {
+  double begin_s = -1e300;
+  double end_s = 1e300;
+};
+
+/// When controllers ran, as the events tell.
+Result<Window> window_of(const log::LogFile& file) {
+  const auto events = file.events();
+  if (!events) return std::unexpected(events.error());
+  Window window;
+  constexpr double kHalfNanosecond = 0.5e-9;
+  for (const log::EventText& one : *events) {
+    const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
+    if (one.event.kind == log::EventKind::kBringUpDone) window.begin_s = time_s - kHalfNanosecond;
+    if (one.event.kind == log::EventKind::kControllersDone) {
+      window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
+    }
+  }
+  return window;
+}
+
+Status read_state(const log::LogFile& file, const Window& window, RunData& run) {
+  std::vector<log::Column> columns =
+      columns_of(file, kState, {"position_rad", "velocity_rad_s", "torque_Nm"});
+  if (!run.robot.sensors.empty()) {
+    const auto sensors = columns_of(file, kState, {"sensor"});
+    columns.insert(columns.end(), sensors.begin(), sensors.end());
+  }
+  auto table = file.read(kState, columns);
+  if (!table) return std::unexpected(table.error());
+  crop(*table, window.begin_s, window.end_s);
+  const std::size_t n = run.robot.joints.size();
+  if (table->columns.size() < 3 * n || table->time_s.size() < 2) {
+    return log_error(run, "this log has no cycle in which controllers ran", {});
+  }
+  run.time_s = table->time_s;
+  run.position_rad = take(*table, 0, n);
+  run.velocity_rad_s = take(*table, n, n);
+  run.torque_Nm = take(*table, 2 * n, n);
+  run.sensor = take(*table, 3 * n, table->columns.size() - 3 * n);
+  return {};
+}
+
+/// References of the joints that the command puts under position control, by the state's times.
+Status read_command(const log::LogFile& file, RunData& run) {
+  auto table = file.read(kCommand, columns_of(file, kCommand, {"position_rad", "mode"}));
+  if (!table) return std::unexpected(table.error());
+  const std::size_t n = run.robot.joints.size();
+  const double gap = std::numeric_limits<double>::quiet_NaN();
+  run.reference_rad.assign(n, std::vector<double>(run.rows(), gap));
+  constexpr auto kPosition = static_cast<double>(hal::ControlMode::kPosition);
+  std::size_t c = 0;
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    while (c < table->time_s.size() && table->time_s[c] < run.time_s[row]) ++c;
+    if (c == table->time_s.size()) break;
+    if (table->time_s[c] != run.time_s[row]) continue;
+    for (std::size_t j = 0; j < n; ++j) {
+      if (table->columns[n + j][c] == kPosition) run.reference_rad[j][row] = table->columns[j][c];
+    }
+  }
+  return {};
+}
+
+Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
+  if (file.find(kTruth) == nullptr) return {};
+  auto table = file.read(kTruth, columns_of(file, kTruth, {"base_position_m", "base_quaternion",
+                                                           "base_velocity"}));
+  if (!table) return std::unexpected(table.error());
+  crop(*table, window.begin_s, window.end_s);
+  if (table->time_s == run.time_s) run.base = std::move(table->columns);
+  return {};
+}
+
+}  // namespace
+
+std::size_t RunData::first_channel(std::size_t index) const {
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < index; ++i) first += robot.sensors[i].channels();
+  return first;
+}
+
+model::Placement RunData::base_placement(std::size_t row) const {
+  if (base.size() != 13 || !robot.model.floating_base) return {};
+  const Eigen::Quaterniond rotation(base[6][row], base[3][row], base[4][row], base[5][row]);
+  return {rotation.normalized().toRotationMatrix(),
+          Eigen::Vector3d(base[0][row], base[1][row], base[2][row])};
+}
+
+std::vector<double> RunData::positions(std::size_t row) const {
+  std::vector<double> q;
+  for (const std::vector<double>& joint : position_rad) q.push_back(joint[row]);
+  return q;
+}
+
+std::vector<Tracking> RunData::tracking() const {
+  std::vector<Tracking> all;
+  for (std::size_t j = 0; j < position_rad.size(); ++j) {
+    Tracking one{robot.joints[j].name, 0.0, 0.0, 0.0};
+    std::size_t samples = 0;
+    for (std::size_t row = 0; row < rows(); ++row) {
+      one.max_torque_Nm = std::max(one.max_torque_Nm, std::abs(torque_Nm[j][row]));
+      const double error = reference_rad[j][row] - position_rad[j][row];
+      if (std::isnan(error)) continue;
+      one.rms_rad += error * error;
+      one.max_rad = std::max(one.max_rad, std::abs(error));
+      ++samples;
+    }
+    if (samples == 0) continue;
+    one.rms_rad = std::sqrt(one.rms_rad / static_cast<double>(samples));
+    all.push_back(one);
+  }
+  std::ranges::stable_sort(all, std::ranges::greater{}, &Tracking::rms_rad);
+  return all;
+}
+
+Result<RunData> read_run(const std::string& path) {
+  const Result<log::LogFile> file = log::LogFile::open(path);
+  if (!file) return std::unexpected(file.error());
+  RunData run;
+  run.path = path;
+  run.info = file->info();
+  run.result = file->result();
+  run.truncated = file->truncated();
+  run.data_sha256 = file->data_sha256();
+  if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());
+  if (const Status s = read_description(run); !s) return std::unexpected(s.error());
+  const Result<Window> window = window_of(*file);
+  if (!window) return std::unexpected(window.error());
+  if (const Status s = read_state(*file, *window, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_truth(*file, *window, run); !s) return std::unexpected(s.error());
+  const double start_s = run.time_s.front();
+  for (double& time_s : run.time_s) time_s -= start_s;
+  run.step_s = run.time_s.back() / static_cast<double>(run.rows() - 1);
+  return run;
+}
+
+}  // namespace tandem::report

@@ -1,0 +1,59 @@
+// A run read back from its log: what was measured, what was asked for, what is known.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/robot_config.hpp"
+#include "log/log_file.hpp"
+#include "model/tree.hpp"
+
+namespace tandem::report {
+
+/// Columns over the cycles in which controllers ran: [joint][row], [channel][row], …
+using Columns = std::vector<std::vector<double>>;
+
+/// How well a joint under position control followed.
+struct Tracking {
+  std::string joint;
+  double rms_rad = 0.0;
+  double max_rad = 0.0;
+  double max_torque_Nm = 0.0;  ///< the largest magnitude measured
+};
+
+struct RunData {
+  std::string path;
+  log::RunInfo info;
+  log::StringMap result;            ///< empty when the run was killed
+  bool truncated = false;
+  std::string data_sha256;
+
+  hal::RobotConfig robot;           ///< as it was logged
+  model::Tree tree;
+  std::string hip, knee, foot;      ///< the experiment's [report]; may be empty
+
+  double step_s = 0.0;              ///< between rows
+  std::vector<double> time_s;       ///< of each row, 0 when the controllers started
+  Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
+  Columns reference_rad;            ///< [joint][row]; NaN when not under position control
+  Columns sensor;                   ///< [channel][row], all sensors one after another
+  Columns base;                     ///< [13][row]: position, quaternion xyzw, velocity of the base
+                                    ///< in its frame; empty when the log has no truth
+
+  [[nodiscard]] std::size_t rows() const { return time_s.size(); }
+  /// First channel of sensor `index` in `sensor`.
+  [[nodiscard]] std::size_t first_channel(std::size_t index) const;
+  /// The root link in W; upright at the origin when the log has no truth.
+  [[nodiscard]] model::Placement base_placement(std::size_t row) const;
+  /// Every joint's position at a row, in the image's order.
+  [[nodiscard]] std::vector<double> positions(std::size_t row) const;
+  /// Joints that were under position control, the worst first.
+  [[nodiscard]] std::vector<Tracking> tracking() const;
+};
+
+/// Errors: as log::LogFile::open; a log without state and command; one without its robot's files.
+[[nodiscard]] Result<RunData> read_run(const std::string& path);
+
+}  // namespace tandem::report

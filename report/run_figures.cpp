@@ -1,0 +1,271 @@
+#include "report/run_figures.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "report/inverse_dynamics.hpp"
+#include "report/posture.hpp"
+
+namespace tandem::report {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kMotionStep_s = 0.005;  // of the inverse dynamics
+
+std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+/// The joints of the tree from the root to the link of the first foot's site.
+std::vector<int> first_leg(const RunData& run) {
+  std::vector<int> joints;
+  if (run.robot.contact.feet.empty()) return joints;
+  for (const hal::SiteConfig& site : run.robot.model.sites) {
+    const int link = run.tree.link_index(site.link);
+    if (site.name != run.robot.contact.feet.front().site || link < 0) continue;
+    for (int body = run.tree.links[at(link)].body; body > 0;
+         body = run.tree.joints[at(body) - 1].parent) {
+      joints.insert(joints.begin(), body - 1);
+    }
+  }
+  return joints;
+}
+
+/// Joints (image) of the first leg that turn about the robot's lateral axis.
+std::vector<int> pitch_joints(const RunData& run) {
+  PostureSample zero{"", {}, std::vector<double>(run.robot.joints.size(), 0.0)};
+  const auto bodies = body_placements(run.tree, run.robot, zero);
+  std::vector<int> found;
+  for (const int joint : first_leg(run)) {
+    const model::Joint& j = run.tree.joints[at(joint)];
+    const int index = run.robot.joint_index(j.name);
+    if (index >= 0 && std::abs((bodies[at(joint) + 1].R * j.axis).y()) > 0.9) {
+      found.push_back(index);
+    }
+  }
+  return found;
+}
+
+/// Joints by how far they moved, the widest first.
+std::vector<int> widest_joints(const RunData& run) {
+  std::vector<double> range;
+  for (const std::vector<double>& q : run.position_rad) {
+    const auto [low, high] = std::ranges::minmax_element(q);
+    range.push_back(*high - *low);
+  }
+  std::vector<int> order(range.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::ranges::greater{}, [&](int j) { return range[at(j)]; });
+  return order;
+}
+
+Curve curve_of(const RunData& run, std::string label, CurveStyle style,
+               const std::vector<double>& values, double factor) {
+  Curve curve{std::move(label), style, run.time_s, values};
+  for (double& value : curve.y) value *= factor;
+  return curve;
+}
+
+Figure hip_figure(const RunData& run, const RunData* other, int joint) {
+  const std::string& name = run.robot.joints[at(joint)].name;
+  Figure figure;
+  figure.name = "hip_position";
+  figure.title = "Hip position against its reference";
+  figure.x_label = "time [s]";
+  figure.y_label = name + " [deg]";
+  figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
+                                   CurveStyle::kMeasured, run.position_rad[at(joint)], kDegrees));
+  if (other != nullptr) {
+    figure.curves.push_back(curve_of(*other, "measured, B", CurveStyle::kSecond,
+                                     other->position_rad[at(joint)], kDegrees));
+  }
+  figure.curves.push_back(
+      curve_of(run, "reference", CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
+  return figure;
+}
+
+/// Weight of everything that moves [N].
+double weight_N(const RunData& run) {
+  double mass_kg = 0.0;
+  for (const model::Body& body : run.tree.bodies) mass_kg += body.inertia.mass_kg;
+  const auto& g = run.robot.model.gravity_m_s2;
+  return mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+}
+
+Figure force_figure(const RunData& run, const RunData* other, const std::vector<int>& sensors) {
+  Figure figure;
+  figure.name = "foot_force";
+  figure.title = "Vertical force in the feet's six-axis sensors";
+  figure.x_label = "time [s]";
+  figure.y_label = "force [N]";
+  constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond};
+  const std::size_t shown = other == nullptr ? std::min<std::size_t>(2, sensors.size()) : 1;
+  for (std::size_t i = 0; i < shown; ++i) {
+    const std::string& name = run.robot.sensors[at(sensors[i])].name;
+    figure.curves.push_back(curve_of(run, other == nullptr ? name : name + ", A", kStyles[i],
+                                     vertical_force(run, sensors[i]), 1.0));
+  }
+  if (other != nullptr) {
+    figure.curves.push_back(curve_of(*other, "B", CurveStyle::kSecond,
+                                     vertical_force(*other, sensors.front()), 1.0));
+  }
+  if (run.robot.model.floating_base && run.robot.contact.feet.size() == 2) {
+    figure.levels.push_back({"half the weight", 0.5 * weight_N(run)});
+  }
+  return figure;
+}
+
+Figure torque_figure(const RunData& run, const RunData* other, int joint,
+                     const tandem_kernels* kernels) {
+  const std::string& name = run.robot.joints[at(joint)].name;
+  Figure figure;
+  figure.name = "knee_torque";
+  figure.title = "Knee torque: measured, and by inverse dynamics";
+  figure.x_label = "time [s]";
+  figure.y_label = name + " [Nm]";
+  figure.curves.push_back(curve_of(run, other == nullptr ? "spring, measured" : "spring, A",
+                                   CurveStyle::kMeasured, run.torque_Nm[at(joint)], 1.0));
+  if (other != nullptr) {
+    figure.curves.push_back(
+        curve_of(*other, "spring, B", CurveStyle::kSecond, other->torque_Nm[at(joint)], 1.0));
+  }
+  if (kernels != nullptr) figure.curves.push_back(inverse_dynamics_curve(run, joint, *kernels));
+  return figure;
+}
+
+/// The row in which `values` comes nearest to `wanted`, between two rows.
+std::size_t nearest_row(const std::vector<double>& values, double wanted, std::size_t begin,
+                        std::size_t end) {
+  std::size_t best = begin;
+  for (std::size_t row = begin; row < end; ++row) {
+    if (std::abs(values[row] - wanted) < std::abs(values[best] - wanted)) best = row;
+  }
+  return best;
+}
+
+/// Moments of the first half cycle and the end: by the base's height, or by `joint`'s position.
+std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
+  const bool base = run.base.size() == 13 && run.robot.model.floating_base;
+  const std::vector<double>& depth = base ? run.base[2] : run.position_rad[at(joint)];
+  const double start = depth.front();
+  const auto far = std::ranges::max_element(
+      depth, {}, [start](double value) { return std::abs(value - start); });
+  const double turn = *far;
+  // The first time that the run comes to within a hundredth of its farthest point.
+  const auto arrived = std::ranges::find_if(depth, [&](double value) {
+    return std::abs(value - turn) <= 0.01 * std::abs(turn - start);
+  });
+  const auto lowest = static_cast<std::size_t>(arrived - depth.begin());
+  const std::size_t half = nearest_row(depth, 0.5 * (start + turn), 0, lowest + 1);
+  const std::size_t last = run.rows() - 1;
+  std::vector<PostureSample> samples;
+  const auto add = [&](const char* what, std::size_t row) {
+    samples.push_back({fmt::format("{}{}, {:.2f} s", what, suffix, run.time_s[row]),
+                       run.base_placement(row), run.positions(row)});
+  };
+  add("start", 0);
+  add("half way", half);
+  add(base ? "lowest" : "farthest", lowest);
+  add("end", last);
+  return samples;
+}
+
+}  // namespace
+
+Subjects subjects_of(const RunData& run) {
+  Subjects subjects;
+  std::vector<int> joints = pitch_joints(run);
+  if (joints.size() < 2) joints = widest_joints(run);
+  subjects.hip = run.robot.joint_index(run.hip);
+  subjects.knee = run.robot.joint_index(run.knee);
+  if (subjects.hip < 0) subjects.hip = joints.front();
+  if (subjects.knee < 0) subjects.knee = joints[std::min<std::size_t>(1, joints.size() - 1)];
+  for (std::size_t i = 0; i < run.robot.sensors.size(); ++i) {
+    const hal::SensorConfig& sensor = run.robot.sensors[i];
+    if (sensor.type != hal::SensorType::kForceTorque) continue;
+    const bool first = sensor.name == run.foot;
+    subjects.foot_sensors.insert(
+        first ? subjects.foot_sensors.begin() : subjects.foot_sensors.end(), static_cast<int>(i));
+  }
+  return subjects;
+}
+
+std::vector<double> vertical_force(const RunData& run, int sensor) {
+  const hal::SensorConfig& config = run.robot.sensors[at(sensor)];
+  const std::size_t first = run.first_channel(at(sensor));
+  const int link = run.tree.link_index(config.link);
+  std::vector<double> force(run.rows());
+  for (std::size_t row = 0; row < run.rows(); ++row) {
+    const PostureSample sample{"", run.base_placement(row), run.positions(row)};
+    const auto bodies = body_placements(run.tree, run.robot, sample);
+    const model::Link& frame = run.tree.links[at(std::max(link, 0))];
+    const Eigen::Vector3d measured(run.sensor[first][row], run.sensor[first + 1][row],
+                                   run.sensor[first + 2][row]);
+    force[row] = (bodies[at(frame.body)].R * frame.in_body.R * measured).z();
+  }
+  return force;
+}
+
+Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels& kernels) {
+  const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
+  const std::size_t base_q = kernels.floating_base != 0 ? 7 : 0;
+  const std::size_t base_v = kernels.floating_base != 0 ? 6 : 0;
+  Motion motion;
+  motion.step_s = run.step_s * static_cast<double>(stride);
+  Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
+  std::vector<std::size_t> model_order(kernels.joints);
+  std::size_t wanted = 0;
+  for (std::size_t i = 0; i < kernels.joints; ++i) {
+    const int index = run.robot.joint_index(kernels.joint_names[i]);
+    if (index < 0) return curve;  // not this robot's kernels
+    model_order[i] = at(index);
+    if (index == joint) wanted = base_v + i;
+  }
+  if (base_q > 0 && run.base.size() != 13) return curve;
+  for (std::size_t row = 0; row < run.rows(); row += stride) {
+    std::vector<double> q(base_q);
+    std::vector<double> v(base_v);
+    for (std::size_t i = 0; i < base_q; ++i) q[i] = run.base[i][row];
+    for (std::size_t i = 0; i < base_v; ++i) v[i] = run.base[7 + i][row];
+    for (const std::size_t j : model_order) {
+      q.push_back(run.position_rad[j][row]);
+      v.push_back(run.velocity_rad_s[j][row]);
+    }
+    std::vector<double> sensors;
+    for (std::size_t s = 0; s < kernels.sensors; ++s) {
+      const int index = run.robot.sensor_index(kernels.sensor_names[s]);
+      const std::size_t first = run.first_channel(at(std::max(index, 0)));
+      for (std::size_t i = 0; i < 6; ++i) sensors.push_back(run.sensor[first + i][row]);
+    }
+    motion.q.push_back(std::move(q));
+    motion.v.push_back(std::move(v));
+    motion.sensors.push_back(std::move(sensors));
+    curve.x.push_back(run.time_s[row]);
+  }
+  for (const std::vector<double>& tau : inverse_dynamics(kernels, motion)) {
+    curve.y.push_back(tau[wanted]);
+  }
+  return curve;
+}
+
+std::vector<Figure> figures_of(const RunData& run, const RunData* other,
+                               const tandem_kernels* kernels) {
+  const Subjects subjects = subjects_of(run);
+  std::vector<Figure> figures;
+  figures.push_back(hip_figure(run, other, subjects.hip));
+  if (!subjects.foot_sensors.empty()) {
+    figures.push_back(force_figure(run, other, subjects.foot_sensors));
+  }
+  figures.push_back(torque_figure(run, other, subjects.knee, kernels));
+  std::vector<PostureSample> samples = moments(run, subjects.hip, other == nullptr ? "" : " A");
+  if (other != nullptr) {
+    const auto more = moments(*other, subjects.hip, " B");
+    samples.insert(samples.end(), more.begin(), more.end());
+  }
+  figures.push_back(posture_figure(run.tree, run.robot, samples));
+  return figures;
+}
+
+}  // namespace tandem::report

@@ -1,0 +1,38 @@
+// The figures of a run: hip position, foot force, knee torque, posture; of two runs, laid over
+// each other.
+// Layer: report.  Thread: non-RT only.
+#pragma once
+
+#include <vector>
+
+#include "model/kernels.h"
+#include "report/figure.hpp"
+#include "report/run_data.hpp"
+
+namespace tandem::report {
+
+/// Which joints and sensor the figures show.
+struct Subjects {
+  int hip = -1;                  ///< joint in the image
+  int knee = -1;
+  std::vector<int> foot_sensors; ///< force/torque sensors in the image, the chosen one first
+};
+
+/// What the experiment's [report] says. Where it is silent: the first two pitch joints of the
+/// first foot's leg, and the force/torque sensors of the legs; on a robot without feet the two
+/// joints that move most.
+[[nodiscard]] Subjects subjects_of(const RunData& run);
+
+/// @param kernels  of the run's robot, for the torque that inverse dynamics gives; null: without.
+/// @param other    laid over `run`; may be null. Of the same robot.
+[[nodiscard]] std::vector<Figure> figures_of(const RunData& run, const RunData* other,
+                                             const tandem_kernels* kernels);
+
+/// The torque [Nm] of one joint by inverse dynamics of the logged motion, as a curve over time.
+[[nodiscard]] Curve inverse_dynamics_curve(const RunData& run, int joint,
+                                           const tandem_kernels& kernels);
+
+/// Upward force [N] that a six-axis sensor measured, turned into the world by the run's posture.
+[[nodiscard]] std::vector<double> vertical_force(const RunData& run, int sensor);
+
+}  // namespace tandem::report
