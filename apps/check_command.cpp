@@ -1,0 +1,109 @@
+#include <fmt/core.h>
+
+#include "apps/commands.hpp"
+#include "apps/composition.hpp"
+#include "apps/console.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Json errors_json(const Diagnostics& errors) {
+  Json list = Json::array();
+  for (const Error& error : errors) {
+    list.push_back({{"file", error.file},
+                    {"line", error.line},
+                    {"key", error.key},
+                    {"message", error.message},
+                    {"hint", error.hint}});
+  }
+  return list;
+}
+
+void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
+  facts.add("robot", fmt::format("{} ({})", robot.name, robot.file));
+  facts.add("description", robot.model.urdf);
+  facts.add("base", robot.model.floating_base ? "floating" : "fixed");
+  facts.add("joints", fmt::format("{} on {} boards", robot.joints.size(), robot.boards.size()));
+  facts.add("sensors", std::to_string(robot.sensors.size()));
+  for (const hal::BusConfig& bus : robot.buses) {
+    std::size_t nodes = 0;
+    for (const hal::BoardConfig& board : robot.boards) nodes += board.bus == bus.name ? 1 : 0;
+    for (const hal::SensorConfig& sensor : robot.sensors) nodes += sensor.bus == bus.name ? 1 : 0;
+    facts.add("bus " + bus.name, fmt::format("{} nodes, {}", nodes, bus.fd ? "CAN FD" : "CAN"));
+  }
+}
+
+/// What a run would do.
+void print_plan(const Composition& c, std::FILE* out) {
+  const runtime::Experiment& e = c.experiment;
+  const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
+  Facts facts;
+  add_robot_facts(e.robot, facts);
+  facts.add("kernels", fmt::format("{} ({})", c.kernels.path(), c.kernels->variant));
+  facts.add("backend", "sim: drive master, frames, boards' firmware and plant in this process");
+  facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
+  for (const ControllerNote& note : c.notes) {
+    facts.add("controller " + note.name, note.doc);
+  }
+  facts.add("loop", fmt::format("{:.3g} kHz, {} cycles, {:.3f} s after bring-up", 1e-3 / period_s,
+                                e.cycles(), e.duration_s));
+  facts.add("integrator", fmt::format("{}, {} us steps",
+                                      e.sim.integrator == sim::Integrator::kRungeKutta4
+                                          ? "Runge-Kutta 4"
+                                          : "semi-implicit Euler",
+                                      static_cast<double>(e.sim.substep_ns) * 1e-3));
+  facts.add("seed", std::to_string(e.seed));
+  facts.add("log", e.log.folder + "/");
+  fmt::print(out, "{} is right. It would run:\n", e.file);
+  facts.print(out);
+}
+
+void print_robot(const RobotFiles& robot, std::FILE* out) {
+  Facts facts;
+  add_robot_facts(robot.config, facts);
+  fmt::print(out, "{} is right.\n", robot.config.file);
+  facts.print(out);
+}
+
+void print_warnings(const Diagnostics& warnings) {
+  for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
+}
+
+/// A robot has a [model]; an experiment names a robot.
+bool is_robot(const std::string& file) {
+  const Result<TomlDocument> document = TomlDocument::load(file);
+  return document && document->root().has("model");
+}
+
+Diagnostics check_robot(const std::string& file, std::FILE* out) {
+  const auto robot = read_robot(file);
+  if (!robot) return robot.error();
+  print_warnings(robot->warnings);
+  print_robot(*robot, out);
+  return {};
+}
+
+Diagnostics check_experiment(const std::string& file, std::FILE* out) {
+  const auto composition = compose(file, {});
+  if (!composition) return composition.error();
+  print_warnings((*composition)->experiment.warnings);
+  print_plan(**composition, out);
+  return {};
+}
+
+}  // namespace
+
+Exit check_command(const CheckOptions& options) {
+  std::FILE* out = human_output(options.json);
+  const Diagnostics errors = is_robot(options.file) ? check_robot(options.file, out)
+                                                    : check_experiment(options.file, out);
+  print_errors(errors);
+  const Json json{{"ok", errors.empty()}, {"errors", errors_json(errors)}};
+  if (const Status written = write_json(options.json, json); !written) {
+    print_errors({written.error()});
+    return Exit::kUsage;
+  }
+  return errors.empty() ? Exit::kDone : Exit::kUsage;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,213 @@
+#include "apps/command_line.hpp"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char kExamples[] = R"(Examples:
+  tandem run config/coman/squat.toml                 simulate, as fast as the machine goes
+  tandem run config/coman/squat.toml --realtime      at the speed of a clock
+  tandem check config/coman/squat.toml               read every file, move nothing
+  tandem report runs/coman-squat.mcap                draw the plots of a run
+  tandem log csv runs/coman-squat.mcap --fields position_rad
+  tandem model info config/coman/robot.toml          joints, mass, operation counts
+`tandem COMMAND --help` tells more, with examples.
+
+Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
+
+const char kRunExamples[] = R"(Examples:
+  tandem run config/coman/squat.toml --report        and draw the plots
+  tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
+  tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
+  tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
+The same experiment and seed give the same bytes at every rate.)";
+
+const char kCheckExamples[] = R"(Examples:
+  tandem check config/coman/squat.toml               an experiment: robot, description, plugins
+  tandem check config/coman/robot.toml               a robot by itself
+  tandem check my_robot.toml --json -                errors with file, line, key and hint)";
+
+const char kModelBuildExamples[] = R"(Examples:
+  tandem model build config/coman/robot.toml
+  tandem model build my_robot/robot.toml -o /tmp/my_robot.so
+Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models), where
+`tandem run` finds it. A library that is up to date is left alone.)";
+
+const char kModelInfoExamples[] = R"(Examples:
+  tandem model info config/walkman/robot.toml
+  tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
+
+const char kLogInfoExamples[] = R"(Examples:
+  tandem log info runs/coman-squat.mcap              topics, messages, time, digest)";
+
+const char kLogCsvExamples[] = R"(Examples:
+  tandem log csv runs/coman-squat.mcap > state.csv
+  tandem log csv runs/coman-squat.mcap --topic command --every 10 -o ref.csv)";
+
+const char kReportExamples[] = R"(Examples:
+  tandem report runs/coman-squat.mcap                report.html and PNG files beside the log
+  tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
+
+const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
+
+void add_run(CLI::App& app, RunOptions& o) {
+  app.add_option("experiment", o.experiment, "Experiment TOML")->required();
+  CLI::Option* rate =
+      app.add_option("--rate", o.rate, "Simulated seconds per wall second (default: free running)")
+          ->check(CLI::PositiveNumber);
+  app.add_flag_callback("--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
+      ->excludes(rate);
+  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
+  app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
+      ->check(CLI::PositiveNumber);
+  CLI::Option* log =
+      app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
+  app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
+  app.add_option("--kernel-variant", o.kernel_variant,
+                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  app.add_flag("--report", o.report, "Draw the report after the run");
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kRunExamples);
+}
+
+void add_check(CLI::App& app, CheckOptions& o) {
+  app.add_option("file", o.file, "Experiment or robot TOML")->required();
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kCheckExamples);
+}
+
+void add_model(CLI::App& app, ModelOptions& o) {
+  app.require_subcommand(1);
+  CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
+  build->add_option("robot", o.robot, "Robot TOML")->required();
+  build->add_option("-o,--output", o.output, "Shared library to write");
+  build->add_flag("--force", o.force, "Build even when the library is up to date");
+  build->footer(kModelBuildExamples);
+  build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
+  CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
+  info->add_option("robot", o.robot, "Robot TOML")->required();
+  info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
+  info->add_option("--json", o.json, kJsonHelp);
+  info->footer(kModelInfoExamples);
+  info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
+}
+
+void add_log(CLI::App& app, LogOptions& o) {
+  app.require_subcommand(1);
+  CLI::App* info = app.add_subcommand("info", "What a log holds");
+  info->add_option("log", o.log, "MCAP file")->required();
+  info->add_option("--json", o.json, kJsonHelp);
+  info->footer(kLogInfoExamples);
+  info->callback([&o] { o.action = LogOptions::Action::kInfo; });
+  CLI::App* csv = app.add_subcommand("csv", "One topic as comma-separated values");
+  csv->add_option("log", o.log, "MCAP file")->required();
+  csv->add_option("--topic", o.topic, "Topic to write (default: the state)");
+  csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")
+      ->delimiter(',');
+  csv->add_option("--every", o.every, "Write each n-th message")->check(CLI::PositiveNumber);
+  csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
+  csv->footer(kLogCsvExamples);
+  csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
+}
+
+void add_report(CLI::App& app, ReportOptions& o) {
+  app.add_option("log", o.log, "MCAP file")->required();
+  app.add_option("other", o.other, "A second log, laid over the first");
+  app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kReportExamples);
+}
+
+/// The innermost subcommand that was named.
+const CLI::App& innermost(const CLI::App& app) {
+  const std::vector<CLI::App*> named = app.get_subcommands();
+  return named.empty() ? app : innermost(*named.front());
+}
+
+std::vector<std::string> flags_of(const CLI::App& app) {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
+  }
+  return flags;
+}
+
+std::vector<std::string> subcommands_of(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(sub->get_name());
+  }
+  return names;
+}
+
+/// The message for words that fit nowhere, with the nearest that would.
+std::string unknown_word(const CLI::App& app, const std::string& word) {
+  const bool flag = word.starts_with('-');
+  const std::vector<std::string> known = flag ? flags_of(app) : subcommands_of(app);
+  const std::string name = word.substr(0, word.find('='));
+  if (!flag && known.empty()) return fmt::format("'{}' is one argument too many", word);
+  return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name,
+                     suggest(name, known));
+}
+
+/// "tandem model build": as typed, for the pointer to its help.
+std::string path_of(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
+}
+
+Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = innermost(app);
+  const std::vector<std::string> unknown = app.remaining(true);
+  const std::string message =
+      unknown.empty() ? std::string(error.what()) : unknown_word(command, unknown.front());
+  fmt::print(stderr, "tandem: {}\nTry `{} --help`.\n", message, path_of(command));
+  return Exit::kUsage;
+}
+
+}  // namespace
+
+Command parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"Tandem: one controller, simulated robot and real robot in tandem.", "tandem"};
+  app.footer(kExamples);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
+  app.get_formatter()->column_width(34);
+
+  RunOptions run;
+  CheckOptions check;
+  ModelOptions model;
+  LogOptions log;
+  ReportOptions report;
+  CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
+  CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
+  CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
+  CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv");
+  CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
+  add_run(*run_app, run);
+  add_check(*check_app, check);
+  add_model(*model_app, model);
+  add_log(*log_app, log);
+  add_report(*report_app, report);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) return report_usage_error(app, error);
+    app.exit(error);  // prints help or version
+    return Exit::kDone;
+  }
+  if (run_app->parsed()) return run;
+  if (check_app->parsed()) return check;
+  if (model_app->parsed()) return model;
+  if (log_app->parsed()) return log;
+  return report;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,23 @@
+// The commands of `tandem`. Each prints for people, writes JSON when asked, and answers the
+// exit status.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include "apps/command_line.hpp"
+#include "base/result.hpp"
+#include "report/report.hpp"
+
+namespace tandem::apps {
+
+/// Reads every file first, and runs only when all is right.
+[[nodiscard]] Exit run_command(const RunOptions& options);
+/// Reads every file, says what a run would do, moves nothing.
+[[nodiscard]] Exit check_command(const CheckOptions& options);
+[[nodiscard]] Exit model_command(const ModelOptions& options);
+[[nodiscard]] Exit log_command(const LogOptions& options);
+[[nodiscard]] Exit report_command(const ReportOptions& options);
+
+/// What report_command() draws, for a run that ends with its report.
+[[nodiscard]] Result<report::ReportFiles> draw_report(const ReportOptions& options);
+
+}  // namespace tandem::apps

@@ -1,0 +1,98 @@
+#include "apps/composition.hpp"
+
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "apps/kernel_store.hpp"
+#include "controllers/plugin_loader.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// Errors of several stages, so that one reading finds as many as it can.
+class Collector {
+ public:
+  void add(Error error, const std::string& file, int line) {
+    if (error.file.empty()) {
+      error.file = file;
+      error.line = line;
+    }
+    errors_.push_back(std::move(error));
+  }
+  void add(const Diagnostics& errors) {
+    errors_.insert(errors_.end(), errors.begin(), errors.end());
+  }
+  [[nodiscard]] bool empty() const { return errors_.empty(); }
+  [[nodiscard]] std::unexpected<Diagnostics> give() { return std::unexpected(std::move(errors_)); }
+
+ private:
+  Diagnostics errors_;
+};
+
+/// A plugin's path is relative to the experiment's file; its bare name is looked for.
+std::string plugin_path(const runtime::Experiment& e, const std::string& plugin) {
+  if (!plugin.contains('/')) return plugin;
+  const std::filesystem::path path = plugin;
+  if (path.is_absolute()) return plugin;
+  return (std::filesystem::path(e.document.folder()) / path).lexically_normal().string();
+}
+
+void add_controllers(Composition& c, Collector& errors) {
+  const std::vector<std::string> folders = controller_folders();
+  for (const runtime::ControllerSpec& spec : c.experiment.controllers) {
+    Result<LoadedController> loaded =
+        load_controller(plugin_path(c.experiment, spec.plugin), folders);
+    const int line = spec.parameters.line();
+    if (!loaded) {
+      errors.add(loaded.error(), c.experiment.file, line);
+      continue;
+    }
+    const std::string doc = loaded->plugin().doc;
+    if (c.controllers == nullptr) continue;  // without kernels: only that it can be loaded
+    const Status added = c.controllers->add(spec.name, std::move(*loaded), spec.parameters);
+    if (!added) {
+      errors.add(added.error(), c.experiment.file, line);
+      continue;
+    }
+    c.notes.push_back({spec.name, doc});
+  }
+  errors.add(c.experiment.document.diagnostics());
+}
+
+}  // namespace
+
+std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
+                                                                 const Overrides& overrides) {
+  auto experiment = runtime::read_experiment(file);
+  if (!experiment) return std::unexpected(experiment.error());
+  auto c = std::make_unique<Composition>();
+  runtime::Experiment& e = c->experiment;
+  e = std::move(*experiment);
+  e.seed = overrides.seed.value_or(e.seed);
+  e.duration_s = overrides.duration_s.value_or(e.duration_s);
+  if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
+
+  Collector errors;
+  const auto robot = with_description(e.robot);
+  if (!robot) return std::unexpected(robot.error());
+  if (auto kernels = find_kernels(*robot, e.kernel_variant)) {
+    c->kernels = std::move(*kernels);
+    c->controllers = std::make_unique<runtime::ControllerHost>(e.robot, c->kernels.get(),
+                                                               e.loop.period_ns);
+  } else {
+    errors.add(kernels.error(), e.robot.file, 0);
+  }
+  add_controllers(*c, errors);
+  if (!errors.empty()) return errors.give();
+
+  auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), e.sim_robot_config());
+  if (!backend) {
+    errors.add(backend.error(), e.robot.file, 0);
+    return errors.give();
+  }
+  c->backend = std::move(*backend);
+  return c;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,125 @@
+#include "apps/console.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+namespace tandem::apps {
+namespace {
+
+/// Columns that a UTF-8 text takes: bytes that do not continue a character.
+std::size_t width(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+std::string left(const std::string& text, std::size_t columns) {
+  return text + std::string(columns - std::min(columns, width(text)), ' ');
+}
+
+std::string right(const std::string& text, std::size_t columns) {
+  return std::string(columns - std::min(columns, width(text)), ' ') + text;
+}
+
+}  // namespace
+
+std::FILE* human_output(const std::string& json_file) {
+  return json_file == "-" ? stderr : stdout;
+}
+
+Status write_json(const std::string& file, const Json& value) {
+  if (file.empty()) return {};
+  const std::string text = value.dump(2) + "\n";
+  if (file == "-") {
+    fmt::print("{}", text);
+    std::fflush(stdout);
+    return {};
+  }
+  errno = 0;
+  std::ofstream out(file, std::ios::binary);
+  out << text << std::flush;
+  if (!out) {
+    Error error{.message = fmt::format("cannot write the JSON: {}", std::strerror(errno)),
+                .hint = "name a file in a folder that exists and can be written",
+                .file = file,
+                .key = {}};
+    return std::unexpected(std::move(error));
+  }
+  return {};
+}
+
+void print_errors(const Diagnostics& errors) {
+  for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
+}
+
+void Table::print(std::FILE* out) const {
+  std::vector<std::size_t> columns;
+  for (const auto& row : rows_) {
+    columns.resize(std::max(columns.size(), row.size()), 0);
+    for (std::size_t i = 0; i < row.size(); ++i) columns[i] = std::max(columns[i], width(row[i]));
+  }
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    if (rows_[r].empty()) continue;
+    std::string line;
+    for (std::size_t i = 0; i < rows_[r].size(); ++i) {
+      line += i == 0 ? "  " + left(rows_[r][i], columns[i]) : "  " + right(rows_[r][i], columns[i]);
+    }
+    fmt::print(out, "{}\n", line);
+    if (r > 0) continue;
+    std::size_t rule = 0;
+    for (const std::size_t column : columns) rule += column + 2;
+    std::string dashes;
+    for (std::size_t i = 2; i < rule; ++i) dashes += "─";
+    fmt::print(out, "  {}\n", dashes);
+  }
+}
+
+void Facts::print(std::FILE* out) const {
+  std::size_t column = 0;
+  for (const auto& [name, value] : facts_) column = std::max(column, width(name));
+  for (const auto& [name, value] : facts_) {
+    fmt::print(out, "  {}  {}\n", left(name, column), value);
+  }
+}
+
+Progress::Progress(std::FILE* out, double total_s)
+    : out_(out),
+      total_s_(total_s),
+      terminal_(isatty(fileno(out)) != 0),
+      started_(std::chrono::steady_clock::now()),
+      next_(started_) {}
+
+void Progress::update(double done_s, const std::string& note) {
+  const double share = total_s_ > 0.0 ? std::clamp(done_s / total_s_, 0.0, 1.0) : 1.0;
+  if (!terminal_) {
+    const int tenth = static_cast<int>(share * 10.0 + 1e-9);
+    if (tenth <= tenth_) return;
+    tenth_ = tenth;
+    fmt::print(out_, "  {:3d} %  {:6.2f} of {:.2f} s  {}\n", tenth * 10, done_s, total_s_, note);
+    std::fflush(out_);
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_ && share < 1.0) return;
+  next_ = now + std::chrono::milliseconds(50);
+  constexpr int kCells = 30;
+  const int full = static_cast<int>(share * kCells);
+  std::string bar;
+  for (int i = 0; i < kCells; ++i) bar += i < full ? "█" : "░";
+  const double wall_s = std::chrono::duration<double>(now - started_).count();
+  fmt::print(out_, "\r  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}\033[K", bar, done_s, total_s_,
+             wall_s, note);
+  std::fflush(out_);
+  drawn_ = true;
+}
+
+void Progress::finish() {
+  if (drawn_) fmt::print(out_, "\n");
+  drawn_ = false;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,70 @@
+// Text for people: tables, errors, progress; and the JSON files for programs.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// Keys in the order in which they are written.
+using Json = nlohmann::ordered_json;
+
+/// Where text for people goes: standard error when the JSON takes standard output ("-").
+[[nodiscard]] std::FILE* human_output(const std::string& json_file);
+
+/// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
+[[nodiscard]] Status write_json(const std::string& file, const Json& value);
+
+/// Every error on a line of its own, on standard error.
+void print_errors(const Diagnostics& errors);
+
+/// A table of two or more columns, the first left-aligned and the others to the right.
+class Table {
+ public:
+  explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
+  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
+  [[nodiscard]] std::size_t rows() const { return rows_.size() - 1; }
+  /// Prints with a rule below the header, when that is not empty.
+  void print(std::FILE* out) const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// Name and value, one pair a line, the values aligned.
+class Facts {
+ public:
+  void add(std::string name, std::string value) { facts_.emplace_back(name, value); }
+  void print(std::FILE* out) const;
+
+ private:
+  std::vector<std::pair<std::string, std::string>> facts_;
+};
+
+/// The progress of a run: a bar that is redrawn on a terminal, a line per tenth elsewhere.
+class Progress {
+ public:
+  Progress(std::FILE* out, double total_s);
+  /// @param done_s  simulated seconds so far.  @param note  behind the bar; may be empty.
+  void update(double done_s, const std::string& note);
+  /// Ends the bar's line, when there is one.
+  void finish();
+
+ private:
+  std::FILE* out_;
+  double total_s_;
+  bool terminal_;
+  bool drawn_ = false;
+  int tenth_ = -1;
+  std::chrono::steady_clock::time_point started_;
+  std::chrono::steady_clock::time_point next_;
+};
+
+}  // namespace tandem::apps

@@ -1,0 +1,105 @@
+#include <fmt/core.h>
+
+#include <fstream>
+#include <iostream>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "log/csv.hpp"
+#include "log/log_file.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Json topic_json(const log::Topic& topic) {
+  Json fields = Json::array();
+  for (const hal::Field& field : topic.layout.fields()) fields.push_back(field.name);
+  return {{"messages", topic.messages}, {"schema", topic.type}, {"fields", fields}};
+}
+
+Json info_json(const log::LogFile& file) {
+  Json json;
+  json["path"] = file.path();
+  json["complete"] = !file.truncated();
+  std::int64_t start_ns = 0;
+  std::int64_t end_ns = 0;
+  for (const log::Topic& topic : file.topics()) {
+    if (topic.messages == 0) continue;
+    start_ns = std::min(start_ns, topic.first_ns);
+    end_ns = std::max(end_ns, topic.last_ns);
+  }
+  json["start_ns"] = start_ns;
+  json["end_ns"] = end_ns;
+  json["messages"] = file.messages();
+  json["data_sha256"] = file.data_sha256();
+  json["metadata"] = Json::object();
+  for (const auto& [key, value] : log::to_map(file.info())) json["metadata"][key] = value;
+  for (const auto& [key, value] : file.result()) json["metadata"][key] = value;
+  json["topics"] = Json::object();
+  for (const log::Topic& topic : file.topics()) json["topics"][topic.name] = topic_json(topic);
+  return json;
+}
+
+void print_info(const log::LogFile& file, std::FILE* out) {
+  const log::RunInfo& info = file.info();
+  fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (its run was killed)" : "");
+  Facts facts;
+  facts.add("robot", fmt::format("{}, {} joints, {} sensors", info.robot, info.joints.size(),
+                                 info.sensors.size()));
+  facts.add("backend", info.hal);
+  facts.add("seed", std::to_string(info.seed));
+  facts.add("period", fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
+  facts.add("kernels", info.kernel_variant);
+  facts.add("written by", "tandem " + info.version);
+  for (const auto& [key, value] : file.result()) facts.add(key, value);
+  facts.add("data sha256", file.data_sha256());
+  facts.print(out);
+  Table table({"topic", "messages", "from [s]", "to [s]", "fields"});
+  for (const log::Topic& topic : file.topics()) {
+    table.add({topic.name, std::to_string(topic.messages),
+               fmt::format("{:.3f}", static_cast<double>(topic.first_ns) * 1e-9),
+               fmt::format("{:.3f}", static_cast<double>(topic.last_ns) * 1e-9),
+               std::to_string(topic.layout.fields().size())});
+  }
+  fmt::print(out, "\n");
+  table.print(out);
+}
+
+/// "state" and "/tandem/state" name the same topic.
+std::string full_topic(const std::string& name) {
+  if (name.empty()) return "/tandem/state";
+  return name.starts_with('/') ? name : "/tandem/" + name;
+}
+
+Status write_csv(const log::LogFile& file, const LogOptions& options) {
+  const std::string topic = full_topic(options.topic);
+  if (options.output.empty()) {
+    return log::write_csv(file, topic, options.every, std::cout, options.fields);
+  }
+  std::ofstream out(options.output, std::ios::binary);
+  if (!out) {
+    return std::unexpected(Error{"cannot write this file", "name a file in a folder that exists",
+                                 options.output, 0, {}});
+  }
+  return log::write_csv(file, topic, options.every, out, options.fields);
+}
+
+}  // namespace
+
+Exit log_command(const LogOptions& options) {
+  const Result<log::LogFile> file = log::LogFile::open(options.log);
+  Status done;
+  if (!file) {
+    done = std::unexpected(file.error());
+  } else if (options.action == LogOptions::Action::kCsv) {
+    done = write_csv(*file, options);
+  } else {
+    print_info(*file, human_output(options.json));
+    done = write_json(options.json, info_json(*file));
+  }
+  if (done) return Exit::kDone;
+  print_errors({done.error()});
+  return Exit::kUsage;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,101 @@
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/kernel_sizes.hpp"
+#include "apps/kernel_store.hpp"
+#include "apps/robot_files.hpp"
+#include "model/kernel_build.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// One line on a terminal, redrawn; nothing elsewhere.
+void print_progress(int done, int total, const std::string& file) {
+  if (isatty(STDERR_FILENO) == 0) return;
+  fmt::print(stderr, "\r  [{}/{}] {}\033[K{}", done, total, file, done < total ? "" : "\n");
+}
+
+Status build(const RobotFiles& robot, const ModelOptions& options) {
+  model::BuildOptions build;
+  build.library = options.output.empty()
+                      ? model::library_path(user_model_folder(), robot.config.name)
+                      : options.output;
+  build.progress = print_progress;
+  if (options.force) {
+    std::error_code ignored;  // what cannot be removed is found out by writing it
+    std::filesystem::remove_all(build.library + ".build", ignored);
+  }
+  const Result<model::BuildReport> report = model::build_kernels(robot.tree, robot.spec, build);
+  if (!report) return std::unexpected(report.error());
+  if (report->was_up_to_date) {
+    fmt::print("{}: kernels are up to date ({})\n", robot.config.name, report->library);
+  } else {
+    fmt::print("{}: {} files compiled in {:.1f} s: {}\n", robot.config.name, report->compiled,
+               report->seconds, report->library);
+  }
+  return {};
+}
+
+Json kernel_json(const tandem_kernel_count& count, std::uint64_t text_bytes) {
+  return {{"add", count.add},   {"mul", count.mul},       {"div", count.div},
+          {"sqrt", count.sqrt}, {"sincos", count.sincos}, {"text_bytes", text_bytes}};
+}
+
+Status info(const RobotFiles& robot, const ModelOptions& options) {
+  const auto library = find_kernels(robot, options.kernel_variant);
+  if (!library) return std::unexpected(library.error());
+  const tandem_kernels& k = **library;
+  auto bytes = kernel_text_bytes(library->path(), k.variant);
+  if (!bytes) return std::unexpected(bytes.error());
+
+  std::FILE* out = human_output(options.json);
+  Facts facts;
+  facts.add("robot", fmt::format("{}, {} base", k.robot, k.floating_base != 0 ? "floating" : "fixed"));
+  facts.add("joints", fmt::format("{} (nv {}, nq {})", k.joints, k.nv, k.nq));
+  facts.add("mass", fmt::format("{:.3f} kg", k.mass_kg));
+  facts.add("sites, sensors", fmt::format("{}, {}", k.sites, k.sensors));
+  facts.add("kernels", fmt::format("{} ({})", library->path(), k.variant));
+  facts.add("made from", fmt::format("{:.16}…", k.description_hash));
+  facts.print(out);
+  fmt::print(out, "\n");
+
+  Json json{{"robot", k.robot},
+            {"joints", k.joints},
+            {"nv", k.nv},
+            {"mass_kg", k.mass_kg},
+            {"kernel_variant", k.variant},
+            {"description_hash", k.description_hash},
+            {"library", library->path()},
+            {"kernels", Json::object()}};
+  Table table({"kernel", "add", "mul", "div", "sqrt", "sincos", "code [bytes]"});
+  for (std::uint32_t i = 0; i < k.kernel_count; ++i) {
+    const tandem_kernel_count& c = k.counts[i];
+    const std::uint64_t text_bytes = (*bytes)[c.kernel];
+    table.add({c.kernel, std::to_string(c.add), std::to_string(c.mul), std::to_string(c.div),
+               std::to_string(c.sqrt), std::to_string(c.sincos), std::to_string(text_bytes)});
+    json["kernels"][c.kernel] = kernel_json(c, text_bytes);
+  }
+  table.print(out);
+  return write_json(options.json, json);
+}
+
+}  // namespace
+
+Exit model_command(const ModelOptions& options) {
+  const auto robot = read_robot(options.robot);
+  if (!robot) {
+    print_errors(robot.error());
+    return Exit::kUsage;
+  }
+  const Status done = options.action == ModelOptions::Action::kBuild ? build(*robot, options)
+                                                                     : info(*robot, options);
+  if (done) return Exit::kDone;
+  print_errors({done.error()});
+  return Exit::kUsage;
+}
+
+}  // namespace tandem::apps

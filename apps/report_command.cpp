@@ -1,0 +1,54 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/kernel_store.hpp"
+#include "report/report.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// "runs/coman-squat-001.mcap" -> "runs/coman-squat-001"
+std::string default_folder(const std::string& log) {
+  std::filesystem::path folder = log;
+  folder.replace_extension();
+  return folder.string() == log ? log + ".report" : folder.string();
+}
+
+}  // namespace
+
+Result<report::ReportFiles> draw_report(const ReportOptions& options) {
+  model::KernelLibrary kernels;  // lives as long as the drawing needs it
+  const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
+    auto found = find_kernels(run.info.robot, run.info.description_hash, {});
+    if (!found) return nullptr;
+    kernels = std::move(*found);
+    return kernels.get();
+  };
+  const std::string folder = options.output.empty() ? default_folder(options.log) : options.output;
+  return report::make_report(options.log, options.other, folder, find);
+}
+
+Exit report_command(const ReportOptions& options) {
+  const auto files = draw_report(options);
+  if (!files) {
+    print_errors({files.error()});
+    return Exit::kUsage;
+  }
+  std::FILE* out = human_output(options.json);
+  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  Facts facts;
+  facts.add("report", files->page);
+  for (const std::string& image : files->images) facts.add("image", image);
+  facts.print(out);
+  const Json json{{"report", files->page}, {"images", files->images}};
+  if (const Status written = write_json(options.json, json); !written) {
+    print_errors({written.error()});
+    return Exit::kUsage;
+  }
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

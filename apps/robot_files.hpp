@@ -1,0 +1,33 @@
+// A robot's files together: its TOML, its description, and what kernels are made from.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include <expected>
+#include <string>
+
+#include "base/result.hpp"
+#include "hal/robot_config.hpp"
+#include "model/model_spec.hpp"
+#include "model/tree.hpp"
+
+namespace tandem::apps {
+
+struct RobotFiles {
+  hal::RobotConfig config;  ///< completed from the description
+  model::Tree tree;
+  model::ModelSpec spec;
+  Diagnostics warnings;     ///< what the description's reader tolerated
+};
+
+/// Reads the description that `config` names, and checks the two against each other.
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(
+    hal::RobotConfig config);
+
+/// Reads a robot.toml and its description.
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);
+
+/// What the kernels of a robot are made from. A rigid joint (order 0 or 1) carries its rotor's
+/// inertia as armature; behind a spring the motor is a state of its own.
+[[nodiscard]] model::ModelSpec spec_of(const hal::RobotConfig& config);
+
+}  // namespace tandem::apps

@@ -1,0 +1,177 @@
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/composition.hpp"
+#include "apps/console.hpp"
+#include "apps/run_log.hpp"
+#include "apps/run_summary.hpp"
+#include "rt/clock.hpp"
+#include "rt/stop_signal.hpp"
+#include "rt/thread_setup.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+/// The loop on its own thread, and how long its controllers took.
+class LoopThread {
+ public:
+  LoopThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
+      : thread_([this, &cycle, config] { run(cycle, config); }) {}
+  [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
+  void join() { thread_.join(); }
+  // For when it has joined.
+  [[nodiscard]] double wall_s() const { return wall_s_; }
+  [[nodiscard]] const rt::ThreadReport& report() const { return report_; }
+
+ private:
+  void run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
+    report_ = rt::set_up_thread(config);
+    SteadyClock::time_point began = SteadyClock::now();
+    auto before = runtime::RunPhase::kBringUp;
+    bool more = true;
+    while (more) {
+      more = cycle.step();
+      const runtime::RunPhase now = cycle.phase();
+      if (now == before) continue;
+      const SteadyClock::time_point time = SteadyClock::now();
+      if (now == runtime::RunPhase::kRunning) began = time;
+      if (before == runtime::RunPhase::kRunning) {
+        wall_s_ = std::chrono::duration<double>(time - began).count();
+      }
+      before = now;
+    }
+    done_.store(true, std::memory_order_release);
+  }
+
+  double wall_s_ = 0.0;
+  rt::ThreadReport report_;
+  std::atomic<bool> done_{false};
+  std::thread thread_;  // last: it uses the others
+};
+
+std::string progress_note(const runtime::Progress& progress) {
+  const runtime::RunPhase phase = progress.phase.load();
+  return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
+}
+
+void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const runtime::Experiment& e,
+           std::FILE* out, bool quiet) {
+  const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
+  const runtime::Progress& progress = cycle.progress();
+  Progress bar(out, static_cast<double>(e.cycles()) * period_s);
+  while (!loop.done()) {
+    if (rt::stop_requested()) cycle.request_stop();
+    if (!quiet) {
+      bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
+                 progress_note(progress));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  if (!quiet) {
+    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s, "");
+    bar.finish();
+  }
+}
+
+std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
+                                     const std::optional<log::RecordingResult>& log) {
+  std::vector<std::string> texts;
+  for (const runtime::Fault& fault : cycle.faults()) {
+    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
+                                fault.joint.empty() ? "" : ": ", fault.text));
+  }
+  if (log && !log->error.empty()) {
+    texts.push_back(fmt::format("the log lost {} messages: {}", log->failed, log->error));
+  }
+  return texts;
+}
+
+runtime::CycleConfig cycle_config(runtime::Experiment& e, const RunOptions& options) {
+  e.loop.pacing = rt::Pacing::kSimulated;
+  e.loop.rate = options.rate.value_or(0.0);
+  runtime::CycleConfig config;
+  config.loop = e.loop;
+  config.running_cycles = e.cycles();
+  return config;
+}
+
+/// Draws the report and prints where it is; a report that cannot be drawn is no fault of the run.
+void add_report(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
+  if (!options.report || !summary.log) return;
+  const auto files = draw_report({.log = summary.log->path, .other = {}, .output = {}, .json = {}});
+  if (!files) {
+    print_errors({files.error()});
+    return;
+  }
+  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  if (options.quiet) return;
+  Facts facts;
+  facts.add("report", files->page);
+  facts.add("plots", files->images.back());
+  facts.print(out);
+}
+
+Exit run(Composition& c, const RunOptions& options) {
+  std::FILE* out = human_output(options.json);
+  runtime::Experiment& e = c.experiment;
+  const runtime::CycleConfig config = cycle_config(e, options);
+  std::unique_ptr<log::Recorder> recorder;
+  if (!options.no_log) {
+    auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
+    if (!opened) {
+      print_errors({opened.error()});
+      return Exit::kUsage;
+    }
+    recorder = std::move(*opened);
+  }
+  rt::WallClock clock;
+  const hal::TruthImage* truth = e.sim.ground_truth ? &c.backend->truth() : nullptr;
+  runtime::RobotCycle cycle({e.robot, *c.backend, *c.controllers, clock, recorder.get(), truth},
+                            config);
+  if (!options.quiet) {
+    fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
+               e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
+               1e6 / static_cast<double>(e.loop.period_ns),
+               options.rate ? fmt::format("rate {:g}", *options.rate) : "free running");
+  }
+  rt::install_stop_signals();
+  LoopThread loop(cycle, e.thread);
+  watch(cycle, loop, e, out, options.quiet);
+  loop.join();
+  if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
+
+  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, {}};
+  if (recorder != nullptr) summary.log = recorder->close();
+  summary.faults = fault_texts(cycle, summary.log);
+  if (!options.quiet) {
+    fmt::print(out, "\n");
+    summary.print(out);
+  }
+  for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
+  add_report(options, summary, out);
+  if (const Status written = write_json(options.json, summary.json()); !written) {
+    print_errors({written.error()});
+    return Exit::kUsage;
+  }
+  return summary.faults.empty() ? Exit::kDone : Exit::kFault;
+}
+
+}  // namespace
+
+Exit run_command(const RunOptions& options) {
+  const auto composition =
+      compose(options.experiment, {options.seed, options.duration_s, options.kernel_variant});
+  if (!composition) {
+    print_errors(composition.error());
+    return Exit::kUsage;
+  }
+  return run(**composition, options);
+}
+
+}  // namespace tandem::apps

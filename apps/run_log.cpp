@@ -1,0 +1,113 @@
+#include "apps/run_log.hpp"
+
+#include <fmt/core.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+log::RunInfo info_of(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  log::RunInfo info;
+  info.version = TANDEM_VERSION;
+  info.robot = e.robot.name;
+  info.hal = "sim";
+  for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
+  for (const hal::SensorConfig& sensor : e.robot.sensors) {
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  }
+  info.seed = e.seed;
+  info.period_ns = e.loop.period_ns;
+  info.kernel_variant = c.kernels->variant;
+  info.description_hash = c.kernels->description_hash;
+  for (const std::string& file : {e.file, e.robot.file, e.robot.model.urdf}) {
+    info.configuration.emplace_back(file, text_of(file));
+  }
+  return info;
+}
+
+/// Bytes that the run will write at most: what is compressed takes less.
+std::uint64_t bytes_needed(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  constexpr std::uint64_t kMessageOverhead = 64;
+  constexpr std::uint64_t kFixed = 1'000'000;
+  std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
+                              hal::CommandImage(e.robot.shape()).bytes().size();
+  if (e.sim.ground_truth) cycle_bytes += c.backend->truth().bytes().size();
+  const std::uint64_t whole = e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + kFixed;
+  return e.log.compression == runtime::LogCompression::kNone ? whole : whole / 4;
+}
+
+Error folder_error(const std::string& folder, std::string message) {
+  return {.message = std::move(message),
+          .hint = "choose another folder with --log, or run with --no-log",
+          .file = folder,
+          .key = {}};
+}
+
+Status check_folder(const std::string& folder, std::uint64_t needed) {
+  std::error_code problem;
+  fs::create_directories(folder, problem);
+  if (problem) {
+    return std::unexpected(folder_error(folder, "cannot make the log's folder: " +
+                                                    problem.message()));
+  }
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    return std::unexpected(folder_error(
+        folder, std::string("cannot write into the log's folder: ") + std::strerror(errno)));
+  }
+  struct statvfs disk {};
+  if (statvfs(folder.c_str(), &disk) != 0) return {};
+  const std::uint64_t room = static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
+  if (room >= needed) return {};
+  return std::unexpected(folder_error(
+      folder, fmt::format("the disk is too full for the log: it has {:.1f} MB, the run may need "
+                          "{:.1f} MB",
+                          static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6)));
+}
+
+std::string next_path(const std::string& folder, const std::string& name) {
+  for (int number = 1;; ++number) {
+    const std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) return path;
+  }
+}
+
+log::RecorderOptions recorder_options(runtime::LogCompression compression) {
+  log::RecorderOptions options;
+  switch (compression) {
+    case runtime::LogCompression::kNone: options.writer.compression = log::Compression::kNone; break;
+    case runtime::LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
+    case runtime::LogCompression::kZstd: options.writer.compression = log::Compression::kZstd; break;
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder) {
+  if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());
+  const std::string name =
+      c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
+  return log::Recorder::open(next_path(folder, name), info_of(c),
+                             recorder_options(c.experiment.log.compression));
+}
+
+}  // namespace tandem::apps

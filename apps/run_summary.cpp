@@ -1,0 +1,139 @@
+#include "apps/run_summary.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tandem::apps {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr std::size_t kJointsShown = 5;
+
+double weight_N(const tandem_kernels& k) {
+  const double* g = k.gravity_m_s2;
+  return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+}
+
+Json percentiles_json(const rt::Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
+}
+
+Json log_json(const std::optional<log::RecordingResult>& log) {
+  if (!log) return nullptr;
+  return {{"path", log->path},
+          {"messages", log->messages},
+          {"dropped", log->dropped},
+          {"data_sha256", log->data_sha256}};
+}
+
+Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
+  if (!ground) return nullptr;
+  return {{"weight_N", ground->weight_N},
+          {"mean_vertical_force_N", ground->mean_vertical_force_N},
+          {"max_foot_slip_m", ground->max_foot_slip_m}};
+}
+
+Json base_json(const std::optional<runtime::BaseFigures>& base) {
+  if (!base) return nullptr;
+  return {{"min_height_m", base->min_height_m},
+          {"max_height_m", base->max_height_m},
+          {"final_tilt_rad", base->final_tilt_rad}};
+}
+
+std::string microseconds(const rt::Percentiles& p) {
+  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
+  return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f} us", us(p.p50), us(p.p99), us(p.p999),
+                     us(p.max));
+}
+
+void print_worst_joints(const RunSummary& s, std::FILE* out) {
+  struct Row {
+    std::string joint;
+    runtime::TrackingError error;
+  };
+  std::vector<Row> rows;
+  const auto tracking = s.cycle.statistics().tracking();
+  for (std::size_t i = 0; i < tracking.size(); ++i) {
+    rows.push_back({s.composition.experiment.robot.joints[i].name, tracking[i]});
+  }
+  std::ranges::stable_sort(rows, std::ranges::greater{}, [](const Row& r) { return r.error.rms_rad; });
+  Table table({"worst joints", "rms [deg]", "max [deg]"});
+  for (std::size_t i = 0; i < std::min(kJointsShown, rows.size()); ++i) {
+    table.add({rows[i].joint, fmt::format("{:.3f}", rows[i].error.rms_rad * kDegrees),
+               fmt::format("{:.3f}", rows[i].error.max_rad * kDegrees)});
+  }
+  if (table.rows() > 0) table.print(out);
+}
+
+}  // namespace
+
+double RunSummary::sim_s() const {
+  const auto period_ns = static_cast<double>(composition.experiment.loop.period_ns);
+  return static_cast<double>(cycle.running_cycles()) * period_ns * 1e-9;
+}
+
+Json RunSummary::json() const {
+  const runtime::Experiment& e = composition.experiment;
+  const rt::LoopStatistics& loop = cycle.loop();
+  Json json;
+  json["robot"] = e.robot.name;
+  json["hal"] = "sim";
+  json["seed"] = e.seed;
+  json["cycles"] = cycle.running_cycles();
+  json["period_ns"] = e.loop.period_ns;
+  json["sim_seconds"] = sim_s();
+  json["wall_seconds"] = wall_s;
+  json["realtime_factor"] = wall_s > 0.0 ? Json(sim_s() / wall_s) : Json(nullptr);
+  json["overruns"] = loop.overruns;
+  json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());
+  json["cycle_ns"] = percentiles_json(loop.execution.percentiles());
+  json["log"] = log_json(log);
+  json["joints"] = Json::object();
+  const auto tracking = cycle.statistics().tracking();
+  for (std::size_t i = 0; i < tracking.size(); ++i) {
+    json["joints"][e.robot.joints[i].name] = {{"rms_tracking_error_rad", tracking[i].rms_rad},
+                                              {"max_tracking_error_rad", tracking[i].max_rad}};
+  }
+  json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
+  json["base"] = base_json(cycle.statistics().base());
+  json["faults"] = faults;
+  json["kernel_variant"] = composition.kernels->variant;
+  return json;
+}
+
+void RunSummary::print(std::FILE* out) const {
+  print_worst_joints(*this, out);
+  fmt::print(out, "\n");
+  Facts facts;
+  if (const auto ground = cycle.statistics().ground(weight_N(*composition.kernels))) {
+    facts.add("force on the ground",
+              fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",
+                          ground->mean_vertical_force_N, ground->weight_N,
+                          100.0 * (ground->mean_vertical_force_N / ground->weight_N - 1.0)));
+    facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
+  }
+  if (const auto base = cycle.statistics().base()) {
+    facts.add("base height", fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end",
+                                         base->min_height_m, base->max_height_m,
+                                         base->final_tilt_rad * kDegrees));
+  }
+  facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
+                                     wall_s > 0.0 ? sim_s() / wall_s : 0.0));
+  facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().execution.percentiles()));
+  if (composition.experiment.loop.rate > 0.0) {
+    facts.add("wake-up p50/p99/p99.9/max", microseconds(cycle.loop().wakeup.percentiles()));
+    facts.add("overruns", std::to_string(cycle.loop().overruns));
+  }
+  facts.add("kernels", composition.kernels->variant);
+  if (log) {
+    facts.add("log", fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path,
+                                 log->messages, log->dropped,
+                                 static_cast<double>(log->bytes) * 1e-6));
+  }
+  facts.print(out);
+}
+
+}  // namespace tandem::apps

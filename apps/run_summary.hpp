@@ -1,0 +1,30 @@
+// What a run amounts to: for the JSON file and for the table at its end.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/composition.hpp"
+#include "apps/console.hpp"
+#include "log/recorder.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+struct RunSummary {
+  const Composition& composition;
+  const runtime::RobotCycle& cycle;
+  double wall_s = 0.0;                         ///< while controllers ran
+  std::optional<log::RecordingResult> log;     ///< empty: nothing was logged
+  std::vector<std::string> faults;             ///< the log's trouble included
+
+  [[nodiscard]] double sim_s() const;
+  /// docs/json.md
+  [[nodiscard]] Json json() const;
+  void print(std::FILE* out) const;
+};
+
+}  // namespace tandem::apps
