@@ -87,6 +87,10 @@ Status McapWriter::open(const std::string& path, const WriterOptions& options) {
 
 void McapWriter::emit(std::span<const std::byte> bytes) {
   crc_ = crc(crc_, bytes);
+  emit_raw(bytes);
+}
+
+void McapWriter::emit_raw(std::span<const std::byte> bytes) {
   while (!bytes.empty() && !failed()) {
     const ssize_t written = ::write(file_, bytes.data(), bytes.size());
     if (written < 0) {
@@ -190,7 +194,8 @@ void McapWriter::finish_chunk() {
   append(head, chunk.start_time);
   append(head, chunk.end_time);
   append(head, chunk.uncompressed);
-  append(head, crc(0, chunk_));
+  const std::uint32_t chunk_crc = crc(0, chunk_);
+  append(head, chunk_crc);
   append(head, mcap_name(options_.compression));
   append(head, chunk.compressed);
   Bytes record;
@@ -198,7 +203,13 @@ void McapWriter::finish_chunk() {
   append(record, static_cast<std::uint64_t>(head.size() + records.size()));
   append(record, head);
   emit(record);
-  emit(records);
+  if (options_.compression == Compression::kNone) {  // the same bytes: their CRC is known
+    crc_ = static_cast<std::uint32_t>(
+        crc32_combine(crc_, chunk_crc, static_cast<z_off_t>(chunk_.size())));
+    emit_raw(records);
+  } else {
+    emit(records);
+  }
   chunk.length = offset_ - chunk.offset;
   write_indices(chunk);
   chunks_.push_back(std::move(chunk));

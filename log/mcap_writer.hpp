@@ -75,6 +75,7 @@ class McapWriter {
   };
 
   void emit(std::span<const std::byte> bytes);  // to the file, into the CRC
+  void emit_raw(std::span<const std::byte> bytes);  // to the file only
   void emit_record(Opcode opcode, const Bytes& content);
   void finish_chunk();
   void write_indices(Chunk& chunk);

@@ -13,7 +13,8 @@ namespace tandem::runtime::test {
 /// Moves its joints by 0.2 rad, 1 Hz, about where they stood.
 class Sine : public Controller {
  public:
-  explicit Sine(std::vector<std::size_t> joints, hal::ControlMode mode = hal::ControlMode::kPosition)
+  explicit Sine(std::vector<std::size_t> joints,
+                hal::ControlMode mode = hal::ControlMode::kPosition)
       : joints_(std::move(joints)), mode_(mode), middle_(joints_.size()) {}
 
   Status configure(ControllerSetup& setup) override {

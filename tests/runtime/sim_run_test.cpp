@@ -1,0 +1,130 @@
+// Whole runs through the whole chain: cycle, controller, limits, drive master, frames, firmware,
+// plant and log, of a robot with one joint. Linked with the real-time trap; the preset rtsan
+// checks the same runs.
+#include "log/log_file.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using test::Sine;
+
+constexpr std::uint64_t kRunning = 600;
+
+/// The swing, moved on a sine for 0.6 s.
+struct SimRun {
+  explicit SimRun(std::uint64_t seed = 1, double rate = 0.0, log::Recorder* recorder = nullptr)
+      : robot(tandem::test::swing_robot()), host(robot, tandem::test::swing_kernels(2), 1'000'000) {
+    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
+                                      {.posture = "up", .release_ns = 100'000'000, .seed = seed});
+    EXPECT_TRUE(made) << made.error().to_string();
+    backend = std::move(*made);
+    EXPECT_TRUE(host.add("sine", std::make_unique<Sine>(std::vector<std::size_t>{0}),
+                         test::parameters("amplitude_rad = 0.1")));
+    const CycleConfig config{.loop = {.pacing = rt::Pacing::kSimulated, .rate = rate},
+                             .running_cycles = kRunning};
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{robot, *backend, host, clock, recorder, &backend->truth()}, config);
+  }
+  void run_to(RunPhase phase) {
+    while (cycle->phase() != phase && cycle->step()) {
+    }
+    ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
+  }
+
+  hal::RobotConfig robot;
+  ControllerHost host;
+  std::unique_ptr<sim::SimRobot> backend;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST(SimRun, BringsTheDriveUpFollowsAndShutsDown) {
+  SimRun run;
+  run.cycle->run();
+  EXPECT_TRUE(run.cycle->faults().empty())
+      << run.cycle->faults()[0].text;
+  EXPECT_EQ(run.cycle->running_cycles(), kRunning);
+  const TrackingError error = run.cycle->statistics().tracking()[0];
+  EXPECT_GT(error.max_rad, 0.0);
+  EXPECT_LT(error.max_rad, 0.05);  // of a sine of 0.1 rad
+  EXPECT_LE(error.rms_rad, error.max_rad);
+}
+
+/// State, command and truth of the next `count` cycles.
+std::vector<std::byte> bytes_of(SimRun& run, int count) {
+  std::vector<std::byte> all;
+  for (int i = 0; i < count; ++i) {
+    run.cycle->step();
+    for (const auto bytes :
+         {run.cycle->state().bytes(), run.cycle->command().bytes(), run.backend->truth().bytes()}) {
+      all.insert(all.end(), bytes.begin(), bytes.end());
+    }
+  }
+  return all;
+}
+
+TEST(SimRun, RepeatsItsBytesAfterARestoreAtAnyPhase) {
+  SimRun run;
+  for (const RunPhase phase : {RunPhase::kBringUp, RunPhase::kRunning}) {
+    run.run_to(phase);
+    for (int i = 0; i < 37; ++i) EXPECT_TRUE(run.cycle->step());
+    const auto snapshot = run.cycle->save();
+    ASSERT_TRUE(snapshot) << snapshot.error().to_string();
+    const auto first = bytes_of(run, 300);
+    ASSERT_TRUE(run.cycle->restore(*snapshot));
+    EXPECT_TRUE(bytes_of(run, 300) == first) << to_string(phase);
+  }
+}
+
+TEST(SimRun, GoesOnFromASnapshotInAFreshRobot) {
+  SimRun one;
+  one.run_to(RunPhase::kRunning);
+  const auto snapshot = one.cycle->save();
+  ASSERT_TRUE(snapshot);
+  SimRun other(99);  // even its noise goes on as the snapshot's
+  ASSERT_TRUE(other.cycle->restore(*snapshot));
+  EXPECT_TRUE(bytes_of(one, 200) == bytes_of(other, 200));
+}
+
+std::string hash_of_run(const std::string& path, std::uint64_t seed, double rate) {
+  auto recorder = log::Recorder::open(path, {.joints = {"swing"}}, {});
+  EXPECT_TRUE(recorder);
+  SimRun run(seed, rate, recorder->get());
+  run.cycle->run();
+  const log::RecordingResult result = (*recorder)->close();
+  EXPECT_EQ(result.dropped, 0U);
+  EXPECT_EQ(result.data_sha256, log::LogFile::open(path)->data_sha256());
+  return result.data_sha256;
+}
+
+TEST(SimRun, LogsTheSameDataForTheSameSeedWhateverTheRate) {
+  const log::ScratchFolder folder;
+  const std::string first = hash_of_run(folder / "1.mcap", 7, 0.0);
+  EXPECT_EQ(hash_of_run(folder / "2.mcap", 7, 0.0), first);
+  EXPECT_EQ(hash_of_run(folder / "3.mcap", 7, 5.0), first);
+  EXPECT_NE(hash_of_run(folder / "4.mcap", 8, 0.0), first);
+}
+
+TEST(SimRun, EndsInAFaultThatNamesTheJointWhenTheCableIsCut) {
+  SimRun run;
+  run.run_to(RunPhase::kRunning);
+  for (int i = 0; i < 50; ++i) EXPECT_TRUE(run.cycle->step());
+  run.backend->connect_bus(0, false);
+  run.cycle->run();
+  const auto faults = run.cycle->faults();
+  ASSERT_FALSE(faults.empty());
+  EXPECT_LT(run.cycle->running_cycles(), 250U);
+  bool named = false;
+  for (const Fault& fault : faults) {
+    named = named || fault.text.find("swing") != std::string::npos;
+  }
+  EXPECT_TRUE(named) << faults[0].text;
+}
+
+}  // namespace
+}  // namespace tandem::runtime
