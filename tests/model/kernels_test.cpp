@@ -1,0 +1,278 @@
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "model/emit.hpp"
+#include "model/kernel_build.hpp"
+#include "model/kernel_library.hpp"
+#include "tests/model/reference.hpp"
+
+namespace tandem::model {
+namespace {
+
+std::string built_library(const std::string& robot) {
+  return library_path(TANDEM_TEST_KERNELS, robot);
+}
+
+// Calls the compiled kernel with arrays.
+Runner runner(const tandem_kernels& k, const Mechanism& m) {
+  return [&k, &m](Kernel kernel, const Arrays& in) {
+    Arrays out;
+    for (const KernelArray& array : kernel_shape(kernel, m).outputs)
+      out.emplace_back(static_cast<std::size_t>(array.size),
+                       std::numeric_limits<double>::quiet_NaN());
+    const auto i = [&](std::size_t n) { return in[n].data(); };
+    const auto o = [&](std::size_t n) { return out[n].data(); };
+    switch (kernel) {
+      case Kernel::kForwardDynamics: k.forward_dynamics(i(0), i(1), i(2), i(3), o(0)); break;
+      case Kernel::kInverseDynamics: k.inverse_dynamics(i(0), i(1), i(2), i(3), o(0)); break;
+      case Kernel::kMassMatrix: k.mass_matrix(i(0), o(0)); break;
+      case Kernel::kBias: k.bias(i(0), i(1), o(0)); break;
+      case Kernel::kCenterOfMass: k.center_of_mass(i(0), i(1), o(0), o(1), o(2)); break;
+      case Kernel::kCentroidalMomentum: k.centroidal_momentum(i(0), i(1), o(0)); break;
+      case Kernel::kEnergy: k.energy(i(0), i(1), o(0)); break;
+      case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
+      case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
+      case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
+    }
+    return out;
+  };
+}
+
+struct Compiled {
+  const char* robot;
+  const char* variant;
+};
+void PrintTo(const Compiled& c, std::ostream* out) { *out << c.robot << " " << c.variant; }
+
+class CompiledKernels : public testing::TestWithParam<Compiled> {
+ protected:
+  void SetUp() override {
+    const auto [name, variant] = GetParam();
+    const ReferenceRobot& robot = reference_robot(name);
+    mechanism = reference_mechanism(robot);
+    const std::string hash = description_hash(reference_tree(robot), reference_spec(robot));
+    const auto loaded = load_kernels(built_library(name), hash);
+    ASSERT_TRUE(loaded) << loaded.error().to_string();
+    const auto chosen = load_kernels(built_library(name), hash, variant);
+    if (!chosen) GTEST_SKIP() << chosen.error().to_string();
+    library = *chosen;
+  }
+  Mechanism mechanism;
+  KernelLibrary library;
+};
+
+TEST_P(CompiledKernels, AgreeWithPinocchioInEveryQuantity) {
+  against_reference(reference_robot(GetParam().robot), mechanism, runner(*library, mechanism),
+                    [&](const char* quantity, const Array& actual, const Array& expected) {
+                      EXPECT_LE(relative_error(actual, expected), 1e-10) << quantity;
+                    });
+}
+
+TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
+  const Runner compiled = runner(*library, mechanism);
+  const nlohmann::json reference = read_reference(GetParam().robot);
+  for (const nlohmann::json& state : reference["states"]) {
+    Array wrench(static_cast<std::size_t>(6 * mechanism.wrenches));
+    for (std::size_t i = 0; i < wrench.size(); ++i) wrench[i] = 3.0 - static_cast<double>(i);
+    const Array q = flat(state["q"]);
+    const Array v = flat(state["v"]);
+    const Array a = flat(state["a"]);
+    const Arrays all[] = {{q, v, flat(state["tau"]), wrench}, {q, v, a, wrench}, {q}, {q, v},
+                          {q, v}, {q, v}, {q, v}, {q, v, a}, {q}, {q, v, a, wrench}};
+    for (int k = 0; k < kKernels; ++k) {
+      const Kernel kernel = static_cast<Kernel>(k);
+      const Arrays expected = evaluate_kernel(kernel, mechanism, all[k]);
+      const Arrays actual = compiled(kernel, all[k]);
+      for (std::size_t i = 0; i < expected.size(); ++i)
+        EXPECT_LE(relative_error(actual[i], expected[i]),
+                  kernel == Kernel::kForwardDynamics ? 1e-10 : 1e-13)
+            << kernel_shape(kernel, mechanism).name;
+    }
+  }
+}
+
+TEST_P(CompiledKernels, SayWhatTheyAre) {
+  EXPECT_EQ(library->abi, TANDEM_KERNELS_ABI);
+  EXPECT_STREQ(library->robot, GetParam().robot);
+  EXPECT_STREQ(library->variant, GetParam().variant);
+  EXPECT_EQ(library->nq, static_cast<std::uint32_t>(mechanism.nq()));
+  EXPECT_EQ(library->nv, static_cast<std::uint32_t>(mechanism.nv()));
+  ASSERT_EQ(library->joints, mechanism.joint_names.size());
+  for (std::size_t j = 0; j < mechanism.joint_names.size(); ++j)
+    EXPECT_EQ(library->joint_names[j], mechanism.joint_names[j]);
+  ASSERT_EQ(library->sites, mechanism.site_names.size());
+  for (std::size_t s = 0; s < mechanism.site_names.size(); ++s)
+    EXPECT_EQ(library->site_names[s], mechanism.site_names[s]);
+  EXPECT_EQ(library->wrenches, mechanism.wrench_names.size());
+  EXPECT_EQ(library->sensors, mechanism.sensor_names.size());
+  EXPECT_EQ(library->mass_kg, mechanism.mass_kg);
+  EXPECT_EQ(library->gravity_m_s2[2], -9.81);
+  ASSERT_EQ(library->kernel_count, static_cast<std::uint32_t>(kKernels));
+  for (int k = 0; k < kKernels; ++k)
+    EXPECT_EQ(library->counts[k].kernel, kernel_shape(static_cast<Kernel>(k), mechanism).name);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Robots, CompiledKernels,
+    testing::Values(Compiled{"double_pendulum", "baseline"}, Compiled{"double_pendulum", "x86-64-v3"},
+                    Compiled{"ur5e", "baseline"}, Compiled{"ur5e", "x86-64-v3"},
+                    Compiled{"coman", "baseline"}, Compiled{"coman", "x86-64-v3"}),
+    [](const auto& test) {
+      std::string name = std::string(test.param.robot) + "_" + test.param.variant;
+      for (char& c : name) c = c == '-' ? '_' : c;
+      return name;
+    });
+
+TEST(Kernels, SinesAndCosinesAreThoseOfLibmWithinTwoUlp) {
+  // The double pendulum's first site rotates with q0 + q1 about one axis: entries are sin, cos.
+  const auto library = load_kernels(built_library("double_pendulum"));
+  ASSERT_TRUE(library);
+  const Array v(2, 0.0);
+  Array pose(12 * (*library)->sites);
+  Array twist(6 * (*library)->sites);
+  Array acceleration(6 * (*library)->sites);
+  double worst = 0.0;
+  for (int i = -40000; i <= 40000; ++i) {
+    const double angle = i < 20000 ? i * 1e-3 : i * 2.5;
+    const Array q{angle, 0.0};
+    (*library)->site_motion(q.data(), v.data(), v.data(), pose.data(), twist.data(),
+                            acceleration.data());
+    worst = std::max(worst, std::abs(pose[4] - std::cos(angle)));
+    worst = std::max(worst, std::abs(pose[7] - std::sin(angle)));
+  }
+  EXPECT_LE(worst, 2.3e-16);
+}
+
+TEST(Kernels, AStateThatIsNotFiniteGivesResultsThatAreNotFinite) {
+  const auto library = load_kernels(built_library("ur5e"));
+  ASSERT_TRUE(library);
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                           std::numeric_limits<double>::infinity()}) {
+    const Array q{0.1, bad, 0.3, 0.4, 0.5, 0.6};
+    const Array v(6, 0.1);
+    const Array wrench(6 * (*library)->wrenches, 0.0);
+    Array vdot(6, 0.0);
+    (*library)->forward_dynamics(q.data(), v.data(), v.data(), wrench.data(), vdot.data());
+    EXPECT_FALSE(std::isfinite(vdot[1]));
+  }
+}
+
+TEST(Generator, WritesTheSameTextTwice) {
+  const ReferenceRobot& robot = reference_robot("coman");
+  const auto first = generate_kernels(reference_tree(robot), reference_spec(robot));
+  const auto second = generate_kernels(reference_tree(robot), reference_spec(robot));
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->hash, second->hash);
+  ASSERT_EQ(first->sources.size(), second->sources.size());
+  for (std::size_t i = 0; i < first->sources.size(); ++i)
+    EXPECT_TRUE(first->sources[i].text == second->sources[i].text) << first->sources[i].name;
+}
+
+TEST(Generator, StaysBelowTheOperationGoals) {
+  for (const auto& [name, goal] : {std::pair("coman", 10000u), {"walkman", 11500u}}) {
+    const Mechanism m = reference_mechanism(reference_robot(name));
+    Graph graph;
+    const TracedKernel kernel = trace_kernel(Kernel::kForwardDynamics, m, graph);
+    const OperationCount count = count_operations(graph, kernel.outputs);
+    EXPECT_LT(count.add + count.mul, goal) << name;
+    EXPECT_EQ(count.sincos, static_cast<std::uint32_t>(m.joint_count())) << name;
+  }
+}
+
+TEST(Generator, HashFollowsWhatMattersAndNothingElse) {
+  const ReferenceRobot& robot = reference_robot("ur5e");
+  Tree tree = reference_tree(robot);
+  ModelSpec spec = reference_spec(robot);
+  const std::string hash = description_hash(tree, spec);
+  EXPECT_EQ(hash.size(), 64u);
+  tree.file = "elsewhere.urdf";
+  EXPECT_EQ(description_hash(tree, spec), hash);
+  tree.links.back().inertia.mass_kg += 1e-12;
+  EXPECT_NE(description_hash(tree, spec), hash);
+  tree = reference_tree(robot);
+  spec.armature.emplace_back("elbow_joint", 0.1);
+  EXPECT_NE(description_hash(tree, spec), hash);
+}
+
+TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
+  auto library = load_kernels("/nonexistent/kernels.so");
+  ASSERT_FALSE(library);
+  EXPECT_NE(library.error().to_string().find("tandem model build"), std::string::npos);
+  const auto text = std::filesystem::path(testing::TempDir()) / "text.so";
+  std::ofstream(text) << "no library";
+  library = load_kernels(text.string());
+  ASSERT_FALSE(library);
+  EXPECT_NE(library.error().message.find("cannot load"), std::string::npos);
+  library = load_kernels(built_library("ur5e"), std::string(64, '0'));
+  ASSERT_FALSE(library);
+  EXPECT_NE(library.error().message.find("another description"), std::string::npos);
+  library = load_kernels(built_library("ur5e"), {}, "x86-64-v9");
+  ASSERT_FALSE(library);
+  EXPECT_NE(library.error().hint.find("baseline"), std::string::npos);
+}
+
+struct BuildFolder {
+  std::filesystem::path path = std::filesystem::path(testing::TempDir()) /
+                               testing::UnitTest::GetInstance()->current_test_info()->name();
+  BuildFolder() {
+    std::filesystem::remove_all(path);
+    std::filesystem::create_directories(path);
+  }
+  ~BuildFolder() { std::filesystem::remove_all(path); }
+  [[nodiscard]] BuildOptions options() const {
+    return {.library = (path / "k.so").string(), .compiler = {}, .jobs = 1, .progress = {}};
+  }
+};
+
+TEST(KernelBuild, DoesNothingWhenUpToDateAndOnlyWhatChangedElse) {
+  const BuildFolder folder;
+  const ReferenceRobot& robot = reference_robot("double_pendulum");
+  const Tree tree = reference_tree(robot);
+  ModelSpec spec = reference_spec(robot);
+  BuildOptions options = folder.options();
+  int calls = 0;
+  int last_total = 0;
+  options.progress = [&](int done, int total, const std::string&) {
+    EXPECT_EQ(done, ++calls);
+    last_total = total;
+  };
+  const auto first = build_kernels(tree, spec, options);
+  ASSERT_TRUE(first) << first.error().to_string();
+  EXPECT_FALSE(first->was_up_to_date);
+  EXPECT_EQ(calls, last_total);
+  EXPECT_TRUE(load_kernels(options.library, first->hash));
+  options.progress = {};
+  EXPECT_TRUE(build_kernels(tree, spec, options)->was_up_to_date);
+  spec.armature.emplace_back(tree.joints[0].name, 0.25);
+  const auto second = build_kernels(tree, spec, options);
+  ASSERT_TRUE(second);
+  EXPECT_GT(second->compiled, 0);
+  EXPECT_LT(second->compiled, first->compiled);  // library.cpp is the same
+  EXPECT_TRUE(load_kernels(options.library, second->hash));
+  EXPECT_FALSE(load_kernels(options.library, first->hash));
+}
+
+TEST(KernelBuild, NamesTheCompilerThatIsNotThereAndTheLogOfOneThatFails) {
+  const BuildFolder folder;
+  const ReferenceRobot& robot = reference_robot("double_pendulum");
+  BuildOptions options = folder.options();
+  options.compiler = "no-such-compiler";
+  auto report = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().message.find("no-such-compiler"), std::string::npos);
+  EXPECT_NE(report.error().hint.find("g++"), std::string::npos);
+  options.compiler = "/bin/false";
+  report = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  ASSERT_FALSE(report);
+  EXPECT_TRUE(std::filesystem::exists(report.error().file));
+  options.library = "/proc/nowhere/k.so";
+  report = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().message.find("/proc/nowhere"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::model
