@@ -54,8 +54,11 @@ function(tandem_controller name)
   add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
   target_link_libraries(controller_${name} PRIVATE tandem_hal ${PLUGIN_LINKS})
   # Nothing undefined that the loader would find missing, nothing exported but the entry point.
-  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL
-    $<$<NOT:$<BOOL:${TANDEM_SANITIZE}>>:-Wl,--no-undefined>)
+  # (A sanitizer's symbols stay undefined until then: they are in the executable.)
+  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL)
+  if(NOT TANDEM_SANITIZE)
+    target_link_options(controller_${name} PRIVATE -Wl,--no-undefined)
+  endif()
   set_target_properties(controller_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name}
     CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
 endfunction()
