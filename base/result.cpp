@@ -1,5 +1,8 @@
 #include "base/result.hpp"
 
+#include <algorithm>
+#include <numeric>
+
 namespace tandem {
 
 std::string Error::to_string() const {
@@ -13,6 +16,15 @@ std::string Error::to_string() const {
   text += message;
   if (!hint.empty()) text += " (" + hint + ")";
   return text;
+}
+
+void sort_by_line(Diagnostics& errors) {
+  std::vector<std::size_t> order(errors.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(errors[i].line, i); });
+  Diagnostics sorted;
+  for (const std::size_t i : order) sorted.push_back(std::move(errors[i]));
+  errors = std::move(sorted);
 }
 
 }  // namespace tandem

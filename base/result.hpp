@@ -31,6 +31,9 @@ using Status = std::expected<void, Error>;
 /// Every error met in one reading, in the order of the file.
 using Diagnostics = std::vector<Error>;
 
+/// Puts the errors of one file into the order of its lines; those of a line keep theirs.
+void sort_by_line(Diagnostics& errors);
+
 /// Shorthand for `return fail("…", "do this next")`.
 [[nodiscard]] inline std::unexpected<Error> fail(std::string message, std::string hint = {}) {
   return std::unexpected(

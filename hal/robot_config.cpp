@@ -217,7 +217,7 @@ std::expected<RobotConfig, Diagnostics> finish(Result<TomlDocument> document) {
   RobotConfig robot = read(*document);
   if (document->diagnostics().empty()) return robot;
   Diagnostics errors = document->diagnostics();
-  std::ranges::stable_sort(errors, {}, &Error::line);
+  sort_by_line(errors);
   return std::unexpected(errors);
 }
 

@@ -253,7 +253,7 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
   Outline outline = outline_urdf(text, file);
   if (outline.errors.empty()) check_topology(outline, file);
   if (!outline.errors.empty()) {
-    std::ranges::stable_sort(outline.errors, {}, &Error::line);
+    sort_by_line(outline.errors);
     return std::unexpected(outline.errors);
   }
   const auto model = parse_with_urdfdom(outline.text);

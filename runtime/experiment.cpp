@@ -203,7 +203,7 @@ void combine(Experiment& e, TomlTable& root) {
 }
 
 Diagnostics in_order(Diagnostics errors) {
-  std::ranges::stable_sort(errors, {}, &Error::line);
+  sort_by_line(errors);
   return errors;
 }
 
