@@ -1,0 +1,50 @@
+// Whatever bytes stand for a URDF: errors with a message, or a tree that the dynamics can use.
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "model/urdf.hpp"
+
+namespace {
+
+using tandem::model::Tree;
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+void check(const Tree& tree) {
+  require(tree.bodies.size() == tree.joints.size() + 1);
+  require(!tree.links.empty());
+  for (std::size_t i = 0; i < tree.joints.size(); ++i) {
+    const auto& joint = tree.joints[i];
+    require(joint.parent >= 0 && joint.parent <= static_cast<int>(i));
+    require(std::abs(joint.axis.norm() - 1.0) < 1e-12);
+    require(joint.in_parent.R.allFinite() && joint.in_parent.p.allFinite());
+    require(joint.line > 0);
+  }
+  for (const auto& body : tree.bodies) {
+    require(std::isfinite(body.inertia.mass_kg) && body.inertia.mass_kg >= 0.0);
+  }
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    require(tree.links[i].parent < static_cast<int>(i));
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  for (const bool floating : {false, true}) {
+    const auto model = tandem::model::parse_urdf(
+        text, "fuzz.urdf", {.floating_base = floating, .mimic_independent = floating});
+    if (model.has_value()) {
+      check(model->tree);
+    } else {
+      require(!model.error().empty());
+      for (const auto& error : model.error()) require(!error.message.empty());
+    }
+  }
+  return 0;
+}
