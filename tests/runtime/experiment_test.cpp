@@ -343,6 +343,19 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   }
 }
 
+TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {
+  const std::filesystem::path folder = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam();
+  int read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::filesystem::path& file = entry.path();
+    if (file.extension() != ".toml" || file.filename() == "robot.toml") continue;
+    const auto experiment = read_experiment(file.string());
+    EXPECT_TRUE(experiment.has_value()) << experiment.error()[0].to_string();
+    ++read;
+  }
+  EXPECT_GT(read, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, BundledRobot,
                          testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum"),
                          [](const auto& robot) { return std::string(robot.param); });
