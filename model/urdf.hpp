@@ -1,5 +1,5 @@
 // Reads a URDF strictly: a robot that cannot be simulated is refused, with link or joint, file
-// and line. docs/model.md says what of URDF is understood.
+// and line. docs/urdf.md says what of URDF is understood.
 // Layer: model.  Thread: non-RT only; readers in several threads wait for each other.
 #pragma once
 
