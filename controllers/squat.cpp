@@ -66,6 +66,9 @@ class Squat : public Controller {
     }
     period_s_ = static_cast<double>(setup.period_ns) * 1e-9;
     measured_.assign(setup.robot.joints.size(), 0.0);
+    for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
+      damping_.push_back(stance->in_leg(j) ? link_damping_Nms_rad_ : 0.0);
+    }
     last_v_.assign(setup.kernels->nv, 0.0);
     vdot_.assign(setup.kernels->nv, 0.0);
     stance_.emplace(std::move(*stance));
@@ -83,7 +86,7 @@ class Squat : public Controller {
     std::ranges::fill(last_v_, 0.0);
   }
 
-  Code update(const hal::CycleTime& time, const hal::StateImage&,
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     if (standing_ == 0) return Code::kFault;
     const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
@@ -97,7 +100,7 @@ class Squat : public Controller {
       last_v_[i] = v[i];
     }
     stance_->carry(vdot_);
-    write(min_jerk(t_s / plan_.approach_s), command);
+    write(min_jerk(t_s / plan_.approach_s), state, command);
     return plan_.over(t_s) ? Code::kStopped : Code::kOk;
   }
 
@@ -114,6 +117,7 @@ class Squat : public Controller {
     plan_.approach_s = parameters.number_or("approach_s", 1.0, kPositive);
     plan_.start_s = parameters.number_or("start_s", plan_.approach_s, kPositive);
     if (parameters.has("settle_s")) plan_.settle_s = parameters.number("settle_s", kNotNegative);
+    link_damping_Nms_rad_ = parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
     if (plan_.start_s < plan_.approach_s) {
       parameters.error("start_s", "the squat would start before the start posture is reached",
                        "give approach_s or more");
@@ -121,14 +125,17 @@ class Squat : public Controller {
   }
 
   /// References between the measured and the start posture, then those of the squat.
-  void write(const MinJerk& approach, hal::CommandImage& command) const noexcept TANDEM_RT {
+  void write(const MinJerk& approach, const hal::StateImage& state,
+             hal::CommandImage& command) const noexcept TANDEM_RT {
     const ModelMap& map = stance_->map();
     for (std::size_t j = 0; j < map.joints(); ++j) {
       const double way = stance_->q()[map.q_index(j)] - measured_[j];
       command.position_rad()[j] = measured_[j] + way * approach.s;
       command.velocity_rad_s()[j] =
           way * approach.ds / plan_.approach_s + stance_->v()[map.v_index(j)] * approach.s;
-      command.torque_Nm()[j] = stance_->tau()[map.v_index(j)] * approach.s;
+      // On a spring the link may swing, which the motor's own loop hardly damps.
+      const double swing = state.velocity_rad_s()[j] - command.velocity_rad_s()[j];
+      command.torque_Nm()[j] = stance_->tau()[map.v_index(j)] * approach.s - damping_[j] * swing;
     }
   }
 
@@ -187,7 +194,8 @@ class Squat : public Controller {
   std::int64_t start_ns_ = 0;
   double height_m_ = 0.0;      // of the base above the soles at the start
   std::int64_t standing_ = 0;  // whether the start posture was found
-  std::vector<double> measured_, last_v_, vdot_;
+  double link_damping_Nms_rad_ = 0.0;  // of the legs' joints
+  std::vector<double> damping_, measured_, last_v_, vdot_;
 };
 
 }  // namespace

@@ -217,6 +217,10 @@ void Stance::carry(std::span<const double> vdot) noexcept TANDEM_RT {
   carry_on_both_feet(*kernels_, {feet_[0].site, feet_[1].site}, q_, pose_, site_J_, tau_);
 }
 
+bool Stance::in_leg(std::size_t j) const noexcept {
+  return std::find(columns_.begin() + 2, columns_.end(), map_.v_index(j)) != columns_.end();
+}
+
 double Stance::residual() noexcept TANDEM_RT {
   evaluate();
   return error().cwiseAbs().maxCoeff();

@@ -56,6 +56,8 @@ class Stance {
   /// The joints' torques for the velocity at hand and an acceleration (nv).
   void carry(std::span<const double> vdot) noexcept TANDEM_RT;
 
+  /// Whether the image's joint `j` is one of the legs' twelve.
+  [[nodiscard]] bool in_leg(std::size_t j) const noexcept;
   [[nodiscard]] const ModelMap& map() const noexcept { return map_; }
   [[nodiscard]] std::span<const double> q() const noexcept { return q_; }
   [[nodiscard]] std::span<const double> v() const noexcept { return v_; }

@@ -126,6 +126,22 @@ TEST(Squat, StartsFromTheMeasuredPosture) {
   EXPECT_EQ(run.command.torque_Nm()[ankle], 0.0);
 }
 
+TEST(Squat, DampsTheSwingOfTheLegsLinksOnRequest) {
+  test::Harness run(test::biped_robot(), "squat",
+                    std::string(kSquat) + "link_damping_Nms_rad = 7.0\n", test::biped_kernels());
+  ASSERT_EQ(run.problem(), "");
+  std::ranges::copy(run.robot.postures[0].position_rad, run.state.position_rad().begin());
+  run.start();
+  for (double& velocity : run.state.velocity_rad_s()) velocity = 0.1;
+  ASSERT_EQ(run.step(), Code::kOk);
+  const auto torque = [&](const char* joint) {
+    return run.command.torque_Nm()[static_cast<std::size_t>(run.robot.joint_index(joint))];
+  };
+  EXPECT_DOUBLE_EQ(torque("LKneeSag"), -0.7);
+  EXPECT_DOUBLE_EQ(torque("RAnkLat"), -0.7);
+  EXPECT_EQ(torque("LArm"), 0.0);
+}
+
 TEST(Squat, StopsAfterItsSettleTime) {
   test::Harness run(test::biped_robot(), "squat",
                     "depth_m = 0.1\nperiod_s = 1\napproach_s = 0.2\nsettle_s = 0.3\n",
