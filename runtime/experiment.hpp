@@ -25,7 +25,7 @@ enum class BackendKind : std::uint8_t { kSim };
 /// [sim]. Its `order` and `noise` are already applied to Experiment::robot.
 struct SimOptions {
   sim::Integrator integrator = sim::Integrator::kSemiImplicitEuler;
-  std::int64_t substep_ns = 500'000;  ///< divides the period and every board's control period
+  std::int64_t substep_ns = 250'000;  ///< divides the period and every board's control period
   int order = -1;                     ///< 0 to 3 for every actuator; -1: as robot.toml says
   bool noise = true;                  ///< false: sensors and torque measurement without noise
   bool ground_truth = true;           ///< log the plant's true state beside the measured one

@@ -32,7 +32,7 @@ Status check(const PlantConfig& config) {
     return fail("the robot's kernels were built for another version", "build them again");
   }
   if (config.substep_ns <= 0) {
-    return fail("the plant's sub-step has to be above 0 ns", "500000 is usual");
+    return fail("the plant's sub-step has to be above 0 ns", "250000 is usual");
   }
   if (!(config.rate_limit > 0.0)) {
     return fail("the plausible rate has to be above 0", "1000 is usual");

@@ -38,7 +38,7 @@ struct PlantConfig {
   hal::ContactConfig contact;
   double base_height_m = 0.0;  ///< of the floating base at the start, upright at x = y = 0
   Integrator integrator = Integrator::kSemiImplicitEuler;
-  std::int64_t substep_ns = 500'000;
+  std::int64_t substep_ns = 250'000;
   /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
   bool held = false;
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down

@@ -24,7 +24,7 @@ namespace tandem::sim {
 struct SimRobotConfig {
   std::int64_t period_ns = 1'000'000;  ///< of the loop
   Integrator integrator = Integrator::kSemiImplicitEuler;
-  std::int64_t substep_ns = 500'000;
+  std::int64_t substep_ns = 250'000;
   std::string posture;                      ///< where the robot starts; empty: every joint at 0
   bool hold = true;                         ///< hoist and brakes until every drive is enabled
   std::int64_t release_ns = 1'000'000'000;  ///< in which the hoist lets the base down
