@@ -14,7 +14,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kExact = 1e-14;   // below this a constant is rounding noise
+constexpr double kExact = 1e-14;    // below this a constant is rounding noise
 constexpr double kParallel = 1e-9;  // candidates only: nothing depends on it but their quality
 
 // Operations of one constant turn, of one component of a constant shift and of an offset.
@@ -137,8 +137,8 @@ std::vector<Placement> align_frames(const Tree& tree) {
       double best = std::numeric_limits<double>::infinity();
       std::size_t best_index = 0;
       for (std::size_t c = 0; c < own.candidates.size(); ++c) {
-        const double cost = own.subtree_cost[c] +
-                            edge_cost(tree, j, parent.candidates[p], own.candidates[c]);
+        const double cost =
+            own.subtree_cost[c] + edge_cost(tree, j, parent.candidates[p], own.candidates[c]);
         if (cost < best - 1e-9) {
           best = cost;
           best_index = c;

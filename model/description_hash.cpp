@@ -27,8 +27,8 @@ std::string text_of(const Tree& tree) {
   std::string text = fmt::format("floating {}\n", tree.floating_base);
   for (const Joint& j : tree.joints)
     text += fmt::format("joint '{}' {} {}{}{}\n", j.name, j.parent,
-                        j.type == JointType::kPrismatic ? "prismatic" : "revolute",
-                        text_of(j.axis), text_of(j.in_parent));
+                        j.type == JointType::kPrismatic ? "prismatic" : "revolute", text_of(j.axis),
+                        text_of(j.in_parent));
   for (const Link& l : tree.links)
     text += fmt::format("link '{}' {} {} '{}' {}{}{}\n", l.name, l.body, l.parent, l.joint,
                         l.moving, text_of(l.in_body), text_of(l.inertia));

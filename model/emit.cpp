@@ -26,11 +26,17 @@ std::string literal(double value) {
 class Emitter {
  public:
   Emitter(const Graph& graph, const TracedKernel& kernel, std::uint32_t part_operations)
-      : nodes_(graph.nodes()), kernel_(kernel), part_operations_(part_operations),
-        live_(live_nodes(graph, kernel.outputs)), uses_(nodes_.size(), 0),
-        part_of_(nodes_.size(), kNowhere), last_part_(nodes_.size(), 0),
-        slot_(nodes_.size(), kNowhere), angle_(nodes_.size(), kNowhere),
-        text_(nodes_.size()), outputs_of_(nodes_.size()) {
+      : nodes_(graph.nodes()),
+        kernel_(kernel),
+        part_operations_(part_operations),
+        live_(live_nodes(graph, kernel.outputs)),
+        uses_(nodes_.size(), 0),
+        part_of_(nodes_.size(), kNowhere),
+        last_part_(nodes_.size(), 0),
+        slot_(nodes_.size(), kNowhere),
+        angle_(nodes_.size(), kNowhere),
+        text_(nodes_.size()),
+        outputs_of_(nodes_.size()) {
     result_.name = kernel.shape.name;
     result_.count = count_operations(graph, kernel.outputs);
   }
@@ -216,8 +222,10 @@ class Emitter {
 
   void write_entry() {
     std::string body;
-    if (workspace_ > 0) body += "  double w[" + std::to_string(workspace_) + "];\n";
-    else body += "  double* w = nullptr;\n";
+    if (workspace_ > 0)
+      body += "  double w[" + std::to_string(workspace_) + "];\n";
+    else
+      body += "  double* w = nullptr;\n";
     for (std::size_t k = 0; k < angles_.size(); ++k)
       body += "  w[" + std::to_string(k) + "] = " + early(angles_[k]) + ";\n";
     const std::string n = std::to_string(angles_.size());
@@ -225,7 +233,8 @@ class Emitter {
       body += "  sines_and_cosines(" + n + ", w, w + " + n + ", w + 2 * " + n + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + kernel_.shape.name + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
-    result_.entry = "void " + kernel_.shape.name + "(" + result_.parameters + ") {\n" + body + "}\n";
+    result_.entry =
+        "void " + kernel_.shape.name + "(" + result_.parameters + ") {\n" + body + "}\n";
   }
   std::string early(std::uint32_t i) {
     part_ = kNowhere;
@@ -238,8 +247,8 @@ class Emitter {
   std::uint32_t part_operations_;
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, part_of_, last_part_, slot_, angle_;
-  std::vector<std::string> text_;                         // written where it is used
-  std::vector<std::vector<std::uint32_t>> outputs_of_;    // per node
+  std::vector<std::string> text_;                       // written where it is used
+  std::vector<std::vector<std::uint32_t>> outputs_of_;  // per node
   std::vector<std::string> output_names_;
   std::vector<std::uint32_t> angles_;
   std::vector<std::vector<std::uint32_t>> parts_;

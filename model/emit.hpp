@@ -23,9 +23,9 @@ struct TracedKernel {
 /// the stack, because compilers take far more than twice as long for a function twice as long.
 struct EmittedKernel {
   std::string name;
-  std::string parameters;          ///< "const double* q, …" of the entry
-  std::string entry;               ///< definition
-  std::vector<std::string> parts;  ///< definitions
+  std::string parameters;                 ///< "const double* q, …" of the entry
+  std::string entry;                      ///< definition
+  std::vector<std::string> parts;         ///< definitions
   std::vector<std::string> declarations;  ///< of the parts
   std::vector<std::uint32_t> sizes;       ///< operations of each part
   OperationCount count;

@@ -49,10 +49,9 @@ std::size_t Graph::Hash::operator()(const std::array<std::uint64_t, 3>& key) con
 }
 
 std::uint32_t Graph::intern(const Node& node) {
-  const std::array<std::uint64_t, 3> key{
-      static_cast<std::uint64_t>(node.op),
-      (static_cast<std::uint64_t>(node.a) << 32) | node.b,
-      std::bit_cast<std::uint64_t>(node.value)};
+  const std::array<std::uint64_t, 3> key{static_cast<std::uint64_t>(node.op),
+                                         (static_cast<std::uint64_t>(node.a) << 32) | node.b,
+                                         std::bit_cast<std::uint64_t>(node.value)};
   const auto [entry, added] = known_.try_emplace(key, static_cast<std::uint32_t>(nodes_.size()));
   if (added) nodes_.push_back(node);
   return entry->second;
@@ -108,7 +107,8 @@ Expr operator*(const Expr& a, const Expr& b) {
     return make(graph, Op::kMul, a.node(), constant.node(), a.negative() != constant.negative());
   }
   const bool negative = a.negative() != b.negative();
-  return make(graph, Op::kMul, std::min(a.node(), b.node()), std::max(a.node(), b.node()), negative);
+  return make(graph, Op::kMul, std::min(a.node(), b.node()), std::max(a.node(), b.node()),
+              negative);
 }
 
 Expr operator/(const Expr& a, const Expr& b) {

@@ -25,7 +25,7 @@ struct Node {
 
 /// How many operations a piece of the graph takes.
 struct OperationCount {
-  std::uint32_t add = 0;     ///< additions and subtractions
+  std::uint32_t add = 0;  ///< additions and subtractions
   std::uint32_t mul = 0;
   std::uint32_t div = 0;
   std::uint32_t sqrt = 0;
@@ -45,9 +45,9 @@ class Expr {
       : graph_(graph), node_(node), negative_(negative) {}
 
   [[nodiscard]] bool is_constant() const { return graph_ == nullptr; }
-  [[nodiscard]] double value() const { return value_; }          ///< @pre is_constant()
-  [[nodiscard]] std::uint32_t node() const { return node_; }     ///< @pre !is_constant()
-  [[nodiscard]] bool negative() const { return negative_; }      ///< @pre !is_constant()
+  [[nodiscard]] double value() const { return value_; }       ///< @pre is_constant()
+  [[nodiscard]] std::uint32_t node() const { return node_; }  ///< @pre !is_constant()
+  [[nodiscard]] bool negative() const { return negative_; }   ///< @pre !is_constant()
   [[nodiscard]] Graph* graph() const { return graph_; }
 
   Expr operator-() const;

@@ -34,7 +34,13 @@ class ForwardDynamics {
  public:
   ForwardDynamics(const Mechanism& m, std::span<const S> q, std::span<const S> v,
                   std::span<const S> tau, std::span<const S> wrench, std::span<S> vdot)
-      : m_(m), q_(q), v_(v), tau_(tau), wrench_(wrench), vdot_(vdot), bodies_(m.moments.size()),
+      : m_(m),
+        q_(q),
+        v_(v),
+        tau_(tau),
+        wrench_(wrench),
+        vdot_(vdot),
+        bodies_(m.moments.size()),
         joints_(m.joints.size()) {}
 
   void run() {
@@ -57,7 +63,7 @@ class ForwardDynamics {
   };
   struct JointState {
     JointTransform<S> transform;
-    Vec3<S> Uf, Un;   // the articulated inertia's column of the joint over D: force, moment
+    Vec3<S> Uf, Un;  // the articulated inertia's column of the joint over D: force, moment
     S u_over_D = 0.0;
   };
 

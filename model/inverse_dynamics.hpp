@@ -81,8 +81,8 @@ class SensorWrenches {
   }
 
   Force<S> subtree(int body) const {
-    Force<S> force = inertial_force(m_.true_moments[body], motions_[body]) -
-                     external_force(m_, body, wrench_);
+    Force<S> force =
+        inertial_force(m_.true_moments[body], motions_[body]) - external_force(m_, body, wrench_);
     for (const int j : m_.children[body]) force = force + up(transforms_[j], subtree(j + 1));
     return force;
   }

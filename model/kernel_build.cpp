@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -22,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Variant {
-  std::string name;       // "x86-64-v3"
-  std::string space;      // its C++ namespace
+  std::string name;   // "x86-64-v3"
+  std::string space;  // its C++ namespace
   std::vector<std::string> flags;
 };
 
@@ -61,13 +60,11 @@ std::vector<std::string> compiler_command(const BuildOptions& options) {
   std::vector<std::string> command;
   if (!kDefaultLauncher.empty() && program_exists(std::string(kDefaultLauncher)))
     command.emplace_back(kDefaultLauncher);
-  const char* from_environment = std::getenv("CXX");
+  const std::string built_with(kDefaultCompiler);
   if (!options.compiler.empty()) {
     command.push_back(options.compiler);
-  } else if (from_environment != nullptr && *from_environment != '\0') {
-    command.emplace_back(from_environment);
   } else {
-    command.emplace_back(kDefaultCompiler);
+    command.push_back(program_exists(built_with) ? built_with : "c++");
   }
   return command;
 }
@@ -161,9 +158,25 @@ Status compile(const std::vector<Job>& jobs, const fs::path& directory,
       options.progress(++finished, static_cast<int>(jobs.size()) + 1, jobs[done[seen]].object);
     }
   }
-  if (failed < jobs.size())
-    return std::unexpected(compile_error(directory, jobs[failed].object));
+  if (failed < jobs.size()) return std::unexpected(compile_error(directory, jobs[failed].object));
   return {};
+}
+
+// Writes the sources and compiles what is not up to date: how many files.
+Result<int> compile_stale(const GeneratedKernels& generated, const std::vector<Job>& jobs,
+                          const fs::path& directory, const BuildOptions& options) {
+  for (const auto* files : {&generated.headers, &generated.sources})
+    for (const SourceFile& file : *files)
+      if (Status status = write_if_changed(directory / file.name, file.text); !status)
+        return std::unexpected(status.error());
+  std::vector<Job> stale;
+  for (const Job& job : jobs)
+    if (!fs::exists(directory / job.object) ||
+        read_file(directory / (job.object + ".stamp")) != job.stamp)
+      stale.push_back(job);
+  if (Status status = compile(stale, directory, options); !status)
+    return std::unexpected(status.error());
+  return static_cast<int>(stale.size());
 }
 
 Status link(const std::vector<Job>& jobs, const std::vector<std::string>& compiler,
@@ -200,8 +213,7 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
                 "choose another path for the kernel library");
   const std::vector<std::string> compiler = compiler_command(options);
   if (!program_exists(compiler.back()))
-    return fail("no C++ compiler '" + compiler.back() + "'",
-                "install g++ (apt install g++), or set CXX to a compiler");
+    return fail("no C++ compiler '" + compiler.back() + "'", "install one: apt install g++");
 
   BuildReport report{options.library, generated->hash, false, 0, 0.0, generated->counts};
   const std::vector<Job> jobs = make_jobs(*generated, compiler);
@@ -212,25 +224,13 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
     report.was_up_to_date = true;
     return report;
   }
-  for (const auto* files : {&generated->headers, &generated->sources})
-    for (const SourceFile& file : *files)
-      if (Status status = write_if_changed(directory / file.name, file.text); !status)
-        return std::unexpected(status.error());
-  std::vector<Job> stale;
-  for (const Job& job : jobs)
-    if (!fs::exists(directory / job.object) ||
-        read_file(directory / (job.object + ".stamp")) != job.stamp)
-      stale.push_back(job);
-  if (Status status = compile(stale, directory, options); !status)
-    return std::unexpected(status.error());
+  const Result<int> compiled = compile_stale(*generated, jobs, directory, options);
+  if (!compiled) return std::unexpected(compiled.error());
   if (Status status = link(jobs, compiler, directory, library, stamp); !status)
     return std::unexpected(status.error());
-  if (options.progress)
-    options.progress(static_cast<int>(stale.size()) + 1, static_cast<int>(stale.size()) + 1,
-                     library.filename().string());
-  report.compiled = static_cast<int>(stale.size());
-  report.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  report.compiled = *compiled;
+  if (options.progress) options.progress(*compiled + 1, *compiled + 1, library.filename().string());
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
 }
 

@@ -12,7 +12,7 @@ namespace tandem::model {
 
 struct BuildOptions {
   std::string library;   ///< path of the shared library to make
-  std::string compiler;  ///< empty: $CXX, else the compiler that built this program
+  std::string compiler;  ///< empty: the one that built this program, else c++
   int jobs = 0;          ///< compilers at a time; 0: one per core
   /// Called from the caller's thread as files are done: how many of how many, and which.
   std::function<void(int done, int total, const std::string& file)> progress;
@@ -20,10 +20,10 @@ struct BuildOptions {
 
 struct BuildReport {
   std::string library;
-  std::string hash;                  ///< description_hash()
-  bool was_up_to_date = false;       ///< nothing was compiled
-  int compiled = 0;                  ///< files
-  double seconds = 0.0;              ///< wall time of compiling and linking
+  std::string hash;             ///< description_hash()
+  bool was_up_to_date = false;  ///< nothing was compiled
+  int compiled = 0;             ///< files
+  double seconds = 0.0;         ///< wall time of compiling and linking
   std::vector<KernelCount> counts;
 };
 

@@ -28,10 +28,9 @@ Result<KernelLibrary> load_kernels(const std::string& path, const std::string& h
   void* handle = dlopen(absolute.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) return refuse(path, std::string("cannot load: ") + dlerror(), kBuildHint);
   library.handle_ = std::shared_ptr<void>(handle, [](void* h) { dlclose(h); });
-  const auto get = reinterpret_cast<decltype(&tandem_kernels_get)>(
-      dlsym(handle, "tandem_kernels_get"));
-  if (get == nullptr)
-    return refuse(path, "is a library, but has no robot's kernels", kBuildHint);
+  const auto get =
+      reinterpret_cast<decltype(&tandem_kernels_get)>(dlsym(handle, "tandem_kernels_get"));
+  if (get == nullptr) return refuse(path, "is a library, but has no robot's kernels", kBuildHint);
   const tandem_kernels* best = get(nullptr);
   if (best->abi != TANDEM_KERNELS_ABI)
     return refuse(path,

@@ -95,8 +95,8 @@ Matrix3d from_rpy(const std::array<double, 3>& rpy) {
 struct Maker {
   const Tree& tree;
   const ModelSpec& spec;
-  std::vector<Placement> frames;      // chosen frame of each body, in the description's
-  std::vector<int> site_link;         // per site
+  std::vector<Placement> frames;  // chosen frame of each body, in the description's
+  std::vector<int> site_link;     // per site
   Mechanism result;
 
   Placement in_frame(int body, const Placement& in_described) const {
@@ -105,6 +105,7 @@ struct Maker {
   void bodies();
   Status armature();
   Status sites();
+  void gather_beyond(int first, MechanismSensor& sensor) const;
   Status sensor(const SensorSpec& sensor);
   Status sensors();
 };
@@ -162,6 +163,27 @@ Status Maker::sites() {
   return {};
 }
 
+// What hangs on the link `first`: on its own body masses and sites, and the joints that leave it.
+void Maker::gather_beyond(int first, MechanismSensor& sensor) const {
+  std::vector<bool> beyond(tree.links.size(), false);
+  for (std::size_t i = static_cast<std::size_t>(first); i < tree.links.size(); ++i) {
+    const Link& link = tree.links[i];
+    beyond[i] = static_cast<int>(i) == first || (link.parent >= 0 && beyond[link.parent]);
+    if (!beyond[i]) continue;
+    if (link.body == sensor.body)
+      add_to(sensor.beyond, moments_of(in_frame(sensor.body, link.in_body) * link.inertia));
+    const bool starts_here = link.moving >= 0 && static_cast<int>(i) != first;
+    if (starts_here && tree.joints[link.moving].parent == sensor.body)
+      sensor.joints.push_back(link.moving);
+  }
+  drop_noise(sensor.beyond, result.mass_kg);
+  for (std::size_t s = 0; s < result.sites.size(); ++s) {
+    const MechanismSite& site = result.sites[s];
+    if (site.wrench >= 0 && site.body == sensor.body && beyond[site_link[s]])
+      sensor.sites.push_back(static_cast<int>(s));
+  }
+}
+
 Status Maker::sensor(const SensorSpec& spec_of) {
   const std::string user = "sensor '" + spec_of.name + "'";
   const int first = tree.child_link_index(spec_of.joint);
@@ -183,19 +205,7 @@ Status Maker::sensor(const SensorSpec& spec_of) {
                     spec_of.joint + "'",
                 "name a link that the joint carries, or one that carries the joint");
   }
-  std::vector<bool> beyond(tree.links.size(), false);
-  for (std::size_t i = static_cast<std::size_t>(first); i < tree.links.size(); ++i) {
-    const Link& link = tree.links[i];
-    beyond[i] = static_cast<int>(i) == first || (link.parent >= 0 && beyond[link.parent]);
-    if (beyond[i] && link.body == sensor.body)
-      add_to(sensor.beyond, moments_of(in_frame(sensor.body, link.in_body) * link.inertia));
-    if (beyond[i] && link.moving >= 0 && tree.joints[link.moving].parent == sensor.body)
-      sensor.joints.push_back(link.moving);
-  }
-  drop_noise(sensor.beyond, result.mass_kg);
-  for (std::size_t s = 0; s < result.sites.size(); ++s)
-    if (result.sites[s].wrench >= 0 && result.sites[s].body == sensor.body && beyond[site_link[s]])
-      sensor.sites.push_back(static_cast<int>(s));
+  gather_beyond(first, sensor);
   sensor.in_body = fixed_placement(in_frame(tree.links[frame].body, tree.links[frame].in_body));
   result.sensors.push_back(std::move(sensor));
   result.sensor_names.push_back(spec_of.name);

@@ -26,7 +26,7 @@ struct MechanismJoint {
   int parent = 0;
   bool prismatic = false;
   FixedPlacement in_parent;
-  double offset = 0.0;   ///< revolute only [rad]
+  double offset = 0.0;  ///< revolute only [rad]
   double cos_offset = 1.0;
   double sin_offset = 0.0;
   double armature = 0.0;
@@ -36,30 +36,30 @@ struct MechanismJoint {
 struct MechanismSite {
   int body = 0;
   FixedPlacement in_body;
-  int wrench = -1;       ///< index among the wrenches, -1: none may act here
+  int wrench = -1;  ///< index among the wrenches, -1: none may act here
 };
 
 /// The wrench through a joint of the description: that of all that lies beyond it.
 struct MechanismSensor {
-  int body = 0;                    ///< holds the far side of the joint
-  Moments<double> beyond;          ///< of that body's part beyond the joint, in its frame
-  std::vector<int> joints;         ///< moving joints that start beyond, on that body
-  std::vector<int> sites;          ///< sites with a wrench beyond, on that body
-  int through = -1;                ///< joint that leads from frame_body to body; -1: the same
-  FixedPlacement in_body;          ///< the sensor's frame in its body (body, or its parent)
+  int body = 0;             ///< holds the far side of the joint
+  Moments<double> beyond;   ///< of that body's part beyond the joint, in its frame
+  std::vector<int> joints;  ///< moving joints that start beyond, on that body
+  std::vector<int> sites;   ///< sites with a wrench beyond, on that body
+  int through = -1;         ///< joint that leads from frame_body to body; -1: the same
+  FixedPlacement in_body;   ///< the sensor's frame in its body (body, or its parent)
 };
 
 struct Mechanism {
   bool floating_base = false;
   Vec3<double> gravity{0.0, 0.0, -9.81};
   std::vector<MechanismJoint> joints;
-  std::vector<std::vector<int>> children;   ///< per body: the joints that start there
-  std::vector<Moments<double>> moments;     ///< per body, regrouped
+  std::vector<std::vector<int>> children;     ///< per body: the joints that start there
+  std::vector<Moments<double>> moments;       ///< per body, regrouped
   std::vector<Moments<double>> true_moments;  ///< per body, as described
   std::vector<MechanismSite> sites;
   std::vector<MechanismSensor> sensors;
   int wrenches = 0;
-  double mass_kg = 0.0;                     ///< of everything that moves
+  double mass_kg = 0.0;  ///< of everything that moves
   std::vector<std::string> joint_names, site_names, wrench_names, sensor_names;
 
   [[nodiscard]] int joint_count() const { return static_cast<int>(joints.size()); }

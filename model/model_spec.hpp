@@ -23,16 +23,16 @@ struct SiteSpec {
 struct SensorSpec {
   std::string name;
   std::string joint;
-  std::string frame_link;           ///< the frame that the wrench is expressed in; on either
-                                    ///< side of the joint
+  std::string frame_link;  ///< the frame that the wrench is expressed in; on either
+                           ///< side of the joint
 };
 
 /// Everything that the kernels of one robot depend on, beyond the description file's content.
 struct ModelSpec {
-  std::string robot;                ///< the name kernels report
-  std::string urdf;                 ///< path of the description
+  std::string robot;  ///< the name kernels report
+  std::string urdf;   ///< path of the description
   bool floating_base = false;
-  bool mimic_independent = false;   ///< treat mimic joints as independent; else they are refused
+  bool mimic_independent = false;  ///< treat mimic joints as independent; else they are refused
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
   std::vector<SiteSpec> sites;

@@ -63,9 +63,9 @@ template <class S>
 template <class T>
 struct Turn {
   int axis = 2;
-  T c = 1.0;  ///< cosine
-  T s = 0.0;  ///< sine
-  T c2 = 2.0; ///< twice the cosine
+  T c = 1.0;   ///< cosine
+  T s = 0.0;   ///< sine
+  T c2 = 2.0;  ///< twice the cosine
 
   [[nodiscard]] Turn inverse() const { return {axis, c, -s, c2}; }
 };
@@ -124,7 +124,7 @@ template <class S, class T>
 /// R = turns[0] turns[1] … P.
 struct FixedRotation {
   std::vector<Turn<double>> turns;
-  std::array<int, 3> from{0, 1, 2};            ///< (P v)[r] = sign[r] v[from[r]]
+  std::array<int, 3> from{0, 1, 2};  ///< (P v)[r] = sign[r] v[from[r]]
   std::array<double, 3> sign{1.0, 1.0, 1.0};
 };
 

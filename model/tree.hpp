@@ -35,44 +35,44 @@ enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 /// the frame of body i + 1 at q = 0.
 struct Joint {
   std::string name;
-  int parent = 0;                   ///< body; always smaller than i + 1
+  int parent = 0;  ///< body; always smaller than i + 1
   JointType type = JointType::kRevolute;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit length, in the joint's frame
-  Placement in_parent;              ///< the joint's frame (q = 0) in the parent body's frame
+  Placement in_parent;  ///< the joint's frame (q = 0) in the parent body's frame
   double lower = -std::numeric_limits<double>::infinity();  ///< position [rad or m]
   double upper = std::numeric_limits<double>::infinity();
   double velocity = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s]
   double effort = std::numeric_limits<double>::infinity();    ///< [Nm or N]
-  int line = 0;                     ///< in the description; 0 when unknown
+  int line = 0;  ///< in the description; 0 when unknown
 };
 
 /// What moves as one piece: a link and all that is fixed to it.
 struct Body {
-  std::string name;                 ///< of the link whose frame is the body's frame
-  Inertia inertia;                  ///< of all its links together, in the body's frame
+  std::string name;  ///< of the link whose frame is the body's frame
+  Inertia inertia;   ///< of all its links together, in the body's frame
 };
 
 /// A link of the description. Its frame is that of the joint that leads to it.
 struct Link {
   std::string name;
-  int body = 0;                     ///< the body it is part of
-  Placement in_body;                ///< its frame in the body's frame
-  Inertia inertia;                  ///< its own, in its own frame; mass 0 when it has none
-  int parent = -1;                  ///< link; smaller than its own index; -1: the root
-  std::string joint;                ///< from the parent to it, moving or fixed; empty: the root
-  int moving = -1;                  ///< index in `joints` when that joint moves, else -1
+  int body = 0;       ///< the body it is part of
+  Placement in_body;  ///< its frame in the body's frame
+  Inertia inertia;    ///< its own, in its own frame; mass 0 when it has none
+  int parent = -1;    ///< link; smaller than its own index; -1: the root
+  std::string joint;  ///< from the parent to it, moving or fixed; empty: the root
+  int moving = -1;    ///< index in `joints` when that joint moves, else -1
 };
 
 /// Joints, bodies and links stand in the model's order: depth first from the root, the children
 /// of a link by the name of their joint (fixed ones count in that order, though they make no
 /// body of their own). A locked joint is a fixed one.
 struct Tree {
-  std::string name;                 ///< the description's robot name
-  std::string file;                 ///< the description's path; may be empty
-  bool floating_base = false;       ///< body 0 moves freely, else it is fixed to the world
+  std::string name;            ///< the description's robot name
+  std::string file;            ///< the description's path; may be empty
+  bool floating_base = false;  ///< body 0 moves freely, else it is fixed to the world
   std::vector<Joint> joints;
-  std::vector<Body> bodies;         ///< joints.size() + 1; body 0 is the root's
-  std::vector<Link> links;          ///< link 0 is the root
+  std::vector<Body> bodies;  ///< joints.size() + 1; body 0 is the root's
+  std::vector<Link> links;   ///< link 0 is the root
 
   [[nodiscard]] int nv() const { return static_cast<int>(joints.size()) + (floating_base ? 6 : 0); }
   [[nodiscard]] int nq() const { return static_cast<int>(joints.size()) + (floating_base ? 7 : 0); }

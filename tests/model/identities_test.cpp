@@ -26,9 +26,7 @@ struct RandomState {
     wrench = array(6 * m.wrenches);
     if (m.floating_base) normalise(q);
   }
-  static void normalise(Array& q) {
-    Eigen::Map<Eigen::Vector4d>(q.data() + 3).normalize();
-  }
+  static void normalise(Array& q) { Eigen::Map<Eigen::Vector4d>(q.data() + 3).normalize(); }
 };
 
 // q moved along v for a time: a first-order step, and for the base's rotation an exact one.
@@ -46,8 +44,7 @@ Array moved(const Mechanism& m, const Array& q, const Array& v, double time) {
     result[5] = next.z();
     result[6] = next.w();
   }
-  for (int j = 0; j < m.joint_count(); ++j)
-    result[m.q_index(j)] += v[m.v_index(j)] * time;
+  for (int j = 0; j < m.joint_count(); ++j) result[m.q_index(j)] += v[m.v_index(j)] * time;
   return result;
 }
 
@@ -74,8 +71,7 @@ TEST_P(Identities, ForwardUndoesInverseDynamicsWithWrenchesAndArmature) {
       const RandomState s(m, seed);
       const Array tau =
           evaluate_kernel(Kernel::kInverseDynamics, m, {s.q, s.v, s.vdot, s.wrench})[0];
-      const Array vdot =
-          evaluate_kernel(Kernel::kForwardDynamics, m, {s.q, s.v, tau, s.wrench})[0];
+      const Array vdot = evaluate_kernel(Kernel::kForwardDynamics, m, {s.q, s.v, tau, s.wrench})[0];
       EXPECT_LE(relative_error(vdot, s.vdot), 1e-9);
     }
   }
@@ -162,8 +158,8 @@ struct FreeMotion {
         for (int i = 0; i < 4; ++i) qdot[3 + i] = rate.coeffs()[i];
       }
       for (int j = 0; j < m.joint_count(); ++j) qdot[m.q_index(j)] = at_v[m.v_index(j)];
-      return std::pair(qdot, evaluate_kernel(Kernel::kForwardDynamics, m,
-                                             {at_q, at_v, torques, none})[0]);
+      return std::pair(
+          qdot, evaluate_kernel(Kernel::kForwardDynamics, m, {at_q, at_v, torques, none})[0]);
     };
     const auto plus = [](Array a, const Array& b, double scale) {
       for (std::size_t i = 0; i < a.size(); ++i) a[i] += scale * b[i];

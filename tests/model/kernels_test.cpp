@@ -80,8 +80,16 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
     const Array q = flat(state["q"]);
     const Array v = flat(state["v"]);
     const Array a = flat(state["a"]);
-    const Arrays all[] = {{q, v, flat(state["tau"]), wrench}, {q, v, a, wrench}, {q}, {q, v},
-                          {q, v}, {q, v}, {q, v}, {q, v, a}, {q}, {q, v, a, wrench}};
+    const Arrays all[] = {{q, v, flat(state["tau"]), wrench},
+                          {q, v, a, wrench},
+                          {q},
+                          {q, v},
+                          {q, v},
+                          {q, v},
+                          {q, v},
+                          {q, v, a},
+                          {q},
+                          {q, v, a, wrench}};
     for (int k = 0; k < kKernels; ++k) {
       const Kernel kernel = static_cast<Kernel>(k);
       const Arrays expected = evaluate_kernel(kernel, mechanism, all[k]);
@@ -117,9 +125,10 @@ TEST_P(CompiledKernels, SayWhatTheyAre) {
 
 INSTANTIATE_TEST_SUITE_P(
     Robots, CompiledKernels,
-    testing::Values(Compiled{"double_pendulum", "baseline"}, Compiled{"double_pendulum", "x86-64-v3"},
-                    Compiled{"ur5e", "baseline"}, Compiled{"ur5e", "x86-64-v3"},
-                    Compiled{"coman", "baseline"}, Compiled{"coman", "x86-64-v3"}),
+    testing::Values(Compiled{"double_pendulum", "baseline"},
+                    Compiled{"double_pendulum", "x86-64-v3"}, Compiled{"ur5e", "baseline"},
+                    Compiled{"ur5e", "x86-64-v3"}, Compiled{"coman", "baseline"},
+                    Compiled{"coman", "x86-64-v3"}),
     [](const auto& test) {
       std::string name = std::string(test.param.robot) + "_" + test.param.variant;
       for (char& c : name) c = c == '-' ? '_' : c;
@@ -149,8 +158,8 @@ TEST(Kernels, SinesAndCosinesAreThoseOfLibmWithinTwoUlp) {
 TEST(Kernels, AStateThatIsNotFiniteGivesResultsThatAreNotFinite) {
   const auto library = load_kernels(built_library("ur5e"));
   ASSERT_TRUE(library);
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
-                           std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const Array q{0.1, bad, 0.3, 0.4, 0.5, 0.6};
     const Array v(6, 0.1);
     const Array wrench(6 * (*library)->wrenches, 0.0);

@@ -35,7 +35,7 @@ INSTANTIATE_TEST_SUITE_P(Robots, Reference, testing::ValuesIn(kReferenceRobots),
 
 // Robotran moves the base by T1 T2 T3 R1 R2 R3. Its rates in terms of ours: v = B rates.
 struct RobotranBase {
-  Eigen::Matrix3d R;              // base to world
+  Eigen::Matrix3d R;  // base to world
   Eigen::Matrix<double, 6, 6> B;
   Eigen::Matrix<double, 6, 1> Bdot_rates;
 
@@ -57,8 +57,7 @@ struct RobotranBase {
     const Vector3d w = u1 * rates[3] + u2 * rates[4] + z * rates[5];
     const Vector3d linear = R.transpose() * Vector3d(rates[0], rates[1], rates[2]);
     const Vector3d u1_dot =
-        Rz.transpose() *
-            (-rates[4] * Vector3d::UnitY()).cross(Ry.transpose() * Vector3d::UnitX()) -
+        Rz.transpose() * (-rates[4] * Vector3d::UnitY()).cross(Ry.transpose() * Vector3d::UnitX()) -
         rates[5] * z.cross(u1);
     const Vector3d u2_dot = -rates[5] * z.cross(u2);
     Bdot_rates.head<3>() = -w.cross(linear);
@@ -67,8 +66,8 @@ struct RobotranBase {
 };
 
 struct RobotranState {
-  Array q, v, bdot;     // ours; bdot = Bdot rates, to be added to B accelerations
-  Eigen::MatrixXd B;    // of all coordinates, rows in our order
+  Array q, v, bdot;   // ours; bdot = Bdot rates, to be added to B accelerations
+  Eigen::MatrixXd B;  // of all coordinates, rows in our order
 };
 
 RobotranState convert(const nlohmann::json& state, const nlohmann::json& coordinates,
@@ -102,8 +101,8 @@ TEST(Robotran, ItsMassMatrixBiasAndTorquesOfWalkmanAreOurs) {
     const RobotranState s = convert(state, reference["coordinates"], m);
     ASSERT_EQ(s.q.size(), static_cast<std::size_t>(m.nq()));
     const Array M_ours = evaluate_kernel(Kernel::kMassMatrix, m, {s.q})[0];
-    const Eigen::MatrixXd M = s.B.transpose() *
-                              Eigen::Map<const Eigen::MatrixXd>(M_ours.data(), m.nv(), m.nv()) * s.B;
+    const Eigen::MatrixXd M =
+        s.B.transpose() * Eigen::Map<const Eigen::MatrixXd>(M_ours.data(), m.nv(), m.nv()) * s.B;
     const Array expected_M = full_from_lower(state["M_lower"]);
     EXPECT_LE(relative_error(Array(M.data(), M.data() + M.size()), expected_M), kTolerance);
 

@@ -16,12 +16,14 @@ std::string arm_with(const std::string& sensor_joint) {
   const auto joint = [](const std::string& name, const std::string& type, const std::string& parent,
                         const std::string& child, const std::string& axis) {
     return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent +
-           "'/><child link='" + child + "'/><origin xyz='0.1 -0.2 0.3' rpy='0.3 -0.4 0.5'/><axis xyz='" +
-           axis + "'/><limit lower='-9' upper='9' velocity='9' effort='9'/></joint>";
+           "'/><child link='" + child +
+           "'/><origin xyz='0.1 -0.2 0.3' rpy='0.3 -0.4 0.5'/><axis xyz='" + axis +
+           "'/><limit lower='-9' upper='9' velocity='9' effort='9'/></joint>";
   };
   return "<robot name='arm'>" + link("base", "0 0.1 0", 3) + link("cart", "0.1 0 0", 2) +
          link("pole", "0 0 0.4", 1.5) + link("hand", "0 0.05 0.1", 0.7) +
-         link("finger", "0.02 0 0.03", 0.3) + joint("slide", "prismatic", "base", "cart", "1 2 0.5") +
+         link("finger", "0.02 0 0.03", 0.3) +
+         joint("slide", "prismatic", "base", "cart", "1 2 0.5") +
          joint("swing", "continuous", "cart", "pole", "0 1 0.2") + sensor_joint +
          joint("grip", "prismatic", "hand", "finger", "0 0 1") + "</robot>";
 }
@@ -80,19 +82,16 @@ TEST_P(SensorOfAnArm, MeasuresMinusTheForcesOfSixJointsInItsPlace) {
       a->insert(a->begin(), twist.begin(), twist.end());
   }
   const Array wrench{1, 2, 3, 0.4, 0.5, 0.6, -3, 2, -1, 0.3, 0.2, 0.1};
-  const Array measured =
-      evaluate_kernel(Kernel::kSensorWrenches, rigid, {q, v, vdot, wrench})[0];
+  const Array measured = evaluate_kernel(Kernel::kSensorWrenches, rigid, {q, v, vdot, wrench})[0];
   const Array tau =
       evaluate_kernel(Kernel::kInverseDynamics, free, {free_q, free_v, free_vdot, wrench})[0];
   const std::size_t first = floating ? 8 : 2;
   const double scale = 30.0;  // weights and forces of this example
-  for (std::size_t i = 0; i < 6; ++i)
-    EXPECT_NEAR(measured[i], -tau[first + i], 1e-13 * scale) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(measured[i], -tau[first + i], 1e-13 * scale) << i;
 }
 
-INSTANTIATE_TEST_SUITE_P(Base, SensorOfAnArm, testing::Bool(), [](const auto& test) {
-  return test.param ? "Floating" : "Fixed";
-});
+INSTANTIATE_TEST_SUITE_P(Base, SensorOfAnArm, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Floating" : "Fixed"; });
 
 TEST(Sensor, ThroughAMovingJointShowsItsTorqueAndTheWeightOnIt) {
   const ReferenceRobot& robot = reference_robot("ur5e");
