@@ -33,7 +33,7 @@ struct FaultRecord {
 struct Fault {
   double time_s = 0.0;
   std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole
-  std::string text;   ///< one sentence, beginning with `joint`
+  std::string text;   ///< one sentence, without `joint`
 };
 
 }  // namespace tandem::runtime

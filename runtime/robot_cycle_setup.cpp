@@ -127,7 +127,6 @@ Fault RobotCycle::tell(const FaultRecord& record) const {
       fault.text = "the drives were not enabled in time: " + backend_->status_text();
       break;
   }
-  if (!fault.joint.empty()) fault.text = fault.joint + ": " + fault.text;
   return fault;
 }
 

@@ -137,7 +137,7 @@ TEST(RobotCycle, ShutsDownWhenADriveOfCategory1Faults) {
   const auto faults = run.cycle->faults();
   ASSERT_EQ(faults.size(), 1U);
   EXPECT_EQ(faults[0].joint, "elbow");
-  EXPECT_EQ(faults[0].text, "elbow: the drive reports error 0x7310");
+  EXPECT_EQ(faults[0].text, "the drive reports error 0x7310");
   EXPECT_DOUBLE_EQ(faults[0].time_s, 0.1);
   EXPECT_EQ(run.backend.idle_writes, 0U);
 }
@@ -191,7 +191,7 @@ TEST(RobotCycle, NoticesAJointWhoseFeedbackStops) {
   run.steps(1);
   EXPECT_EQ(run.cycle->phase(), RunPhase::kShutDown);
   EXPECT_EQ(run.cycle->faults().at(0).joint, "wrist");
-  EXPECT_EQ(run.cycle->faults().at(0).text, "wrist: no feedback for 11 cycles");
+  EXPECT_EQ(run.cycle->faults().at(0).text, "no feedback for 11 cycles");
 }
 
 TEST(RobotCycle, TellsOnceOfASensorThatIsLostAndGoesOn) {
@@ -220,7 +220,7 @@ TEST(RobotCycle, NamesTheControllerThatGivesUp) {
   run.controller->answer = Code::kOutOfRange;
   run.cycle->run();
   EXPECT_EQ(run.cycle->faults().at(0).joint, "sine");
-  EXPECT_EQ(run.cycle->faults().at(0).text, "sine: the controller gave up: OutOfRange");
+  EXPECT_EQ(run.cycle->faults().at(0).text, "the controller gave up: OutOfRange");
 }
 
 TEST(RobotCycle, EndsAtOnceWhenTheSimulationDiverges) {

@@ -1,0 +1,124 @@
+// COMAN's squat as `tandem run` runs it: experiment, generated kernels, plugin, whole chain, log.
+// Every cycle is under the real-time trap; the preset rtsan checks the same runs.
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "controllers/plugin_loader.hpp"
+#include "log/log_file.hpp"
+#include "model/kernel_library.hpp"
+#include "rt/clock.hpp"
+#include "runtime/experiment.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/log/scratch_folder.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+constexpr std::uint64_t kRunning = 1500;  // cycles: into the first descent
+
+/// The experiment, composed and ready to run.
+struct Squat {
+  explicit Squat(double rate = 0.0, log::Recorder* recorder = nullptr) {
+    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/coman/squat.toml");
+    if (!read) {
+      ADD_FAILURE() << read.error().at(0).to_string();
+      return;
+    }
+    experiment = std::make_unique<Experiment>(std::move(*read));
+    experiment->loop.rate = rate;
+    compose(recorder);
+  }
+  void compose(log::Recorder* recorder) {
+    const std::string library = std::string(TANDEM_BINARY_DIR) + "/lib/models/coman_kernels.so";
+    auto loaded = model::load_kernels(library);
+    ASSERT_TRUE(loaded) << loaded.error().to_string();
+    kernels = *loaded;
+    Experiment& e = *experiment;
+    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
+    for (const ControllerSpec& spec : e.controllers) {
+      auto plugin = load_controller(spec.plugin, {std::string(TANDEM_BINARY_DIR) +
+                                                  "/lib/controllers"});
+      ASSERT_TRUE(plugin) << plugin.error().to_string();
+      const Status added = host->add(spec.name, std::move(*plugin), spec.parameters);
+      ASSERT_TRUE(added) << added.error().to_string();
+    }
+    auto made = sim::SimRobot::create(e.robot, kernels.get(), e.sim_robot_config());
+    ASSERT_TRUE(made) << made.error().to_string();
+    backend = std::move(*made);
+    const CycleConfig config{.loop = e.loop, .running_cycles = kRunning};
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{e.robot, *backend, *host, clock, recorder, &backend->truth()}, config);
+  }
+  void run_to(RunPhase phase) {
+    while (cycle->phase() != phase && cycle->step()) {
+    }
+    ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
+  }
+
+  std::unique_ptr<Experiment> experiment;
+  model::KernelLibrary kernels;
+  rt::WallClock clock;
+  std::unique_ptr<ControllerHost> host;
+  std::unique_ptr<sim::SimRobot> backend;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST(SquatRun, RunsWithoutAFaultUnderTheTrap) {
+  Squat squat;
+  ASSERT_NE(squat.cycle, nullptr);
+  squat.cycle->run();
+  for (const Fault& fault : squat.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
+  EXPECT_EQ(squat.cycle->running_cycles(), kRunning);
+}
+
+std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded = false) {
+  auto recorder = log::Recorder::open(path, {}, {});
+  EXPECT_TRUE(recorder);
+  Squat squat(rate, recorder->get());
+  if (squat.cycle == nullptr) return {};
+  std::atomic<bool> done{false};
+  std::thread load([&] {
+    double sum = 0.0;
+    while (loaded && !done.load()) sum += std::sin(sum + 1.0);
+  });
+  squat.cycle->run();
+  done = true;
+  load.join();
+  const log::RecordingResult result = (*recorder)->close();
+  EXPECT_EQ(result.dropped, 0U);
+  EXPECT_EQ(result.error, "");
+  return result.data_sha256;
+}
+
+TEST(SquatRun, LogsTheSameDataForTheSameSeedWhateverTheRateAndTheLoad) {
+  const log::ScratchFolder folder;
+  const std::string first = hash_of_run(folder / "1.mcap");
+  EXPECT_EQ(hash_of_run(folder / "2.mcap"), first);
+  EXPECT_EQ(hash_of_run(folder / "rate.mcap", 5.0), first);
+  EXPECT_EQ(hash_of_run(folder / "load.mcap", 0.0, true), first);
+}
+
+TEST(SquatRun, RepeatsItsBytesAfterARestore) {
+  Squat squat;
+  ASSERT_NE(squat.cycle, nullptr);
+  squat.run_to(RunPhase::kRunning);
+  for (int i = 0; i < 400; ++i) ASSERT_TRUE(squat.cycle->step());
+  const auto snapshot = squat.cycle->save();
+  ASSERT_TRUE(snapshot) << snapshot.error().to_string();
+  std::vector<std::byte> bytes[2];
+  for (std::vector<std::byte>& all : bytes) {
+    for (int i = 0; i < 300; ++i) {
+      ASSERT_TRUE(squat.cycle->step());
+      for (const auto one : {squat.cycle->state().bytes(), squat.cycle->command().bytes(),
+                             squat.backend->truth().bytes()}) {
+        all.insert(all.end(), one.begin(), one.end());
+      }
+    }
+    ASSERT_TRUE(squat.cycle->restore(*snapshot));
+  }
+  EXPECT_TRUE(bytes[0] == bytes[1]);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
