@@ -259,8 +259,10 @@ TEST_P(BackendConformance, TorqueReferenceShowsInTheMeasuredTorque) {
   const double before = devices.torque.ref_torque_Nm(j);
   ASSERT_EQ(devices.torque.set_ref_torque(j, before + rig.it.torque_Nm), Code::kOk);
   rig.run(0.1);
-  const double measured = rig.mean([&] { return devices.torque.torque_Nm(j); }, 0.1);
-  EXPECT_NEAR(measured - before, rig.it.torque_Nm, 0.3 * rig.it.torque_Nm);
+  const double change = rig.mean([&] { return devices.torque.torque_Nm(j); }, 0.1) - before;
+  // The joint is free: what its rotor's inertia and friction take does not reach the link.
+  EXPECT_GT(change, 0.3 * rig.it.torque_Nm);
+  EXPECT_LT(change, 1.3 * rig.it.torque_Nm);
 }
 
 TEST_P(BackendConformance, OpenLoopVoltageIsAppliedAndDrivesTheMotor) {
