@@ -12,7 +12,7 @@ namespace tandem::report {
 enum class CurveStyle : std::uint8_t {
   kMeasured,    ///< solid, blue
   kReference,   ///< dashed, orange: what was asked for
-  kComputed,    ///< dashed, green: what a model says
+  kComputed,    ///< dashed, orange: what a model says
   kSecond,      ///< solid, purple: the other side, or the other log
   kThird,       ///< solid, grey
   kStick,       ///< solid with round joints, blue
@@ -34,10 +34,11 @@ struct Note {
   double y = 0.0;
 };
 
-/// A horizontal line across the plot, with its label in the key.
+/// A horizontal line across the plot, with its label at the right end.
 struct Level {
   std::string label;
   double y = 0.0;
+  bool label_below = false;
 };
 
 struct Figure {

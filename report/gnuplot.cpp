@@ -25,20 +25,19 @@ constexpr std::size_t kMostPoints = 1600;
 const char kSettings[] = R"(set encoding utf8
 set border 3 lw 1 lc rgb '#5b6470'
 set tics nomirror out scale 0.6 textcolor rgb '#3a424c'
-set tmargin 5
 set grid lw 1 lc rgb '#e3e7ec' lt 1 dt solid
 set xlabel textcolor rgb '#3a424c'
 set ylabel textcolor rgb '#3a424c'
-set style line 1 lw 2.4 lc rgb '#1f5fa8' dt solid
-set style line 2 lw 2.0 lc rgb '#e07b00' dt (9,5)
-set style line 3 lw 2.0 lc rgb '#1b8a5a' dt (9,5)
+set style line 1 lw 3.4 lc rgb '#1f5fa8' dt solid
+set style line 2 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
+set style line 3 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
 set style line 4 lw 2.0 lc rgb '#8e4aa8' dt solid
 set style line 5 lw 1.6 lc rgb '#8a939e' dt solid
 set style line 6 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
 set style line 7 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
 set style line 8 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
 set style line 9 lw 1.8 lc rgb "#3a424c" dt (3,4)
-set key at graph 0, graph 1.085 left top horizontal reverse Left samplen 2.6 width 1 maxrows 1
+set key at graph 0, graph 1.085 left top horizontal reverse Left samplen 1.8 font ',12'
 )";
 
 int line_style(CurveStyle style) { return static_cast<int>(style) + 1; }
@@ -85,7 +84,8 @@ struct Extent {
 };
 
 /// Ranges of both axes. With equal axes the room beside the figure is shared on both sides.
-std::string ranges(const Figure& figure) {
+/// @param aspect  width by height of the drawing area.
+std::string ranges(const Figure& figure, double aspect) {
   Extent x;
   Extent y;
   for (const Curve& curve : figure.curves) {
@@ -96,10 +96,10 @@ std::string ranges(const Figure& figure) {
   for (const Note& note : figure.notes) y.include(note.y);
   y.widen(0.08);
   if (figure.equal_axes) {
-    constexpr double kAspect = 2.1;  // of the plots' drawing area, width by height
-    const double missing = kAspect * (y.high - y.low) - (x.high - x.low);
-    x.low -= std::max(0.5 * missing, 0.1);
-    x.high += std::max(0.5 * missing, 0.1);
+    const double wide = std::max(1.06 * (x.high - x.low), aspect * (y.high - y.low));
+    const double more = 0.5 * (wide - (x.high - x.low));
+    x = {x.low - more, x.high + more};
+    y.high = y.low + wide / aspect;
   } else {
     x.widen(0.0);
   }
@@ -119,29 +119,49 @@ std::string plot_command(const Figure& figure, std::size_t index) {
                        line_style(curve.style), title);
   }
   for (const Level& level : figure.levels) {
-    out += fmt::format("{}{:.9g} with lines ls 9 title {} noenhanced",
-                       out.empty() ? "plot " : ", ", level.y, quoted(level.label));
+    out += fmt::format("{}{:.9g} with lines ls 9 notitle", out.empty() ? "plot " : ", ", level.y);
   }
   return out + "\n";
 }
 
 /// Everything of one figure but terminal and output.
-std::string body(const Figure& figure, std::size_t index) {
-  std::string out = "unset label\n" + ranges(figure);
+std::string body(const Figure& figure, std::size_t index, double aspect) {
+  std::string out = "unset label\n" + ranges(figure, aspect);
   out += fmt::format("set label 1 {} at graph 0, graph 1.145 left font ',15' "
                      "textcolor rgb '#1d242c' noenhanced\n",
                      quoted(figure.title));
-  for (std::size_t i = 0; i < figure.notes.size(); ++i) {
-    const Note& note = figure.notes[i];
-    out += fmt::format("set label {} {} at {:.6g},{:.6g} center textcolor rgb '#3a424c' "
-                       "noenhanced\n",
-                       i + 2, quoted(note.text), note.x, note.y);
+  for (const Note& note : figure.notes) {
+    out += fmt::format("set label {} at {:.6g},{:.6g} center textcolor rgb '#3a424c' noenhanced\n",
+                       quoted(note.text), note.x, note.y);
+  }
+  for (const Level& level : figure.levels) {
+    out += fmt::format("set label {} at graph 0.99, first {:.9g} right offset 0,{} font ',12' "
+                       "textcolor rgb '#3a424c' noenhanced front\n",
+                       quoted(level.label), level.y, level.label_below ? "-0.7" : "0.65");
   }
   out += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n",
                      quoted(figure.x_label), quoted(figure.y_label));
-  out += figure.equal_axes ? "set size ratio -1\nset format x ''\n"
-                           : "set size noratio\nset format x\n";
+  out += figure.equal_axes ? "set format x ''\n" : "set format x\n";
   return out + plot_command(figure, index);
+}
+
+/// All figures in two columns, as one picture.
+std::string overview(std::span<const Figure> figures, const std::string& folder) {
+  constexpr double kWidth = 1800.0;
+  constexpr double kRowHeight = 560.0;
+  constexpr double kTop = 0.17, kBottom = 0.13, kBetween = 0.30;  // shares of a row
+  const double rows = static_cast<double>((figures.size() + 1) / 2);
+  const double plot_height = (rows - kTop - kBottom - kBetween * (rows - 1.0)) / rows * kRowHeight;
+  const double aspect = (0.985 - 0.06 - 0.08) / 2.0 * kWidth / plot_height;
+  std::string out = "unset lmargin\nunset rmargin\nunset bmargin\nunset tmargin\n";
+  out += fmt::format("set terminal pngcairo size {:.0f},{:.0f} fontscale 1.15 linewidth 1.4 rounded "
+                     "font 'DejaVu Sans,13'\nset output {}\n",
+                     kWidth, rows * kRowHeight, quoted(folder + "/overview.png"));
+  out += fmt::format("set multiplot layout {:.0f},2 margins 0.06,0.985,{:.4f},{:.4f} "
+                     "spacing 0.08,{:.4f}\n",
+                     rows, kBottom / rows, 1.0 - kTop / rows, kBetween / rows);
+  for (std::size_t f = 0; f < figures.size(); ++f) out += body(figures[f], f, aspect);
+  return out + "unset multiplot\nunset output\n";
 }
 
 Status write_all(int pipe, const std::string& text) {
@@ -212,9 +232,12 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
       out += data_block(block_name(f, c), decimated(figures[f].curves[c], kMostPoints));
     }
   }
+  constexpr double kSingleAspect = (0.975 - 0.105) * 760.0 / ((0.84 - 0.145) * 430.0);
   for (std::size_t f = 0; f < figures.size(); ++f) {
-    const std::string drawing = body(figures[f], f);
+    const std::string drawing = body(figures[f], f, kSingleAspect);
     const std::string path = folder + "/" + figures[f].name;
+    out += "set lmargin at screen 0.105\nset rmargin at screen 0.975\n"
+           "set bmargin at screen 0.145\nset tmargin at screen 0.84\n";
     out += "set terminal svg size 760,430 dynamic rounded font 'DejaVu Sans,13' background "
            "rgb '#ffffff'\n";
     out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".svg"), drawing);
@@ -222,18 +245,7 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
            "font 'DejaVu Sans,13'\n";
     out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".png"), drawing);
   }
-  const std::size_t rows = (figures.size() + 1) / 2;
-  out += fmt::format(
-      "set terminal pngcairo size 1800,{} fontscale 1.15 linewidth 1.4 rounded "
-      "font 'DejaVu Sans,13'\n",
-      std::max<std::size_t>(rows, 1) * 560);
-  out += fmt::format("set output {}\n", quoted(folder + "/overview.png"));
-  out += fmt::format("set multiplot layout {},2 margins 0.06,0.985,{:.3f},{:.3f} "
-                     "spacing 0.08,{:.3f}\n",
-                     std::max<std::size_t>(rows, 1), 0.14 / static_cast<double>(rows),
-                     1.0 - 0.16 / static_cast<double>(rows), 0.30 / static_cast<double>(rows));
-  for (std::size_t f = 0; f < figures.size(); ++f) out += body(figures[f], f);
-  return out + "unset multiplot\nunset output\n";
+  return out + overview(figures, folder);
 }
 
 Status draw(std::span<const Figure> figures, const std::string& folder) {

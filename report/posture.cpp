@@ -1,5 +1,7 @@
 #include "report/posture.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
@@ -132,7 +134,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
       high = std::max(high, body.p.z());
     }
   }
-  const double pitch_m = 0.55 * (high - low);
+  const double pitch_m = 0.6 * (high - low);
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
     const auto bodies = body_placements(tree, robot, samples[s]);
@@ -149,10 +151,12 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
       curve.y.push_back(kGap);
     }
     add_soles(legs, tree, robot, bodies, shift_m);
-    figure.notes.push_back({samples[s].label, shift_m + samples[s].base.p.x(),
-                            low - 0.10 * (high - low)});
+    const double x = shift_m + samples[s].base.p.x();
+    figure.notes.push_back({samples[s].label, x, low - 0.08 * (high - low)});
+    figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x,
+                            low - 0.17 * (high - low)});
   }
-  if (!robot.contact.feet.empty()) figure.levels.push_back({"ground", robot.contact.height_m});
+  if (!robot.contact.feet.empty()) figure.levels.push_back({"ground", robot.contact.height_m, false});
   for (Curve* curve : {&others, &trunk, &legs}) {
     if (!curve->x.empty()) figure.curves.push_back(std::move(*curve));
   }

@@ -102,9 +102,10 @@ Result<Window> window_of(const log::LogFile& file) {
   for (const log::EventText& one : *events) {
     const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
     if (one.event.kind == log::EventKind::kBringUpDone) window.begin_s = time_s - kHalfNanosecond;
-    if (one.event.kind == log::EventKind::kControllersDone) {
-      window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
-    }
+    const bool end = one.event.kind == log::EventKind::kControllersDone ||
+                     one.event.kind == log::EventKind::kStopRequested ||
+                     one.event.kind == log::EventKind::kFault;
+    if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
   }
   return window;
 }

@@ -35,7 +35,7 @@ std::vector<int> first_leg(const RunData& run) {
 
 /// Joints (image) of the first leg that turn about the robot's lateral axis.
 std::vector<int> pitch_joints(const RunData& run) {
-  PostureSample zero{"", {}, std::vector<double>(run.robot.joints.size(), 0.0)};
+  PostureSample zero{"", 0.0, {}, std::vector<double>(run.robot.joints.size(), 0.0)};
   const auto bodies = body_placements(run.tree, run.robot, zero);
   std::vector<int> found;
   for (const int joint : first_leg(run)) {
@@ -86,12 +86,30 @@ Figure hip_figure(const RunData& run, const RunData* other, int joint) {
   return figure;
 }
 
+double gravity_m_s2(const RunData& run) {
+  const auto& g = run.robot.model.gravity_m_s2;
+  return std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+}
+
 /// Weight of everything that moves [N].
 double weight_N(const RunData& run) {
   double mass_kg = 0.0;
   for (const model::Body& body : run.tree.bodies) mass_kg += body.inertia.mass_kg;
-  const auto& g = run.robot.model.gravity_m_s2;
-  return mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+  return mass_kg * gravity_m_s2(run);
+}
+
+/// Weight of the links beyond a sensor's joint [N]: what a foot's sensor does not carry.
+double weight_beyond_N(const RunData& run, int sensor) {
+  const int first = run.tree.child_link_index(run.robot.sensors[at(sensor)].joint);
+  if (first < 0) return 0.0;
+  std::vector<bool> beyond(run.tree.links.size(), false);
+  double mass_kg = 0.0;
+  for (std::size_t i = at(first); i < run.tree.links.size(); ++i) {
+    const int parent = run.tree.links[i].parent;
+    beyond[i] = i == at(first) || (parent >= 0 && beyond[at(parent)]);
+    if (beyond[i]) mass_kg += run.tree.links[i].inertia.mass_kg;
+  }
+  return mass_kg * gravity_m_s2(run);
 }
 
 Figure force_figure(const RunData& run, const RunData* other, const std::vector<int>& sensors) {
@@ -112,7 +130,10 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
                                      vertical_force(*other, sensors.front()), 1.0));
   }
   if (run.robot.model.floating_base && run.robot.contact.feet.size() == 2) {
-    figure.levels.push_back({"half the weight", 0.5 * weight_N(run)});
+    const double half = 0.5 * weight_N(run);
+    figure.levels.push_back(
+        {"half the weight; lower line: less the foot beyond the sensor", half, true});
+    figure.levels.push_back({"", half - weight_beyond_N(run, sensors.front()), true});
   }
   return figure;
 }
@@ -162,8 +183,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const std::size_t last = run.rows() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back({fmt::format("{}{}, {:.2f} s", what, suffix, run.time_s[row]),
-                       run.base_placement(row), run.positions(row)});
+    samples.push_back({what + suffix, run.time_s[row], run.base_placement(row),
+                       run.positions(row)});
   };
   add("start", 0);
   add("half way", half);
@@ -198,7 +219,7 @@ std::vector<double> vertical_force(const RunData& run, int sensor) {
   const int link = run.tree.link_index(config.link);
   std::vector<double> force(run.rows());
   for (std::size_t row = 0; row < run.rows(); ++row) {
-    const PostureSample sample{"", run.base_placement(row), run.positions(row)};
+    const PostureSample sample{"", run.time_s[row], run.base_placement(row), run.positions(row)};
     const auto bodies = body_placements(run.tree, run.robot, sample);
     const model::Link& frame = run.tree.links[at(std::max(link, 0))];
     const Eigen::Vector3d measured(run.sensor[first][row], run.sensor[first + 1][row],

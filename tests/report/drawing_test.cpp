@@ -47,7 +47,7 @@ Figure ramp(const std::string& name) {
   figure.x_label = "time [s]";
   figure.y_label = "position [deg]";
   figure.curves = {curve};
-  figure.levels = {{"the limit", 40.0}};
+  figure.levels = {{"the limit", 40.0, false}};
   return figure;
 }
 
