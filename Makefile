@@ -1,5 +1,6 @@
 # Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
 JOBS ?= $(shell nproc)
+FUZZ_SECONDS ?= 60
 
 .PHONY: demo test unit rtsan fuzz bench clean help
 
@@ -34,7 +35,7 @@ fuzz:
 	@scripts/install-dependencies test
 	@cmake --preset fuzz --log-level=WARNING
 	@cmake --build --preset fuzz --parallel $(JOBS)
-	@scripts/run-fuzzers build/fuzz $(or $(FUZZ_SECONDS),60)
+	@tests/fuzz/run.sh $(FUZZ_SECONDS)
 
 clean:
 	@rm -rf build runs

@@ -25,10 +25,24 @@ std::string right(const std::string& text, std::size_t columns) {
   return std::string(columns - std::min(columns, width(text)), ' ') + text;
 }
 
+Error json_error(const std::string& file) {
+  return {.message = std::string("cannot write the JSON: ") + std::strerror(errno),
+          .hint = "name a file in a folder that exists and can be written",
+          .file = file,
+          .key = {}};
+}
+
 }  // namespace
 
 std::FILE* human_output(const std::string& json_file) {
   return json_file == "-" ? stderr : stdout;
+}
+
+Status check_writable(const std::string& file) {
+  if (file.empty() || file == "-") return {};
+  errno = 0;
+  const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
+  return out ? Status{} : std::unexpected(json_error(file));
 }
 
 Status write_json(const std::string& file, const Json& value) {
@@ -42,14 +56,7 @@ Status write_json(const std::string& file, const Json& value) {
   errno = 0;
   std::ofstream out(file, std::ios::binary);
   out << text << std::flush;
-  if (!out) {
-    Error error{.message = fmt::format("cannot write the JSON: {}", std::strerror(errno)),
-                .hint = "name a file in a folder that exists and can be written",
-                .file = file,
-                .key = {}};
-    return std::unexpected(std::move(error));
-  }
-  return {};
+  return out ? Status{} : std::unexpected(json_error(file));
 }
 
 void print_errors(const Diagnostics& errors) {

@@ -19,6 +19,9 @@ using Json = nlohmann::ordered_json;
 /// Where text for people goes: standard error when the JSON takes standard output ("-").
 [[nodiscard]] std::FILE* human_output(const std::string& json_file);
 
+/// Whether `file` can be written, found out before a run: an error that names it when not.
+[[nodiscard]] Status check_writable(const std::string& file);
+
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 

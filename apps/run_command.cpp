@@ -83,8 +83,7 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
   std::vector<std::string> texts;
   for (const runtime::Fault& fault : cycle.faults()) {
-    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
-                                fault.joint.empty() ? "" : ": ", fault.text));
+    texts.push_back(fmt::format("{:.3f} s: {}", fault.time_s, fault.text));
   }
   if (log && !log->error.empty()) {
     texts.push_back(fmt::format("the log lost {} messages: {}", log->failed, log->error));
@@ -165,6 +164,10 @@ Exit run(Composition& c, const RunOptions& options) {
 }  // namespace
 
 Exit run_command(const RunOptions& options) {
+  if (const Status writable = check_writable(options.json); !writable) {
+    print_errors({writable.error()});
+    return Exit::kUsage;
+  }
   const auto composition =
       compose(options.experiment, {options.seed, options.duration_s, options.kernel_variant});
   if (!composition) {

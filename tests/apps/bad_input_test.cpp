@@ -1,0 +1,189 @@
+// Wrong input ends with exit status 2, one clear message, and no run.
+#include <algorithm>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+std::ptrdiff_t error_lines(const std::string& err) {
+  std::ptrdiff_t lines = 0;
+  std::istringstream in(err);
+  for (std::string line; std::getline(in, line);) lines += line.starts_with("error: ") ? 1 : 0;
+  return lines;
+}
+
+class BadInput : public Program {
+ protected:
+  /// The experiment must be refused with one error that holds every one of `texts`.
+  void expect_refused(const std::vector<std::string>& texts,
+                      const std::string& arguments = "run hold.toml --duration 0.05") const {
+    const Outcome outcome = tandem(arguments);
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_EQ(error_lines(outcome.err), 1) << outcome.err;
+    for (const std::string& text : texts) {
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    }
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_FALSE(has_log());
+  }
+};
+
+TEST_F(BadInput, AMissingExperimentIsRefused) {
+  expect_refused({"nothing.toml", "cannot read"}, "run nothing.toml");
+}
+
+TEST_F(BadInput, AFolderInPlaceOfAnExperimentIsRefused) {
+  expect_refused({"this is a folder"}, "run .");
+}
+
+TEST_F(BadInput, AMissingRobotIsRefused) {
+  std::filesystem::remove(folder_ / "robot.toml");
+  expect_refused({"robot.toml", "cannot read"});
+}
+
+TEST_F(BadInput, AMissingUrdfIsRefused) {
+  std::filesystem::remove(folder_ / "double_pendulum.urdf");
+  expect_refused({"double_pendulum.urdf"});
+}
+
+TEST_F(BadInput, AUrdfCutInHalfIsRefused) {
+  const std::string text = read_text(folder_ / "double_pendulum.urdf");
+  write_text(folder_ / "double_pendulum.urdf", text.substr(0, text.size() / 2));
+  expect_refused({"double_pendulum.urdf:"});
+}
+
+TEST_F(BadInput, ANanInTheTomlIsRefused) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = nan");
+  expect_refused({"robot.toml:", "inertia_kg_m2", "finite"});
+}
+
+TEST_F(BadInput, AnInfiniteNumberInTheTomlIsRefused) {
+  edit("robot.toml", "max_torque_Nm = 2.0", "max_torque_Nm = inf");
+  expect_refused({"robot.toml:", "max_torque_Nm", "finite"});
+}
+
+TEST_F(BadInput, ANanInTheUrdfIsRefused) {
+  const std::string text = read_text(folder_ / "double_pendulum.urdf");
+  const std::size_t at = text.find("mass value=\"");
+  ASSERT_NE(at, std::string::npos);
+  edit("double_pendulum.urdf", text.substr(at, text.find('"', at + 12) - at + 1),
+       "mass value=\"nan\"");
+  expect_refused({"double_pendulum.urdf:"});
+}
+
+TEST_F(BadInput, AJointThatTheUrdfLacksIsRefusedWithTheNearest) {
+  edit("robot.toml", "name = \"joint2\"", "name = \"jiont2\"");
+  edit("robot.toml", "joint2 = -0.5", "jiont2 = -0.5");
+  const Outcome outcome = tandem("run hold.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("no joint 'jiont2'"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("did you mean 'joint2'?"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(has_log());
+}
+
+TEST_F(BadInput, AJointOnTwoBoardsIsRefused) {
+  edit("robot.toml", "[[joint]]\nname = \"joint1\"",
+       "[[board]]\nname = \"board_2\"\nbus = \"arm\"\nnode_id = 2\n\n"
+       "[[joint]]\nname = \"joint1\"\nboard = \"board_2\"\naxis = 0\nactuator = \"motor\"\n"
+       "gains = \"motor\"\nencoder_counts_per_rev = 65536\nmotor_encoder_counts_per_rev = 65536\n"
+       "\n[[joint]]\nname = \"joint1\"");
+  expect_refused({"robot.toml:", "joint1", "two boards", "board_1", "board_2"});
+}
+
+TEST_F(BadInput, ANodeIdTwiceOnABusIsRefused) {
+  edit("robot.toml", "[posture.ready]",
+       "[[sensor]]\nname = \"imu\"\ntype = \"imu\"\nbus = \"arm\"\nnode_id = 1\nlink = \"link2\"\n"
+       "\n[posture.ready]");
+  expect_refused({"robot.toml:", "node id 1 is taken on bus 'arm'"});
+}
+
+TEST_F(BadInput, AMisspeltKeyIsRefusedWithTheNearest) {
+  edit("hold.toml", "duration_s", "durration_s");
+  const Outcome outcome = tandem("run hold.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("hold.toml:"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("did you mean 'duration_s'?"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(has_log());
+}
+
+TEST_F(BadInput, AnUnknownKeyOfTheRobotIsRefused) {
+  edit("robot.toml", "gear_ratio = 20", "gear_ratio = 20\ngear_ration = 3");
+  expect_refused({"robot.toml:", "gear_ration", "unknown key", "did you mean 'gear_ratio'?"});
+}
+
+TEST_F(BadInput, AnUnknownParameterOfAControllerIsRefused) {
+  edit("hold.toml", "plugin = \"hold\"", "plugin = \"hold\"\n[controller.parameters]\nspeeed = 1");
+  expect_refused({"hold.toml:", "speeed", "unknown key"});
+}
+
+TEST_F(BadInput, AGainOfTheWrongSignIsRefused) {
+  edit("robot.toml", "kp = 6.0", "kp = -6.0");
+  expect_refused({"robot.toml:", "gains.motor.position.kp", "wrong sign"});
+}
+
+TEST_F(BadInput, APluginThatDoesNotExistIsRefusedWithTheNearest) {
+  edit("hold.toml", "\"hold\"", "\"hodl\"");
+  expect_refused({"hold.toml:", "hodl", "hold"});
+}
+
+TEST_F(BadInput, APluginWithoutItsEntryPointIsRefused) {
+  edit("hold.toml", "\"hold\"", "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/no_entry.so\"");
+  expect_refused({"no_entry.so", "tandem_controller_plugin"});
+}
+
+TEST_F(BadInput, APluginOfAnotherAbiIsRefused) {
+  edit("hold.toml", "\"hold\"", "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/other_abi.so\"");
+  expect_refused({"other_abi.so", "ABI"});
+}
+
+TEST_F(BadInput, ALogFolderThatCannotBeMadeIsRefused) {
+  expect_refused({"/proc/tandem", "log's folder", "--log"},
+                 "run hold.toml --duration 0.05 --log /proc/tandem");
+}
+
+TEST_F(BadInput, ALogFolderThatIsAFileIsRefused) {
+  expect_refused({"hold.toml", "log's folder"}, "run hold.toml --duration 0.05 --log hold.toml");
+}
+
+TEST_F(BadInput, AReadOnlyLogFolderIsRefused) {
+  if (geteuid() == 0) {
+    expect_refused({"/sys", "log"}, "run hold.toml --duration 0.05 --log /sys/kernel");
+    return;
+  }
+  std::filesystem::create_directory(folder_ / "locked");
+  std::filesystem::permissions(folder_ / "locked", std::filesystem::perms::owner_read);
+  expect_refused({"locked", "cannot write"}, "run hold.toml --duration 0.05 --log locked");
+}
+
+TEST_F(BadInput, AFullDiskIsRefused) {
+  const std::string disk = (folder_ / "disk").string();
+  std::filesystem::create_directory(disk);
+  if (std::system(("mount -t tmpfs -o size=64k tmpfs '" + disk + "' 2>/dev/null").c_str()) != 0) {
+    GTEST_SKIP() << "a small disk needs the right to mount";
+  }
+  expect_refused({"disk", "too full"}, "run hold.toml --log disk");
+  EXPECT_EQ(std::system(("umount '" + disk + "'").c_str()), 0);
+}
+
+TEST_F(BadInput, APeriodOfZeroIsRefused) {
+  edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 0");
+  expect_refused({"hold.toml:", "period_ns", "out of range"});
+}
+
+TEST_F(BadInput, KernelsOfAnotherDescriptionAreRefusedWithTheCommandThatMendsIt) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
+  expect_refused({"another description", "run: tandem model build robot.toml"});
+}
+
+TEST_F(BadInput, AKernelVariantThatIsNotThereIsRefused) {
+  expect_refused({"no variant 'x87'"}, "run hold.toml --kernel-variant x87");
+}
+
+TEST_F(BadInput, AJsonFileThatCannotBeWrittenIsRefused) {
+  expect_refused({"nowhere/result.json"},
+                 "run hold.toml --duration 0.05 --quiet --json nowhere/result.json");
+}
+
+}  // namespace
+}  // namespace tandem::apps

@@ -1,0 +1,51 @@
+// `tandem check`: every error of every file, and nothing moves.
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Check : public Program {};
+
+TEST_F(Check, TellsWhatARunWouldDoAndLeavesNothingBehind) {
+  const Outcome outcome = tandem("check hold.toml");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  for (const std::string text : {"double_pendulum", "controller hold", "5000 cycles"}) {
+    EXPECT_NE(outcome.out.find(text), std::string::npos) << text << "\nin: " << outcome.out;
+  }
+  EXPECT_FALSE(has_log());
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "runs"));
+}
+
+TEST_F(Check, ReadsARobotByItself) {
+  const Outcome outcome = tandem("check robot.toml");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("2 on 1 boards"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
+  edit("robot.toml", "kp = 6.0", "kp = -6.0");
+  edit("robot.toml", "gear_ratio", "gear_ration");
+  const Outcome outcome = tandem("check hold.toml --json -");
+  EXPECT_EQ(outcome.status, 2);
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["ok"], false);
+  ASSERT_EQ(json["errors"].size(), 3U) << outcome.out;  // missing, unknown, wrong sign
+  for (const auto& error : json["errors"]) {
+    EXPECT_NE(error["file"].get<std::string>().find("robot.toml"), std::string::npos);
+    EXPECT_GT(error["line"], 0);
+    EXPECT_NE(error["key"], "");
+    EXPECT_NE(error["message"], "");
+    EXPECT_TRUE(error.contains("hint"));
+  }
+}
+
+TEST_F(Check, SaysOkAsJson) {
+  const Outcome outcome = tandem("check hold.toml --json -");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(nlohmann::json::parse(outcome.out),
+            nlohmann::json::parse(R"({"ok": true, "errors": []})"));
+  EXPECT_NE(outcome.err.find("double_pendulum"), std::string::npos) << "text for people";
+}
+
+}  // namespace
+}  // namespace tandem::apps

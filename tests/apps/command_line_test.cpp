@@ -1,0 +1,66 @@
+// Help that teaches, and messages for what was mistyped.
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class CommandLine : public Program {};
+
+TEST_F(CommandLine, HelpShowsEveryCommandWithExamples) {
+  const Outcome outcome = tandem("--help");
+  EXPECT_EQ(outcome.status, 0);
+  for (const std::string text : {"run", "check", "model", "log", "report", "--version",
+                                 "tandem run config/coman/squat.toml", "Exit status"}) {
+    EXPECT_NE(outcome.out.find(text), std::string::npos) << text;
+  }
+}
+
+TEST_F(CommandLine, HelpOfACommandHasExamplesOfItsOwn) {
+  const Outcome outcome = tandem("model build --help");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.out.find("tandem model build config/coman/robot.toml"), std::string::npos);
+}
+
+TEST_F(CommandLine, VersionIsPrinted) {
+  const Outcome outcome = tandem("--version");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_TRUE(outcome.out.starts_with("tandem 0.")) << outcome.out;
+}
+
+TEST_F(CommandLine, AnUnknownFlagSuggestsTheNearest) {
+  const Outcome outcome = tandem("run hold.toml --sede 3");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("unknown flag '--sede': did you mean '--seed'?"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(CommandLine, AnUnknownCommandSuggestsTheNearest) {
+  const Outcome outcome = tandem("rnu hold.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("unknown command 'rnu': did you mean 'run'?"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(CommandLine, AnUnknownSubcommandSuggestsTheNearest) {
+  const Outcome outcome = tandem("log csb some.mcap");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("did you mean 'csv'?"), std::string::npos) << outcome.err;
+}
+
+TEST_F(CommandLine, AMissingArgumentIsNamed) {
+  const Outcome outcome = tandem("run");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("experiment"), std::string::npos) << outcome.err;
+}
+
+TEST_F(CommandLine, ARateThatIsNotPositiveIsRefused) {
+  EXPECT_EQ(tandem("run hold.toml --rate 0").status, 2);
+  EXPECT_EQ(tandem("run hold.toml --rate fast").status, 2);
+}
+
+TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {
+  EXPECT_EQ(tandem("run hold.toml --rate 2 --realtime").status, 2);
+}
+
+}  // namespace
+}  // namespace tandem::apps

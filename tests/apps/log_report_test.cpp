@@ -1,0 +1,72 @@
+// `tandem log` and `tandem report` on the log of a short run.
+#include <algorithm>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class LogAndReport : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    const Outcome outcome = tandem("run trajectory.toml --duration 0.5 --quiet");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+  }
+  const std::string log_ = "runs/double_pendulum-trajectory-001.mcap";
+};
+
+TEST_F(LogAndReport, InfoTellsTopicsAndMetadata) {
+  const Outcome outcome = tandem("log info " + log_ + " --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["complete"], true);
+  EXPECT_EQ(json["metadata"]["robot"], "double_pendulum");
+  EXPECT_GE(json["topics"]["/tandem/state"]["messages"], 500);
+  EXPECT_EQ(json["data_sha256"].get<std::string>().size(), 64U);
+}
+
+TEST_F(LogAndReport, CsvWritesTheFieldsAskedFor) {
+  const Outcome outcome = tandem("log csv " + log_ + " --fields position_rad");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("time_s,position_rad.joint1,position_rad.joint2\n"))
+      << outcome.out.substr(0, 100);
+  EXPECT_GE(std::ranges::count(outcome.out, '\n'), 501);
+}
+
+TEST_F(LogAndReport, CsvSuggestsTheNearestTopic) {
+  const Outcome outcome = tandem("log csv " + log_ + " --topic sttae");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("did you mean '/tandem/state'?"), std::string::npos) << outcome.err;
+}
+
+TEST_F(LogAndReport, AFileThatIsNoLogIsRefused) {
+  EXPECT_EQ(tandem("log info hold.toml").status, 2);
+  EXPECT_EQ(tandem("report hold.toml").status, 2);
+}
+
+TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
+  const Outcome outcome = tandem("report " + log_ + " --json report.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto files = json("report.json");
+  const std::string page = read_text(folder_ / files["report"].get<std::string>());
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_NE(page.find("inverse dynamics"), std::string::npos);
+  EXPECT_GE(files["images"].size(), 4U);
+  for (const auto& image : files["images"]) {
+    EXPECT_TRUE(read_text(folder_ / image.get<std::string>()).starts_with("\x89PNG"));
+  }
+}
+
+TEST_F(LogAndReport, ReportLaysTwoLogsOverEachOther) {
+  ASSERT_EQ(tandem("run hold.toml --duration 0.5 --quiet").status, 0);
+  const Outcome outcome =
+      tandem("report " + log_ + " runs/double_pendulum-hold-001.mcap -o both --json report.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::string page = read_text(folder_ / "both/report.html");
+  EXPECT_NE(page.find("measured, A"), std::string::npos);
+  EXPECT_NE(page.find("measured, B"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::apps

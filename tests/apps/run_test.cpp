@@ -1,0 +1,74 @@
+// `tandem run` on the smallest robot: results, logs, and the same bytes at every rate.
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Run : public Program {
+ protected:
+  [[nodiscard]] nlohmann::json run(const std::string& arguments) const {
+    const Outcome outcome = tandem("run " + arguments + " --quiet --json -");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+};
+
+TEST_F(Run, WritesTheDocumentedKeys) {
+  const auto json = run("hold.toml --duration 0.5 --seed 7");
+  for (const std::string key :
+       {"robot", "hal", "seed", "cycles", "period_ns", "sim_seconds", "wall_seconds",
+        "realtime_factor", "overruns", "wakeup_ns", "cycle_ns", "log", "joints", "ground", "base",
+        "faults", "kernel_variant"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  EXPECT_EQ(json["robot"], "double_pendulum");
+  EXPECT_EQ(json["seed"], 7);
+  EXPECT_EQ(json["cycles"], 500);
+  EXPECT_EQ(json["period_ns"], 1'000'000);
+  EXPECT_DOUBLE_EQ(json["sim_seconds"], 0.5);
+  for (const std::string key : {"p50", "p99", "p999", "max"}) {
+    EXPECT_TRUE(json["cycle_ns"].contains(key)) << key;
+    EXPECT_TRUE(json["wakeup_ns"].contains(key)) << key;
+  }
+  EXPECT_EQ(json["log"]["dropped"], 0);
+  EXPECT_EQ(json["log"]["data_sha256"].get<std::string>().size(), 64U);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / json["log"]["path"].get<std::string>()));
+  EXPECT_TRUE(json["joints"]["joint1"].contains("rms_tracking_error_rad"));
+  EXPECT_TRUE(json["joints"]["joint1"].contains("max_tracking_error_rad"));
+  EXPECT_TRUE(json["ground"].is_null());
+  EXPECT_TRUE(json["faults"].empty());
+}
+
+TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
+  const auto first = run("trajectory.toml --duration 0.5");
+  const auto second = run("trajectory.toml --duration 0.5");
+  const auto paced = run("trajectory.toml --duration 0.5 --rate 5");
+  EXPECT_NE(first["log"]["path"], second["log"]["path"]);
+  EXPECT_EQ(first["log"]["data_sha256"], second["log"]["data_sha256"]);
+  EXPECT_EQ(first["log"]["data_sha256"], paced["log"]["data_sha256"]);
+  EXPECT_EQ(first["joints"], paced["joints"]);
+}
+
+TEST_F(Run, WithoutALogWritesNone) {
+  const auto json = run("hold.toml --duration 0.1 --no-log");
+  EXPECT_TRUE(json["log"].is_null());
+  EXPECT_FALSE(has_log());
+}
+
+TEST_F(Run, EndsWithATableAndTheLogsPath) {
+  const Outcome outcome = tandem("run hold.toml --duration 0.2");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  for (const std::string text : {"worst joints", "x real time", "runs/double_pendulum-hold-001.mcap",
+                                 "0 dropped", "100 %"}) {
+    EXPECT_NE(outcome.out.find(text), std::string::npos) << text << "\nin: " << outcome.out;
+  }
+}
+
+TEST_F(Run, KeepsStandardOutputForTheJsonAlone) {
+  const Outcome outcome = tandem("run hold.toml --duration 0.1 --json -");
+  EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << outcome.out;
+  EXPECT_NE(outcome.err.find("worst joints"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::apps
