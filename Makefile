@@ -35,7 +35,7 @@ fuzz:
 	@scripts/install-dependencies test
 	@cmake --preset fuzz --log-level=WARNING
 	@cmake --build --preset fuzz --parallel $(JOBS)
-	@tests/fuzz/run.sh $(FUZZ_SECONDS)
+	@scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS)
 
 clean:
 	@rm -rf build runs
