@@ -19,7 +19,8 @@ States random_states(std::size_t nq, std::size_t nv, bool floating_base) {
   std::mt19937 generator(1);
   const auto array = [&](std::size_t size) {
     std::vector<double> values(size);
-    for (double& value : values) value = -1.0 + 2.0 * generator() / 4294967296.0;
+    for (double& value : values)
+      value = -1.0 + 2.0 * static_cast<double>(generator()) / 4294967296.0;
     return values;
   };
   States states;
@@ -97,7 +98,7 @@ void add_kernels(const std::string& robot, const model::KernelLibrary& library) 
 
 void add_robot(const std::string& robot, bool floating_base) {
   const std::string path = std::string(TANDEM_MODEL_FOLDER "/") + robot + "_kernels.so";
-  for (const char* variant : {"baseline", "x86-64-v3"}) {
+  for (const char* variant : {"baseline", "x86-64-v3", "x86-64-v4"}) {
     const auto library = model::load_kernels(path, {}, variant);
     if (library) {
       add_kernels(robot, *library);

@@ -97,8 +97,9 @@ void add_part_files(const std::vector<EmittedKernel>& kernels, GeneratedKernels&
 constexpr std::string_view kLibrarySource = R"(#include "kernels.h"
 
 namespace baseline { extern const tandem_kernels table; }
-#ifdef TANDEM_HAS_X86_64_V3
+#ifdef TANDEM_X86_64
 namespace x86_64_v3 { extern const tandem_kernels table; }
+namespace x86_64_v4 { extern const tandem_kernels table; }
 #endif
 
 static bool same(const char* a, const char* b) {
@@ -108,10 +109,14 @@ static bool same(const char* a, const char* b) {
 
 extern "C" __attribute__((visibility("default"))) const tandem_kernels* tandem_kernels_get(
     const char* variant) {
-#ifdef TANDEM_HAS_X86_64_V3
+#ifdef TANDEM_X86_64
   __builtin_cpu_init();
   const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                   __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+  const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+                  __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+                  __builtin_cpu_supports("avx512vl");
+  if (v4 && (variant == nullptr || same(variant, "x86-64-v4"))) return &x86_64_v4::table;
   if (v3 && (variant == nullptr || same(variant, "x86-64-v3"))) return &x86_64_v3::table;
 #endif
   if (variant == nullptr || same(variant, "baseline")) return &baseline::table;

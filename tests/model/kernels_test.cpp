@@ -126,9 +126,11 @@ TEST_P(CompiledKernels, SayWhatTheyAre) {
 INSTANTIATE_TEST_SUITE_P(
     Robots, CompiledKernels,
     testing::Values(Compiled{"double_pendulum", "baseline"},
-                    Compiled{"double_pendulum", "x86-64-v3"}, Compiled{"ur5e", "baseline"},
-                    Compiled{"ur5e", "x86-64-v3"}, Compiled{"coman", "baseline"},
-                    Compiled{"coman", "x86-64-v3"}),
+                    Compiled{"double_pendulum", "x86-64-v3"},
+                    Compiled{"double_pendulum", "x86-64-v4"}, Compiled{"ur5e", "baseline"},
+                    Compiled{"ur5e", "x86-64-v3"}, Compiled{"ur5e", "x86-64-v4"},
+                    Compiled{"coman", "baseline"}, Compiled{"coman", "x86-64-v3"},
+                    Compiled{"coman", "x86-64-v4"}),
     [](const auto& test) {
       std::string name = std::string(test.param.robot) + "_" + test.param.variant;
       for (char& c : name) c = c == '-' ? '_' : c;
