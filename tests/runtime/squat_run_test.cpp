@@ -1,7 +1,8 @@
-// COMAN's squat as `tandem run` runs it: experiment, generated kernels, plugin, whole chain, log.
+// The squats as `tandem run` runs them: experiment, generated kernels, plugin, whole chain, log.
 // Every cycle is under the real-time trap; the preset rtsan checks the same runs.
 #include <atomic>
 #include <cmath>
+#include <numbers>
 #include <thread>
 
 #include "controllers/plugin_loader.hpp"
@@ -16,22 +17,25 @@ namespace tandem::runtime {
 namespace {
 
 constexpr std::uint64_t kRunning = 1500;  // cycles: into the first descent
+constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// The experiment, composed and ready to run.
+/// The experiment, composed and ready to run; for its own duration when `cycles` is 0.
 struct Squat {
-  explicit Squat(double rate = 0.0, log::Recorder* recorder = nullptr) {
-    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/coman/squat.toml");
+  explicit Squat(const std::string& robot, std::uint64_t cycles = kRunning, double rate = 0.0,
+                 log::Recorder* recorder = nullptr) {
+    auto read =
+        read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/squat.toml");
     if (!read) {
       ADD_FAILURE() << read.error().at(0).to_string();
       return;
     }
     experiment = std::make_unique<Experiment>(std::move(*read));
     experiment->loop.rate = rate;
-    compose(recorder);
+    compose(robot, cycles, recorder);
   }
-  void compose(log::Recorder* recorder) {
-    const std::string library = std::string(TANDEM_BINARY_DIR) + "/lib/models/coman_kernels.so";
-    auto loaded = model::load_kernels(library);
+  void compose(const std::string& robot, std::uint64_t cycles, log::Recorder* recorder) {
+    auto loaded = model::load_kernels(std::string(TANDEM_BINARY_DIR) + "/lib/models/" + robot +
+                                      "_kernels.so");
     ASSERT_TRUE(loaded) << loaded.error().to_string();
     kernels = *loaded;
     Experiment& e = *experiment;
@@ -46,7 +50,8 @@ struct Squat {
     auto made = sim::SimRobot::create(e.robot, kernels.get(), e.sim_robot_config());
     ASSERT_TRUE(made) << made.error().to_string();
     backend = std::move(*made);
-    const CycleConfig config{.loop = e.loop, .running_cycles = kRunning};
+    const CycleConfig config{.loop = e.loop,
+                             .running_cycles = cycles == 0 ? e.cycles() : cycles};
     cycle = std::make_unique<RobotCycle>(
         CycleParts{e.robot, *backend, *host, clock, recorder, &backend->truth()}, config);
   }
@@ -64,18 +69,45 @@ struct Squat {
   std::unique_ptr<RobotCycle> cycle;
 };
 
-TEST(SquatRun, RunsWithoutAFaultUnderTheTrap) {
-  Squat squat;
+struct Case {
+  const char* robot;
+  double depth_m;
+};
+class SquatOf : public testing::TestWithParam<Case> {};
+INSTANTIATE_TEST_SUITE_P(Robots, SquatOf,
+                         testing::Values(Case{"coman", 0.10}, Case{"walkman", 0.30}),
+                         [](const auto& one) { return one.param.robot; });
+
+TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
+  Squat squat(GetParam().robot, 0);
   ASSERT_NE(squat.cycle, nullptr);
   squat.cycle->run();
   for (const Fault& fault : squat.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
-  EXPECT_EQ(squat.cycle->running_cycles(), kRunning);
+  const Experiment& e = *squat.experiment;
+  EXPECT_EQ(squat.cycle->running_cycles(), e.cycles());
+
+  const auto tracking = squat.cycle->statistics().tracking();
+  for (const char* name : {"LHipSag", "RHipSag", "LKneeSag", "RKneeSag"}) {
+    const int joint = e.robot.joint_index(name);
+    ASSERT_GE(joint, 0) << name;
+    EXPECT_LT(tracking[static_cast<std::size_t>(joint)].rms_rad, kDegree) << name;
+  }
+  const double weight_N = squat.kernels->mass_kg * 9.81;
+  const auto ground = squat.cycle->statistics().ground(weight_N);
+  ASSERT_TRUE(ground);
+  EXPECT_NEAR(ground->mean_vertical_force_N, weight_N, 0.005 * weight_N);
+  EXPECT_LT(ground->max_foot_slip_m, 0.005);
+  const auto base = squat.cycle->statistics().base();
+  ASSERT_TRUE(base);
+  EXPECT_LT(base->final_tilt_rad, kDegree);
+  EXPECT_NEAR(base->max_height_m - base->min_height_m, GetParam().depth_m,
+              0.1 * GetParam().depth_m);
 }
 
 std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded = false) {
   auto recorder = log::Recorder::open(path, {}, {});
   EXPECT_TRUE(recorder);
-  Squat squat(rate, recorder->get());
+  Squat squat("coman", kRunning, rate, recorder->get());
   if (squat.cycle == nullptr) return {};
   std::atomic<bool> done{false};
   std::thread load([&] {
@@ -100,7 +132,7 @@ TEST(SquatRun, LogsTheSameDataForTheSameSeedWhateverTheRateAndTheLoad) {
 }
 
 TEST(SquatRun, RepeatsItsBytesAfterARestore) {
-  Squat squat;
+  Squat squat("coman");
   ASSERT_NE(squat.cycle, nullptr);
   squat.run_to(RunPhase::kRunning);
   for (int i = 0; i < 400; ++i) ASSERT_TRUE(squat.cycle->step());
