@@ -5,6 +5,7 @@
 
 #include "base/nearest.hpp"
 #include "hal/sim/setup.hpp"
+#include "hal/sim/stability.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -26,6 +27,7 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
   plant.substep_ns = config.substep_ns;
   plant.held = config.hold;
   plant.release_ns = config.release_ns;
+  plant.rate_limit = config.rate_limit;
   const hal::PostureConfig* posture = robot.posture(config.posture);
   if (posture == nullptr && !config.posture.empty()) {
     std::vector<std::string> known;
@@ -52,6 +54,18 @@ std::int64_t common_tick(const hal::RobotConfig& robot, std::int64_t period_ns) 
   return tick;
 }
 
+// A step that cannot be stable would show as a drive's fault, far from its cause.
+Status check_step(const PlantConfig& config, const Plant& plant) {
+  const StepLimit limit = longest_step(config, plant);
+  if (static_cast<double>(config.substep_ns) * 1e-9 <= limit.seconds) return {};
+  const auto at_most = static_cast<std::int64_t>(limit.seconds * 1e9);
+  return std::unexpected(
+      Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
+            .hint = "at most " + std::to_string(at_most) + " ns in this posture",
+            .file = {},
+            .key = "sim.substep_ns"});
+}
+
 Status named(Status status, const std::string& key) {
   if (!status)
     status.error().key = key + (status.error().key.empty() ? "" : ".") + status.error().key;
@@ -68,6 +82,7 @@ Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot
   if (!plant) return std::unexpected(plant.error());
   Result<Plant> body = Plant::create(*plant);
   if (!body) return std::unexpected(body.error());
+  if (Status status = check_step(*plant, *body); !status) return std::unexpected(status.error());
   Result<Sensors> sensors = Sensors::create(robot, *kernels);
   if (!sensors) return std::unexpected(sensors.error());
 

@@ -30,6 +30,7 @@ struct SimRobotConfig {
   std::int64_t release_ns = 1'000'000'000;  ///< in which the hoist lets the base down
   std::uint64_t seed = 1;                   ///< of every measurement's noise
   bool truth = true;                        ///< keep truth() up to date
+  double rate_limit = 1000.0;  ///< any rate beyond it [rad/s or m/s] counts as diverged
 };
 
 /// What read() does, in this order, from cycle k-1 to cycle k.
@@ -53,7 +54,8 @@ class SimRobot final : public hal::Backend {
  public:
   /// @param robot    complete: limits filled in from the description
   /// @param kernels  of this robot; outlive it
-  /// Errors: those of Plant, Sensors and DriveMaster; a posture, board or sensor that cannot be.
+  /// Errors: those of Plant, Sensors and DriveMaster; a posture, board or sensor that cannot be;
+  /// a sub-step that is unstable in the posture (names the joint and the longest that is not).
   [[nodiscard]] static Result<std::unique_ptr<SimRobot>> create(const hal::RobotConfig& robot,
                                                                 const tandem_kernels* kernels,
                                                                 const SimRobotConfig& config);

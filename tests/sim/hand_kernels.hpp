@@ -154,6 +154,25 @@ inline void center_of_mass(const double* q, const double* v, double* c, double* 
   for (int i = 0; i < 3; ++i) c[i] = q[i];
 }
 
+inline void mass_matrix(const double*, double* M) {
+  for (int i = 0; i < 36; ++i) M[i] = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    M[7 * i] = kBlockMass;
+    M[7 * (3 + i)] = kBlockInertia[i];
+  }
+}
+/// Column by column: the twist that each unit velocity gives.
+inline void site_jacobians(const double* q, double* J) {
+  const double rest[6] = {};
+  double pose[36], twist[18], acceleration[18];
+  for (int column = 0; column < 6; ++column) {
+    double v[6] = {};
+    v[column] = 1.0;
+    site_motion(q, v, rest, pose, twist, acceleration);
+    for (int row = 0; row < 18; ++row) J[6 * row + column] = twist[row];
+  }
+}
+
 inline constexpr const char* kSites[] = {"left", "right", "imu"};
 inline constexpr const char* kSensors[] = {"left_ft", "right_ft"};
 
@@ -178,6 +197,8 @@ const tandem_kernels* block_kernels() {
     k.forward_dynamics = block::forward_dynamics<tilt_deg>;
     k.inverse_dynamics = block::inverse_dynamics<tilt_deg>;
     k.site_motion = block::site_motion;
+    k.mass_matrix = block::mass_matrix;
+    k.site_jacobians = block::site_jacobians;
     k.sensor_wrenches = block::sensor_wrenches;
     k.energy = block::energy<tilt_deg>;
     k.center_of_mass = block::center_of_mass;
@@ -213,6 +234,10 @@ inline void site_motion(const double* q, const double* v, const double* vdot, do
   for (int i = 0; i < 12; ++i) pose[i] = P[i];
   for (int i = 0; i < 6; ++i) twist[i] = T[i];
   for (int i = 0; i < 6; ++i) acceleration[i] = A[i];
+}
+template <int armature_g>
+void mass_matrix(const double*, double* M) {
+  M[0] = kInertia + armature_g * 1e-3;
 }
 inline void center_of_mass(const double* q, const double* v, double* c, double* cdot, double* J) {
   const double s = std::sin(q[0]), k = std::cos(q[0]), l = kPendulumLength;
@@ -254,6 +279,7 @@ const tandem_kernels* pendulum_kernels() {
     k.sensors = 1;
     k.sensor_names = pendulum::kSensors;
     k.sensor_wrenches = pendulum::sensor_wrenches<gravity_cm>;
+    k.mass_matrix = pendulum::mass_matrix<armature_g>;
     k.site_motion = pendulum::site_motion;
     k.center_of_mass = pendulum::center_of_mass;
     return k;

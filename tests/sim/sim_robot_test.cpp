@@ -207,14 +207,23 @@ TEST(SimRobot, ACutCableLeavesTheBoardInItsSafeState) {
 }
 
 TEST(SimRobot, DivergenceIsAFaultThatNamesJointAndTime) {
-  hal::RobotConfig robot = swing_robot();
-  robot.actuators[0].spring_Nm_rad = 5e7;
-  Loop loop(robot);
-  for (int i = 0; i < 5000 && loop.read != Code::kDiverged; ++i) loop.step();
+  Loop loop(swing_robot(), {.posture = "up", .rate_limit = 0.5});
+  loop.bring_up();
+  loop.command.position_rad()[0] += 0.5;
+  for (int i = 0; i < 1000 && loop.read != Code::kDiverged; ++i) loop.step();
   ASSERT_EQ(loop.read, Code::kDiverged);
   EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
   const std::string text = loop.sim_robot->status_text();
   EXPECT_NE(text.find("joint swing at "), std::string::npos) << text;
+}
+
+TEST(SimRobot, AnUnstableSubStepIsRefusedWithTheJoint) {
+  hal::RobotConfig robot = swing_robot();
+  robot.actuators[0].spring_Nm_rad = 5e7;
+  const auto made = SimRobot::create(robot, swing_kernels(2), {});
+  ASSERT_FALSE(made.has_value());
+  EXPECT_EQ(made.error().key, "sim.substep_ns");
+  EXPECT_NE(made.error().message.find("joint swing"), std::string::npos) << made.error().message;
 }
 
 TEST(SimRobot, StagesAreReportedInOrder) {
