@@ -1,7 +1,8 @@
 // gravity_compensation: carries the robot's weight, so that a hand can move it.
 #include <Eigen/Geometry>
-#include <algorithm>
+#include <array>
 #include <optional>
+#include <string>
 
 #include "controllers/controller.hpp"
 #include "controllers/min_jerk.hpp"
@@ -12,12 +13,21 @@
 namespace tandem {
 namespace {
 
+/// The model has an IMU as a site: one that stands in its link's frame, or else one of its name.
+std::string imu_site(const hal::RobotConfig& robot, const hal::SensorConfig& sensor) {
+  const std::array<double, 3> none{};
+  for (const hal::SiteConfig& site : robot.model.sites) {
+    if (site.link == sensor.link && site.xyz_m == none && site.rpy_rad == none) return site.name;
+  }
+  return sensor.name;
+}
+
 /// Parameters: mode ("compliant": a virtual spring and damper about the start posture, "torque":
 /// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (the robot's), ramp_s (1),
 /// left_sole and right_sole ("l_sole", "r_sole"; floating base only).
 ///
 /// tau = h(q, 0) for a fixed base. A floating base is taken to stand on both feet, turned as its
-/// IMU says (the site of the sensor's name), or upright when it has none.
+/// IMU says, or upright when it has none.
 class GravityCompensation : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
@@ -91,7 +101,7 @@ class GravityCompensation : public Controller {
     for (std::size_t i = 0; i < setup.robot.sensors.size(); ++i) {
       const hal::SensorConfig& sensor = setup.robot.sensors[i];
       if (sensor.type != hal::SensorType::kImu) continue;
-      if (const Result<std::size_t> site = site_index(*kernels_, sensor.name)) {
+      if (const Result<std::size_t> site = site_index(*kernels_, imu_site(setup.robot, sensor))) {
         imu_ = Imu{i, *site};
       }
     }

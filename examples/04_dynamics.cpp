@@ -1,0 +1,40 @@
+// 04: a robot's generated dynamics by themselves: a pendulum without motors keeps its energy.
+//   build/release/bin/example_04_dynamics build/release/lib/models/double_pendulum_kernels.so
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include "model/kernel_library.hpp"
+
+using State = std::array<double, 4>;  // q then v
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const auto kernels = tandem::model::load_kernels(argv[1]);  // refuses other files
+  if (!kernels || (*kernels)->nv != 2) return 2;
+  const tandem_kernels& robot = **kernels;
+  std::printf("%s, %.3f kg, kernels for %s\n", robot.robot, robot.mass_kg, robot.variant);
+  const double none[2] = {};  // no torque on any joint, no wrench
+  const auto rate = [&](const State& x) {
+    State out{x[2], x[3]};
+    robot.forward_dynamics(x.data(), x.data() + 2, none, none, out.data() + 2);
+    return out;
+  };
+  const auto along = [](State x, const State& d, double h) {
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += h * d[i];
+    return x;
+  };
+  const double h = 1e-3;
+  State x{0.5, -0.5, 0.0, 0.0};
+  double first_J = 0.0, now_J = 0.0;
+  for (int step = 0; step <= 5000; ++step) {
+    double energy[2];  // kinetic, potential
+    robot.energy(x.data(), x.data() + 2, energy);
+    now_J = energy[0] + energy[1];
+    if (step == 0) first_J = now_J;
+    if (step % 1000 == 0) std::printf("%d s  %.9f J\n", step / 1000, now_J);
+    const State a = rate(x), b = rate(along(x, a, h / 2)), c = rate(along(x, b, h / 2));
+    const State d = rate(along(x, c, h));
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += h / 6 * (a[i] + 2 * (b[i] + c[i]) + d[i]);
+  }
+  return std::abs(now_J - first_J) < 1e-8 ? 0 : 1;
+}
