@@ -71,8 +71,8 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
 }  // namespace
 
 double RunSummary::sim_s() const {
-  const auto period_ns = static_cast<double>(composition.experiment.loop.period_ns);
-  return static_cast<double>(cycle.running_cycles()) * period_ns * 1e-9;
+  const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
+  return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
 }
 
 Json RunSummary::json() const {

@@ -64,13 +64,14 @@ function(tandem_controller name)
 endfunction()
 
 # tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|hil|rt]): one GoogleTest executable,
-# each of its cases a ctest of its own.
+# each of its cases a ctest of its own. The target `tests` builds them all.
 function(tandem_test name)
   cmake_parse_arguments(TEST "" "LABEL" "SOURCES;LINKS" ${ARGN})
   if(NOT TEST_LABEL)
     set(TEST_LABEL unit)
   endif()
   add_executable(${name} ${TEST_SOURCES})
+  add_dependencies(tests ${name})
   target_link_libraries(${name} PRIVATE ${TEST_LINKS} GTest::gtest_main)
   target_precompile_headers(${name} REUSE_FROM tandem_test_pch)
   target_compile_definitions(${name} PRIVATE TANDEM_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
