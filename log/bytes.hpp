@@ -16,7 +16,7 @@ using Bytes = std::vector<std::byte>;
 
 template <class T>
 concept Unsigned = std::same_as<T, std::uint8_t> || std::same_as<T, std::uint16_t> ||
-                   std::same_as<T, std::uint32_t> || std::same_as<T, std::uint64_t>;
+    std::same_as<T, std::uint32_t> || std::same_as<T, std::uint64_t>;
 
 /// Writes `value` to the sizeof(T) bytes at `out`.
 template <Unsigned T>

@@ -18,8 +18,8 @@ bool lz4_decompress(std::span<const std::byte> data, Bytes& out) {
   while (wanted != 0 && !data.empty()) {
     std::size_t produced = out.size() - done;
     std::size_t consumed = data.size();
-    wanted = LZ4F_decompress(context, out.data() + done, &produced, data.data(), &consumed,
-                             nullptr);
+    wanted =
+        LZ4F_decompress(context, out.data() + done, &produced, data.data(), &consumed, nullptr);
     if (LZ4F_isError(wanted) || (produced == 0 && consumed == 0)) break;
     done += produced;
     data = data.subspan(consumed);
@@ -54,8 +54,8 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
       preferences.frameInfo.blockSizeID = LZ4F_max4MB;
       preferences.frameInfo.contentSize = data.size();
       out.resize(LZ4F_compressFrameBound(data.size(), &preferences));
-      out.resize(LZ4F_compressFrame(out.data(), out.size(), data.data(), data.size(),
-                                    &preferences));
+      out.resize(
+          LZ4F_compressFrame(out.data(), out.size(), data.data(), data.size(), &preferences));
       return;
     }
     case Compression::kZstd:

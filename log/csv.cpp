@@ -75,8 +75,8 @@ std::string header(const std::vector<const hal::Field*>& fields, const RunInfo& 
 
 }  // namespace
 
-Status write_csv(const LogFile& log, const std::string& topic, std::size_t every,
-                 std::ostream& out, std::span<const std::string> fields) {
+Status write_csv(const LogFile& log, const std::string& topic, std::size_t every, std::ostream& out,
+                 std::span<const std::string> fields) {
   if (topic == "/tandem/event") return write_events(log, out);
   const Topic* found = log.find(topic);
   const auto chosen = choose(found, fields);

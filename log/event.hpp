@@ -13,15 +13,15 @@
 namespace tandem::log {
 
 enum class EventKind : std::uint8_t {
-  kStarted = 0,        ///< the first cycle
-  kBringUpDone,        ///< every axis follows the command; controllers start
-  kControllersDone,    ///< the duration is over, or every controller is done
-  kFault,              ///< a joint, the backend or a controller is in fault; the run stops
-  kSensorLost,         ///< a sensor's sample is too old
-  kLimited,            ///< a command was limited for the first time (per joint)
-  kOverrun,            ///< the loop skipped `code` cycles
-  kStopRequested,      ///< from outside: signal or caller
-  kShutDown,           ///< the drives are disabled
+  kStarted = 0,      ///< the first cycle
+  kBringUpDone,      ///< every axis follows the command; controllers start
+  kControllersDone,  ///< the duration is over, or every controller is done
+  kFault,            ///< a joint, the backend or a controller is in fault; the run stops
+  kSensorLost,       ///< a sensor's sample is too old
+  kLimited,          ///< a command was limited for the first time (per joint)
+  kOverrun,          ///< the loop skipped `code` cycles
+  kStopRequested,    ///< from outside: signal or caller
+  kShutDown,         ///< the drives are disabled
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 

@@ -19,11 +19,11 @@ struct SensorInfo {
 /// The metadata record "tandem", and "configuration" with the files' texts. Outside the data
 /// hash: equal runs on different machines may differ in it.
 struct RunInfo {
-  std::string version{};           ///< of tandem
+  std::string version{};  ///< of tandem
   std::string robot{};
-  std::string hal{};               ///< "sim", …
-  std::vector<std::string> joints{};   ///< the image's order
-  std::vector<SensorInfo> sensors{};   ///< the image's order
+  std::string hal{};                  ///< "sim", …
+  std::vector<std::string> joints{};  ///< the image's order
+  std::vector<SensorInfo> sensors{};  ///< the image's order
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
   std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits

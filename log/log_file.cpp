@@ -126,8 +126,8 @@ Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& 
     if (field == nullptr) {
       std::vector<std::string> names;
       for (const hal::Field& one : (*topic)->layout.fields()) names.push_back(one.name);
-      return std::unexpected(at(path_, name + " has no field '" + column.field + "'",
-                                suggest(column.field, names)));
+      return std::unexpected(
+          at(path_, name + " has no field '" + column.field + "'", suggest(column.field, names)));
     }
     if (column.index >= field->count) {
       return std::unexpected(at(path_, column.field + " of " + name + " has only " +
@@ -138,14 +138,13 @@ Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& 
   Table table;
   table.columns.resize(columns.size());
   std::size_t count = 0;
-  const Status done =
-      for_each(name, [&](std::int64_t time_ns, std::span<const std::byte> body) {
-        if (count++ % every != 0) return;
-        table.time_s.push_back(static_cast<double>(time_ns) * 1e-9);
-        for (std::size_t i = 0; i < columns.size(); ++i) {
-          table.columns[i].push_back(element(*fields[i], body, columns[i].index));
-        }
-      });
+  const Status done = for_each(name, [&](std::int64_t time_ns, std::span<const std::byte> body) {
+    if (count++ % every != 0) return;
+    table.time_s.push_back(static_cast<double>(time_ns) * 1e-9);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      table.columns[i].push_back(element(*fields[i], body, columns[i].index));
+    }
+  });
   if (!done) return std::unexpected(done.error());
   return table;
 }
@@ -153,15 +152,14 @@ Result<Table> LogFile::read(const std::string& name, const std::vector<Column>& 
 Result<std::vector<EventText>> LogFile::events() const {
   std::vector<EventText> events;
   Status decoded;
-  const Status done =
-      for_each("/tandem/event", [&](std::int64_t, std::span<const std::byte> body) {
-        auto event = decode_event(body);
-        if (!event) {
-          decoded = std::unexpected(event.error());
-          return;
-        }
-        events.push_back(std::move(*event));
-      });
+  const Status done = for_each("/tandem/event", [&](std::int64_t, std::span<const std::byte> body) {
+    auto event = decode_event(body);
+    if (!event) {
+      decoded = std::unexpected(event.error());
+      return;
+    }
+    events.push_back(std::move(*event));
+  });
   if (!done) return std::unexpected(done.error());
   if (!decoded) return std::unexpected(decoded.error());
   return events;

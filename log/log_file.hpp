@@ -17,13 +17,13 @@ namespace tandem::log {
 
 /// A topic of the file.
 struct Topic {
-  std::string name;             ///< "/tandem/state"
-  std::string type;             ///< "tandem/msg/State"
-  std::string encoding;         ///< "cdr"
+  std::string name;      ///< "/tandem/state"
+  std::string type;      ///< "tandem/msg/State"
+  std::string encoding;  ///< "cdr"
   std::uint64_t messages = 0;
-  std::int64_t first_ns = 0;    ///< times of the first and the last message
+  std::int64_t first_ns = 0;  ///< times of the first and the last message
   std::int64_t last_ns = 0;
-  hal::Layout layout;           ///< empty when the type is not all fixed-size numbers
+  hal::Layout layout;  ///< empty when the type is not all fixed-size numbers
 };
 
 /// One number of each message: element `index` of `field`.

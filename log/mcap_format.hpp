@@ -29,9 +29,9 @@ enum class Opcode : std::uint8_t {
   kDataEnd = 0x0F,        ///< CRC u32 of everything before
 };
 
-inline constexpr std::array<std::byte, 8> kMagic{
-    std::byte{0x89}, std::byte{'M'}, std::byte{'C'},  std::byte{'A'},
-    std::byte{'P'},  std::byte{'0'}, std::byte{'\r'}, std::byte{'\n'}};
+inline constexpr std::array<std::byte, 8> kMagic{std::byte{0x89}, std::byte{'M'}, std::byte{'C'},
+                                                 std::byte{'A'},  std::byte{'P'}, std::byte{'0'},
+                                                 std::byte{'\r'}, std::byte{'\n'}};
 inline constexpr std::size_t kRecordHeaderBytes = 9;
 inline constexpr std::size_t kMessageHeaderBytes = 22;
 

@@ -46,9 +46,7 @@ class McapReader {
   [[nodiscard]] Result<std::optional<MessageView>> next();
 
   /// Those met so far: the first message's are all known once it has been read.
-  [[nodiscard]] const std::map<std::uint16_t, ChannelRecord>& channels() const {
-    return channels_;
-  }
+  [[nodiscard]] const std::map<std::uint16_t, ChannelRecord>& channels() const { return channels_; }
   [[nodiscard]] const std::map<std::uint16_t, SchemaRecord>& schemas() const { return schemas_; }
   /// By name. The run's own stand before the first message, its result behind the last.
   [[nodiscard]] const std::map<std::string, StringMap>& metadata() const { return metadata_; }

@@ -145,8 +145,8 @@ void McapWriter::add_metadata(std::string_view name, const StringMap& map) {
   emit_record(Opcode::kMetadata, content);
 }
 
-bool McapWriter::write(std::uint16_t channel, std::int64_t time_ns,
-                       std::span<const std::byte> head, std::span<const std::byte> body) {
+bool McapWriter::write(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> head,
+                       std::span<const std::byte> body) {
   if (failed()) return false;
   const auto time = static_cast<std::uint64_t>(time_ns);
   const std::size_t at = chunk_.size();

@@ -35,8 +35,7 @@ class McapWriter {
   [[nodiscard]] Status open(const std::string& path, const WriterOptions& options);
 
   /// Ids count from 1 (schemas) and 0 (channels). Written into the first chunk.
-  std::uint16_t add_schema(std::string_view name, std::string_view encoding,
-                           std::string_view text);
+  std::uint16_t add_schema(std::string_view name, std::string_view encoding, std::string_view text);
   std::uint16_t add_channel(std::uint16_t schema, std::string_view topic,
                             std::string_view message_encoding, const StringMap& metadata = {});
   /// Outside of every chunk, at the present end of the file.
@@ -74,7 +73,7 @@ class McapWriter {
     std::map<std::uint16_t, std::uint64_t> per_channel;
   };
 
-  void emit(std::span<const std::byte> bytes);  // to the file, into the CRC
+  void emit(std::span<const std::byte> bytes);      // to the file, into the CRC
   void emit_raw(std::span<const std::byte> bytes);  // to the file only
   void emit_record(Opcode opcode, const Bytes& content);
   void finish_chunk();

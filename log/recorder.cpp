@@ -1,5 +1,6 @@
 #include "log/recorder.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 
@@ -39,8 +40,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const 
                                  .file = path,
                                  .key = {}});
   }
-  const std::uint16_t schema =
-      writer.add_schema("tandem/msg/Event", "ros2msg", event_schema());
+  const std::uint16_t schema = writer.add_schema("tandem/msg/Event", "ros2msg", event_schema());
   writer.add_channel(schema, "/tandem/event", "cdr");
   return recorder;
 }
@@ -73,7 +73,8 @@ bool Recorder::push(const Event& event) noexcept TANDEM_RT {
 }
 
 void Recorder::wait_for_space(std::size_t messages) const noexcept {
-  while (ring_->size() + messages > ring_->capacity()) {
+  const std::size_t wanted = std::min(messages, ring_->capacity());
+  while (ring_->size() + wanted > ring_->capacity()) {
     std::this_thread::sleep_for(kPoll / 10);
   }
 }

@@ -31,12 +31,12 @@ struct RecorderOptions {
 /// What a closed recording amounts to.
 struct RecordingResult {
   std::string path;
-  std::uint64_t messages = 0;      ///< in the file
-  std::uint64_t dropped = 0;       ///< refused because the ring was full
-  std::uint64_t failed = 0;        ///< lost because writing failed (disk full)
-  std::uint64_t bytes = 0;         ///< of the file
-  std::string data_sha256;         ///< over channel id, time and data of every message, in order
-  std::string error;               ///< why writing failed; empty when it did not
+  std::uint64_t messages = 0;  ///< in the file
+  std::uint64_t dropped = 0;   ///< refused because the ring was full
+  std::uint64_t failed = 0;    ///< lost because writing failed (disk full)
+  std::uint64_t bytes = 0;     ///< of the file
+  std::string data_sha256;     ///< over channel id, time and data of every message, in order
+  std::string error;           ///< why writing failed; empty when it did not
 };
 
 /// One recording. Message times are the images' own (simulated or nominal) times, so equal runs
@@ -60,12 +60,12 @@ class Recorder {
 
   /// Hands `image` over. False, and counted, when the ring is full.
   /// @rt one copy of the bytes.
-  bool push(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept
-      TANDEM_RT;
+  bool push(Channel channel, std::int64_t time_ns,
+            std::span<const std::byte> image) noexcept TANDEM_RT;
   bool push(const Event& event) noexcept TANDEM_RT;
 
-  /// Blocks until `messages` fit into the ring. For simulated time only, where the loop may wait
-  /// for the disk; never on a robot.
+  /// Blocks until `messages` fit into the ring, or until it is empty. For simulated time only,
+  /// where the loop may wait for the disk; never on a robot.
   void wait_for_space(std::size_t messages) const noexcept;
 
   [[nodiscard]] std::uint64_t dropped() const noexcept { return ring_->dropped(); }

@@ -10,8 +10,8 @@ namespace {
 using hal::FieldType;
 
 constexpr std::pair<FieldType, std::string_view> kTypes[] = {
-    {FieldType::kF64, "float64"}, {FieldType::kI64, "int64"},   {FieldType::kU64, "uint64"},
-    {FieldType::kU32, "uint32"},  {FieldType::kU16, "uint16"},  {FieldType::kI8, "int8"},
+    {FieldType::kF64, "float64"}, {FieldType::kI64, "int64"},  {FieldType::kU64, "uint64"},
+    {FieldType::kU32, "uint32"},  {FieldType::kU16, "uint16"}, {FieldType::kI8, "int8"},
     {FieldType::kU8, "uint8"},
 };
 
@@ -40,8 +40,7 @@ Status add_member(std::string_view member, std::string_view comment, hal::Layout
   std::size_t count = 1;
   if (const auto bracket = type.find('['); bracket != std::string_view::npos) {
     const std::string_view digits = type.substr(bracket + 1, type.size() - bracket - 2);
-    const auto [end, error] =
-        std::from_chars(digits.data(), digits.data() + digits.size(), count);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), count);
     if (error != std::errc{} || end != digits.data() + digits.size() || type.back() != ']' ||
         count > 1'000'000) {
       return refuse();

@@ -72,8 +72,7 @@ void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {
   late_mask_ = (late_mask_ << 1) | 1U;
   if (config_.on_overrun != OverrunPolicy::kStop || config_.pacing != Pacing::kWallClock) return;
   const std::uint64_t window =
-      config_.stop_window == 64 ? ~std::uint64_t{0}
-                                : (std::uint64_t{1} << config_.stop_window) - 1;
+      config_.stop_window == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << config_.stop_window) - 1;
   tick.stop = std::popcount(late_mask_ & window) >= config_.stop_late;
 }
 

@@ -32,29 +32,29 @@ enum class OverrunPolicy : std::uint8_t {
 struct LoopConfig {
   std::int64_t period_ns = 1'000'000;
   Pacing pacing = Pacing::kSimulated;
-  double rate = 0.0;           ///< simulated only: times real time; 0 runs as fast as it can
+  double rate = 0.0;  ///< simulated only: times real time; 0 runs as fast as it can
   OverrunPolicy on_overrun = OverrunPolicy::kSkip;
-  int stop_late = 5;           ///< 1 to stop_window
-  int stop_window = 50;        ///< 1 to 64 cycles
+  int stop_late = 5;     ///< 1 to stop_window
+  int stop_window = 50;  ///< 1 to 64 cycles
 };
 
 /// One cycle, as wait() announces it.
 struct Tick {
-  std::uint64_t cycle = 0;     ///< number of the cycle
-  std::int64_t time_ns = 0;    ///< cycle * period_ns, exactly
-  std::uint64_t skipped = 0;   ///< wall clock: cycles missed just before this one
-  bool late = false;           ///< the cycle before overran into this one's grid point
-  bool hold = false;           ///< the policy wants the last command repeated
-  bool stop = false;           ///< the policy wants the robot stopped
+  std::uint64_t cycle = 0;    ///< number of the cycle
+  std::int64_t time_ns = 0;   ///< cycle * period_ns, exactly
+  std::uint64_t skipped = 0;  ///< wall clock: cycles missed just before this one
+  bool late = false;          ///< the cycle before overran into this one's grid point
+  bool hold = false;          ///< the policy wants the last command repeated
+  bool stop = false;          ///< the policy wants the robot stopped
 };
 
 /// Counts and histograms of one run.
 struct LoopStatistics {
-  std::uint64_t cycles = 0;     ///< started
-  std::uint64_t overruns = 0;   ///< cycles whose work ended after the next grid point
-  std::uint64_t skipped = 0;    ///< grid points without a cycle (wall clock)
-  Histogram wakeup;             ///< from the grid point to the return of wait(); paced runs only
-  Histogram execution;          ///< from the return of wait() to finish()
+  std::uint64_t cycles = 0;    ///< started
+  std::uint64_t overruns = 0;  ///< cycles whose work ended after the next grid point
+  std::uint64_t skipped = 0;   ///< grid points without a cycle (wall clock)
+  Histogram wakeup;            ///< from the grid point to the return of wait(); paced runs only
+  Histogram execution;         ///< from the return of wait() to finish()
 };
 
 /// `for (;;) { const Tick tick = loop.wait(); …; loop.finish(); }`
@@ -85,12 +85,12 @@ class CyclicLoop {
 
   LoopConfig config_;
   Clock* clock_;
-  std::int64_t step_ns_ = 0;      // between grid points on the clock; 0: not paced
-  std::int64_t grid_ns_ = 0;      // clock time of the next grid point
+  std::int64_t step_ns_ = 0;  // between grid points on the clock; 0: not paced
+  std::int64_t grid_ns_ = 0;  // clock time of the next grid point
   bool started_ = false;
   std::uint64_t next_cycle_ = 0;
-  std::int64_t begin_ns_ = 0;     // clock time at which the current cycle began
-  std::uint64_t late_mask_ = 0;   // bit 0: the newest cycle was late
+  std::int64_t begin_ns_ = 0;    // clock time at which the current cycle began
+  std::uint64_t late_mask_ = 0;  // bit 0: the newest cycle was late
   LoopStatistics statistics_;
 };
 

@@ -31,8 +31,7 @@ void Histogram::record(std::int64_t duration_ns) noexcept TANDEM_RT {
 }
 
 std::int64_t Histogram::percentile_ns(double fraction) const noexcept {
-  const auto wanted =
-      static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
+  const auto wanted = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
   std::uint64_t seen = 0;
   for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
     seen += counts_[bucket];

@@ -29,10 +29,10 @@ void set_scheduling(const ThreadConfig& config, ThreadReport& report) {
     report.granted.push_back(what);
     return;
   }
-  const std::string how =
-      error == EINVAL ? "give a priority from 1 to 99"
-                      : "allow it: 'rtprio " + std::to_string(config.priority) +
-                            "' for the user in /etc/security/limits.d/, then log in again";
+  const std::string how = error == EINVAL
+                              ? "give a priority from 1 to 99"
+                              : "allow it: 'rtprio " + std::to_string(config.priority) +
+                                    "' for the user in /etc/security/limits.d/, then log in again";
   report.missing.push_back({what, reason(error), how});
 }
 
@@ -65,9 +65,8 @@ void lock_memory(const ThreadConfig& config, ThreadReport& report) {
     report.granted.emplace_back("locked memory");
     return;
   }
-  const std::string why = unlimited
-                              ? reason(errno)
-                              : "the limit is " + std::to_string(limit.rlim_cur / 1024) + " KiB";
+  const std::string why =
+      unlimited ? reason(errno) : "the limit is " + std::to_string(limit.rlim_cur / 1024) + " KiB";
   report.missing.push_back(
       {"locked memory", why,
        "allow it: 'memlock unlimited' for the user in /etc/security/limits.d/, then log in again"});

@@ -22,8 +22,7 @@ ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kerne
       period_ns_(period_ns),
       capabilities_(hal::joint_capabilities(robot)) {}
 
-Status ControllerHost::add(const std::string& name, LoadedController plugin,
-                           TomlTable parameters) {
+Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters) {
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
   return add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters));
 }
@@ -56,10 +55,9 @@ Status ControllerHost::check_claims(const std::string& name,
     }
     const std::string& joint = robot_->joints[claim.joint].name;
     if (!owner[claim.joint].empty()) {
-      return std::unexpected(about(joint,
-                                   "is claimed by the controllers '" + owner[claim.joint] +
-                                       "' and '" + name + "'",
-                                   "let one controller have the joint"));
+      return std::unexpected(about(
+          joint, "is claimed by the controllers '" + owner[claim.joint] + "' and '" + name + "'",
+          "let one controller have the joint"));
     }
     owner[claim.joint] = name;
     if (Status able = hal::check_capability(*robot_, claim.joint, claim.mode, claim.interaction);

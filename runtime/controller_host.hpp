@@ -33,8 +33,7 @@ class ControllerHost {
   [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
                            TomlTable parameters);
   /// The same for a plugin; the host keeps its library open.
-  [[nodiscard]] Status add(const std::string& name, LoadedController plugin,
-                           TomlTable parameters);
+  [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters);
 
   /// Writes "stay where you are" for every joint: position control at the measured position.
   /// A joint whose last command was in position control keeps its reference and feed-forward.

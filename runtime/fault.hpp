@@ -10,14 +10,14 @@
 namespace tandem::runtime {
 
 enum class FaultSource : std::uint8_t {
-  kDrive,        ///< a drive reports an error; `code` is its CiA 402 error code
-  kJointLost,    ///< no feedback of a joint for too long; `code` is its age in cycles
-  kSensorLost,   ///< the same of a sensor
-  kBackend,      ///< read, write or the backend as a whole; `code` is a Code
-  kController,   ///< a controller gave up; `code` is a Code
-  kCommand,      ///< a controller's command was not finite
-  kOverrun,      ///< too many late cycles
-  kBringUp,      ///< the drives were not enabled in time
+  kDrive,       ///< a drive reports an error; `code` is its CiA 402 error code
+  kJointLost,   ///< no feedback of a joint for too long; `code` is its age in cycles
+  kSensorLost,  ///< the same of a sensor
+  kBackend,     ///< read, write or the backend as a whole; `code` is a Code
+  kController,  ///< a controller gave up; `code` is a Code
+  kCommand,     ///< a controller's command was not finite
+  kOverrun,     ///< too many late cycles
+  kBringUp,     ///< the drives were not enabled in time
 };
 
 struct FaultRecord {

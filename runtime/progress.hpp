@@ -23,7 +23,7 @@ struct Progress {
   std::atomic<std::uint64_t> running_cycles{0};  ///< of the phase kRunning
   std::atomic<std::uint64_t> total_cycles{0};    ///< that kRunning will have; 0: until stopped
   std::atomic<std::uint64_t> overruns{0};
-  std::atomic<std::uint64_t> dropped{0};         ///< messages the log lost
+  std::atomic<std::uint64_t> dropped{0};  ///< messages the log lost
 };
 
 }  // namespace tandem::runtime

@@ -37,9 +37,10 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
 
 /// The only stage that may block: for the cycle's time and, when time is simulated, for the log.
 rt::Tick RobotCycle::wait() noexcept {
-  constexpr std::size_t kMessagesPerCycle = 16;  // three images and room for events
+  // Three images, and every event that one cycle can bring.
+  const std::size_t most = 3 + 8 + 3 * joint_faulted_.size() + sensor_lost_.size();
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
-  if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(kMessagesPerCycle);
+  if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
   return loop_.wait();
 }
 
@@ -205,8 +206,8 @@ void RobotCycle::check_sensors() noexcept TANDEM_RT {
   }
 }
 
-void RobotCycle::fault(FaultSource source, std::int32_t index, std::uint32_t code) noexcept
-    TANDEM_RT {
+void RobotCycle::fault(FaultSource source, std::int32_t index,
+                       std::uint32_t code) noexcept TANDEM_RT {
   const bool of_joint = source == FaultSource::kDrive || source == FaultSource::kJointLost ||
                         source == FaultSource::kCommand;
   const bool of_sensor = source == FaultSource::kSensorLost;
@@ -241,8 +242,7 @@ void RobotCycle::go(RunPhase next) noexcept TANDEM_RT {
   phase_began_ = time_.cycle;
 }
 
-void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) noexcept
-    TANDEM_RT {
+void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
   recorder_->push(log::Event{time_.cycle, time_.time_ns, code, joint, kind, {}});
 }

@@ -24,11 +24,11 @@ namespace tandem::runtime {
 
 struct CycleConfig {
   rt::LoopConfig loop{};
-  std::uint64_t running_cycles = 0;       ///< that controllers run; 0: until stopped
-  std::uint64_t bring_up_cycles = 20'000; ///< at most, then the run ends in a fault
-  std::uint64_t shut_down_cycles = 2'000; ///< at most
-  std::uint32_t lost_after_cycles = 10;   ///< feedback older than this is a lost joint or sensor
-  bool time_stages = false;               ///< fill stage_ns(): seven clock reads per cycle
+  std::uint64_t running_cycles = 0;        ///< that controllers run; 0: until stopped
+  std::uint64_t bring_up_cycles = 20'000;  ///< at most, then the run ends in a fault
+  std::uint64_t shut_down_cycles = 2'000;  ///< at most
+  std::uint32_t lost_after_cycles = 10;    ///< feedback older than this is a lost joint or sensor
+  bool time_stages = false;                ///< fill stage_ns(): seven clock reads per cycle
 };
 
 /// The stages that stage_ns() tells apart.
@@ -109,8 +109,8 @@ class RobotCycle {
   void react(hal::StopCategory category) noexcept TANDEM_RT;
   void run_controllers() noexcept TANDEM_RT;
   void go(RunPhase next) noexcept TANDEM_RT;
-  void event(log::EventKind kind, std::int32_t joint = -1, std::uint32_t code = 0) noexcept
-      TANDEM_RT;
+  void event(log::EventKind kind, std::int32_t joint = -1,
+             std::uint32_t code = 0) noexcept TANDEM_RT;
   void lap(Stage stage) noexcept TANDEM_RT;
   void archive(Archive& ar);
   [[nodiscard]] Fault tell(const FaultRecord& record) const;
@@ -132,12 +132,12 @@ class RobotCycle {
 
   hal::CycleTime time_;
   RunPhase phase_ = RunPhase::kBringUp;
-  bool started_ = false;           // the first cycle was
-  bool disable_ = false;           // stop category 0: no torque at once
-  bool joint_fault_ = false;       // some joint is or was in fault
+  bool started_ = false;      // the first cycle was
+  bool disable_ = false;      // stop category 0: no torque at once
+  bool joint_fault_ = false;  // some joint is or was in fault
   Code read_code_ = Code::kOk;
-  std::uint64_t phase_began_ = 0;  // cycle
-  std::uint64_t ran_ = 0;          // cycles of kRunning
+  std::uint64_t phase_began_ = 0;                                          // cycle
+  std::uint64_t ran_ = 0;                                                  // cycles of kRunning
   std::vector<std::uint8_t> joint_faulted_, sensor_lost_, joint_limited_;  // noted once each
   std::array<FaultRecord, 64> faults_{};
   std::size_t fault_count_ = 0;

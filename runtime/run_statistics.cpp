@@ -5,8 +5,7 @@
 
 namespace tandem::runtime {
 
-RunStatistics::RunStatistics(std::size_t joints, std::size_t feet)
-    : errors_(joints), feet_(feet) {}
+RunStatistics::RunStatistics(std::size_t joints, std::size_t feet) : errors_(joints), feet_(feet) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
                          const hal::TruthImage* truth) noexcept TANDEM_RT {

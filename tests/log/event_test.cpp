@@ -22,8 +22,9 @@ TEST(Event, IsEncodedAsPlainCdr) {
   const Event event{.cycle = 2, .time_ns = 3, .code = 4, .joint = -1, .kind = EventKind::kFault};
   Bytes body;
   encode_event(event, "ab", body);
-  const unsigned char expected[] = {2, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0,
-                                    0xFF, 0xFF, 0xFF, 0xFF, 3, 0, 0, 0, 3, 0, 0, 0, 'a', 'b', 0};
+  const unsigned char expected[] = {2, 0, 0, 0, 0, 0, 0, 0, 3,    0,    0,    0,
+                                    0, 0, 0, 0, 4, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF,
+                                    3, 0, 0, 0, 3, 0, 0, 0, 'a',  'b',  0};
   ASSERT_EQ(body.size(), sizeof expected);
   for (std::size_t i = 0; i < body.size(); ++i) {
     EXPECT_EQ(static_cast<unsigned char>(body[i]), expected[i]) << i;

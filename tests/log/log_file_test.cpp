@@ -97,8 +97,7 @@ TEST_F(LogFileOfThree, WritesOnlyTheFieldsAskedFor) {
 TEST_F(LogFileOfThree, WritesEventsAsCsv) {
   std::ostringstream out;
   ASSERT_TRUE(write_csv(open(), "/tandem/event", 1, out));
-  EXPECT_EQ(out.str(),
-            "time_s,cycle,kind,joint,code,text\n0.5,2,shut down,-1,0,\"shut down\"\n");
+  EXPECT_EQ(out.str(), "time_s,cycle,kind,joint,code,text\n0.5,2,shut down,-1,0,\"shut down\"\n");
   EXPECT_FALSE(write_csv(open(), "/nothing", 1, out));
 }
 

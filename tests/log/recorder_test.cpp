@@ -44,8 +44,8 @@ RecordingResult record(const std::string& path, std::uint64_t cycles,
   auto recorder = Recorder::open(path, run_info(), options);
   EXPECT_TRUE(recorder) << recorder.error().to_string();
   hal::StateImage state = image();
-  const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State",
-                                                state.layout());
+  const auto channel =
+      (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
   (*recorder)->start();
   for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
     (*recorder)->wait_for_space(2);
@@ -103,9 +103,9 @@ TEST(Recorder, ReadsBackTheSameNumbersNamesAndHash) {
 TEST(Recorder, HashesTheDataAndNothingElse) {
   const ScratchFolder folder;
   const RecordingResult one = record(folder / "one.mcap", 500);
-  const RecordingResult other = record(
-      folder / "other.mcap", 500,
-      {.writer = {.compression = Compression::kZstd, .chunk_bytes = 3000}, .ring_slots = 8});
+  const RecordingResult other =
+      record(folder / "other.mcap", 500,
+             {.writer = {.compression = Compression::kZstd, .chunk_bytes = 3000}, .ring_slots = 8});
   const RecordingResult shorter = record(folder / "shorter.mcap", 499);
   EXPECT_EQ(one.data_sha256.size(), 64U);
   EXPECT_EQ(one.data_sha256, other.data_sha256);
@@ -155,8 +155,8 @@ TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
   if (child == 0) {
     auto recorder = Recorder::open(folder / "run.mcap", run_info(), {});
     hal::StateImage state = image();
-    const auto channel = (*recorder)->add_channel("/tandem/state", "tandem/msg/State",
-                                                  state.layout());
+    const auto channel =
+        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
     (*recorder)->start();
     for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
       (*recorder)->wait_for_space(1);

@@ -27,8 +27,8 @@ TEST(CyclicLoop, StartsEachCycleAtAnAbsoluteGridPoint) {
   clock.wakeup_latency_ns = 40'000;
   CyclicLoop loop(wall(), clock);
   for (int i = 0; i < 4; ++i) cycle(loop, clock, 200'000);
-  EXPECT_EQ(clock.sleeps, (std::vector<std::int64_t>{kStart + kMs, kStart + 2 * kMs,
-                                                     kStart + 3 * kMs}));
+  EXPECT_EQ(clock.sleeps,
+            (std::vector<std::int64_t>{kStart + kMs, kStart + 2 * kMs, kStart + 3 * kMs}));
   EXPECT_EQ(loop.statistics().wakeup.max_ns(), 40'000);
   EXPECT_EQ(loop.statistics().wakeup.count(), 3U);
   EXPECT_EQ(loop.statistics().execution.max_ns(), 200'000);

@@ -66,8 +66,7 @@ TEST_F(RtTrap, CatchesLocksAndWaits) {
   EXPECT_EQ(caught([&] { const std::lock_guard lock(mutex); }), Calls{"pthread_mutex_lock"});
   std::condition_variable condition;
   std::unique_lock lock(mutex);
-  EXPECT_FALSE(
-      caught([&] { condition.wait_for(lock, std::chrono::microseconds(1)); }).empty());
+  EXPECT_FALSE(caught([&] { condition.wait_for(lock, std::chrono::microseconds(1)); }).empty());
 }
 
 TEST_F(RtTrap, CatchesSleepingAndFileCalls) {

@@ -51,16 +51,16 @@ TEST_F(ControllerHostOfFake, RefusesAModeThatTheJointLacks) {
   robot.gains[0].current = {};
   ControllerHost host(robot, nullptr, 1'000'000);
   const std::vector<std::size_t> joints{1};
-  const Status added = host.add(
-      "left", std::make_unique<Sine>(joints, ControlMode::kCurrent), parameters());
+  const Status added =
+      host.add("left", std::make_unique<Sine>(joints, ControlMode::kCurrent), parameters());
   ASSERT_FALSE(added);
   EXPECT_EQ(added.error().key, "elbow");
 }
 
 TEST_F(ControllerHostOfFake, ReportsParametersThatTheControllerDoesNotKnow) {
   const auto document = TomlDocument::parse("amplitude_rd = 0.1", "x.toml");
-  ASSERT_TRUE(host_.add("left", std::make_unique<Sine>(std::vector<std::size_t>{0}),
-                        document->root()));
+  ASSERT_TRUE(
+      host_.add("left", std::make_unique<Sine>(std::vector<std::size_t>{0}), document->root()));
   ASSERT_EQ(document->diagnostics().size(), 1U);
   EXPECT_EQ(document->diagnostics()[0].key, "amplitude_rd");
   EXPECT_EQ(document->diagnostics()[0].hint, "did you mean 'amplitude_rad'?");

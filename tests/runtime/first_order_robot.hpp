@@ -25,11 +25,11 @@ class FirstOrderRobot final : public hal::Backend {
   // What a test may change between two cycles.
   std::uint64_t bring_up_cycles = 20;
   std::uint64_t shut_down_cycles = 3;
-  Code answer = Code::kOk;             // of read()
+  Code answer = Code::kOk;  // of read()
   int faulted_joint = -1, lost_joint = -1, lost_sensor = -1;
-  bool latch_on_fault = false;         // phase() turns kFault with a joint
-  hal::TruthImage truth;               // its feet and base are the test's to set
-  std::uint64_t idle_writes = 0;       // commands with every joint idle
+  bool latch_on_fault = false;    // phase() turns kFault with a joint
+  hal::TruthImage truth;          // its feet and base are the test's to set
+  std::uint64_t idle_writes = 0;  // commands with every joint idle
 
   hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
   hal::Phase phase() const noexcept override {

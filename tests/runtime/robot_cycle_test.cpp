@@ -24,7 +24,7 @@ constexpr std::uint64_t kRunning = 500;
 /// A run of the fake robot's configuration on first-order joints; one controller moves joint 0.
 struct TestRun {
   explicit TestRun(CycleConfig config = {}, log::Recorder* recorder = nullptr,
-               rt::Clock* other_clock = nullptr, hal::RobotConfig of = hal::test::fake_robot())
+                   rt::Clock* other_clock = nullptr, hal::RobotConfig of = hal::test::fake_robot())
       : robot(std::move(of)), backend(robot), host(robot, nullptr, 1'000'000) {
     auto sine = std::make_unique<Sine>(std::vector<std::size_t>{0});
     controller = sine.get();
@@ -250,9 +250,8 @@ TEST(RobotCycle, GivesUpOnAShutDownThatNeverEnds) {
 
 TEST(RobotCycle, RepeatsTheLastCommandAfterALateCycleWhenThePolicyIsHold) {
   rt::FakeClock clock;
-  TestRun run({.loop = {.pacing = rt::Pacing::kWallClock,
-                    .on_overrun = rt::OverrunPolicy::kHold}},
-          nullptr, &clock);
+  TestRun run({.loop = {.pacing = rt::Pacing::kWallClock, .on_overrun = rt::OverrunPolicy::kHold}},
+              nullptr, &clock);
   run.steps(100);
   const int updates = run.controller->updates;
   const double sent = run.cycle->command().position_rad()[0];
@@ -268,10 +267,10 @@ TEST(RobotCycle, RepeatsTheLastCommandAfterALateCycleWhenThePolicyIsHold) {
 TEST(RobotCycle, StopsWhenTooManyCyclesAreLate) {
   rt::FakeClock clock;
   TestRun run({.loop = {.pacing = rt::Pacing::kWallClock,
-                    .on_overrun = rt::OverrunPolicy::kStop,
-                    .stop_late = 2,
-                    .stop_window = 10}},
-          nullptr, &clock);
+                        .on_overrun = rt::OverrunPolicy::kStop,
+                        .stop_late = 2,
+                        .stop_window = 10}},
+              nullptr, &clock);
   run.steps(100);
   clock.now += 1'500'000;
   run.steps(1);

@@ -46,8 +46,7 @@ struct SimRun {
 TEST(SimRun, BringsTheDriveUpFollowsAndShutsDown) {
   SimRun run;
   run.cycle->run();
-  EXPECT_TRUE(run.cycle->faults().empty())
-      << run.cycle->faults()[0].text;
+  EXPECT_TRUE(run.cycle->faults().empty()) << run.cycle->faults()[0].text;
   EXPECT_EQ(run.cycle->running_cycles(), kRunning);
   const TrackingError error = run.cycle->statistics().tracking()[0];
   EXPECT_GT(error.max_rad, 0.0);

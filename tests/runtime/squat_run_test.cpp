@@ -41,8 +41,8 @@ struct Squat {
     Experiment& e = *experiment;
     host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
     for (const ControllerSpec& spec : e.controllers) {
-      auto plugin = load_controller(spec.plugin, {std::string(TANDEM_BINARY_DIR) +
-                                                  "/lib/controllers"});
+      auto plugin =
+          load_controller(spec.plugin, {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"});
       ASSERT_TRUE(plugin) << plugin.error().to_string();
       const Status added = host->add(spec.name, std::move(*plugin), spec.parameters);
       ASSERT_TRUE(added) << added.error().to_string();
@@ -50,8 +50,7 @@ struct Squat {
     auto made = sim::SimRobot::create(e.robot, kernels.get(), e.sim_robot_config());
     ASSERT_TRUE(made) << made.error().to_string();
     backend = std::move(*made);
-    const CycleConfig config{.loop = e.loop,
-                             .running_cycles = cycles == 0 ? e.cycles() : cycles};
+    const CycleConfig config{.loop = e.loop, .running_cycles = cycles == 0 ? e.cycles() : cycles};
     cycle = std::make_unique<RobotCycle>(
         CycleParts{e.robot, *backend, *host, clock, recorder, &backend->truth()}, config);
   }

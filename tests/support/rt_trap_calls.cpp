@@ -86,11 +86,11 @@ Function* next(const char* name) {
 }  // namespace
 
 // Looked up once, on first use: a look-up inside the cycle is as wrong as the call itself.
-#define TANDEM_TRAP(result, name, parameters, arguments)       \
-  extern "C" result name parameters {                          \
-    static auto* const real = next<result parameters>(#name);  \
-    note_rt_call(#name);                                       \
-    return real arguments;                                     \
+#define TANDEM_TRAP(result, name, parameters, arguments)      \
+  extern "C" result name parameters {                         \
+    static auto* const real = next<result parameters>(#name); \
+    note_rt_call(#name);                                      \
+    return real arguments;                                    \
   }
 
 TANDEM_TRAP(int, pthread_mutex_lock, (pthread_mutex_t * mutex), (mutex))
