@@ -12,7 +12,7 @@ std::uint8_t bit(Capability capability, bool set) {
   return set ? static_cast<std::uint8_t>(capability) : std::uint8_t{0};
 }
 
-Capability needed(ControlMode mode) {
+Capability needed(ControlMode mode) noexcept TANDEM_RT {
   switch (mode) {
     case ControlMode::kVelocity: return Capability::kVelocity;
     case ControlMode::kTorque: return Capability::kTorque;
@@ -68,7 +68,8 @@ const char* to_string(Capability capability) noexcept {
   return "?";
 }
 
-bool JointCapabilities::can(ControlMode mode, InteractionMode interaction) const noexcept {
+bool JointCapabilities::can(ControlMode mode, InteractionMode interaction) const noexcept
+    TANDEM_RT {
   if (mode == ControlMode::kIdle) return true;
   if (!can(needed(mode))) return false;
   return interaction == InteractionMode::kStiff || can(Capability::kCompliant);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
@@ -41,11 +42,11 @@ struct JointCapabilities {
   double damping_Nms_rad = 0.0;
   std::uint8_t bits = 0;
 
-  [[nodiscard]] bool can(Capability capability) const noexcept {
+  [[nodiscard]] bool can(Capability capability) const noexcept TANDEM_RT {
     return (bits & static_cast<std::uint8_t>(capability)) != 0;
   }
   /// Whether the joint can be put into `mode`. Every joint can be idle.
-  [[nodiscard]] bool can(ControlMode mode, InteractionMode interaction) const noexcept;
+  [[nodiscard]] bool can(ControlMode mode, InteractionMode interaction) const noexcept TANDEM_RT;
 };
 
 /// Of every joint, in the image's order.

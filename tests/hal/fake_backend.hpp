@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "base/archive.hpp"
@@ -81,9 +82,9 @@ class FakeBackend : public Backend {
       publish(j, state);
     }
     const double load = joints_.back().torque;
-    std::ranges::copy(std::vector<double>{load, 0.0, 9.81, 0.0, 0.0, load},
+    std::ranges::copy(std::array<double, 6>{load, 0.0, 9.81, 0.0, 0.0, load},
                       state.sensor_values(0).begin());
-    std::ranges::copy(std::vector<double>{0, 0, 0, 1, 0, 0, joints_[0].velocity, 0, 0, 9.81},
+    std::ranges::copy(std::array<double, 10>{0, 0, 0, 1, 0, 0, joints_[0].velocity, 0, 0, 9.81},
                       state.sensor_values(1).begin());
     return Code::kOk;
   }
