@@ -65,6 +65,32 @@ void add_point(Curve& curve, const Eigen::Vector3d& point, double shift_m) {
   curve.y.push_back(point.z());
 }
 
+struct Spread {
+  double low_m = 0.0, high_m = 0.0;  ///< heights of the first figure
+  double pitch_m = 0.0;              ///< from one figure to the next, so that none touch
+};
+
+Spread spread(const model::Tree& tree, const hal::RobotConfig& robot,
+              std::span<const PostureSample> samples) {
+  Spread out;
+  if (!robot.contact.feet.empty()) out.low_m = out.high_m = robot.contact.height_m;
+  double widest = 0.0;
+  for (const PostureSample& sample : samples) {
+    double left = 1e300;
+    double right = -1e300;
+    for (const model::Placement& body : body_placements(tree, robot, sample)) {
+      left = std::min(left, body.p.x());
+      right = std::max(right, body.p.x());
+      if (&sample != &samples.front()) continue;
+      out.low_m = std::min(out.low_m, body.p.z());
+      out.high_m = std::max(out.high_m, body.p.z());
+    }
+    widest = std::max(widest, right - left);
+  }
+  out.pitch_m = std::max(0.6 * (out.high_m - out.low_m), 1.2 * widest);
+  return out;
+}
+
 /// The soles as lines from heel to toe.
 void add_soles(Curve& curve, const model::Tree& tree, const hal::RobotConfig& robot,
                std::span<const model::Placement> bodies, double shift_m) {
@@ -121,20 +147,12 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
   figure.y_label = "z [m]";
   figure.equal_axes = true;
   Curve others{"arms and head", CurveStyle::kStickThird, {}, {}};
-  Curve trunk{"trunk", CurveStyle::kStickSecond, {}, {}};
+  const bool legged = !robot.contact.feet.empty();
+  Curve trunk{legged ? "trunk" : robot.name, CurveStyle::kStickSecond, {}, {}};
   Curve legs{"legs", CurveStyle::kStick, {}, {}};
   const std::vector<Limb> limbs = limbs_of(tree, robot);
 
-  // As far apart as the first figure is high: they never touch.
-  double low = robot.contact.feet.empty() ? 0.0 : robot.contact.height_m;
-  double high = low;
-  if (!samples.empty()) {
-    for (const model::Placement& body : body_placements(tree, robot, samples.front())) {
-      low = std::min(low, body.p.z());
-      high = std::max(high, body.p.z());
-    }
-  }
-  const double pitch_m = 0.6 * (high - low);
+  const auto [low, high, pitch_m] = spread(tree, robot, samples);
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
     const auto bodies = body_placements(tree, robot, samples[s]);
@@ -156,7 +174,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
     figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x,
                             low - 0.17 * (high - low)});
   }
-  if (!robot.contact.feet.empty()) figure.levels.push_back({"ground", robot.contact.height_m, false});
+  if (legged) figure.levels.push_back({"ground", robot.contact.height_m, false});
   for (Curve* curve : {&others, &trunk, &legs}) {
     if (!curve->x.empty()) figure.curves.push_back(std::move(*curve));
   }

@@ -61,6 +61,8 @@ std::vector<int> widest_joints(const RunData& run) {
   return order;
 }
 
+bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
+
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
                const std::vector<double>& values, double factor) {
   Curve curve{std::move(label), style, run.time_s, values};
@@ -72,7 +74,7 @@ Figure hip_figure(const RunData& run, const RunData* other, int joint) {
   const std::string& name = run.robot.joints[at(joint)].name;
   Figure figure;
   figure.name = "hip_position";
-  figure.title = "Hip position against its reference";
+  figure.title = std::string(legged(run) ? "Hip" : "Joint") + " position against its reference";
   figure.x_label = "time [s]";
   figure.y_label = name + " [deg]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
@@ -82,7 +84,7 @@ Figure hip_figure(const RunData& run, const RunData* other, int joint) {
                                      other->position_rad[at(joint)], kDegrees));
   }
   figure.curves.push_back(
-      curve_of(run, "reference", CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
+      curve_of(run, other == nullptr ? "reference" : "reference, A", CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
   return figure;
 }
 
@@ -126,7 +128,8 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
                                      vertical_force(run, sensors[i]), 1.0));
   }
   if (other != nullptr) {
-    figure.curves.push_back(curve_of(*other, "B", CurveStyle::kSecond,
+    const std::string& name = run.robot.sensors[at(sensors.front())].name;
+    figure.curves.push_back(curve_of(*other, name + ", B", CurveStyle::kSecond,
                                      vertical_force(*other, sensors.front()), 1.0));
   }
   if (run.robot.model.floating_base && run.robot.contact.feet.size() == 2) {
@@ -143,14 +146,15 @@ Figure torque_figure(const RunData& run, const RunData* other, int joint,
   const std::string& name = run.robot.joints[at(joint)].name;
   Figure figure;
   figure.name = "knee_torque";
-  figure.title = "Knee torque: measured, and by inverse dynamics";
+  figure.title = std::string(legged(run) ? "Knee" : "Joint") +
+                 " torque: measured, and by inverse dynamics";
   figure.x_label = "time [s]";
   figure.y_label = name + " [Nm]";
-  figure.curves.push_back(curve_of(run, other == nullptr ? "spring, measured" : "spring, A",
+  figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
                                    CurveStyle::kMeasured, run.torque_Nm[at(joint)], 1.0));
   if (other != nullptr) {
     figure.curves.push_back(
-        curve_of(*other, "spring, B", CurveStyle::kSecond, other->torque_Nm[at(joint)], 1.0));
+        curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[at(joint)], 1.0));
   }
   if (kernels != nullptr) figure.curves.push_back(inverse_dynamics_curve(run, joint, *kernels));
   return figure;
@@ -167,6 +171,7 @@ std::size_t nearest_row(const std::vector<double>& values, double wanted, std::s
 }
 
 /// Moments of the first half cycle and the end: by the base's height, or by `joint`'s position.
+/// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
   const bool base = run.base.size() == 13 && run.robot.model.floating_base;
   const std::vector<double>& depth = base ? run.base[2] : run.position_rad[at(joint)];
@@ -187,9 +192,9 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
                        run.positions(row)});
   };
   add("start", 0);
-  add("half way", half);
+  if (suffix.empty()) add("half way", half);
   add(base ? "lowest" : "farthest", lowest);
-  add("end", last);
+  if (suffix.empty()) add("end", last);
   return samples;
 }
 

@@ -1,0 +1,95 @@
+// The numbers behind the figures: slopes, inverse dynamics of a logged motion, postures.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "model/urdf.hpp"
+#include "report/inverse_dynamics.hpp"
+#include "report/posture.hpp"
+
+namespace tandem::report {
+namespace {
+
+TEST(Derivative, OfAStraightLineIsItsSlopeUpToTheEnds) {
+  std::vector<double> line;
+  for (int i = 0; i < 50; ++i) line.push_back(3.0 - 0.2 * i);
+  for (const double slope : derivative(line, 0.1, 7)) EXPECT_NEAR(slope, -2.0, 1e-12);
+}
+
+TEST(Derivative, OfASineIsItsCosineToSecondOrderInTheWindow) {
+  constexpr double kStep = 0.001;
+  std::vector<double> sine;
+  for (int i = 0; i < 2000; ++i) sine.push_back(std::sin(i * kStep));
+  const std::vector<double> slope = derivative(sine, kStep, 10);
+  for (std::size_t i = 20; i < 1980; ++i) {
+    EXPECT_NEAR(slope[i], std::cos(static_cast<double>(i) * kStep), 2e-5);
+  }
+}
+
+// A cart of 2 kg on a foot: v' = (tau + fz) / 2. The sensor above the foot (1 kg, 10 N) feels
+// the ground less the foot's weight.
+void cart_inverse_dynamics(const double*, const double*, const double* vdot, const double* wrench,
+                           double* tau) {
+  tau[0] = 2.0 * vdot[0] - wrench[2];
+}
+void cart_sensor(const double*, const double*, const double*, const double* wrench, double* out) {
+  for (int i = 0; i < 6; ++i) out[i] = wrench[i];
+  out[2] -= 10.0;
+}
+
+TEST(InverseDynamics, ExplainsTheSensorsByWrenchesAtTheSites) {
+  tandem_kernels cart{};
+  cart.nq = cart.nv = cart.joints = cart.wrenches = cart.sensors = 1;
+  cart.inverse_dynamics = cart_inverse_dynamics;
+  cart.sensor_wrenches = cart_sensor;
+  Motion motion;
+  motion.step_s = 0.01;
+  for (int i = 0; i < 100; ++i) {
+    motion.q.push_back({0.0});
+    motion.v.push_back({0.5 * i * motion.step_s});     // v' = 0.5
+    motion.sensors.push_back({0, 0, 25.0, 0, 0, 0});   // ground: 35 N
+  }
+  for (const std::vector<double>& tau : inverse_dynamics(cart, motion)) {
+    EXPECT_NEAR(tau[0], 2.0 * 0.5 - 35.0, 1e-9);
+  }
+}
+
+TEST(InverseDynamics, WithoutSensorsTakesNoWrench) {
+  tandem_kernels cart{};
+  cart.nq = cart.nv = cart.joints = cart.wrenches = 1;
+  cart.inverse_dynamics = cart_inverse_dynamics;
+  cart.sensor_wrenches = [](const double*, const double*, const double*, const double*, double*) {};
+  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.03}, {0.06}}, {{}, {}, {}}};
+  EXPECT_NEAR(inverse_dynamics(cart, motion)[1][0], 2.0 * 3.0, 1e-9);
+}
+
+TEST(Posture, PlacesEveryBodyOfThePendulum) {
+  const std::string folder = TANDEM_SOURCE_DIR "/config/double_pendulum/";
+  const auto robot = hal::read_robot_config(folder + "robot.toml");
+  ASSERT_TRUE(robot.has_value());
+  const auto description = model::read_urdf(robot->model.urdf, {});
+  ASSERT_TRUE(description.has_value());
+  const model::Tree& tree = description->tree;
+  const PostureSample straight{"", 0.0, {}, {0.0, 0.0}};
+  const PostureSample bent{"", 0.0, {}, {0.7, 0.0}};
+  const auto a = body_placements(tree, *robot, straight);
+  const auto b = body_placements(tree, *robot, bent);
+  ASSERT_EQ(a.size(), 3U);
+  const double length = (a[2].p - a[1].p).norm();
+  EXPECT_GT(length, 0.0);
+  EXPECT_NEAR((b[2].p - b[1].p).norm(), length, 1e-12) << "a link does not stretch";
+  const Eigen::Vector3d axis = a[1].R * tree.joints[0].axis;
+  const auto across = [&axis](const Eigen::Vector3d& d) { return (d - d.dot(axis) * axis).eval(); };
+  const Eigen::Vector3d from = across(a[2].p - a[1].p);
+  const Eigen::Vector3d to = across(b[2].p - b[1].p);
+  EXPECT_NEAR(std::atan2(from.cross(to).dot(axis), from.dot(to)), 0.7, 1e-9);
+
+  const std::vector<PostureSample> samples{straight, bent};
+  const Figure figure = posture_figure(tree, *robot, samples);
+  ASSERT_EQ(figure.curves.size(), 1U);
+  EXPECT_TRUE(figure.equal_axes);
+  EXPECT_EQ(figure.notes.size(), 4U);
+}
+
+}  // namespace
+}  // namespace tandem::report
