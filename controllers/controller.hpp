@@ -82,23 +82,21 @@ inline constexpr std::uint32_t kControllerAbi = 1;
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {
-  std::uint32_t abi;         ///< kControllerAbi of the headers it was built with
-  const char* compiler;      ///< __VERSION__ of its compiler, for the error message
-  const char* name;          ///< "squat"
-  const char* doc;           ///< one line for `tandem check`
-  Controller* (*create)();   ///< never null
+  std::uint32_t abi;        ///< kControllerAbi of the headers it was built with
+  const char* compiler;     ///< __VERSION__ of its compiler, for the error message
+  const char* name;         ///< "squat"
+  const char* doc;          ///< one line for `tandem check`
+  Controller* (*create)();  ///< never null
 };
 
 }  // namespace tandem
 
 /// Defines the library's entry point: `TANDEM_CONTROLLER(Squat, "squat", "One line.")`.
-#define TANDEM_CONTROLLER(Class, plugin_name, plugin_doc)                                     \
-  extern "C" __attribute__((visibility("default"))) const ::tandem::ControllerPlugin*         \
-  tandem_controller_plugin() {                                                                \
-    static const ::tandem::ControllerPlugin plugin{::tandem::kControllerAbi, __VERSION__,     \
-                                                   plugin_name, plugin_doc,                   \
-                                                   []() -> ::tandem::Controller* {            \
-                                                     return new Class;                        \
-                                                   }};                                        \
-    return &plugin;                                                                           \
+#define TANDEM_CONTROLLER(Class, plugin_name, plugin_doc)                             \
+  extern "C" __attribute__((visibility("default"))) const ::tandem::ControllerPlugin* \
+  tandem_controller_plugin() {                                                        \
+    static const ::tandem::ControllerPlugin plugin{                                   \
+        ::tandem::kControllerAbi, __VERSION__, plugin_name, plugin_doc,               \
+        []() -> ::tandem::Controller* { return new Class; }};                         \
+    return &plugin;                                                                   \
   }

@@ -36,8 +36,8 @@ class GravityCompensation : public Controller {
     map_ = std::move(*map);
     kernels_ = setup.kernels;
     ramp_s_ = setup.parameters.number_or("ramp_s", 1.0, kPositive);
-    compliant_ = setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) ==
-                 "compliant";
+    compliant_ =
+        setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
     if (const Status feet = find_feet(setup); !feet) return feet;
     if (const Status joints = claim_joints(setup); !joints) return joints;
     q_.assign(kernels_->nq, 0.0);
@@ -114,10 +114,9 @@ class GravityCompensation : public Controller {
     const double stiffness = setup.parameters.number_or("stiffness_Nm_rad", -1.0, kNotNegative);
     const double damping = setup.parameters.number_or("damping_Nms_rad", -1.0, kNotNegative);
     for (const std::size_t j : joints_parameter(setup)) {
-      const Status claimed =
-          compliant_ ? claim(setup, j, hal::ControlMode::kPosition,
-                             hal::InteractionMode::kCompliant)
-                     : claim(setup, j, hal::ControlMode::kTorque);
+      const Status claimed = compliant_ ? claim(setup, j, hal::ControlMode::kPosition,
+                                                hal::InteractionMode::kCompliant)
+                                        : claim(setup, j, hal::ControlMode::kTorque);
       if (!claimed) return claimed;
       Joint joint{.index = j,
                   .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,

@@ -15,10 +15,9 @@ class Hold : public Controller {
     duration_s_ = setup.parameters.number_or("duration_s", 3.0, kPositive);
     posture_ = posture_parameter(setup);
     for (const std::size_t joint : joints_parameter(setup)) {
-      const Status claimed =
-          claim(setup, joint, hal::ControlMode::kPosition,
-                interaction == "stiff" ? hal::InteractionMode::kStiff
-                                       : hal::InteractionMode::kCompliant);
+      const Status claimed = claim(
+          setup, joint, hal::ControlMode::kPosition,
+          interaction == "stiff" ? hal::InteractionMode::kStiff : hal::InteractionMode::kCompliant);
       if (!claimed) return claimed;
       const double target = posture_ == nullptr ? 0.0 : posture_->position_rad.at(joint);
       const hal::JointConfig& limit = setup.robot.joints[joint];
@@ -68,5 +67,4 @@ class Hold : public Controller {
 }  // namespace
 }  // namespace tandem
 
-TANDEM_CONTROLLER(tandem::Hold, "hold",
-                  "Holds joints where they are, or leads them to a posture.")
+TANDEM_CONTROLLER(tandem::Hold, "hold", "Holds joints where they are, or leads them to a posture.")

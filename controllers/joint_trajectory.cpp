@@ -18,8 +18,8 @@ class JointTrajectory : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
-    through_ = parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic"}) ==
-               "quintic";
+    through_ =
+        parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic"}) == "quintic";
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
     joints_ = joints_parameter(setup);
     for (const std::size_t joint : joints_) {
@@ -91,8 +91,7 @@ class JointTrajectory : public Controller {
         const double after = point(i + 1, k).position - point(i, k).position;
         // The start is not known yet: the first way-point is where the joints rest.
         const bool turns = i == 1 || before * after <= 0.0;
-        point(i, k).velocity =
-            turns ? 0.0 : (before + after) / (times_s_[i + 1] - times_s_[i - 1]);
+        point(i, k).velocity = turns ? 0.0 : (before + after) / (times_s_[i + 1] - times_s_[i - 1]);
       }
     }
   }
@@ -134,8 +133,8 @@ class JointTrajectory : public Controller {
   bool through_ = false;
   bool stop_at_end_ = false;
   std::vector<std::size_t> joints_;
-  std::vector<double> times_s_;   // of every point, the start at 0 first
-  std::vector<Motion> points_;    // per time, per joint
+  std::vector<double> times_s_;  // of every point, the start at 0 first
+  std::vector<Motion> points_;   // per time, per joint
   std::int64_t start_ns_ = 0;
   std::size_t segment_ = 0;
 };

@@ -24,9 +24,9 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
   for (const hal::JointConfig& joint : robot.joints) {
     const auto found = std::ranges::find(model, joint.name);
     if (found == model.end()) {
-      return fail("the model of " + std::string(kernels->robot) + " has no joint '" + joint.name +
-                      "'",
-                  suggest(joint.name, model));
+      return fail(
+          "the model of " + std::string(kernels->robot) + " has no joint '" + joint.name + "'",
+          suggest(joint.name, model));
     }
     map.index_.push_back(static_cast<std::size_t>(found - model.begin()));
   }
@@ -39,8 +39,8 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
   return map;
 }
 
-void ModelMap::positions_to_q(std::span<const double> image, std::span<double> q) const noexcept
-    TANDEM_RT {
+void ModelMap::positions_to_q(std::span<const double> image,
+                              std::span<double> q) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < index_.size(); ++j) q[q_index(j)] = image[j];
 }
 

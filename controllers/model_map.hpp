@@ -29,8 +29,7 @@ class ModelMap {
     return index_[j] + (base_ == 0 ? 0 : 7);
   }
   /// Writes the joints' part of q from values in the image's order.
-  void positions_to_q(std::span<const double> image, std::span<double> q) const noexcept
-      TANDEM_RT;
+  void positions_to_q(std::span<const double> image, std::span<double> q) const noexcept TANDEM_RT;
 
  private:
   std::vector<std::size_t> index_;  // per joint of the image, in the model's joints

@@ -17,12 +17,10 @@ namespace fs = std::filesystem;
 
 const char kEntry[] = "tandem_controller_plugin";
 
-std::unexpected<Error> refuse(const std::string& name, const std::string& file,
-                              std::string message, std::string hint) {
-  return std::unexpected(Error{.message = std::move(message),
-                               .hint = std::move(hint),
-                               .file = file,
-                               .key = name});
+std::unexpected<Error> refuse(const std::string& name, const std::string& file, std::string message,
+                              std::string hint) {
+  return std::unexpected(
+      Error{.message = std::move(message), .hint = std::move(hint), .file = file, .key = name});
 }
 
 std::string joined(const std::vector<std::string>& parts) {

@@ -12,9 +12,9 @@
 namespace tandem {
 namespace {
 
-constexpr int kWalkSteps = 200;   // of the way down, checked at configuration
-constexpr int kFirstSolve = 50;   // Newton steps to the first configuration
-constexpr int kCycleSolve = 4;    // and at most in a cycle; one is enough as a rule
+constexpr int kWalkSteps = 200;  // of the way down, checked at configuration
+constexpr int kFirstSolve = 50;  // Newton steps to the first configuration
+constexpr int kCycleSolve = 4;   // and at most in a cycle; one is enough as a rule
 
 std::string metres(double value) {
   char text[32];
@@ -192,8 +192,8 @@ class Squat : public Controller {
   std::optional<Stance> stance_;
   double period_s_ = 0.0;
   std::int64_t start_ns_ = 0;
-  double height_m_ = 0.0;      // of the base above the soles at the start
-  std::int64_t standing_ = 0;  // whether the start posture was found
+  double height_m_ = 0.0;              // of the base above the soles at the start
+  std::int64_t standing_ = 0;          // whether the start posture was found
   double link_damping_Nms_rad_ = 0.0;  // of the legs' joints
   std::vector<double> damping_, measured_, last_v_, vdot_;
 };
@@ -201,5 +201,4 @@ class Squat : public Controller {
 }  // namespace
 }  // namespace tandem
 
-TANDEM_CONTROLLER(tandem::Squat, "squat",
-                  "Squats on both feet with the centre of mass over them.")
+TANDEM_CONTROLLER(tandem::Squat, "squat", "Squats on both feet with the centre of mass over them.")

@@ -150,10 +150,10 @@ Stance::Vector Stance::error() const noexcept TANDEM_RT {
     const Matrix3d R = rotation(pose_, foot.site);
     const Matrix3d wanted = Eigen::AngleAxisd(foot.yaw_rad, Vector3d::UnitZ()).toRotationMatrix();
     const Matrix3d turn = wanted * R.transpose();
-    e.segment<3>(6 * i) = Eigen::Map<const Vector3d>(foot.position_m.data()) -
-                          origin(pose_, foot.site);
-    e.segment<3>(6 * i + 3) = 0.5 * Vector3d(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0),
-                                             turn(1, 0) - turn(0, 1));
+    e.segment<3>(6 * i) =
+        Eigen::Map<const Vector3d>(foot.position_m.data()) - origin(pose_, foot.site);
+    e.segment<3>(6 * i + 3) =
+        0.5 * Vector3d(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
   }
   e[12] = com_m_[0] - com_[0];
   e[13] = com_m_[1] - com_[1];

@@ -33,8 +33,8 @@ class Stance {
   /// @param left, right  names of the sites at the soles: z up, x ahead, when the robot stands
   /// Errors: no kernels, no floating base, no such site, not six joints from the base to a sole.
   [[nodiscard]] static Result<Stance> make(const hal::RobotConfig& robot,
-                                           const tandem_kernels* kernels,
-                                           const std::string& left, const std::string& right);
+                                           const tandem_kernels* kernels, const std::string& left,
+                                           const std::string& right);
 
   /// Puts the feet where joint positions (the image's order) have them, flat on the ground, and
   /// starts from there.
@@ -44,7 +44,7 @@ class Stance {
   /// What solve() did.
   struct Solution {
     bool converged = false;
-    int steps = 0;       ///< of Newton; each costs three kernel calls and one 14 x 14 solution
+    int steps = 0;          ///< of Newton; each costs three kernel calls and one 14 x 14 solution
     double residual = 0.0;  ///< largest before the last step [m or rad]
   };
   /// Solves for a height of the base, from the configuration at hand.
@@ -73,7 +73,7 @@ class Stance {
   using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
   struct Foot {
     std::size_t site = 0;
-    std::array<double, 3> middle_m{};  // of its contact points, in the site's frame
+    std::array<double, 3> middle_m{};    // of its contact points, in the site's frame
     std::array<double, 3> position_m{};  // of the site, in G
     double yaw_rad = 0.0;
   };

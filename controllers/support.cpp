@@ -19,8 +19,7 @@ void carry_on_both_feet(const tandem_kernels& kernels, const Feet& feet, std::sp
   const Vector3 between = 0.5 * (origin(feet.left) + origin(feet.right));
   // The wrench on the base in W's axes, about the base's origin, then about `between`.
   const Vector3 force = R * Vector3(tau[0], tau[1], tau[2]);
-  const Vector3 moment =
-      R * Vector3(tau[3], tau[4], tau[5]) - (between - base).cross(force);
+  const Vector3 moment = R * Vector3(tau[3], tau[4], tau[5]) - (between - base).cross(force);
   Wrench half;
   half << 0.5 * force, 0.5 * moment;
   for (const std::size_t site : {feet.left, feet.right}) {

@@ -48,8 +48,7 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
     out.damping_Nms_rad = gains.damping_Nms_rad;
     out.max_stiffness_Nm_rad = std::max(gains.position.gains.kp, gains.stiffness_Nm_rad);
     const double critical = 2.0 * std::sqrt(out.max_stiffness_Nm_rad * actuator.inertia_kg_m2);
-    out.max_damping_Nms_rad =
-        std::max({critical, gains.position.gains.kd, gains.damping_Nms_rad});
+    out.max_damping_Nms_rad = std::max({critical, gains.position.gains.kd, gains.damping_Nms_rad});
   }
   return out;
 }
@@ -68,8 +67,8 @@ const char* to_string(Capability capability) noexcept {
   return "?";
 }
 
-bool JointCapabilities::can(ControlMode mode, InteractionMode interaction) const noexcept
-    TANDEM_RT {
+bool JointCapabilities::can(ControlMode mode,
+                            InteractionMode interaction) const noexcept TANDEM_RT {
   if (mode == ControlMode::kIdle) return true;
   if (!can(needed(mode))) return false;
   return interaction == InteractionMode::kStiff || can(Capability::kCompliant);

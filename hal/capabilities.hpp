@@ -54,8 +54,7 @@ struct JointCapabilities {
 
 /// Whether a joint can be put into a mode; asked for every claim at configuration.
 /// @return an Error that names the joint, the mode and the gains table that lacks a loop.
-[[nodiscard]] Status check_capability(const RobotConfig& robot, std::size_t joint,
-                                      ControlMode mode,
+[[nodiscard]] Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode mode,
                                       InteractionMode interaction = InteractionMode::kStiff);
 
 /// The gains that bring-up gives the drives, as the parameters at revision 0.

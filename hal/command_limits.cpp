@@ -72,8 +72,7 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   double& reference = command.position_rad()[joint];
   const double measured = state.position_rad()[joint];
   const bool wanted = is(ControlMode::kPosition, command.mode()[joint]);
-  const bool closed =
-      wanted && is(ControlMode::kPosition, last.mode) && in_operation(state, joint);
+  const bool closed = wanted && is(ControlMode::kPosition, last.mode) && in_operation(state, joint);
   if (!closed && std::isfinite(measured)) last.position_rad = measured;
   last.mode = command.mode()[joint];
   last.interaction = command.interaction()[joint];

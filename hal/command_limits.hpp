@@ -65,10 +65,10 @@ class CommandLimits {
     std::int64_t interaction = 0;
   };
   void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
-  void position(std::size_t joint, const StateImage& state, CommandImage& command) noexcept
-      TANDEM_RT;
-  void bounded(std::size_t joint, double& value, double& last, double min, double max) noexcept
-      TANDEM_RT;
+  void position(std::size_t joint, const StateImage& state,
+                CommandImage& command) noexcept TANDEM_RT;
+  void bounded(std::size_t joint, double& value, double& last, double min,
+               double max) noexcept TANDEM_RT;
 
   double period_s_;
   std::vector<JointCapabilities> limits_;

@@ -14,8 +14,8 @@ namespace tandem::hal {
   return j < field.size() ? field[j] : std::numeric_limits<double>::quiet_NaN();
 }
 
-[[nodiscard]] inline bool in_mode(const JointAccess& io, std::size_t j, ControlMode mode) noexcept
-    TANDEM_RT {
+[[nodiscard]] inline bool in_mode(const JointAccess& io, std::size_t j,
+                                  ControlMode mode) noexcept TANDEM_RT {
   return io.command.mode()[j] == static_cast<std::int8_t>(mode);
 }
 

@@ -40,8 +40,8 @@ ControlMode ControlModes::control_mode(std::size_t j) const noexcept TANDEM_RT {
   return static_cast<ControlMode>(io_.state.mode()[j]);
 }
 
-Code InteractionModes::set_interaction_mode(std::size_t j, InteractionMode mode) noexcept
-    TANDEM_RT {
+Code InteractionModes::set_interaction_mode(std::size_t j,
+                                            InteractionMode mode) noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return Code::kOutOfRange;
   if (mode == InteractionMode::kCompliant && !io_.joints[j].can(Capability::kCompliant)) {
     return Code::kOutOfRange;

@@ -29,8 +29,7 @@ double PidControl::error(std::size_t j, PidLoop loop) const noexcept TANDEM_RT {
   return at(command.current_A(), j) - at(io_.state.current_A(), j);
 }
 
-Code ImpedanceControl::set_impedance(std::size_t j, const Impedance& impedance) noexcept
-    TANDEM_RT {
+Code ImpedanceControl::set_impedance(std::size_t j, const Impedance& impedance) noexcept TANDEM_RT {
   const Impedance max = impedance_limits(j);
   const Code stiffness = checked(io_, j, impedance.stiffness_Nm_rad, 0.0, max.stiffness_Nm_rad);
   if (stiffness != Code::kOk) return stiffness;

@@ -19,18 +19,17 @@ bool Trapezoid::step(double target_rad, double speed_rad_s, double acceleration_
   // way that is left after this step, way - (v + w) dt / 2.
   const double side = way < 0.0 ? -1.0 : 1.0;
   const double left = side * (way - velocity_rad_s * dt_s / 2.0);
-  const double brake = a * (std::sqrt(dt_s * dt_s / 4.0 + 2.0 * std::max(left, 0.0) / a) -
-                            dt_s / 2.0);
+  const double brake =
+      a * (std::sqrt(dt_s * dt_s / 4.0 + 2.0 * std::max(left, 0.0) / a) - dt_s / 2.0);
   const double wanted = side * std::min(brake, speed_rad_s);
   run(wanted, a, dt_s);
   return false;
 }
 
-void Trapezoid::run(double target_rad_s, double acceleration_rad_s2, double dt_s) noexcept
-    TANDEM_RT {
+void Trapezoid::run(double target_rad_s, double acceleration_rad_s2,
+                    double dt_s) noexcept TANDEM_RT {
   const double change = acceleration_rad_s2 * dt_s;
-  const double next =
-      std::clamp(target_rad_s, velocity_rad_s - change, velocity_rad_s + change);
+  const double next = std::clamp(target_rad_s, velocity_rad_s - change, velocity_rad_s + change);
   position_rad += (velocity_rad_s + next) * dt_s / 2.0;
   velocity_rad_s = next;
 }

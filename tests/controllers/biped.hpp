@@ -15,11 +15,11 @@ namespace tandem::test {
 
 struct BipedBody {
   const char* joint;
-  int parent;              ///< body; 0 is the base
-  Eigen::Vector3d at;      ///< the joint in the parent's frame
+  int parent;          ///< body; 0 is the base
+  Eigen::Vector3d at;  ///< the joint in the parent's frame
   Eigen::Vector3d axis;
   double mass_kg;
-  Eigen::Vector3d com;     ///< in the body's own frame
+  Eigen::Vector3d com;  ///< in the body's own frame
 };
 
 inline constexpr int kBipedJoints = 14;
@@ -218,8 +218,10 @@ inline hal::RobotConfig biped_robot() {
     joint.max_velocity_rad_s = 5.0;
     joint.max_torque_Nm = 200.0;
     const std::string name = joint.name.substr(1);
-    stand.position_rad.push_back(name == "KneeSag" ? 0.5 : name == "HipSag" ? -0.25
-                                 : name == "AnkSag" ? -0.25 : 0.0);
+    stand.position_rad.push_back(name == "KneeSag"  ? 0.5
+                                 : name == "HipSag" ? -0.25
+                                 : name == "AnkSag" ? -0.25
+                                                    : 0.0);
   }
   robot.postures.push_back(stand);
   for (const char* sole : {"l_sole", "r_sole"}) {

@@ -78,8 +78,7 @@ TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {
   test::Harness run(test::biped_robot(), "gravity_compensation", "", test::biped_kernels());
   ASSERT_EQ(run.problem(), "");
-  Stance stance =
-      Stance::make(run.robot, test::biped_kernels(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(run.robot, test::biped_kernels(), "l_sole", "r_sole").value();
   const double height = stance.place(run.robot.postures[0].position_rad);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   ASSERT_TRUE(stance.solve(height, 50).converged);

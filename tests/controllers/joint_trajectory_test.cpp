@@ -1,5 +1,5 @@
-#include "controllers/segment.hpp"
 #include "controllers/min_jerk.hpp"
+#include "controllers/segment.hpp"
 #include "tests/controllers/harness.hpp"
 #include "tests/hal/fake_backend.hpp"
 
@@ -71,7 +71,9 @@ TEST(JointTrajectory, RunsThroughWayPointsWithoutAJumpOfVelocity) {
     const double position = run.command.position_rad()[0];
     const double velocity = run.command.velocity_rad_s()[0];
     ASSERT_NEAR(velocity, last_velocity, 0.02) << i;
-    if (i > 0) { ASSERT_NEAR(velocity, (position - last_position) * 1e3, 0.01) << i; }
+    if (i > 0) {
+      ASSERT_NEAR(velocity, (position - last_position) * 1e3, 0.01) << i;
+    }
     if (i == 2000) {  // (1.2 - 0.5) / 2 s on the way
       EXPECT_NEAR(position, 1.0, 1e-9);
       EXPECT_NEAR(velocity, 0.35, 1e-9);

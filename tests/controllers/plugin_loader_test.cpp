@@ -44,8 +44,8 @@ TEST(PluginLoader, RefusesALibraryWithoutItsEntryPoint) {
 TEST(PluginLoader, RefusesALibraryOfAnotherAbi) {
   const auto loaded = load_controller("other_abi", kBroken);
   ASSERT_FALSE(loaded.has_value());
-  EXPECT_EQ(loaded.error().message, "was built for controller ABI 999, this program has " +
-                                        std::to_string(kControllerAbi));
+  EXPECT_EQ(loaded.error().message,
+            "was built for controller ABI 999, this program has " + std::to_string(kControllerAbi));
 }
 
 TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {

@@ -21,8 +21,7 @@ class SquatRobots : public testing::TestWithParam<Case> {
 };
 
 TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   for (int i = 0; i <= 100; ++i) {
@@ -33,8 +32,7 @@ TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
 }
 
 TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   const double rate = GetParam().depth_m / 2.0;
@@ -42,14 +40,15 @@ TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
     stance.predict(1e-3);
     ASSERT_TRUE(stance.solve(height - rate * i * 1e-3, 2).converged) << i;
     stance.move(-rate);
-    if (i > 1) { ASSERT_LT(stance.residual(), 1e-9) << i; }
+    if (i > 1) {
+      ASSERT_LT(stance.residual(), 1e-9) << i;
+    }
   }
 }
 
 TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
   // The same torques and the ground's two wrenches, through inverse dynamics once more.
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
   const double height = stance.place(posture);
   const tandem_kernels& kernels = *loaded.kernels;
   ASSERT_TRUE(stance.solve(height - GetParam().depth_m, 50).converged);
@@ -67,8 +66,7 @@ TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
     wrench[6 * w + 4] = -middle * half;
   }
   std::vector<double> tau(kernels.nv);
-  kernels.inverse_dynamics(stance.q().data(), rest.data(), rest.data(), wrench.data(),
-                           tau.data());
+  kernels.inverse_dynamics(stance.q().data(), rest.data(), rest.data(), wrench.data(), tau.data());
   for (std::size_t i = 0; i < kernels.nv; ++i) EXPECT_NEAR(stance.tau()[i], tau[i], 1e-6) << i;
 }
 

@@ -22,11 +22,11 @@ namespace tandem::hal::test {
 struct ConformanceRobot {
   RobotConfig robot;
   std::unique_ptr<Backend> backend;
-  std::size_t joint = 0;      ///< is moved; everything else holds its position
-  double way_rad = 0.2;       ///< it may move this far to both sides of where it stands
-  double torque_Nm = 0.5;     ///< moves it gently
-  double voltage_V = 0.5;     ///< moves it gently
-  double current_A = 0.2;     ///< moves it gently
+  std::size_t joint = 0;   ///< is moved; everything else holds its position
+  double way_rad = 0.2;    ///< it may move this far to both sides of where it stands
+  double torque_Nm = 0.5;  ///< moves it gently
+  double voltage_V = 0.5;  ///< moves it gently
+  double current_A = 0.2;  ///< moves it gently
   std::function<void(std::size_t joint)> provoke_fault;  ///< makes the joint's drive trip
   std::shared_ptr<void> keep;                            ///< whatever else must live
 };
@@ -170,8 +170,7 @@ TEST_P(BackendConformance, EncodersAgreeWithEachOtherOnTheMove) {
   EXPECT_NEAR(motor_way, way, 0.5 * way);
   EXPECT_NEAR(motor_rate, motor_way, 0.1 * motor_way);
   EXPECT_NEAR(acceleration, devices.encoders.velocity_rad_s(j) - rate_before, 0.05);
-  EXPECT_GE(devices.encoders.timestamp_ns(j),
-            devices.clock.now_ns() - 4 * rig.time.period_ns);
+  EXPECT_GE(devices.encoders.timestamp_ns(j), devices.clock.now_ns() - 4 * rig.time.period_ns);
 }
 
 TEST_P(BackendConformance, EveryJointFollowsAMotion) {
@@ -250,8 +249,7 @@ TEST_P(BackendConformance, VelocityMoveIsFollowedAndStops) {
               0.2 * speed);
   ASSERT_EQ(devices.velocity.stop(j), Code::kOk);
   rig.run(0.7);
-  EXPECT_NEAR(rig.mean([&] { return devices.encoders.velocity_rad_s(j); }, 0.3), 0.0,
-              0.1 * speed);
+  EXPECT_NEAR(rig.mean([&] { return devices.encoders.velocity_rad_s(j); }, 0.3), 0.0, 0.1 * speed);
 }
 
 TEST_P(BackendConformance, TorqueReferenceShowsInTheMeasuredTorque) {

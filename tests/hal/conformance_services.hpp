@@ -129,16 +129,16 @@ TEST_P(BackendConformance, AGainOfEveryLoopChangesTheVoltage) {
 
 TEST_P(BackendConformance, AmplifierTakesTheTorqueOffAndPutsItOnAgain) {
   ASSERT_EQ(devices.amplifier.disable(j), Code::kOk);
-  ASSERT_TRUE(rig.until(
-      [&] { return devices.amplifier.status(j) != DriveState::kOperationEnabled; }, 0.5));
+  ASSERT_TRUE(
+      rig.until([&] { return devices.amplifier.status(j) != DriveState::kOperationEnabled; }, 0.5));
   rig.run(0.05);
   EXPECT_NEAR(devices.open_loop.voltage_V(j), 0.0, 0.011);
   EXPECT_EQ(devices.modes.control_mode(j), ControlMode::kIdle);
   ASSERT_EQ(devices.amplifier.enable(j), Code::kOk);
-  ASSERT_TRUE(rig.until(
-      [&] { return devices.amplifier.status(j) == DriveState::kOperationEnabled; }, 1.0));
-  EXPECT_TRUE(rig.until(
-      [&] { return devices.modes.control_mode(j) == ControlMode::kPosition; }, 0.5));
+  ASSERT_TRUE(
+      rig.until([&] { return devices.amplifier.status(j) == DriveState::kOperationEnabled; }, 1.0));
+  EXPECT_TRUE(
+      rig.until([&] { return devices.modes.control_mode(j) == ControlMode::kPosition; }, 0.5));
 }
 
 TEST_P(BackendConformance, AmplifierMeasuresCurrentAndTemperature) {
@@ -154,8 +154,7 @@ TEST_P(BackendConformance, AFaultLatchesIsNamedAndIsReset) {
   ASSERT_TRUE(rig.it.provoke_fault) << "the backend's test must be able to trip a drive";
   rig.it.provoke_fault(j);
   ASSERT_TRUE(rig.until([&] { return devices.amplifier.fault(j) != 0; }, 1.0));
-  EXPECT_TRUE(rig.until(
-      [&] { return devices.amplifier.status(j) == DriveState::kFault; }, 3.0))
+  EXPECT_TRUE(rig.until([&] { return devices.amplifier.status(j) == DriveState::kFault; }, 3.0))
       << "the fault reaction does not end";
   rig.run(0.5);
   EXPECT_NE(devices.amplifier.fault(j), 0U) << "a fault does not go away by itself";

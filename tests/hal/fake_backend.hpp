@@ -146,8 +146,7 @@ class FakeBackend : public Backend {
   void follow_mode(Joint& joint, std::size_t j) {
     if (command_.fault_reset()[j] != 0) joint.fault = 0;
     const bool changed = joint.mode != command_.mode()[j] ||
-                         joint.interaction != command_.interaction()[j] ||
-                         joint.enabled == 0;
+                         joint.interaction != command_.interaction()[j] || joint.enabled == 0;
     joint.mode = command_.mode()[j];
     joint.interaction = command_.interaction()[j];
     joint.enabled = cycles_ >= kBringUpCycles && joint.fault == 0 && joint.mode != 0;

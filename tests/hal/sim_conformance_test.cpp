@@ -7,8 +7,7 @@ namespace tandem::hal::test {
 namespace {
 
 ConformanceRobot make_ur5e() {
-  auto loaded =
-      std::make_shared<tandem::test::TestRobot>(tandem::test::load_test_robot("ur5e"));
+  auto loaded = std::make_shared<tandem::test::TestRobot>(tandem::test::load_test_robot("ur5e"));
   sim::SimRobotConfig config;
   config.posture = "ready";
   auto backend = sim::SimRobot::create(loaded->robot, loaded->kernels.get(), config);
