@@ -1,0 +1,88 @@
+// The documentation against the sources: every TOML key is documented, every link leads somewhere.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kRoot = TANDEM_SOURCE_DIR;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// The first group of every match.
+std::set<std::string> matches(const std::string& text, const char* pattern) {
+  const std::regex expression(pattern);
+  std::set<std::string> found;
+  for (std::sregex_iterator it(text.begin(), text.end(), expression), end; it != end; ++it) {
+    found.insert((*it)[1]);
+  }
+  return found;
+}
+
+/// Keys that the readers of robots and experiments ask for.
+std::set<std::string> keys_read() {
+  std::set<std::string> keys;
+  for (const char* file : {"hal/robot_config.cpp", "hal/robot_config_drives.cpp",
+                           "runtime/experiment.cpp"}) {
+    const std::string source = text_of(kRoot / file);
+    const auto found = matches(
+        source,
+        "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|tables|vector3|gain)"
+        "(?:_or|_or_empty|_or_default)?\\((?:table, )?\"(\\w+)\"");
+    EXPECT_GT(found.size(), 5U) << file << " reads no keys: is the pattern right?";
+    keys.insert(found.begin(), found.end());
+  }
+  return keys;
+}
+
+TEST(Documentation, OfTheConfigurationHasEveryKey) {
+  const std::string page = text_of(kRoot / "docs/configuration.md");
+  for (const std::string& key : keys_read()) {
+    const std::regex word("\\b" + key + "\\b");
+    EXPECT_TRUE(std::regex_search(page, word))
+        << "docs/configuration.md does not know the key " << key;
+  }
+}
+
+TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
+  const std::string page = text_of(kRoot / "docs/json.md");
+  for (const char* file : {"apps/run_summary.cpp", "apps/check_command.cpp",
+                           "apps/model_command.cpp", "apps/log_command.cpp"}) {
+    const std::string source = text_of(kRoot / file);
+    for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
+      for (const std::string& key : matches(source, pattern)) {
+        EXPECT_NE(page.find(key), std::string::npos) << "docs/json.md lacks " << key << " of " << file;
+      }
+    }
+  }
+}
+
+TEST(Documentation, LinksLeadToFilesThatExist) {
+  std::vector<fs::path> pages{kRoot / "README.md"};
+  for (const auto& entry : fs::directory_iterator(kRoot / "docs")) {
+    if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  }
+  int links = 0;
+  for (const fs::path& page : pages) {
+    for (const std::string& link : matches(text_of(page), "\\]\\(([^)#:]+)\\)")) {
+      ++links;
+      EXPECT_TRUE(fs::exists(page.parent_path() / link))
+          << fs::relative(page, kRoot).string() << " links to " << link;
+    }
+  }
+  EXPECT_GT(links, 10);
+}
+
+}  // namespace
