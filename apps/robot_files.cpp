@@ -34,9 +34,9 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
 }
 
 std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file) {
-  auto config = hal::read_robot_config(file);
-  if (!config) return std::unexpected(config.error());
-  return with_description(std::move(*config));
+  auto robot = runtime::read_robot(file);
+  if (!robot) return std::unexpected(robot.error());
+  return with_description(std::move(robot->config));
 }
 
 }  // namespace tandem::apps

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tuple>
 
 namespace tandem {
 
@@ -21,7 +22,8 @@ std::string Error::to_string() const {
 void sort_by_line(Diagnostics& errors) {
   std::vector<std::size_t> order(errors.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(errors[i].line, i); });
+  std::ranges::sort(
+      order, {}, [&](std::size_t i) { return std::tuple(errors[i].line == 0, errors[i].line, i); });
   Diagnostics sorted;
   for (const std::size_t i : order) sorted.push_back(std::move(errors[i]));
   errors = std::move(sorted);

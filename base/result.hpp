@@ -31,7 +31,8 @@ using Status = std::expected<void, Error>;
 /// Every error met in one reading, in the order of the file.
 using Diagnostics = std::vector<Error>;
 
-/// Puts the errors of one file into the order of its lines; those of a line keep theirs.
+/// Puts the errors of one file into the order of its lines; those of a line keep theirs,
+/// and those without a line come last.
 void sort_by_line(Diagnostics& errors);
 
 /// Shorthand for `return fail("…", "do this next")`.

@@ -227,6 +227,17 @@ std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& fil
   return finish(TomlDocument::load(file));
 }
 
+RobotConfig read_robot_config(const std::string& file, Diagnostics& errors) {
+  const Result<TomlDocument> document = TomlDocument::load(file);
+  if (!document) {
+    errors.push_back(document.error());
+    return {};
+  }
+  RobotConfig robot = read(*document);
+  errors.insert(errors.end(), document->diagnostics().begin(), document->diagnostics().end());
+  return robot;
+}
+
 std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
                                                            const std::string& file) {
   return finish(TomlDocument::parse(text, file));

@@ -207,6 +207,9 @@ struct RobotConfig {
 /// a reference to a board, bus, actuator or gains table that does not exist, a joint on two
 /// boards or twice, an axis twice, a node id twice on a bus, a gain of the wrong sign.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file);
+/// The same, but appends the errors and answers what could be read in spite of them: references
+/// may lead nowhere and names be empty. Only for finding errors in what comes next.
+[[nodiscard]] RobotConfig read_robot_config(const std::string& file, Diagnostics& errors);
 /// The same from memory; `file` names it in errors and gives the folder of relative paths.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
                                                                          const std::string& file);
@@ -231,7 +234,8 @@ struct RobotDescription {
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
 /// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested), a
 /// moving joint without [[joint]] or lock, a site or sensor on an unknown link or joint, a limit
-/// that neither gives, a limit beyond the wire's range, a posture beyond the limits.
+/// that neither gives, a limit beyond the wire's range, a posture beyond the limits. Empty names
+/// are passed over: the reader has reported them.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
                                                     const RobotDescription& description);
 

@@ -79,7 +79,7 @@ class Completion {
 
   void check_name(int line, const std::string& key, const std::string& kind,
                   const std::string& name, const std::vector<std::string>& known) {
-    if (std::ranges::find(known, name) != known.end()) return;
+    if (name.empty() || std::ranges::find(known, name) != known.end()) return;
     error(line, key, "the description has no " + kind + " '" + name + "'", suggest(name, known));
   }
 

@@ -245,6 +245,22 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   return found;
 }
 
+std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file) {
+  Diagnostics errors;
+  hal::RobotConfig config = hal::read_robot_config(file, errors);
+  Diagnostics others;  // of the description
+  if (!config.model.urdf.empty()) {
+    auto description = complete_robot(config);
+    if (description && errors.empty()) return CompleteRobot{std::move(config), *description};
+    for (Error& error : description ? Diagnostics{} : description.error()) {
+      (error.file == file ? errors : others).push_back(std::move(error));
+    }
+  }
+  errors = in_order(std::move(errors));
+  errors.insert(errors.end(), others.begin(), others.end());
+  return std::unexpected(errors);
+}
+
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
   const auto document = TomlDocument::load(file);
   if (!document) return std::unexpected(Diagnostics{document.error()});
@@ -252,15 +268,10 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
   Experiment e = read(*document, root);
   Diagnostics robot_errors;
   if (!e.robot_file.empty()) {
-    if (auto robot = hal::read_robot_config(e.robot_file)) {
-      e.robot = *robot;
+    if (auto robot = read_robot(e.robot_file)) {
+      e.robot = std::move(robot->config);
+      e.warnings = std::move(robot->description.warnings);
       combine(e, root);
-      auto description = complete_robot(e.robot);
-      if (description) {
-        e.warnings = description->warnings;
-      } else {
-        robot_errors = description.error();
-      }
     } else {
       robot_errors = robot.error();
     }

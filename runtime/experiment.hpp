@@ -90,6 +90,16 @@ struct Experiment {
 [[nodiscard]] std::expected<Experiment, Diagnostics> parse_experiment(
     std::string_view text, const std::string& file, const hal::RobotConfig& robot);
 
+/// A robot.toml with its description.
+struct CompleteRobot {
+  hal::RobotConfig config;
+  model::UrdfModel description;
+};
+
+/// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
+/// complete_robot()'s.
+[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file);
+
 /// Reads the robot's URDF and fills from it what robot.toml left out. Errors: read_urdf()'s and
 /// complete_from_description()'s. The answer holds the tree and what was tolerated in it.
 [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);

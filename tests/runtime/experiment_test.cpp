@@ -306,6 +306,7 @@ TEST_F(ExperimentFiles, SuggestTheDescriptionsJoint) {
 }
 
 TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
+  write("arm.urdf", kUrdf);
   write("robot.toml", replaced(kRobot, "kp = 6", "kp = -6"));
   const auto e = read_experiment(write("x.toml", with("perod_ns = 1")));
   ASSERT_FALSE(e.has_value());
@@ -313,6 +314,18 @@ TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
   EXPECT_EQ(e.error()[0].key, "perod_ns");
   EXPECT_EQ(e.error()[1].key, "gains.motor.position.kp");
   EXPECT_EQ(e.error()[1].file, (folder_ / "robot.toml").string());
+}
+
+TEST_F(ExperimentFiles, ReportARobotsErrorsAndThoseAgainstItsDescriptionTogether) {
+  write("arm.urdf", kUrdf);
+  const auto robot =
+      read_robot(write("robot.toml", replaced(kRobot, "name = \"elbow\"", "name = \"elbwo\"")));
+  ASSERT_FALSE(robot.has_value());
+  std::string all;
+  for (const Error& error : robot.error())
+    all += std::to_string(error.line) + " " + error.key + "\n";
+  EXPECT_EQ(all, "22 joint.elbwo\n39 posture.ready.elbow\n0 joint\n");
+  EXPECT_EQ(robot.error()[0].hint, "did you mean 'elbow'?");
 }
 
 TEST_F(ExperimentFiles, NameAMissingRobot) {
