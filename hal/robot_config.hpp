@@ -230,12 +230,16 @@ struct RobotDescription {
   std::vector<std::string> links;
 };
 
+/// The names of joints and links that the URDF lacks, each with the nearest; empty names are passed
+/// over. A configuration that has errors of its own can be checked so far.
+[[nodiscard]] Diagnostics check_names(const RobotConfig& robot,
+                                      const RobotDescription& description);
+
 /// Checks the configuration against its URDF and fills the limits that the TOML left to it.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
 /// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested), a
 /// moving joint without [[joint]] or lock, a site or sensor on an unknown link or joint, a limit
-/// that neither gives, a limit beyond the wire's range, a posture beyond the limits. Empty names
-/// are passed over: the reader has reported them.
+/// that neither gives, a limit beyond the wire's range, a posture beyond the limits.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
                                                     const RobotDescription& description);
 

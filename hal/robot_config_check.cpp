@@ -52,45 +52,84 @@ const GainsConfig& RobotConfig::gains_of(const JointConfig& joint) const {
 namespace {
 
 /// Collects the errors of one robot against its description.
-class Completion {
+class Check {
  public:
-  Completion(RobotConfig& robot, const RobotDescription& description)
+  Check(const RobotConfig& robot, const RobotDescription& description)
       : robot_(robot), description_(description) {}
 
-  Diagnostics run() {
-    for (JointConfig& joint : robot_.joints) complete(joint);
-    for (const JointDescription& joint : description_.moving_joints) {
-      if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
-      error(0, "joint", "the description's joint '" + joint.name + "' has no [[joint]]",
-            "add one, or fix it with [model.lock] " + joint.name + " = 0.0");
-    }
-    for (const SiteConfig& site : robot_.model.sites) {
-      check_name(site.line, "site." + site.name + ".link", "link", site.link, description_.links);
-    }
-    check_sensors();
-    for (const PostureConfig& posture : robot_.postures) check(posture);
-    return std::move(errors_);
-  }
-
- private:
+ protected:
   void error(int line, std::string key, std::string message, std::string hint) {
     errors_.push_back({std::move(message), std::move(hint), robot_.file, line, std::move(key)});
   }
 
-  void check_name(int line, const std::string& key, const std::string& kind,
-                  const std::string& name, const std::vector<std::string>& known) {
-    if (name.empty() || std::ranges::find(known, name) != known.end()) return;
-    error(line, key, "the description has no " + kind + " '" + name + "'", suggest(name, known));
-  }
+  const RobotConfig& robot_;
+  const RobotDescription& description_;
+  Diagnostics errors_;
+};
 
-  void check_sensors() {
-    std::vector<std::string> joints = names_of(description_.moving_joints);
+class NameCheck : private Check {
+ public:
+  using Check::Check;
+
+  Diagnostics run() {
+    const std::vector<std::string> moving = names_of(description_.moving_joints);
+    for (const JointConfig& joint : robot_.joints) {
+      if (std::ranges::find(description_.other_joints, joint.name) ==
+          description_.other_joints.end()) {
+        check_name(joint.line, "joint." + joint.name, "joint", joint.name, moving);
+      } else {
+        error(joint.line, "joint." + joint.name,
+              "the joint '" + joint.name + "' does not move in the description",
+              "remove the [[joint]]");
+      }
+    }
+    for (const SiteConfig& site : robot_.model.sites) {
+      check_name(site.line, "site." + site.name + ".link", "link", site.link, description_.links);
+    }
+    std::vector<std::string> joints = moving;
     joints.insert(joints.end(), description_.other_joints.begin(), description_.other_joints.end());
     for (const SensorConfig& sensor : robot_.sensors) {
       const std::string key = "sensor." + sensor.name;
       check_name(sensor.line, key + ".link", "link", sensor.link, description_.links);
       if (sensor.type != SensorType::kForceTorque) continue;
       check_name(sensor.line, key + ".joint", "joint", sensor.joint, joints);
+    }
+    return std::move(errors_);
+  }
+
+ private:
+  void check_name(int line, const std::string& key, const std::string& kind,
+                  const std::string& name, const std::vector<std::string>& known) {
+    if (name.empty() || std::ranges::find(known, name) != known.end()) return;
+    error(line, key, "the description has no " + kind + " '" + name + "'", suggest(name, known));
+  }
+};
+
+/// Fills limits, and checks them and what depends on them.
+class Completion : private Check {
+ public:
+  Completion(RobotConfig& robot, const RobotDescription& description)
+      : Check(robot, description), completed_(robot) {}
+
+  Diagnostics run() {
+    bool all_known = true;
+    for (JointConfig& joint : completed_.joints) {
+      const JointDescription* found = find(description_.moving_joints, joint.name);
+      if (found != nullptr) complete(joint, *found);
+      all_known = all_known && found != nullptr;
+    }
+    if (all_known) check_driven();
+    for (const PostureConfig& posture : robot_.postures) check(posture);
+    return std::move(errors_);
+  }
+
+ private:
+  /// Only once every [[joint]] is known: a misspelt one would be reported twice.
+  void check_driven() {
+    for (const JointDescription& joint : description_.moving_joints) {
+      if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
+      error(0, "joint", "the description's joint '" + joint.name + "' has no [[joint]]",
+            "add one, or fix it with [model.lock] " + joint.name + " = 0.0");
     }
   }
 
@@ -109,30 +148,18 @@ class Completion {
           "neither this file nor the description gives a limit", "set " + key);
   }
 
-  void complete(JointConfig& joint) {
-    const JointDescription* found = find(description_.moving_joints, joint.name);
+  void complete(JointConfig& joint, const JointDescription& found) {
     const std::string key = "joint." + joint.name;
-    if (found == nullptr) {
-      const bool fixed = std::ranges::find(description_.other_joints, joint.name) !=
-                         description_.other_joints.end();
-      if (fixed) {
-        error(joint.line, key, "the joint '" + joint.name + "' does not move in the description",
-              "remove the [[joint]]");
-      } else {
-        check_name(joint.line, key, "joint", joint.name, names_of(description_.moving_joints));
-      }
-      return;
-    }
     const double countable = countable_rad(joint);
     if (std::isnan(joint.min_position_rad)) {
-      joint.min_position_rad = std::max(found->min_position_rad, -countable);
+      joint.min_position_rad = std::max(found.min_position_rad, -countable);
     }
     if (std::isnan(joint.max_position_rad)) {
-      joint.max_position_rad = std::min(found->max_position_rad, countable);
+      joint.max_position_rad = std::min(found.max_position_rad, countable);
     }
     check_limits(joint, key, countable);
-    fill(joint.max_velocity_rad_s, found->max_velocity_rad_s, joint, "max_velocity_rad_s");
-    fill(joint.max_torque_Nm, found->max_torque_Nm, joint, "max_torque_Nm");
+    fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, joint, "max_velocity_rad_s");
+    fill(joint.max_torque_Nm, found.max_torque_Nm, joint, "max_torque_Nm");
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
@@ -166,15 +193,20 @@ class Completion {
     }
   }
 
-  RobotConfig& robot_;
-  const RobotDescription& description_;
-  Diagnostics errors_;
+  RobotConfig& completed_;
 };
 
 }  // namespace
 
+Diagnostics check_names(const RobotConfig& robot, const RobotDescription& description) {
+  return NameCheck(robot, description).run();
+}
+
 Diagnostics complete_from_description(RobotConfig& robot, const RobotDescription& description) {
-  return Completion(robot, description).run();
+  Diagnostics errors = check_names(robot, description);
+  Diagnostics others = Completion(robot, description).run();
+  errors.insert(errors.end(), others.begin(), others.end());
+  return errors;
 }
 
 }  // namespace tandem::hal

@@ -225,39 +225,56 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .truth = sim.ground_truth};
 }
 
-std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
-  auto found =
-      model::read_urdf(robot.model.urdf, {.floating_base = robot.model.floating_base,
-                                          .mimic_independent = robot.model.mimic_independent,
-                                          .lock = robot.model.lock});
-  if (!found) return found;
+namespace {
+
+std::expected<model::UrdfModel, Diagnostics> read_description(const hal::ModelConfig& model) {
+  return model::read_urdf(model.urdf, {.floating_base = model.floating_base,
+                                       .mimic_independent = model.mimic_independent,
+                                       .lock = model.lock});
+}
+
+hal::RobotDescription plain(const model::Tree& tree) {
   hal::RobotDescription description;
-  for (const model::Joint& joint : found->tree.joints) {
+  for (const model::Joint& joint : tree.joints) {
     description.moving_joints.push_back(
         {joint.name, joint.lower, joint.upper, joint.velocity, joint.effort});
   }
-  for (const model::Link& link : found->tree.links) {
+  for (const model::Link& link : tree.links) {
     description.links.push_back(link.name);
     if (link.moving < 0 && !link.joint.empty()) description.other_joints.push_back(link.joint);
   }
-  Diagnostics errors = hal::complete_from_description(robot, description);
-  if (!errors.empty()) return std::unexpected(std::move(errors));
+  return description;
+}
+
+}  // namespace
+
+std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
+  auto found = read_description(robot.model);
+  if (!found) return found;
+  Diagnostics errors = hal::complete_from_description(robot, plain(found->tree));
+  if (!errors.empty()) return std::unexpected(in_order(std::move(errors)));
   return found;
 }
 
 std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file) {
   Diagnostics errors;
   hal::RobotConfig config = hal::read_robot_config(file, errors);
-  Diagnostics others;  // of the description
-  if (!config.model.urdf.empty()) {
+  if (errors.empty()) {
     auto description = complete_robot(config);
-    if (description && errors.empty()) return CompleteRobot{std::move(config), *description};
-    for (Error& error : description ? Diagnostics{} : description.error()) {
-      (error.file == file ? errors : others).push_back(std::move(error));
-    }
+    if (!description) return std::unexpected(description.error());
+    return CompleteRobot{std::move(config), std::move(*description)};
+  }
+  // The file is wrong by itself; what can be said of its names beside that is said too.
+  const auto description =
+      config.model.urdf.empty() ? std::unexpected(Diagnostics{}) : read_description(config.model);
+  if (description) {
+    const Diagnostics names = hal::check_names(config, plain(description->tree));
+    errors.insert(errors.end(), names.begin(), names.end());
   }
   errors = in_order(std::move(errors));
-  errors.insert(errors.end(), others.begin(), others.end());
+  if (!description) {
+    errors.insert(errors.end(), description.error().begin(), description.error().end());
+  }
   return std::unexpected(errors);
 }
 

@@ -324,7 +324,7 @@ TEST_F(ExperimentFiles, ReportARobotsErrorsAndThoseAgainstItsDescriptionTogether
   std::string all;
   for (const Error& error : robot.error())
     all += std::to_string(error.line) + " " + error.key + "\n";
-  EXPECT_EQ(all, "22 joint.elbwo\n39 posture.ready.elbow\n0 joint\n");
+  EXPECT_EQ(all, "22 joint.elbwo\n39 posture.ready.elbow\n");
   EXPECT_EQ(robot.error()[0].hint, "did you mean 'elbow'?");
 }
 
