@@ -52,13 +52,13 @@ DriveState drive_state(std::uint16_t word) noexcept TANDEM_RT {
 
 std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT {
   switch (state) {
-    case DriveState::kSwitchOnDisabled: return kCommandShutdown;          // transition 2
-    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;           // transition 3
-    case DriveState::kSwitchedOn: return kCommandEnableOperation;         // transition 4
-    case DriveState::kOperationEnabled: return kCommandEnableOperation;   // stays
-    case DriveState::kNotReadyToSwitchOn:                                 // transition 1 is its own
-    case DriveState::kQuickStopActive:                                    // transition 12
-    case DriveState::kFaultReactionActive:                                // transition 14 is its own
+    case DriveState::kSwitchOnDisabled: return kCommandShutdown;               // 2
+    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;                // 3
+    case DriveState::kSwitchedOn: return kCommandEnableOperation;              // 4
+    case DriveState::kOperationEnabled: return kCommandEnableOperation;        // stays
+    case DriveState::kNotReadyToSwitchOn:   // transition 1 is the drive's own
+    case DriveState::kQuickStopActive:      // transition 12
+    case DriveState::kFaultReactionActive:  // transition 14 is the drive's own
     case DriveState::kFault: return kCommandDisableVoltage;
   }
   return kCommandDisableVoltage;

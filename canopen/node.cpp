@@ -90,7 +90,7 @@ void Node::transmit_synchronous(FrameSink& out) noexcept TANDEM_RT {
   for (TxPdo& pdo : tpdos_) pdo.sync(out);
 }
 
-NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept {
+NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
   const auto message = parse_nmt(frame);
   if (!message || (message->node != 0 && message->node != config_.id)) return 0;
   switch (message->command) {
@@ -182,7 +182,7 @@ NodeEvents Node::enter(NmtState state) noexcept {
   return before == NmtState::kOperational ? NodeEvents{kEventLeftOperational} : NodeEvents{0};
 }
 
-void Node::reset_communication() noexcept {
+void Node::reset_communication() noexcept TANDEM_RT {
   applied_rpdos_ = 0;
   error_register_ = 0;
   error_behaviour_ = 0;

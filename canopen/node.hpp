@@ -97,14 +97,14 @@ class Node final : private ObjectOwner {
   };
 
   void add_objects(ObjectDictionary& od);
-  NodeEvents on_nmt(const Frame& frame, FrameSink& out) noexcept;
+  NodeEvents on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
   NodeEvents on_sync() noexcept;
   NodeEvents on_rpdo(const Frame& frame, FrameSink& out) noexcept;
   void on_heartbeat(const Frame& frame) noexcept;
   NodeEvents watch_heartbeats(std::int64_t dt_ns, FrameSink& out) noexcept;
   NodeEvents enter(NmtState state) noexcept;
   NodeEvents communication_error() noexcept;
-  void reset_communication() noexcept;
+  void reset_communication() noexcept TANDEM_RT;
   void produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept;
   AbortCode check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT override;
   void written(const ObjectEntry& entry) noexcept TANDEM_RT override;

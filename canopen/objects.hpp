@@ -52,7 +52,7 @@ inline constexpr std::uint16_t kSoftwareVersion = 0x100A;    // string
 inline constexpr std::uint16_t kEmergencyId = 0x1014;        // u32
 inline constexpr std::uint16_t kHeartbeatConsumer = 0x1016;  // u32[]: node << 16 | time [ms]
 inline constexpr std::uint16_t kHeartbeatProducer = 0x1017;  // u16 [ms]
-inline constexpr std::uint16_t kIdentity = 0x1018;           // u32: vendor, product, revision, serial
+inline constexpr std::uint16_t kIdentity = 0x1018;           // u32: IdentitySub
 inline constexpr std::uint16_t kErrorBehaviour = 0x1029;     // u8[1]: on a communication error
 inline constexpr std::uint16_t kRpdoParameter = 0x1400;      // + number - 1
 inline constexpr std::uint16_t kRpdoMapping = 0x1600;
@@ -110,7 +110,7 @@ inline constexpr std::uint16_t kMotorData = 0x2026;         // f32: MotorDataSub
 inline constexpr std::uint16_t kLimits = 0x2030;            // f32: LimitSub
 inline constexpr std::uint16_t kI2t = 0x2031;               // f32: I2tSub
 inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: never
-inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link revolution]
+inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link rev]
 inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
 
 // The manufacturer's, of a sensor node

@@ -44,7 +44,7 @@ bool Pdo::add_to(ObjectDictionary& od, PdoDirection direction, int number, int n
   return ok;
 }
 
-void Pdo::reset() noexcept {
+void Pdo::reset() noexcept TANDEM_RT {
   cob_id_ = default_cob_id_;
   type_ = kEventProfile;
   inhibit_100us_ = 0;

@@ -34,7 +34,7 @@ class Pdo : public ObjectOwner {
   /// @return false when `od` is full.
   bool add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id);
   /// Power-on values.
-  void reset() noexcept;
+  void reset() noexcept TANDEM_RT;
 
   [[nodiscard]] bool in_use() const noexcept { return (cob_id_ & cob::kInvalid) == 0; }
   [[nodiscard]] std::uint32_t cob_id() const noexcept { return cob_id_ & cob::kIdMask; }

@@ -165,7 +165,7 @@ bool AxisMaster::reset_is_late(std::int64_t now_ns) noexcept {
   return now_ns - since_ns_ >= kResetTimeoutNs;
 }
 
-bool AxisMaster::off() const noexcept {
+bool AxisMaster::off() const noexcept TANDEM_RT {
   switch (drive()) {
     case WireState::kOperationEnabled:
     case WireState::kQuickStopActive:

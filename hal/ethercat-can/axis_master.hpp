@@ -79,7 +79,7 @@ class AxisMaster {
     return heard_ && drive() == canopen::DriveState::kOperationEnabled;
   }
   /// True when no torque can come from the drive any more.
-  [[nodiscard]] bool off() const noexcept;
+  [[nodiscard]] bool off() const noexcept TANDEM_RT;
   [[nodiscard]] AxisTrouble trouble() const noexcept { return trouble_; }
   [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }

@@ -60,9 +60,11 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     axes.emplace_back(AxisScale::of(joint), gains.stiffness_Nm_rad, gains.damping_Nms_rad);
     for (const PidConfig* loop :
          {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
-      sent_gains.push_back(loop->gains);
+      file_gains.push_back(loop->gains);
     }
   }
+  sent_gains = file_gains;
+  std::size_t channel = 0;
   for (NodePlan& plan : layout.nodes) {
     Port& port = ports[plan.bus];
     const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
@@ -75,11 +77,13 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
                             ? kSensorTimeoutCycles
                             : robot.boards[static_cast<std::size_t>(plan.board)]
                                   .command_timeout_cycles;
-    nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+    node.first_channel = channel;
+    channel += node.channels.size();
   }
 }
 
-void DriveMaster::Impl::begin(const CycleTime& time) noexcept {
+void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
   dt_ns = begun ? time.time_ns - now_ns : time.period_ns;
   now_ns = time.time_ns;
   if (!begun) {
@@ -99,7 +103,7 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept {
   }
 }
 
-void DriveMaster::Impl::take_frames(Port& port) noexcept {
+void DriveMaster::Impl::take_frames(Port& port) noexcept TANDEM_RT {
   std::array<Frame, kChunk> frames;
   for (std::size_t taken = 0; taken < kMaxFramesPerCycle;) {
     const std::size_t count = port.bus->receive(frames);
@@ -109,7 +113,7 @@ void DriveMaster::Impl::take_frames(Port& port) noexcept {
   }
 }
 
-void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept {
+void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept TANDEM_RT {
   using namespace canopen;
   if (frame.id > cob::kIdMask || (frame.flags & (kFlagRtr | kFlagError)) != 0) return;
   const std::int16_t index = port.nodes[frame.id & 0x7F];
@@ -132,7 +136,7 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept {
   }
 }
 
-void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame) noexcept {
+void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame) noexcept TANDEM_RT {
   const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
   const bool listening = node.master.running() ||
                          node.master.stage() == NodeMaster::Stage::kStarting;
@@ -155,7 +159,7 @@ void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame) noex
   }
 }
 
-void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept {
+void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TANDEM_RT {
   const auto message = canopen::parse_emergency(frame);
   if (!message) return;
   const auto code = static_cast<std::uint16_t>(message->code);
@@ -166,7 +170,7 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept {
   }
 }
 
-void DriveMaster::Impl::process_nodes() noexcept {
+void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
     const std::size_t expected =
@@ -185,20 +189,19 @@ void DriveMaster::Impl::process_nodes() noexcept {
   }
 }
 
-void DriveMaster::Impl::fill(StateImage& state) noexcept {
+void DriveMaster::Impl::fill(StateImage& state) noexcept TANDEM_RT {
   for (std::size_t joint = 0; joint < axes.size(); ++joint) axes[joint].fill(state, joint);
   for (const Node& node : nodes) {
     if (node.plan.sensor < 0) continue;
     const auto sensor = static_cast<std::size_t>(node.plan.sensor);
-    const std::span<double> values = state.sensor_values(sensor);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = static_cast<double>(node.channels[i]);
+    for (std::size_t i = 0; i < node.channels.size(); ++i) {
+      state.sensor()[node.first_channel + i] = static_cast<double>(node.channels[i]);
     }
     state.sensor_age_cycles()[sensor] = node.silent_cycles;
   }
 }
 
-void DriveMaster::Impl::write_pdos() noexcept {
+void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     if (!node.master.running()) continue;
     for (std::size_t p = 0; p < node.plan.pdos.size(); ++p) {
@@ -218,14 +221,15 @@ void DriveMaster::Impl::write_pdos() noexcept {
   }
 }
 
-void DriveMaster::Impl::send_parameters(const ParameterImage& parameters) noexcept {
+void DriveMaster::Impl::send_parameters(const ParameterImage& parameters) noexcept TANDEM_RT {
   for (Node& node : nodes) {
     if (node.plan.board >= 0 && node.master.running()) send_parameter(node, parameters);
   }
 }
 
 /// Finishes the transfer under way, then starts the next item that differs from what the drive has.
-void DriveMaster::Impl::send_parameter(Node& node, const ParameterImage& parameters) noexcept {
+void DriveMaster::Impl::send_parameter(Node& node,
+                                       const ParameterImage& parameters) noexcept TANDEM_RT {
   canopen::SdoClient& sdo = node.master.sdo();
   if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
   if (node.sending >= 0 && sdo.status() == canopen::SdoClient::Status::kAborted) {
@@ -261,7 +265,7 @@ void DriveMaster::Impl::send_parameter(Node& node, const ParameterImage& paramet
   }
 }
 
-bool DriveMaster::Impl::flush() noexcept {
+bool DriveMaster::Impl::flush() noexcept TANDEM_RT {
   bool all = true;
   for (Port& port : ports) {
     const auto frames = port.sink.frames();
@@ -271,7 +275,7 @@ bool DriveMaster::Impl::flush() noexcept {
   return all;
 }
 
-Code DriveMaster::Impl::receive_code() const noexcept {
+Code DriveMaster::Impl::receive_code() const noexcept TANDEM_RT {
   for (const Port& port : ports) {
     if (port.bus->state() == BusState::kBusOff) return Code::kBusOff;
   }

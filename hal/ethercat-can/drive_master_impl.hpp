@@ -47,6 +47,7 @@ struct DriveMaster::Impl {
     std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
     std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
     std::vector<float> channels;                     ///< a sensor's
+    std::size_t first_channel = 0;                   ///< of them in StateImage::sensor()
     std::uint32_t fields_heard = 0;                  ///< this cycle's axes, or sensor channels
     std::uint32_t silent_cycles = 0;
     bool recovering = false;                         ///< a lost node that is configured anew
@@ -58,31 +59,31 @@ struct DriveMaster::Impl {
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
 
   // Exchange: drive_master.cpp
-  void begin(const CycleTime& time) noexcept;
-  void take_frames(Port& port) noexcept;
-  void dispatch(Port& port, const canopen::Frame& frame) noexcept;
-  void on_tpdo(Node& node, int number, const canopen::Frame& frame) noexcept;
-  void on_emergency(Node& node, const canopen::Frame& frame) noexcept;
-  void process_nodes() noexcept;
-  void fill(StateImage& state) noexcept;
-  void write_pdos() noexcept;
-  void send_parameters(const ParameterImage& parameters) noexcept;
-  void send_parameter(Node& node, const ParameterImage& parameters) noexcept;
-  [[nodiscard]] bool flush() noexcept;
-  [[nodiscard]] Code receive_code() const noexcept;
+  void begin(const CycleTime& time) noexcept TANDEM_RT;
+  void take_frames(Port& port) noexcept TANDEM_RT;
+  void dispatch(Port& port, const canopen::Frame& frame) noexcept TANDEM_RT;
+  void on_tpdo(Node& node, int number, const canopen::Frame& frame) noexcept TANDEM_RT;
+  void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
+  void process_nodes() noexcept TANDEM_RT;
+  void fill(StateImage& state) noexcept TANDEM_RT;
+  void write_pdos() noexcept TANDEM_RT;
+  void send_parameters(const ParameterImage& parameters) noexcept TANDEM_RT;
+  void send_parameter(Node& node, const ParameterImage& parameters) noexcept TANDEM_RT;
+  [[nodiscard]] bool flush() noexcept TANDEM_RT;
+  [[nodiscard]] Code receive_code() const noexcept TANDEM_RT;
 
   // Stages: drive_master_stages.cpp
-  void advance() noexcept;
-  void boot() noexcept;
-  void watch() noexcept;
-  void react(StopCategory category) noexcept;
-  void recover() noexcept;
-  void take_resets(const CommandImage& command) noexcept;
-  void set_goals(AxisMaster::Goal goal) noexcept;
-  void fail() noexcept;
-  void make_commands(const CommandImage* image) noexcept;
-  [[nodiscard]] bool all_enabled() const noexcept;
-  [[nodiscard]] bool shut_down() noexcept;
+  void advance() noexcept TANDEM_RT;
+  void boot() noexcept TANDEM_RT;
+  void watch() noexcept TANDEM_RT;
+  void react(StopCategory category) noexcept TANDEM_RT;
+  void recover() noexcept TANDEM_RT;
+  void take_resets(const CommandImage& command) noexcept TANDEM_RT;
+  void set_goals(AxisMaster::Goal goal) noexcept TANDEM_RT;
+  void fail() noexcept TANDEM_RT;
+  void make_commands(const CommandImage* image) noexcept TANDEM_RT;
+  [[nodiscard]] bool all_enabled() const noexcept TANDEM_RT;
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
   [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }
 
   // Texts: drive_master_text.cpp
@@ -102,6 +103,7 @@ struct DriveMaster::Impl {
   std::vector<AxisMaster> axes;          ///< by joint
   std::vector<std::size_t> joint_node;   ///< by joint: index in nodes
   std::vector<std::uint8_t> joint_fresh; ///< by joint: feedback came in this cycle
+  std::vector<PidGains> file_gains;      ///< by joint and loop: what the configuration writes
   std::vector<PidGains> sent_gains;      ///< by joint and loop: what the drive has
   std::vector<std::uint32_t> sent_revision;
 

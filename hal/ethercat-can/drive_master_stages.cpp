@@ -16,7 +16,7 @@ constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kH
 
 }  // namespace
 
-void DriveMaster::Impl::advance() noexcept {
+void DriveMaster::Impl::advance() noexcept TANDEM_RT {
   switch (stage) {
     case Stage::kBooting: boot(); break;
     case Stage::kEnabling:
@@ -50,7 +50,7 @@ void DriveMaster::Impl::advance() noexcept {
   }
 }
 
-void DriveMaster::Impl::boot() noexcept {
+void DriveMaster::Impl::boot() noexcept TANDEM_RT {
   bool all_ready = true;
   bool all_running = true;
   for (const Node& node : nodes) {
@@ -68,7 +68,7 @@ void DriveMaster::Impl::boot() noexcept {
 }
 
 /// Finds what went wrong since the last cycle, and carries the worst stop category out.
-void DriveMaster::Impl::watch() noexcept {
+void DriveMaster::Impl::watch() noexcept TANDEM_RT {
   StopCategory worst = StopCategory::kWarn;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
@@ -86,7 +86,7 @@ void DriveMaster::Impl::watch() noexcept {
   if (worst != StopCategory::kWarn) react(worst);
 }
 
-void DriveMaster::Impl::react(StopCategory category) noexcept {
+void DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
   stage = Stage::kFaulted;
   const Goal goal = reaction == StopCategory::kCategory0   ? Goal::kNothing
@@ -99,7 +99,7 @@ void DriveMaster::Impl::react(StopCategory category) noexcept {
 }
 
 /// Goes on with what take_resets() began: drives that are reset, nodes that are configured anew.
-void DriveMaster::Impl::recover() noexcept {
+void DriveMaster::Impl::recover() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     const bool sensor_lost =
         node.plan.sensor >= 0 && node.master.stage() == NodeStage::kDown;
@@ -138,7 +138,7 @@ void DriveMaster::Impl::recover() noexcept {
   }
 }
 
-void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept {
+void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept TANDEM_RT {
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
     if (command.fault_reset()[joint] == 0 || axis.trouble() == AxisTrouble::kNone) continue;
@@ -154,26 +154,22 @@ void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept {
     for (const std::size_t lost : node.plan.joints) {
       axes[lost].forget();
       // The configuration goes back to the file's gains; what was set since is sent again.
-      const GainsConfig& gains = robot.gains_of(robot.joints[lost]);
-      sent_gains[lost * kPidLoops + 0] = gains.position.gains;
-      sent_gains[lost * kPidLoops + 1] = gains.velocity.gains;
-      sent_gains[lost * kPidLoops + 2] = gains.torque.gains;
-      sent_gains[lost * kPidLoops + 3] = gains.current.gains;
+      std::copy_n(&file_gains[lost * kPidLoops], kPidLoops, &sent_gains[lost * kPidLoops]);
       sent_revision[lost] = 0;
     }
   }
 }
 
-void DriveMaster::Impl::set_goals(Goal goal) noexcept {
+void DriveMaster::Impl::set_goals(Goal goal) noexcept TANDEM_RT {
   for (AxisMaster& axis : axes) axis.set_goal(goal, now_ns);
 }
 
-void DriveMaster::Impl::fail() noexcept {
+void DriveMaster::Impl::fail() noexcept TANDEM_RT {
   stage = Stage::kFailed;
   set_goals(Goal::kNothing);
 }
 
-void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept {
+void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM_RT {
   StopCategory worst = StopCategory::kWarn;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
@@ -188,11 +184,11 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept {
   if (worst != StopCategory::kWarn) react(worst);
 }
 
-bool DriveMaster::Impl::all_enabled() const noexcept {
+bool DriveMaster::Impl::all_enabled() const noexcept TANDEM_RT {
   return std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.enabled(); });
 }
 
-bool DriveMaster::Impl::shut_down() noexcept {
+bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
   if (!shutting_down) {
     shutting_down = true;
     shut_down_since_ns = now_ns;

@@ -134,7 +134,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   return steps;
 }
 
-std::uint16_t gains_object(PidLoop loop) noexcept {
+std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT {
   switch (loop) {
     case PidLoop::kPosition: return object::kPositionGains;
     case PidLoop::kVelocity: return object::kVelocityGains;

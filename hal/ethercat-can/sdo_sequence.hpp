@@ -43,7 +43,7 @@ template <class T>
                                                       const NodePlan& node);
 
 /// The object of a loop's gains on axis 0 (2020 to 2023).
-[[nodiscard]] std::uint16_t gains_object(PidLoop loop) noexcept;
+[[nodiscard]] std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT;
 
 /// How many of a heartbeat's periods may pass without it.
 inline constexpr int kHeartbeatPeriods = 3;

@@ -182,7 +182,7 @@ TEST(Exchange, ShutsDownByQuickStopAndPreOperational) {
   bool done = false;
   while (!done && cycles < 5000) {
     (void)rig.read();
-    done = rig.master->shut_down();
+    done = rig.shut_down();
     ++cycles;
   }
   ASSERT_TRUE(done);

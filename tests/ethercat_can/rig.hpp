@@ -14,6 +14,7 @@
 #include "firmware_emu/sensor_board.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/loopback.hpp"
+#include "rt/scoped_realtime.hpp"
 
 namespace tandem::hal::can::testing {
 
@@ -97,6 +98,7 @@ inline firmware::SensorSetup sensor_setup() {
 }
 
 /// One cycle as the in-process robot does it. The joints stand where `position_rad` says.
+/// The master's and the boards' part of it must neither allocate nor lock: every test proves it.
 class Rig {
  public:
   using Change = std::function<void(firmware::BoardSetup&, std::size_t)>;
@@ -139,11 +141,19 @@ class Rig {
   Code read() {
     time = {.cycle = cycle, .time_ns = static_cast<std::int64_t>(cycle) * 1'000'000};
     ++cycle;
+    const rt::ScopedRealtime in_cycle;
     master->cycle_begin(time);
     run_boards();
     return master->receive(state);
   }
-  Code write() { return master->send(command, parameters); }
+  Code write() {
+    const rt::ScopedRealtime in_cycle;
+    return master->send(command, parameters);
+  }
+  bool shut_down() {
+    const rt::ScopedRealtime in_cycle;
+    return master->shut_down();
+  }
   Code step() {
     const Code code = read();
     if (master->phase() != Phase::kBringUp) (void)write();
