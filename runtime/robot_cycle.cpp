@@ -1,6 +1,5 @@
 #include "runtime/robot_cycle.hpp"
 
-#include "hal/capabilities.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "rt/stop_signal.hpp"
 
