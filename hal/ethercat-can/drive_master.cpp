@@ -15,7 +15,6 @@ using canopen::PdoDirection;
 
 namespace {
 
-constexpr std::size_t kChunk = 64;  // frames taken from a bus at once
 /// A sensor has no time-out of its own in the configuration.
 constexpr int kSensorTimeoutCycles = 10;
 /// Items of one axis' parameters: kp, ki, kd of each loop.
@@ -104,12 +103,11 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
 }
 
 void DriveMaster::Impl::take_frames(Port& port) noexcept TANDEM_RT {
-  std::array<Frame, kChunk> frames;
   for (std::size_t taken = 0; taken < kMaxFramesPerCycle;) {
-    const std::size_t count = port.bus->receive(frames);
-    for (std::size_t i = 0; i < count; ++i) dispatch(port, frames[i]);
+    const std::size_t count = port.bus->receive(inbox);
+    for (std::size_t i = 0; i < count; ++i) dispatch(port, inbox[i]);
     taken += count;
-    if (count < frames.size()) return;
+    if (count < inbox.size()) return;
   }
 }
 

@@ -100,6 +100,7 @@ struct DriveMaster::Impl {
   RobotConfig robot;
   std::vector<Port> ports;
   std::vector<Node> nodes;
+  std::array<canopen::Frame, 64> inbox{};  ///< what is taken from a bus at once; no state
   std::vector<AxisMaster> axes;          ///< by joint
   std::vector<std::size_t> joint_node;   ///< by joint: index in nodes
   std::vector<std::uint8_t> joint_fresh; ///< by joint: feedback came in this cycle
