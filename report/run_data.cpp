@@ -158,7 +158,17 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
                                                            "base_velocity"}));
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
-  if (table->time_s == run.time_s) run.base = std::move(table->columns);
+  // The log of a killed run may end between a state and its truth.
+  const std::size_t rows = std::min(run.rows(), table->time_s.size());
+  if (rows < 2 || !std::equal(run.time_s.begin(), run.time_s.begin() + rows, table->time_s.begin())) {
+    return {};
+  }
+  run.base = std::move(table->columns);
+  run.time_s.resize(rows);
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm,
+                           &run.reference_rad, &run.sensor, &run.base}) {
+    for (std::vector<double>& column : *columns) column.resize(rows);
+  }
   return {};
 }
 

@@ -58,6 +58,24 @@ TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
   }
 }
 
+TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
+  const std::string log = (folder_ / "killed/double_pendulum-trajectory-001.mcap").string();
+  const std::string kill_when_it_has_written =
+      "cd '" + folder_.string() + "'; '" TANDEM_BINARY_DIR
+      "/bin/tandem' run trajectory.toml --duration 60 --realtime --log killed --quiet & "
+      "for i in $(seq 300); do [ $(stat -c %s '" + log + "' 2>/dev/null || echo 0) -gt 300000 ] "
+      "&& break; sleep 0.1; done; kill -9 $!; wait";
+  std::system(kill_when_it_has_written.c_str());
+  const Outcome info = tandem("log info " + log + " --json -");
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto json = nlohmann::json::parse(info.out);
+  EXPECT_EQ(json["complete"], false);
+  EXPECT_GT(json["topics"]["/tandem/state"]["messages"], 100);
+  const Outcome report = tandem("report " + log);
+  EXPECT_EQ(report.status, 0) << report.err;
+  EXPECT_EQ(report.err, "") << "nothing is left out";
+}
+
 TEST_F(LogAndReport, ReportLaysTwoLogsOverEachOther) {
   ASSERT_EQ(tandem("run hold.toml --duration 0.5 --quiet").status, 0);
   const Outcome outcome =
