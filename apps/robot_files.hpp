@@ -26,8 +26,4 @@ struct RobotFiles {
 /// Reads a robot.toml and its description.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);
 
-/// What the kernels of a robot are made from. A rigid joint (order 0 or 1) carries its rotor's
-/// inertia as armature; behind a spring the motor is a state of its own.
-[[nodiscard]] model::ModelSpec spec_of(const hal::RobotConfig& config);
-
 }  // namespace tandem::apps
