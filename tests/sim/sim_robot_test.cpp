@@ -229,6 +229,7 @@ TEST(SimRobot, AnUnstableSubStepIsRefusedWithTheJoint) {
 TEST(SimRobot, StagesAreReportedInOrder) {
   Loop loop(swing_robot());
   std::vector<Stage> stages;
+  stages.reserve(kStages);  // the hook runs in the cycle
   loop.sim_robot->set_stage_hook(
       [](void* context, Stage stage) {
         static_cast<std::vector<Stage>*>(context)->push_back(stage);
