@@ -6,13 +6,16 @@
 namespace tandem {
 namespace {
 
-/// Parameters: joints (all), posture (none), duration_s (3), interaction ("stiff").
+/// Parameters: joints (all), posture (none), duration_s (3), interaction ("stiff"),
+/// link_damping_Nms_rad (0).
 class Hold : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     const std::string interaction =
         setup.parameters.choice_or("interaction", "stiff", {"stiff", "compliant"});
     duration_s_ = setup.parameters.number_or("duration_s", 3.0, kPositive);
+    link_damping_Nms_rad_ =
+        setup.parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
     posture_ = posture_parameter(setup);
     for (const std::size_t joint : joints_parameter(setup)) {
       const Status claimed = claim(
@@ -39,7 +42,7 @@ class Hold : public Controller {
     }
   }
 
-  Code update(const hal::CycleTime& time, const hal::StateImage&,
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const double since_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
     const MinJerk profile = min_jerk(since_s / duration_s_);
@@ -47,6 +50,10 @@ class Hold : public Controller {
       const double way = move.to_rad - move.from_rad;
       command.position_rad()[move.joint] = move.from_rad + way * profile.s;
       command.velocity_rad_s()[move.joint] = way * profile.ds / duration_s_;
+      // On a spring the link may swing, which the motor's own loop hardly damps.
+      const double swing =
+          state.velocity_rad_s()[move.joint] - command.velocity_rad_s()[move.joint];
+      command.torque_Nm()[move.joint] = -link_damping_Nms_rad_ * swing;
     }
     return Code::kOk;
   }
@@ -60,6 +67,7 @@ class Hold : public Controller {
   };
   const hal::PostureConfig* posture_ = nullptr;
   double duration_s_ = 0.0;
+  double link_damping_Nms_rad_ = 0.0;
   std::int64_t start_ns_ = 0;
   std::vector<Move> moves_;
 };

@@ -37,6 +37,16 @@ TEST(Hold, LeadsToAPostureWithoutAJump) {
   EXPECT_EQ(run.command.position_rad()[1], -0.5);
 }
 
+TEST(Hold, BrakesTheSwingOfALinkOnRequest) {
+  test::Harness run(robot(), "hold", "joints = ['wrist']\nlink_damping_Nms_rad = 4.0\n");
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  run.state.velocity_rad_s()[2] = 0.5;
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.torque_Nm()[2], -2.0);
+  EXPECT_EQ(run.command.torque_Nm()[0], 0.0);
+}
+
 TEST(Hold, ClaimsOnlyTheJointsItIsGiven) {
   test::Harness run(robot(), "hold", "joints = ['wrist']\ninteraction = 'compliant'\n");
   ASSERT_EQ(run.problem(), "");
