@@ -47,11 +47,11 @@ void print_plan(const Composition& c, std::FILE* out) {
   }
   facts.add("loop", fmt::format("{:.3g} kHz, {} cycles, {:.3f} s after bring-up", 1e-3 / period_s,
                                 e.cycles(), e.duration_s));
-  facts.add("integrator", fmt::format("{}, {} us steps",
-                                      e.sim.integrator == sim::Integrator::kRungeKutta4
-                                          ? "Runge-Kutta 4"
-                                          : "semi-implicit Euler",
-                                      static_cast<double>(e.sim.substep_ns) * 1e-3));
+  facts.add("integrator",
+            fmt::format("{}, {} us steps",
+                        e.sim.integrator == sim::Integrator::kRungeKutta4 ? "Runge-Kutta 4"
+                                                                          : "semi-implicit Euler",
+                        static_cast<double>(e.sim.substep_ns) * 1e-3));
   facts.add("seed", std::to_string(e.seed));
   facts.add("log", e.log.folder + "/");
   fmt::print(out, "{} is right. It would run:\n", e.file);
@@ -95,8 +95,8 @@ Diagnostics check_experiment(const std::string& file, std::FILE* out) {
 
 Exit check_command(const CheckOptions& options) {
   std::FILE* out = human_output(options.json);
-  const Diagnostics errors = is_robot(options.file) ? check_robot(options.file, out)
-                                                    : check_experiment(options.file, out);
+  const Diagnostics errors =
+      is_robot(options.file) ? check_robot(options.file, out) : check_experiment(options.file, out);
   print_errors(errors);
   const Json json{{"ok", errors.empty()}, {"errors", errors_json(errors)}};
   if (const Status written = write_json(options.json, json); !written) {

@@ -13,8 +13,8 @@ const char kExamples[] = R"(Examples:
   tandem run config/coman/squat.toml                 simulate, as fast as the machine goes
   tandem run config/coman/squat.toml --realtime      at the speed of a clock
   tandem check config/coman/squat.toml               read every file, move nothing
-  tandem report runs/coman-squat.mcap                draw the plots of a run
-  tandem log csv runs/coman-squat.mcap --fields position_rad
+  tandem report runs/coman-squat-001.mcap                draw the plots of a run
+  tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
 `tandem COMMAND --help` tells more, with examples.
 
@@ -43,14 +43,14 @@ const char kModelInfoExamples[] = R"(Examples:
   tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
 
 const char kLogInfoExamples[] = R"(Examples:
-  tandem log info runs/coman-squat.mcap              topics, messages, time, digest)";
+  tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest)";
 
 const char kLogCsvExamples[] = R"(Examples:
-  tandem log csv runs/coman-squat.mcap > state.csv
-  tandem log csv runs/coman-squat.mcap --topic command --every 10 -o ref.csv)";
+  tandem log csv runs/coman-squat-001.mcap > state.csv
+  tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
 
 const char kReportExamples[] = R"(Examples:
-  tandem report runs/coman-squat.mcap                report.html and PNG files beside the log
+  tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
   tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
 
 const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
@@ -60,7 +60,8 @@ void add_run(CLI::App& app, RunOptions& o) {
   CLI::Option* rate =
       app.add_option("--rate", o.rate, "Simulated seconds per wall second (default: free running)")
           ->check(CLI::PositiveNumber);
-  app.add_flag_callback("--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
+  app.add_flag_callback(
+         "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
       ->excludes(rate);
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
@@ -108,8 +109,7 @@ void add_log(CLI::App& app, LogOptions& o) {
   CLI::App* csv = app.add_subcommand("csv", "One topic as comma-separated values");
   csv->add_option("log", o.log, "MCAP file")->required();
   csv->add_option("--topic", o.topic, "Topic to write (default: the state)");
-  csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")
-      ->delimiter(',');
+  csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")->delimiter(',');
   csv->add_option("--every", o.every, "Write each n-th message")->check(CLI::PositiveNumber);
   csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
   csv->footer(kLogCsvExamples);
@@ -152,8 +152,7 @@ std::string unknown_word(const CLI::App& app, const std::string& word) {
   const std::vector<std::string> known = flag ? flags_of(app) : subcommands_of(app);
   const std::string name = word.substr(0, word.find('='));
   if (!flag && known.empty()) return fmt::format("'{}' is one argument too many", word);
-  return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name,
-                     suggest(name, known));
+  return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name, suggest(name, known));
 }
 
 /// "tandem model build": as typed, for the pointer to its help.

@@ -20,28 +20,28 @@ enum class Exit : int {
 /// tandem run EXPERIMENT
 struct RunOptions {
   std::string experiment;
-  std::optional<double> rate;            ///< 1: real time; empty: as fast as it goes
-  std::optional<std::uint64_t> seed;     ///< instead of the experiment's
-  std::optional<double> duration_s;      ///< instead of the experiment's
-  std::string log_folder;                ///< empty: the experiment's
+  std::optional<double> rate;         ///< 1: real time; empty: as fast as it goes
+  std::optional<std::uint64_t> seed;  ///< instead of the experiment's
+  std::optional<double> duration_s;   ///< instead of the experiment's
+  std::string log_folder;             ///< empty: the experiment's
   bool no_log = false;
-  std::string kernel_variant;            ///< empty: the best that this CPU runs
-  bool report = false;                   ///< draw the report after the run
-  bool quiet = false;                    ///< neither progress nor table
-  std::string json;                      ///< file, "-" for standard output, empty for none
+  std::string kernel_variant;  ///< empty: the best that this CPU runs
+  bool report = false;         ///< draw the report after the run
+  bool quiet = false;          ///< neither progress nor table
+  std::string json;            ///< file, "-" for standard output, empty for none
 };
 
 /// tandem check FILE
 struct CheckOptions {
-  std::string file;                      ///< an experiment or a robot
+  std::string file;  ///< an experiment or a robot
   std::string json;
 };
 
 /// tandem model build|info ROBOT
 struct ModelOptions {
   enum class Action : std::uint8_t { kBuild, kInfo } action = Action::kBuild;
-  std::string robot;                     ///< robot.toml
-  std::string output;                    ///< library; empty: beside `tandem` or in the cache
+  std::string robot;   ///< robot.toml
+  std::string output;  ///< library; empty: beside `tandem` or in the cache
   std::string kernel_variant;
   bool force = false;
   std::string json;
@@ -51,18 +51,18 @@ struct ModelOptions {
 struct LogOptions {
   enum class Action : std::uint8_t { kInfo, kCsv } action = Action::kInfo;
   std::string log;
-  std::string topic;                     ///< empty: the state
-  std::vector<std::string> fields;       ///< empty: all
-  std::size_t every = 1;                 ///< n: each n-th message
-  std::string output;                    ///< empty: standard output
+  std::string topic;                ///< empty: the state
+  std::vector<std::string> fields;  ///< empty: all
+  std::size_t every = 1;            ///< n: each n-th message
+  std::string output;               ///< empty: standard output
   std::string json;
 };
 
 /// tandem report LOG [LOG_B]
 struct ReportOptions {
   std::string log;
-  std::string other;                     ///< laid over `log`; may be empty
-  std::string output;                    ///< folder; empty: beside the log
+  std::string other;   ///< laid over `log`; may be empty
+  std::string output;  ///< folder; empty: beside the log
   std::string json;
 };
 

@@ -78,8 +78,8 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!robot) return std::unexpected(robot.error());
   if (auto kernels = find_kernels(*robot, e.kernel_variant)) {
     c->kernels = std::move(*kernels);
-    c->controllers = std::make_unique<runtime::ControllerHost>(e.robot, c->kernels.get(),
-                                                               e.loop.period_ns);
+    c->controllers =
+        std::make_unique<runtime::ControllerHost>(e.robot, c->kernels.get(), e.loop.period_ns);
   } else {
     errors.add(kernels.error(), e.robot.file, 0);
   }

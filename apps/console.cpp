@@ -34,9 +34,7 @@ Error json_error(const std::string& file) {
 
 }  // namespace
 
-std::FILE* human_output(const std::string& json_file) {
-  return json_file == "-" ? stderr : stdout;
-}
+std::FILE* human_output(const std::string& json_file) { return json_file == "-" ? stderr : stdout; }
 
 Status check_writable(const std::string& file) {
   if (file.empty() || file == "-") return {};

@@ -78,8 +78,8 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
   }
   std::ofstream out(options.output, std::ios::binary);
   if (!out) {
-    return std::unexpected(Error{"cannot write this file", "name a file in a folder that exists",
-                                 options.output, 0, {}});
+    return std::unexpected(Error{
+        "cannot write this file", "name a file in a folder that exists", options.output, 0, {}});
   }
   return log::write_csv(file, topic, options.every, out, options.fields);
 }

@@ -12,15 +12,15 @@ struct Overloaded : F... {
 int main(int argc, char** argv) {
   using namespace tandem::apps;
   const Command command = parse_command_line(argc, argv);
-  const Exit exit = std::visit(
-      Overloaded{
-          [](Exit done) { return done; },
-          [](const RunOptions& options) { return run_command(options); },
-          [](const CheckOptions& options) { return check_command(options); },
-          [](const ModelOptions& options) { return model_command(options); },
-          [](const LogOptions& options) { return log_command(options); },
-          [](const ReportOptions& options) { return report_command(options); },
-      },
-      command);
+  const Exit exit =
+      std::visit(Overloaded{
+                     [](Exit done) { return done; },
+                     [](const RunOptions& options) { return run_command(options); },
+                     [](const CheckOptions& options) { return check_command(options); },
+                     [](const ModelOptions& options) { return model_command(options); },
+                     [](const LogOptions& options) { return log_command(options); },
+                     [](const ReportOptions& options) { return report_command(options); },
+                 },
+                 command);
   return static_cast<int>(exit);
 }

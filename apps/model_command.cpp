@@ -54,7 +54,8 @@ Status info(const RobotFiles& robot, const ModelOptions& options) {
 
   std::FILE* out = human_output(options.json);
   Facts facts;
-  facts.add("robot", fmt::format("{}, {} base", k.robot, k.floating_base != 0 ? "floating" : "fixed"));
+  facts.add("robot",
+            fmt::format("{}, {} base", k.robot, k.floating_base != 0 ? "floating" : "fixed"));
   facts.add("joints", fmt::format("{} (nv {}, nq {})", k.joints, k.nv, k.nq));
   facts.add("mass", fmt::format("{:.3f} kg", k.mass_kg));
   facts.add("sites, sensors", fmt::format("{}, {}", k.sites, k.sensors));

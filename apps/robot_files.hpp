@@ -16,12 +16,11 @@ struct RobotFiles {
   hal::RobotConfig config;  ///< completed from the description
   model::Tree tree;
   model::ModelSpec spec;
-  Diagnostics warnings;     ///< what the description's reader tolerated
+  Diagnostics warnings;  ///< what the description's reader tolerated
 };
 
 /// Reads the description that `config` names, and checks the two against each other.
-[[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(
-    hal::RobotConfig config);
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config);
 
 /// Reads a robot.toml and its description.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);

@@ -65,8 +65,8 @@ Status check_folder(const std::string& folder, std::uint64_t needed) {
   std::error_code problem;
   fs::create_directories(folder, problem);
   if (problem) {
-    return std::unexpected(folder_error(folder, "cannot make the log's folder: " +
-                                                    problem.message()));
+    return std::unexpected(
+        folder_error(folder, "cannot make the log's folder: " + problem.message()));
   }
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
     return std::unexpected(folder_error(
@@ -93,9 +93,13 @@ std::string next_path(const std::string& folder, const std::string& name) {
 log::RecorderOptions recorder_options(runtime::LogCompression compression) {
   log::RecorderOptions options;
   switch (compression) {
-    case runtime::LogCompression::kNone: options.writer.compression = log::Compression::kNone; break;
+    case runtime::LogCompression::kNone:
+      options.writer.compression = log::Compression::kNone;
+      break;
     case runtime::LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
-    case runtime::LogCompression::kZstd: options.writer.compression = log::Compression::kZstd; break;
+    case runtime::LogCompression::kZstd:
+      options.writer.compression = log::Compression::kZstd;
+      break;
   }
   return options;
 }

@@ -59,7 +59,8 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
   for (std::size_t i = 0; i < tracking.size(); ++i) {
     rows.push_back({s.composition.experiment.robot.joints[i].name, tracking[i]});
   }
-  std::ranges::stable_sort(rows, std::ranges::greater{}, [](const Row& r) { return r.error.rms_rad; });
+  std::ranges::stable_sort(rows, std::ranges::greater{},
+                           [](const Row& r) { return r.error.rms_rad; });
   Table table({"worst joints", "rms [deg]", "max [deg]"});
   for (std::size_t i = 0; i < std::min(kJointsShown, rows.size()); ++i) {
     table.add({rows[i].joint, fmt::format("{:.3f}", rows[i].error.rms_rad * kDegrees),
@@ -116,9 +117,9 @@ void RunSummary::print(std::FILE* out) const {
     facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
   }
   if (const auto base = cycle.statistics().base()) {
-    facts.add("base height", fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end",
-                                         base->min_height_m, base->max_height_m,
-                                         base->final_tilt_rad * kDegrees));
+    facts.add("base height",
+              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
+                          base->max_height_m, base->final_tilt_rad * kDegrees));
   }
   facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
                                      wall_s > 0.0 ? sim_s() / wall_s : 0.0));
@@ -129,9 +130,9 @@ void RunSummary::print(std::FILE* out) const {
   }
   facts.add("kernels", composition.kernels->variant);
   if (log) {
-    facts.add("log", fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path,
-                                 log->messages, log->dropped,
-                                 static_cast<double>(log->bytes) * 1e-6));
+    facts.add("log",
+              fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
+                          log->dropped, static_cast<double>(log->bytes) * 1e-6));
   }
   facts.print(out);
 }

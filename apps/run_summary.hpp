@@ -17,9 +17,9 @@ namespace tandem::apps {
 struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;
-  double wall_s = 0.0;                         ///< while controllers ran
-  std::optional<log::RecordingResult> log;     ///< empty: nothing was logged
-  std::vector<std::string> faults;             ///< the log's trouble included
+  double wall_s = 0.0;                      ///< while controllers ran
+  std::optional<log::RecordingResult> log;  ///< empty: nothing was logged
+  std::vector<std::string> faults;          ///< the log's trouble included
 
   [[nodiscard]] double sim_s() const;
   /// docs/json.md

@@ -12,9 +12,8 @@ Curve decimated(const Curve& curve, std::size_t most) {
     const std::size_t begin = bin * curve.x.size() / bins;
     const std::size_t end = (bin + 1) * curve.x.size() / bins;
     const auto first = curve.y.begin();
-    const auto [low, high] =
-        std::minmax_element(first + static_cast<std::ptrdiff_t>(begin),
-                            first + static_cast<std::ptrdiff_t>(end));
+    const auto [low, high] = std::minmax_element(first + static_cast<std::ptrdiff_t>(begin),
+                                                 first + static_cast<std::ptrdiff_t>(end));
     const auto a = static_cast<std::size_t>(low - first);
     const auto b = static_cast<std::size_t>(high - first);
     for (const std::size_t i : {std::min(a, b), std::max(a, b)}) {

@@ -10,14 +10,14 @@ namespace tandem::report {
 
 /// What a curve is, which decides how it looks.
 enum class CurveStyle : std::uint8_t {
-  kMeasured,    ///< solid, blue
-  kReference,   ///< dashed, orange: what was asked for
-  kComputed,    ///< dashed, orange: what a model says
-  kSecond,      ///< solid, purple: the other side, or the other log
-  kThird,       ///< solid, grey
-  kStick,       ///< solid with round joints, blue
-  kStickSecond, ///< the same, dark grey
-  kStickThird,  ///< the same, light grey
+  kMeasured,     ///< solid, blue
+  kReference,    ///< dashed, orange: what was asked for
+  kComputed,     ///< dashed, orange: what a model says
+  kSecond,       ///< solid, purple: the other side, or the other log
+  kThird,        ///< solid, grey
+  kStick,        ///< solid with round joints, blue
+  kStickSecond,  ///< the same, dark grey
+  kStickThird,   ///< the same, light grey
 };
 
 struct Curve {
@@ -42,7 +42,7 @@ struct Level {
 };
 
 struct Figure {
-  std::string name;     ///< file name without ending
+  std::string name;  ///< file name without ending
   std::string title;
   std::string x_label;  ///< with unit
   std::string y_label;  ///< with unit

@@ -127,20 +127,22 @@ std::string plot_command(const Figure& figure, std::size_t index) {
 /// Everything of one figure but terminal and output.
 std::string body(const Figure& figure, std::size_t index, double aspect) {
   std::string out = "unset label\n" + ranges(figure, aspect);
-  out += fmt::format("set label 1 {} at graph 0, graph 1.145 left font ',15' "
-                     "textcolor rgb '#1d242c' noenhanced\n",
-                     quoted(figure.title));
+  out += fmt::format(
+      "set label 1 {} at graph 0, graph 1.145 left font ',15' "
+      "textcolor rgb '#1d242c' noenhanced\n",
+      quoted(figure.title));
   for (const Note& note : figure.notes) {
     out += fmt::format("set label {} at {:.6g},{:.6g} center textcolor rgb '#3a424c' noenhanced\n",
                        quoted(note.text), note.x, note.y);
   }
   for (const Level& level : figure.levels) {
-    out += fmt::format("set label {} at graph 0.99, first {:.9g} right offset 0,{} font ',12' "
-                       "textcolor rgb '#3a424c' noenhanced front\n",
-                       quoted(level.label), level.y, level.label_below ? "-0.7" : "0.65");
+    out += fmt::format(
+        "set label {} at graph 0.99, first {:.9g} right offset 0,{} font ',12' "
+        "textcolor rgb '#3a424c' noenhanced front\n",
+        quoted(level.label), level.y, level.label_below ? "-0.7" : "0.65");
   }
-  out += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n",
-                     quoted(figure.x_label), quoted(figure.y_label));
+  out += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n", quoted(figure.x_label),
+                     quoted(figure.y_label));
   out += figure.equal_axes ? "set format x ''\n" : "set format x\n";
   return out + plot_command(figure, index);
 }
@@ -154,12 +156,14 @@ std::string overview(std::span<const Figure> figures, const std::string& folder)
   const double plot_height = (rows - kTop - kBottom - kBetween * (rows - 1.0)) / rows * kRowHeight;
   const double aspect = (0.985 - 0.06 - 0.08) / 2.0 * kWidth / plot_height;
   std::string out = "unset lmargin\nunset rmargin\nunset bmargin\nunset tmargin\n";
-  out += fmt::format("set terminal pngcairo size {:.0f},{:.0f} fontscale 1.15 linewidth 1.4 rounded "
-                     "font 'DejaVu Sans,13'\nset output {}\n",
-                     kWidth, rows * kRowHeight, quoted(folder + "/overview.png"));
-  out += fmt::format("set multiplot layout {:.0f},2 margins 0.06,0.985,{:.4f},{:.4f} "
-                     "spacing 0.08,{:.4f}\n",
-                     rows, kBottom / rows, 1.0 - kTop / rows, kBetween / rows);
+  out += fmt::format(
+      "set terminal pngcairo size {:.0f},{:.0f} fontscale 1.15 linewidth 1.4 rounded "
+      "font 'DejaVu Sans,13'\nset output {}\n",
+      kWidth, rows * kRowHeight, quoted(folder + "/overview.png"));
+  out += fmt::format(
+      "set multiplot layout {:.0f},2 margins 0.06,0.985,{:.4f},{:.4f} "
+      "spacing 0.08,{:.4f}\n",
+      rows, kBottom / rows, 1.0 - kTop / rows, kBetween / rows);
   for (std::size_t f = 0; f < figures.size(); ++f) out += body(figures[f], f, aspect);
   return out + "unset multiplot\nunset output\n";
 }
@@ -236,13 +240,16 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
   for (std::size_t f = 0; f < figures.size(); ++f) {
     const std::string drawing = body(figures[f], f, kSingleAspect);
     const std::string path = folder + "/" + figures[f].name;
-    out += "set lmargin at screen 0.105\nset rmargin at screen 0.975\n"
-           "set bmargin at screen 0.145\nset tmargin at screen 0.84\n";
-    out += "set terminal svg size 760,430 dynamic rounded font 'DejaVu Sans,13' background "
-           "rgb '#ffffff'\n";
+    out +=
+        "set lmargin at screen 0.105\nset rmargin at screen 0.975\n"
+        "set bmargin at screen 0.145\nset tmargin at screen 0.84\n";
+    out +=
+        "set terminal svg size 760,430 dynamic rounded font 'DejaVu Sans,13' background "
+        "rgb '#ffffff'\n";
     out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".svg"), drawing);
-    out += "set terminal pngcairo size 1520,860 fontscale 1.45 linewidth 1.7 rounded "
-           "font 'DejaVu Sans,13'\n";
+    out +=
+        "set terminal pngcairo size 1520,860 fontscale 1.45 linewidth 1.7 rounded "
+        "font 'DejaVu Sans,13'\n";
     out += fmt::format("set output {}\n{}unset output\n", quoted(path + ".png"), drawing);
   }
   return out + overview(figures, folder);

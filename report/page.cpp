@@ -64,7 +64,8 @@ Result<std::string> inline_svg(const std::string& file, const std::string& name)
   if (!in) return std::unexpected(file_error("cannot read the drawing", file));
   std::string svg = text.str();
   svg.erase(0, svg.find("<svg"));
-  for (const char* id : {"gnuplot_plot_", "gnuplot_canvas", "gpDot", "gpPt", "greybox", "textbox"}) {
+  for (const char* id :
+       {"gnuplot_plot_", "gnuplot_canvas", "gpDot", "gpPt", "greybox", "textbox"}) {
     const std::string unique = name + "_" + id;
     for (std::size_t at = 0; (at = svg.find(id, at)) != std::string::npos; at += unique.size()) {
       svg.replace(at, std::strlen(id), unique);

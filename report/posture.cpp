@@ -105,8 +105,8 @@ void add_soles(Curve& curve, const model::Tree& tree, const hal::RobotConfig& ro
       };
       const model::Placement in_link{(rotation(2) * rotation(1) * rotation(0)).matrix(),
                                      Eigen::Map<const Eigen::Vector3d>(site.xyz_m.data())};
-      const model::Placement sole = bodies[static_cast<std::size_t>(link.body)] * link.in_body *
-                                    in_link;
+      const model::Placement sole =
+          bodies[static_cast<std::size_t>(link.body)] * link.in_body * in_link;
       const auto [heel, toe] = std::ranges::minmax_element(
           foot.points_m, {}, [](const std::array<double, 3>& p) { return p[0]; });
       for (const auto& point : {*heel, *toe}) {
@@ -171,8 +171,8 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
     add_soles(legs, tree, robot, bodies, shift_m);
     const double x = shift_m + samples[s].base.p.x();
     figure.notes.push_back({samples[s].label, x, low - 0.08 * (high - low)});
-    figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x,
-                            low - 0.17 * (high - low)});
+    figure.notes.push_back(
+        {fmt::format("{:.2f} s", samples[s].time_s), x, low - 0.17 * (high - low)});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m, false});
   for (Curve* curve : {&others, &trunk, &legs}) {

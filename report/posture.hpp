@@ -14,9 +14,9 @@ namespace tandem::report {
 
 /// One moment of a run. Joints stand in the process image's order.
 struct PostureSample {
-  std::string label;                           ///< "lowest"
+  std::string label;  ///< "lowest"
   double time_s = 0.0;
-  model::Placement base;                       ///< of the root link in W
+  model::Placement base;  ///< of the root link in W
   std::vector<double> position_rad;
 };
 

@@ -16,8 +16,8 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("log" + side, run.path + (run.truncated ? " (its run was killed)" : ""));
-  facts.emplace_back("robot" + side, fmt::format("{}, {} joints", run.info.robot,
-                                                 run.info.joints.size()));
+  facts.emplace_back("robot" + side,
+                     fmt::format("{}, {} joints", run.info.robot, run.info.joints.size()));
   facts.emplace_back("backend" + side, run.info.hal);
   facts.emplace_back("seed" + side, std::to_string(run.info.seed));
   facts.emplace_back("period" + side,
@@ -50,7 +50,10 @@ Status create(const std::string& folder) {
   std::filesystem::create_directories(folder, problem);
   if (!problem) return {};
   return std::unexpected(Error{"cannot create the report's folder: " + problem.message(),
-                               "name a folder that can be written with -o", folder, 0, {}});
+                               "name a folder that can be written with -o",
+                               folder,
+                               0,
+                               {}});
 }
 
 Page page_of(const RunData& run, const RunData* other) {
@@ -79,7 +82,10 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
   const RunData* over = other.empty() ? nullptr : &*second;
   if (over != nullptr && over->info.joints != run->info.joints) {
     return std::unexpected(Error{"the two logs are of different robots",
-                                 "lay runs of one robot over each other", other, 0, {}});
+                                 "lay runs of one robot over each other",
+                                 other,
+                                 0,
+                                 {}});
   }
   if (const Status s = create(folder); !s) return std::unexpected(s.error());
 

@@ -16,9 +16,9 @@ namespace tandem::report {
 using FindKernels = std::function<const tandem_kernels*(const RunData&)>;
 
 struct ReportFiles {
-  std::string page;                 ///< report.html
-  std::vector<std::string> images;  ///< PNG, one per figure, and the overview
-  std::vector<std::string> remarks; ///< what the report lacks, and why
+  std::string page;                  ///< report.html
+  std::vector<std::string> images;   ///< PNG, one per figure, and the overview
+  std::vector<std::string> remarks;  ///< what the report lacks, and why
 };
 
 /// Draws the report of `log` (and `other`, when not empty) into `folder`, which is created.

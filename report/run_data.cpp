@@ -51,7 +51,8 @@ Status read_description(RunData& run) {
     return log_error(run, "this log does not carry the description " + m.urdf,
                      "report needs a log that `tandem run` has written");
   }
-  auto description = model::parse_urdf(text, m.urdf, {m.floating_base, m.mimic_independent, m.lock});
+  auto description =
+      model::parse_urdf(text, m.urdf, {m.floating_base, m.mimic_independent, m.lock});
   if (!description) return std::unexpected(description.error().front());
   run.tree = std::move(description->tree);
   return {};
@@ -154,13 +155,14 @@ Status read_command(const log::LogFile& file, RunData& run) {
 
 Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
-  auto table = file.read(kTruth, columns_of(file, kTruth, {"base_position_m", "base_quaternion",
-                                                           "base_velocity"}));
+  auto table = file.read(
+      kTruth, columns_of(file, kTruth, {"base_position_m", "base_quaternion", "base_velocity"}));
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
   // The log of a killed run may end between a state and its truth.
   const std::size_t rows = std::min(run.rows(), table->time_s.size());
-  if (rows < 2 || !std::equal(run.time_s.begin(), run.time_s.begin() + rows, table->time_s.begin())) {
+  if (rows < 2 ||
+      !std::equal(run.time_s.begin(), run.time_s.begin() + rows, table->time_s.begin())) {
     return {};
   }
   run.base = std::move(table->columns);

@@ -26,21 +26,21 @@ struct Tracking {
 struct RunData {
   std::string path;
   log::RunInfo info;
-  log::StringMap result;            ///< empty when the run was killed
+  log::StringMap result;  ///< empty when the run was killed
   bool truncated = false;
   std::string data_sha256;
 
-  hal::RobotConfig robot;           ///< as it was logged
+  hal::RobotConfig robot;  ///< as it was logged
   model::Tree tree;
-  std::string hip, knee, foot;      ///< the experiment's [report]; may be empty
+  std::string hip, knee, foot;  ///< the experiment's [report]; may be empty
 
-  double step_s = 0.0;              ///< between rows
-  std::vector<double> time_s;       ///< of each row, 0 when the controllers started
+  double step_s = 0.0;                              ///< between rows
+  std::vector<double> time_s;                       ///< of each row, 0 when the controllers started
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
-  Columns reference_rad;            ///< [joint][row]; NaN when not under position control
-  Columns sensor;                   ///< [channel][row], all sensors one after another
-  Columns base;                     ///< [13][row]: position, quaternion xyzw, velocity of the base
-                                    ///< in its frame; empty when the log has no truth
+  Columns reference_rad;  ///< [joint][row]; NaN when not under position control
+  Columns sensor;         ///< [channel][row], all sensors one after another
+  Columns base;           ///< [13][row]: position, quaternion xyzw, velocity of the base
+                          ///< in its frame; empty when the log has no truth
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
   /// First channel of sensor `index` in `sensor`.

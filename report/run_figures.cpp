@@ -83,8 +83,8 @@ Figure hip_figure(const RunData& run, const RunData* other, int joint) {
     figure.curves.push_back(curve_of(*other, "measured, B", CurveStyle::kSecond,
                                      other->position_rad[at(joint)], kDegrees));
   }
-  figure.curves.push_back(
-      curve_of(run, other == nullptr ? "reference" : "reference, A", CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
+  figure.curves.push_back(curve_of(run, other == nullptr ? "reference" : "reference, A",
+                                   CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
   return figure;
 }
 
@@ -146,8 +146,8 @@ Figure torque_figure(const RunData& run, const RunData* other, int joint,
   const std::string& name = run.robot.joints[at(joint)].name;
   Figure figure;
   figure.name = "knee_torque";
-  figure.title = std::string(legged(run) ? "Knee" : "Joint") +
-                 " torque: measured, and by inverse dynamics";
+  figure.title =
+      std::string(legged(run) ? "Knee" : "Joint") + " torque: measured, and by inverse dynamics";
   figure.x_label = "time [s]";
   figure.y_label = name + " [Nm]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
@@ -180,16 +180,15 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
       depth, {}, [start](double value) { return std::abs(value - start); });
   const double turn = *far;
   // The first time that the run comes to within a hundredth of its farthest point.
-  const auto arrived = std::ranges::find_if(depth, [&](double value) {
-    return std::abs(value - turn) <= 0.01 * std::abs(turn - start);
-  });
+  const auto arrived = std::ranges::find_if(
+      depth, [&](double value) { return std::abs(value - turn) <= 0.01 * std::abs(turn - start); });
   const auto lowest = static_cast<std::size_t>(arrived - depth.begin());
   const std::size_t half = nearest_row(depth, 0.5 * (start + turn), 0, lowest + 1);
   const std::size_t last = run.rows() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back({what + suffix, run.time_s[row], run.base_placement(row),
-                       run.positions(row)});
+    samples.push_back(
+        {what + suffix, run.time_s[row], run.base_placement(row), run.positions(row)});
   };
   add("start", 0);
   if (suffix.empty()) add("half way", half);

@@ -13,9 +13,9 @@ namespace tandem::report {
 
 /// Which joints and sensor the figures show.
 struct Subjects {
-  int hip = -1;                  ///< joint in the image
+  int hip = -1;  ///< joint in the image
   int knee = -1;
-  std::vector<int> foot_sensors; ///< force/torque sensors in the image, the chosen one first
+  std::vector<int> foot_sensors;  ///< force/torque sensors in the image, the chosen one first
 };
 
 /// What the experiment's [report] says. Where it is silent: the first two pitch joints of the

@@ -61,9 +61,12 @@ TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
 TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
   const std::string log = (folder_ / "killed/double_pendulum-trajectory-001.mcap").string();
   const std::string kill_when_it_has_written =
-      "cd '" + folder_.string() + "'; '" TANDEM_BINARY_DIR
+      "cd '" + folder_.string() +
+      "'; '" TANDEM_BINARY_DIR
       "/bin/tandem' run trajectory.toml --duration 60 --realtime --log killed --quiet & "
-      "for i in $(seq 300); do [ $(stat -c %s '" + log + "' 2>/dev/null || echo 0) -gt 300000 ] "
+      "for i in $(seq 300); do [ $(stat -c %s '" +
+      log +
+      "' 2>/dev/null || echo 0) -gt 300000 ] "
       "&& break; sleep 0.1; done; kill -9 $!; wait";
   std::system(kill_when_it_has_written.c_str());
   const Outcome info = tandem("log info " + log + " --json -");

@@ -39,7 +39,8 @@ class Program : public ::testing::Test {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/double_pendulum";
-    for (const char* file : {"double_pendulum.urdf", "robot.toml", "hold.toml", "trajectory.toml"}) {
+    for (const char* file :
+         {"double_pendulum.urdf", "robot.toml", "hold.toml", "trajectory.toml"}) {
       std::filesystem::copy_file(source / file, folder_ / file);
     }
   }

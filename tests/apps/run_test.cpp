@@ -58,8 +58,8 @@ TEST_F(Run, WithoutALogWritesNone) {
 TEST_F(Run, EndsWithATableAndTheLogsPath) {
   const Outcome outcome = tandem("run hold.toml --duration 0.2");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  for (const std::string text : {"worst joints", "x real time", "runs/double_pendulum-hold-001.mcap",
-                                 "0 dropped", "100 %"}) {
+  for (const std::string text : {"worst joints", "x real time",
+                                 "runs/double_pendulum-hold-001.mcap", "0 dropped", "100 %"}) {
     EXPECT_NE(outcome.out.find(text), std::string::npos) << text << "\nin: " << outcome.out;
   }
 }

@@ -34,8 +34,8 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 /// Keys that the readers of robots and experiments ask for.
 std::set<std::string> keys_read() {
   std::set<std::string> keys;
-  for (const char* file : {"hal/robot_config.cpp", "hal/robot_config_drives.cpp",
-                           "runtime/experiment.cpp"}) {
+  for (const char* file :
+       {"hal/robot_config.cpp", "hal/robot_config_drives.cpp", "runtime/experiment.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(
         source,
@@ -63,7 +63,8 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
     const std::string source = text_of(kRoot / file);
     for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
       for (const std::string& key : matches(source, pattern)) {
-        EXPECT_NE(page.find(key), std::string::npos) << "docs/json.md lacks " << key << " of " << file;
+        EXPECT_NE(page.find(key), std::string::npos)
+            << "docs/json.md lacks " << key << " of " << file;
       }
     }
   }

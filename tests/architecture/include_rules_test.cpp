@@ -88,9 +88,8 @@ TEST(Architecture, RoomsIncludeOnlyWhatTheirRowAllows) {
   for (const auto& [room, allowed] : rules()) {
     for (const auto& [file, line, included] : includes_of(room)) {
       ++checked;
-      EXPECT_TRUE(may_include(room, included))
-          << file << ":" << line << " includes \"" << included << "\", which " << room
-          << "/ may not use";
+      EXPECT_TRUE(may_include(room, included)) << file << ":" << line << " includes \"" << included
+                                               << "\", which " << room << "/ may not use";
     }
   }
   EXPECT_GT(checked, 20) << "no includes were found: is the source folder right?";

@@ -46,8 +46,8 @@ TEST(InverseDynamics, ExplainsTheSensorsByWrenchesAtTheSites) {
   motion.step_s = 0.01;
   for (int i = 0; i < 100; ++i) {
     motion.q.push_back({0.0});
-    motion.v.push_back({0.5 * i * motion.step_s});     // v' = 0.5
-    motion.sensors.push_back({0, 0, 25.0, 0, 0, 0});   // ground: 35 N
+    motion.v.push_back({0.5 * i * motion.step_s});    // v' = 0.5
+    motion.sensors.push_back({0, 0, 25.0, 0, 0, 0});  // ground: 35 N
   }
   for (const std::vector<double>& tau : inverse_dynamics(cart, motion)) {
     EXPECT_NEAR(tau[0], 2.0 * 0.5 - 35.0, 1e-9);
