@@ -18,7 +18,6 @@ endif()
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(tomlplusplus REQUIRED)
 
 # Contraction is off so that a run's bits do not depend on the build type.
