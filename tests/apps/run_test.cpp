@@ -70,5 +70,18 @@ TEST_F(Run, KeepsStandardOutputForTheJsonAlone) {
   EXPECT_NE(outcome.err.find("worst joints"), std::string::npos);
 }
 
+TEST_F(Run, EveryBundledExperimentRuns) {
+  int runs = 0;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(TANDEM_SOURCE_DIR "/config")) {
+    const std::filesystem::path& file = entry.path();
+    if (file.extension() != ".toml" || file.filename() == "robot.toml") continue;
+    const Outcome outcome = tandem("run '" + file.string() + "' --duration 0.2 --no-log --quiet");
+    EXPECT_EQ(outcome.status, 0) << file << "\n" << outcome.err;
+    ++runs;
+  }
+  EXPECT_GE(runs, 10);
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -22,6 +22,12 @@ TEST(Hold, KeepsTheMeasuredPositionOfEveryJoint) {
   EXPECT_EQ(run.command.velocity_rad_s()[1], 0.0);
 }
 
+TEST(Hold, KeepsAJointWhoseLimitsLeaveOutZero) {
+  hal::RobotConfig config = robot();
+  config.joints[1].min_position_rad = 0.2;
+  EXPECT_EQ(test::Harness(config, "hold", "").problem(), "");
+}
+
 TEST(Hold, LeadsToAPostureWithoutAJump) {
   test::Harness run(robot(), "hold", "posture = 'ready'\nduration_s = 2.0\n");
   ASSERT_EQ(run.problem(), "");
