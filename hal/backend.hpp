@@ -47,7 +47,12 @@ class Backend {
   /// The cause of Phase::kFault, or what bring-up waits for ("LHip (node 3): waiting for …").
   [[nodiscard]] virtual std::string status_text() const = 0;
 
-  /// Advances to cycle `time.cycle`: exchanges SYNC and feedback, and fills `state`.
+  /// First call of every cycle, the only one that may block: starts the exchange with the robot
+  /// (SYNC goes out) and waits until the answers are there, or the time for them is over. A robot
+  /// in this process has nothing to wait for.
+  virtual void exchange(const CycleTime& /*time*/) noexcept {}
+
+  /// Advances to cycle `time.cycle` and fills `state` from the robot's answers.
   /// A joint whose sample did not arrive keeps the last one and raises its age.
   /// @return kOk, kTimeout, kBusOff, kDiverged (simulation only), kFault.
   /// @rt no allocation, lock or throw; bounded by the number of nodes.

@@ -11,14 +11,16 @@ using log::EventKind;
 
 bool RobotCycle::step() noexcept {
   if (phase_ == RunPhase::kDone) return false;
-  cycle(wait());
+  const rt::Tick tick = wait();
+  time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+  backend_->exchange(time_);
+  cycle(tick);
   return phase_ != RunPhase::kDone;
 }
 
 void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
   const rt::ScopedRealtime in_cycle;
   if (config_.time_stages) lap_ns_ = clock_->now_ns();
-  time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
   read();
   lap(Stage::kRead);
   check(tick);
@@ -34,7 +36,8 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
   loop_.finish();
 }
 
-/// The only stage that may block: for the cycle's time and, when time is simulated, for the log.
+/// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
+/// is simulated, for the log.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
   const std::size_t most = 3 + 8 + 3 * joint_faulted_.size() + sensor_lost_.size();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "base/realtime.hpp"
 #include "canopen/frame.hpp"
@@ -14,7 +15,20 @@ namespace tandem::hal::can {
 enum class BusState : std::uint8_t {
   kActive = 0,
   kErrorPassive,  ///< still works, errors are frequent
-  kBusOff,        ///< nothing is sent or received
+  kBusOff,        ///< the controller has taken itself off the bus: nothing is sent or received
+  kDown,          ///< the interface is there, and down
+  kGone,          ///< the interface is not there (any more)
+};
+
+/// What has passed since the bus was opened.
+struct BusStatistics {
+  std::uint64_t sent = 0;           ///< frames taken for sending
+  std::uint64_t received = 0;       ///< data frames
+  std::uint64_t send_refused = 0;   ///< frames that were lost because the queue or the bus was down
+  std::uint64_t queue_full = 0;     ///< times that the transmit queue took less than was given
+  std::uint64_t receive_lost = 0;   ///< frames that came faster than they were taken
+  std::uint64_t error_frames = 0;   ///< that the controller's driver told of
+  std::uint64_t recoveries = 0;     ///< times that the bus became usable again
 };
 
 /// One end of a bus. Never blocks.
@@ -29,6 +43,18 @@ class Bus {
   /// @return how many; less than frames.size() means that nothing more is there.
   virtual std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT = 0;
   [[nodiscard]] virtual BusState state() const noexcept TANDEM_RT = 0;
+
+  /// When the frames of the last receive() reached this machine [ns, the clock of sent_ns()], in
+  /// their order; empty when the bus does not know.
+  [[nodiscard]] virtual std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT {
+    return {};
+  }
+  /// When the last send() handed its frames over; 0 when the bus does not know.
+  [[nodiscard]] virtual std::int64_t sent_ns() const noexcept TANDEM_RT { return 0; }
+
+  [[nodiscard]] virtual BusStatistics statistics() const noexcept { return {}; }
+  /// Why state() is not kActive, with what to do about it; empty while it is. Not RT.
+  [[nodiscard]] virtual std::string status_text() const { return {}; }
 };
 
 }  // namespace tandem::hal::can
