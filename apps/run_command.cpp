@@ -97,6 +97,7 @@ runtime::CycleConfig cycle_config(runtime::Experiment& e, const RunOptions& opti
   runtime::CycleConfig config;
   config.loop = e.loop;
   config.running_cycles = e.cycles();
+  config.settle_cycles = e.settle_cycles();
   return config;
 }
 

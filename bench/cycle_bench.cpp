@@ -34,7 +34,7 @@ struct SimStages {
 };
 
 constexpr const char* kSimStages[sim::kStages] = {
-    "plant", "master: SYNC", "sensors", "boards' firmware", "master: decode", "truth"};
+    "master: SYNC", "plant", "sensors", "boards' firmware", "master: decode", "truth"};
 
 std::string first_value(const char* file, const std::string& key) {
   std::ifstream in(file);
@@ -107,10 +107,13 @@ int run(const std::string& file, const std::string& library, bool logged) {
     recorder = std::move(*opened);
   }
   SimStages stages;
-  (*robot)->set_stage_hook(SimStages::hook, &stages);
+  (*robot)->set_stage_hook({SimStages::hook, &stages});
   rt::WallClock clock;
   runtime::RobotCycle cycle({e->robot, **robot, host, clock, recorder.get(), &(*robot)->truth()},
-                            {.loop = e->loop, .running_cycles = e->cycles(), .time_stages = true});
+                            {.loop = e->loop,
+                             .running_cycles = e->cycles(),
+                             .settle_cycles = e->settle_cycles(),
+                             .time_stages = true});
   const std::int64_t begin_ns = clock.now_ns();
   bool more = true;
   while (more) {

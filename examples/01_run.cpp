@@ -30,7 +30,9 @@ int main(int argc, char** argv) {
   }
   rt::WallClock clock;
   runtime::RobotCycle cycle({e.robot, *robot, controllers, clock},
-                            {.loop = e.loop, .running_cycles = e.cycles()});
+                            {.loop = e.loop,
+                             .running_cycles = e.cycles(),
+                             .settle_cycles = e.settle_cycles()});
   while (cycle.step()) {
     if (cycle.state().cycle()[0] % 500 != 0) continue;
     std::printf("%5.1f s  %.3f rad\n", static_cast<double>(cycle.state().time_ns()[0]) * 1e-9,

@@ -28,13 +28,20 @@ void check_reference(TomlTable& table, const char* key, const std::string& name,
   table.error(key, "the robot has no " + kind + " '" + name + "'", suggest(name, known));
 }
 
-void read_backend(TomlTable table) {
+/// @param sim  says how long the hoist needs, which is the default of settle_s
+HalOptions read_hal(TomlTable table, const SimOptions& sim) {
+  HalOptions hal;
   const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "dds"});
-  if (backend != "sim") {
-    table.error("backend", "the backend '" + backend + "' is not part of this version",
-                "set backend = \"sim\"");
+  if (backend == "dds") {
+    table.error("backend", "the backend 'dds' is not part of this version",
+                "set backend = \"sim\" or \"can\"");
   }
+  if (backend == "can") hal.backend = BackendKind::kCan;
+  hal.lockstep = table.boolean_or("lockstep", hal.lockstep);
+  hal.answer_window = table.number_or("answer_window", hal.answer_window, {0.05, 0.95});
+  hal.settle_s = table.number_or("settle_s", sim.hoist ? sim.hoist_release_s : 0.0, {0.0, 600.0});
   table.finish();
+  return hal;
 }
 
 SimOptions read_sim(TomlTable table) {
@@ -127,8 +134,8 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.posture = root.text_or("posture", {});
   e.kernel_variant = root.text_or("kernel_variant", {});
   e.loop.period_ns = root.integer_or("period_ns", e.loop.period_ns, 10'000, 1'000'000'000);
-  read_backend(root.table_or_empty("hal"));
   e.sim = read_sim(root.table_or_empty("sim"));
+  e.hal = read_hal(root.table_or_empty("hal"), e.sim);
   read_overrun(root.table_or_empty("overrun"), e.loop);
   e.thread = read_realtime(root);
   e.log = read_log(root.table_or_empty("log"));
@@ -212,6 +219,11 @@ Diagnostics in_order(Diagnostics errors) {
 std::uint64_t Experiment::cycles() const {
   return static_cast<std::uint64_t>(
       std::llround(duration_s * 1e9 / static_cast<double>(loop.period_ns)));
+}
+
+std::uint64_t Experiment::settle_cycles() const {
+  return static_cast<std::uint64_t>(
+      std::ceil(hal.settle_s * 1e9 / static_cast<double>(loop.period_ns)));
 }
 
 sim::SimRobotConfig Experiment::sim_robot_config() const {

@@ -19,8 +19,16 @@
 
 namespace tandem::runtime {
 
-/// [hal] backend. "can" and "dds" are known names that this version refuses.
-enum class BackendKind : std::uint8_t { kSim };
+/// [hal] backend. "dds" is a known name that this version refuses.
+enum class BackendKind : std::uint8_t { kSim, kCan };
+
+/// [hal]: what stands for the robot, and how the loop and it go together.
+struct HalOptions {
+  BackendKind backend = BackendKind::kSim;
+  bool lockstep = false;        ///< "can": wait for an emulated robot's answers, at any speed
+  double answer_window = 0.5;   ///< "can" in real time: share of the period to wait for answers
+  double settle_s = 0.0;        ///< every joint is held, from enabled until controllers start
+};
 
 /// [sim]. Its `order` and `noise` are already applied to Experiment::robot.
 struct SimOptions {
@@ -64,7 +72,7 @@ struct Experiment {
   std::uint64_t seed = 1;
   std::string posture;         ///< where the robot starts; empty: every joint at 0
   std::string kernel_variant;  ///< empty: the best that this CPU runs
-  BackendKind backend = BackendKind::kSim;
+  HalOptions hal;
   SimOptions sim;
   rt::LoopConfig loop;      ///< period and [overrun]; the caller sets pacing and rate
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
@@ -75,6 +83,8 @@ struct Experiment {
 
   /// Cycles that controllers run: duration over period, rounded.
   [[nodiscard]] std::uint64_t cycles() const;
+  /// Cycles that every joint is held before they do: settle_s over period, rounded up.
+  [[nodiscard]] std::uint64_t settle_cycles() const;
   /// How to simulate it, with the seed and the period as they are now.
   [[nodiscard]] sim::SimRobotConfig sim_robot_config() const;
 };

@@ -9,6 +9,7 @@ namespace tandem::runtime {
 
 enum class RunPhase : std::uint8_t {
   kBringUp,   ///< the backend configures and enables its drives
+  kSettling,  ///< every joint is held where it was enabled, until the robot has been let down
   kRunning,   ///< controllers run
   kHolding,   ///< a joint with stop category "hold" is in fault: every joint stays where it is
   kShutDown,  ///< the drives stop and are disabled

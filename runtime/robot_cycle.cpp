@@ -57,7 +57,7 @@ void RobotCycle::read() noexcept TANDEM_RT {
 void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (tick.skipped > 0) event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
   if (tick.stop) fault(FaultSource::kOverrun, -1, 0);
-  if (phase_ == RunPhase::kRunning || phase_ == RunPhase::kHolding) {
+  if (phase_ != RunPhase::kBringUp && phase_ != RunPhase::kShutDown) {
     check_joints();
     check_sensors();
   }
@@ -71,10 +71,12 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
   if (phase_ == RunPhase::kBringUp) {
     if (backend_->phase() == hal::Phase::kOperational) {
       event(EventKind::kBringUpDone);
-      go(RunPhase::kRunning);
+      go(config_.settle_cycles > 0 ? RunPhase::kSettling : RunPhase::kRunning);
     } else if (in_phase >= config_.bring_up_cycles) {
       fault(FaultSource::kBringUp, -1, 0);
     }
+  } else if (phase_ == RunPhase::kSettling) {
+    if (in_phase >= config_.settle_cycles) go(RunPhase::kRunning);
   } else if (phase_ != RunPhase::kShutDown && config_.running_cycles != 0 &&
              in_phase >= config_.running_cycles) {
     event(EventKind::kControllersDone);
@@ -95,6 +97,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       controllers_->release(command_);  // every reference follows its joint until it is enabled
       controllers_->hold(state_, command_);
       break;
+    case RunPhase::kSettling: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;
@@ -227,8 +230,8 @@ void RobotCycle::react(hal::StopCategory category) noexcept TANDEM_RT {
   switch (category) {
     case hal::StopCategory::kWarn: return;
     case hal::StopCategory::kHold:
-      if (phase_ == RunPhase::kRunning) {
-        controllers_->stop();
+      if (phase_ == RunPhase::kRunning) controllers_->stop();
+      if (phase_ == RunPhase::kRunning || phase_ == RunPhase::kSettling) {
         phase_ = RunPhase::kHolding;  // the run's time goes on: phase_began_ stays
       }
       return;

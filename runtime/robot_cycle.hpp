@@ -26,6 +26,7 @@ struct CycleConfig {
   rt::LoopConfig loop{};
   std::uint64_t running_cycles = 0;        ///< that controllers run; 0: until stopped
   std::uint64_t bring_up_cycles = 20'000;  ///< at most, then the run ends in a fault
+  std::uint64_t settle_cycles = 0;         ///< every joint is held, from enabled to kRunning
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   std::uint32_t lost_after_cycles = 10;    ///< feedback older than this is a lost joint or sensor
   bool time_stages = false;                ///< fill stage_ns(): seven clock reads per cycle
@@ -48,7 +49,8 @@ struct CycleParts {
 
 /// A run from bring-up to shut-down, cycle by cycle:
 ///
-///   kBringUp   -> kRunning    when the backend says that every axis follows the command
+///   kBringUp   -> kSettling   when the backend says that every axis follows the command
+///   kSettling  -> kRunning    after settle_cycles, in which every joint is held where it is
 ///   kRunning   -> kShutDown   after running_cycles, when every controller is done, when a stop
 ///                             is requested, or in a fault (stop category 0 or 1)
 ///   kRunning   -> kHolding    in a fault of a joint with stop category "hold"; then, when the

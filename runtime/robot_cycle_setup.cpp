@@ -20,6 +20,7 @@ const char* to_string(Stage stage) noexcept {
 const char* to_string(RunPhase phase) noexcept {
   switch (phase) {
     case RunPhase::kBringUp: return "bring-up";
+    case RunPhase::kSettling: return "settling";
     case RunPhase::kRunning: return "running";
     case RunPhase::kHolding: return "holding";
     case RunPhase::kShutDown: return "shut-down";

@@ -26,17 +26,16 @@ std::size_t LoopbackBus::Queue::push(std::span<const Frame> frames) noexcept {
 std::size_t LoopbackBus::Queue::pop(std::span<Frame> frames) noexcept {
   const std::size_t given = std::min(frames.size(), count);
   std::copy_n(storage.begin() + static_cast<std::ptrdiff_t>(first), given, frames.begin());
-  first += given;
-  count -= given;
-  passed += given;
-  if (count == 0) first = 0;
+  drop(given);
   return given;
 }
 
-void LoopbackBus::Queue::clear() noexcept {
-  passed += count;
-  first = 0;
-  count = 0;
+void LoopbackBus::Queue::drop(std::size_t frames) noexcept {
+  const std::size_t gone = std::min(frames, count);
+  first += gone;
+  count -= gone;
+  passed += gone;
+  if (count == 0) first = 0;
 }
 
 /// Only the frames that wait: what the storage held before is no state.

@@ -22,7 +22,7 @@ namespace tandem::hal::can {
 /// ```
 /// master.cycle_begin(time);                       // through bus.master()
 /// for (const Frame& frame : bus.to_boards()) …    // every board sees every frame
-/// bus.clear_to_boards();
+/// bus.take_to_boards(bus.to_boards().size());
 /// bus.boards().send(frames_of_a_board);
 /// ```
 class LoopbackBus {
@@ -39,7 +39,8 @@ class LoopbackBus {
   [[nodiscard]] std::span<const canopen::Frame> to_boards() const noexcept TANDEM_RT {
     return to_boards_.frames();
   }
-  void clear_to_boards() noexcept TANDEM_RT { to_boards_.clear(); }
+  /// The first `count` of them are delivered.
+  void take_to_boards(std::size_t count) noexcept TANDEM_RT { to_boards_.drop(count); }
 
   [[nodiscard]] std::uint64_t dropped() const noexcept {
     return to_boards_.dropped + to_master_.dropped;
@@ -62,7 +63,7 @@ class LoopbackBus {
     }
     std::size_t push(std::span<const canopen::Frame> frames) noexcept;
     std::size_t pop(std::span<canopen::Frame> frames) noexcept;
-    void clear() noexcept;
+    void drop(std::size_t frames) noexcept;
     void archive(Archive& ar);
 
     std::vector<canopen::Frame> storage;

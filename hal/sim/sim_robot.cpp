@@ -1,274 +1,61 @@
 #include "hal/sim/sim_robot.hpp"
 
-#include <limits>
-#include <numeric>
-
-#include "base/nearest.hpp"
-#include "hal/sim/setup.hpp"
-#include "hal/sim/stability.hpp"
+#include "base/archive.hpp"
 
 namespace tandem::sim {
-namespace {
-
-using hal::can::LoopbackBus;
-
-std::size_t bus_index(const hal::RobotConfig& robot, const std::string& name) {
-  std::size_t index = 0;
-  while (robot.buses[index].name != name) ++index;  // the configuration was checked
-  return index;
-}
-
-Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_kernels* kernels,
-                                 const SimRobotConfig& config) {
-  PlantConfig plant;
-  plant.kernels = kernels;
-  plant.contact = robot.contact;
-  plant.integrator = config.integrator;
-  plant.substep_ns = config.substep_ns;
-  plant.held = config.hold;
-  plant.release_ns = config.release_ns;
-  plant.rate_limit = config.rate_limit;
-  const hal::PostureConfig* posture = robot.posture(config.posture);
-  if (posture == nullptr && !config.posture.empty()) {
-    std::vector<std::string> known;
-    for (const hal::PostureConfig& one : robot.postures) known.push_back(one.name);
-    return std::unexpected(Error{.message = "the robot has no such posture",
-                                 .hint = suggest(config.posture, known),
-                                 .file = robot.file,
-                                 .key = "posture." + config.posture});
-  }
-  if (posture != nullptr) plant.base_height_m = posture->base_height_m;
-  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-    const hal::JointConfig& joint = robot.joints[j];
-    const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
-    plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0});
-  }
-  return plant;
-}
-
-std::int64_t common_tick(const hal::RobotConfig& robot, std::int64_t period_ns) {
-  std::int64_t tick = period_ns;
-  for (const hal::BoardConfig& board : robot.boards) {
-    tick = std::gcd(tick, board.control_period_ns);
-  }
-  return tick;
-}
-
-// A step that cannot be stable would show as a drive's fault, far from its cause.
-Status check_step(const PlantConfig& config, const Plant& plant) {
-  const StepLimit limit = longest_step(config, plant);
-  if (static_cast<double>(config.substep_ns) * 1e-9 <= limit.seconds) return {};
-  const auto at_most = static_cast<std::int64_t>(limit.seconds * 1e9);
-  return std::unexpected(
-      Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
-            .hint = "at most " + std::to_string(at_most) + " ns in this posture",
-            .file = {},
-            .key = "sim.substep_ns"});
-}
-
-Status named(Status status, const std::string& key) {
-  if (!status)
-    status.error().key = key + (status.error().key.empty() ? "" : ".") + status.error().key;
-  return status;
-}
-
-}  // namespace
 
 Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot,
                                                    const tandem_kernels* kernels,
                                                    const SimRobotConfig& config) {
-  if (config.period_ns <= 0) return fail("the loop's period has to be above 0 ns");
-  Result<PlantConfig> plant = plant_config(robot, kernels, config);
-  if (!plant) return std::unexpected(plant.error());
-  Result<Plant> body = Plant::create(*plant);
-  if (!body) return std::unexpected(body.error());
-  if (Status status = check_step(*plant, *body); !status) return std::unexpected(status.error());
-  Result<Sensors> sensors = Sensors::create(robot, *kernels);
-  if (!sensors) return std::unexpected(sensors.error());
-
-  std::unique_ptr<SimRobot> sim(new SimRobot(robot, config, std::move(*body), std::move(*sensors)));
-  if (Status status = sim->add_nodes(robot, config); !status) {
-    return std::unexpected(status.error());
-  }
+  auto emulated = EmulatedRobot::create(robot, kernels, config);
+  if (!emulated) return std::unexpected(emulated.error());
   std::vector<hal::can::Bus*> ends;
-  for (const auto& bus : sim->buses_) ends.push_back(&bus->master());
-  Result<std::unique_ptr<hal::can::DriveMaster>> master =
-      hal::can::DriveMaster::create(robot, ends);
+  for (std::size_t b = 0; b < (*emulated)->buses(); ++b) {
+    ends.push_back(&(*emulated)->bus(b).master());
+  }
+  auto master = hal::can::DriveMaster::create(robot, ends);
   if (!master) return std::unexpected(master.error());
-  sim->master_ = std::move(*master);
-  return sim;
+  return std::unique_ptr<SimRobot>(
+      new SimRobot(std::move(*emulated), std::move(*master), config.truth));
 }
 
-SimRobot::SimRobot(const hal::RobotConfig& robot, const SimRobotConfig& config, Plant plant,
-                   Sensors sensors)
-    : plant_(std::move(plant)),
-      sensors_(std::move(sensors)),
-      truth_filler_(plant_),
-      truth_(plant_.joints(), plant_.contact().feet()),
-      keep_truth_(config.truth),
-      sensor_truth_(sensors_.channels(), 0.0),
-      unplugged_(robot.joints.size(), 0),
-      posture_(robot.shape()),
-      tick_ns_(common_tick(robot, config.period_ns)) {
-  for (std::size_t b = 0; b < robot.buses.size(); ++b) {
-    buses_.push_back(std::make_unique<LoopbackBus>());
-  }
-  for (const hal::JointConfig& joint : robot.joints) {
-    supply_V_.push_back(robot.actuator_of(joint).voltage_limit_V);
-  }
-  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-    posture_.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-  }
-}
-
-Status SimRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotConfig& config) {
-  for (std::size_t b = 0; b < robot.boards.size(); ++b) {
-    const firmware::BoardSetup setup = board_setup(robot, b, config.seed);
-    if (Status status = named(firmware::check(setup), "board." + setup.name); !status) {
-      return status;
-    }
-    boards_.push_back({std::make_unique<firmware::Board>(setup),
-                       bus_index(robot, robot.boards[b].bus), joints_of(robot, robot.boards[b]),
-                       sense_.size()});
-    sense_.resize(sense_.size() + setup.axes.size());
-  }
-  drive_.resize(sense_.size());
-  std::size_t channel = 0;
-  for (std::size_t s = 0; s < robot.sensors.size(); ++s) {
-    const firmware::SensorSetup setup = sensor_setup(robot, s, config.seed);
-    if (Status status = named(firmware::check(setup), "sensor." + setup.name); !status) {
-      return status;
-    }
-    sensor_nodes_.push_back({std::make_unique<firmware::SensorBoard>(setup),
-                             bus_index(robot, robot.sensors[s].bus), channel, setup.channels});
-    channel += setup.channels;
-  }
-  return {};
-}
+SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
+                   std::unique_ptr<hal::can::DriveMaster> master, bool keep_truth)
+    : robot_(std::move(robot)),
+      master_(std::move(master)),
+      truth_filler_(robot_->plant()),
+      truth_(robot_->plant().joints(), robot_->plant().contact().feet()),
+      keep_truth_(keep_truth) {}
 
 hal::Phase SimRobot::phase() const noexcept {
-  if (plant_.diverged()) return hal::Phase::kFault;
-  const hal::Phase phase = master_->phase();
-  if (phase == hal::Phase::kOperational && !plant_.released()) return hal::Phase::kBringUp;
-  return phase;
+  return plant().diverged() ? hal::Phase::kFault : master_->phase();
 }
 
 std::string SimRobot::status_text() const {
-  if (plant_.diverged()) return "the simulation diverged: " + plant_.diverged_text();
-  if (master_->phase() == hal::Phase::kOperational && !plant_.released()) {
-    return "the hoist lets the robot down";
-  }
+  if (plant().diverged()) return "the simulation diverged: " + plant().diverged_text();
   return master_->status_text();
 }
 
 Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
-  if (started_ == 0) {
-    now_ns_ = time.time_ns;
-    started_ = 1;
-  }
-  if (const Code code = advance_to(time.time_ns); code != Code::kOk) return code;
-  finished(Stage::kPlant);
   master_->cycle_begin(time);
-  finished(Stage::kMasterSync);
-  sense();
-  finished(Stage::kSense);
-  deliver();
-  run_boards();
-  finished(Stage::kBoards);
+  hook_(Stage::kMasterSync);
+  if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
   const Code code = master_->receive(state);
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
-  let_down(state);
-  finished(Stage::kMasterDecode);
-  if (keep_truth_) truth_filler_.fill(plant_, time, truth_);
-  finished(Stage::kTruth);
+  hook_(Stage::kMasterDecode);
+  if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
+  hook_(Stage::kTruth);
   return code;
 }
 
 Code SimRobot::write(const hal::CommandImage& command,
                      const hal::ParameterImage& parameters) noexcept TANDEM_RT {
-  const bool own = letting_down_ != 0 && !plant_.released();
-  return master_->send(own ? posture_ : command, parameters);
-}
-
-Code SimRobot::advance_to(std::int64_t time_ns) noexcept {
-  while (now_ns_ < time_ns) {
-    if (const Code code = plant_.advance(tick_ns_); code != Code::kOk) return code;
-    now_ns_ += tick_ns_;
-    if (now_ns_ >= time_ns) break;
-    sense();  // boards that are faster than the loop
-    deliver();
-    run_boards();
-  }
-  return Code::kOk;
-}
-
-void SimRobot::sense() noexcept {
-  plant_.evaluate();
-  sensors_.sample(plant_, sensor_truth_);
-  for (const BoardNode& node : boards_) {
-    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
-      const std::size_t j = node.joints[axis];
-      const JointReading joint = plant_.joint(j);
-      firmware::AxisSense& pins = sense_[node.first + axis];
-      pins = {.link_position_rad = joint.position_rad,
-              .motor_position_rad = joint.motor_position_rad,
-              .spring_torque_Nm = joint.torque_Nm,
-              .current_A = joint.current_A,
-              .temperature_C = joint.temperature_C,
-              .bus_voltage_V = supply_V_[j]};
-      if (unplugged_[j] == 0) continue;
-      --unplugged_[j];
-      pins.link_position_rad = std::numeric_limits<double>::quiet_NaN();
-    }
-  }
-}
-
-void SimRobot::deliver() noexcept {
-  for (BoardNode& node : boards_) {
-    for (const canopen::Frame& frame : buses_[node.bus]->to_boards()) node.board->receive(frame);
-  }
-  for (SensorNode& node : sensor_nodes_) {
-    for (const canopen::Frame& frame : buses_[node.bus]->to_boards()) node.board->receive(frame);
-  }
-  for (const auto& bus : buses_) bus->clear_to_boards();
-}
-
-void SimRobot::run_boards() noexcept {
-  for (BoardNode& node : boards_) {
-    const std::size_t axes = node.joints.size();
-    const std::span<firmware::AxisDrive> drives(drive_.data() + node.first, axes);
-    node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
-    for (std::size_t axis = 0; axis < axes; ++axis) {
-      plant_.set_drive(node.joints[axis], drives[axis].voltage_V, drives[axis].enabled);
-    }
-    (void)buses_[node.bus]->boards().send(node.board->outgoing());
-    node.board->clear_outgoing();
-  }
-  for (SensorNode& node : sensor_nodes_) {
-    node.board->step(tick_ns_, {sensor_truth_.data() + node.first, node.channels});
-    (void)buses_[node.bus]->boards().send(node.board->outgoing());
-    node.board->clear_outgoing();
-  }
-}
-
-/// All axes enabled for the first time: they hold where they are while the hoist yields.
-void SimRobot::let_down(const hal::StateImage& state) noexcept {
-  if (letting_down_ != 0 || master_->phase() != hal::Phase::kOperational) return;
-  letting_down_ = 1;
-  for (std::size_t j = 0; j < posture_.joints(); ++j) {
-    posture_.position_rad()[j] = state.position_rad()[j];
-  }
-  plant_.release();
+  return master_->send(command, parameters);
 }
 
 bool SimRobot::archive(Archive& ar) {
-  ar(plant_, truth_, *master_);
-  for (const auto& bus : buses_) ar(*bus);
-  for (const BoardNode& node : boards_) ar(*node.board);
-  for (const SensorNode& node : sensor_nodes_) ar(*node.board);
-  for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled);
-  ar(unplugged_, posture_, now_ns_, started_, letting_down_);
+  ar(*robot_, truth_, *master_);
   return true;
 }
 

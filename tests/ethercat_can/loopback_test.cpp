@@ -64,7 +64,7 @@ TEST(Loopback, ArchivesTheFramesInFlight) {
   (void)bus.master().send(frames);
   Archive saved;
   bus.archive(saved);
-  bus.clear_to_boards();
+  bus.take_to_boards(bus.to_boards().size());
   Archive restore(saved.bytes());
   bus.archive(restore);
   ASSERT_TRUE(restore.ok() && restore.at_end());

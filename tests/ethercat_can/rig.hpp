@@ -222,14 +222,14 @@ class Rig {
       (void)legs.boards().send(board.outgoing());
       board.clear_outgoing();
     }
-    legs.clear_to_boards();
+    legs.take_to_boards(legs.to_boards().size());
     if (sensor_present) {
       for (const canopen::Frame& frame : arms.to_boards()) sensor.receive(frame);
       sensor.step(1'000'000, wrench);
       (void)arms.boards().send(sensor.outgoing());
       sensor.clear_outgoing();
     }
-    arms.clear_to_boards();
+    arms.take_to_boards(arms.to_boards().size());
   }
 };
 

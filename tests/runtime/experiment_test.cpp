@@ -118,7 +118,10 @@ TEST(Experiment, ReadsEveryKey) {
 period_ns = 2_000_000
 kernel_variant = "baseline"
 [hal]
-backend = "sim"
+backend = "can"
+lockstep = true
+answer_window = 0.7
+settle_s = 0.003
 [sim]
 integrator = "rk4"
 substep_ns = 250_000
@@ -147,6 +150,10 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->seed, 7u);
   EXPECT_EQ(e->cycles(), 1250u);
   EXPECT_EQ(e->kernel_variant, "baseline");
+  EXPECT_EQ(e->hal.backend, BackendKind::kCan);
+  EXPECT_TRUE(e->hal.lockstep);
+  EXPECT_EQ(e->hal.answer_window, 0.7);
+  EXPECT_EQ(e->settle_cycles(), 2u);
   EXPECT_EQ(e->sim.integrator, sim::Integrator::kRungeKutta4);
   EXPECT_EQ(e->sim.substep_ns, 250'000);
   EXPECT_EQ(e->robot.actuators[0].order, 0);
@@ -207,9 +214,9 @@ TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
 }
 
 TEST(Experiment, RefusesABackendOfALaterVersion) {
-  EXPECT_EQ(errors_of(with("[hal]\nbackend = 'can'")),
-            "arm/x.toml:5: hal.backend: the backend 'can' is not part of this version "
-            "(set backend = \"sim\")\n");
+  EXPECT_EQ(errors_of(with("[hal]\nbackend = 'dds'")),
+            "arm/x.toml:5: hal.backend: the backend 'dds' is not part of this version "
+            "(set backend = \"sim\" or \"can\")\n");
 }
 
 TEST(Experiment, SuggestsTheNearestPosture) {

@@ -67,6 +67,32 @@ TEST(RobotCycle, GoesThroughBringUpRunningAndShutDown) {
   EXPECT_FALSE(run.cycle->step());
 }
 
+TEST(RobotCycle, HoldsEveryJointUntilTheRobotHasSettled) {
+  TestRun run({.settle_cycles = 30});
+  run.steps(20);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kSettling);
+  const double held = run.cycle->command().position_rad()[0];
+  for (int i = 0; i < 29; ++i) {
+    run.steps(1);
+    EXPECT_EQ(run.cycle->phase(), RunPhase::kSettling);
+    EXPECT_EQ(run.cycle->command().position_rad()[0], held);
+    EXPECT_EQ(run.cycle->command().mode()[0], static_cast<std::int8_t>(hal::ControlMode::kPosition));
+  }
+  EXPECT_EQ(run.controller->updates, 0);
+  run.steps(1);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(run.controller->updates, 1);
+}
+
+TEST(RobotCycle, AFaultWhileSettlingIsTheJointsStopCategory) {
+  TestRun run({.settle_cycles = 30});
+  run.steps(25);
+  run.backend.faulted_joint = 0;
+  run.cycle->run();
+  EXPECT_EQ(run.controller->updates, 0);
+  ASSERT_EQ(run.cycle->faults().size(), 1U);
+}
+
 TEST(RobotCycle, TellsItsProgressToAnotherThread) {
   TestRun run;
   std::uint64_t last = 0;

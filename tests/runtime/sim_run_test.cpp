@@ -113,7 +113,7 @@ TEST(SimRun, EndsInAFaultThatNamesTheJointWhenTheCableIsCut) {
   SimRun run;
   run.run_to(RunPhase::kRunning);
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(run.cycle->step());
-  run.backend->connect_bus(0, false);
+  run.backend->robot().bus(0).set_connected(false);
   run.cycle->run();
   const auto faults = run.cycle->faults();
   ASSERT_FALSE(faults.empty());

@@ -50,7 +50,9 @@ struct Squat {
     auto made = sim::SimRobot::create(e.robot, kernels.get(), e.sim_robot_config());
     ASSERT_TRUE(made) << made.error().to_string();
     backend = std::move(*made);
-    const CycleConfig config{.loop = e.loop, .running_cycles = cycles == 0 ? e.cycles() : cycles};
+    const CycleConfig config{.loop = e.loop,
+                             .running_cycles = cycles == 0 ? e.cycles() : cycles,
+                             .settle_cycles = e.settle_cycles()};
     cycle = std::make_unique<RobotCycle>(
         CycleParts{e.robot, *backend, *host, clock, recorder, &backend->truth()}, config);
   }

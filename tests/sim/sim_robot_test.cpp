@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "canopen/messages.hpp"
 #include "hal/capabilities.hpp"
 #include "tests/sim/swing_robot.hpp"
 
@@ -188,7 +189,7 @@ TEST(SimRobot, FasterBoardsRunBetweenTheCycles) {
 TEST(SimRobot, AnUnpluggedEncoderIsThatJointsFault) {
   Loop loop(swing_robot());
   loop.bring_up();
-  loop.sim_robot->unplug_encoder(0, 5);
+  loop.sim_robot->robot().unplug_encoder(0, 5);
   loop.run(20);
   EXPECT_NE(loop.state.fault()[0], 0U);
   EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
@@ -199,7 +200,7 @@ TEST(SimRobot, AnUnpluggedEncoderIsThatJointsFault) {
 TEST(SimRobot, ACutCableLeavesTheBoardInItsSafeState) {
   Loop loop(swing_robot());
   loop.bring_up();
-  loop.sim_robot->connect_bus(0, false);
+  loop.sim_robot->robot().bus(0).set_connected(false);
   loop.run(2500);
   EXPECT_GT(loop.state.age_cycles()[0], 2400U);
   EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);
@@ -230,14 +231,32 @@ TEST(SimRobot, StagesAreReportedInOrder) {
   Loop loop(swing_robot());
   std::vector<Stage> stages;
   stages.reserve(kStages);  // the hook runs in the cycle
-  loop.sim_robot->set_stage_hook(
-      [](void* context, Stage stage) {
-        static_cast<std::vector<Stage>*>(context)->push_back(stage);
-      },
-      &stages);
+  loop.sim_robot->set_stage_hook({[](void* context, Stage stage) {
+                                    static_cast<std::vector<Stage>*>(context)->push_back(stage);
+                                  },
+                                  &stages});
   loop.run(1);
-  EXPECT_EQ(stages, (std::vector<Stage>{Stage::kPlant, Stage::kMasterSync, Stage::kSense,
+  EXPECT_EQ(stages, (std::vector<Stage>{Stage::kMasterSync, Stage::kPlant, Stage::kSense,
                                         Stage::kBoards, Stage::kMasterDecode, Stage::kTruth}));
+}
+
+TEST(EmulatedRobot, FramesAfterSyncWaitForTheNextStep) {
+  const hal::RobotConfig config = swing_robot();
+  auto made = EmulatedRobot::create(config, swing_kernels(2), {.posture = "up"});
+  ASSERT_TRUE(made.has_value());
+  EmulatedRobot& robot = **made;
+  const auto reset = canopen::make_nmt(canopen::NmtCommand::kResetNode, 0);
+  const std::array frames{canopen::make_sync(), reset, canopen::make_sync()};
+  std::array<canopen::Frame, 8> answers;
+  robot.bus(0).master().send(frames);
+  EXPECT_EQ(robot.step(0), Code::kOk);
+  EXPECT_EQ(robot.bus(0).to_boards().size(), 2U);
+  const std::size_t first = robot.bus(0).master().receive(answers);
+  EXPECT_EQ(robot.step(1'000'000), Code::kOk);
+  EXPECT_TRUE(robot.bus(0).to_boards().empty());
+  const std::size_t second = robot.bus(0).master().receive(answers);
+  EXPECT_EQ(first, second) << "each step answers one boot-up per node, after a power-on or a reset";
+  EXPECT_GT(second, 0U);
 }
 
 TEST(SimRobot, AnUnknownPostureSuggestsTheNearest) {

@@ -50,6 +50,8 @@ class Standing {
   void bring_up() {
     for (int i = 0; i < 10'000 && robot->phase() != hal::Phase::kOperational; ++i) step();
     ASSERT_EQ(robot->phase(), hal::Phase::kOperational) << robot->status_text();
+    for (int i = 0; i < 10'000 && !robot->plant().released(); ++i) step();
+    ASSERT_TRUE(robot->plant().released());
   }
   std::size_t joint(const char* name) const {
     return static_cast<std::size_t>(coman.robot.joint_index(name));

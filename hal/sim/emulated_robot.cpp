@@ -1,0 +1,240 @@
+#include "hal/sim/emulated_robot.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "base/archive.hpp"
+#include "base/nearest.hpp"
+#include "hal/sim/setup.hpp"
+#include "hal/sim/stability.hpp"
+
+namespace tandem::sim {
+namespace {
+
+using hal::can::LoopbackBus;
+
+std::size_t bus_index(const hal::RobotConfig& robot, const std::string& name) {
+  std::size_t index = 0;
+  while (robot.buses[index].name != name) ++index;  // the configuration was checked
+  return index;
+}
+
+Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+                                 const SimRobotConfig& config) {
+  PlantConfig plant;
+  plant.kernels = kernels;
+  plant.contact = robot.contact;
+  plant.integrator = config.integrator;
+  plant.substep_ns = config.substep_ns;
+  plant.held = config.hold;
+  plant.release_ns = config.release_ns;
+  plant.rate_limit = config.rate_limit;
+  const hal::PostureConfig* posture = robot.posture(config.posture);
+  if (posture == nullptr && !config.posture.empty()) {
+    std::vector<std::string> known;
+    for (const hal::PostureConfig& one : robot.postures) known.push_back(one.name);
+    return std::unexpected(Error{.message = "the robot has no such posture",
+                                 .hint = suggest(config.posture, known),
+                                 .file = robot.file,
+                                 .key = "posture." + config.posture});
+  }
+  if (posture != nullptr) plant.base_height_m = posture->base_height_m;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    const hal::JointConfig& joint = robot.joints[j];
+    const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
+    plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0});
+  }
+  return plant;
+}
+
+std::int64_t common_tick(const hal::RobotConfig& robot, std::int64_t period_ns) {
+  std::int64_t tick = period_ns;
+  for (const hal::BoardConfig& board : robot.boards) {
+    tick = std::gcd(tick, board.control_period_ns);
+  }
+  return tick;
+}
+
+// A step that cannot be stable would show as a drive's fault, far from its cause.
+Status check_step(const PlantConfig& config, const Plant& plant) {
+  const StepLimit limit = longest_step(config, plant);
+  if (static_cast<double>(config.substep_ns) * 1e-9 <= limit.seconds) return {};
+  const auto at_most = static_cast<std::int64_t>(limit.seconds * 1e9);
+  return std::unexpected(
+      Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
+            .hint = "at most " + std::to_string(at_most) + " ns in this posture",
+            .file = {},
+            .key = "sim.substep_ns"});
+}
+
+Status named(Status status, const std::string& key) {
+  if (!status)
+    status.error().key = key + (status.error().key.empty() ? "" : ".") + status.error().key;
+  return status;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotConfig& robot,
+                                                             const tandem_kernels* kernels,
+                                                             const SimRobotConfig& config) {
+  if (config.period_ns <= 0) return fail("the loop's period has to be above 0 ns");
+  Result<PlantConfig> plant = plant_config(robot, kernels, config);
+  if (!plant) return std::unexpected(plant.error());
+  Result<Plant> body = Plant::create(*plant);
+  if (!body) return std::unexpected(body.error());
+  if (Status status = check_step(*plant, *body); !status) return std::unexpected(status.error());
+  Result<Sensors> sensors = Sensors::create(robot, *kernels);
+  if (!sensors) return std::unexpected(sensors.error());
+
+  std::unique_ptr<EmulatedRobot> made(
+      new EmulatedRobot(robot, config, std::move(*body), std::move(*sensors)));
+  if (Status status = made->add_nodes(robot, config); !status) {
+    return std::unexpected(status.error());
+  }
+  return made;
+}
+
+EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig& config,
+                             Plant plant, Sensors sensors)
+    : plant_(std::move(plant)),
+      sensors_(std::move(sensors)),
+      sensor_truth_(sensors_.channels(), 0.0),
+      unplugged_(robot.joints.size(), 0),
+      tick_ns_(common_tick(robot, config.period_ns)) {
+  for (std::size_t b = 0; b < robot.buses.size(); ++b) {
+    buses_.push_back(std::make_unique<LoopbackBus>());
+  }
+  for (const hal::JointConfig& joint : robot.joints) {
+    supply_V_.push_back(robot.actuator_of(joint).voltage_limit_V);
+  }
+}
+
+Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotConfig& config) {
+  for (std::size_t b = 0; b < robot.boards.size(); ++b) {
+    const firmware::BoardSetup setup = board_setup(robot, b, config.seed);
+    if (Status status = named(firmware::check(setup), "board." + setup.name); !status) {
+      return status;
+    }
+    boards_.push_back({std::make_unique<firmware::Board>(setup),
+                       bus_index(robot, robot.boards[b].bus), joints_of(robot, robot.boards[b]),
+                       sense_.size()});
+    sense_.resize(sense_.size() + setup.axes.size());
+  }
+  drive_.resize(sense_.size());
+  std::size_t channel = 0;
+  for (std::size_t s = 0; s < robot.sensors.size(); ++s) {
+    const firmware::SensorSetup setup = sensor_setup(robot, s, config.seed);
+    if (Status status = named(firmware::check(setup), "sensor." + setup.name); !status) {
+      return status;
+    }
+    sensor_nodes_.push_back({std::make_unique<firmware::SensorBoard>(setup),
+                             bus_index(robot, robot.sensors[s].bus), channel, setup.channels});
+    channel += setup.channels;
+  }
+  return {};
+}
+
+Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
+  if (started_ == 0) now_ns_ = time_ns;
+  started_ = 1;
+  while (now_ns_ < time_ns) {
+    if (const Code code = plant_.advance(tick_ns_); code != Code::kOk) return code;
+    now_ns_ += tick_ns_;
+    if (now_ns_ >= time_ns) break;
+    sense();  // boards that are faster than the loop
+    deliver(false);
+    run_boards();
+  }
+  hook_(Stage::kPlant);
+  sense();
+  hook_(Stage::kSense);
+  deliver(true);
+  run_boards();
+  if (let_down_ == 0 && all_enabled()) {
+    let_down_ = 1;
+    plant_.release();
+  }
+  hook_(Stage::kBoards);
+  return Code::kOk;
+}
+
+bool EmulatedRobot::all_enabled() const noexcept {
+  return std::ranges::all_of(boards_, [](const BoardNode& node) {
+    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      const canopen::DriveState state = node.board->axis(axis).machine().state();
+      if (state != canopen::DriveState::kOperationEnabled) return false;
+    }
+    return true;
+  });
+}
+
+void EmulatedRobot::sense() noexcept {
+  plant_.evaluate();
+  sensors_.sample(plant_, sensor_truth_);
+  for (const BoardNode& node : boards_) {
+    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      const std::size_t j = node.joints[axis];
+      const JointReading joint = plant_.joint(j);
+      firmware::AxisSense& pins = sense_[node.first + axis];
+      pins = {.link_position_rad = joint.position_rad,
+              .motor_position_rad = joint.motor_position_rad,
+              .spring_torque_Nm = joint.torque_Nm,
+              .current_A = joint.current_A,
+              .temperature_C = joint.temperature_C,
+              .bus_voltage_V = supply_V_[j]};
+      if (unplugged_[j] == 0) continue;
+      --unplugged_[j];
+      pins.link_position_rad = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+/// What has come before SYNC and, at the step's end, SYNC itself. Frames after it stay.
+void EmulatedRobot::deliver(bool at_sync) noexcept {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    const std::span<const canopen::Frame> waiting = buses_[b]->to_boards();
+    const auto sync = std::ranges::find(waiting, canopen::cob::kSync, &canopen::Frame::id);
+    auto count = static_cast<std::size_t>(sync - waiting.begin());
+    if (at_sync && sync != waiting.end()) ++count;
+    for (const canopen::Frame& frame : waiting.first(count)) {
+      for (BoardNode& node : boards_) {
+        if (node.bus == b) node.board->receive(frame);
+      }
+      for (SensorNode& node : sensor_nodes_) {
+        if (node.bus == b) node.board->receive(frame);
+      }
+    }
+    buses_[b]->take_to_boards(count);
+  }
+}
+
+void EmulatedRobot::run_boards() noexcept {
+  for (BoardNode& node : boards_) {
+    const std::size_t axes = node.joints.size();
+    const std::span<firmware::AxisDrive> drives(drive_.data() + node.first, axes);
+    node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      plant_.set_drive(node.joints[axis], drives[axis].voltage_V, drives[axis].enabled);
+    }
+    (void)buses_[node.bus]->boards().send(node.board->outgoing());
+    node.board->clear_outgoing();
+  }
+  for (SensorNode& node : sensor_nodes_) {
+    node.board->step(tick_ns_, {sensor_truth_.data() + node.first, node.channels});
+    (void)buses_[node.bus]->boards().send(node.board->outgoing());
+    node.board->clear_outgoing();
+  }
+}
+
+void EmulatedRobot::archive(Archive& ar) {
+  ar(plant_);
+  for (const auto& bus : buses_) ar(*bus);
+  for (const BoardNode& node : boards_) ar(*node.board);
+  for (const SensorNode& node : sensor_nodes_) ar(*node.board);
+  for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled);
+  ar(unplugged_, now_ns_, started_, let_down_);
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,136 @@
+// The robot behind its connectors: boards' firmware, sensor nodes and plant. What is on the other
+// end of the buses, in this process or in another.
+// Layer: hal/sim.  Thread: create non-RT; the rest one thread's.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware_emu/board.hpp"
+#include "firmware_emu/sensor_board.hpp"
+#include "hal/ethercat-can/loopback.hpp"
+#include "hal/robot_config.hpp"
+#include "hal/sim/plant.hpp"
+#include "hal/sim/sensors.hpp"
+
+namespace tandem::sim {
+
+/// How to simulate; [sim] of an experiment.
+struct SimRobotConfig {
+  std::int64_t period_ns = 1'000'000;  ///< of the loop
+  Integrator integrator = Integrator::kSemiImplicitEuler;
+  std::int64_t substep_ns = 250'000;
+  std::string posture;                      ///< where the robot starts; empty: every joint at 0
+  bool hold = true;                         ///< hoist and brakes until every drive is enabled
+  std::int64_t release_ns = 1'000'000'000;  ///< in which the hoist lets the base down
+  std::uint64_t seed = 1;                   ///< of every measurement's noise
+  bool truth = true;                        ///< keep truth() up to date
+  double rate_limit = 1000.0;  ///< any rate beyond it [rad/s or m/s] counts as diverged
+};
+
+/// The stages of a cycle of the simulated robot, from cycle k-1 to cycle k.
+enum class Stage : std::uint8_t {
+  kMasterSync,    ///< the master sends SYNC k
+  kPlant,         ///< physics, in sub-steps of the plant, up to the time of cycle k
+  kSense,         ///< accelerations, forces and sensors' truth at cycle k
+  kBoards,        ///< frames to the boards; firmware and controllers; their answers
+  kMasterDecode,  ///< the master fills the state image
+  kTruth,         ///< the true state is copied for the log
+};
+inline constexpr std::size_t kStages = 6;
+
+/// Calls `call(context, stage)` at the end of a stage: what takes the time is bench/'s question,
+/// and no clock is read here. Null: nobody asks.
+struct StageHook {
+  void (*call)(void* context, Stage finished) = nullptr;
+  void* context = nullptr;
+
+  void operator()(Stage finished) const noexcept {
+    if (call != nullptr) call(context, finished);
+  }
+};
+
+/// ```
+/// robot->bus(b).master().send(frames);        // what the master sends, SYNC k its last
+/// code = robot->step(time_ns of cycle k);
+/// robot->bus(b).master().receive(answers);
+/// ```
+/// Boards sample at SYNC k and compute what their bridges do until k+1, with what the master sent
+/// before SYNC k. A board with a shorter control period than the loop's runs in between. Frames
+/// after SYNC k wait for the next step. Nothing but frames and time passes between the robot and
+/// its master, so that it does not matter what carries them.
+///
+/// With `hold` the robot powers on hanging from a hoist, every joint whose bridge is off held by a
+/// brake. When all axes are in Operation Enabled the hoist lets it down.
+class EmulatedRobot {
+ public:
+  /// @param robot    complete: limits filled in from the description
+  /// @param kernels  of this robot; outlive it
+  /// Errors: those of Plant and Sensors; a posture, board or sensor that cannot be; a sub-step that
+  /// is unstable in the posture (names the joint and the longest that is not).
+  [[nodiscard]] static Result<std::unique_ptr<EmulatedRobot>> create(
+      const hal::RobotConfig& robot, const tandem_kernels* kernels, const SimRobotConfig& config);
+
+  /// Advances to `time_ns`; the first call starts time there. The frames of each bus up to its
+  /// first SYNC are delivered, or all when there is none, and the nodes' answers put out.
+  /// @return kOk, kDiverged.
+  /// @rt no allocation, lock or throw; O(nodes + frames), and the plant's sub-steps.
+  [[nodiscard]] Code step(std::int64_t time_ns) noexcept TANDEM_RT;
+
+  /// The buses, in robot.toml's order. A master is connected to their master() end.
+  [[nodiscard]] hal::can::LoopbackBus& bus(std::size_t index) noexcept { return *buses_[index]; }
+  [[nodiscard]] std::size_t buses() const noexcept { return buses_.size(); }
+  [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
+  /// The time of the last step.
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
+  /// True when every axis of every board is in Operation Enabled.
+  [[nodiscard]] bool all_enabled() const noexcept;
+
+  /// Faults to inject: joint `joint`'s link encoder gives no number for the next `cycles`.
+  void unplug_encoder(std::size_t joint, std::uint32_t cycles) noexcept {
+    unplugged_[joint] = cycles;
+  }
+
+  void set_stage_hook(StageHook hook) noexcept { hook_ = hook; }
+  void archive(Archive& ar);
+
+ private:
+  struct BoardNode {
+    std::unique_ptr<firmware::Board> board;
+    std::size_t bus;
+    std::vector<std::size_t> joints;  // by axis
+    std::size_t first;                // of its axes in sense_ and drive_
+  };
+  struct SensorNode {
+    std::unique_ptr<firmware::SensorBoard> board;
+    std::size_t bus;
+    std::size_t first, channels;  // in sensor_truth_
+  };
+
+  EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig& config, Plant plant,
+                Sensors sensors);
+  Status add_nodes(const hal::RobotConfig& robot, const SimRobotConfig& config);
+
+  void sense() noexcept;
+  void deliver(bool at_sync) noexcept;
+  void run_boards() noexcept;
+
+  Plant plant_;
+  Sensors sensors_;
+  std::vector<std::unique_ptr<hal::can::LoopbackBus>> buses_;
+  std::vector<BoardNode> boards_;
+  std::vector<SensorNode> sensor_nodes_;
+  std::vector<double> supply_V_;  // per joint
+  std::vector<firmware::AxisSense> sense_;
+  std::vector<firmware::AxisDrive> drive_;
+  std::vector<double> sensor_truth_;
+  std::vector<std::uint32_t> unplugged_;  // cycles left, per joint
+  std::int64_t tick_ns_;                  // boards run every so often
+  std::int64_t now_ns_ = 0;
+  std::uint8_t started_ = 0, let_down_ = 0;
+  StageHook hook_;
+};
+
+}  // namespace tandem::sim
