@@ -16,6 +16,7 @@ const char kExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                draw the plots of a run
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
+  tandem latency --load idle --duration 10           how late this machine wakes the loop up
 `tandem COMMAND --help` tells more, with examples.
 
 Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
@@ -52,6 +53,14 @@ const char kLogCsvExamples[] = R"(Examples:
 const char kReportExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
   tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
+
+const char kLatencyExamples[] = R"(Examples:
+  tandem latency                                     ours beside cyclictest, idle, then under load
+  tandem latency --load idle --duration 60 --cpu 2,3
+  tandem latency --mode turns --cpu 3                one after the other on one CPU
+  tandem latency --json - --quiet | jq '.loads[].ratio'
+In mode `swap` both run at once and exchange their CPUs each slice; in `together` each keeps its
+own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. Nothing is judged.)";
 
 const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
 
@@ -124,6 +133,35 @@ void add_report(CLI::App& app, ReportOptions& o) {
   app.footer(kReportExamples);
 }
 
+void add_latency(CLI::App& app, LatencyOptions& o) {
+  app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
+      ->check(CLI::Range(50, 1'000'000));
+  app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--mode", o.mode, "Who has which CPU when (default: swap)")
+      ->check(CLI::IsMember({"swap", "together", "turns"}));
+  app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--cpu", o.cpus, "CPUs: ours,cyclictest's (default: the first two)")
+      ->delimiter(',')
+      ->expected(1, 2)
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--policy", o.policy, "Scheduling of both (default: fifo)")
+      ->check(CLI::IsMember({"fifo", "rr", "other"}));
+  app.add_option("--priority", o.priority, "Real-time priority of both (default: 80)")
+      ->check(CLI::Range(1, 99));
+  CLI::Option* load = app.add_option("--load", o.load,
+                                     "idle, stress, both (default: both if stress-ng is installed)")
+                          ->check(CLI::IsMember({"idle", "stress", "both"}));
+  app.add_flag_callback(
+         "--stress", [&o] { o.load = "stress"; }, "The same as --load stress")
+      ->excludes(load);
+  app.add_option("-o,--output", o.output, "Folder of page and plots (default: runs/latency)");
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kLatencyExamples);
+}
+
 /// The innermost subcommand that was named.
 const CLI::App& innermost(const CLI::App& app) {
   const std::vector<CLI::App*> named = app.get_subcommands();
@@ -184,16 +222,20 @@ Command parse_command_line(int argc, const char* const* argv) {
   ModelOptions model;
   LogOptions log;
   ReportOptions report;
+  LatencyOptions latency;
   CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
   CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv");
   CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
+  CLI::App* latency_app =
+      app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
   add_run(*run_app, run);
   add_check(*check_app, check);
   add_model(*model_app, model);
   add_log(*log_app, log);
   add_report(*report_app, report);
+  add_latency(*latency_app, latency);
 
   try {
     app.parse(argc, argv);
@@ -206,6 +248,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (check_app->parsed()) return check;
   if (model_app->parsed()) return model;
   if (log_app->parsed()) return log;
+  if (latency_app->parsed()) return latency;
   return report;
 }
 

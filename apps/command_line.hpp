@@ -66,9 +66,24 @@ struct ReportOptions {
   std::string json;
 };
 
+/// tandem latency
+struct LatencyOptions {
+  std::int64_t period_us = 1000;
+  double duration_s = 30.0;   ///< per load
+  std::string mode = "swap";  ///< swap, together, turns
+  int slices = 10;
+  std::vector<int> cpus;        ///< empty: the first two that may be used
+  std::string policy = "fifo";  ///< fifo, rr, other
+  int priority = 80;
+  std::string load;  ///< idle, stress, both; empty: both with stress-ng, else idle
+  std::string output = "runs/latency";  ///< folder of plots and page
+  bool quiet = false;
+  std::string json;
+};
+
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command =
-    std::variant<Exit, RunOptions, CheckOptions, ModelOptions, LogOptions, ReportOptions>;
+using Command = std::variant<Exit, RunOptions, CheckOptions, ModelOptions, LogOptions,
+                             ReportOptions, LatencyOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

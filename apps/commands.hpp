@@ -16,6 +16,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit model_command(const ModelOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
+/// Measures; judges nothing.
+[[nodiscard]] Exit latency_command(const LatencyOptions& options);
 
 /// What report_command() draws, for a run that ends with its report.
 [[nodiscard]] Result<report::ReportFiles> draw_report(const ReportOptions& options);

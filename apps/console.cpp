@@ -57,6 +57,10 @@ Status write_json(const std::string& file, const Json& value) {
   return out ? Status{} : std::unexpected(json_error(file));
 }
 
+Json percentiles_json(const rt::Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
+}
+
 void print_errors(const Diagnostics& errors) {
   for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "rt/histogram.hpp"
 
 namespace tandem::apps {
 
@@ -24,6 +25,9 @@ using Json = nlohmann::ordered_json;
 
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
+
+/// p50, p99, p999, max; all [ns].
+[[nodiscard]] Json percentiles_json(const rt::Percentiles& p);
 
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);

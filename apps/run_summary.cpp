@@ -17,10 +17,6 @@ double weight_N(const tandem_kernels& k) {
   return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
 }
 
-Json percentiles_json(const rt::Percentiles& p) {
-  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
-}
-
 Json log_json(const std::optional<log::RecordingResult>& log) {
   if (!log) return nullptr;
   return {{"path", log->path},

@@ -49,6 +49,7 @@ struct Figure {
   std::vector<Curve> curves;
   std::vector<Level> levels;
   std::vector<Note> notes;
+  bool log_axes = false;    ///< both logarithmic; only what is positive is drawn
   bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
 };
 

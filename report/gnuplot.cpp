@@ -83,9 +83,27 @@ struct Extent {
   }
 };
 
+/// Both axes logarithmic: half as much again beyond the positive values.
+std::string log_ranges(const Figure& figure) {
+  Extent x;
+  Extent y;
+  for (const Curve& curve : figure.curves) {
+    for (const double value : curve.x) x.include(value > 0.0 ? value : NAN);
+    for (const double value : curve.y) y.include(value > 0.0 ? value : NAN);
+  }
+  for (const Level& level : figure.levels) y.include(level.y);
+  if (!(x.low <= x.high)) x = {1.0, 10.0};
+  if (!(y.low <= y.high)) y = {1.0, 10.0};
+  return fmt::format(
+      "set logscale xy\nset format y '%g'\nset xrange [{:.6g}:{:.6g}]\nset yrange "
+      "[{:.6g}:{:.6g}]\n",
+      x.low / 1.5, x.high * 1.5, y.low / 1.5, y.high * 1.5);
+}
+
 /// Ranges of both axes. With equal axes the room beside the figure is shared on both sides.
 /// @param aspect  width by height of the drawing area.
 std::string ranges(const Figure& figure, double aspect) {
+  if (figure.log_axes) return log_ranges(figure);
   Extent x;
   Extent y;
   for (const Curve& curve : figure.curves) {
@@ -126,7 +144,7 @@ std::string plot_command(const Figure& figure, std::size_t index) {
 
 /// Everything of one figure but terminal and output.
 std::string body(const Figure& figure, std::size_t index, double aspect) {
-  std::string out = "unset label\n" + ranges(figure, aspect);
+  std::string out = "unset label\nunset logscale\nset format y\n" + ranges(figure, aspect);
   out += fmt::format(
       "set label 1 {} at graph 0, graph 1.145 left font ',15' "
       "textcolor rgb '#1d242c' noenhanced\n",

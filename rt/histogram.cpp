@@ -44,4 +44,21 @@ Percentiles Histogram::percentiles() const noexcept {
   return {percentile_ns(0.5), percentile_ns(0.99), percentile_ns(0.999), max_ns_};
 }
 
+void Histogram::add(const Histogram& other) noexcept {
+  for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
+    counts_[bucket] += other.counts_[bucket];
+  }
+  count_ += other.count_;
+  sum_ns_ += other.sum_ns_;
+  max_ns_ = std::max(max_ns_, other.max_ns_);
+}
+
+std::vector<HistogramBin> Histogram::bins() const {
+  std::vector<HistogramBin> out;
+  for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
+    if (counts_[bucket] > 0) out.push_back({upper_end(bucket), counts_[bucket]});
+  }
+  return out;
+}
+
 }  // namespace tandem::rt

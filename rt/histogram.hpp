@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "base/realtime.hpp"
 
@@ -15,6 +16,12 @@ struct Percentiles {
   std::int64_t p99 = 0;
   std::int64_t p999 = 0;
   std::int64_t max = 0;
+};
+
+/// One bucket: how many values there were up to its upper end, and above the bucket before it.
+struct HistogramBin {
+  std::int64_t upper_ns = 0;
+  std::uint64_t count = 0;
 };
 
 /// Counts of durations from 0 ns to 2^40 ns (18 minutes). Values below 64 ns are exact; above,
@@ -31,6 +38,11 @@ class Histogram {
   /// `fraction` (0 to 1) of the values are <= v; never more than the maximum. 0 when empty.
   [[nodiscard]] std::int64_t percentile_ns(double fraction) const noexcept;
   [[nodiscard]] Percentiles percentiles() const noexcept;
+
+  /// Adds everything that `other` holds.
+  void add(const Histogram& other) noexcept;
+  /// The buckets that are not empty, the smallest first. Allocates.
+  [[nodiscard]] std::vector<HistogramBin> bins() const;
 
  private:
   static constexpr unsigned kLinearBits = 5;  // 32 buckets per power of two

@@ -56,5 +56,24 @@ TEST(Histogram, IsZeroWhenEmpty) {
   EXPECT_EQ(none.max, 0);
 }
 
+TEST(Histogram, GivesItsBucketsAndAddsAnother) {
+  Histogram a;
+  Histogram b;
+  for (const std::int64_t value : {3, 3, 5}) a.record(value);
+  for (const std::int64_t value : {5, 1'000'000}) b.record(value);
+  a.add(b);
+  const auto bins = a.bins();
+  ASSERT_EQ(bins.size(), 3U);
+  EXPECT_EQ(bins[0].upper_ns, 3);
+  EXPECT_EQ(bins[0].count, 2U);
+  EXPECT_EQ(bins[1].upper_ns, 5);
+  EXPECT_EQ(bins[1].count, 2U);
+  EXPECT_GE(bins[2].upper_ns, 1'000'000);
+  EXPECT_LE(bins[2].upper_ns, 1'031'250);
+  EXPECT_EQ(a.count(), 5U);
+  EXPECT_EQ(a.sum_ns(), 1'000'016);
+  EXPECT_EQ(a.max_ns(), 1'000'000);
+}
+
 }  // namespace
 }  // namespace tandem::rt
