@@ -28,6 +28,11 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
 The same experiment and seed give the same bytes at every rate.)";
 
+const char kAskExamples[] = R"(Examples:
+  tandem ask '{"do": "help"}'                        what the running process can be asked
+  tandem ask '{"do": "status"}' --socket /tmp/run.sock
+Without --socket it is the only running process of this user.)";
+
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
   tandem check config/coman/robot.toml               a robot by itself
@@ -64,6 +69,9 @@ own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. Nothing 
 
 const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
 
+const char kSocketHelp[] =
+    "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
+
 void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
   CLI::Option* rate =
@@ -83,7 +91,15 @@ void add_run(CLI::App& app, RunOptions& o) {
   app.add_flag("--report", o.report, "Draw the report after the run");
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp);
+  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
+  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
   app.footer(kRunExamples);
+}
+
+void add_ask(CLI::App& app, AskOptions& o) {
+  app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
+  app.add_option("--socket", o.socket, kSocketHelp);
+  app.footer(kAskExamples);
 }
 
 void add_check(CLI::App& app, CheckOptions& o) {
@@ -218,12 +234,14 @@ Command parse_command_line(int argc, const char* const* argv) {
   app.get_formatter()->column_width(34);
 
   RunOptions run;
+  AskOptions ask;
   CheckOptions check;
   ModelOptions model;
   LogOptions log;
   ReportOptions report;
   LatencyOptions latency;
   CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
+  CLI::App* ask_app = app.add_subcommand("ask", "Ask a running process, in JSON");
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
   CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv");
@@ -231,6 +249,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   CLI::App* latency_app =
       app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
   add_run(*run_app, run);
+  add_ask(*ask_app, ask);
   add_check(*check_app, check);
   add_model(*model_app, model);
   add_log(*log_app, log);
@@ -245,6 +264,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     return Exit::kDone;
   }
   if (run_app->parsed()) return run;
+  if (ask_app->parsed()) return ask;
   if (check_app->parsed()) return check;
   if (model_app->parsed()) return model;
   if (log_app->parsed()) return log;

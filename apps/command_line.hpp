@@ -29,6 +29,14 @@ struct RunOptions {
   bool report = false;         ///< draw the report after the run
   bool quiet = false;          ///< neither progress nor table
   std::string json;            ///< file, "-" for standard output, empty for none
+  std::string socket;          ///< of the run's control; empty: default_control_path("run")
+  bool no_socket = false;
+};
+
+/// tandem ask QUESTION
+struct AskOptions {
+  std::string question;  ///< JSON
+  std::string socket;    ///< empty: that of the only running process
 };
 
 /// tandem check FILE
@@ -82,7 +90,7 @@ struct LatencyOptions {
 };
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command = std::variant<Exit, RunOptions, CheckOptions, ModelOptions, LogOptions,
+using Command = std::variant<Exit, RunOptions, AskOptions, CheckOptions, ModelOptions, LogOptions,
                              ReportOptions, LatencyOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

@@ -11,6 +11,8 @@ namespace tandem::apps {
 
 /// Reads every file first, and runs only when all is right.
 [[nodiscard]] Exit run_command(const RunOptions& options);
+/// Asks a running process one thing and prints its answer.
+[[nodiscard]] Exit ask_command(const AskOptions& options);
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
 [[nodiscard]] Exit model_command(const ModelOptions& options);

@@ -6,6 +6,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
 #include "rt/clock.hpp"
@@ -140,6 +141,9 @@ Exit run(Composition& c, const RunOptions& options) {
                1e6 / static_cast<double>(e.loop.period_ns),
                options.rate ? fmt::format("rate {:g}", *options.rate) : "free running");
   }
+  ControlRegistry commands;
+  add_run_commands(commands, cycle);
+  const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
   rt::install_stop_signals();
   LoopThread loop(cycle, e.thread);
   watch(cycle, loop, e, out, options.quiet);

@@ -1,0 +1,159 @@
+#include "apps/control_client.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+
+#include "apps/control_socket.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+/// 0, or the errno of what went wrong.
+int connect_to(const Descriptor& descriptor, const sockaddr_un& address) {
+  if (descriptor.get() < 0) return errno;
+  const auto* raw = reinterpret_cast<const sockaddr*>(&address);
+  return ::connect(descriptor.get(), raw, sizeof address) == 0 ? 0 : errno;
+}
+
+/// Whether the process that "<kind>-<pid>.sock" names is gone.
+bool owner_is_dead(const std::string& name) {
+  int pid = 0;
+  const char* end = name.data() + name.size();
+  const auto parsed = std::from_chars(name.data() + name.rfind('-') + 1, end, pid);
+  const bool named = parsed.ec == std::errc() && std::string_view(parsed.ptr, end) == ".sock";
+  return named && pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH;
+}
+
+/// Sends all of `out`, then receives up to the end of a line, both by `deadline`.
+Result<std::string> exchange(int fd, std::string out, SteadyClock::time_point deadline) {
+  std::string in;
+  while (!in.ends_with('\n')) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(deadline - SteadyClock::now());
+    pollfd watched{fd, static_cast<short>(out.empty() ? POLLIN : POLLOUT), 0};
+    const int ready =
+        ::poll(&watched, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return fail("no answer in time", "is the process stopped, or very busy?");
+    char bytes[4096];
+    const ssize_t count = out.empty()
+                              ? ::recv(fd, bytes, sizeof bytes, MSG_DONTWAIT)
+                              : ::send(fd, out.data(), out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) continue;
+    if (count <= 0) return fail("the process closed the connection", "look at what it printed");
+    if (out.empty()) {
+      in.append(bytes, static_cast<std::size_t>(count));
+    } else {
+      out.erase(0, static_cast<std::size_t>(count));
+    }
+  }
+  return in;
+}
+
+}  // namespace
+
+Result<sockaddr_un> control_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty()) return fail("the socket's path is empty", "name a file with --socket");
+  if (path.size() >= sizeof address.sun_path) {
+    return fail(fmt::format("the socket's path has {} bytes, {} are possible: {}", path.size(),
+                            sizeof address.sun_path - 1, path),
+                "choose a shorter one with --socket");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  return address;
+}
+
+bool control_socket_alive(const std::string& path) {
+  const Result<sockaddr_un> address = control_address(path);
+  if (!address) return false;
+  const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const int error = connect_to(descriptor, *address);
+  return error == 0 || error == EAGAIN;  // EAGAIN: it listens, and others wait before us
+}
+
+std::vector<std::string> running_control_sockets(const std::string& kind) {
+  std::vector<std::string> found;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(control_folder(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.ends_with(".sock") || !entry.is_socket(error)) continue;
+    if (!kind.empty() && !name.starts_with(kind + "-")) continue;
+    if (control_socket_alive(entry.path().string())) {
+      found.push_back(entry.path().string());
+    } else if (owner_is_dead(name)) {
+      ::unlink(entry.path().c_str());
+    }
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+Result<std::string> find_control_socket(const std::string& path, const std::string& kind) {
+  if (!path.empty()) return path;
+  const std::vector<std::string> running = running_control_sockets(kind);
+  if (running.size() == 1) return running.front();
+  const std::string what = kind.empty() ? "tandem" : "tandem " + kind;
+  if (running.empty()) {
+    return fail(fmt::format("no running `{}` in {}", what, control_folder()),
+                "start one, or name its socket with --socket");
+  }
+  std::string list;
+  for (const std::string& one : running) list += "\n  --socket " + one;
+  return fail(fmt::format("{} running `{}`", running.size(), what), "say which:" + list);
+}
+
+Result<Json> ask(const std::string& path, const Json& question) {
+  const Result<sockaddr_un> address = control_address(path);
+  if (!address) return std::unexpected(address.error());
+  const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  if (const int error = connect_to(descriptor, *address); error != 0) {
+    return fail(fmt::format("nobody listens at {}: {}", path, std::strerror(error)),
+                "is the process running?");
+  }
+  const auto deadline = SteadyClock::now() + std::chrono::milliseconds(kControlAnswer_ms);
+  const Result<std::string> line = exchange(descriptor.get(), question.dump() + "\n", deadline);
+  if (!line) return std::unexpected(line.error());
+  Json answer = Json::parse(*line, nullptr, false);
+  if (!answer.is_object() || !answer.contains("ok") || !answer["ok"].is_boolean()) {
+    return fail("what listens at " + path + " is no tandem", "name another one with --socket");
+  }
+  if (answer["ok"].get<bool>()) return answer;
+  return fail(answer.value("error", std::string("refused")), answer.value("hint", std::string()));
+}
+
+Result<Json> ask(const std::string& path, const std::string& kind, const Json& question) {
+  const Result<std::string> found = find_control_socket(path, kind);
+  if (!found) return std::unexpected(found.error());
+  return ask(*found, question);
+}
+
+}  // namespace tandem::apps

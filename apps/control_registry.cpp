@@ -1,0 +1,150 @@
+#include "apps/control_registry.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <exception>
+#include <set>
+#include <utility>
+
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char* to_string(ControlKey::Type type) {
+  switch (type) {
+    case ControlKey::Type::kText: return "text";
+    case ControlKey::Type::kInteger: return "integer";
+    case ControlKey::Type::kNumber: return "number";
+    case ControlKey::Type::kBoolean: return "true or false";
+    case ControlKey::Type::kObject: return "object";
+  }
+  return "?";
+}
+
+bool is_of(const Json& value, ControlKey::Type type) {
+  switch (type) {
+    case ControlKey::Type::kText: return value.is_string();
+    case ControlKey::Type::kInteger: return value.is_number_integer();
+    case ControlKey::Type::kNumber: return value.is_number();
+    case ControlKey::Type::kBoolean: return value.is_boolean();
+    case ControlKey::Type::kObject: return value.is_object();
+  }
+  return false;
+}
+
+/// A JSON object without a key twice.
+Result<Json> parse(std::string_view text) {
+  std::vector<std::set<std::string>> open;
+  std::string twice;
+  const Json::parser_callback_t watch = [&](int, Json::parse_event_t event, Json& value) {
+    if (event == Json::parse_event_t::object_start) open.emplace_back();
+    if (event == Json::parse_event_t::object_end) open.pop_back();
+    if (event == Json::parse_event_t::key && !open.back().insert(value).second) twice = value;
+    return true;
+  };
+  try {
+    Json value = Json::parse(text, watch);
+    if (!twice.empty()) {
+      return fail(fmt::format("the key \"{}\" is there twice", twice), "give it once");
+    }
+    if (value.is_object()) return value;
+  } catch (const Json::parse_error& error) {
+    return fail(fmt::format("no JSON, at byte {}", error.byte),
+                R"(send one object per line: {"do": "help"})");
+  }
+  return fail("no JSON object", R"(send one object per line: {"do": "help"})");
+}
+
+Status check_keys(const Json& request, const std::string& command,
+                  const std::vector<ControlKey>& keys) {
+  std::vector<std::string> names;
+  for (const ControlKey& key : keys) names.push_back(key.name);
+  for (const auto& [name, value] : request.items()) {
+    if (name == "do") continue;
+    const auto known = std::ranges::find(keys, name, &ControlKey::name);
+    if (known == keys.end()) {
+      return fail(fmt::format("{}: unknown key \"{}\"", command, name),
+                  names.empty() ? "it takes none" : suggest(name, names));
+    }
+    if (!is_of(value, known->type)) {
+      return fail(
+          fmt::format("{}: \"{}\" is not of type {}", command, name, to_string(known->type)),
+          known->doc);
+    }
+  }
+  for (const ControlKey& key : keys) {
+    if (key.required && !request.contains(key.name)) {
+      return fail(fmt::format("{}: \"{}\" is missing", command, key.name), key.doc);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+ControlRegistry::ControlRegistry() {
+  add("help", "lists the commands", {}, [this](const Json&) { return help(); });
+}
+
+void ControlRegistry::add(std::string name, std::string doc, std::vector<ControlKey> keys,
+                          Handler handler) {
+  commands_.push_back({std::move(name), std::move(doc), std::move(keys), std::move(handler)});
+}
+
+Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& request) const {
+  const auto name = request.find("do");
+  if (name == request.end() || !name->is_string()) {
+    return fail("\"do\" does not name a command", R"({"do": "help"} lists them)");
+  }
+  const auto wanted = name->get<std::string>();
+  const auto found = std::ranges::find(commands_, wanted, &Command::name);
+  if (found != commands_.end()) return &*found;
+  std::vector<std::string> names;
+  for (const Command& command : commands_) names.push_back(command.name);
+  return fail(fmt::format("unknown command \"{}\"", wanted), suggest(wanted, names));
+}
+
+Result<Json> ControlRegistry::run(std::string_view question) const {
+  const Result<Json> request = parse(question);
+  if (!request) return request;
+  const Result<const Command*> command = find(*request);
+  if (!command) return std::unexpected(command.error());
+  if (Status keys = check_keys(*request, (*command)->name, (*command)->keys); !keys) {
+    return std::unexpected(keys.error());
+  }
+  try {
+    return (*command)->handler(*request);
+  } catch (const std::exception& error) {
+    return fail(fmt::format("{}: {}", (*command)->name, error.what()));
+  }
+}
+
+Json ControlRegistry::answer(std::string_view question) const {
+  const Result<Json> result = run(question);
+  Json answer;
+  answer["ok"] = result.has_value();
+  if (result) {
+    answer.update(*result);
+  } else {
+    answer["error"] = result.error().message;
+    answer["hint"] = result.error().hint;
+  }
+  return answer;
+}
+
+Json ControlRegistry::help() const {
+  Json list = Json::array();
+  for (const Command& command : commands_) {
+    Json keys = Json::object();
+    for (const ControlKey& key : command.keys) {
+      keys[key.name] =
+          fmt::format("{}{}: {}", to_string(key.type), key.required ? "" : ", optional", key.doc);
+    }
+    list.push_back({{"do", command.name}, {"doc", command.doc}, {"keys", std::move(keys)}});
+  }
+  return {{"commands", std::move(list)}};
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,60 @@
+// What a running process can be asked for: commands by name, whatever carries them to it.
+// Layer: apps.  Thread: filled before it is served; answer() the serving thread's.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/console.hpp"
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// A key of a command's request, beside "do".
+struct ControlKey {
+  enum class Type : std::uint8_t { kText, kInteger, kNumber, kBoolean, kObject };
+
+  std::string name;
+  Type type = Type::kText;
+  bool required = false;
+  std::string doc;  ///< one line, with unit and range
+};
+
+/// A question is a JSON object, {"do": "estop", "category": 0}. Its answer is one, too:
+/// {"ok": true, …} with what the command found, or {"ok": false, "error": …, "hint": …}.
+class ControlRegistry {
+ public:
+  /// Gets a request whose keys are known, there when required, and of the right type.
+  /// @return an object: its keys follow "ok" in the answer.
+  using Handler = std::function<Result<Json>(const Json& request)>;
+
+  /// The command "help" is there from the start: it lists the others.
+  ControlRegistry();
+  ControlRegistry(const ControlRegistry&) = delete;
+  ControlRegistry& operator=(const ControlRegistry&) = delete;
+
+  /// @param doc  one line, for "help".  @pre `name` is new
+  void add(std::string name, std::string doc, std::vector<ControlKey> keys, Handler handler);
+
+  /// The answer to `question`, a JSON text. Answered as errors: what is no JSON object, a key
+  /// twice, an unknown command or key (with the nearest), a missing key, a wrong type, and
+  /// whatever a handler says or throws.
+  [[nodiscard]] Json answer(std::string_view question) const;
+
+ private:
+  struct Command {
+    std::string name, doc;
+    std::vector<ControlKey> keys;
+    Handler handler;
+  };
+  [[nodiscard]] Result<Json> run(std::string_view question) const;
+  [[nodiscard]] Result<const Command*> find(const Json& request) const;
+  [[nodiscard]] Json help() const;
+
+  std::vector<Command> commands_;
+};
+
+}  // namespace tandem::apps

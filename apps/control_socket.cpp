@@ -1,0 +1,226 @@
+#include "apps/control_socket.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "apps/control_client.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr mode_t kFolderMode = 0700;
+constexpr mode_t kSocketMode = 0600;
+
+std::string reason() { return std::strerror(errno); }
+
+/// The folder of the default paths: made when it is missing, refused when it is not ours alone.
+Status prepare_folder(const std::string& folder) {
+  if (folder != control_folder()) return {};
+  if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
+    return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
+                "choose another place with --socket");
+  }
+  struct stat found {};
+  const bool there = ::lstat(folder.c_str(), &found) == 0 && S_ISDIR(found.st_mode);
+  if (there && found.st_uid == ::geteuid() && (found.st_mode & 0077) == 0) return {};
+  return fail(folder + " is no folder of this user alone",
+              "remove it, or choose another place with --socket");
+}
+
+/// Removes the socket of a dead process; what is anything else stays.
+Status clear_way(const std::string& path) {
+  struct stat found {};
+  if (::lstat(path.c_str(), &found) != 0) return {};
+  if (!S_ISSOCK(found.st_mode)) {
+    return fail(path + " is there, and no socket", "choose another place with --socket");
+  }
+  if (control_socket_alive(path)) {
+    return fail("another process listens at " + path, "choose another place with --socket");
+  }
+  if (::unlink(path.c_str()) == 0) return {};
+  return fail(fmt::format("cannot remove the stale socket {}: {}", path, reason()),
+              "remove it, or choose another place with --socket");
+}
+
+}  // namespace
+
+struct ControlSocket::Client {
+  explicit Client(int descriptor) : fd(descriptor) {}
+  ~Client() { ::close(fd); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  int fd;
+  std::string in, out;
+  std::uint64_t last_turn = 0;
+  bool ending = false;  // nothing more is read: closed when its answers are out
+  bool gone = false;
+};
+
+std::string control_folder() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  std::error_code error;
+  if (runtime != nullptr && std::filesystem::is_directory(runtime, error)) {
+    return (std::filesystem::path(runtime) / "tandem").string();
+  }
+  return fmt::format("/tmp/tandem-{}", ::geteuid());
+}
+
+std::string default_control_path(const std::string& kind) {
+  return fmt::format("{}/{}-{}.sock", control_folder(), kind, ::getpid());
+}
+
+ControlSocket::ControlSocket(std::string path, const ControlRegistry& registry)
+    : path_(std::move(path)), registry_(&registry) {}
+
+Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& path,
+                                                           const ControlRegistry& registry) {
+  std::unique_ptr<ControlSocket> socket(new ControlSocket(path, registry));
+  if (Status listening = socket->listen(); !listening) {
+    return std::unexpected(listening.error());
+  }
+  socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
+  return socket;
+}
+
+Status ControlSocket::listen() {
+  const Result<sockaddr_un> address = control_address(path_);
+  if (!address) return std::unexpected(address.error());
+  const std::string folder = std::filesystem::path(path_).parent_path().string();
+  if (Status ready = prepare_folder(folder); !ready) return ready;
+  if (Status clear = clear_way(path_); !clear) return clear;
+  listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  struct stat made {};
+  // Nobody can connect before listen(), so the mode is right for the first who can.
+  const bool listens =
+      listener_ >= 0 && wake_ >= 0 &&
+      ::bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
+      ::chmod(path_.c_str(), kSocketMode) == 0 && ::stat(path_.c_str(), &made) == 0 &&
+      ::listen(listener_, static_cast<int>(kMaxControlClients)) == 0;
+  if (!listens) {
+    return fail(fmt::format("cannot listen at {}: {}", path_, reason()),
+                "choose another place with --socket");
+  }
+  device_ = made.st_dev;
+  inode_ = made.st_ino;
+  return {};
+}
+
+ControlSocket::~ControlSocket() {
+  if (thread_.joinable()) {
+    const std::uint64_t one = 1;
+    (void)!::write(wake_, &one, sizeof one);
+    thread_.join();
+  }
+  struct stat found {};
+  const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
+                    found.st_ino == inode_;
+  if (ours) ::unlink(path_.c_str());
+  if (listener_ >= 0) ::close(listener_);
+  if (wake_ >= 0) ::close(wake_);
+}
+
+void ControlSocket::serve() {
+  std::vector<pollfd> watched;
+  for (;;) {
+    watched.assign({{wake_, POLLIN, 0}, {listener_, POLLIN, 0}});
+    for (const auto& client : clients_) {
+      // A client with answers to come is not asked for more: it takes them first.
+      const short events = client->out.empty() ? POLLIN : POLLOUT;
+      watched.push_back({client->fd, events, 0});
+    }
+    if (::poll(watched.data(), watched.size(), -1) < 0) {
+      if (errno == EINTR) continue;
+      return;
+    }
+    if (watched[0].revents != 0) return;
+    for (std::size_t i = 0; i + 2 < watched.size(); ++i) {
+      const short happened = watched[i + 2].revents;
+      if (happened == 0) continue;
+      Client& client = *clients_[i];
+      client.last_turn = ++turn_;
+      if ((happened & POLLIN) != 0) {
+        take(client);
+      } else if ((happened & POLLOUT) != 0) {
+        flush(client);
+        answer_lines(client);
+      } else {
+        client.gone = true;
+      }
+    }
+    std::erase_if(clients_, [](const auto& one) { return one->gone; });
+    if (watched[1].revents != 0) accept();
+  }
+}
+
+void ControlSocket::accept() {
+  const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) return;
+  if (clients_.size() == kMaxControlClients) {
+    clients_.erase(std::ranges::min_element(clients_, {},
+                                            [](const auto& client) { return client->last_turn; }));
+  }
+  clients_.push_back(std::make_unique<Client>(fd));
+  clients_.back()->last_turn = ++turn_;
+}
+
+void ControlSocket::take(Client& client) {
+  char bytes[4096];
+  const ssize_t count = ::recv(client.fd, bytes, sizeof bytes, 0);
+  if (count > 0) {
+    client.in.append(bytes, static_cast<std::size_t>(count));
+    answer_lines(client);
+  } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
+    client.gone = true;
+  }
+}
+
+/// Answers what is there, line by line, as long as the client takes the answers.
+void ControlSocket::answer_lines(Client& client) {
+  while (!client.gone && !client.ending && client.out.empty()) {
+    const std::size_t end = client.in.find('\n');
+    const std::size_t length = end == std::string::npos ? client.in.size() : end + 1;
+    if (length > kMaxControlLine) {
+      client.out = Json{{"ok", false},
+                        {"error", fmt::format("a line of more than {} bytes", kMaxControlLine)},
+                        {"hint", "send shorter ones"}}
+                       .dump();
+      client.ending = true;
+    } else if (end == std::string::npos) {
+      return;
+    } else {
+      const Json answer = registry_->answer(std::string_view(client.in).substr(0, end));
+      client.out = answer.dump(-1, ' ', false, Json::error_handler_t::replace);
+      client.in.erase(0, length);
+    }
+    client.out += '\n';
+    flush(client);
+  }
+}
+
+void ControlSocket::flush(Client& client) {
+  while (!client.out.empty()) {
+    const ssize_t count = ::send(client.fd, client.out.data(), client.out.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      client.gone = errno != EAGAIN;
+      return;
+    }
+    client.out.erase(0, static_cast<std::size_t>(count));
+  }
+  if (client.ending) client.gone = true;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,70 @@
+// The Unix-domain socket of a running process: a line of JSON in, a line of JSON out.
+// Layer: apps.  Thread: open/close main; serves on a thread of its own, never the loop's.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/control_registry.hpp"
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// Longest question or answer [bytes], its end of line included.
+inline constexpr std::size_t kMaxControlLine = 256 * 1024;
+/// Clients at once. A further one takes the place of the one that has been quiet the longest, so
+/// that an emergency stop always finds its way in.
+inline constexpr std::size_t kMaxControlClients = 16;
+
+/// The folder of every socket of this user: $XDG_RUNTIME_DIR/tandem, or /tmp/tandem-<uid> where
+/// there is no such folder.
+[[nodiscard]] std::string control_folder();
+/// "<control_folder()>/<kind>-<pid>.sock" of this process.
+/// @param kind  the command that runs: "run", "emulate"
+[[nodiscard]] std::string default_control_path(const std::string& kind);
+
+/// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
+/// or leaves undone reaches the process: a client that sends a line that is too long, that does
+/// not read its answers, or that is gone, is closed.
+class ControlSocket {
+ public:
+  /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
+  /// process is replaced.
+  /// @param registry  complete; outlives the socket
+  /// Errors: a path that is too long; a folder that is missing or another user's; a file that is
+  /// no socket; a process that listens there.
+  [[nodiscard]] static Result<std::unique_ptr<ControlSocket>> open(const std::string& path,
+                                                                   const ControlRegistry& registry);
+  ~ControlSocket();
+  ControlSocket(const ControlSocket&) = delete;
+  ControlSocket& operator=(const ControlSocket&) = delete;
+
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+ private:
+  struct Client;
+  ControlSocket(std::string path, const ControlRegistry& registry);
+  Status listen();
+  void serve();
+  void accept();
+  void take(Client& client);
+  void answer_lines(Client& client);
+  static void flush(Client& client);
+
+  std::string path_;
+  const ControlRegistry* registry_;
+  int listener_ = -1;
+  int wake_ = -1;  // eventfd: the destructor's word to the thread
+  dev_t device_ = 0;
+  ino_t inode_ = 0;
+  std::uint64_t turn_ = 0;  // counts what clients do, to know who has been quiet
+  std::vector<std::unique_ptr<Client>> clients_;
+  std::thread thread_;
+};
+
+}  // namespace tandem::apps

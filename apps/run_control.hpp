@@ -1,0 +1,23 @@
+// What a running `tandem run` can be asked for.
+// Layer: apps.  Thread: main; the handlers run on the serving thread.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "apps/control_registry.hpp"
+#include "apps/control_socket.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+/// Adds "status". The cycle outlives the registry.
+void add_run_commands(ControlRegistry& registry, const runtime::RobotCycle& cycle);
+
+/// Serves `registry` at `path`, the default one of `kind` when it is empty. A socket that cannot be
+/// opened is told on standard error and left out: it never stops a run.
+[[nodiscard]] std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry,
+                                                   const std::string& path,
+                                                   const std::string& kind);
+
+}  // namespace tandem::apps

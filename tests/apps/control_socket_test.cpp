@@ -1,0 +1,276 @@
+// The control socket: strict questions, rude clients, stale files.
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "apps/control_client.hpp"
+#include "apps/control_socket.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using std::string_literals::operator""s;
+
+void add_commands(ControlRegistry& registry) {
+  registry.add("echo", "says it again",
+               {{.name = "text", .required = true, .doc = "what to say"},
+                {.name = "times", .type = ControlKey::Type::kInteger, .doc = "1 to 3"}},
+               [](const Json& request) -> Result<Json> {
+                 const int times = request.value("times", 1);
+                 if (times > 3) return fail("too often", "three times at most");
+                 return Json{{"text", request["text"]}, {"times", times}};
+               });
+  registry.add("long", "an answer of 200 kB", {}, [](const Json&) -> Result<Json> {
+    return Json{{"text", std::string(200'000, 'x')}};
+  });
+  registry.add("throw", "throws", {},
+               [](const Json&) -> Result<Json> { throw std::runtime_error("out of luck"); });
+}
+
+struct Answers : ::testing::Test {
+  Answers() { add_commands(registry); }
+  [[nodiscard]] std::string error(const std::string& question) const {
+    const Json answer = registry.answer(question);
+    EXPECT_EQ(answer["ok"], false) << answer;
+    return answer.value("error", ""s) + " | " + answer.value("hint", ""s);
+  }
+  ControlRegistry registry;
+};
+
+TEST_F(Answers, CarryWhatTheCommandFound) {
+  const Json answer = registry.answer(R"({"do": "echo", "text": "hello", "times": 2})");
+  EXPECT_EQ(answer.dump(), R"({"ok":true,"text":"hello","times":2})");
+}
+
+TEST_F(Answers, ListTheCommandsWithTheirKeys) {
+  const Json answer = registry.answer(R"({"do": "help"})");
+  ASSERT_EQ(answer["commands"].size(), 4U);
+  EXPECT_EQ(answer["commands"][0]["do"], "help");
+  EXPECT_EQ(answer["commands"][1]["keys"]["times"], "integer, optional: 1 to 3");
+}
+
+TEST_F(Answers, ToWhatIsNoJsonObjectAreErrors) {
+  for (const char* text : {"", "help", "{\"do\": \"help\"", "{\"do\": \"help\"} x", "\xff\xfe",
+                           "[]", "null", "3", "{'do': 'help'}", "{\"do\": \"help\",}"}) {
+    EXPECT_NE(error(text).find("no JSON"), std::string::npos) << text;
+  }
+  EXPECT_NE(error(std::string(100'000, '[')).find("no JSON"), std::string::npos);
+  EXPECT_EQ(error(R"({"do": "help", "do": "help"})"),
+            "the key \"do\" is there twice | give it once");
+}
+
+TEST_F(Answers, NameTheNearestCommandAndKey) {
+  EXPECT_EQ(error(R"({"do": "hepl"})"), "unknown command \"hepl\" | did you mean 'help'?");
+  EXPECT_EQ(error(R"({"do": "echo", "test": "x"})"),
+            "echo: unknown key \"test\" | did you mean 'text'?");
+  EXPECT_NE(error(R"({"do": 3})").find("does not name a command"), std::string::npos);
+  EXPECT_NE(error(R"({})").find("does not name a command"), std::string::npos);
+}
+
+TEST_F(Answers, RefuseWrongTypesAndMissingKeys) {
+  EXPECT_EQ(error(R"({"do": "echo", "text": 3})"),
+            "echo: \"text\" is not of type text | what to say");
+  EXPECT_EQ(error(R"({"do": "echo", "text": "x", "times": 1.5})"),
+            "echo: \"times\" is not of type integer | 1 to 3");
+  EXPECT_EQ(error(R"({"do": "echo"})"), "echo: \"text\" is missing | what to say");
+}
+
+TEST_F(Answers, CarryWhatAHandlerRefusesOrThrows) {
+  EXPECT_EQ(error(R"({"do": "echo", "text": "x", "times": 4})"), "too often | three times at most");
+  EXPECT_NE(error(R"({"do": "throw"})").find("out of luck"), std::string::npos);
+}
+
+/// A folder of its own for the default paths, and a client that speaks bytes.
+struct Socket : ::testing::Test {
+  Socket() {
+    add_commands(registry);
+    char name[] = "/tmp/tandem-test-XXXXXX";
+    folder = ::mkdtemp(name);
+    ::setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
+    path = folder + "/s.sock";
+  }
+  ~Socket() override { std::filesystem::remove_all(folder); }
+
+  [[nodiscard]] std::unique_ptr<ControlSocket> open(const std::string& where) const {
+    auto socket = ControlSocket::open(where, registry);
+    EXPECT_TRUE(socket.has_value()) << socket.error().to_string();
+    return socket ? std::move(*socket) : nullptr;
+  }
+  [[nodiscard]] std::string refusal(const std::string& where) const {
+    const auto socket = ControlSocket::open(where, registry);
+    EXPECT_FALSE(socket.has_value());
+    return socket ? "" : socket.error().to_string();
+  }
+  [[nodiscard]] int connect() const {
+    const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
+    const auto address = control_address(path);
+    EXPECT_EQ(::connect(fd, reinterpret_cast<const sockaddr*>(&*address), sizeof *address), 0);
+    return fd;
+  }
+  static void send(int fd, const std::string& text) {
+    ASSERT_EQ(::send(fd, text.data(), text.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(text.size()));
+  }
+  /// Up to the end of the next line, or of the connection.
+  static std::string line(int fd) {
+    std::string text;
+    char byte = 0;
+    while (!text.ends_with('\n') && ::recv(fd, &byte, 1, 0) == 1) text += byte;
+    return text;
+  }
+  /// True when the other end has closed; unread answers are thrown away.
+  static bool closed(int fd) {
+    char bytes[4096];
+    ssize_t count = 0;
+    do count = ::recv(fd, bytes, sizeof bytes, 0);
+    while (count > 0);
+    return count == 0 || errno == ECONNRESET;
+  }
+
+  ControlRegistry registry;
+  std::string folder, path;
+};
+
+TEST_F(Socket, AnswersLineByLine) {
+  const auto socket = open(path);
+  const int fd = connect();
+  send(fd, "{\"do\": \"echo\", \"text\": \"a\"}\n{\"do\": \"echo\", ");
+  EXPECT_EQ(line(fd), "{\"ok\":true,\"text\":\"a\",\"times\":1}\n");
+  send(fd, "\"text\": \"b\"}\r\nrubbish\n");
+  EXPECT_EQ(line(fd), "{\"ok\":true,\"text\":\"b\",\"times\":1}\n");
+  EXPECT_NE(line(fd).find("\"ok\":false"), std::string::npos);
+  ::close(fd);
+  const auto answer = ask(path, {{"do", "echo"}, {"text", "c"}});
+  ASSERT_TRUE(answer.has_value()) << answer.error().to_string();
+  EXPECT_EQ((*answer)["text"], "c");
+  const auto refused = ask(path, {{"do", "ecko"}});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().hint, "did you mean 'echo'?");
+}
+
+TEST_F(Socket, IsTheUsersAloneAndGoesWithItsProcess) {
+  struct stat found {};
+  const std::string own = default_control_path("run");
+  {
+    const auto socket = open(own);
+    ASSERT_EQ(::stat(own.c_str(), &found), 0);
+    EXPECT_EQ(found.st_mode & 0777, 0600U);
+    ASSERT_EQ(::stat(control_folder().c_str(), &found), 0);
+    EXPECT_EQ(found.st_mode & 0777, 0700U);
+  }
+  EXPECT_NE(::stat(own.c_str(), &found), 0);
+  ASSERT_EQ(::chmod(control_folder().c_str(), 0755), 0);
+  EXPECT_NE(refusal(own).find("no folder of this user alone"), std::string::npos);
+}
+
+TEST_F(Socket, ClosesAClientWhoseLineIsTooLong) {
+  const auto socket = open(path);
+  const int fd = connect();
+  std::thread sender([fd] {
+    const std::string much(2 * kMaxControlLine, ' ');
+    (void)::send(fd, much.data(), much.size(), MSG_NOSIGNAL);
+  });
+  EXPECT_TRUE(closed(fd));
+  sender.join();
+  ::close(fd);
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+}
+
+TEST_F(Socket, IsNotHeldUpByAClientThatDoesNotReadOrHalfWrites) {
+  const auto socket = open(path);
+  const int deaf = connect();
+  for (int i = 0; i < 5; ++i) send(deaf, "{\"do\": \"long\"}\n");
+  const int slow = connect();
+  send(slow, "{\"do\": ");
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  send(slow, "\"help\"}\n");
+  EXPECT_NE(line(slow).find("commands"), std::string::npos);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(line(deaf).size(), 200'022U);  // all, once it reads
+  ::close(deaf);
+  ::close(slow);
+}
+
+TEST_F(Socket, OutlivesClientsThatVanish) {
+  const auto socket = open(path);
+  for (int i = 0; i < 50; ++i) {
+    const int fd = connect();
+    send(fd, i % 2 == 0 ? "{\"do\": \"long\"}\n{\"do\": \"long\"}\n" : "{\"do\"");
+    ::close(fd);
+  }
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+}
+
+TEST_F(Socket, GivesTheQuietestClientsPlaceToANewOne) {
+  const auto socket = open(path);
+  std::vector<int> clients;
+  for (std::size_t i = 0; i < kMaxControlClients; ++i) {
+    clients.push_back(connect());
+    send(clients.back(), "{\"do\": \"help\"}\n");
+    EXPECT_NE(line(clients.back()), "");
+  }
+  send(clients.front(), "{\"do\": \"help\"}\n");
+  EXPECT_NE(line(clients.front()), "");
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  EXPECT_TRUE(closed(clients[1]));
+  send(clients.front(), "{\"do\": \"help\"}\n");
+  EXPECT_NE(line(clients.front()), "");
+  for (const int fd : clients) ::close(fd);
+}
+
+TEST_F(Socket, ReplacesTheFileOfADeadProcessAndNothingElse) {
+  const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  const auto address = control_address(path);
+  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&*address), sizeof *address), 0);
+  ::close(dead);
+  EXPECT_FALSE(ask(path, {{"do", "help"}}).has_value());
+  const auto socket = open(path);
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
+  EXPECT_NE(refusal(path).find("another process listens"), std::string::npos);
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());  // and it still does
+
+  std::ofstream(folder + "/file") << "precious";
+  EXPECT_NE(refusal(folder + "/file").find("no socket"), std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(folder + "/file"), 8U);
+}
+
+TEST_F(Socket, RefusesPathsThatCannotBe) {
+  EXPECT_NE(refusal(folder + "/" + std::string(100, 'x')).find("107 are possible"),
+            std::string::npos);
+  EXPECT_NE(refusal(folder + "/none/s.sock").find("cannot listen"), std::string::npos);
+  EXPECT_NE(refusal("").find("path is empty"), std::string::npos);
+}
+
+TEST_F(Socket, IsFoundWhenItIsTheOnlyOne) {
+  EXPECT_NE(find_control_socket("", "run").error().message.find("no running `tandem run`"),
+            std::string::npos);
+  const auto one = open(default_control_path("run"));
+  const auto other = open(control_folder() + "/emulate-7.sock");
+  EXPECT_EQ(find_control_socket("", "run").value_or(""), one->path());
+  EXPECT_EQ(find_control_socket("/a/path", "run").value_or(""), "/a/path");
+  const auto both = find_control_socket("", "");
+  ASSERT_FALSE(both.has_value());
+  EXPECT_NE(both.error().message.find("2 running"), std::string::npos);
+  EXPECT_NE(both.error().hint.find(other->path()), std::string::npos);
+}
+
+TEST_F(Socket, OfADeadProcessIsRemovedByWhoLooks) {
+  { const auto makes_the_folder = open(default_control_path("run")); }
+  path = control_folder() + "/run-999999999.sock";  // beyond the greatest process id
+  const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  const auto address = control_address(path);
+  ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&*address), sizeof *address), 0);
+  ::close(dead);
+  EXPECT_TRUE(running_control_sockets("run").empty());
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+}  // namespace
+}  // namespace tandem::apps
