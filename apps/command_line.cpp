@@ -55,6 +55,11 @@ const char kLogCsvExamples[] = R"(Examples:
   tandem log csv runs/coman-squat-001.mcap > state.csv
   tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
 
+const char kLogDiffExamples[] = R"(Examples:
+  tandem log diff runs/a.mcap runs/b.mcap            the same to the last bit, or where they part
+
+Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
+
 const char kReportExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
   tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
@@ -139,6 +144,12 @@ void add_log(CLI::App& app, LogOptions& o) {
   csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
   csv->footer(kLogCsvExamples);
   csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
+  CLI::App* diff = app.add_subcommand("diff", "Compare two runs bit by bit");
+  diff->add_option("log", o.log, "MCAP file")->required();
+  diff->add_option("other", o.other, "MCAP file")->required();
+  diff->add_option("--json", o.json, kJsonHelp);
+  diff->footer(kLogDiffExamples);
+  diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
 }
 
 void add_report(CLI::App& app, ReportOptions& o) {
@@ -244,7 +255,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   CLI::App* ask_app = app.add_subcommand("ask", "Ask a running process, in JSON");
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
-  CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv");
+  CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv, diff");
   CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
   CLI::App* latency_app =
       app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");

@@ -13,7 +13,7 @@ namespace tandem::apps {
 /// Exit status of every command.
 enum class Exit : int {
   kDone = 0,   ///< did what was asked
-  kFault = 1,  ///< the run ended in a fault
+  kFault = 1,  ///< the run ended in a fault; the logs that were compared differ
   kUsage = 2,  ///< wrong input or usage; nothing was run
 };
 
@@ -55,10 +55,11 @@ struct ModelOptions {
   std::string json;
 };
 
-/// tandem log info|csv LOG
+/// tandem log info|csv|diff LOG [LOG_B]
 struct LogOptions {
-  enum class Action : std::uint8_t { kInfo, kCsv } action = Action::kInfo;
+  enum class Action : std::uint8_t { kInfo, kCsv, kDiff } action = Action::kInfo;
   std::string log;
+  std::string other;                ///< diff: the log that `log` is compared with
   std::string topic;                ///< empty: the state
   std::vector<std::string> fields;  ///< empty: all
   std::size_t every = 1;            ///< n: each n-th message

@@ -5,6 +5,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
+#include "log/compare.hpp"
 #include "log/csv.hpp"
 #include "log/log_file.hpp"
 
@@ -84,20 +85,74 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
   return log::write_csv(file, topic, options.every, out, options.fields);
 }
 
+Json comparison_json(const log::Comparison& comparison) {
+  Json json{{"equal", comparison.equal()}, {"topics", Json::object()}};
+  for (const log::TopicComparison& topic : comparison.topics) {
+    Json one{{"equal", topic.equal()}, {"messages", {topic.messages_a, topic.messages_b}}};
+    if (topic.first) {
+      one["first"] = {{"message", topic.first->message},
+                      {"time_ns", topic.first->time_ns},
+                      {"signal", topic.first->signal},
+                      {"values", {topic.first->a, topic.first->b}}};
+    }
+    json["topics"][topic.topic] = one;
+  }
+  json["only"] = {comparison.only_a, comparison.only_b};
+  return json;
+}
+
+void print_comparison(const log::Comparison& comparison, std::FILE* out) {
+  Table table({"topic", "messages", "", "first difference"});
+  for (const log::TopicComparison& topic : comparison.topics) {
+    std::string where = topic.equal() ? "none" : "one log is shorter";
+    if (topic.first) {
+      where = fmt::format("message {} at {:.6f} s: {} is {:.17g} and {:.17g}",
+                          topic.first->message, static_cast<double>(topic.first->time_ns) * 1e-9,
+                          topic.first->signal, topic.first->a, topic.first->b);
+    }
+    table.add({topic.topic, std::to_string(topic.messages_a), std::to_string(topic.messages_b),
+               where});
+  }
+  table.print(out);
+  for (const std::string& topic : comparison.only_a) {
+    fmt::print(out, "only the first log has {}\n", topic);
+  }
+  for (const std::string& topic : comparison.only_b) {
+    fmt::print(out, "only the second log has {}\n", topic);
+  }
+  fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
+}
+
+Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
+  const Result<log::LogFile> other = log::LogFile::open(options.other);
+  if (!other) return std::unexpected(other.error());
+  const Result<log::Comparison> comparison = log::compare(file, *other);
+  if (!comparison) return std::unexpected(comparison.error());
+  print_comparison(*comparison, human_output(options.json));
+  const Status written = write_json(options.json, comparison_json(*comparison));
+  if (!written) return std::unexpected(written.error());
+  return comparison->equal() ? Exit::kDone : Exit::kFault;
+}
+
 }  // namespace
 
 Exit log_command(const LogOptions& options) {
   const Result<log::LogFile> file = log::LogFile::open(options.log);
   Status done;
+  Exit exit = Exit::kDone;
   if (!file) {
     done = std::unexpected(file.error());
   } else if (options.action == LogOptions::Action::kCsv) {
     done = write_csv(*file, options);
+  } else if (options.action == LogOptions::Action::kDiff) {
+    const Result<Exit> compared = diff(*file, options);
+    if (compared) exit = *compared;
+    if (!compared) done = std::unexpected(compared.error());
   } else {
     print_info(*file, human_output(options.json));
     done = write_json(options.json, info_json(*file));
   }
-  if (done) return Exit::kDone;
+  if (done) return exit;
   print_errors({done.error()});
   return Exit::kUsage;
 }

@@ -40,6 +40,15 @@ Frame make_nmt(NmtCommand command, int node) noexcept TANDEM_RT {
   return frame;
 }
 
+Frame make_time(std::int64_t time_ns) noexcept TANDEM_RT {
+  constexpr std::int64_t kMsPerDay = 86'400'000;
+  const std::int64_t time_ms = time_ns / 1'000'000;
+  Frame frame = short_frame(cob::kTime, 6);
+  put(frame.data.data(), static_cast<std::uint32_t>(time_ms % kMsPerDay));
+  put(frame.data.data() + 4, static_cast<std::uint16_t>(time_ms / kMsPerDay));
+  return frame;
+}
+
 std::optional<NmtMessage> parse_nmt(const Frame& frame) noexcept TANDEM_RT {
   if (frame.id != cob::kNmt || frame.length != 2) return std::nullopt;
   switch (const auto command = static_cast<NmtCommand>(frame.data[0])) {

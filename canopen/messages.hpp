@@ -1,4 +1,4 @@
-// The one-frame messages of CiA 301 as make/parse pairs: NMT, SYNC, heartbeat, emergency.
+// The one-frame messages of CiA 301 as make/parse pairs: NMT, SYNC, TIME, heartbeat, emergency.
 // Layer: canopen.  Thread: any.
 #pragma once
 
@@ -40,6 +40,10 @@ struct NmtMessage {
 
 /// Frame 080 without data.
 [[nodiscard]] Frame make_sync() noexcept TANDEM_RT;
+
+/// Frame 100, TIME: bytes 0-3 milliseconds after midnight (28 bits), bytes 4-5 days.
+/// @param time_ns  since midnight of day 0, not negative
+[[nodiscard]] Frame make_time(std::int64_t time_ns) noexcept TANDEM_RT;
 
 /// Frame 700 + node: byte 0 state. Boot-up is the state 0, sent once.
 struct HeartbeatMessage {

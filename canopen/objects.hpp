@@ -10,6 +10,7 @@ namespace tandem::canopen {
 namespace cob {
 inline constexpr std::uint32_t kNmt = 0x000;
 inline constexpr std::uint32_t kSync = 0x080;
+inline constexpr std::uint32_t kTime = 0x100;
 inline constexpr std::uint32_t kEmergency = 0x080;
 inline constexpr std::uint32_t kSdoResponse = 0x580;  ///< server to client
 inline constexpr std::uint32_t kSdoRequest = 0x600;   ///< client to server

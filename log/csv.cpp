@@ -6,6 +6,7 @@
 
 #include "base/nearest.hpp"
 #include "log/schema.hpp"
+#include "log/signal_name.hpp"
 
 namespace tandem::log {
 namespace {
@@ -17,21 +18,6 @@ void append_number(std::string& line, double value) {
 }
 
 /// The name of element `index`.
-std::string column_name(const hal::Field& field, std::size_t index, const RunInfo& info) {
-  if (field.count == 1) return field.name;
-  if (field.name == "sensor") {
-    std::size_t first = 0;
-    for (const SensorInfo& sensor : info.sensors) {
-      if (index < first + sensor.channels) {
-        return "sensor." + sensor.name + "." + std::to_string(index - first);
-      }
-      first += sensor.channels;
-    }
-  }
-  if (field.count == info.joints.size()) return field.name + "." + info.joints[index];
-  return field.name + "." + std::to_string(index);
-}
-
 Status write_events(const LogFile& log, std::ostream& out) {
   const auto events = log.events();
   if (!events) return std::unexpected(events.error());
@@ -68,7 +54,7 @@ Result<std::vector<const hal::Field*>> choose(const Topic* topic,
 std::string header(const std::vector<const hal::Field*>& fields, const RunInfo& info) {
   std::string line = "time_s";
   for (const hal::Field* field : fields) {
-    for (std::size_t i = 0; i < field->count; ++i) line += "," + column_name(*field, i, info);
+    for (std::size_t i = 0; i < field->count; ++i) line += "," + signal_name(*field, i, info);
   }
   return line;
 }

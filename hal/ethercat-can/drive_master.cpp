@@ -353,6 +353,12 @@ Phase DriveMaster::phase() const noexcept {
   return Phase::kFault;
 }
 
+std::size_t DriveMaster::nodes_in_operation(std::size_t bus) const noexcept TANDEM_RT {
+  return static_cast<std::size_t>(std::ranges::count_if(impl_->nodes, [bus](const auto& node) {
+    return node.plan.bus == bus && node.master.running();
+  }));
+}
+
 double DriveMaster::progress() const noexcept { return impl_->progress(); }
 std::string DriveMaster::status_text() const { return impl_->status(); }
 std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }

@@ -78,6 +78,8 @@ class DriveMaster {
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
 
   [[nodiscard]] Phase phase() const noexcept;
+  /// Nodes on bus `bus` that answer every SYNC with their TPDOs.
+  [[nodiscard]] std::size_t nodes_in_operation(std::size_t bus) const noexcept TANDEM_RT;
   /// Share of the bring-up that is done, 0 to 1.
   [[nodiscard]] double progress() const noexcept;
   /// What bring-up waits for, or the cause of a fault: names node, board, joint and object.

@@ -195,9 +195,13 @@ void EmulatedRobot::sense() noexcept {
 void EmulatedRobot::deliver(bool at_sync) noexcept {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     const std::span<const canopen::Frame> waiting = buses_[b]->to_boards();
-    const auto sync = std::ranges::find(waiting, canopen::cob::kSync, &canopen::Frame::id);
-    auto count = static_cast<std::size_t>(sync - waiting.begin());
-    if (at_sync && sync != waiting.end()) ++count;
+    const auto is_sync = [](const canopen::Frame& frame) {
+      return frame.id == canopen::cob::kSync;
+    };
+    std::size_t count = waiting.size();
+    while (count > 0 && !is_sync(waiting[count - 1])) --count;
+    if (count == 0) count = waiting.size();  // no SYNC: nothing to wait for
+    if (!at_sync && is_sync(waiting[count - 1])) --count;
     for (const canopen::Frame& frame : waiting.first(count)) {
       for (BoardNode& node : boards_) {
         if (node.bus == b) node.board->receive(frame);

@@ -74,7 +74,7 @@ class EmulatedRobot {
       const hal::RobotConfig& robot, const tandem_kernels* kernels, const SimRobotConfig& config);
 
   /// Advances to `time_ns`; the first call starts time there. The frames of each bus up to its
-  /// first SYNC are delivered, or all when there is none, and the nodes' answers put out.
+  /// last SYNC are delivered, or all when there is none, and the nodes' answers put out.
   /// @return kOk, kDiverged.
   /// @rt no allocation, lock or throw; O(nodes + frames), and the plant's sub-steps.
   [[nodiscard]] Code step(std::int64_t time_ns) noexcept TANDEM_RT;

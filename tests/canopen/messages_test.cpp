@@ -38,6 +38,13 @@ TEST(Heartbeat, CarriesTheState) {
   EXPECT_EQ(message->state, NmtState::kStopped);
 }
 
+TEST(Time, IsMillisecondsOfTheDayAndDays) {
+  EXPECT_EQ(make_time(0), wire(0x100, {0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(make_time(258'999'999), wire(0x100, {0x02, 0x01, 0, 0, 0, 0}));
+  const std::int64_t day_ns = 86'400'000'000'000;
+  EXPECT_EQ(make_time(3 * day_ns - 1'000'000), wire(0x100, {0xFF, 0x5B, 0x26, 0x05, 2, 0}));
+}
+
 TEST(Heartbeat, NeedsANodeIdAndOneByte) {
   EXPECT_FALSE(parse_heartbeat(wire(0x700, {0x05})));
   EXPECT_FALSE(parse_heartbeat(wire(0x780, {0x05})));

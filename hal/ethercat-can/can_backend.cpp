@@ -1,0 +1,162 @@
+#include "hal/ethercat-can/can_backend.hpp"
+
+#include <algorithm>
+
+#include "canopen/objects.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::Frame;
+
+namespace {
+
+/// Frames of one bus that a cycle may bring; what is beyond stays in the kernel's queue.
+constexpr std::size_t kCollected = 512;
+constexpr std::size_t kBatch = 64;
+/// Lockstep: how long to wait for an answer once the process was asked to stop.
+constexpr std::int64_t kPatienceNs = 500'000'000;
+
+bool is_first_tpdo(const Frame& frame) noexcept {
+  return (frame.id & 0x780) == canopen::cob::tpdo(1, 0) && (frame.id & 0x7F) != 0;
+}
+
+}  // namespace
+
+CanBackend::Collected::Collected(Bus& bus)
+    : bus_(&bus), frames_(kCollected), frames_ns_(kCollected) {}
+
+void CanBackend::Collected::begin_cycle() noexcept {
+  times_ = 0;
+  feedback_ = 0;
+}
+
+void CanBackend::Collected::collect() noexcept {
+  if (first_ > 0) {
+    std::copy_n(frames_.begin() + static_cast<std::ptrdiff_t>(first_), count_, frames_.begin());
+    std::copy_n(frames_ns_.begin() + static_cast<std::ptrdiff_t>(first_), count_,
+                frames_ns_.begin());
+    first_ = 0;
+  }
+  while (count_ < frames_.size()) {
+    const std::size_t room = std::min(kBatch, frames_.size() - count_);
+    const std::span<Frame> batch = std::span(frames_).subspan(count_, room);
+    const std::size_t got = bus_->receive(batch);
+    const std::span<const std::int64_t> stamps = bus_->received_ns();
+    std::size_t kept = count_;
+    for (std::size_t i = 0; i < got; ++i) {
+      if (batch[i].id == canopen::cob::kTime) {
+        ++times_;
+        continue;
+      }
+      if (is_first_tpdo(batch[i])) ++feedback_;
+      frames_ns_[kept] = i < stamps.size() ? stamps[i] : 0;
+      frames_[kept++] = batch[i];
+    }
+    count_ = kept;
+    if (got < room) return;
+  }
+}
+
+void CanBackend::Collected::forget() noexcept {
+  collect();
+  first_ = 0;
+  count_ = 0;
+}
+
+std::size_t CanBackend::Collected::receive(std::span<Frame> frames) noexcept TANDEM_RT {
+  const std::size_t given = std::min(frames.size(), count_);
+  std::copy_n(frames_.begin() + static_cast<std::ptrdiff_t>(first_), given, frames.begin());
+  given_ns_ = std::span<const std::int64_t>(frames_ns_).subspan(first_, given);
+  first_ += given;
+  count_ -= given;
+  return given;
+}
+
+Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
+                                                       std::span<Bus* const> buses,
+                                                       FrameWait& wait,
+                                                       const CanBackendConfig& config) {
+  std::vector<std::unique_ptr<Collected>> collected;
+  std::vector<Bus*> ends;
+  for (Bus* bus : buses) {
+    collected.push_back(std::make_unique<Collected>(*bus));
+    ends.push_back(collected.back().get());
+  }
+  auto master = DriveMaster::create(robot, ends);
+  if (!master) return std::unexpected(master.error());
+  return std::unique_ptr<CanBackend>(
+      new CanBackend(std::move(collected), std::move(*master), wait, config));
+}
+
+CanBackend::CanBackend(std::vector<std::unique_ptr<Collected>> buses,
+                       std::unique_ptr<DriveMaster> master, FrameWait& wait,
+                       const CanBackendConfig& config)
+    : buses_(std::move(buses)), master_(std::move(master)), wait_(&wait), config_(config) {}
+
+Phase CanBackend::phase() const noexcept { return silent_ ? Phase::kFault : master_->phase(); }
+
+std::string CanBackend::status_text() const {
+  if (silent_) {
+    return "no emulated robot answers in lockstep: start `tandem emulate … --lockstep` first, "
+           "or leave --lockstep out to talk to boards in real time";
+  }
+  for (const auto& bus : buses_) {
+    if (std::string text = bus->status_text(); !text.empty()) return text;
+  }
+  return master_->status_text();
+}
+
+bool CanBackend::all_answered() const noexcept {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    const bool enough = config_.lockstep
+                            ? buses_[b]->answered()
+                            : buses_[b]->feedback() >= master_->nodes_in_operation(b);
+    if (!enough) return false;
+  }
+  return true;
+}
+
+void CanBackend::exchange(const CycleTime& time) noexcept {
+  if (silent_) return;
+  for (const auto& bus : buses_) {
+    if (!begun_) bus->forget();  // what was said before there was a master
+    bus->begin_cycle();
+  }
+  begun_ = true;
+  const auto window_ns =
+      static_cast<std::int64_t>(config_.answer_window * static_cast<double>(time.period_ns));
+  std::int64_t deadline_ns =
+      wait_->now_ns() + (config_.lockstep ? config_.lockstep_timeout_ns : window_ns);
+  master_->cycle_begin(time);
+  for (;;) {
+    for (const auto& bus : buses_) bus->collect();
+    if (all_answered()) return;
+    const std::int64_t now_ns = wait_->now_ns();
+    if (now_ns >= deadline_ns) break;
+    if (config_.lockstep && wait_->stopping()) {
+      deadline_ns = std::min(deadline_ns, now_ns + kPatienceNs);
+    }
+    wait_->wait(deadline_ns);
+  }
+  silent_ = config_.lockstep;
+}
+
+Code CanBackend::read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT {
+  if (silent_) return Code::kTimeout;
+  const Code code = master_->receive(state);
+  state.cycle()[0] = time.cycle;
+  state.time_ns()[0] = time.time_ns;
+  return code;
+}
+
+Code CanBackend::write(const CommandImage& command,
+                       const ParameterImage& parameters) noexcept TANDEM_RT {
+  return silent_ ? Code::kFault : master_->send(command, parameters);
+}
+
+/// Nobody is there to be shut down when the emulated robot is gone.
+bool CanBackend::shut_down() noexcept TANDEM_RT { return silent_ || master_->shut_down(); }
+
+bool CanBackend::archive(Archive& /*ar*/) { return false; }
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,106 @@
+// The robot behind CAN buses: real boards, or emulated ones in another process.
+// Layer: hal/ethercat-can.  Thread: create non-RT; the rest the loop's.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/backend.hpp"
+#include "hal/ethercat-can/bus.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+#include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::hal::can {
+
+struct CanBackendConfig {
+  bool lockstep = false;        ///< wait for an emulated robot's TIME, at any speed
+  double answer_window = 0.5;   ///< in real time: share of the period to wait for answers
+  std::int64_t lockstep_timeout_ns = 10'000'000'000;  ///< then the emulated robot is gone
+};
+
+/// exchange() sends SYNC and collects the answers; read() decodes them, write() sends commands.
+///
+/// In real time the wait ends when every node that is in operation has sent its first TPDO, or when
+/// the answer window is over: what comes later counts in the next cycle, as a sample that is a
+/// cycle old. In lockstep it ends when TIME (COB-ID 100) has come on every bus, by which an
+/// emulated robot says that it has answered.
+class CanBackend final : public Backend {
+ public:
+  /// @param buses  the master's end of each of robot.buses, in that order; outlive it
+  /// @param wait   wakes up for frames of any of them; outlives it
+  /// Errors: those of DriveMaster.
+  [[nodiscard]] static Result<std::unique_ptr<CanBackend>> create(const RobotConfig& robot,
+                                                                  std::span<Bus* const> buses,
+                                                                  FrameWait& wait,
+                                                                  const CanBackendConfig& config);
+
+  [[nodiscard]] Pace pace() const noexcept override {
+    return config_.lockstep ? Pace::kSimulatedClock : Pace::kWallClock;
+  }
+  [[nodiscard]] Phase phase() const noexcept override;
+  [[nodiscard]] std::string status_text() const override;
+  void exchange(const CycleTime& time) noexcept override;
+  [[nodiscard]] Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT override;
+  [[nodiscard]] Code write(const CommandImage& command,
+                           const ParameterImage& parameters) noexcept TANDEM_RT override;
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
+  /// The robot cannot be rewound: false.
+  [[nodiscard]] bool archive(Archive& ar) override;
+
+  [[nodiscard]] const DriveMaster& master() const noexcept { return *master_; }
+
+ private:
+  /// A bus whose frames exchange() has taken already. Sending goes straight on.
+  class Collected final : public Bus {
+   public:
+    explicit Collected(Bus& bus);
+    /// Takes what has come. @return how many frames are new.
+    void collect() noexcept;
+    void forget() noexcept;  ///< everything that has come so far
+    [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
+    [[nodiscard]] std::size_t feedback() const noexcept { return feedback_; }
+    void begin_cycle() noexcept;
+
+    std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
+      return bus_->send(frames);
+    }
+    std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
+    [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_->state(); }
+    [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
+      return given_ns_;
+    }
+    [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override {
+      return bus_->sent_ns();
+    }
+    [[nodiscard]] BusStatistics statistics() const noexcept override {
+      return bus_->statistics();
+    }
+    [[nodiscard]] std::string status_text() const override { return bus_->status_text(); }
+
+   private:
+    Bus* bus_;
+    std::vector<canopen::Frame> frames_;
+    std::vector<std::int64_t> frames_ns_;
+    std::span<const std::int64_t> given_ns_;
+    std::size_t first_ = 0, count_ = 0;
+    std::size_t times_ = 0;     ///< TIMEs since begin_cycle()
+    std::size_t feedback_ = 0;  ///< first TPDOs since begin_cycle()
+  };
+
+  CanBackend(std::vector<std::unique_ptr<Collected>> buses, std::unique_ptr<DriveMaster> master,
+             FrameWait& wait, const CanBackendConfig& config);
+  [[nodiscard]] bool all_answered() const noexcept;
+
+  std::vector<std::unique_ptr<Collected>> buses_;
+  std::unique_ptr<DriveMaster> master_;
+  FrameWait* wait_;
+  CanBackendConfig config_;
+  bool begun_ = false;
+  bool silent_ = false;  ///< lockstep: the emulated robot did not answer in time
+};
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,104 @@
+#include "hal/sim/emulator.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "canopen/messages.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::sim {
+
+using canopen::Frame;
+
+namespace {
+
+constexpr std::size_t kBatch = 128;
+/// Steps that are made up after a pause of the process; the rest of the time is lost.
+constexpr std::int64_t kMostBehind = 10;
+
+}  // namespace
+
+Emulator::Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
+                   hal::can::FrameWait& wait, const EmulatorConfig& config)
+    : robot_(&robot), wait_(&wait), config_(config), batch_(kBatch) {
+  for (hal::can::Bus* bus : buses) ports_.push_back({bus});
+}
+
+Code Emulator::poll(std::int64_t patience_ns) noexcept {
+  collect();
+  const std::int64_t now_ns = wait_->now_ns();
+  const Due next = due(now_ns);
+  if (next.now) return step(now_ns);
+  wait_->wait(std::min(next.at_ns, now_ns + patience_ns));
+  return Code::kTimeout;
+}
+
+void Emulator::collect() noexcept {
+  for (std::size_t b = 0; b < ports_.size(); ++b) {
+    Port& port = ports_[b];
+    std::size_t count = 0;
+    do {
+      count = port.bus->receive(batch_);
+      const std::span<const Frame> frames = std::span(batch_).first(count);
+      statistics_.frames_in += count;
+      (void)robot_->bus(b).master().send(frames);
+      const auto syncs = std::ranges::count(frames, canopen::cob::kSync, &Frame::id);
+      if (syncs > 0 && first_sync_ns_ == 0) first_sync_ns_ = wait_->now_ns();
+      port.sync = port.sync || syncs > 0;
+    } while (count == batch_.size());
+  }
+}
+
+Emulator::Due Emulator::due(std::int64_t now_ns) const noexcept {
+  if (std::ranges::all_of(ports_, &Port::sync)) return {now_ns, true};
+  if (config_.lockstep) return {std::numeric_limits<std::int64_t>::max(), false};
+  if (!running_) return {now_ns, true};  // powered on
+  const std::int64_t at_ns = first_sync_ns_ != 0 ? first_sync_ns_ + config_.period_ns / 2
+                                                 : stepped_ns_ + config_.period_ns * 3 / 2;
+  return {at_ns, now_ns >= at_ns};
+}
+
+/// How many periods have passed since the last step, as far as they are made up. In lockstep: 1.
+std::int64_t Emulator::periods_to(std::int64_t now_ns) noexcept {
+  if (config_.lockstep || !running_) return 1;
+  const std::int64_t half_ns = config_.period_ns / 2;
+  const std::int64_t passed = (now_ns - stepped_ns_ + half_ns) / config_.period_ns;
+  if (passed > kMostBehind) statistics_.slipped += static_cast<std::uint64_t>(passed - kMostBehind);
+  return std::clamp<std::int64_t>(passed, 1, kMostBehind);
+}
+
+Code Emulator::step(std::int64_t now_ns) noexcept {
+  std::int64_t periods = periods_to(now_ns);
+  if (first_sync_ns_ == 0) statistics_.steps_without_sync += static_cast<std::uint64_t>(periods);
+  stepped_ns_ = now_ns;
+  running_ = true;
+  first_sync_ns_ = 0;
+  for (Port& port : ports_) port.sync = false;
+  for (; periods > 0; --periods) {
+    const Code code = robot_->step(next_time_ns_);
+    if (code != Code::kOk) return code;
+    next_time_ns_ += config_.period_ns;
+    ++statistics_.steps;
+    answer();
+  }
+  return Code::kOk;
+}
+
+void Emulator::answer() noexcept {
+  for (std::size_t b = 0; b < ports_.size(); ++b) {
+    hal::can::Bus& out = *ports_[b].bus;
+    std::size_t count = 0;
+    do {
+      const std::size_t room = batch_.size() - 1;  // of the last batch TIME is a part
+      count = robot_->bus(b).master().receive(std::span(batch_).first(room));
+      std::size_t all = count;
+      if (count < room && config_.lockstep) batch_[all++] = canopen::make_time(time_ns());
+      const std::size_t sent = all > 0 ? out.send(std::span(batch_).first(all)) : 0;
+      statistics_.frames_out += sent;
+      statistics_.frames_lost += all - sent;
+      if (count < room) break;
+    } while (true);
+  }
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,80 @@
+// The emulated robot on buses that lead out of the process: decides when it steps.
+// Layer: hal/sim.  Thread: one.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hal/ethercat-can/bus.hpp"
+#include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/sim/emulated_robot.hpp"
+
+namespace tandem::sim {
+
+struct EmulatorConfig {
+  std::int64_t period_ns = 1'000'000;  ///< of a step; the master's SYNC period
+  bool lockstep = false;
+};
+
+/// What has passed.
+struct EmulatorStatistics {
+  std::uint64_t steps = 0;
+  std::uint64_t steps_without_sync = 0;  ///< real time: the boards' own clocks went on
+  std::uint64_t slipped = 0;             ///< real time: periods that were too many to be made up
+  std::uint64_t frames_in = 0;
+  std::uint64_t frames_out = 0;
+  std::uint64_t frames_lost = 0;         ///< answers that a bus did not take
+};
+
+/// In lockstep a step is made when SYNC has come on every bus; after its answers TIME goes out on
+/// every bus. Without a master time stands still.
+///
+/// In real time a step is made when SYNC has come on every bus, or half a period after the first of
+/// them; and when none came for a period and a half, because the boards have clocks of their own.
+/// Periods that the process slept through are made up, a few at most.
+class Emulator {
+ public:
+  /// @param buses  the boards' end of each of the robot's buses, in their order; outlive it, as
+  ///               robot and wait do
+  Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
+           hal::can::FrameWait& wait, const EmulatorConfig& config);
+
+  /// Takes what has come, steps if it is time to, else waits, `patience_ns` at most.
+  /// @return kOk: a step was made; kTimeout: none yet; kDiverged: none will be any more.
+  [[nodiscard]] Code poll(std::int64_t patience_ns) noexcept;
+
+  [[nodiscard]] const EmulatorStatistics& statistics() const noexcept { return statistics_; }
+  /// Simulated time of the last step; the first step is at 0.
+  [[nodiscard]] std::int64_t time_ns() const noexcept { return robot_->now_ns(); }
+
+ private:
+  struct Port {
+    hal::can::Bus* bus;
+    bool sync = false;  ///< one has come since the last step
+  };
+  /// When a step is due without any further frame.
+  struct Due {
+    std::int64_t at_ns;
+    bool now;
+  };
+
+  void collect() noexcept;
+  [[nodiscard]] Due due(std::int64_t now_ns) const noexcept;
+  [[nodiscard]] Code step(std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::int64_t periods_to(std::int64_t now_ns) noexcept;
+  void answer() noexcept;
+
+  EmulatedRobot* robot_;
+  std::vector<Port> ports_;
+  hal::can::FrameWait* wait_;
+  EmulatorConfig config_;
+  EmulatorStatistics statistics_;
+  std::vector<canopen::Frame> batch_;
+  std::int64_t next_time_ns_ = 0;   ///< simulated
+  std::int64_t stepped_ns_ = 0;     ///< wall clock: of the last step
+  std::int64_t first_sync_ns_ = 0;  ///< wall clock: of those that wait; 0: none waits
+  bool running_ = false;            ///< the first step was made
+};
+
+}  // namespace tandem::sim

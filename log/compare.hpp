@@ -1,0 +1,42 @@
+// Whether two runs are the same to the last bit and, if not, where they first part.
+// Layer: log.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "log/log_file.hpp"
+
+namespace tandem::log {
+
+/// The first number of a topic that two logs do not share.
+struct Difference {
+  std::uint64_t message = 0;  ///< of the topic, from 0
+  std::int64_t time_ns = 0;   ///< of the first log's message
+  std::string signal;         ///< "position_rad.LHipSag"; "time", "length" or "bytes" without a field
+  double a = 0.0, b = 0.0;    ///< its values; 0 where the signal is none of the layout
+};
+
+struct TopicComparison {
+  std::string topic;
+  std::uint64_t messages_a = 0, messages_b = 0;
+  std::optional<Difference> first;
+
+  [[nodiscard]] bool equal() const { return !first && messages_a == messages_b; }
+};
+
+struct Comparison {
+  std::vector<TopicComparison> topics;  ///< that both logs have, in the first one's order
+  std::vector<std::string> only_a, only_b;
+
+  /// Every topic that both have is the same, and there is one.
+  [[nodiscard]] bool equal() const;
+};
+
+/// Compares every message of every topic that both logs hold: time stamps and bytes. Events are
+/// compared like the rest. Errors: damaged data.
+[[nodiscard]] Result<Comparison> compare(const LogFile& a, const LogFile& b);
+
+}  // namespace tandem::log

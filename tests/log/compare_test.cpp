@@ -1,0 +1,93 @@
+#include "log/compare.hpp"
+
+#include "log/recorder.hpp"
+#include "tests/log/scratch_folder.hpp"
+
+namespace tandem::log {
+namespace {
+
+struct Written {
+  std::uint64_t messages = 3;
+  std::uint64_t odd_message = 99;   ///< whose knee position is another
+  std::int64_t late_message = 99;   ///< whose time is 1 ns later
+  bool command = false;             ///< write a second topic
+};
+
+LogFile write(const std::string& path, const Written& what) {
+  const RunInfo info{.robot = "two", .joints = {"hip", "knee"}, .sensors = {}, .period_ns = 1000};
+  auto recorder = Recorder::open(path, info, {});
+  EXPECT_TRUE(recorder);
+  hal::Layout layout;
+  layout.add("cycle", hal::FieldType::kU64, 1, "");
+  layout.add("position_rad", hal::FieldType::kF64, 2, "");
+  const auto state = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+  const auto command = (*recorder)->add_channel("/tandem/command", "tandem/msg/Command", layout);
+  (*recorder)->start();
+  for (std::uint64_t cycle = 0; cycle < what.messages; ++cycle) {
+    struct {
+      std::uint64_t cycle;
+      double position_rad[2];
+    } message{cycle, {0.5, cycle == what.odd_message ? std::nextafter(0.25, 1.0) : 0.25}};
+    const std::int64_t late_ns = static_cast<std::int64_t>(cycle) == what.late_message ? 1 : 0;
+    const auto time_ns = static_cast<std::int64_t>(cycle) * 1000 + late_ns;
+    (*recorder)->push(state, time_ns, std::as_bytes(std::span(&message, 1)));
+    if (what.command) (*recorder)->push(command, time_ns, std::as_bytes(std::span(&message, 1)));
+  }
+  EXPECT_EQ((*recorder)->close().dropped, 0U);
+  auto file = LogFile::open(path);
+  EXPECT_TRUE(file);
+  return std::move(*file);
+}
+
+class Compare : public testing::Test {
+ protected:
+  Comparison with(const Written& a, const Written& b) {
+    const auto result = compare(write(folder_ / "a.mcap", a), write(folder_ / "b.mcap", b));
+    EXPECT_TRUE(result);
+    return *result;
+  }
+  const ScratchFolder folder_;
+};
+
+const TopicComparison& state_of(const Comparison& comparison) {
+  for (const TopicComparison& topic : comparison.topics) {
+    if (topic.topic == "/tandem/state") return topic;
+  }
+  ADD_FAILURE() << "the state was not compared";
+  return comparison.topics.front();
+}
+
+TEST_F(Compare, TheSameRunIsEqual) {
+  const Comparison result = with({.command = true}, {.command = true});
+  EXPECT_TRUE(result.equal());
+  EXPECT_EQ(state_of(result).messages_a, 3U);
+}
+
+TEST_F(Compare, NamesTheFirstCycleJointAndSignalThatDifferInTheLastBit) {
+  const Comparison result = with({}, {.odd_message = 1});
+  EXPECT_FALSE(result.equal());
+  const auto& first = state_of(result).first;
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->message, 1U);
+  EXPECT_EQ(first->time_ns, 1000);
+  EXPECT_EQ(first->signal, "position_rad.knee");
+  EXPECT_EQ(first->a, 0.25);
+  EXPECT_EQ(first->b, std::nextafter(0.25, 1.0));
+}
+
+TEST_F(Compare, AShorterLogIsNotEqualThoughItsMessagesAre) {
+  const Comparison result = with({}, {.messages = 2});
+  EXPECT_FALSE(result.equal());
+  EXPECT_FALSE(state_of(result).first);
+  EXPECT_EQ(state_of(result).messages_b, 2U);
+}
+
+TEST_F(Compare, ATimeStampCountsToo) {
+  const Comparison result = with({}, {.late_message = 2});
+  ASSERT_TRUE(state_of(result).first);
+  EXPECT_EQ(state_of(result).first->signal, "time");
+  EXPECT_EQ(state_of(result).first->message, 2U);
+}
+
+}  // namespace
+}  // namespace tandem::log

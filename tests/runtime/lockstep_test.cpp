@@ -1,0 +1,110 @@
+// In lockstep a run over CAN is the in-process run, bit for bit.
+#include "hal/sim/sim_robot.hpp"
+#include "log/compare.hpp"
+#include "model/kernel_library.hpp"
+#include "rt/clock.hpp"
+#include "runtime/experiment.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/lockstep.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using test::LockstepRobot;
+
+/// One squat of a robot with its log, in process or over the wire.
+class Squat {
+ public:
+  explicit Squat(const std::string& robot) {
+    auto read =
+        read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/squat.toml");
+    if (!read) {
+      ADD_FAILURE() << read.error().at(0).to_string();
+      return;
+    }
+    e = std::move(*read);
+    auto loaded = model::load_kernels(std::string(TANDEM_BINARY_DIR) + "/lib/models/" + robot +
+                                      "_kernels.so");
+    EXPECT_TRUE(loaded) << loaded.error().to_string();
+    kernels = *loaded;
+    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
+    for (const ControllerSpec& spec : e.controllers) {
+      auto plugin =
+          load_controller(spec.plugin, {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"});
+      EXPECT_TRUE(plugin) << plugin.error().to_string();
+      EXPECT_TRUE(host->add(spec.name, std::move(*plugin), spec.parameters));
+    }
+  }
+  log::LogFile run(hal::Backend& backend, const std::string& path, std::uint64_t cycles = 0) {
+    log::RunInfo info{.robot = e.robot.name, .period_ns = e.loop.period_ns};
+    for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
+    for (const hal::SensorConfig& sensor : e.robot.sensors) {
+      info.sensors.push_back({sensor.name, sensor.channels()});
+    }
+    auto recorder = log::Recorder::open(path, info, {});
+    EXPECT_TRUE(recorder) << recorder.error().to_string();
+    rt::WallClock clock;
+    RobotCycle cycle({e.robot, backend, *host, clock, recorder->get(), nullptr},
+                     {.loop = e.loop,
+                      .running_cycles = cycles == 0 ? e.cycles() : cycles,
+                      .settle_cycles = e.settle_cycles()});
+    cycle.run();
+    for (const Fault& fault : cycle.faults()) ADD_FAILURE() << fault.text;
+    EXPECT_GT(cycle.running_cycles(), 0U) << backend.status_text();
+    const log::RecordingResult result = (*recorder)->close();
+    EXPECT_EQ(result.dropped, 0U);
+    auto file = log::LogFile::open(path);
+    EXPECT_TRUE(file) << file.error().to_string();
+    return *file;
+  }
+
+  Experiment e;
+  model::KernelLibrary kernels;
+  std::unique_ptr<ControllerHost> host;
+};
+
+class Lockstep : public testing::TestWithParam<const char*> {};
+
+TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
+  const log::ScratchFolder folder;
+  Squat in_process(GetParam());
+  auto sim = sim::SimRobot::create(in_process.e.robot, in_process.kernels.get(),
+                                   in_process.e.sim_robot_config());
+  ASSERT_TRUE(sim) << sim.error().to_string();
+  const log::LogFile a = in_process.run(**sim, folder / "a.mcap");
+
+  Squat over_wire(GetParam());
+  LockstepRobot robot(over_wire.e.robot, over_wire.kernels.get(), over_wire.e.sim_robot_config());
+  const log::LogFile b = over_wire.run(*robot.backend, folder / "b.mcap");
+
+  const auto compared = log::compare(a, b);
+  ASSERT_TRUE(compared) << compared.error().to_string();
+  ASSERT_EQ(compared->topics.size(), 3U);
+  for (const log::TopicComparison& topic : compared->topics) {
+    ASSERT_FALSE(topic.first) << topic.topic << ", message " << topic.first->message << ": "
+                              << topic.first->signal << " is " << topic.first->a << " and "
+                              << topic.first->b;
+    EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, Lockstep, testing::Values("coman", "walkman"),
+                         [](const auto& info) { return std::string(info.param); });
+
+TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
+  const log::ScratchFolder folder;
+  Squat squat("coman");
+  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
+  robot.emulator_runs = false;
+  rt::WallClock clock;
+  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr}, {.running_cycles = 10});
+  cycle.run();
+  ASSERT_FALSE(cycle.faults().empty());
+  EXPECT_NE(cycle.faults()[0].text.find("start `tandem emulate"), std::string::npos)
+      << cycle.faults()[0].text;
+  EXPECT_EQ(cycle.running_cycles(), 0U);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
