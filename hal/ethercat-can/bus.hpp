@@ -14,11 +14,17 @@ namespace tandem::hal::can {
 
 enum class BusState : std::uint8_t {
   kActive = 0,
+  kOverloaded,    ///< works, but within the last second frames were lost in a full queue
   kErrorPassive,  ///< still works, errors are frequent
   kBusOff,        ///< the controller has taken itself off the bus: nothing is sent or received
   kDown,          ///< the interface is there, and down
   kGone,          ///< the interface is not there (any more)
 };
+
+/// Whether frames can pass.
+[[nodiscard]] constexpr bool usable(BusState state) noexcept {
+  return state <= BusState::kErrorPassive;
+}
 
 /// What has passed since the bus was opened.
 struct BusStatistics {
@@ -28,6 +34,7 @@ struct BusStatistics {
   std::uint64_t queue_full = 0;     ///< times that the transmit queue took less than was given
   std::uint64_t receive_lost = 0;   ///< frames that came faster than they were taken
   std::uint64_t error_frames = 0;   ///< that the controller's driver told of
+  std::uint64_t ignored = 0;        ///< frames that no node of ours sends: 29-bit, remote, malformed
   std::uint64_t recoveries = 0;     ///< times that the bus became usable again
 };
 

@@ -275,7 +275,7 @@ bool DriveMaster::Impl::flush() noexcept TANDEM_RT {
 
 Code DriveMaster::Impl::receive_code() const noexcept TANDEM_RT {
   for (const Port& port : ports) {
-    if (port.bus->state() == BusState::kBusOff) return Code::kBusOff;
+    if (!usable(port.bus->state())) return Code::kBusOff;
   }
   if (stage == Stage::kFaulted || stage == Stage::kFailed) return Code::kFault;
   if (stage != Stage::kRunning) return Code::kOk;
