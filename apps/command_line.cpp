@@ -26,6 +26,7 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
+  tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
 The same experiment and seed give the same bytes at every rate.)";
 
 const char kAskExamples[] = R"(Examples:
@@ -94,6 +95,11 @@ void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
   app.add_flag("--report", o.report, "Draw the report after the run");
+  CLI::Option* trace =
+      app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
+  app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
+      ->needs(trace)
+      ->check(CLI::Range(1, 1'000'000));
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp);
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);

@@ -25,11 +25,13 @@ struct RunOptions {
   std::optional<double> duration_s;   ///< instead of the experiment's
   std::string log_folder;             ///< empty: the experiment's
   bool no_log = false;
-  std::string kernel_variant;  ///< empty: the best that this CPU runs
-  bool report = false;         ///< draw the report after the run
-  bool quiet = false;          ///< neither progress nor table
-  std::string json;            ///< file, "-" for standard output, empty for none
-  std::string socket;          ///< of the run's control; empty: default_control_path("run")
+  std::string kernel_variant;         ///< empty: the best that this CPU runs
+  bool report = false;                ///< draw the report after the run
+  std::string trace;                  ///< file of trace events; empty: none
+  std::size_t trace_cycles = 10'000;  ///< the last that `trace` holds
+  bool quiet = false;                 ///< neither progress nor table
+  std::string json;                   ///< file, "-" for standard output, empty for none
+  std::string socket;                 ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
 };
 

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -13,6 +14,7 @@
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"
+#include "runtime/trace_file.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -99,6 +101,7 @@ runtime::CycleConfig cycle_config(runtime::Experiment& e, const RunOptions& opti
   config.loop = e.loop;
   config.running_cycles = e.cycles();
   config.settle_cycles = e.settle_cycles();
+  config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
 }
 
@@ -116,6 +119,23 @@ void add_report(const RunOptions& options, const RunSummary& summary, std::FILE*
   facts.add("report", files->page);
   facts.add("plots", files->images.back());
   facts.print(out);
+}
+
+/// Writes what --trace asks for, and says how much of the run it is.
+Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
+  if (options.trace.empty()) return {};
+  const runtime::RobotCycle& cycle = summary.cycle;
+  const Status written = runtime::write_trace(
+      options.trace, summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
+  if (!written || options.quiet) return written;
+  const std::uint64_t all = cycle.trace().count();
+  Facts facts;
+  facts.add(
+      "trace",
+      fmt::format("{} (the last {} of {} cycles; open it on https://ui.perfetto.dev)",
+                  options.trace, std::min<std::uint64_t>(all, cycle.trace().capacity()), all));
+  facts.print(out);
+  return {};
 }
 
 Exit run(Composition& c, const RunOptions& options) {
@@ -159,6 +179,10 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
   add_report(options, summary, out);
+  if (const Status traced = add_trace(options, summary, out); !traced) {
+    print_errors({traced.error()});
+    return Exit::kUsage;
+  }
   if (const Status written = write_json(options.json, summary.json()); !written) {
     print_errors({written.error()});
     return Exit::kUsage;
@@ -169,9 +193,11 @@ Exit run(Composition& c, const RunOptions& options) {
 }  // namespace
 
 Exit run_command(const RunOptions& options) {
-  if (const Status writable = check_writable(options.json); !writable) {
-    print_errors({writable.error()});
-    return Exit::kUsage;
+  for (const std::string& file : {options.json, options.trace}) {
+    if (const Status writable = check_writable(file); !writable) {
+      print_errors({writable.error()});
+      return Exit::kUsage;
+    }
   }
   const auto composition =
       compose(options.experiment, {options.seed, options.duration_s, options.kernel_variant});

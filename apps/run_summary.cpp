@@ -86,7 +86,9 @@ Json RunSummary::json() const {
   json["realtime_factor"] = wall_s > 0.0 ? Json(sim_s() / wall_s) : Json(nullptr);
   json["overruns"] = loop.overruns;
   json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());
-  json["cycle_ns"] = percentiles_json(loop.execution.percentiles());
+  json["bus_ns"] = composition.backend->waits_for_bus() ? percentiles_json(loop.bus.percentiles())
+                                                        : Json(nullptr);
+  json["cycle_ns"] = percentiles_json(loop.work.percentiles());
   json["log"] = log_json(log);
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
@@ -119,7 +121,10 @@ void RunSummary::print(std::FILE* out) const {
   }
   facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
                                      wall_s > 0.0 ? sim_s() / wall_s : 0.0));
-  facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().execution.percentiles()));
+  facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().work.percentiles()));
+  if (composition.backend->waits_for_bus()) {
+    facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
+  }
   if (composition.experiment.loop.rate > 0.0) {
     facts.add("wake-up p50/p99/p99.9/max", microseconds(cycle.loop().wakeup.percentiles()));
     facts.add("overruns", std::to_string(cycle.loop().overruns));

@@ -1,14 +1,17 @@
 // Where the time of a cycle goes: a squat as `tandem run` runs it, stage by stage, the stages of
-// the simulation inside `read` as well.
+// the simulation inside `read` as well; and what tracing the stages costs.
 //   cycle_bench [EXPERIMENT] [KERNELS.so]      (default: COMAN's squat)
 // Times mean something on an idle machine only; the head says which one it was.
 #include <fmt/core.h>
 #include <sched.h>
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
+#include <vector>
 
 #include "controllers/plugin_loader.hpp"
 #include "model/kernel_library.hpp"
@@ -33,8 +36,8 @@ struct SimStages {
   }
 };
 
-constexpr const char* kSimStages[sim::kStages] = {
-    "master: SYNC", "plant", "sensors", "boards' firmware", "master: decode", "truth"};
+constexpr const char* kSimStages[sim::kStages] = {"master: SYNC",     "plant",          "sensors",
+                                                  "boards' firmware", "master: decode", "truth"};
 
 std::string first_value(const char* file, const std::string& key) {
   std::ifstream in(file);
@@ -59,23 +62,30 @@ void row(const std::string& name, std::int64_t sum_ns, std::uint64_t cycles,
              100.0 * static_cast<double>(sum_ns) / static_cast<double>(total_ns));
 }
 
+double us(std::int64_t ns) { return static_cast<double>(ns) * 1e-3; }
+
 void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
+  using runtime::Stage;
+  std::array<std::int64_t, runtime::kStages> sum_ns{};
+  for (const runtime::CycleStamps& stamps : cycle.trace().cycles()) {
+    for (std::size_t i = 1; i < sum_ns.size(); ++i) {
+      sum_ns[i] += stamps.stage_ns(static_cast<Stage>(i));
+    }
+  }
   const std::uint64_t cycles = cycle.loop().cycles;
-  std::int64_t total_ns = 0;
-  for (const std::int64_t stage : cycle.stage_ns()) total_ns += stage;
+  const std::int64_t total_ns = std::accumulate(sum_ns.begin(), sum_ns.end(), std::int64_t{0});
   fmt::print("\n{:24} {:>9} {:>8}\n", "stage", "us/cycle", "share");
-  for (std::size_t i = 0; i < runtime::kStages; ++i) {
-    row(runtime::to_string(static_cast<runtime::Stage>(i)), cycle.stage_ns()[i], cycles, total_ns);
-    if (i != static_cast<std::size_t>(runtime::Stage::kRead)) continue;
+  for (std::size_t i = 2; i < sum_ns.size(); ++i) {  // it neither waits nor exchanges
+    row(runtime::to_string(static_cast<Stage>(i)), sum_ns[i], cycles, total_ns);
+    if (static_cast<Stage>(i) != Stage::kRead) continue;
     for (std::size_t s = 0; s < sim::kStages; ++s) {
       row(fmt::format("  {}", kSimStages[s]), sim.sum_ns[s], cycles, total_ns);
     }
   }
   row("all", total_ns, cycles, total_ns);
-  const auto execution = cycle.loop().execution.percentiles();
-  fmt::print("\ncycle p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us\n",
-             static_cast<double>(execution.p50) * 1e-3, static_cast<double>(execution.p99) * 1e-3,
-             static_cast<double>(execution.max) * 1e-3);
+  const auto work = cycle.loop().work.percentiles();
+  fmt::print("\ncycle p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us\n", us(work.p50), us(work.p99),
+             us(work.max));
 }
 
 int fail_with(const Error& error) {
@@ -83,22 +93,53 @@ int fail_with(const Error& error) {
   return 2;
 }
 
+/// Everything of a run but its loop.
+struct Rig {
+  runtime::Experiment experiment;
+  model::KernelLibrary kernels;
+  std::unique_ptr<runtime::ControllerHost> host;
+  std::unique_ptr<sim::SimRobot> robot;
+  rt::WallClock clock;
+
+  std::unique_ptr<runtime::RobotCycle> cycle(std::size_t trace_cycles, log::Recorder* recorder) {
+    const runtime::CycleParts parts{experiment.robot, *robot,         *host, clock,
+                                    recorder,         &robot->truth()};
+    return std::make_unique<runtime::RobotCycle>(
+        parts, runtime::CycleConfig{.loop = experiment.loop,
+                                    .running_cycles = experiment.cycles(),
+                                    .settle_cycles = experiment.settle_cycles(),
+                                    .trace_cycles = trace_cycles});
+  }
+};
+
+Result<std::unique_ptr<Rig>> make_rig(const std::string& file, const std::string& library) {
+  auto rig = std::make_unique<Rig>();
+  auto e = runtime::read_experiment(file);
+  if (!e) return std::unexpected(e.error().front());
+  rig->experiment = std::move(*e);
+  auto kernels = model::load_kernels(library);
+  if (!kernels) return std::unexpected(kernels.error());
+  rig->kernels = std::move(*kernels);
+  const runtime::Experiment& experiment = rig->experiment;
+  rig->host = std::make_unique<runtime::ControllerHost>(experiment.robot, rig->kernels.get(),
+                                                        experiment.loop.period_ns);
+  for (const runtime::ControllerSpec& spec : experiment.controllers) {
+    auto plugin = load_controller(spec.plugin, {TANDEM_CONTROLLER_FOLDER});
+    if (!plugin) return std::unexpected(plugin.error());
+    const Status added = rig->host->add(spec.name, std::move(*plugin), spec.parameters);
+    if (!added) return std::unexpected(added.error());
+  }
+  auto robot =
+      sim::SimRobot::create(experiment.robot, rig->kernels.get(), experiment.sim_robot_config());
+  if (!robot) return std::unexpected(robot.error());
+  rig->robot = std::move(*robot);
+  return rig;
+}
+
 /// One run, printed. @return the exit status.
 int run(const std::string& file, const std::string& library, bool logged) {
-  auto e = runtime::read_experiment(file);
-  if (!e) return fail_with(e.error().front());
-  const auto kernels = model::load_kernels(library);
-  if (!kernels) return fail_with(kernels.error());
-  runtime::ControllerHost host(e->robot, kernels->get(), e->loop.period_ns);
-  for (const runtime::ControllerSpec& spec : e->controllers) {
-    auto plugin = load_controller(spec.plugin, {TANDEM_CONTROLLER_FOLDER});
-    if (!plugin) return fail_with(plugin.error());
-    const Status added = host.add(spec.name, std::move(*plugin), spec.parameters);
-    if (!added) return fail_with(added.error());
-  }
-  auto robot = sim::SimRobot::create(e->robot, kernels->get(), e->sim_robot_config());
-  if (!robot) return fail_with(robot.error());
-
+  auto rig = make_rig(file, library);
+  if (!rig) return fail_with(rig.error());
   const std::string path = std::filesystem::temp_directory_path() / "tandem_cycle_bench.mcap";
   std::unique_ptr<log::Recorder> recorder;
   if (logged) {
@@ -107,28 +148,62 @@ int run(const std::string& file, const std::string& library, bool logged) {
     recorder = std::move(*opened);
   }
   SimStages stages;
-  (*robot)->set_stage_hook({SimStages::hook, &stages});
-  rt::WallClock clock;
-  runtime::RobotCycle cycle({e->robot, **robot, host, clock, recorder.get(), &(*robot)->truth()},
-                            {.loop = e->loop,
-                             .running_cycles = e->cycles(),
-                             .settle_cycles = e->settle_cycles(),
-                             .time_stages = true});
-  const std::int64_t begin_ns = clock.now_ns();
+  (*rig)->robot->set_stage_hook({SimStages::hook, &stages});
+  const runtime::Experiment& e = (*rig)->experiment;
+  const auto cycle = (*rig)->cycle(e.cycles() + e.cycles() / 2, recorder.get());
+  const std::int64_t begin_ns = stages.clock.now_ns();
   bool more = true;
   while (more) {
-    stages.last_ns = clock.now_ns();
-    more = cycle.step();
+    stages.last_ns = stages.clock.now_ns();
+    more = cycle->step();
   }
-  const double wall_s = static_cast<double>(clock.now_ns() - begin_ns) * 1e-9;
+  const double wall_s = static_cast<double>(stages.clock.now_ns() - begin_ns) * 1e-9;
   const double sim_s =
-      static_cast<double>(cycle.loop().cycles) * static_cast<double>(e->loop.period_ns) * 1e-9;
-  print_stages(cycle, stages);
+      static_cast<double>(cycle->loop().cycles) * static_cast<double>(e.loop.period_ns) * 1e-9;
+  print_stages(*cycle, stages);
   fmt::print("{} log: {:.3f} s simulated in {:.3f} s, {:.1f} x real time\n",
              logged ? "with" : "without", sim_s, wall_s, sim_s / wall_s);
   if (recorder != nullptr) (void)recorder->close();
   std::error_code ignored;
   std::filesystem::remove(path, ignored);
+  return 0;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// What tracing costs: two equal runs, one of them traced, in turns of 20 cycles.
+int trace_cost(const std::string& file, const std::string& library) {
+  constexpr int kTurn = 20;
+  auto plain_rig = make_rig(file, library);
+  auto traced_rig = make_rig(file, library);
+  if (!plain_rig || !traced_rig) return fail_with((plain_rig ? traced_rig : plain_rig).error());
+  const auto plain = (*plain_rig)->cycle(0, nullptr);
+  const auto traced = (*traced_rig)->cycle(10'000, nullptr);
+  rt::WallClock clock;
+  const auto turn_us = [&clock](runtime::RobotCycle& cycle) {
+    const std::int64_t begin_ns = clock.now_ns();
+    for (int i = 0; i < kTurn; ++i) (void)cycle.step();
+    return us(clock.now_ns() - begin_ns) / kTurn;
+  };
+  std::vector<double> plain_us, traced_us, difference_us;
+  for (int i = 0; traced->phase() != runtime::RunPhase::kDone; ++i) {
+    const bool plain_first = i % 2 == 0;
+    const double first = turn_us(plain_first ? *plain : *traced);
+    const double second = turn_us(plain_first ? *traced : *plain);
+    plain_us.push_back(plain_first ? first : second);
+    traced_us.push_back(plain_first ? second : first);
+    difference_us.push_back(traced_us.back() - plain_us.back());
+  }
+  const double base = median(plain_us);
+  fmt::print(
+      "\ntrace      median cycle {:.2f} us without, {:.2f} us with; median difference "
+      "{:+.3f} us: {:+.2f} % of the cycle ({} turns of {} cycles)\n",
+      base, median(traced_us), median(difference_us), 100.0 * median(difference_us) / base,
+      plain_us.size(), kTurn);
   return 0;
 }
 
@@ -139,6 +214,9 @@ int main(int count, char** arguments) {
   const std::string file = count > 1 ? arguments[1] : TANDEM_CONFIG_FOLDER "/coman/squat.toml";
   const std::string library = count > 2 ? arguments[2] : TANDEM_MODEL_FOLDER "/coman_kernels.so";
   tandem::bench::print_machine();
-  const int first = tandem::bench::run(file, library, false);
-  return first != 0 ? first : tandem::bench::run(file, library, true);
+  for (const bool logged : {false, true}) {
+    const int status = tandem::bench::run(file, library, logged);
+    if (status != 0) return status;
+  }
+  return tandem::bench::trace_cost(file, library);
 }

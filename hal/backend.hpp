@@ -47,6 +47,9 @@ class Backend {
   /// The cause of Phase::kFault, or what bring-up waits for ("LHip (node 3): waiting for …").
   [[nodiscard]] virtual std::string status_text() const = 0;
 
+  /// Whether exchange() waits for somebody else's answers, which is no work of the cycle's own.
+  [[nodiscard]] virtual bool waits_for_bus() const noexcept { return false; }
+
   /// First call of every cycle, the only one that may block: starts the exchange with the robot
   /// (SYNC goes out) and waits until the answers are there, or the time for them is over. A robot
   /// in this process has nothing to wait for.

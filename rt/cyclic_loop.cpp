@@ -50,9 +50,12 @@ Tick CyclicLoop::wait() noexcept {
   }
   tick.cycle = next_cycle_++;
   tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
-  begin_ns_ = clock_->now_ns();
+  tick.begin_ns = begin_ns_ = clock_->now_ns();
   if (paced()) {
-    if (started_) statistics_.wakeup.record(begin_ns_ - grid_ns_);
+    if (started_) {
+      tick.wakeup_ns = begin_ns_ - grid_ns_;
+      statistics_.wakeup.record(tick.wakeup_ns);
+    }
     grid_ns_ += step_ns_;
   }
   started_ = true;
@@ -76,8 +79,17 @@ void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {
   tick.stop = std::popcount(late_mask_ & window) >= config_.stop_late;
 }
 
-void CyclicLoop::finish() noexcept TANDEM_RT {
-  statistics_.execution.record(clock_->now_ns() - begin_ns_);
+std::int64_t CyclicLoop::exchanged() noexcept TANDEM_RT {
+  const std::int64_t now_ns = clock_->now_ns();
+  statistics_.bus.record(now_ns - begin_ns_);
+  begin_ns_ = now_ns;
+  return now_ns;
+}
+
+std::int64_t CyclicLoop::finish() noexcept TANDEM_RT {
+  const std::int64_t now_ns = clock_->now_ns();
+  statistics_.work.record(now_ns - begin_ns_);
+  return now_ns;
 }
 
 void CyclicLoop::archive(Archive& ar) {

@@ -40,12 +40,14 @@ struct LoopConfig {
 
 /// One cycle, as wait() announces it.
 struct Tick {
-  std::uint64_t cycle = 0;    ///< number of the cycle
-  std::int64_t time_ns = 0;   ///< cycle * period_ns, exactly
-  std::uint64_t skipped = 0;  ///< wall clock: cycles missed just before this one
-  bool late = false;          ///< the cycle before overran into this one's grid point
-  bool hold = false;          ///< the policy wants the last command repeated
-  bool stop = false;          ///< the policy wants the robot stopped
+  std::uint64_t cycle = 0;      ///< number of the cycle
+  std::int64_t time_ns = 0;     ///< cycle * period_ns, exactly
+  std::int64_t begin_ns = 0;    ///< clock time at which it began: the return of wait()
+  std::int64_t wakeup_ns = -1;  ///< from the grid point to begin_ns; -1: not paced, or the first
+  std::uint64_t skipped = 0;    ///< wall clock: cycles missed just before this one
+  bool late = false;            ///< the cycle before overran into this one's grid point
+  bool hold = false;            ///< the policy wants the last command repeated
+  bool stop = false;            ///< the policy wants the robot stopped
 };
 
 /// Counts and histograms of one run.
@@ -54,10 +56,12 @@ struct LoopStatistics {
   std::uint64_t overruns = 0;  ///< cycles whose work ended after the next grid point
   std::uint64_t skipped = 0;   ///< grid points without a cycle (wall clock)
   Histogram wakeup;            ///< from the grid point to the return of wait(); paced runs only
-  Histogram execution;         ///< from the return of wait() to finish()
+  Histogram bus;               ///< from the return of wait() to exchanged(); with a bus only
+  Histogram work;              ///< the rest, to finish(): what the cycle itself computes
 };
 
-/// `for (;;) { const Tick tick = loop.wait(); …; loop.finish(); }`
+/// `for (;;) { const Tick tick = loop.wait(); …; loop.finish(); }`, and exchanged() between the
+/// two by a cycle that waits for a bus.
 class CyclicLoop {
  public:
   /// @pre config.period_ns > 0, rate >= 0, 1 <= stop_late <= stop_window <= 64.
@@ -67,8 +71,11 @@ class CyclicLoop {
   /// Blocks until the next cycle's start. The first call starts the grid and returns cycle
   /// `next_cycle()` at once. One sleep and one clock read; no allocation or lock.
   [[nodiscard]] Tick wait() noexcept;
-  /// The cycle's work is done: takes its execution time. @rt one clock read.
-  void finish() noexcept TANDEM_RT;
+  /// The answers of the bus are there: what follows is the cycle's own work.
+  /// @return the clock's time [ns]. @rt one clock read.
+  std::int64_t exchanged() noexcept TANDEM_RT;
+  /// The cycle's work is done. @return the clock's time [ns]. @rt one clock read.
+  std::int64_t finish() noexcept TANDEM_RT;
 
   /// The number that the next wait() gives when nothing is late.
   [[nodiscard]] std::uint64_t next_cycle() const noexcept { return next_cycle_; }
@@ -89,7 +96,7 @@ class CyclicLoop {
   std::int64_t grid_ns_ = 0;  // clock time of the next grid point
   bool started_ = false;
   std::uint64_t next_cycle_ = 0;
-  std::int64_t begin_ns_ = 0;    // clock time at which the current cycle began
+  std::int64_t begin_ns_ = 0;    // clock time at which the current cycle's work began
   std::uint64_t late_mask_ = 0;  // bit 0: the newest cycle was late
   LoopStatistics statistics_;
 };

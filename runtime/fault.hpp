@@ -31,6 +31,7 @@ struct FaultRecord {
 
 /// A fault as the result tells it.
 struct Fault {
+  std::uint64_t cycle = 0;
   double time_s = 0.0;
   std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole
   std::string text;   ///< one sentence, without `joint`

@@ -13,27 +13,27 @@ bool RobotCycle::step() noexcept {
   if (phase_ == RunPhase::kDone) return false;
   const rt::Tick tick = wait();
   time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
-  backend_->exchange(time_);
+  trace_wait(tick);
+  exchange();
   cycle(tick);
   return phase_ != RunPhase::kDone;
 }
 
 void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
   const rt::ScopedRealtime in_cycle;
-  if (config_.time_stages) lap_ns_ = clock_->now_ns();
   read();
-  lap(Stage::kRead);
+  mark(Stage::kRead);
   check(tick);
-  lap(Stage::kCheck);
+  mark(Stage::kCheck);
   update(tick);
-  lap(Stage::kUpdate);
+  mark(Stage::kUpdate);
   limit();
-  lap(Stage::kLimit);
+  mark(Stage::kLimit);
   write();
-  lap(Stage::kWrite);
+  mark(Stage::kWrite);
   hand_over();
-  lap(Stage::kHandOver);
-  loop_.finish();
+  finished_ns_ = loop_.finish();
+  mark(Stage::kHandOver, finished_ns_);
 }
 
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
@@ -44,6 +44,12 @@ rt::Tick RobotCycle::wait() noexcept {
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
   if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
   return loop_.wait();
+}
+
+/// May block until the robot has answered, which does not count as the cycle's work.
+void RobotCycle::exchange() noexcept {
+  backend_->exchange(time_);
+  if (backend_->waits_for_bus()) mark(Stage::kExchange, loop_.exchanged());
 }
 
 void RobotCycle::read() noexcept TANDEM_RT {
@@ -252,11 +258,23 @@ void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) n
   recorder_->push(log::Event{time_.cycle, time_.time_ns, code, joint, kind, {}});
 }
 
-void RobotCycle::lap(Stage stage) noexcept TANDEM_RT {
-  if (!config_.time_stages) return;
-  const std::int64_t now_ns = clock_->now_ns();
-  stage_ns_[static_cast<std::size_t>(stage)] += now_ns - lap_ns_;
-  lap_ns_ = now_ns;
+void RobotCycle::trace_wait(const rt::Tick& tick) noexcept TANDEM_RT {
+  if (!trace_.on()) return;
+  stamps_ = &trace_.next();
+  stamps_->cycle = tick.cycle;
+  stamps_->begin_ns = finished_ns_ != 0 ? finished_ns_ : tick.begin_ns;
+  stamps_->end_ns.fill(tick.begin_ns);
+  stamps_->wakeup_ns = tick.wakeup_ns;
+  stamps_->skipped = tick.skipped;
+  stamps_->late = tick.late;
+}
+
+void RobotCycle::mark(Stage stage) noexcept TANDEM_RT {
+  if (stamps_ != nullptr) mark(stage, clock_->now_ns());
+}
+
+void RobotCycle::mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT {
+  if (stamps_ != nullptr) stamps_->end_ns[static_cast<std::size_t>(stage)] = now_ns;
 }
 
 }  // namespace tandem::runtime

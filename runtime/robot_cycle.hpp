@@ -16,6 +16,7 @@
 #include "log/recorder.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "runtime/controller_host.hpp"
+#include "runtime/cycle_trace.hpp"
 #include "runtime/fault.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/run_statistics.hpp"
@@ -29,13 +30,8 @@ struct CycleConfig {
   std::uint64_t settle_cycles = 0;         ///< every joint is held, from enabled to kRunning
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   std::uint32_t lost_after_cycles = 10;    ///< feedback older than this is a lost joint or sensor
-  bool time_stages = false;                ///< fill stage_ns(): seven clock reads per cycle
+  std::size_t trace_cycles = 0;            ///< the last that trace() keeps: 6 clock reads each
 };
-
-/// The stages that stage_ns() tells apart.
-enum class Stage : std::uint8_t { kRead, kCheck, kUpdate, kLimit, kWrite, kHandOver };
-inline constexpr std::size_t kStages = 6;
-[[nodiscard]] const char* to_string(Stage stage) noexcept;
 
 /// The parts that a cycle joins. All outlive it.
 struct CycleParts {
@@ -82,10 +78,7 @@ class RobotCycle {
   [[nodiscard]] const hal::CommandLimits& limits() const noexcept { return limits_; }
   [[nodiscard]] std::vector<Fault> faults() const;
   [[nodiscard]] std::uint64_t running_cycles() const noexcept { return ran_; }
-  /// Nanoseconds spent in each stage in all, with config.time_stages.
-  [[nodiscard]] const std::array<std::int64_t, kStages>& stage_ns() const noexcept {
-    return stage_ns_;
-  }
+  [[nodiscard]] const CycleTrace& trace() const noexcept { return trace_; }
 
   /// Everything that the next step() depends on: backend, controllers, images, counters.
   /// Between two steps, with a simulated robot only; the log goes on where it is.
@@ -95,6 +88,7 @@ class RobotCycle {
 
  private:
   [[nodiscard]] rt::Tick wait() noexcept;
+  void exchange() noexcept;
   void read() noexcept TANDEM_RT;
   void check(const rt::Tick& tick) noexcept TANDEM_RT;
   void update(const rt::Tick& tick) noexcept TANDEM_RT;
@@ -113,7 +107,9 @@ class RobotCycle {
   void go(RunPhase next) noexcept TANDEM_RT;
   void event(log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0) noexcept TANDEM_RT;
-  void lap(Stage stage) noexcept TANDEM_RT;
+  void trace_wait(const rt::Tick& tick) noexcept TANDEM_RT;
+  void mark(Stage stage) noexcept TANDEM_RT;
+  void mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT;
   void archive(Archive& ar);
   [[nodiscard]] Fault tell(const FaultRecord& record) const;
 
@@ -147,8 +143,9 @@ class RobotCycle {
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;
   std::atomic<bool> stop_requested_{false};
   Progress progress_;
-  std::array<std::int64_t, kStages> stage_ns_{};
-  std::int64_t lap_ns_ = 0;
+  CycleTrace trace_;
+  CycleStamps* stamps_ = nullptr;  // this cycle's; null: not traced
+  std::int64_t finished_ns_ = 0;   // clock time at which the last cycle was done; 0: none was
 };
 
 }  // namespace tandem::runtime

@@ -5,18 +5,6 @@
 
 namespace tandem::runtime {
 
-const char* to_string(Stage stage) noexcept {
-  switch (stage) {
-    case Stage::kRead: return "read";
-    case Stage::kCheck: return "check";
-    case Stage::kUpdate: return "update";
-    case Stage::kLimit: return "limit";
-    case Stage::kWrite: return "write";
-    case Stage::kHandOver: return "hand over";
-  }
-  return "?";
-}
-
 const char* to_string(RunPhase phase) noexcept {
   switch (phase) {
     case RunPhase::kBringUp: return "bring-up";
@@ -45,7 +33,8 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet()),
       joint_faulted_(parts.robot.joints.size()),
       sensor_lost_(parts.robot.sensors.size()),
-      joint_limited_(parts.robot.joints.size()) {
+      joint_limited_(parts.robot.joints.size()),
+      trace_(config.trace_cycles) {
   progress_.total_cycles = config.running_cycles;
   if (recorder_ == nullptr) return;
   state_channel_ = recorder_->add_channel("/tandem/state", "tandem/msg/State", state_.layout());
@@ -90,7 +79,10 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
 }
 
 Fault RobotCycle::tell(const FaultRecord& record) const {
-  Fault fault{.time_s = static_cast<double>(record.time_ns) * 1e-9, .joint = {}, .text = {}};
+  Fault fault{.cycle = record.cycle,
+              .time_s = static_cast<double>(record.time_ns) * 1e-9,
+              .joint = {},
+              .text = {}};
   const auto index = static_cast<std::size_t>(record.index);
   const char* code = tandem::to_string(static_cast<Code>(record.code));
   char number[16];

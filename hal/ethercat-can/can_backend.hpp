@@ -43,6 +43,7 @@ class CanBackend final : public Backend {
   }
   [[nodiscard]] Phase phase() const noexcept override;
   [[nodiscard]] std::string status_text() const override;
+  [[nodiscard]] bool waits_for_bus() const noexcept override { return true; }
   void exchange(const CycleTime& time) noexcept override;
   [[nodiscard]] Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const CommandImage& command,

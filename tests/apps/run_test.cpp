@@ -17,7 +17,7 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   const auto json = run("hold.toml --duration 0.5 --seed 7");
   for (const std::string key :
        {"robot", "hal", "seed", "cycles", "period_ns", "sim_seconds", "wall_seconds",
-        "realtime_factor", "overruns", "wakeup_ns", "cycle_ns", "log", "joints", "ground", "base",
+        "realtime_factor", "overruns", "wakeup_ns", "bus_ns", "cycle_ns", "log", "joints", "ground", "base",
         "faults", "kernel_variant"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
@@ -53,6 +53,27 @@ TEST_F(Run, WithoutALogWritesNone) {
   const auto json = run("hold.toml --duration 0.1 --no-log");
   EXPECT_TRUE(json["log"].is_null());
   EXPECT_FALSE(has_log());
+}
+
+TEST_F(Run, WritesATraceOfItsLastCycles) {
+  const Outcome outcome =
+      tandem("run hold.toml --duration 0.2 --no-log --rate 5 --trace t.json --trace-cycles 50");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("t.json (the last 50 of"), std::string::npos) << outcome.out;
+  const auto trace = json("t.json");
+  EXPECT_EQ(trace["otherData"]["cycles"], 50);
+  EXPECT_EQ(trace["otherData"]["robot"], "double_pendulum");
+  int cycles = 0;
+  for (const auto& event : trace["traceEvents"]) cycles += event["name"] == "cycle" ? 1 : 0;
+  EXPECT_EQ(cycles, 50);
+}
+
+TEST_F(Run, RefusesATraceThatCannotBeWrittenBeforeItRuns) {
+  const Outcome outcome = tandem("run hold.toml --trace nowhere/t.json");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("nowhere/t.json"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(has_log());
+  EXPECT_EQ(tandem("run hold.toml --trace-cycles 5").status, 2);
 }
 
 TEST_F(Run, EndsWithATableAndTheLogsPath) {

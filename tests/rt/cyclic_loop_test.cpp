@@ -31,7 +31,7 @@ TEST(CyclicLoop, StartsEachCycleAtAnAbsoluteGridPoint) {
             (std::vector<std::int64_t>{kStart + kMs, kStart + 2 * kMs, kStart + 3 * kMs}));
   EXPECT_EQ(loop.statistics().wakeup.max_ns(), 40'000);
   EXPECT_EQ(loop.statistics().wakeup.count(), 3U);
-  EXPECT_EQ(loop.statistics().execution.max_ns(), 200'000);
+  EXPECT_EQ(loop.statistics().work.max_ns(), 200'000);
   EXPECT_EQ(loop.statistics().overruns, 0U);
 }
 

@@ -12,7 +12,7 @@
 
 namespace tandem::runtime::test {
 
-class FirstOrderRobot final : public hal::Backend {
+class FirstOrderRobot : public hal::Backend {
  public:
   static constexpr double kShare = 0.05;  // of the error made good in a cycle
 

@@ -307,17 +307,6 @@ TEST(RobotCycle, StopsWhenTooManyCyclesAreLate) {
   EXPECT_EQ(run.cycle->faults().at(0).text, "2 of the last 10 cycles were late");
 }
 
-TEST(RobotCycle, TimesItsStagesWhenAsked) {
-  TestRun run({.time_stages = true});
-  run.cycle->run();
-  std::int64_t sum = 0;
-  for (const std::int64_t stage : run.cycle->stage_ns()) {
-    EXPECT_GT(stage, 0);
-    sum += stage;
-  }
-  EXPECT_LE(sum, run.cycle->loop().execution.sum_ns());
-}
-
 /// The bytes of state, command and truth over `count` cycles.
 std::vector<std::byte> bytes_of(TestRun& run, int count) {
   std::vector<std::byte> all;

@@ -1,0 +1,29 @@
+#include "runtime/cycle_trace.hpp"
+
+#include <algorithm>
+
+namespace tandem::runtime {
+
+const char* to_string(Stage stage) noexcept {
+  switch (stage) {
+    case Stage::kWait: return "wait";
+    case Stage::kExchange: return "exchange";
+    case Stage::kRead: return "read";
+    case Stage::kCheck: return "check";
+    case Stage::kUpdate: return "update";
+    case Stage::kLimit: return "limit";
+    case Stage::kWrite: return "write";
+    case Stage::kHandOver: return "hand over";
+  }
+  return "?";
+}
+
+std::vector<CycleStamps> CycleTrace::cycles() const {
+  std::vector<CycleStamps> out;
+  const std::uint64_t held = std::min<std::uint64_t>(count_, ring_.size());
+  out.reserve(held);
+  for (std::uint64_t i = count_ - held; i < count_; ++i) out.push_back(ring_[i % ring_.size()]);
+  return out;
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,63 @@
+// Clock times of every stage of the last cycles: a ring of plain data, filled in the cycle.
+// Layer: runtime.  Thread: made non-RT; marked RT; read when the loop has stopped.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/realtime.hpp"
+
+namespace tandem::runtime {
+
+/// The stages of a cycle, in their order; docs/realtime.md.
+enum class Stage : std::uint8_t {
+  kWait,      ///< for the grid point, and when time is simulated for the log
+  kExchange,  ///< with the bus; only of a backend that waits for one
+  kRead,
+  kCheck,
+  kUpdate,
+  kLimit,
+  kWrite,
+  kHandOver,
+};
+inline constexpr std::size_t kStages = 8;
+[[nodiscard]] const char* to_string(Stage stage) noexcept;
+
+/// One cycle's clock times [ns], of the loop's clock.
+struct CycleStamps {
+  std::uint64_t cycle = 0;
+  std::int64_t begin_ns = 0;                   ///< of the wait: the end of the cycle before
+  std::array<std::int64_t, kStages> end_ns{};  ///< of each stage; it begins where the last ended
+  std::int64_t wakeup_ns = -1;  ///< from the grid point to the end of the wait; -1: not paced
+  std::uint64_t skipped = 0;    ///< grid points missed just before
+  bool late = false;            ///< the cycle before overran into this one's grid point
+
+  [[nodiscard]] std::int64_t stage_ns(Stage stage) const noexcept {
+    const auto i = static_cast<std::size_t>(stage);
+    return end_ns[i] - (i == 0 ? begin_ns : end_ns[i - 1]);
+  }
+};
+
+/// The last `capacity` cycles.
+class CycleTrace {
+ public:
+  /// @param capacity  cycles; 0 traces nothing.
+  explicit CycleTrace(std::size_t capacity) : ring_(capacity) {}
+
+  [[nodiscard]] bool on() const noexcept { return !ring_.empty(); }
+  /// The place of the next cycle, the oldest one's. @pre on()
+  [[nodiscard]] CycleStamps& next() noexcept TANDEM_RT { return ring_[count_++ % ring_.size()]; }
+
+  /// Cycles traced, those that the ring has forgotten included.
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  [[nodiscard]] std::size_t capacity() const noexcept { return ring_.size(); }
+  /// What the ring holds, the oldest first. Allocates.
+  [[nodiscard]] std::vector<CycleStamps> cycles() const;
+
+ private:
+  std::vector<CycleStamps> ring_;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace tandem::runtime

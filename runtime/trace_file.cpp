@@ -1,0 +1,115 @@
+#include "runtime/trace_file.hpp"
+
+#include <fmt/core.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+
+namespace tandem::runtime {
+namespace {
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
+
+/// Appends events to an open file; times in us, to the nanosecond.
+class Events {
+ public:
+  Events(std::FILE* out, std::int64_t zero_ns) : out_(out), zero_ns_(zero_ns) {}
+
+  void name(const char* what, const std::string& value) {
+    event(fmt::format(R"("ph":"M","name":"{}","args":{{"name":{}}})", what, quoted(value)));
+  }
+  void span(const char* name, std::int64_t begin_ns, std::int64_t end_ns,
+            const std::string& arguments = {}) {
+    event(fmt::format(R"("ph":"X","name":"{}","ts":{},"dur":{}{})", name, us(begin_ns - zero_ns_),
+                      us(end_ns - begin_ns), arguments));
+  }
+  void instant(const std::string& name, std::int64_t at_ns) {
+    event(fmt::format(R"("ph":"i","s":"t","name":{},"ts":{})", quoted(name), us(at_ns - zero_ns_)));
+  }
+  void counter(const char* name, std::int64_t at_ns, std::int64_t value_ns) {
+    event(fmt::format(R"("ph":"C","name":"{}","ts":{},"args":{{"us":{}}})", name,
+                      us(at_ns - zero_ns_), us(value_ns)));
+  }
+
+ private:
+  static std::string us(std::int64_t ns) {
+    return fmt::format("{}.{:03}", ns / 1000, ns % 1000);  // of times that are not negative
+  }
+  void event(const std::string& body) {
+    fmt::print(out_, "{}{{\"pid\":1,\"tid\":1,{}}}", first_ ? "" : ",\n", body);
+    first_ = false;
+  }
+
+  std::FILE* out_;
+  std::int64_t zero_ns_;
+  bool first_ = true;
+};
+
+void write_cycle(Events& events, const CycleStamps& stamps) {
+  const auto end_of = [&](Stage stage) { return stamps.end_ns[static_cast<std::size_t>(stage)]; };
+  const std::int64_t woken_ns = end_of(Stage::kWait);
+  const std::int64_t done_ns = end_of(Stage::kHandOver);
+  events.span(to_string(Stage::kWait), stamps.begin_ns, woken_ns);
+  events.span("cycle", woken_ns, done_ns, fmt::format(R"(,"args":{{"cycle":{}}})", stamps.cycle));
+  for (std::size_t i = 1; i < kStages; ++i) {
+    const bool has_bus = end_of(Stage::kExchange) > woken_ns;
+    if (static_cast<Stage>(i) == Stage::kExchange && !has_bus) continue;
+    events.span(to_string(static_cast<Stage>(i)), stamps.end_ns[i - 1], stamps.end_ns[i]);
+  }
+  if (stamps.late) {
+    events.instant(stamps.skipped > 0 ? fmt::format("overrun: {} skipped", stamps.skipped)
+                                      : std::string("overrun"),
+                   woken_ns);
+  }
+  if (stamps.wakeup_ns >= 0) events.counter("wake-up latency [us]", woken_ns, stamps.wakeup_ns);
+  events.counter("work [us]", woken_ns, done_ns - end_of(Stage::kExchange));
+}
+
+void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fault> faults) {
+  for (const Fault& fault : faults) {
+    if (fault.cycle != stamps.cycle) continue;
+    const std::string where = fault.joint.empty() ? "" : fault.joint + ": ";
+    events.instant("fault: " + where + fault.text,
+                   stamps.end_ns[static_cast<std::size_t>(Stage::kCheck)]);
+  }
+}
+
+Error write_error(const std::string& file) {
+  return {.message = std::string("cannot write the trace: ") + std::strerror(errno),
+          .hint = "name a file in a folder that exists and can be written",
+          .file = file,
+          .key = {}};
+}
+
+}  // namespace
+
+Status write_trace(const std::string& file, const std::string& robot, const CycleTrace& trace,
+                   std::span<const Fault> faults) {
+  const std::vector<CycleStamps> cycles = trace.cycles();
+  std::FILE* out = std::fopen(file.c_str(), "wb");
+  if (out == nullptr) return std::unexpected(write_error(file));
+  fmt::print(out, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{{\"robot\":{},\"cycles\":{},",
+             quoted(robot), cycles.size());
+  fmt::print(out, "\"cycles_before\":{}}},\n\"traceEvents\":[\n", trace.count() - cycles.size());
+  Events events(out, cycles.empty() ? 0 : cycles.front().begin_ns);
+  events.name("process_name", "tandem: " + robot);
+  events.name("thread_name", "loop");
+  for (const CycleStamps& stamps : cycles) {
+    write_cycle(events, stamps);
+    write_faults(events, stamps, faults);
+  }
+  fmt::print(out, "\n]}}\n");
+  const bool failed = std::ferror(out) != 0;
+  return std::fclose(out) == 0 && !failed ? Status{} : std::unexpected(write_error(file));
+}
+
+}  // namespace tandem::runtime
