@@ -2,7 +2,7 @@
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 
-.PHONY: demo test unit rtsan fuzz bench clean help
+.PHONY: demo test unit hil rtsan fuzz bench clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 5 minutes the first time)"
@@ -16,14 +16,22 @@ demo:
 	@cmake --build --preset demo --parallel $(JOBS)
 	@build/release/bin/tandem run config/coman/squat.toml --report
 
-# What CI runs: all tests, the real-time proof, and a minute of each fuzz target.
-test: unit rtsan fuzz
+# What CI runs: all tests, those on a real CAN stack apart, the real-time proof, and a minute of
+# each fuzz target.
+test: unit hil rtsan fuzz
 
 unit:
 	@scripts/install-dependencies test
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
-	@scripts/run-tests build/release $(JOBS)
+	@scripts/run-tests build/release $(JOBS) -LE hil
+
+# On this machine's kernel if it has CAN, else in a User-Mode-Linux one: tests/hil/README.md.
+hil:
+	@scripts/install-dependencies test
+	@cmake --preset release --log-level=WARNING
+	@cmake --build --preset release --parallel $(JOBS)
+	@scripts/run-tests build/release 1 -L hil --verbose
 
 rtsan:
 	@scripts/install-dependencies test

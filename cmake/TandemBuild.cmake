@@ -62,19 +62,26 @@ function(tandem_controller name)
     CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
 endfunction()
 
-# tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|hil|rt]): one GoogleTest executable,
-# each of its cases a ctest of its own. The target `tests` builds them all.
-function(tandem_test name)
-  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;LINKS" ${ARGN})
-  if(NOT TEST_LABEL)
-    set(TEST_LABEL unit)
-  endif()
+# tandem_test_program(NAME SOURCES … LINKS …): one GoogleTest executable. The target `tests`
+# builds them all.
+function(tandem_test_program name)
+  cmake_parse_arguments(TEST "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${TEST_SOURCES})
   add_dependencies(tests ${name})
   target_link_libraries(${name} PRIVATE ${TEST_LINKS} GTest::gtest_main)
   target_precompile_headers(${name} REUSE_FROM tandem_test_pch)
   target_compile_definitions(${name} PRIVATE TANDEM_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     TANDEM_BINARY_DIR="${PROJECT_BINARY_DIR}")
+endfunction()
+
+# tandem_test(NAME SOURCES … LINKS … [LABEL unit|sim|rt]): a test program each of whose cases is
+# a ctest of its own.
+function(tandem_test name)
+  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;LINKS" ${ARGN})
+  if(NOT TEST_LABEL)
+    set(TEST_LABEL unit)
+  endif()
+  tandem_test_program(${name} SOURCES ${TEST_SOURCES} LINKS ${TEST_LINKS})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS ${TEST_LABEL} TIMEOUT 300)
 endfunction()
