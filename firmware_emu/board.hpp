@@ -73,6 +73,11 @@ class Board {
   }
   [[nodiscard]] const canopen::ObjectDictionary& dictionary() const noexcept { return od_; }
 
+  /// What 1018:`sub` says from now on: the firmware was exchanged, or the whole board.
+  void set_identity(canopen::IdentitySub sub, std::uint32_t value) noexcept TANDEM_RT {
+    od_.set_value(canopen::object::kIdentity, static_cast<std::uint8_t>(sub), value);
+  }
+
   /// Everything that changes, frames that wait to be sent included.
   void archive(Archive& ar);
 

@@ -83,6 +83,7 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   temperature_.assign(n, ambient_C);
   bridge_.assign(n, 0);
   braked_.assign(n, 0);
+  broken_.assign(n, 0);
   cooling_.assign(n, 1.0);
   for (const ActuatorModel& model : models_) feeds_through_ |= model.order == 0;
 }
@@ -133,8 +134,10 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
       torque_Nm[j] = braked_[j] != 0 ? rigid_brake(j, q[j], qd[j]) : drive;
       continue;
     }
-    const double spring = m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
-                          m.spring_damping_Nms_rad * (velocity - qd[j]);
+    const double spring =
+        broken_[j] != 0 ? 0.0
+                        : m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
+                              m.spring_damping_Nms_rad * (velocity - qd[j]);
     torque_Nm[j] = spring;
     const bool held = braked_[j] != 0;
     rate.position_rad[j] = held ? 0.0 : velocity;

@@ -2,6 +2,7 @@
 // Layer: hal/sim.  Thread: create non-RT; evaluate and step RT.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -87,6 +88,14 @@ class Actuators {
                  double load_Nm) noexcept TANDEM_RT;
   [[nodiscard]] bool braked(std::size_t joint) const noexcept { return braked_[joint] != 0; }
 
+  /// The series spring of `joint` parts, for good: nothing passes between motor and link any more.
+  /// What the spring had stored is lost; energy does not appear. @pre the actuator is elastic
+  void break_spring(std::size_t joint) noexcept TANDEM_RT { broken_[joint] = 1; }
+  /// The winding is at least so hot now, from outside; it cools by itself.
+  void heat(std::size_t joint, double at_least_C) noexcept TANDEM_RT {
+    temperature_[joint] = std::max(temperature_[joint], at_least_C);
+  }
+
   /// Torque on the links `torque_Nm` (n) and the motor state's rate of change.
   void evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
                 MotorState rate) const noexcept TANDEM_RT;
@@ -104,7 +113,9 @@ class Actuators {
   [[nodiscard]] std::span<const double> voltage_V() const noexcept { return voltage_; }
   [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }
 
-  void archive(Archive& ar) { ar(voltage_, bridge_, braked_, brake_rad_, brake_Nm_, temperature_); }
+  void archive(Archive& ar) {
+    ar(voltage_, bridge_, braked_, broken_, brake_rad_, brake_Nm_, temperature_);
+  }
 
  private:
   [[nodiscard]] double current(std::size_t joint, double velocity_rad_s) const noexcept;
@@ -112,7 +123,7 @@ class Actuators {
 
   std::vector<ActuatorModel> models_;
   std::vector<double> voltage_, brake_rad_, brake_Nm_, temperature_;
-  std::vector<std::uint8_t> bridge_, braked_;
+  std::vector<std::uint8_t> bridge_, braked_, broken_;
   std::vector<double> cooling_;  // exp(-h / time constant) of the last step length
   double cooling_h_s_ = 0.0;
   double ambient_C_;

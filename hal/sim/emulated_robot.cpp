@@ -1,7 +1,6 @@
 #include "hal/sim/emulated_robot.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 
 #include "base/archive.hpp"
@@ -101,7 +100,9 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
     : plant_(std::move(plant)),
       sensors_(std::move(sensors)),
       sensor_truth_(sensors_.channels(), 0.0),
-      unplugged_(robot.joints.size(), 0),
+      faults_(config.seed),
+      disturbances_(robot.joints.size()),
+      period_ns_(config.period_ns),
       tick_ns_(common_tick(robot, config.period_ns)) {
   for (std::size_t b = 0; b < robot.buses.size(); ++b) {
     buses_.push_back(std::make_unique<LoopbackBus>());
@@ -119,7 +120,7 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
     }
     boards_.push_back({std::make_unique<firmware::Board>(setup),
                        bus_index(robot, robot.boards[b].bus), joints_of(robot, robot.boards[b]),
-                       sense_.size()});
+                       sense_.size(), setup.product, setup.revision});
     sense_.resize(sense_.size() + setup.axes.size());
   }
   drive_.resize(sense_.size());
@@ -133,12 +134,13 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
                              bus_index(robot, robot.sensors[s].bus), channel, setup.channels});
     channel += setup.channels;
   }
-  return {};
+  return add_faults(robot, config);
 }
 
 Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
-  if (started_ == 0) now_ns_ = time_ns;
+  if (started_ == 0) now_ns_ = first_ns_ = time_ns;
   started_ = 1;
+  if (faults_.any()) begin_faults(time_ns);
   while (now_ns_ < time_ns) {
     if (const Code code = plant_.advance(tick_ns_); code != Code::kOk) return code;
     now_ns_ += tick_ns_;
@@ -154,6 +156,7 @@ Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
   run_boards();
   if (let_down_ == 0 && all_enabled()) {
     let_down_ = 1;
+    enabled_ns_ = now_ns_ - first_ns_;
     plant_.release();
   }
   hook_(Stage::kBoards);
@@ -184,9 +187,7 @@ void EmulatedRobot::sense() noexcept {
               .current_A = joint.current_A,
               .temperature_C = joint.temperature_C,
               .bus_voltage_V = supply_V_[j]};
-      if (unplugged_[j] == 0) continue;
-      --unplugged_[j];
-      pins.link_position_rad = std::numeric_limits<double>::quiet_NaN();
+      if (faults_.any()) disturb(j, pins);
     }
   }
 }
@@ -202,43 +203,84 @@ void EmulatedRobot::deliver(bool at_sync) noexcept {
     while (count > 0 && !is_sync(waiting[count - 1])) --count;
     if (count == 0) count = waiting.size();  // no SYNC: nothing to wait for
     if (!at_sync && is_sync(waiting[count - 1])) --count;
+    canopen::Frame late;
+    while (at_sync && faults_.next_due(Direction::kToBoards, b, late)) receive(b, late);
     for (const canopen::Frame& frame : waiting.first(count)) {
-      for (BoardNode& node : boards_) {
-        if (node.bus == b) node.board->receive(frame);
+      if (!faults_.any()) {
+        receive(b, frame);
+        continue;
       }
-      for (SensorNode& node : sensor_nodes_) {
-        if (node.bus == b) node.board->receive(frame);
-      }
+      canopen::FrameSink out(passed_);
+      faults_.pass(Direction::kToBoards, b, frame, out);
+      for (const canopen::Frame& one : out.frames()) receive(b, one);
     }
     buses_[b]->take_to_boards(count);
   }
 }
 
+/// Everybody on the bus who has power hears it.
+void EmulatedRobot::receive(std::size_t bus, const canopen::Frame& frame) noexcept {
+  for (BoardNode& node : boards_) {
+    if (node.bus == bus && node.powered != 0) node.board->receive(frame);
+  }
+  for (SensorNode& node : sensor_nodes_) {
+    if (node.bus == bus && node.powered != 0) node.board->receive(frame);
+  }
+  for (Twin& twin : twins_) {
+    if (twin.bus == bus && faults_.slots()[twin.slot].active != 0) twin.board->receive(frame);
+  }
+}
+
 void EmulatedRobot::run_boards() noexcept {
+  if (faults_.any()) release_late_answers();
   for (BoardNode& node : boards_) {
     const std::size_t axes = node.joints.size();
     const std::span<firmware::AxisDrive> drives(drive_.data() + node.first, axes);
-    node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
-    for (std::size_t axis = 0; axis < axes; ++axis) {
-      plant_.set_drive(node.joints[axis], drives[axis].voltage_V, drives[axis].enabled);
+    if (node.powered != 0) {
+      node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
+      answer(node.bus, node.board->outgoing());
+      node.board->clear_outgoing();
+    } else {
+      std::ranges::fill(drives, firmware::AxisDrive{});
     }
-    (void)buses_[node.bus]->boards().send(node.board->outgoing());
-    node.board->clear_outgoing();
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      double voltage_V = drives[axis].voltage_V;
+      if (faults_.any()) {  // a bridge gives no more than its supply
+        const double most_V = sense_[node.first + axis].bus_voltage_V;
+        voltage_V = std::clamp(voltage_V, -most_V, most_V);
+      }
+      plant_.set_drive(node.joints[axis], voltage_V, drives[axis].enabled);
+    }
   }
   for (SensorNode& node : sensor_nodes_) {
+    if (node.powered == 0) continue;
     node.board->step(tick_ns_, {sensor_truth_.data() + node.first, node.channels});
-    (void)buses_[node.bus]->boards().send(node.board->outgoing());
+    answer(node.bus, node.board->outgoing());
     node.board->clear_outgoing();
+  }
+  run_twins();
+}
+
+void EmulatedRobot::answer(std::size_t bus, std::span<const canopen::Frame> frames) noexcept {
+  if (!faults_.any()) {
+    (void)buses_[bus]->boards().send(frames);
+    return;
+  }
+  for (const canopen::Frame& frame : frames) {
+    canopen::FrameSink out(passed_);
+    faults_.pass(Direction::kToMaster, bus, frame, out);
+    (void)buses_[bus]->boards().send(out.frames());
   }
 }
 
 void EmulatedRobot::archive(Archive& ar) {
   ar(plant_);
   for (const auto& bus : buses_) ar(*bus);
-  for (const BoardNode& node : boards_) ar(*node.board);
-  for (const SensorNode& node : sensor_nodes_) ar(*node.board);
+  for (BoardNode& node : boards_) ar(*node.board, node.powered);
+  for (SensorNode& node : sensor_nodes_) ar(*node.board, node.powered);
+  for (const Twin& twin : twins_) ar(*twin.board);
   for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled);
-  ar(unplugged_, now_ns_, started_, let_down_);
+  ar(faults_, disturbances_, now_ns_, first_ns_, enabled_ns_, started_, let_down_);
 }
 
 }  // namespace tandem::sim

@@ -3,8 +3,10 @@
 // Layer: hal/sim.  Thread: create non-RT; the rest one thread's.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "firmware_emu/sensor_board.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "hal/robot_config.hpp"
+#include "hal/sim/fault_injection.hpp"
 #include "hal/sim/plant.hpp"
 #include "hal/sim/sensors.hpp"
 
@@ -28,6 +31,7 @@ struct SimRobotConfig {
   std::uint64_t seed = 1;                   ///< of every measurement's noise
   bool truth = true;                        ///< keep truth() up to date
   double rate_limit = 1000.0;  ///< any rate beyond it [rad/s or m/s] counts as diverged
+  std::vector<Fault> faults = {};  ///< a scenario: read_scenario()
 };
 
 /// The stages of a cycle of the simulated robot, from cycle k-1 to cycle k.
@@ -88,9 +92,14 @@ class EmulatedRobot {
   /// True when every axis of every board is in Operation Enabled.
   [[nodiscard]] bool all_enabled() const noexcept;
 
-  /// Faults to inject: joint `joint`'s link encoder gives no number for the next `cycles`.
-  void unplug_encoder(std::size_t joint, std::uint32_t cycles) noexcept {
-    unplugged_[joint] = cycles;
+  /// Adds a fault, between two steps. A start that has passed is the next step.
+  /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: a second board
+  ///         with a node id has to be known when the robot is made.
+  [[nodiscard]] Code inject(const Fault& fault) noexcept TANDEM_RT;
+  /// The next injected fault that has begun and was not given yet; null: none.
+  [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
+  [[nodiscard]] const firmware::Board& board(std::size_t index) const noexcept {
+    return *boards_[index].board;
   }
 
   void set_stage_hook(StageHook hook) noexcept { hook_ = hook; }
@@ -102,11 +111,30 @@ class EmulatedRobot {
     std::size_t bus;
     std::vector<std::size_t> joints;  // by axis
     std::size_t first;                // of its axes in sense_ and drive_
+    std::uint32_t product, revision;  // that it was made with
+    std::uint8_t powered = 1;
   };
   struct SensorNode {
     std::unique_ptr<firmware::SensorBoard> board;
     std::size_t bus;
     std::size_t first, channels;  // in sensor_truth_
+    std::uint8_t powered = 1;
+  };
+  /// A second board with a node id, without motors: it is there while its fault lasts.
+  struct Twin {
+    std::unique_ptr<firmware::Board> board;
+    std::size_t bus;
+    std::size_t slot;  // of faults_
+    std::vector<firmware::AxisSense> sense;
+    std::vector<firmware::AxisDrive> drive;
+  };
+  /// What is wrong with a joint's sensors and supply.
+  struct Disturbance {
+    double jump_rad[2] = {};    // by EncoderSide
+    double frozen_rad[2] = {};
+    double supply_V = 0.0;      // most that there is
+    std::uint32_t frozen[2] = {};
+    std::uint32_t unplugged[2] = {};
   };
 
   EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig& config, Plant plant,
@@ -115,7 +143,19 @@ class EmulatedRobot {
 
   void sense() noexcept;
   void deliver(bool at_sync) noexcept;
+  void receive(std::size_t bus, const canopen::Frame& frame) noexcept;
   void run_boards() noexcept;
+  void answer(std::size_t bus, std::span<const canopen::Frame> frames) noexcept;
+
+  // emulated_robot_faults.cpp
+  Status add_faults(const hal::RobotConfig& robot, const SimRobotConfig& config);
+  void begin_faults(std::int64_t time_ns) noexcept;
+  void apply(const FaultSlot& slot, std::int64_t time_ns) noexcept;
+  void apply_to_board(const FaultSlot& slot) noexcept;
+  void apply_to_joint(const FaultSlot& slot, std::int64_t since_ns) noexcept;
+  void disturb(std::size_t joint, firmware::AxisSense& pins) const noexcept;
+  void release_late_answers() noexcept;
+  void run_twins() noexcept;
 
   Plant plant_;
   Sensors sensors_;
@@ -126,9 +166,15 @@ class EmulatedRobot {
   std::vector<firmware::AxisSense> sense_;
   std::vector<firmware::AxisDrive> drive_;
   std::vector<double> sensor_truth_;
-  std::vector<std::uint32_t> unplugged_;  // cycles left, per joint
-  std::int64_t tick_ns_;                  // boards run every so often
+  FaultInjection faults_;
+  std::vector<Disturbance> disturbances_;  // per joint
+  std::vector<Twin> twins_;
+  std::array<canopen::Frame, FaultInjection::kMostFramesOut> passed_{};  // scratch
+  std::int64_t period_ns_;
+  std::int64_t tick_ns_;  // boards run every so often
   std::int64_t now_ns_ = 0;
+  std::int64_t first_ns_ = 0;     // time of the first step
+  std::int64_t enabled_ns_ = -1;  // after it, when all axes were enabled first
   std::uint8_t started_ = 0, let_down_ = 0;
   StageHook hook_;
 };

@@ -78,6 +78,15 @@ class Plant {
   void release() noexcept TANDEM_RT;
   [[nodiscard]] bool released() const noexcept { return released_ != 0 && !hoist_.holding(); }
 
+  /// Damage: see Actuators. They last until a snapshot from before is restored.
+  void break_spring(std::size_t joint) noexcept TANDEM_RT {
+    actuators_.break_spring(map_[joint]);
+    vdot_fresh_ = 0;
+  }
+  void heat_winding(std::size_t joint, double at_least_C) noexcept TANDEM_RT {
+    actuators_.heat(map_[joint], at_least_C);
+  }
+
   /// 1: the hoist holds the base, 0: it is free.
   [[nodiscard]] double hoist_share() const noexcept { return hoist_.share(); }
 

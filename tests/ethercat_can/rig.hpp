@@ -156,7 +156,7 @@ class Rig {
   }
   Code step() {
     const Code code = read();
-    (void)write();
+    if (master->phase() != Phase::kBringUp) (void)write();
     return code;
   }
   void steps(int count) {

@@ -17,7 +17,13 @@ ConformanceRobot make_ur5e() {
   made.joint = static_cast<std::size_t>(loaded->robot.joint_index("shoulder_pan_joint"));
   made.torque_Nm = 5.0;
   made.voltage_V = 1.0;
-  made.provoke_fault = [raw = backend->get()](std::size_t j) { raw->robot().unplug_encoder(j, 20); };
+  made.provoke_fault = [raw = backend->get()](std::size_t j) {
+    sim::Fault unplugged;
+    unplugged.kind = hal::FaultKind::kEncoderUnplug;
+    unplugged.joint = static_cast<std::int32_t>(j);
+    unplugged.duration_ns = 20'000'000;
+    ASSERT_EQ(raw->robot().inject(unplugged), Code::kOk);
+  };
   made.backend = std::move(*backend);
   made.keep = loaded;
   return made;

@@ -11,7 +11,13 @@ ConformanceRobot make_swing() {
   made.robot = tandem::test::swing_robot(order);
   auto backend = sim::SimRobot::create(made.robot, tandem::test::swing_kernels(order), {});
   EXPECT_TRUE(backend.has_value()) << backend.error().to_string();
-  made.provoke_fault = [raw = backend->get()](std::size_t j) { raw->robot().unplug_encoder(j, 3); };
+  made.provoke_fault = [raw = backend->get()](std::size_t j) {
+    sim::Fault unplugged;
+    unplugged.kind = hal::FaultKind::kEncoderUnplug;
+    unplugged.joint = static_cast<std::int32_t>(j);
+    unplugged.duration_ns = 3'000'000;
+    ASSERT_EQ(raw->robot().inject(unplugged), Code::kOk);
+  };
   made.backend = std::move(*backend);
   return made;
 }

@@ -5,59 +5,14 @@
 
 #include "canopen/messages.hpp"
 #include "hal/capabilities.hpp"
-#include "tests/sim/swing_robot.hpp"
+#include "tests/sim/swing_loop.hpp"
 
 namespace tandem::sim {
 namespace {
 
 using test::swing_kernels;
 using test::swing_robot;
-
-// A robot in its loop, which holds the position that it finds.
-struct Loop {
-  explicit Loop(const hal::RobotConfig& config, SimRobotConfig sim = {.posture = "up"},
-                int order = 2)
-      : robot(config),
-        state(config.shape()),
-        command(config.shape()),
-        parameters(hal::initial_parameters(config)) {
-    auto made = SimRobot::create(config, swing_kernels(order), sim);
-    EXPECT_TRUE(made.has_value()) << made.error().to_string();
-    sim_robot = std::move(*made);
-    time.period_ns = sim.period_ns;
-  }
-  void step() {
-    time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
-    read = sim_robot->read(time, state);
-    if (sim_robot->phase() != hal::Phase::kOperational) {
-      command.position_rad()[0] = state.position_rad()[0];
-      command.mode()[0] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    }
-    written = sim_robot->write(command, parameters);
-    ++time.cycle;
-  }
-  void run(int cycles) {
-    for (int i = 0; i < cycles; ++i) step();
-  }
-  void bring_up() {
-    for (int i = 0; i < 5000 && sim_robot->phase() != hal::Phase::kOperational; ++i) step();
-    ASSERT_EQ(sim_robot->phase(), hal::Phase::kOperational) << sim_robot->status_text();
-  }
-  std::vector<std::byte> bytes() {
-    Archive ar;
-    EXPECT_TRUE(sim_robot->archive(ar));
-    ar(state, command, time);
-    return {ar.bytes().begin(), ar.bytes().end()};
-  }
-
-  hal::RobotConfig robot;
-  hal::StateImage state;
-  hal::CommandImage command;
-  hal::ParameterImage parameters;
-  hal::CycleTime time;
-  std::unique_ptr<SimRobot> sim_robot;
-  Code read = Code::kOk, written = Code::kOk;
-};
+using Loop = test::SwingLoop;
 
 TEST(SimRobot, PowersOnHeldAndThenHoldsByItself) {
   for (const int order : {0, 1, 2, 3}) {
@@ -189,7 +144,11 @@ TEST(SimRobot, FasterBoardsRunBetweenTheCycles) {
 TEST(SimRobot, AnUnpluggedEncoderIsThatJointsFault) {
   Loop loop(swing_robot());
   loop.bring_up();
-  loop.sim_robot->robot().unplug_encoder(0, 5);
+  Fault unplugged;
+  unplugged.kind = hal::FaultKind::kEncoderUnplug;
+  unplugged.joint = 0;
+  unplugged.duration_ns = 5'000'000;
+  ASSERT_EQ(loop.sim_robot->robot().inject(unplugged), Code::kOk);
   loop.run(20);
   EXPECT_NE(loop.state.fault()[0], 0U);
   EXPECT_EQ(loop.sim_robot->phase(), hal::Phase::kFault);

@@ -1,0 +1,172 @@
+// What injected faults do to boards, joints and supply.
+#include <algorithm>
+#include <limits>
+
+#include "canopen/messages.hpp"
+#include "hal/sim/emulated_robot.hpp"
+#include "hal/sim/setup.hpp"
+
+namespace tandem::sim {
+
+using hal::FaultKind;
+
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kAmbient_C = 25.0;
+
+/// From `from` to `to` in `ramp_ns`.
+double ramp(double from, double to, std::int64_t since_ns, std::int64_t ramp_ns) noexcept {
+  if (since_ns >= ramp_ns) return to;
+  return from + (to - from) * static_cast<double>(since_ns) / static_cast<double>(ramp_ns);
+}
+
+}  // namespace
+
+Status EmulatedRobot::add_faults(const hal::RobotConfig& robot, const SimRobotConfig& config) {
+  for (const Fault& fault : config.faults) {
+    if (!faults_.add(fault)) {
+      return fail("a scenario has at most " + std::to_string(FaultInjection::kMostFaults) +
+                  " faults");
+    }
+    if (fault.kind != FaultKind::kBoardDuplicate) continue;
+    const auto index = static_cast<std::size_t>(fault.board);
+    firmware::BoardSetup setup = board_setup(robot, index, config.seed);
+    setup.serial += static_cast<std::uint32_t>(robot.boards.size());
+    const std::size_t axes = setup.axes.size();
+    Twin twin{std::make_unique<firmware::Board>(setup), boards_[index].bus,
+              faults_.slots().size() - 1, std::vector<firmware::AxisSense>(axes),
+              std::vector<firmware::AxisDrive>(axes)};
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      twin.sense[axis].bus_voltage_V = supply_V_[boards_[index].joints[axis]];
+    }
+    twins_.push_back(std::move(twin));
+  }
+  return {};
+}
+
+Code EmulatedRobot::inject(const Fault& fault) noexcept TANDEM_RT {
+  if (fault.kind == FaultKind::kBoardDuplicate) return Code::kOutOfRange;
+  Fault added = fault;
+  const bool on_enabled = fault.from == FaultFrom::kEnabled;
+  const bool counts = started_ != 0 && (!on_enabled || enabled_ns_ >= 0);
+  const std::int64_t next_ns = now_ns_ - first_ns_ + period_ns_ - (on_enabled ? enabled_ns_ : 0);
+  if (counts) added.start_ns = std::max(added.start_ns, next_ns);
+  return faults_.add(added) ? Code::kOk : Code::kQueueFull;
+}
+
+/// Begins and ends what is due; then every active fault acts on what is whole.
+void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
+  faults_.begin_step(time_ns - first_ns_, enabled_ns_);
+  for (std::size_t j = 0; j < disturbances_.size(); ++j) {
+    Disturbance& one = disturbances_[j];
+    one.supply_V = supply_V_[j];
+    for (std::size_t side : {0u, 1u}) {
+      one.jump_rad[side] = 0.0;
+      one.frozen[side] = one.unplugged[side] = 0;
+    }
+  }
+  for (const FaultSlot& slot : faults_.slots()) {
+    if (slot.active != 0 || slot.ended != 0) apply(slot, time_ns - first_ns_);
+  }
+}
+
+void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept {
+  const Fault& fault = slot.fault;
+  const std::int64_t from_ns = fault.from == FaultFrom::kEnabled ? enabled_ns_ : 0;
+  const std::int64_t since_ns = time_ns - from_ns - fault.start_ns;
+  if (fault.joint >= 0) {
+    if (slot.active != 0) apply_to_joint(slot, since_ns);
+  } else if (fault.kind == FaultKind::kSupplySag && slot.active != 0) {
+    for (const std::size_t j : boards_[static_cast<std::size_t>(fault.board)].joints) {
+      const double volts = ramp(supply_V_[j], fault.value, since_ns, fault.ramp_ns);
+      disturbances_[j].supply_V = std::min(disturbances_[j].supply_V, volts);
+    }
+  } else {
+    apply_to_board(slot);
+  }
+}
+
+/// What happens once, at the beginning or the end.
+void EmulatedRobot::apply_to_board(const FaultSlot& slot) noexcept {
+  const Fault& fault = slot.fault;
+  const bool reset = fault.kind == FaultKind::kBoardReset && slot.began != 0;
+  const bool kill = fault.kind == FaultKind::kBoardKill;
+  const auto act = [&](auto& node) {
+    if (kill) node.powered = slot.active != 0 ? 0 : 1;
+    if (!reset && !(kill && slot.ended != 0)) return;
+    node.board->clear_outgoing();
+    node.board->receive(canopen::make_nmt(canopen::NmtCommand::kResetNode, 0));
+  };
+  if (fault.sensor >= 0) act(sensor_nodes_[static_cast<std::size_t>(fault.sensor)]);
+  if (fault.board < 0) return;
+  BoardNode& node = boards_[static_cast<std::size_t>(fault.board)];
+  act(node);
+  if (kill && slot.began != 0) {
+    for (const std::size_t j : node.joints) plant_.set_drive(j, 0.0, false);
+  }
+  const bool on = slot.active != 0;
+  if (fault.kind == FaultKind::kBoardIdentity) {
+    node.board->set_identity(canopen::kProduct, on ? fault.number : node.product);
+  } else if (fault.kind == FaultKind::kBoardRevision) {
+    node.board->set_identity(canopen::kRevision, on ? fault.number : node.revision);
+  }
+}
+
+void EmulatedRobot::apply_to_joint(const FaultSlot& slot, std::int64_t since_ns) noexcept {
+  const Fault& fault = slot.fault;
+  const auto j = static_cast<std::size_t>(fault.joint);
+  const auto side = static_cast<std::size_t>(fault.encoder);
+  Disturbance& one = disturbances_[j];
+  switch (fault.kind) {
+    case FaultKind::kEncoderFreeze:
+      if (slot.began != 0) {  // where it stood at the last SYNC
+        const JointReading now = plant_.joint(j);
+        one.frozen_rad[side] =
+            fault.encoder == EncoderSide::kLink ? now.position_rad : now.motor_position_rad;
+      }
+      one.frozen[side] = 1;
+      break;
+    case FaultKind::kEncoderJump: one.jump_rad[side] += fault.value; break;
+    case FaultKind::kEncoderUnplug: one.unplugged[side] = 1; break;
+    case FaultKind::kMotorOverheat:
+      plant_.heat_winding(j, ramp(kAmbient_C, fault.value, since_ns, fault.ramp_ns));
+      break;
+    case FaultKind::kSpringBreak:
+      if (slot.began != 0) plant_.break_spring(j);
+      break;
+    default: break;
+  }
+}
+
+void EmulatedRobot::disturb(std::size_t joint, firmware::AxisSense& pins) const noexcept {
+  const Disturbance& one = disturbances_[joint];
+  double* const angle[2] = {&pins.link_position_rad, &pins.motor_position_rad};
+  for (std::size_t side : {0u, 1u}) {
+    if (one.frozen[side] != 0) *angle[side] = one.frozen_rad[side];
+    *angle[side] += one.jump_rad[side];
+    if (one.unplugged[side] != 0) *angle[side] = kNaN;
+  }
+  pins.bus_voltage_V = one.supply_V;
+}
+
+void EmulatedRobot::release_late_answers() noexcept {
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    canopen::Frame late;
+    while (faults_.next_due(Direction::kToMaster, b, late)) {
+      (void)buses_[b]->boards().send({&late, 1});
+    }
+  }
+}
+
+/// After the boards proper, as of two answers with one identifier the other may come first.
+void EmulatedRobot::run_twins() noexcept {
+  for (Twin& twin : twins_) {
+    if (faults_.slots()[twin.slot].active == 0) continue;
+    twin.board->step(tick_ns_, twin.sense, twin.drive);
+    answer(twin.bus, twin.board->outgoing());
+    twin.board->clear_outgoing();
+  }
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,145 @@
+// Faults on purpose: when each begins and ends, and what it does to the frames that pass.
+// Layer: hal/sim.  Thread: add() between cycles; the rest the emulated robot's.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/realtime.hpp"
+#include "canopen/frame.hpp"
+#include "hal/fault_kind.hpp"
+
+namespace tandem {
+class Archive;
+}
+
+namespace tandem::sim {
+
+/// Which way a frame goes. A fault may act on both.
+enum class Direction : std::uint8_t { kToBoards = 1, kToMaster = 2, kBoth = 3 };
+
+/// What a fault's time counts from.
+enum class FaultFrom : std::uint8_t {
+  kPowerOn,  ///< the first SYNC
+  kEnabled,  ///< the first time that every axis is in Operation Enabled
+};
+
+enum class EncoderSide : std::uint8_t { kLink, kMotor };
+
+/// One fault, its target by index in the robot's configuration. Plain data without padding.
+struct Fault {
+  std::int64_t start_ns = 0;       ///< after `from`
+  std::int64_t duration_ns = -1;   ///< -1: for good
+  std::int64_t ramp_ns = 0;        ///< in which a sag or a temperature is reached
+  double value = 0.0;              ///< jump [rad, or m of a slide], supply [V], winding [degC]
+  double probability = 1.0;        ///< that a selected frame is struck
+  std::uint64_t seed = 0;          ///< of what is random in it
+  std::int32_t bus = -1;           ///< -1: any
+  std::int32_t board = -1;
+  std::int32_t sensor = -1;
+  std::int32_t joint = -1;
+  std::uint32_t node_id = 0;       ///< frames whose COB-ID carries it; 0: any
+  std::uint32_t cob_id = 0;
+  std::uint32_t cob_mask = 0;      ///< bits of the COB-ID that have to agree; 0: any
+  std::uint32_t count = 0;         ///< most frames that are struck; 0: no limit
+  std::uint32_t steps = 1;         ///< that a frame is delayed
+  std::uint32_t bits = 1;          ///< that are flipped in a frame
+  std::int32_t length = -1;        ///< that a frame gets; -1: its own
+  std::uint32_t number = 0;        ///< product code, revision
+  hal::FaultKind kind = hal::FaultKind::kNone;
+  FaultFrom from = FaultFrom::kPowerOn;
+  Direction direction = Direction::kBoth;
+  EncoderSide encoder = EncoderSide::kLink;
+  std::uint32_t reserved = 0;
+};
+static_assert(sizeof(Fault) == 104);
+
+[[nodiscard]] constexpr bool is_frame_fault(hal::FaultKind kind) noexcept {
+  return kind >= hal::FaultKind::kFrameDrop && kind <= hal::FaultKind::kFrameReorder;
+}
+
+/// A fault with where it stands.
+struct FaultSlot {
+  Fault fault;
+  std::uint64_t random = 0;  ///< its generator's state
+  std::uint32_t struck = 0;  ///< frames
+  std::uint8_t active = 0;
+  std::uint8_t began = 0;  ///< in this step
+  std::uint8_t ended = 0;  ///< in this step
+  std::uint8_t acted = 0;  ///< ever
+  std::uint8_t told = 0;   ///< next_begun() gave it
+  std::array<std::uint8_t, 7> reserved{};
+};
+static_assert(sizeof(FaultSlot) == 128);
+
+/// ```
+/// faults.begin_step(time_ns, enabled_ns);
+/// for (const FaultSlot& slot : faults.slots()) …      // what acts on boards, joints and supply
+/// while (faults.next_due(direction, bus, frame)) …    // frames that were late
+/// faults.pass(direction, bus, frame, out);            // each frame: none, one or several
+/// ```
+/// Deterministic: what is random comes from a generator per fault, seeded by the run's seed, the
+/// fault's and its number.
+class FaultInjection {
+ public:
+  static constexpr std::size_t kMostFaults = 64;
+  static constexpr std::size_t kMostHeld = 256;  ///< frames; beyond it a frame is not delayed
+  static constexpr std::size_t kMostFramesOut = 8;  ///< that one pass() gives
+
+  explicit FaultInjection(std::uint64_t seed) noexcept : seed_(seed) {}
+
+  /// @return false: there are kMostFaults already.
+  [[nodiscard]] bool add(const Fault& fault) noexcept TANDEM_RT;
+
+  /// Begins and ends faults: those whose time has come act on the whole step to `time_ns`.
+  /// @param time_ns     since the first SYNC
+  /// @param enabled_ns  when every axis was enabled, on the same clock; below 0: not yet
+  void begin_step(std::int64_t time_ns, std::int64_t enabled_ns) noexcept TANDEM_RT;
+
+  /// False as long as nothing was ever injected: nothing needs to be asked.
+  [[nodiscard]] bool any() const noexcept { return count_ > 0; }
+  [[nodiscard]] std::span<const FaultSlot> slots() const noexcept {
+    return {slots_.data(), count_};
+  }
+
+  /// What becomes of one frame, in `out`: at most kMostFramesOut.
+  void pass(Direction direction, std::size_t bus, const canopen::Frame& frame,
+            canopen::FrameSink& out) noexcept TANDEM_RT;
+  /// The next delayed frame whose step has come.
+  [[nodiscard]] bool next_due(Direction direction, std::size_t bus,
+                              canopen::Frame& frame) noexcept TANDEM_RT;
+
+  /// The next fault that has begun and was not given yet; null: none.
+  [[nodiscard]] const Fault* next_begun() noexcept TANDEM_RT;
+
+  void archive(Archive& ar);
+
+ private:
+  struct Held {
+    std::uint64_t due = 0;  ///< step
+    std::uint32_t bus = 0;
+    std::uint32_t slot = 0;
+    Direction direction = Direction::kToBoards;
+    std::array<std::uint8_t, 7> reserved{};
+    canopen::Frame frame;
+  };
+  static_assert(sizeof(Held) == 96);
+
+  [[nodiscard]] bool strikes(FaultSlot& slot) noexcept;
+  [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, Direction direction,
+                          std::size_t bus, const canopen::Frame& frame) noexcept;
+  void take_held(std::size_t index, canopen::Frame& frame) noexcept;
+  [[nodiscard]] std::size_t held_by(std::size_t slot, Direction direction,
+                                    std::size_t bus) const noexcept;
+
+  std::array<FaultSlot, kMostFaults> slots_{};
+  std::size_t count_ = 0;
+  std::array<Held, kMostHeld> held_{};
+  std::size_t held_count_ = 0;
+  std::uint64_t step_ = 0;
+  std::uint64_t seed_;
+};
+
+}  // namespace tandem::sim

@@ -1,0 +1,114 @@
+#include "hal/sim/scenario.hpp"
+
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::sim {
+namespace {
+
+using hal::FaultKind;
+
+auto parse(std::string_view text, int order = 2) {
+  return parse_scenario(text, "faults.toml", test::swing_robot(order), 1'000'000);
+}
+
+std::string errors_of(std::string_view text, int order = 2) {
+  const auto faults = parse(text, order);
+  std::string all;
+  if (!faults) {
+    for (const Error& error : faults.error()) all += error.to_string() + "\n";
+  }
+  return all;
+}
+
+TEST(Scenario, GivesEveryKeyItsPlace) {
+  const auto faults = parse(R"(
+[[fault]]
+kind = "frame_delay"
+after_enabled_s = 0.25
+for_cycles = 20
+board = "board"
+direction = "to_master"
+probability = 0.5
+count = 7
+seed = 3
+steps = 2
+[[fault]]
+kind = "encoder_jump"
+at_cycle = 1500
+joint = "swing"
+encoder = "motor"
+rad = -0.2
+[[fault]]
+kind = "supply_sag"
+at_s = 1.5
+for_s = 0.5
+board = "board"
+volts = 12
+ramp_s = 0.1
+[[fault]]
+kind = "board_kill"
+sensor = "tip"
+)");
+  ASSERT_TRUE(faults) << faults.error()[0].to_string();
+  ASSERT_EQ(faults->size(), 4U);
+  const Fault& delay = (*faults)[0];
+  EXPECT_EQ(delay.kind, FaultKind::kFrameDelay);
+  EXPECT_EQ(delay.from, FaultFrom::kEnabled);
+  EXPECT_EQ(delay.start_ns, 250'000'000);
+  EXPECT_EQ(delay.duration_ns, 20'000'000);
+  EXPECT_EQ(delay.bus, 0);
+  EXPECT_EQ(delay.node_id, 1U);
+  EXPECT_EQ(delay.direction, Direction::kToMaster);
+  EXPECT_EQ(delay.probability, 0.5);
+  EXPECT_EQ(delay.count, 7U);
+  EXPECT_EQ(delay.seed, 3U);
+  EXPECT_EQ(delay.steps, 2U);
+  const Fault& jump = (*faults)[1];
+  EXPECT_EQ(jump.start_ns, 1'500'000'000);
+  EXPECT_EQ(jump.duration_ns, -1);
+  EXPECT_EQ(jump.joint, 0);
+  EXPECT_EQ(jump.encoder, EncoderSide::kMotor);
+  EXPECT_EQ(jump.value, -0.2);
+  const Fault& sag = (*faults)[2];
+  EXPECT_EQ(sag.board, 0);
+  EXPECT_EQ(sag.value, 12.0);
+  EXPECT_EQ(sag.ramp_ns, 100'000'000);
+  EXPECT_EQ((*faults)[3].sensor, 0);
+}
+
+TEST(Scenario, SaysWhatIsWrongAndWhere) {
+  EXPECT_EQ(errors_of("[[fault]]\nkind = \"board_kil\"\n").find("faults.toml:2: "), 0U);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"board_kil\"\n").find("board_kill"), std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"spring_break\"\njoint = \"swin\"\n")
+                .find("did you mean 'swing'?"),
+            std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"board_kill\"\nboard = \"board\"\nrad = 1.0\n")
+                .find("faults.toml:4: fault[0].rad"),
+            std::string::npos)
+      << errors_of("[[fault]]\nkind = \"board_kill\"\nboard = \"board\"\nrad = 1.0\n");
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"bus_down\"\nbus = \"line\"\nat_s = 1\nat_cycle = 1\n")
+                .find("begins once"),
+            std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"board_reset\"\nboard = \"board\"\nfor_s = 1\n")
+                .find("happens once"),
+            std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"spring_break\"\njoint = \"swing\"\n", 0).find("rigid"),
+            std::string::npos);
+  EXPECT_NE(errors_of("").find("there is no fault"), std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = \"frame_drop\"\nprobability = 0\n").find("probability"),
+            std::string::npos);
+}
+
+TEST(Scenario, TakesTheWordsOfACommandLine) {
+  const std::vector<std::string> words{"kind=encoder_jump", "joint=swing", "rad=-0.5"};
+  const auto faults = parse(scenario_of_words(words));
+  ASSERT_TRUE(faults) << faults.error()[0].to_string();
+  EXPECT_EQ((*faults)[0].value, -0.5);
+  const std::vector<std::string> toml{"kind = \"frame_drop\"\ncob_id = 0x181"};
+  const auto same = parse(scenario_of_words(toml));
+  ASSERT_TRUE(same) << same.error()[0].to_string();
+  EXPECT_EQ((*same)[0].cob_id, 0x181U);
+}
+
+}  // namespace
+}  // namespace tandem::sim
