@@ -29,8 +29,10 @@ constexpr int kMaxErrors = 2;
 
 }  // namespace
 
-SocketCanBus::SocketCanBus(const SocketCanOptions& options, int socket, int index)
+SocketCanBus::SocketCanBus(const SocketCanOptions& options, std::vector<can_filter> filters,
+                           int socket, int index)
     : options_(options),
+      filters_(std::move(filters)),
       socket_(socket),
       index_(index),
       out_(std::make_unique<Batch>()),
@@ -222,8 +224,10 @@ SocketCanBus::Link SocketCanBus::look_for_link() noexcept {
   if (options_.fd && facts.mtu < static_cast<int>(CANFD_MTU)) return Link::kClassicOnly;
   discard_waiting();
   if (facts.index == index_) return Link::kUp;
-  ++system_calls_;
-  if (bind_to(socket_, facts.index) != 0) return Link::kGone;
+  system_calls_ += 2;
+  if (set_filters(socket_, filters_) != 0 || bind_to(socket_, facts.index) != 0) {
+    return Link::kGone;
+  }
   index_ = facts.index;
   return Link::kUp;
 }

@@ -13,6 +13,7 @@
 #include "base/result.hpp"
 #include "hal/ethercat-can/bus.hpp"
 
+struct can_filter;
 struct canfd_frame;
 
 namespace tandem::hal::can {
@@ -80,7 +81,8 @@ class SocketCanBus final : public Bus {
   enum class Link : std::uint8_t { kUp, kDown, kGone, kClassicOnly };
   struct Batch;
 
-  SocketCanBus(const SocketCanOptions& options, int socket, int index);
+  SocketCanBus(const SocketCanOptions& options, std::vector<can_filter> filters, int socket,
+               int index);
 
   [[nodiscard]] bool send_batch(std::size_t count) noexcept;
   void take(std::size_t at, std::span<canopen::Frame> frames) noexcept;
@@ -96,6 +98,7 @@ class SocketCanBus final : public Bus {
   void discard_waiting() noexcept;
 
   SocketCanOptions options_;
+  std::vector<can_filter> filters_;
   int socket_;
   int index_;  ///< of the interface that the socket is bound to; 0: none
   std::unique_ptr<Batch> out_;

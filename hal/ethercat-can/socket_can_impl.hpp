@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <ctime>
+#include <span>
 #include <string>
 
 #include "hal/ethercat-can/socket_can_bus.hpp"
@@ -61,6 +62,10 @@ struct InterfaceFacts {
 [[nodiscard]] int read_interface(int socket, const std::string& name,
                                  InterfaceFacts& facts) noexcept;
 inline constexpr std::uint64_t kReadInterfaceCalls = 4;
+
+/// The kernel drops a socket's filters with its interface: set before each bind_to().
+/// @return errno; 0 when they are set.
+[[nodiscard]] int set_filters(int socket, std::span<const can_filter> filters) noexcept;
 
 /// @return errno; 0 when the socket is bound.
 [[nodiscard]] int bind_to(int socket, int index) noexcept;

@@ -92,8 +92,8 @@ Result<int> check_interface(const SocketCanOptions& options, int socket) {
 }
 
 template <class T>
-bool set(int socket, int level, int name, const T& value, std::size_t size = sizeof(T)) {
-  return ::setsockopt(socket, level, name, &value, static_cast<socklen_t>(size)) == 0;
+bool set(int socket, int level, int name, const T& value) {
+  return ::setsockopt(socket, level, name, &value, sizeof(value)) == 0;
 }
 
 /// The kernel doubles what it is asked for, up to twice its limit; root may go beyond.
@@ -123,7 +123,7 @@ Status size_queues(const SocketCanOptions& options, int socket) {
   return {};
 }
 
-/// What the kernel lets through, data frames with 11-bit identifiers only.
+/// What the kernel lets through; to master and boards only data frames with 11-bit identifiers.
 std::vector<can_filter> filters(SocketSide side) {
   std::vector<can_filter> all;
   const auto let = [&](std::uint32_t id, std::uint32_t mask) {
@@ -148,22 +148,21 @@ std::vector<can_filter> filters(SocketSide side) {
     }
     let(cob::kSdoRequest, kFunctionMask);
     let(cob::kHeartbeat + kMasterNodeId, cob::kIdMask);
+  } else {
+    all.push_back({.can_id = 0, .can_mask = 0});
   }
   return all;
 }
 
-Status configure(const SocketCanOptions& options, int socket) {
+Status configure(const SocketCanOptions& options, std::span<const can_filter> filter, int socket) {
   if (auto sized = size_queues(options, socket); !sized) return sized;
   const can_err_mask_t every_error = CAN_ERR_MASK;
-  const auto filter = filters(options.side);
   const int on = 1;
-  const bool done =
-      set(socket, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, on) &&
-      set(socket, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, every_error) &&
-      (filter.empty() ||
-       ::setsockopt(socket, SOL_CAN_RAW, CAN_RAW_FILTER, filter.data(),
-                    static_cast<socklen_t>(filter.size() * sizeof(can_filter))) == 0) &&
-      set(socket, SOL_SOCKET, SO_TIMESTAMPNS, on) && set(socket, SOL_SOCKET, SO_RXQ_OVFL, on);
+  const bool done = set(socket, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, on) &&
+                    set(socket, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, every_error) &&
+                    set_filters(socket, filter) == 0 &&
+                    set(socket, SOL_SOCKET, SO_TIMESTAMPNS, on) &&
+                    set(socket, SOL_SOCKET, SO_RXQ_OVFL, on);
   if (done) return {};
   return refuse(options,
                 fmt::format("the kernel refuses a socket option: {}", std::strerror(errno)),
@@ -182,14 +181,16 @@ Result<std::unique_ptr<SocketCanBus>> SocketCanBus::open(const SocketCanOptions&
   OpenSocket socket{*made};
   const auto index = check_interface(options, *made);
   if (!index) return std::unexpected(index.error());
-  if (const auto configured = configure(options, *made); !configured) {
+  std::vector<can_filter> filter = filters(options.side);
+  if (const auto configured = configure(options, filter, *made); !configured) {
     return std::unexpected(configured.error());
   }
   if (const int error = bind_to(*made, *index); error != 0) {
     return refuse(options, fmt::format("cannot be bound to: {}", std::strerror(error)),
                   set_up(options));
   }
-  return std::unique_ptr<SocketCanBus>(new SocketCanBus(options, socket.release(), *index));
+  return std::unique_ptr<SocketCanBus>(
+      new SocketCanBus(options, std::move(filter), socket.release(), *index));
 }
 
 std::string SocketCanBus::status_text() const {
@@ -249,6 +250,11 @@ int read_interface(int socket, const std::string& name, InterfaceFacts& facts) n
   if (::ioctl(socket, SIOCGIFMTU, &request) != 0) return errno;
   facts.mtu = request.ifr_mtu;
   return 0;
+}
+
+int set_filters(int socket, std::span<const can_filter> filters) noexcept {
+  const auto bytes = static_cast<socklen_t>(filters.size_bytes());
+  return ::setsockopt(socket, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), bytes) == 0 ? 0 : errno;
 }
 
 int bind_to(int socket, int index) noexcept {
