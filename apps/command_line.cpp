@@ -16,6 +16,7 @@ const char kExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                draw the plots of a run
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
+  tandem doctor                                      is this machine fit for real time?
   tandem latency --load idle --duration 10           how late this machine wakes the loop up
 `tandem COMMAND --help` tells more, with examples.
 
@@ -72,6 +73,12 @@ const char kLatencyExamples[] = R"(Examples:
   tandem latency --json - --quiet | jq '.loads[].ratio'
 In mode `swap` both run at once and exchange their CPUs each slice; in `together` each keeps its
 own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. Nothing is judged.)";
+
+const char kDoctorExamples[] = R"(Examples:
+  tandem doctor                                      kernel, CPUs, interrupts, limits, memory
+  tandem doctor config/coman/robot.toml              and the CAN interfaces of its buses
+  tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
+Each finding comes with the command that mends it. The exit status does not depend on them.)";
 
 const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
 
@@ -195,6 +202,13 @@ void add_latency(CLI::App& app, LatencyOptions& o) {
   app.footer(kLatencyExamples);
 }
 
+void add_doctor(CLI::App& app, DoctorOptions& o) {
+  app.add_option("robot", o.robot, "Robot TOML, to look at the CAN interfaces of its buses");
+  app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kDoctorExamples);
+}
+
 /// The innermost subcommand that was named.
 const CLI::App& innermost(const CLI::App& app) {
   const std::vector<CLI::App*> named = app.get_subcommands();
@@ -257,12 +271,14 @@ Command parse_command_line(int argc, const char* const* argv) {
   LogOptions log;
   ReportOptions report;
   LatencyOptions latency;
+  DoctorOptions doctor;
   CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
   CLI::App* ask_app = app.add_subcommand("ask", "Ask a running process, in JSON");
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
   CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv, diff");
   CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
+  CLI::App* doctor_app = app.add_subcommand("doctor", "Is this machine fit for real time?");
   CLI::App* latency_app =
       app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
   add_run(*run_app, run);
@@ -272,6 +288,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   add_log(*log_app, log);
   add_report(*report_app, report);
   add_latency(*latency_app, latency);
+  add_doctor(*doctor_app, doctor);
 
   try {
     app.parse(argc, argv);
@@ -286,6 +303,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (model_app->parsed()) return model;
   if (log_app->parsed()) return log;
   if (latency_app->parsed()) return latency;
+  if (doctor_app->parsed()) return doctor;
   return report;
 }
 

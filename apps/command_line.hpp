@@ -92,9 +92,16 @@ struct LatencyOptions {
   std::string json;
 };
 
+/// tandem doctor [ROBOT]
+struct DoctorOptions {
+  std::string robot;       ///< robot.toml, whose CAN interfaces are looked at; may be empty
+  std::string root = "/";  ///< of the files that are read
+  std::string json;
+};
+
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 using Command = std::variant<Exit, RunOptions, AskOptions, CheckOptions, ModelOptions, LogOptions,
-                             ReportOptions, LatencyOptions>;
+                             ReportOptions, LatencyOptions, DoctorOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

@@ -18,6 +18,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit model_command(const ModelOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
+/// Says what of the machine stands in the way of real time; exit status 0 whatever it finds.
+[[nodiscard]] Exit doctor_command(const DoctorOptions& options);
 /// Measures; judges nothing.
 [[nodiscard]] Exit latency_command(const LatencyOptions& options);
 

@@ -75,8 +75,10 @@ void Table::print(std::FILE* out) const {
     if (rows_[r].empty()) continue;
     std::string line;
     for (std::size_t i = 0; i < rows_[r].size(); ++i) {
-      line += i == 0 ? "  " + left(rows_[r][i], columns[i]) : "  " + right(rows_[r][i], columns[i]);
+      const std::string& cell = rows_[r][i];
+      line += "  " + (i == 0 || left_ ? left(cell, columns[i]) : right(cell, columns[i]));
     }
+    line.erase(line.find_last_not_of(' ') + 1);
     fmt::print(out, "{}\n", line);
     if (r > 0) continue;
     std::size_t rule = 0;

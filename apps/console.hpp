@@ -32,17 +32,20 @@ using Json = nlohmann::ordered_json;
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);
 
-/// A table of two or more columns, the first left-aligned and the others to the right.
+/// A table of two or more columns, the first left-aligned and the others to the right, unless all
+/// are texts.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
   [[nodiscard]] std::size_t rows() const { return rows_.size() - 1; }
+  void align_left() { left_ = true; }
   /// Prints with a rule below the header, when that is not empty.
   void print(std::FILE* out) const;
 
  private:
   std::vector<std::vector<std::string>> rows_;
+  bool left_ = false;
 };
 
 /// Name and value, one pair a line, the values aligned.
