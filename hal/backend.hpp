@@ -9,6 +9,7 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "hal/stop_category.hpp"
 
 namespace tandem {
 class Archive;
@@ -25,7 +26,7 @@ enum class Pace : std::uint8_t {
 
 /// Where a backend stands between power-on and power-off.
 enum class Phase : std::uint8_t {
-  kBringUp,     ///< nodes are being configured and drives enabled; commands are not used yet
+  kBringUp,     ///< nodes are being configured and drives enabled, at first or by reset()
   kOperational, ///< every axis follows the command
   kFault,       ///< latched; `fault_text()` says the cause
 };
@@ -66,7 +67,17 @@ class Backend {
   [[nodiscard]] virtual Code write(const CommandImage& command,
                                    const ParameterImage& parameters) noexcept TANDEM_RT = 0;
 
-  /// Asks the drives to stop and disable, category 1: called each cycle until it answers true.
+  /// Latches a stop of every joint, kept until reset(): write() has no effect and phase() is kFault
+  /// from now on. Of several the hardest is carried out; kWarn changes nothing. During bring-up it
+  /// ends it. The drives hear of it in this cycle. A joint's own fault needs no call: the backend
+  /// carries out its category by itself.
+  virtual void stop(StopCategory category) noexcept TANDEM_RT = 0;
+  /// Clears what stop() latched and what is latched in drives and nodes; then every joint is
+  /// enabled at its measured position. phase() is kBringUp meanwhile, kOperational when every joint
+  /// follows the command again, kFault when a cause is still there.
+  virtual void reset() noexcept TANDEM_RT = 0;
+
+  /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend

@@ -12,6 +12,7 @@
 
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "hal/stop_category.hpp"
 
 namespace tandem::hal {
 
@@ -85,9 +86,6 @@ struct GainsConfig {
   double damping_Nms_rad = 0.0;
 };
 
-/// What the loop does when this joint's board dies or faults. IEC 60204-1 names.
-enum class StopCategory : std::uint8_t { kCategory0 = 0, kCategory1 = 1, kHold = 2, kWarn = 3 };
-
 /// [[joint]]
 struct JointConfig {
   std::string name;                     ///< URDF joint
@@ -104,7 +102,7 @@ struct JointConfig {
   double encoder_counts_per_rev = 0.0;  ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
   double torque_noise_Nm = 0.0;         ///< standard deviation of the spring torque's measurement
-  StopCategory on_fault = StopCategory::kCategory1;
+  StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                         ///< in the TOML, for messages
 };
 

@@ -70,8 +70,8 @@ void read_gains(TomlTable table, const std::string& name, RobotConfig& robot) {
 
 StopCategory read_stop_category(TomlTable& table, StopCategory value) {
   static const std::vector<std::string> kNames{"category0", "category1", "hold", "warn"};
-  const std::string& name = kNames[static_cast<std::size_t>(value)];
-  const auto found = std::ranges::find(kNames, table.choice_or("on_fault", name, kNames));
+  const auto found =
+      std::ranges::find(kNames, table.choice_or("on_fault", to_string(value), kNames));
   return static_cast<StopCategory>(found - kNames.begin());
 }
 

@@ -48,6 +48,8 @@ class CanBackend final : public Backend {
   [[nodiscard]] Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const CommandImage& command,
                            const ParameterImage& parameters) noexcept TANDEM_RT override;
+  void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
+  void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   /// The robot cannot be rewound: false.
   [[nodiscard]] bool archive(Archive& ar) override;

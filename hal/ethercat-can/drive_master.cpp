@@ -336,6 +336,9 @@ Code DriveMaster::send(const CommandImage& command,
   return taken ? Code::kOk : Code::kQueueFull;
 }
 
+void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT { impl_->stop(category); }
+void DriveMaster::reset() noexcept TANDEM_RT { impl_->reset(); }
+
 bool DriveMaster::shut_down() noexcept TANDEM_RT {
   const bool done = impl_->shut_down();
   (void)impl_->flush();
@@ -343,6 +346,7 @@ bool DriveMaster::shut_down() noexcept TANDEM_RT {
 }
 
 Phase DriveMaster::phase() const noexcept {
+  if (impl_->resetting) return Phase::kBringUp;
   switch (impl_->stage) {
     case Impl::Stage::kBooting:
     case Impl::Stage::kEnabling: return Phase::kBringUp;
@@ -365,8 +369,8 @@ std::string DriveMaster::parameter_error() const { return impl_->refused_text();
 void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
-  ar(stage, reaction, begun, shutting_down, now_ns, dt_ns, shut_down_since_ns, refused_node,
-     refused_step, refused_code, axes, sent_revision);
+  ar(stage, reaction, latched, resetting, begun, shutting_down, now_ns, dt_ns, shut_down_since_ns,
+     refused_node, refused_step, refused_code, axes, sent_revision);
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {

@@ -45,8 +45,10 @@ inline constexpr int kMasterNodeId = 127;
 ///
 /// In operation a fault latches per joint, with cause and time, and the stop category of the
 /// joints concerned is carried out: 0 opens every bridge, 1 quick-stops every axis, hold keeps
-/// every healthy axis at its position, warn only tells. CommandImage::fault_reset clears it: the
-/// drive is reset (a board that was lost is configured anew), and enabled at its measured position.
+/// every healthy axis at its position, warn only tells. stop() latches the same without a fault.
+/// reset() clears all of it: drives are reset, a board that was lost is configured anew, and every
+/// axis is enabled at its measured position. CommandImage::fault_reset does that for one joint, but
+/// leaves what stop() latched.
 class DriveMaster {
  public:
   /// @param robot  complete: limits filled in from the description.
@@ -72,6 +74,12 @@ class DriveMaster {
   /// per node that has changed. During bring-up: nothing. In a fault: only looks for resets.
   /// @return kOk, kQueueFull (the bus did not take all), kFault.
   Code send(const CommandImage& command, const ParameterImage& parameters) noexcept TANDEM_RT;
+
+  /// Latches a stop, and sends it at once. kWarn: nothing. During bring-up: ends it.
+  void stop(StopCategory category) noexcept TANDEM_RT;
+  /// Clears every latched fault and stop, and enables every axis again. phase() is kBringUp until
+  /// they are, or until one cannot be. Without effect after a bring-up that failed.
+  void reset() noexcept TANDEM_RT;
 
   /// Category 1: quick stop, then disabled, then NMT pre-operational. Once per cycle instead of
   /// send(), until it answers true.

@@ -78,11 +78,17 @@ struct DriveMaster::Impl {
   void watch() noexcept TANDEM_RT;
   void react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
+  void stop(StopCategory category) noexcept TANDEM_RT;
+  void reset() noexcept TANDEM_RT;
+  void reset_joint(std::size_t joint) noexcept TANDEM_RT;
   void take_resets(const CommandImage& command) noexcept TANDEM_RT;
+  void enable_again() noexcept TANDEM_RT;
+  void watch_reset() noexcept TANDEM_RT;
   void set_goals(AxisMaster::Goal goal) noexcept TANDEM_RT;
   void fail() noexcept TANDEM_RT;
   void make_commands(const CommandImage* image) noexcept TANDEM_RT;
   [[nodiscard]] bool all_enabled() const noexcept TANDEM_RT;
+  [[nodiscard]] bool stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
   [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }
 
@@ -109,7 +115,9 @@ struct DriveMaster::Impl {
   std::vector<std::uint32_t> sent_revision;
 
   Stage stage = Stage::kBooting;
-  StopCategory reaction = StopCategory::kWarn;
+  StopCategory reaction = StopCategory::kWarn;  ///< the hardest that is carried out
+  StopCategory latched = StopCategory::kWarn;   ///< of stop(): until reset()
+  bool resetting = false;                       ///< reset() is not through yet
   bool begun = false;
   bool shutting_down = false;
   std::int64_t now_ns = 0;

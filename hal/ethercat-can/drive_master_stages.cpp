@@ -34,20 +34,56 @@ void DriveMaster::Impl::advance() noexcept TANDEM_RT {
     case Stage::kFaulted:
       watch();
       recover();
-      if (std::ranges::any_of(axes, [](const AxisMaster& axis) {
-            return axis.trouble() != AxisTrouble::kNone || axis.goal() == Goal::kReset;
-          })) {
-        break;
-      }
-      set_goals(Goal::kEnable);  // every fault is reset: all axes again, where they are
-      if (all_enabled()) {
-        set_goals(Goal::kFollow);
-        reaction = StopCategory::kWarn;
-        stage = Stage::kRunning;
-      }
+      enable_again();
       break;
     case Stage::kFailed: break;
   }
+  if (resetting) watch_reset();
+}
+
+/// Once every fault is reset: all axes again, where they are.
+void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
+  if (latched != StopCategory::kWarn) return;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    if (stands_in_the_way(joint) || axes[joint].goal() == Goal::kReset) return;
+  }
+  bool all = true;
+  for (AxisMaster& axis : axes) {
+    if (axis.trouble() != AxisTrouble::kNone) continue;  // "warn": the others go on without it
+    axis.set_goal(Goal::kEnable, now_ns);
+    all = all && axis.enabled();
+  }
+  if (!all) return;
+  for (AxisMaster& axis : axes) {
+    if (axis.trouble() == AxisTrouble::kNone) axis.set_goal(Goal::kFollow, now_ns);
+  }
+  reaction = StopCategory::kWarn;
+  stage = Stage::kRunning;
+}
+
+/// A joint whose category is "warn" never keeps the others from moving.
+bool DriveMaster::Impl::stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT {
+  return axes[joint].trouble() != AxisTrouble::kNone &&
+         robot.joints[joint].on_fault != StopCategory::kWarn;
+}
+
+/// reset() is through when every joint follows again, or when nothing is under way any more and a
+/// cause is still there.
+void DriveMaster::Impl::watch_reset() noexcept TANDEM_RT {
+  bool under_way = stage == Stage::kFaulted;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    const AxisMaster& axis = axes[joint];
+    const Node& node = node_of(joint);
+    const bool node_starts = axis.trouble() == AxisTrouble::kNodeLost &&
+                             (node.recovering || node.master.running());
+    if (axis.goal() == Goal::kReset || node_starts) return;
+    if (stage == Stage::kFaulted && stands_in_the_way(joint)) under_way = false;
+    if (stage == Stage::kRunning && axis.trouble() == AxisTrouble::kNone &&
+        axis.goal() != Goal::kFollow) {
+      under_way = true;
+    }
+  }
+  resetting = under_way;
 }
 
 void DriveMaster::Impl::boot() noexcept TANDEM_RT {
@@ -98,7 +134,31 @@ void DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   }
 }
 
-/// Goes on with what take_resets() began: drives that are reset, nodes that are configured anew.
+void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
+  if (category == StopCategory::kWarn || shutting_down) return;
+  latched = std::min(latched, category);
+  resetting = false;
+  if (stage == Stage::kFailed) return;
+  const bool harder = stage != Stage::kFaulted || category < reaction;
+  if (stage == Stage::kBooting || stage == Stage::kEnabling) {
+    fail();
+  } else {
+    react(category);
+  }
+  if (!harder) return;
+  make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
+  write_pdos();
+  (void)flush();
+}
+
+void DriveMaster::Impl::reset() noexcept TANDEM_RT {
+  if (shutting_down || (stage != Stage::kFaulted && stage != Stage::kRunning)) return;
+  latched = StopCategory::kWarn;
+  resetting = true;
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) reset_joint(joint);
+}
+
+/// Goes on with what reset_joint() began: drives that are reset, nodes that are configured anew.
 void DriveMaster::Impl::recover() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     const bool sensor_lost =
@@ -140,23 +200,28 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
 
 void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept TANDEM_RT {
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
-    AxisMaster& axis = axes[joint];
-    if (command.fault_reset()[joint] == 0 || axis.trouble() == AxisTrouble::kNone) continue;
-    if (axis.trouble() != AxisTrouble::kNodeLost) {
-      axis.set_goal(Goal::kReset, now_ns);
-      continue;
-    }
-    Node& node = node_of(joint);
-    if (node.recovering || node.master.stage() != NodeStage::kDown) continue;
-    node.recovering = true;
-    node.sending = -1;
-    node.master.restart(now_ns);
-    for (const std::size_t lost : node.plan.joints) {
-      axes[lost].forget();
-      // The configuration goes back to the file's gains; what was set since is sent again.
-      std::copy_n(&file_gains[lost * kPidLoops], kPidLoops, &sent_gains[lost * kPidLoops]);
-      sent_revision[lost] = 0;
-    }
+    if (command.fault_reset()[joint] != 0) reset_joint(joint);
+  }
+}
+
+/// Begins to clear what is latched of a joint; recover() goes on with it.
+void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
+  AxisMaster& axis = axes[joint];
+  if (axis.trouble() == AxisTrouble::kNone) return;
+  if (axis.trouble() != AxisTrouble::kNodeLost) {
+    axis.set_goal(Goal::kReset, now_ns);
+    return;
+  }
+  Node& node = node_of(joint);
+  if (node.recovering || node.master.stage() != NodeStage::kDown) return;
+  node.recovering = true;
+  node.sending = -1;
+  node.master.restart(now_ns);
+  for (const std::size_t lost : node.plan.joints) {
+    axes[lost].forget();
+    // The configuration goes back to the file's gains; what was set since is sent again.
+    std::copy_n(&file_gains[lost * kPidLoops], kPidLoops, &sent_gains[lost * kPidLoops]);
+    sent_revision[lost] = 0;
   }
 }
 
@@ -192,7 +257,7 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
   if (!shutting_down) {
     shutting_down = true;
     shut_down_since_ns = now_ns;
-    set_goals(Goal::kQuickStop);
+    set_goals(reaction == StopCategory::kCategory0 ? Goal::kNothing : Goal::kQuickStop);
   }
   const bool at_rest = std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.off(); });
   const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;

@@ -139,6 +139,9 @@ std::string DriveMaster::Impl::status() const {
     causes.push_back(fmt::format("{}: waiting for 'operation enabled', is in '{}'", joint_name(j),
                                  canopen::to_string(axes[j].drive())));
   }
+  if (causes.empty() && latched != StopCategory::kWarn) {
+    return fmt::format("stopped by request ({})", to_string(latched));
+  }
   if (causes.empty()) return stage == Stage::kFaulted ? "enabling every axis again" : "";
   std::string text;
   for (std::size_t i = 0; i < std::min(causes.size(), kMostCauses); ++i) {

@@ -28,6 +28,8 @@ class SimRobot final : public hal::Backend {
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
+  void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
+  void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master_->shut_down(); }
   [[nodiscard]] bool archive(Archive& ar) override;
 

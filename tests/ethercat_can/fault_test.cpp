@@ -179,6 +179,138 @@ TEST(Fault, ABoardThatRebootsIsConfiguredAnewByTheReset) {
   EXPECT_EQ(rig.axis(5).objects().gains[0][0], 500.0F) << "what was set at run time is sent again";
 }
 
+bool every_axis(const Rig& rig, canopen::DriveMotion motion) {
+  for (std::size_t j = 0; j < 6; ++j) {
+    if (rig.axis(j).machine().motion() != motion) return false;
+  }
+  return true;
+}
+
+TEST(Stop, OfCategory0OpensEveryBridgeWithTheNextSync) {
+  Rig rig;
+  rig.bring_up();
+  (void)rig.read();
+  rig.master->stop(StopCategory::kCategory0);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.write(), Code::kFault);
+  (void)rig.read();
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kNone));
+  EXPECT_EQ(rig.state.fault()[0], 0u) << "no drive is at fault";
+  EXPECT_EQ(rig.master->status_text(), "stopped by request (category0)");
+}
+
+TEST(Stop, OfCategory1BringsEveryAxisToRestFirst) {
+  Rig rig;
+  rig.bring_up();
+  (void)rig.read();
+  rig.master->stop(StopCategory::kCategory1);
+  (void)rig.write();
+  (void)rig.read();
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kQuickStop));
+  rig.steps(1500);
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kNone));
+}
+
+TEST(Stop, TheHardestIsCarriedOutAndNoneSoftensIt) {
+  Rig rig;
+  rig.bring_up();
+  rig.master->stop(StopCategory::kWarn);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+  rig.master->stop(StopCategory::kHold);
+  rig.steps(5);
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kFollow));
+  rig.master->stop(StopCategory::kCategory0);
+  rig.master->stop(StopCategory::kHold);
+  rig.steps(2);
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kNone));
+}
+
+TEST(Stop, StaysUntilTheResetThatEnablesEveryAxisWhereItIs) {
+  for (const StopCategory category :
+       {StopCategory::kCategory0, StopCategory::kCategory1, StopCategory::kHold}) {
+    Rig rig;
+    rig.bring_up();
+    rig.master->stop(category);
+    rig.steps(2000);
+    EXPECT_EQ(rig.master->phase(), Phase::kFault);
+    for (double& q : rig.position_rad) q += 0.2;
+    rig.steps(5);
+    reset(rig, 1);
+    EXPECT_EQ(rig.master->phase(), Phase::kFault) << "a joint's reset leaves the robot's stop";
+    rig.master->reset();
+    EXPECT_EQ(rig.master->phase(), Phase::kBringUp);
+    EXPECT_LT(rig.leave(Phase::kBringUp, 200), 200);
+    ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+    for (std::size_t j = 0; j < 6; ++j) {  // one that never let go keeps what it holds
+      const std::int32_t held = category == StopCategory::kHold ? 0 : 1146;
+      EXPECT_EQ(rig.axis(j).objects().target_position, held) << to_string(category);
+    }
+  }
+}
+
+TEST(Stop, IsResetTogetherWithTheFaultsOfDrivesAndBoards) {
+  Rig rig;
+  rig.bring_up();
+  break_encoder(rig, 1);
+  rig.boards[2] = std::make_unique<firmware::Board>(testing::board_setup(rig.robot, 2));
+  rig.steps(5);
+  rig.master->stop(StopCategory::kCategory1);
+  rig.steps(1500);
+  rig.master->reset();
+  rig.leave(Phase::kBringUp, 2000);
+  ASSERT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+  EXPECT_EQ(rig.axis(5).objects().link_counts, 36000u) << "configured anew";
+}
+
+TEST(Stop, IsNotResetWhileACauseIsStillThere) {
+  Rig rig;
+  rig.bring_up();
+  rig.position_rad[1] = std::nan("");
+  rig.steps(1500);
+  rig.master->reset();
+  EXPECT_EQ(rig.leave(Phase::kBringUp, 3000), 1001) << "kResetTimeoutNs";
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.state.fault()[1], 0x7300u);
+  for (std::size_t j : {0u, 2u, 3u, 4u, 5u}) {
+    EXPECT_EQ(rig.state.drive_state()[j], static_cast<int>(DriveState::kSwitchOnDisabled));
+  }
+  rig.present[2] = false;
+  rig.steps(20);
+  rig.position_rad[1] = 0.0;
+  rig.master->reset();
+  EXPECT_GT(rig.leave(Phase::kBringUp, 5000), 2000) << "a board that is away is waited for";
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.state.fault()[1], 0u);
+  EXPECT_NE(rig.master->status_text().find("board board_2"), std::string::npos);
+}
+
+TEST(Stop, AJointThatOnlyWarnsIsResetWhileTheOthersFollow) {
+  Rig rig(with_category(StopCategory::kWarn));
+  rig.bring_up();
+  break_encoder(rig, 1);
+  rig.steps(1500);
+  rig.master->reset();
+  EXPECT_EQ(rig.master->phase(), Phase::kBringUp);
+  rig.command.position_rad()[3] = 0.01;
+  rig.steps(2);
+  EXPECT_EQ(rig.axis(3).objects().target_position, 57);
+  rig.leave(Phase::kBringUp, 100);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+  EXPECT_EQ(rig.state.fault()[1], 0u);
+}
+
+TEST(Stop, DuringBringUpEndsIt) {
+  Rig rig;
+  rig.steps(20);
+  ASSERT_EQ(rig.master->phase(), Phase::kBringUp);
+  rig.master->stop(StopCategory::kCategory1);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  rig.steps(3000);
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kNone));
+  rig.master->reset();
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+}
+
 TEST(Fault, BoardsStopByThemselvesWhenTheMasterDies) {
   Rig rig;
   rig.bring_up();

@@ -156,7 +156,7 @@ class Rig {
   }
   Code step() {
     const Code code = read();
-    if (master->phase() != Phase::kBringUp) (void)write();
+    (void)write();
     return code;
   }
   void steps(int count) {

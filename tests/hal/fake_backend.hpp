@@ -65,6 +65,7 @@ class FakeBackend : public Backend {
   Pace pace() const noexcept override { return Pace::kSimulatedClock; }
   Phase phase() const noexcept override {
     if (cycles_ < kBringUpCycles) return Phase::kBringUp;
+    if (latched_ != StopCategory::kWarn) return Phase::kFault;
     for (const Joint& joint : joints_) {
       if (joint.fault != 0) return Phase::kFault;
     }
@@ -97,9 +98,14 @@ class FakeBackend : public Backend {
     }
     return Code::kOk;
   }
+  void stop(StopCategory category) noexcept override { latched_ = std::min(latched_, category); }
+  void reset() noexcept override {
+    latched_ = StopCategory::kWarn;
+    for (Joint& joint : joints_) joint.fault = 0;
+  }
   bool shut_down() noexcept override { return true; }
   bool archive(Archive& ar) override {
-    ar(joints_, command_, cycles_);
+    ar(joints_, command_, cycles_, latched_);
     return ar.ok();
   }
 
@@ -149,7 +155,8 @@ class FakeBackend : public Backend {
                          joint.interaction != command_.interaction()[j] || joint.enabled == 0;
     joint.mode = command_.mode()[j];
     joint.interaction = command_.interaction()[j];
-    joint.enabled = cycles_ >= kBringUpCycles && joint.fault == 0 && joint.mode != 0;
+    const bool torque = latched_ >= StopCategory::kHold;
+    joint.enabled = torque && cycles_ >= kBringUpCycles && joint.fault == 0 && joint.mode != 0;
     if (changed) {
       joint.reference = joint.position;
       joint.integral = 0.0;
@@ -201,6 +208,7 @@ class FakeBackend : public Backend {
   std::vector<Joint> joints_;
   CommandImage command_;
   std::int64_t cycles_ = 0;
+  StopCategory latched_ = StopCategory::kWarn;
 };
 
 }  // namespace tandem::hal::test

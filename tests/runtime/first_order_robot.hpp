@@ -2,6 +2,7 @@
 // as clean of heap and locks as a real backend. Faults can be injected.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -30,11 +31,16 @@ class FirstOrderRobot : public hal::Backend {
   bool latch_on_fault = false;    // phase() turns kFault with a joint
   hal::TruthImage truth;          // its feet and base are the test's to set
   std::uint64_t idle_writes = 0;  // commands with every joint idle
+  bool reset_clears = true;       // false: the cause is still there
+  std::uint64_t stops = 0;        // calls of stop()
+  hal::StopCategory latched = hal::StopCategory::kWarn;  // by stop()
 
   hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
   hal::Phase phase() const noexcept override {
     if (cycles_ < bring_up_cycles) return hal::Phase::kBringUp;
+    if (latched != hal::StopCategory::kWarn) return hal::Phase::kFault;
     if (latch_on_fault && faulted_joint >= 0) return hal::Phase::kFault;
+    if (enabling_ > 0) return hal::Phase::kBringUp;
     return hal::Phase::kOperational;
   }
   std::string status_text() const override {
@@ -43,10 +49,11 @@ class FirstOrderRobot : public hal::Backend {
 
   Code read(const hal::CycleTime& time, hal::StateImage& state) noexcept override {
     ++cycles_;
+    if (enabling_ > 0) --enabling_;
     const double dt = static_cast<double>(time.period_ns) * 1e-9;
     for (std::size_t j = 0; j < position_.size(); ++j) {
       const double before = position_[j];
-      if (command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
+      if (follows() && command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
         position_[j] += kShare * (command_.position_rad()[j] - position_[j]);
       }
       velocity_[j] = (position_[j] - before) / dt;
@@ -59,7 +66,9 @@ class FirstOrderRobot : public hal::Backend {
       const bool faulted = faulted_joint == static_cast<int>(j);
       state.fault()[j] = faulted ? 0x7310 : 0;
       state.drive_state()[j] = static_cast<std::uint8_t>(
-          faulted ? hal::DriveState::kFault : hal::DriveState::kOperationEnabled);
+          faulted   ? hal::DriveState::kFault
+          : follows() ? hal::DriveState::kOperationEnabled
+                      : hal::DriveState::kSwitchOnDisabled);
     }
     for (std::size_t s = 0; s < state.sensor_age_cycles().size(); ++s) {
       const bool lost = lost_sensor == static_cast<int>(s);
@@ -76,17 +85,33 @@ class FirstOrderRobot : public hal::Backend {
     if (idle) ++idle_writes;
     return Code::kOk;
   }
+  void stop(hal::StopCategory category) noexcept override {
+    latched = std::min(latched, category);
+    ++stops;
+    enabling_ = 0;
+  }
+  void reset() noexcept override {
+    if (!reset_clears) return;
+    latched = hal::StopCategory::kWarn;
+    faulted_joint = lost_joint = -1;
+    enabling_ = kEnablingCycles;
+  }
   bool shut_down() noexcept override { return ++shutting_down_ >= shut_down_cycles; }
   bool archive(Archive& ar) override {
-    ar(position_, velocity_, command_, truth, cycles_, shutting_down_);
+    ar(position_, velocity_, command_, truth, cycles_, shutting_down_, enabling_, latched);
     return can_rewind;
   }
   bool can_rewind = true;
 
  private:
+  static constexpr std::uint64_t kEnablingCycles = 5;  // that a reset takes
+  [[nodiscard]] bool follows() const {
+    return enabling_ == 0 && latched >= hal::StopCategory::kHold;
+  }
+
   std::vector<double> position_, velocity_;
   hal::CommandImage command_;
-  std::uint64_t cycles_ = 0, shutting_down_ = 0;
+  std::uint64_t cycles_ = 0, shutting_down_ = 0, enabling_ = 0;
 };
 
 }  // namespace tandem::runtime::test
