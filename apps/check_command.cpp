@@ -40,7 +40,10 @@ void print_plan(const Composition& c, std::FILE* out) {
   Facts facts;
   add_robot_facts(e.robot, facts);
   facts.add("kernels", fmt::format("{} ({})", c.kernels.path(), c.kernels->variant));
-  facts.add("backend", "sim: drive master, frames, boards' firmware and plant in this process");
+  facts.add("backend", e.hal.backend == runtime::BackendKind::kCan
+                           ? "can: drive master here, boards on SocketCAN interfaces"
+                           : "sim: drive master, frames, boards' firmware and plant in this "
+                             "process");
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
     facts.add("controller " + note.name, note.doc);
@@ -67,12 +70,6 @@ void print_robot(const RobotFiles& robot, std::FILE* out) {
 
 void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
-}
-
-/// A robot has a [model]; an experiment names a robot.
-bool is_robot(const std::string& file) {
-  const Result<TomlDocument> document = TomlDocument::load(file);
-  return document && document->root().has("model");
 }
 
 Diagnostics check_robot(const std::string& file, std::FILE* out) {

@@ -85,6 +85,15 @@ const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standa
 const char kSocketHelp[] =
     "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
 
+const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
+
+const char kEmulateExamples[] = R"(Examples:
+  tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
+  tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
+  tandem emulate config/coman/robot.toml                   in real time, for `run --hal can`
+Interfaces without hardware:
+  ip link add can0 type vcan && ip link set can0 mtu 72 up)";
+
 void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
   CLI::Option* rate =
@@ -96,6 +105,10 @@ void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
       ->check(CLI::PositiveNumber);
+  app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
+      ->check(CLI::IsMember({"sim", "can"}));
+  app.add_flag("--lockstep", o.lockstep, "CAN: wait for `tandem emulate --lockstep`, at any speed");
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
   CLI::Option* log =
       app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
@@ -118,6 +131,24 @@ void add_ask(CLI::App& app, AskOptions& o) {
   app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
   app.add_option("--socket", o.socket, kSocketHelp);
   app.footer(kAskExamples);
+}
+
+void add_emulate(CLI::App& app, EmulateOptions& o) {
+  app.add_option("file", o.file, "Robot or experiment TOML")->required();
+  app.add_flag("--lockstep", o.lockstep, "A step per SYNC, whatever the clock says");
+  app.add_option("--posture", o.posture,
+                 "Where it starts (default: the experiment's, or the robot's first)");
+  app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
+  app.add_option("--period-ns", o.period_ns, "Of a step (default: the experiment's, or 1 ms)")
+      ->check(CLI::Range(10'000, 1'000'000'000));
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--kernel-variant", o.kernel_variant,
+                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
+  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kEmulateExamples);
 }
 
 void add_check(CLI::App& app, CheckOptions& o) {
@@ -265,6 +296,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   app.get_formatter()->column_width(34);
 
   RunOptions run;
+  EmulateOptions emulate;
   AskOptions ask;
   CheckOptions check;
   ModelOptions model;
@@ -281,7 +313,10 @@ Command parse_command_line(int argc, const char* const* argv) {
   CLI::App* doctor_app = app.add_subcommand("doctor", "Is this machine fit for real time?");
   CLI::App* latency_app =
       app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
+  CLI::App* emulate_app =
+      app.add_subcommand("emulate", "The robot on the other end of CAN: boards' firmware and plant");
   add_run(*run_app, run);
+  add_emulate(*emulate_app, emulate);
   add_ask(*ask_app, ask);
   add_check(*check_app, check);
   add_model(*model_app, model);
@@ -298,6 +333,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     return Exit::kDone;
   }
   if (run_app->parsed()) return run;
+  if (emulate_app->parsed()) return emulate;
   if (ask_app->parsed()) return ask;
   if (check_app->parsed()) return check;
   if (model_app->parsed()) return model;

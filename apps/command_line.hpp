@@ -26,6 +26,9 @@ struct RunOptions {
   std::string log_folder;             ///< empty: the experiment's
   bool no_log = false;
   std::string kernel_variant;         ///< empty: the best that this CPU runs
+  std::string hal;                    ///< "sim", "can"; empty: the experiment's
+  bool lockstep = false;              ///< CAN: wait for an emulated robot
+  std::vector<std::string> interfaces;  ///< "can0=vcan0"
   bool report = false;                ///< draw the report after the run
   std::string trace;                  ///< file of trace events; empty: none
   std::size_t trace_cycles = 10'000;  ///< the last that `trace` holds
@@ -44,6 +47,21 @@ struct AskOptions {
 /// tandem check FILE
 struct CheckOptions {
   std::string file;  ///< an experiment or a robot
+  std::string json;
+};
+
+/// tandem emulate ROBOT|EXPERIMENT
+struct EmulateOptions {
+  std::string file;                      ///< a robot, or an experiment for posture, seed and [sim]
+  std::optional<std::string> posture;    ///< instead of the experiment's
+  std::optional<std::uint64_t> seed;     ///< instead of the experiment's
+  std::optional<std::int64_t> period_ns; ///< instead of the experiment's
+  bool lockstep = false;                 ///< a step per SYNC, whatever the clock says
+  std::vector<std::string> interfaces;   ///< "can0=vcan0"
+  std::string kernel_variant;            ///< empty: the best that this CPU runs
+  std::string socket;                    ///< of the control socket; empty: the default path
+  bool no_socket = false;
+  bool quiet = false;  ///< neither progress nor table
   std::string json;
 };
 
@@ -100,8 +118,16 @@ struct DoctorOptions {
 };
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command = std::variant<Exit, RunOptions, AskOptions, CheckOptions, ModelOptions, LogOptions,
-                             ReportOptions, LatencyOptions, DoctorOptions>;
+using Command = std::variant<Exit,
+                             RunOptions,
+                             AskOptions,
+                             CheckOptions,
+                             ModelOptions,
+                             LogOptions,
+                             ReportOptions,
+                             LatencyOptions,
+                             DoctorOptions,
+                             EmulateOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

@@ -13,6 +13,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit run_command(const RunOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
+/// The robot on the other end of the wire, until it is asked to stop.
+[[nodiscard]] Exit emulate_command(const EmulateOptions& options);
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
 [[nodiscard]] Exit model_command(const ModelOptions& options);

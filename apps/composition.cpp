@@ -6,6 +6,8 @@
 
 #include "apps/kernel_store.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "hal/ethercat-can/can_backend.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -62,6 +64,11 @@ void add_controllers(Composition& c, Collector& errors) {
 
 }  // namespace
 
+std::string hal_name(const runtime::HalOptions& hal) {
+  if (hal.backend == runtime::BackendKind::kSim) return "sim";
+  return hal.lockstep ? "can lockstep" : "can";
+}
+
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
                                                                  const Overrides& overrides) {
   auto experiment = runtime::read_experiment(file);
@@ -72,8 +79,13 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
+  e.hal.backend = overrides.backend.value_or(e.hal.backend);
+  e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
 
   Collector errors;
+  if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
+    return std::unexpected(Diagnostics{done.error()});
+  }
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   if (auto kernels = find_kernels(*robot, e.kernel_variant)) {
@@ -85,14 +97,36 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   }
   add_controllers(*c, errors);
   if (!errors.empty()) return errors.give();
+  if (e.hal.backend == runtime::BackendKind::kCan) {
+    if (const auto layout = hal::can::make_pdo_layout(e.robot); !layout) {
+      errors.add(layout.error(), e.robot.file, 0);
+      return errors.give();
+    }
+    return c;
+  }
 
   auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), e.sim_robot_config());
   if (!backend) {
     errors.add(backend.error(), e.robot.file, 0);
     return errors.give();
   }
+  c->sim = backend->get();
   c->backend = std::move(*backend);
   return c;
+}
+
+Diagnostics connect(Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  if (e.hal.backend != runtime::BackendKind::kCan) return {};
+  auto sockets = CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep);
+  if (!sockets) return sockets.error();
+  c.sockets = std::move(*sockets);
+  auto backend = hal::can::CanBackend::create(
+      e.robot, c.sockets->buses(), *c.sockets,
+      {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
+  if (!backend) return {backend.error()};
+  c.backend = std::move(*backend);
+  return {};
 }
 
 }  // namespace tandem::apps

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/can_sockets.hpp"
 #include "apps/robot_files.hpp"
 #include "base/result.hpp"
 #include "hal/sim/sim_robot.hpp"
@@ -24,6 +25,9 @@ struct Overrides {
   std::optional<std::uint64_t> seed;
   std::optional<double> duration_s;
   std::string kernel_variant;
+  std::optional<runtime::BackendKind> backend;
+  bool lockstep = false;                ///< true: whatever the experiment says
+  std::vector<std::string> interfaces;  ///< "can0=vcan0"
 };
 
 /// A controller as `check` tells of it.
@@ -35,15 +39,24 @@ struct ControllerNote {
 struct Composition {
   runtime::Experiment experiment;  ///< overrides applied; its robot is completed
   model::KernelLibrary kernels;
-  std::unique_ptr<sim::SimRobot> backend;
+  std::unique_ptr<CanSockets> sockets;   ///< of the CAN backend
+  std::unique_ptr<hal::Backend> backend; ///< the CAN backend only after connect()
+  sim::SimRobot* sim = nullptr;          ///< the backend, when it is the simulation
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::vector<ControllerNote> notes;
 };
+
+/// "sim", "can", "can lockstep", for logs and summaries.
+[[nodiscard]] std::string hal_name(const runtime::HalOptions& hal);
 
 /// Reads an experiment with all its files and composes it. Every error that can be found without
 /// running is found here: experiment, robot, description, kernels, backend, plugins, parameters,
 /// claims.
 [[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
     const std::string& experiment, const Overrides& overrides);
+
+/// Opens the CAN interfaces and makes the CAN backend; the simulation has nothing to connect.
+/// Errors: CanSockets::open()'s.
+[[nodiscard]] Diagnostics connect(Composition& composition);
 
 }  // namespace tandem::apps

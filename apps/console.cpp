@@ -97,6 +97,28 @@ void Facts::print(std::FILE* out) const {
   }
 }
 
+StatusLine::StatusLine(std::FILE* out)
+    : out_(out),
+      terminal_(isatty(fileno(out)) != 0),
+      next_(std::chrono::steady_clock::now()) {}
+
+StatusLine::~StatusLine() {
+  if (drawn_) fmt::print(out_, "\n");
+}
+
+bool StatusLine::due() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return false;
+  next_ = now + std::chrono::seconds(terminal_ ? 1 : 10);
+  return true;
+}
+
+void StatusLine::show(const std::string& text) {
+  fmt::print(out_, "{}  {}{}", terminal_ ? "\r" : "", text, terminal_ ? "\033[K" : "\n");
+  std::fflush(out_);
+  drawn_ = terminal_;
+}
+
 Progress::Progress(std::FILE* out, double total_s)
     : out_(out),
       total_s_(total_s),

@@ -58,6 +58,24 @@ class Facts {
   std::vector<std::pair<std::string, std::string>> facts_;
 };
 
+/// One line that is shown anew once a second, on a terminal in its own place.
+class StatusLine {
+ public:
+  explicit StatusLine(std::FILE* out);
+  ~StatusLine();
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+  /// True once a second; elsewhere than on a terminal once in ten.
+  [[nodiscard]] bool due();
+  void show(const std::string& text);
+
+ private:
+  std::FILE* out_;
+  bool terminal_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point next_;
+};
+
 /// The progress of a run: a bar that is redrawn on a terminal, a line per tenth elsewhere.
 class Progress {
  public:

@@ -19,4 +19,9 @@ std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file) {
   return with_description(std::move(robot->config));
 }
 
+bool is_robot(const std::string& file) {
+  const Result<TomlDocument> document = TomlDocument::load(file);
+  return document && document->root().has("model");
+}
+
 }  // namespace tandem::apps

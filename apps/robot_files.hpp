@@ -22,6 +22,9 @@ struct RobotFiles {
 /// Reads the description that `config` names, and checks the two against each other.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config);
 
+/// Whether the file is a robot's: a robot has a [model], an experiment names a robot.
+[[nodiscard]] bool is_robot(const std::string& file);
+
 /// Reads a robot.toml and its description.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);
 

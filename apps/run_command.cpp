@@ -94,8 +94,10 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
   return texts;
 }
 
-runtime::CycleConfig cycle_config(runtime::Experiment& e, const RunOptions& options) {
-  e.loop.pacing = rt::Pacing::kSimulated;
+runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
+  runtime::Experiment& e = c.experiment;
+  const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
+  e.loop.pacing = simulated ? rt::Pacing::kSimulated : rt::Pacing::kWallClock;
   e.loop.rate = options.rate.value_or(0.0);
   runtime::CycleConfig config;
   config.loop = e.loop;
@@ -103,6 +105,23 @@ runtime::CycleConfig cycle_config(runtime::Experiment& e, const RunOptions& opti
   config.settle_cycles = e.settle_cycles();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
+}
+
+std::string pace_text(const Composition& c, const RunOptions& options) {
+  const runtime::HalOptions& hal = c.experiment.hal;
+  const std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
+  if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
+  const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
+  return where + how + (options.rate ? fmt::format("rate {:g}", *options.rate) : "free running");
+}
+
+/// Boards have clocks of their own.
+Status check_pace(const Composition& c, const RunOptions& options) {
+  if (c.backend->pace() == hal::Pace::kSimulatedClock || options.rate.value_or(1.0) == 1.0) {
+    return {};
+  }
+  return fail("boards on a bus keep real time, so --rate cannot be other than 1",
+              "leave --rate out, or add --lockstep for emulated boards");
 }
 
 /// Draws the report and prints where it is; a report that cannot be drawn is no fault of the run.
@@ -141,7 +160,7 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
 Exit run(Composition& c, const RunOptions& options) {
   std::FILE* out = human_output(options.json);
   runtime::Experiment& e = c.experiment;
-  const runtime::CycleConfig config = cycle_config(e, options);
+  const runtime::CycleConfig config = cycle_config(c, options);
   std::unique_ptr<log::Recorder> recorder;
   if (!options.no_log) {
     auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
@@ -152,14 +171,15 @@ Exit run(Composition& c, const RunOptions& options) {
     recorder = std::move(*opened);
   }
   rt::WallClock clock;
-  const hal::TruthImage* truth = e.sim.ground_truth ? &c.backend->truth() : nullptr;
+  const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
+  const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
   runtime::RobotCycle cycle({e.robot, *c.backend, *c.controllers, clock, recorder.get(), truth},
                             config);
   if (!options.quiet) {
     fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
                e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
                1e6 / static_cast<double>(e.loop.period_ns),
-               options.rate ? fmt::format("rate {:g}", *options.rate) : "free running");
+               pace_text(c, options));
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle);
@@ -199,10 +219,24 @@ Exit run_command(const RunOptions& options) {
       return Exit::kUsage;
     }
   }
-  const auto composition =
-      compose(options.experiment, {options.seed, options.duration_s, options.kernel_variant});
+  Overrides overrides{.seed = options.seed,
+                      .duration_s = options.duration_s,
+                      .kernel_variant = options.kernel_variant,
+                      .lockstep = options.lockstep,
+                      .interfaces = options.interfaces};
+  if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
+  if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
+  const auto composition = compose(options.experiment, overrides);
   if (!composition) {
     print_errors(composition.error());
+    return Exit::kUsage;
+  }
+  if (const Diagnostics errors = connect(**composition); !errors.empty()) {
+    print_errors(errors);
+    return Exit::kUsage;
+  }
+  if (const Status paced = check_pace(**composition, options); !paced) {
+    print_errors({paced.error()});
     return Exit::kUsage;
   }
   return run(**composition, options);

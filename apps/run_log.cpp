@@ -27,7 +27,7 @@ log::RunInfo info_of(const Composition& c) {
   log::RunInfo info;
   info.version = TANDEM_VERSION;
   info.robot = e.robot.name;
-  info.hal = "sim";
+  info.hal = hal_name(e.hal);
   for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
   for (const hal::SensorConfig& sensor : e.robot.sensors) {
     info.sensors.push_back({sensor.name, sensor.channels()});
@@ -49,7 +49,7 @@ std::uint64_t bytes_needed(const Composition& c) {
   constexpr std::uint64_t kFixed = 1'000'000;
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
-  if (e.sim.ground_truth) cycle_bytes += c.backend->truth().bytes().size();
+  if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
   const std::uint64_t whole = e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + kFixed;
   return e.log.compression == runtime::LogCompression::kNone ? whole : whole / 4;
 }

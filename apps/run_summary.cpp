@@ -77,7 +77,7 @@ Json RunSummary::json() const {
   const rt::LoopStatistics& loop = cycle.loop();
   Json json;
   json["robot"] = e.robot.name;
-  json["hal"] = "sim";
+  json["hal"] = hal_name(e.hal);
   json["seed"] = e.seed;
   json["cycles"] = cycle.running_cycles();
   json["period_ns"] = e.loop.period_ns;

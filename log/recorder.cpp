@@ -10,7 +10,7 @@ namespace tandem::log {
 namespace {
 
 constexpr Recorder::Channel kEventChannel = 0;
-constexpr auto kPoll = std::chrono::microseconds(500);
+constexpr auto kPoll = std::chrono::milliseconds(2);
 
 }  // namespace
 
@@ -75,7 +75,7 @@ bool Recorder::push(const Event& event) noexcept TANDEM_RT {
 void Recorder::wait_for_space(std::size_t messages) const noexcept {
   const std::size_t wanted = std::min(messages, ring_->capacity());
   while (ring_->size() + wanted > ring_->capacity()) {
-    std::this_thread::sleep_for(kPoll / 10);
+    std::this_thread::sleep_for(kPoll / 20);
   }
 }
 

@@ -106,14 +106,9 @@ std::string CanBackend::status_text() const {
   return master_->status_text();
 }
 
-bool CanBackend::all_answered() const noexcept {
-  for (std::size_t b = 0; b < buses_.size(); ++b) {
-    const bool enough = config_.lockstep
-                            ? buses_[b]->answered()
-                            : buses_[b]->feedback() >= master_->nodes_in_operation(b);
-    if (!enough) return false;
-  }
-  return true;
+bool CanBackend::answered(std::size_t bus) const noexcept {
+  return config_.lockstep ? buses_[bus]->answered()
+                          : buses_[bus]->feedback() >= master_->nodes_in_operation(bus);
 }
 
 void CanBackend::exchange(const CycleTime& time) noexcept {
@@ -128,17 +123,25 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
   std::int64_t deadline_ns =
       wait_->now_ns() + (config_.lockstep ? config_.lockstep_timeout_ns : window_ns);
   master_->cycle_begin(time);
-  for (;;) {
-    for (const auto& bus : buses_) bus->collect();
-    if (all_answered()) return;
+  // One bus after the other, the last first: its answers come last, and the others' with them.
+  for (std::size_t waiting = buses_.size(); waiting > 0;) {
+    buses_[waiting - 1]->collect();
+    if (answered(waiting - 1)) {
+      --waiting;
+      continue;
+    }
     const std::int64_t now_ns = wait_->now_ns();
-    if (now_ns >= deadline_ns) break;
+    if (now_ns >= deadline_ns) {
+      silent_ = config_.lockstep;
+      if (silent_) return;
+      --waiting;  // what the other buses have brought is still taken
+      continue;
+    }
     if (config_.lockstep && wait_->stopping()) {
       deadline_ns = std::min(deadline_ns, now_ns + kPatienceNs);
     }
-    wait_->wait(deadline_ns);
+    wait_->wait(deadline_ns - now_ns, static_cast<int>(waiting - 1));
   }
-  silent_ = config_.lockstep;
 }
 
 Code CanBackend::read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT {

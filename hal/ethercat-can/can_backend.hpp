@@ -96,7 +96,7 @@ class CanBackend final : public Backend {
 
   CanBackend(std::vector<std::unique_ptr<Collected>> buses, std::unique_ptr<DriveMaster> master,
              FrameWait& wait, const CanBackendConfig& config);
-  [[nodiscard]] bool all_answered() const noexcept;
+  [[nodiscard]] bool answered(std::size_t bus) const noexcept;
 
   std::vector<std::unique_ptr<Collected>> buses_;
   std::unique_ptr<DriveMaster> master_;

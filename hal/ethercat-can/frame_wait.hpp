@@ -1,4 +1,4 @@
-// Sleeps until frames come, on one or several buses, and knows the time that the deadline is in.
+// Sleeps until frames come, on one or several buses, and knows the time.
 // Layer: hal/ethercat-can.  Thread: the loop's, or the emulator's.
 #pragma once
 
@@ -12,9 +12,10 @@ class FrameWait {
 
   /// Monotonic [ns].
   [[nodiscard]] virtual std::int64_t now_ns() noexcept = 0;
-  /// Blocks until a frame is there, the deadline has passed, or the process was asked to stop; may
-  /// return early without a reason. No allocation.
-  virtual void wait(std::int64_t deadline_ns) noexcept = 0;
+  /// Blocks until a frame is there on bus `bus`, or on any (kAnyBus), the time is over, or the
+  /// process was asked to stop; may return early without a reason. No allocation.
+  virtual void wait(std::int64_t at_most_ns, int bus) noexcept = 0;
+  static constexpr int kAnyBus = -1;
   /// True once the process was asked to stop: nobody should wait any longer.
   [[nodiscard]] virtual bool stopping() const noexcept { return false; }
 };

@@ -51,7 +51,8 @@ BusState SocketCanBus::state() const noexcept TANDEM_RT {
 // ---- Sending
 
 std::size_t SocketCanBus::send(std::span<const Frame> frames) noexcept TANDEM_RT {
-  now_ns_ = sent_ns_ = clock_ns(CLOCK_MONOTONIC);
+  read_clock(options_.stamps);
+  if (options_.stamps) sent_ns_ = now_ns_;
   const std::uint64_t before = statistics_.sent;
   std::size_t next = 0;
   bool open = linked() && controller_ != BusState::kBusOff;
@@ -99,7 +100,7 @@ void SocketCanBus::note_send_error(int error) noexcept {
 
 std::size_t SocketCanBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
   received_ = 0;
-  now_ns_ = clock_ns(CLOCK_MONOTONIC);
+  read_clock(false);
   if (!linked()) return 0;
   frames = frames.first(std::min(frames.size(), kMaxReceive));
   std::size_t budget = frames.size() + kMaxOthers;
@@ -120,7 +121,7 @@ std::size_t SocketCanBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
     budget -= got;
     if (got < wanted) break;
   }
-  if (received_ > 0) {  // from the kernel's clock to ours
+  if (options_.stamps && received_ > 0) {  // from the kernel's clock to ours
     const std::int64_t offset = clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC);
     for (std::size_t i = 0; i < received_; ++i) stamps_[i] -= offset;
   }
@@ -184,12 +185,13 @@ void SocketCanBus::note_link_error(int error) noexcept {
     note_loss(error);
     return;
   }
-  next_look_ns_ = now_ns_ + kRetryNs;
+  next_look_ns_ = clock_ns(CLOCK_MONOTONIC) + kRetryNs;
 }
 
 /// @param error  errno of a frame that was refused; 0: frames were lost on the way in
 void SocketCanBus::note_loss(int error) noexcept {
   loss_error_ = error;
+  now_ns_ = clock_ns(CLOCK_MONOTONIC);
   lossy_until_ns_ = now_ns_ + kLossyNs;
 }
 
@@ -198,6 +200,11 @@ void SocketCanBus::change(Link link, BusState controller) noexcept {
   link_ = link;
   controller_ = controller;
   if (!was_usable && usable(state())) ++statistics_.recoveries;
+}
+
+void SocketCanBus::read_clock(bool stamp) noexcept {
+  if (stamp || link_ != Link::kUp || lossy_until_ns_ != 0) now_ns_ = clock_ns(CLOCK_MONOTONIC);
+  if (lossy_until_ns_ != 0 && now_ns_ >= lossy_until_ns_) lossy_until_ns_ = 0;
 }
 
 bool SocketCanBus::linked() noexcept {
@@ -247,7 +254,7 @@ void SocketCanBus::discard_waiting() noexcept {
 
 // ---- Waiting
 
-bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t deadline_ns) noexcept {
+bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t at_most_ns) noexcept {
   std::array<pollfd, kMaxBuses> waits;
   const std::size_t count = std::min(buses.size(), kMaxBuses);
   for (std::size_t i = 0; i < count; ++i) {
@@ -255,7 +262,7 @@ bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t deadline
     const bool away = state == BusState::kDown || state == BusState::kGone;
     waits[i] = {.fd = away ? -1 : buses[i]->descriptor(), .events = POLLIN, .revents = 0};
   }
-  const std::int64_t rest_ns = std::max<std::int64_t>(0, deadline_ns - clock_ns(CLOCK_MONOTONIC));
+  const std::int64_t rest_ns = std::max<std::int64_t>(0, at_most_ns);
   const timespec rest{.tv_sec = rest_ns / kSecondNs, .tv_nsec = rest_ns % kSecondNs};
   return ::ppoll(waits.data(), count, &rest, nullptr) > 0;
 }

@@ -30,6 +30,7 @@ struct SocketCanOptions {
   bool fd = true;         ///< frames of up to 64 bytes
   SocketSide side = SocketSide::kMaster;
   std::size_t receive_queue = 512;  ///< frames that wait in the socket until they are taken
+  bool stamps = true;                    ///< tell received_ns() and sent_ns(): clock reads
   std::size_t send_queue = 256;     ///< frames that wait until the interface has taken them
 };
 
@@ -55,16 +56,17 @@ class SocketCanBus final : public Bus {
   SocketCanBus& operator=(const SocketCanBus&) = delete;
 
   /// A frame that the kernel does not take is lost and counted; it is not tried again.
-  /// @rt one system call per 64 frames, and a clock read
+  /// @rt one system call per 64 frames, and a clock read with `stamps`
   std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
   /// @pre frames.size() <= kMaxReceive
   /// @rt one system call per 64 frames and one more when all of them were there; two clock reads
+  ///     with `stamps`
   std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
   [[nodiscard]] BusState state() const noexcept TANDEM_RT override;
 
   /// CLOCK_MONOTONIC, from the kernel's stamp.
   [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
-    return {stamps_.data(), received_};
+    return {stamps_.data(), options_.stamps ? received_ : 0};
   }
   /// CLOCK_MONOTONIC, just before the frames were handed over.
   [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return sent_ns_; }
@@ -92,6 +94,8 @@ class SocketCanBus final : public Bus {
   void note_link_error(int error) noexcept;
   void note_loss(int error) noexcept;
   void change(Link link, BusState controller) noexcept;
+  /// Reads the clock, when somebody needs to know the time: stamps, or an end to what is wrong.
+  void read_clock(bool stamp) noexcept;
   /// Whether the link is up; looks for it when it is time to.
   [[nodiscard]] bool linked() noexcept;
   [[nodiscard]] Link look_for_link() noexcept;
@@ -123,10 +127,9 @@ inline constexpr std::size_t kMaxBuses = 32;
 
 /// Sleeps until a frame waits at one of the buses, or the time is over, or a signal came. A bus
 /// that is down or gone is passed over.
-/// @param deadline_ns  CLOCK_MONOTONIC
 /// @return whether something waits
 /// @pre buses.size() <= kMaxBuses
 /// @rt blocks; no allocation; one system call
-bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t deadline_ns) noexcept;
+bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t at_most_ns) noexcept;
 
 }  // namespace tandem::hal::can

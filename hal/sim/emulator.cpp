@@ -26,10 +26,10 @@ Emulator::Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
 
 Code Emulator::poll(std::int64_t patience_ns) noexcept {
   collect();
-  const std::int64_t now_ns = wait_->now_ns();
+  const std::int64_t now_ns = config_.lockstep ? 0 : wait_->now_ns();  // nothing depends on it
   const Due next = due(now_ns);
   if (next.now) return step(now_ns);
-  wait_->wait(std::min(next.at_ns, now_ns + patience_ns));
+  wait_->wait(std::min(next.at_ns - now_ns, patience_ns), next.bus);
   return Code::kTimeout;
 }
 
@@ -43,19 +43,25 @@ void Emulator::collect() noexcept {
       statistics_.frames_in += count;
       (void)robot_->bus(b).master().send(frames);
       const auto syncs = std::ranges::count(frames, canopen::cob::kSync, &Frame::id);
-      if (syncs > 0 && first_sync_ns_ == 0) first_sync_ns_ = wait_->now_ns();
+      if (syncs > 0 && first_sync_ns_ == 0 && !config_.lockstep) {
+        first_sync_ns_ = wait_->now_ns();
+      }
       port.sync = port.sync || syncs > 0;
     } while (count == batch_.size());
   }
 }
 
 Emulator::Due Emulator::due(std::int64_t now_ns) const noexcept {
-  if (std::ranges::all_of(ports_, &Port::sync)) return {now_ns, true};
-  if (config_.lockstep) return {std::numeric_limits<std::int64_t>::max(), false};
-  if (!running_) return {now_ns, true};  // powered on
+  constexpr int kAny = hal::can::FrameWait::kAnyBus;
+  int bus = static_cast<int>(ports_.size()) - 1;
+  while (bus >= 0 && ports_[static_cast<std::size_t>(bus)].sync) --bus;
+  if (bus < 0) return {now_ns, true, kAny};
+  // The master's SYNC on the last bus is the last of all: in lockstep none other needs a look.
+  if (config_.lockstep) return {std::numeric_limits<std::int64_t>::max(), false, bus};
+  if (!running_) return {now_ns, true, kAny};  // powered on
   const std::int64_t at_ns = first_sync_ns_ != 0 ? first_sync_ns_ + config_.period_ns / 2
                                                  : stepped_ns_ + config_.period_ns * 3 / 2;
-  return {at_ns, now_ns >= at_ns};
+  return {at_ns, now_ns >= at_ns, kAny};
 }
 
 /// How many periods have passed since the last step, as far as they are made up. In lockstep: 1.
@@ -69,7 +75,9 @@ std::int64_t Emulator::periods_to(std::int64_t now_ns) noexcept {
 
 Code Emulator::step(std::int64_t now_ns) noexcept {
   std::int64_t periods = periods_to(now_ns);
-  if (first_sync_ns_ == 0) statistics_.steps_without_sync += static_cast<std::uint64_t>(periods);
+  if (first_sync_ns_ == 0 && !config_.lockstep) {
+    statistics_.steps_without_sync += static_cast<std::uint64_t>(periods);
+  }
   stepped_ns_ = now_ns;
   running_ = true;
   first_sync_ns_ = 0;

@@ -57,6 +57,7 @@ class Emulator {
   struct Due {
     std::int64_t at_ns;
     bool now;
+    int bus;  ///< on which the frame would come, or kAnyBus
   };
 
   void collect() noexcept;

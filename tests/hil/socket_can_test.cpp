@@ -186,11 +186,11 @@ TEST(SocketCanWait, WakesForAFrameAtAnyOfItsBuses) {
   const Rig one("can0", SocketSide::kMaster);
   const Rig other("can1", SocketSide::kMaster);
   const std::array<SocketCanBus*, 2> buses{&one.bus(), &other.bus()};
-  EXPECT_FALSE(wait_for_frames(buses, test::monotonic_ns() + 5 * kMs));
+  EXPECT_FALSE(wait_for_frames(buses, 5 * kMs));
   EXPECT_FALSE(wait_for_frames(buses, 0)) << "the time is over: does not wait";
   const RawCan node("can1");
   node.write(0x70A, {0});
-  EXPECT_TRUE(wait_for_frames(buses, test::monotonic_ns() + 60'000 * kMs));
+  EXPECT_TRUE(wait_for_frames(buses, 60'000 * kMs));
   EXPECT_EQ(other.receive().size(), 1U);
 }
 
@@ -209,7 +209,7 @@ TEST(SocketCanWait, EndsWithASignal) {
     }
   });
   const std::int64_t deadline = test::monotonic_ns() + 60'000 * kMs;
-  EXPECT_FALSE(wait_for_frames(buses, deadline));
+  EXPECT_FALSE(wait_for_frames(buses, 60'000 * kMs));
   EXPECT_LT(test::monotonic_ns(), deadline);
   ended = true;
   signals.join();

@@ -43,11 +43,11 @@ class LockstepRobot final : private hal::can::FrameWait {
   class Nothing final : public FrameWait {
    public:
     std::int64_t now_ns() noexcept override { return 0; }
-    void wait(std::int64_t) noexcept override {}
+    void wait(std::int64_t, int) noexcept override {}
   };
 
   std::int64_t now_ns() noexcept override { return waited_; }
-  void wait(std::int64_t) noexcept override {
+  void wait(std::int64_t, int) noexcept override {
     ++waited_;
     if (emulator_runs) (void)emulator->poll(0);
   }

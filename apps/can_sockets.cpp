@@ -1,0 +1,64 @@
+#include "apps/can_sockets.hpp"
+
+#include <algorithm>
+
+#include "base/nearest.hpp"
+#include "rt/clock.hpp"
+#include "rt/stop_signal.hpp"
+
+namespace tandem::apps {
+
+using hal::can::SocketCanBus;
+
+std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
+    const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps) {
+  std::unique_ptr<CanSockets> all(new CanSockets);
+  Diagnostics errors;
+  for (const hal::BusConfig& bus : robot.buses) {
+    auto opened = SocketCanBus::open({.interface = bus.interface, .fd = bus.fd, .side = side, .stamps = stamps});
+    if (!opened) {
+      Error error = opened.error();
+      error.key = "bus '" + bus.name + "'" + (error.key.empty() ? "" : ", ") + error.key;
+      errors.push_back(std::move(error));
+      continue;
+    }
+    all->waited_.push_back(opened->get());
+    all->ends_.push_back(opened->get());
+    all->sockets_.push_back(std::move(*opened));
+  }
+  if (!errors.empty()) return std::unexpected(std::move(errors));
+  return all;
+}
+
+std::int64_t CanSockets::now_ns() noexcept { return rt::WallClock{}.now_ns(); }
+
+void CanSockets::wait(std::int64_t at_most_ns, int bus) noexcept {
+  const std::span<SocketCanBus* const> all(waited_);
+  const auto chosen = bus == kAnyBus ? all : all.subspan(static_cast<std::size_t>(bus), 1);
+  (void)hal::can::wait_for_frames(chosen, at_most_ns);
+}
+
+bool CanSockets::stopping() const noexcept { return rt::stop_requested(); }
+
+Status replace_interfaces(hal::RobotConfig& robot, std::span<const std::string> replacements) {
+  std::vector<std::string> known;
+  for (const hal::BusConfig& bus : robot.buses) known.push_back(bus.interface);
+  for (const std::string& text : replacements) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+      return fail("--interface " + text + " is not of the form FROM=TO",
+                  "for instance --interface can0=vcan0");
+    }
+    const std::string from = text.substr(0, equals);
+    if (std::ranges::find(known, from) == known.end()) {
+      return fail("no bus of " + robot.file + " has the interface '" + from + "'",
+                  suggest(from, known));
+    }
+    for (std::size_t b = 0; b < known.size(); ++b) {
+      if (known[b] == from) robot.buses[b].interface = text.substr(equals + 1);
+    }
+  }
+  return {};
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,188 @@
+#include <fmt/core.h>
+
+#include "apps/can_sockets.hpp"
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/errands.hpp"
+#include "apps/kernel_store.hpp"
+#include "apps/robot_files.hpp"
+#include "apps/run_control.hpp"
+#include "hal/sim/emulator.hpp"
+#include "rt/stop_signal.hpp"
+#include "rt/thread_setup.hpp"
+#include "runtime/experiment.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// What is emulated, from a robot's file or an experiment's.
+struct Subject {
+  hal::RobotConfig robot;
+  sim::SimRobotConfig sim;
+  rt::ThreadConfig thread;
+};
+
+/// A robot by itself starts in the first of its postures; an experiment says all.
+std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) {
+  Subject subject;
+  if (is_robot(options.file)) {
+    auto robot = read_robot(options.file);
+    if (!robot) return std::unexpected(robot.error());
+    subject.robot = std::move(robot->config);
+    if (!subject.robot.postures.empty()) subject.sim.posture = subject.robot.postures[0].name;
+    subject.thread = {.policy = rt::SchedulingPolicy::kOther, .lock_memory = false};
+  } else {
+    auto experiment = runtime::read_experiment(options.file);
+    if (!experiment) return std::unexpected(experiment.error());
+    subject.sim = experiment->sim_robot_config();
+    subject.thread = experiment->thread;
+    subject.robot = std::move(experiment->robot);
+  }
+  subject.sim.posture = options.posture.value_or(subject.sim.posture);
+  subject.sim.seed = options.seed.value_or(subject.sim.seed);
+  subject.sim.period_ns = options.period_ns.value_or(subject.sim.period_ns);
+  if (Status done = replace_interfaces(subject.robot, options.interfaces); !done) {
+    return std::unexpected(Diagnostics{done.error()});
+  }
+  return subject;
+}
+
+/// All that emulating needs; nothing is sent before it is complete.
+struct Emulation {
+  Subject subject;
+  model::KernelLibrary kernels;
+  std::unique_ptr<sim::EmulatedRobot> robot;
+  std::unique_ptr<CanSockets> sockets;
+  std::unique_ptr<sim::Emulator> emulator;
+};
+
+Diagnostics in_file(Error error, const std::string& file) {
+  if (error.file.empty()) error.file = file;
+  return {std::move(error)};
+}
+
+std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
+    const EmulateOptions& options) {
+  auto e = std::make_unique<Emulation>();
+  auto subject = read_subject(options);
+  if (!subject) return std::unexpected(subject.error());
+  e->subject = std::move(*subject);
+  const hal::RobotConfig& robot = e->subject.robot;
+  const auto description = with_description(robot);
+  if (!description) return std::unexpected(description.error());
+  auto kernels = find_kernels(*description, options.kernel_variant);
+  if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
+  e->kernels = std::move(*kernels);
+  auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
+  if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
+  e->robot = std::move(*emulated);
+  auto sockets = CanSockets::open(robot, hal::can::SocketSide::kBoards, false);
+  if (!sockets) return std::unexpected(sockets.error());
+  e->sockets = std::move(*sockets);
+  e->emulator = std::make_unique<sim::Emulator>(
+      *e->robot, e->sockets->buses(), *e->sockets,
+      sim::EmulatorConfig{e->subject.sim.period_ns, options.lockstep});
+  return e;
+}
+
+std::string interfaces_of(const hal::RobotConfig& robot) {
+  std::string names;
+  for (const hal::BusConfig& bus : robot.buses) {
+    names += (names.empty() ? "" : ", ") + bus.interface;
+  }
+  return names;
+}
+
+Json summary_json(const Emulation& e, bool lockstep) {
+  const sim::EmulatorStatistics& s = e.emulator->statistics();
+  Json json;
+  json["robot"] = e.subject.robot.name;
+  json["lockstep"] = lockstep;
+  json["steps"] = s.steps;
+  json["steps_without_sync"] = s.steps_without_sync;
+  json["slipped"] = s.slipped;
+  json["sim_seconds"] = static_cast<double>(e.emulator->time_ns()) * 1e-9;
+  json["frames_in"] = s.frames_in;
+  json["frames_out"] = s.frames_out;
+  json["frames_lost"] = s.frames_lost;
+  json["all_enabled"] = e.robot->all_enabled();
+  json["diverged"] = e.robot->plant().diverged();
+  return json;
+}
+
+void print_summary(const Emulation& e, std::FILE* out) {
+  const sim::EmulatorStatistics& s = e.emulator->statistics();
+  Facts facts;
+  facts.add("simulated", fmt::format("{:.3f} s in {} steps, {} of them without SYNC, {} slipped",
+                                     static_cast<double>(e.emulator->time_ns()) * 1e-9, s.steps,
+                                     s.steps_without_sync, s.slipped));
+  facts.add("frames",
+            fmt::format("{} in, {} out, {} lost", s.frames_in, s.frames_out, s.frames_lost));
+  for (const hal::can::SocketCanBus* bus : e.sockets->sockets()) {
+    if (std::string text = bus->status_text(); !text.empty()) {
+      facts.add(bus->interface(), std::move(text));
+    }
+  }
+  if (e.robot->plant().diverged()) {
+    facts.add("the simulation diverged", e.robot->plant().diverged_text());
+  }
+  facts.print(out);
+}
+
+/// Emulates until it is asked to stop, or the plant diverges.
+void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
+  constexpr std::int64_t kPatienceNs = 100'000'000;
+  StatusLine line(out);
+  while (!rt::stop_requested()) {
+    if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
+    errands.do_all();
+    if (quiet || !line.due()) continue;
+    const sim::EmulatorStatistics& s = e.emulator->statistics();
+    line.show(fmt::format("{:.1f} s simulated, {} steps ({} without SYNC), {}",
+                          static_cast<double>(e.emulator->time_ns()) * 1e-9, s.steps,
+                          s.steps_without_sync,
+                          e.robot->all_enabled() ? "all axes enabled" : "not all axes enabled"));
+  }
+}
+
+}  // namespace
+
+Exit emulate_command(const EmulateOptions& options) {
+  std::FILE* out = human_output(options.json);
+  if (const Status writable = check_writable(options.json); !writable) {
+    print_errors({writable.error()});
+    return Exit::kUsage;
+  }
+  const auto composed = compose_emulation(options);
+  if (!composed) {
+    print_errors(composed.error());
+    return Exit::kUsage;
+  }
+  Emulation& e = **composed;
+  rt::install_stop_signals();
+  const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
+  if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
+  if (!options.quiet) {
+    fmt::print(out, "{}: {} boards and {} sensors on {}, {}; Ctrl-C ends it\n",
+               e.subject.robot.name, e.subject.robot.boards.size(),
+               e.subject.robot.sensors.size(), interfaces_of(e.subject.robot),
+               options.lockstep ? "a step per SYNC" : "in real time");
+    std::fflush(out);
+  }
+  Errands errands;
+  ControlRegistry commands;
+  commands.add("status", "steps, frames and simulated time so far", {}, [&](const Json&) {
+    return errands.ask([&] { return summary_json(e, options.lockstep); });
+  });
+  const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "emulate");
+  emulate(e, errands, out, options.quiet);
+  if (!options.quiet) print_summary(e, out);
+  if (const Status written = write_json(options.json, summary_json(e, options.lockstep));
+      !written) {
+    print_errors({written.error()});
+    return Exit::kUsage;
+  }
+  return e.robot->plant().diverged() ? Exit::kFault : Exit::kDone;
+}
+
+}  // namespace tandem::apps
