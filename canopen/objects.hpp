@@ -220,6 +220,7 @@ enum class ErrorCode : std::uint16_t {
   kSoftware = 0x6000,
   kParameter = 0x6320,
   kPositionSensor = 0x7300,
+  kSensorMismatch = 0x7320,       ///< position: two sensors contradict each other
   kCommunicationOverrun = 0x8110,
   kHeartbeatLost = 0x8130,        ///< life guard or heartbeat error
   kBusOffRecovered = 0x8140,

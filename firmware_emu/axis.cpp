@@ -66,7 +66,9 @@ void Axis::apply_settings() noexcept TANDEM_RT {
       .continuous_current_A = objects_.i2t[kContinuousCurrent - 1],
       .thermal_time_s = objects_.i2t[kThermalTime - 1],
       .temperature_limit_C = objects_.temperature_limit * 0.1,
-      .undervoltage_V = objects_.undervoltage_V};
+      .undervoltage_V = objects_.undervoltage_V,
+      .mismatch_window_rad = objects_.mismatch[kMismatchWindow - 1],
+      .mismatch_timeout_s = objects_.mismatch[kMismatchTimeout - 1]};
   settings_changed_ = false;
 }
 
@@ -136,6 +138,7 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
        .current_A = measured_.current_A,
        .temperature_C = temperature_C_,
        .bus_voltage_V = measured_.bus_voltage_V,
+       .mismatch_rad = mismatch_rad(),
        .sensors_valid = sensors_valid_,
        .powered = powered(),
        .follows_position = follows},
@@ -144,6 +147,12 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
   // A lost connection is a fault of an axis that runs, and stays one until it is back.
   const bool latched = objects_.error_code == static_cast<std::uint16_t>(connection);
   return powered() || latched ? connection : ErrorCode::kNone;
+}
+
+double Axis::mismatch_rad() const noexcept {
+  const double spring = objects_.motor_data[kSpring - 1];
+  const double twist = spring > 0.0 ? measured_.torque_Nm / spring : 0.0;
+  return measured_.motor_position_rad - measured_.link_position_rad - twist;
 }
 
 AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept TANDEM_RT {

@@ -61,6 +61,8 @@ class Axis final : private canopen::ObjectOwner {
   void seed_references() noexcept;
   void watch_stop() noexcept;
   [[nodiscard]] canopen::ErrorCode present_cause(canopen::ErrorCode connection) noexcept;
+  /// By how much motor angle, link angle and the spring's torque contradict each other.
+  [[nodiscard]] double mismatch_rad() const noexcept;
   [[nodiscard]] Reference reference() const noexcept;
   [[nodiscard]] Action action() const noexcept;
   [[nodiscard]] bool powered() const noexcept {

@@ -63,6 +63,7 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.limits = {real32(c.voltage_limit_V), real32(c.current_limit_A), real32(c.torque_limit_Nm),
               real32(c.velocity_limit_rad_s)};
   o.i2t = {real32(setup.continuous_current_A), real32(setup.thermal_time_s)};
+  o.mismatch = {real32(setup.mismatch_window_rad), real32(setup.mismatch_timeout_s)};
   o.transfer_time_s = real32(c.transfer_time_s);
   o.undervoltage_V = real32(setup.undervoltage_V);
   o.stop_time_s = real32(setup.stop_time_s);
@@ -140,6 +141,7 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          od.add(at(co::kMotorResolution), 0, motor_counts, kReadWrite, {1, 4294967295.0}, &owner) &&
          add_array(od, at(co::kLimits), limits, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kI2t), i2t, kReadWrite, kNotNegative, &owner) &&
+         add_array(od, at(own::kMismatch), mismatch, kReadWrite, kNotNegative, &owner) &&
          od.add(at(co::kCommandTimeout), 0, command_timeout, kReadWrite) &&
          od.add(at(co::kTemperatureLimit), 0, temperature_limit, kReadWrite, {}, &owner) &&
          od.add(at(own::kUndervoltage), 0, undervoltage_V, kReadWrite, kNotNegative, &owner) &&

@@ -23,6 +23,7 @@ inline constexpr std::uint16_t kTransferTime = 0x2028;      // f32 [s]
 inline constexpr std::uint16_t kUndervoltage = 0x2035;      // f32 [V]
 inline constexpr std::uint16_t kStopTime = 0x2036;          // f32 [s]
 inline constexpr std::uint16_t kPositionMargin = 0x2037;    // f32 [rad]
+inline constexpr std::uint16_t kMismatch = 0x2038;          // f32: MismatchSub
 inline constexpr std::uint16_t kTelemetry = 0x2040;         // f32: TelemetrySub
 inline constexpr std::uint16_t kRefusedValues = 0x2041;     // u32: values by PDO not taken
 /// Of the board, not of an axis.
@@ -39,6 +40,10 @@ enum EstimatorSub : std::uint8_t {
   kMotorVelocityCutoff,
   kTorqueRateCutoff,
 };
+enum MismatchSub : std::uint8_t {
+  kMismatchWindow = 1,  ///< [rad]; 0: not watched
+  kMismatchTimeout,     ///< [s]
+};
 enum TelemetrySub : std::uint8_t {
   kTorqueReference = 1,  ///< [Nm] into the torque loop, limited
   kTransferVoltage,      ///< [V] what is left of a mode change's step
@@ -51,7 +56,7 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 7;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 100;
+inline constexpr std::size_t kAxisEntries = 103;
 
 /// Plain variables behind the dictionary, the widest first: no padding. Units as in
 /// canopen/objects.hpp.
@@ -80,6 +85,7 @@ struct AxisObjects {
   std::array<float, 3> cutoffs_Hz{};
   std::array<float, 4> limits{};
   std::array<float, 2> i2t{};
+  std::array<float, 2> mismatch{};
   float transfer_time_s = 0.0F;
   float undervoltage_V = 0.0F;
   float stop_time_s = 0.0F;

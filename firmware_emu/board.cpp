@@ -55,7 +55,8 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
         axis.damping_Nms_rad, axis.torque_noise_Nm, axis.torque_quantum_Nm,
         axis.link_velocity_cutoff_Hz, axis.motor_velocity_cutoff_Hz, axis.torque_rate_cutoff_Hz,
         axis.position_margin_rad, axis.following_window_rad, axis.following_timeout_s,
-        axis.continuous_current_A, axis.thermal_time_s, axis.undervoltage_V, axis.stop_time_s}) {
+        axis.continuous_current_A, axis.thermal_time_s, axis.undervoltage_V, axis.stop_time_s,
+        axis.mismatch_window_rad, axis.mismatch_timeout_s}) {
     if (!std::isfinite(value) || value < 0.0) {
       return bad(key, "a setting is negative or not finite");
     }

@@ -22,6 +22,8 @@ struct ProtectionConfig {
   double thermal_time_s = 1.0;
   double temperature_limit_C = 0.0;
   double undervoltage_V = 0.0;        ///< 0: not watched
+  double mismatch_window_rad = 0.0;   ///< 0: not watched
+  double mismatch_timeout_s = 0.0;
 };
 
 struct ProtectionInputs {
@@ -31,6 +33,8 @@ struct ProtectionInputs {
   double current_A = 0.0;
   double temperature_C = 0.0;
   double bus_voltage_V = 0.0;
+  /// Motor angle less link angle less what the spring's torque accounts for.
+  double mismatch_rad = 0.0;
   bool sensors_valid = true;   ///< every reading is a number
   bool powered = false;        ///< the bridge is on
   bool follows_position = false;  ///< CSP: position_error_rad means something
@@ -49,7 +53,7 @@ class Protection {
   /// them, or comes back, may be powered.
   static constexpr double kOutward_rad_s = 0.02;
 
-  /// @return kNone, or the first of: position sensor, I2t, temperature, under-voltage, following
+  /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature, under-voltage, following
   ///         error, position limit.
   canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
                             double dt_s) noexcept TANDEM_RT {
@@ -64,7 +68,11 @@ class Protection {
     const bool lags = in.powered && in.follows_position && config.following_window_rad > 0.0 &&
                       std::abs(in.position_error_rad) > config.following_window_rad;
     state_.lagging_s = lags ? state_.lagging_s + dt_s : 0.0;
+    const bool contradicts = config.mismatch_window_rad > 0.0 &&
+                             std::abs(in.mismatch_rad) > config.mismatch_window_rad;
+    state_.mismatch_s = contradicts ? state_.mismatch_s + dt_s : 0.0;
 
+    if (state_.mismatch_s > config.mismatch_timeout_s) return ErrorCode::kSensorMismatch;
     if (state_.overload != 0) return ErrorCode::kI2t;
     if (state_.overheated != 0) return ErrorCode::kDriveTemperature;
     if (in.bus_voltage_V < config.undervoltage_V) return ErrorCode::kVoltage;
@@ -88,6 +96,7 @@ class Protection {
   struct State {  // wide flags: no padding in a snapshot
     double heat_A2 = 0.0;
     double lagging_s = 0.0;
+    double mismatch_s = 0.0;
     std::int64_t overload = 0;
     std::int64_t overheated = 0;
     std::int64_t warm = 0;

@@ -49,6 +49,8 @@ struct AxisSetup {
   double thermal_time_s = 30.0;            ///< 2031:2
   double temperature_limit_C = 120.0;      ///< 2034
   double undervoltage_V = 0.0;             ///< 2035; 0: not watched
+  double mismatch_window_rad = 0.0;        ///< 2038:1; 0: not watched
+  double mismatch_timeout_s = 0.01;        ///< 2038:2
   double stop_time_s = 1.0;                ///< 2036: longest stop until the bridge opens
 };
 

@@ -8,6 +8,7 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
+#include "hal/fault_kind.hpp"
 #include "hal/image.hpp"
 #include "hal/stop_category.hpp"
 
@@ -36,6 +37,12 @@ struct CycleTime {
   std::uint64_t cycle = 0;
   std::int64_t time_ns = 0;
   std::int64_t period_ns = 1'000'000;
+};
+
+/// An injected fault that has begun.
+struct InjectedFault {
+  FaultKind kind = FaultKind::kNone;
+  std::int32_t joint = -1;  ///< its own, or the first of its board; -1: of a sensor, frames or bus
 };
 
 /// A robot: simulated, emulated behind a bus, or real.
@@ -79,6 +86,10 @@ class Backend {
 
   /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
+
+  /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
+  /// that is not in this process tells nothing.
+  [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend
   /// whose robot cannot be rewound answers false.

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "base/realtime.hpp"
+#include "hal/fault_kind.hpp"
 
 namespace tandem::log {
 
@@ -17,15 +18,19 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kOverrun: return "overrun";
     case EventKind::kStopRequested: return "stop requested";
     case EventKind::kShutDown: return "shut down";
+    case EventKind::kInjected: return "injected";
   }
   return "?";
 }
 
 std::string describe(const Event& event, std::span<const std::string> joints) {
   std::string text = to_string(event.kind);
+  if (event.kind == EventKind::kInjected) {
+    text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
+  }
   const bool has_joint = event.joint >= 0 && static_cast<std::size_t>(event.joint) < joints.size();
   if (has_joint) text += " of " + joints[static_cast<std::size_t>(event.joint)];
-  if (event.code == 0) return text;
+  if (event.code == 0 || event.kind == EventKind::kInjected) return text;
   char code[32];
   if (event.kind == EventKind::kOverrun) {
     std::snprintf(code, sizeof code, ": %u cycles skipped", event.code);

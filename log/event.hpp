@@ -22,6 +22,7 @@ enum class EventKind : std::uint8_t {
   kOverrun,          ///< the loop skipped `code` cycles
   kStopRequested,    ///< from outside: signal or caller
   kShutDown,         ///< the drives are disabled
+  kInjected,         ///< a fault was injected: `code` is its hal::FaultKind
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 

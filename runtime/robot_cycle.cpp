@@ -58,6 +58,11 @@ void RobotCycle::read() noexcept TANDEM_RT {
   state_.time_ns()[0] = time_.time_ns;
   if (!started_) event(EventKind::kStarted);
   started_ = true;
+  for (int most = 4; most > 0; --most) {  // of a cycle, for there is only so much room in the log
+    const hal::InjectedFault injected = backend_->next_injected();
+    if (injected.kind == hal::FaultKind::kNone) break;
+    event(EventKind::kInjected, injected.joint, static_cast<std::uint32_t>(injected.kind));
+  }
 }
 
 void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {

@@ -13,6 +13,11 @@ std::uint64_t seed_of(std::uint64_t seed, std::uint64_t kind, std::size_t index)
   return (seed * 0x9E3779B97F4A7C15U) ^ (kind << 32) ^ (index + 1);
 }
 
+// The encoders and the spring of a healthy joint agree to some 1e-3 rad: encoders' counts, the
+// torque's noise, and the spring's damping, which the comparison leaves out.
+constexpr double kMismatchWindow_rad = 0.02;
+constexpr double kUndervoltageShare = 0.6;  // of the supply
+
 firmware::Pid::Config pid(const hal::PidConfig& config, double limit) {
   return {.kp = config.gains.kp,
           .ki = config.gains.ki,
@@ -31,6 +36,8 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.stiffness_Nm_rad = gains.stiffness_Nm_rad;
   axis.damping_Nms_rad = gains.damping_Nms_rad;
   axis.torque_noise_Nm = joint.torque_noise_Nm;
+  axis.mismatch_window_rad = kMismatchWindow_rad;
+  axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
   c.position = pid(gains.position, joint.max_torque_Nm);
   c.velocity = pid(gains.velocity, joint.max_torque_Nm);

@@ -54,6 +54,12 @@ Code SimRobot::write(const hal::CommandImage& command,
   return master_->send(command, parameters);
 }
 
+hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
+  const Fault* fault = robot_->next_begun_fault();
+  if (fault == nullptr) return {};
+  return {fault->kind, robot_->joint_of(*fault)};
+}
+
 bool SimRobot::archive(Archive& ar) {
   ar(*robot_, truth_, *master_);
   return true;

@@ -31,6 +31,7 @@ class SimRobot final : public hal::Backend {
   void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master_->shut_down(); }
+  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;
 
   /// The true state at the last read(), when `truth` was asked for.

@@ -166,6 +166,25 @@ TEST_F(Guard, StopsOnUnderVoltage) {
   EXPECT_TRUE(reset(r));
 }
 
+TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
+  BoardSetup setup = board_setup();
+  setup.axes[0].mismatch_window_rad = 0.02;
+  setup.axes[0].mismatch_timeout_s = 0.005;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.enable();
+  r.cycles(50);
+  ASSERT_EQ(r.error(), 0) << "a healthy joint";
+  r.tamper = [](std::vector<AxisSense>& sense) { sense[0].link_position_rad += 0.03; };
+  r.cycles(4);
+  EXPECT_EQ(r.error(), 0) << "a short one is borne";
+  ASSERT_LT(until_fault(r, 4), 4);
+  expect_fault(r, 0x7320, 0x20);
+  EXPECT_FALSE(reset(r));
+  r.tamper = nullptr;
+  EXPECT_TRUE(reset(r));
+}
+
 TEST_F(Guard, StopsOnASensorThatGivesNoNumber) {
   rig.start();
   rig.enable();

@@ -1,6 +1,7 @@
 #include "log/event.hpp"
 
 #include "base/realtime.hpp"
+#include "hal/fault_kind.hpp"
 
 namespace tandem::log {
 namespace {
@@ -16,6 +17,10 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kJoints), "overrun: 3 cycles skipped");
   event = {.kind = EventKind::kBringUpDone};
   EXPECT_EQ(describe(event, kJoints), "bring-up done");
+  event = {.code = static_cast<std::uint32_t>(hal::FaultKind::kEncoderFreeze),
+           .joint = 1,
+           .kind = EventKind::kInjected};
+  EXPECT_EQ(describe(event, kJoints), "injected encoder_freeze of knee");
 }
 
 TEST(Event, IsEncodedAsPlainCdr) {
