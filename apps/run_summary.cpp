@@ -85,6 +85,7 @@ Json RunSummary::json() const {
   json["wall_seconds"] = wall_s;
   json["realtime_factor"] = wall_s > 0.0 ? Json(sim_s() / wall_s) : Json(nullptr);
   json["overruns"] = loop.overruns;
+  json["skipped"] = loop.skipped;
   json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());
   json["bus_ns"] = composition.backend->waits_for_bus() ? percentiles_json(loop.bus.percentiles())
                                                         : Json(nullptr);
@@ -119,15 +120,22 @@ void RunSummary::print(std::FILE* out) const {
               fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
                           base->max_height_m, base->final_tilt_rad * kDegrees));
   }
-  facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
-                                     wall_s > 0.0 ? sim_s() / wall_s : 0.0));
+  const rt::LoopStatistics& loop = cycle.loop();
+  const bool wall_clock = composition.experiment.loop.pacing == rt::Pacing::kWallClock;
+  if (wall_clock) {
+    facts.add("ran", fmt::format("{:.3f} s, {} cycles, {} skipped", wall_s,
+                                 cycle.running_cycles(), loop.skipped));
+  } else {
+    facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
+                                       wall_s > 0.0 ? sim_s() / wall_s : 0.0));
+  }
   facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().work.percentiles()));
   if (composition.backend->waits_for_bus()) {
     facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
   }
-  if (composition.experiment.loop.rate > 0.0) {
-    facts.add("wake-up p50/p99/p99.9/max", microseconds(cycle.loop().wakeup.percentiles()));
-    facts.add("overruns", std::to_string(cycle.loop().overruns));
+  if (wall_clock || composition.experiment.loop.rate > 0.0) {
+    facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
+    facts.add("overruns", std::to_string(loop.overruns));
   }
   facts.add("kernels", composition.kernels->variant);
   if (log) {
