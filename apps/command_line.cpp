@@ -109,6 +109,8 @@ void add_run(CLI::App& app, RunOptions& o) {
       ->check(CLI::IsMember({"sim", "can"}));
   app.add_flag("--lockstep", o.lockstep, "CAN: wait for `tandem emulate --lockstep`, at any speed");
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--record-frames", o.record_frames,
+                 "CAN: write every frame to this file, as candump -L does");
   CLI::Option* log =
       app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);

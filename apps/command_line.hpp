@@ -29,6 +29,7 @@ struct RunOptions {
   std::string hal;                    ///< "sim", "can"; empty: the experiment's
   bool lockstep = false;              ///< CAN: wait for an emulated robot
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
+  std::string record_frames;            ///< file of the bus' frames; empty: none
   bool report = false;                ///< draw the report after the run
   std::string trace;                  ///< file of trace events; empty: none
   std::size_t trace_cycles = 10'000;  ///< the last that `trace` holds

@@ -115,14 +115,29 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   return c;
 }
 
-Diagnostics connect(Composition& c) {
+Diagnostics connect(Composition& c, const std::string& record_frames) {
   const runtime::Experiment& e = c.experiment;
-  if (e.hal.backend != runtime::BackendKind::kCan) return {};
+  if (e.hal.backend != runtime::BackendKind::kCan) {
+    if (record_frames.empty()) return {};
+    return {fail("--record-frames: a robot in this process has no bus to record",
+                 "add --hal can, and start tandem emulate")
+                .error()};
+  }
   auto sockets = CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep);
   if (!sockets) return sockets.error();
   c.sockets = std::move(*sockets);
+  const auto ends = c.sockets->buses();
+  std::vector<hal::can::Bus*> buses(ends.begin(), ends.end());
+  if (!record_frames.empty()) {
+    auto record = hal::can::FrameRecord::open(record_frames);
+    if (!record) return {record.error()};
+    c.frames = std::move(*record);
+    for (std::size_t b = 0; b < buses.size(); ++b) {
+      buses[b] = &c.frames->watch(*buses[b], e.robot.buses[b].interface);
+    }
+  }
   auto backend = hal::can::CanBackend::create(
-      e.robot, c.sockets->buses(), *c.sockets,
+      e.robot, buses, *c.sockets,
       {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
   if (!backend) return {backend.error()};
   c.backend = std::move(*backend);

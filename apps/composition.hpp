@@ -13,6 +13,7 @@
 #include "apps/can_sockets.hpp"
 #include "apps/robot_files.hpp"
 #include "base/result.hpp"
+#include "hal/ethercat-can/frame_record.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/kernel_library.hpp"
 #include "runtime/controller_host.hpp"
@@ -40,6 +41,7 @@ struct Composition {
   runtime::Experiment experiment;  ///< overrides applied; its robot is completed
   model::KernelLibrary kernels;
   std::unique_ptr<CanSockets> sockets;   ///< of the CAN backend
+  std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
   std::unique_ptr<hal::Backend> backend; ///< the CAN backend only after connect()
   sim::SimRobot* sim = nullptr;          ///< the backend, when it is the simulation
   std::unique_ptr<runtime::ControllerHost> controllers;
@@ -56,7 +58,8 @@ struct Composition {
     const std::string& experiment, const Overrides& overrides);
 
 /// Opens the CAN interfaces and makes the CAN backend; the simulation has nothing to connect.
-/// Errors: CanSockets::open()'s.
-[[nodiscard]] Diagnostics connect(Composition& composition);
+/// @param record_frames  file that every frame is written to; empty: none
+/// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus.
+[[nodiscard]] Diagnostics connect(Composition& composition, const std::string& record_frames);
 
 }  // namespace tandem::apps

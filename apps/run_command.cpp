@@ -190,8 +190,9 @@ Exit run(Composition& c, const RunOptions& options) {
   loop.join();
   if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 
-  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, {}};
+  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}};
   if (recorder != nullptr) summary.log = recorder->close();
+  if (c.frames != nullptr) summary.frames = c.frames->close();
   summary.faults = fault_texts(cycle, summary.log);
   if (!options.quiet) {
     fmt::print(out, "\n");
@@ -231,7 +232,7 @@ Exit run_command(const RunOptions& options) {
     print_errors(composition.error());
     return Exit::kUsage;
   }
-  if (const Diagnostics errors = connect(**composition); !errors.empty()) {
+  if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {
     print_errors(errors);
     return Exit::kUsage;
   }

@@ -25,6 +25,11 @@ Json log_json(const std::optional<log::RecordingResult>& log) {
           {"data_sha256", log->data_sha256}};
 }
 
+Json frames_json(const std::optional<hal::can::FrameRecord::Result>& frames) {
+  if (!frames) return nullptr;
+  return {{"path", frames->path}, {"frames", frames->frames}, {"lost", frames->lost}};
+}
+
 Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
   if (!ground) return nullptr;
   return {{"weight_N", ground->weight_N},
@@ -91,6 +96,7 @@ Json RunSummary::json() const {
                                                         : Json(nullptr);
   json["cycle_ns"] = percentiles_json(loop.work.percentiles());
   json["log"] = log_json(log);
+  json["frames"] = frames_json(frames);
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
@@ -142,6 +148,11 @@ void RunSummary::print(std::FILE* out) const {
     facts.add("log",
               fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
                           log->dropped, static_cast<double>(log->bytes) * 1e-6));
+  }
+  if (frames) {
+    const std::string trouble = frames->error.empty() ? "" : "; " + frames->error;
+    facts.add("frames", fmt::format("{} ({} frames, {} lost{})", frames->path, frames->frames,
+                                    frames->lost, trouble));
   }
   facts.print(out);
 }

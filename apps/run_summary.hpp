@@ -19,6 +19,7 @@ struct RunSummary {
   const runtime::RobotCycle& cycle;
   double wall_s = 0.0;                      ///< while controllers ran
   std::optional<log::RecordingResult> log;  ///< empty: nothing was logged
+  std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
   std::vector<std::string> faults;          ///< the log's trouble included
 
   [[nodiscard]] double sim_s() const;

@@ -127,6 +127,7 @@ inline constexpr std::size_t kMaxBuses = 32;
 
 /// Sleeps until a frame waits at one of the buses, or the time is over, or a signal came. A bus
 /// that is down or gone is passed over.
+/// @param at_most_ns  from now
 /// @return whether something waits
 /// @pre buses.size() <= kMaxBuses
 /// @rt blocks; no allocation; one system call

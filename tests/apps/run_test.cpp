@@ -76,6 +76,13 @@ TEST_F(Run, RefusesATraceThatCannotBeWrittenBeforeItRuns) {
   EXPECT_EQ(tandem("run hold.toml --trace-cycles 5").status, 2);
 }
 
+TEST_F(Run, RefusesToRecordFramesWithoutABus) {
+  const Outcome outcome = tandem("run hold.toml --no-log --record-frames frames.log");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("--record-frames"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("--hal can"), std::string::npos) << outcome.err;
+}
+
 TEST_F(Run, EndsWithATableAndTheLogsPath) {
   const Outcome outcome = tandem("run hold.toml --duration 0.2");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
