@@ -1,8 +1,10 @@
 #include <fmt/core.h>
 
+#include "apps/bus_table.hpp"
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -72,6 +74,21 @@ void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
 }
 
+/// What `--bus` shows, before anything is refused: a robot's own file has no period.
+Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out, Json& json) {
+  constexpr std::int64_t kPeriodNs = 1'000'000;
+  if (!robot_only) {
+    const auto experiment = runtime::read_experiment(file);
+    if (!experiment) return {};  // composing tells of it
+    return show_buses(experiment->robot, experiment->loop.period_ns, out, json);
+  }
+  const auto robot = read_robot(file);
+  if (!robot) return {};
+  Diagnostics errors = show_buses(robot->config, kPeriodNs, out, json);
+  if (!errors.empty()) return errors;
+  return hal::can::check_bus_load(robot->config, kPeriodNs);
+}
+
 Diagnostics check_robot(const std::string& file, std::FILE* out) {
   const auto robot = read_robot(file);
   if (!robot) return robot.error();
@@ -92,10 +109,16 @@ Diagnostics check_experiment(const std::string& file, std::FILE* out) {
 
 Exit check_command(const CheckOptions& options) {
   std::FILE* out = human_output(options.json);
-  const Diagnostics errors =
-      is_robot(options.file) ? check_robot(options.file, out) : check_experiment(options.file, out);
+  const bool robot_only = is_robot(options.file);
+  Json buses;
+  Diagnostics errors;
+  if (options.bus) errors = check_buses(options.file, robot_only, out, buses);
+  if (errors.empty()) {
+    errors = robot_only ? check_robot(options.file, out) : check_experiment(options.file, out);
+  }
   print_errors(errors);
-  const Json json{{"ok", errors.empty()}, {"errors", errors_json(errors)}};
+  Json json{{"ok", errors.empty()}, {"errors", errors_json(errors)}};
+  if (options.bus) json["buses"] = buses;
   if (const Status written = write_json(options.json, json); !written) {
     print_errors({written.error()});
     return Exit::kUsage;

@@ -38,6 +38,7 @@ Without --socket it is the only running process of this user.)";
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
   tandem check config/coman/robot.toml               a robot by itself
+  tandem check --bus config/coman/squat.toml         the load of every bus, worst case
   tandem check my_robot.toml --json -                errors with file, line, key and hint)";
 
 const char kModelBuildExamples[] = R"(Examples:
@@ -155,6 +156,7 @@ void add_emulate(CLI::App& app, EmulateOptions& o) {
 
 void add_check(CLI::App& app, CheckOptions& o) {
   app.add_option("file", o.file, "Experiment or robot TOML")->required();
+  app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kCheckExamples);
 }

@@ -48,6 +48,7 @@ struct AskOptions {
 /// tandem check FILE
 struct CheckOptions {
   std::string file;  ///< an experiment or a robot
+  bool bus = false;  ///< show the load of every bus
   std::string json;
 };
 

@@ -6,8 +6,8 @@
 
 #include "apps/kernel_store.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
-#include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -95,15 +95,10 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   } else {
     errors.add(kernels.error(), e.robot.file, 0);
   }
+  errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   add_controllers(*c, errors);
   if (!errors.empty()) return errors.give();
-  if (e.hal.backend == runtime::BackendKind::kCan) {
-    if (const auto layout = hal::can::make_pdo_layout(e.robot); !layout) {
-      errors.add(layout.error(), e.robot.file, 0);
-      return errors.give();
-    }
-    return c;
-  }
+  if (e.hal.backend == runtime::BackendKind::kCan) return c;
 
   auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), e.sim_robot_config());
   if (!backend) {

@@ -114,6 +114,9 @@ inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: n
 inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link rev]
 inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
 
+// The manufacturer's, of a board
+inline constexpr std::uint16_t kCycleCounter = 0x2051;  // u8: by RPDO, echoed by TPDO
+
 // The manufacturer's, of a sensor node
 inline constexpr std::uint16_t kSensorChannels = 0x2100;  // f32[]: sub 1 to n, SI units
 }  // namespace object

@@ -14,7 +14,7 @@ using namespace canopen;
 
 constexpr std::string_view kSoftwareVersion = "tandem firmware 1.0";
 constexpr std::string_view kHardwareVersion = "emulated";
-constexpr std::size_t kBoardEntries = 3;
+constexpr std::size_t kBoardEntries = 4;
 constexpr std::int64_t kNsPerUs = 1000;
 
 std::uint8_t register_bits(ErrorCode code) noexcept {
@@ -101,10 +101,12 @@ std::vector<std::unique_ptr<Axis>> make_axes(const BoardSetup& setup, ObjectDict
 
 /// Adds the board's own entries before the node resolves anything.
 std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDictionary& od,
-                                              std::uint32_t& ignored_frames) {
+                                              std::uint32_t& ignored_frames,
+                                              std::uint8_t& cycle_counter) {
   od.add_string(canopen::object::kHardwareVersion, 0, kHardwareVersion);
   od.add_string(canopen::object::kSoftwareVersion, 0, kSoftwareVersion);
   od.add(object::kIgnoredFrames, 0, ignored_frames, kReadTpdo);
+  od.add(canopen::object::kCycleCounter, 0, cycle_counter, kWriteRpdo | kMapTpdo);
   return make_axes(setup, od);
 }
 
@@ -113,7 +115,7 @@ std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDic
 Board::Board(const BoardSetup& setup)
     : setup_(setup),
       od_(kNodeObjects + kBoardEntries + setup.axes.size() * kAxisEntries),
-      axes_(make_board(setup_, od_, ignored_frames_)),
+      axes_(make_board(setup_, od_, ignored_frames_, cycle_counter_)),
       node_({.id = setup_.node_id,
              .device_type = kDriveDeviceType,
              .vendor = setup_.vendor,
@@ -161,6 +163,7 @@ void Board::take(NodeEvents events) noexcept {
   if ((events & kEventLeftOperational) != 0) offline_ = true;
   if ((events & kEventHeartbeatLost) != 0) heartbeat_lost_ = true;
   if ((events & kEventResetNode) != 0) {
+    cycle_counter_ = 0;
     for (const auto& axis : axes_) axis->power_on();
   }
 }
@@ -237,7 +240,7 @@ void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,
 void Board::archive(Archive& ar) {
   ar(od_, node_);
   for (const auto& axis : axes_) axis->archive(ar);
-  ar(commands_, ignored_frames_, until_control_ns_, since_sync_ns_, offline_, heartbeat_lost_,
+  ar(commands_, ignored_frames_, cycle_counter_, until_control_ns_, since_sync_ns_, offline_, heartbeat_lost_,
      sync_pending_);
   for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled);
   archive_outbox(ar, outbox_, kOutboxFrames);

@@ -42,6 +42,7 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
 
 void read_bus(TomlTable table, RobotConfig& robot) {
   BusConfig bus;
+  bus.line = table.line();
   bus.name = table.text("name");
   check_unique(table, robot.buses, bus.name, "bus");
   bus.interface = table.text_or("interface", bus.name);
@@ -52,6 +53,7 @@ void read_bus(TomlTable table, RobotConfig& robot) {
     table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
                 "raise it, or set fd = false");
   }
+  bus.max_load = table.number_or("max_load", bus.max_load, {0.01, 1.0});
   table.finish();
   robot.buses.push_back(bus);
 }

@@ -113,6 +113,8 @@ struct BusConfig {
   bool fd = true;
   std::int64_t bitrate = 1'000'000;
   std::int64_t data_bitrate = 8'000'000;
+  double max_load = 0.9;                ///< mean share of the wire's time that may be used
+  int line = 0;                         ///< in the TOML, for messages
 };
 
 /// [[board]]

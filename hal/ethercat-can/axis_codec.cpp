@@ -52,6 +52,14 @@ void RawFeedback::take(WireField field, const std::uint8_t* bytes) noexcept TAND
   }
 }
 
+void RawFeedback::adopt(const RawFeedback& sample) noexcept TANDEM_RT {
+  statusword = sample.statusword;
+  position = sample.position;
+  velocity = sample.velocity;
+  torque = sample.torque;
+  motor_position = sample.motor_position;
+}
+
 void RawCommand::give(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT {
   switch (field) {
     case WireField::kControlword: put(bytes, controlword); break;

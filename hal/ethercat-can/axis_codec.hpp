@@ -46,6 +46,8 @@ struct RawFeedback {
   std::int8_t mode_display = 0;
 
   void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT;
+  /// Takes over the values that travel every SYNC.
+  void adopt(const RawFeedback& sample) noexcept TANDEM_RT;
   void archive(Archive& ar);
 };
 

@@ -13,6 +13,7 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
     ++age_cycles_;
     return;
   }
+  feedback_.adopt(sample_);
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
   if (heard_ && elapsed_ns > 0) {
     const double change = static_cast<double>(feedback_.velocity) - previous_velocity_;

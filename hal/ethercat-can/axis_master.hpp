@@ -46,13 +46,17 @@ class AxisMaster {
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
 
-  /// A field of a TPDO.
+  /// A field of a slow TPDO: counts at once.
   void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
     feedback_.take(field, bytes);
   }
+  /// A field of an every-SYNC TPDO: counts when received() says that the sample is whole.
+  void take_sample(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+    sample_.take(field, bytes);
+  }
   /// The axis' error code from an emergency of its board.
   void on_emergency(std::uint16_t code) noexcept TANDEM_RT { emergency_code_ = code; }
-  /// Once per cycle, after its frames. `fresh`: a feedback TPDO came in this cycle.
+  /// Once per cycle, after its frames. `fresh`: every part of a sample came in this cycle.
   void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Looks for a fault in what was received. @return true when it is a new one.
   bool check(std::int64_t now_ns) noexcept TANDEM_RT;
@@ -99,6 +103,7 @@ class AxisMaster {
 
   AxisScale scale_;
   RawFeedback feedback_;
+  RawFeedback sample_;  ///< what has come of this cycle's sample; no state
   RawCommand raw_;
   Goal goal_ = Goal::kNothing;
   AxisTrouble trouble_ = AxisTrouble::kNone;

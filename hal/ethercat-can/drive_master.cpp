@@ -44,6 +44,7 @@ DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, in
     }
     if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
   }
+  sample.resize(channels.size());
 }
 
 DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
@@ -93,6 +94,7 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
     for (Port& port : ports) port.next_heartbeat_ns = now_ns;
     begun = true;
   }
+  ++counter;
   for (Port& port : ports) {
     port.sink.push(canopen::make_sync());
     if (port.heartbeat_ns == 0 || now_ns < port.next_heartbeat_ns) continue;
@@ -105,13 +107,17 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
 void DriveMaster::Impl::take_frames(Port& port) noexcept TANDEM_RT {
   for (std::size_t taken = 0; taken < kMaxFramesPerCycle;) {
     const std::size_t count = port.bus->receive(inbox);
-    for (std::size_t i = 0; i < count; ++i) dispatch(port, inbox[i]);
+    const std::span<const std::int64_t> times = port.bus->received_ns();
+    for (std::size_t i = 0; i < count; ++i) {
+      dispatch(port, inbox[i], i < times.size() ? times[i] : 0);
+    }
     taken += count;
     if (count < inbox.size()) return;
   }
 }
 
-void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept TANDEM_RT {
+void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
+                                 std::int64_t at_ns) noexcept TANDEM_RT {
   using namespace canopen;
   if (frame.id > cob::kIdMask || (frame.flags & (kFlagRtr | kFlagError)) != 0) return;
   const std::int16_t index = port.nodes[frame.id & 0x7F];
@@ -123,7 +129,7 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept TANDEM
     case 0x180:
     case 0x280:
     case 0x380:
-    case 0x480: on_tpdo(node, static_cast<int>(function >> 8), frame); break;
+    case 0x480: on_tpdo(node, static_cast<int>(function >> 8), frame, at_ns); break;
     case cob::kSdoResponse: node.master.on_sdo(frame, port.sink); break;
     case cob::kHeartbeat:
       if (const auto message = parse_heartbeat(frame)) {
@@ -134,27 +140,45 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame) noexcept TANDEM
   }
 }
 
-void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame) noexcept TANDEM_RT {
+/// The parts of a sample count only one after the other in one cycle: one that is late, or whose
+/// predecessor is missing, is left out, so that no sample is made of two.
+void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
+                                std::int64_t at_ns) noexcept TANDEM_RT {
   const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
   const bool listening = node.master.running() ||
                          node.master.stage() == NodeMaster::Stage::kStarting;
   if (p < 0 || !listening) return;
   const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
   if (frame.length < pdo.bytes) return;
+  const bool sampled = pdo.group != PdoGroup::kSlowFeedback;
+  if (sampled) {
+    if (pdo.part != 0 && pdo.part != node.next_part) return;
+    node.next_part = pdo.part + 1;
+  }
+  const bool whole = node.next_part == node.plan.parts;
   for (const MappedField& field : pdo.fields) {
     const std::uint8_t* bytes = frame.data.data() + field.offset;
     if (field.field == WireField::kSensorChannel) {
-      node.channels[field.axis] = canopen::get<float>(bytes);
-      ++node.fields_heard;
-      continue;
-    }
-    const std::size_t joint = node.plan.joints[field.axis];
-    axes[joint].take(field.field, bytes);
-    if (field.field == WireField::kStatusword) {
-      ++node.fields_heard;
-      joint_fresh[joint] = 1;
+      node.sample[field.axis] = canopen::get<float>(bytes);
+    } else if (field.field == WireField::kCycleEcho) {
+      on_echo(node, *bytes, at_ns);
+    } else if (sampled) {
+      axes[node.plan.joints[field.axis]].take_sample(field.field, bytes);
+      joint_fresh[node.plan.joints[field.axis]] = whole ? 1 : 0;
+    } else {
+      axes[node.plan.joints[field.axis]].take(field.field, bytes);
     }
   }
+  if (pdo.group == PdoGroup::kSensor && whole) node.channels = node.sample;
+}
+
+void DriveMaster::Impl::on_echo(Node& node, std::uint8_t echo,
+                                std::int64_t at_ns) noexcept TANDEM_RT {
+  const auto trip = static_cast<std::uint8_t>(counter - echo);
+  if (trip == 0 || trip > node.counters_sent) return;  // it has not had a command yet
+  ++node.trip_cycles[std::min<std::size_t>(trip, RoundTrip::kMostCycles - 1)];
+  const std::int64_t sent_ns = ports[node.plan.bus].sent_ns[echo];
+  if (trip == 1 && sent_ns != 0 && at_ns > sent_ns) node.trip_time.record(at_ns - sent_ns);
 }
 
 void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TANDEM_RT {
@@ -171,10 +195,11 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TA
 void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
-    const std::size_t expected =
-        node.plan.board >= 0 ? node.plan.joints.size() : node.channels.size();
-    const bool complete = node.fields_heard >= expected;
-    node.fields_heard = 0;
+    const bool complete =
+        node.plan.board >= 0
+            ? std::ranges::all_of(node.plan.joints, [&](auto j) { return joint_fresh[j] != 0; })
+            : node.next_part == node.plan.parts;
+    node.next_part = 0;
     node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
     if (!node.master.running() || node.timeout_cycles == 0) continue;
     if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
@@ -201,14 +226,22 @@ void DriveMaster::Impl::fill(StateImage& state) noexcept TANDEM_RT {
 
 void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
   for (Node& node : nodes) {
-    if (!node.master.running()) continue;
+    if (!node.master.running()) {
+      node.counters_sent = 0;
+      continue;
+    }
+    if (node.counters_sent < 0xFF) ++node.counters_sent;
     for (std::size_t p = 0; p < node.plan.pdos.size(); ++p) {
       const PdoPlan& pdo = node.plan.pdos[p];
       if (pdo.direction != PdoDirection::kReceive) continue;
       Frame frame = node.frames[p];
       for (const MappedField& field : pdo.fields) {
-        axes[node.plan.joints[field.axis]].raw().give(field.field,
-                                                      frame.data.data() + field.offset);
+        std::uint8_t* bytes = frame.data.data() + field.offset;
+        if (field.field == WireField::kCycleCounter) {
+          *bytes = counter;
+        } else {
+          axes[node.plan.joints[field.axis]].raw().give(field.field, bytes);
+        }
       }
       const bool due = pdo.group == PdoGroup::kCommand || node.sent[p] == 0 ||
                        frame.data != node.frames[p].data;
@@ -267,7 +300,10 @@ bool DriveMaster::Impl::flush() noexcept TANDEM_RT {
   bool all = true;
   for (Port& port : ports) {
     const auto frames = port.sink.frames();
-    if (!frames.empty()) all = port.bus->send(frames) == frames.size() && all;
+    if (!frames.empty()) {
+      all = port.bus->send(frames) == frames.size() && all;
+      port.sent_ns[counter] = port.bus->sent_ns();  // the commands are a cycle's last
+    }
     port.sink.clear();
   }
   return all;
@@ -366,15 +402,29 @@ std::size_t DriveMaster::nodes_in_operation(std::size_t bus) const noexcept TAND
 double DriveMaster::progress() const noexcept { return impl_->progress(); }
 std::string DriveMaster::status_text() const { return impl_->status(); }
 std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
+
+std::vector<RoundTrip> DriveMaster::round_trips() const {
+  std::vector<RoundTrip> trips;
+  for (const Impl::Node& node : impl_->nodes) {
+    if (node.plan.board < 0) continue;
+    trips.push_back({.node = node.plan.name,
+                     .bus = impl_->robot.buses[node.plan.bus].name,
+                     .id = node.plan.id,
+                     .cycles = node.trip_cycles,
+                     .time = node.trip_time});
+  }
+  return trips;
+}
+
 void DriveMaster::archive(Archive& ar) { impl_->archive(ar); }
 
 void DriveMaster::Impl::archive(Archive& ar) {
-  ar(stage, reaction, latched, resetting, begun, shutting_down, now_ns, dt_ns, shut_down_since_ns,
-     refused_node, refused_step, refused_code, axes, sent_revision);
+  ar(stage, reaction, latched, resetting, begun, shutting_down, counter, now_ns, dt_ns,
+     shut_down_since_ns, refused_node, refused_step, refused_code, axes, sent_revision);
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
-    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.recovering,
+    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.counters_sent, node.recovering,
        node.sending, node.next_item);
   }
 }

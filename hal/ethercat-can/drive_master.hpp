@@ -2,6 +2,7 @@
 // Layer: hal/ethercat-can.  Thread: create() non-RT; the rest the loop's thread.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
+#include "rt/histogram.hpp"
 
 namespace tandem {
 class Archive;
@@ -24,6 +26,22 @@ namespace tandem::hal::can {
 
 /// Node id under which the master's heartbeat is sent.
 inline constexpr int kMasterNodeId = 127;
+
+/// How long a board's answers to commands took since the start; its slow TPDO echoes the counter
+/// of the command in force.
+struct RoundTrip {
+  static constexpr std::size_t kMostCycles = 16;
+
+  std::string node;
+  std::string bus;
+  int id = 0;
+  /// [i]: echoes that came i SYNCs after their command was sent; the last: that many or more.
+  /// A command takes effect at the next SYNC and is answered in its cycle: 1 is on time.
+  std::array<std::uint64_t, kMostCycles> cycles{};
+  /// From handing the command over to its echo's arrival, where the bus knows its times. An echo
+  /// that is older than a cycle is not in it.
+  rt::Histogram time;
+};
 
 /// Brings all nodes to operation at once, then exchanges the process image with them.
 ///
@@ -94,6 +112,10 @@ class DriveMaster {
   [[nodiscard]] std::string status_text() const;
   /// Values that a node refused at run time (gains), with the object and why; empty when none.
   [[nodiscard]] std::string parameter_error() const;
+
+  /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.
+  /// Not RT.
+  [[nodiscard]] std::vector<RoundTrip> round_trips() const;
 
   void archive(Archive& ar);
 

@@ -35,6 +35,7 @@ struct DriveMaster::Impl {
     std::vector<canopen::Frame> storage;
     canopen::FrameSink sink;
     std::array<std::int16_t, canopen::kMaxNodeId + 1> nodes{};  ///< by id: index in `nodes`
+    std::array<std::int64_t, 256> sent_ns{};  ///< by counter: when its commands were handed over
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
   };
@@ -47,13 +48,18 @@ struct DriveMaster::Impl {
     std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
     std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
     std::vector<float> channels;                     ///< a sensor's
+    std::vector<float> sample;                       ///< of them, while it is not whole; no state
     std::size_t first_channel = 0;                   ///< of them in StateImage::sensor()
-    std::uint32_t fields_heard = 0;                  ///< this cycle's axes, or sensor channels
+    int next_part = 0;                               ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
+    std::uint8_t counters_sent = 0;                  ///< since its start; stays at 255
     bool recovering = false;                         ///< a lost node that is configured anew
     // Parameters at run time
     std::int16_t sending = -1;                       ///< item under way: see parameter_items
     std::size_t next_item = 0;
+    // Measurements, no state
+    std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
+    rt::Histogram trip_time;
   };
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
@@ -61,8 +67,10 @@ struct DriveMaster::Impl {
   // Exchange: drive_master.cpp
   void begin(const CycleTime& time) noexcept TANDEM_RT;
   void take_frames(Port& port) noexcept TANDEM_RT;
-  void dispatch(Port& port, const canopen::Frame& frame) noexcept TANDEM_RT;
-  void on_tpdo(Node& node, int number, const canopen::Frame& frame) noexcept TANDEM_RT;
+  void dispatch(Port& port, const canopen::Frame& frame, std::int64_t at_ns) noexcept TANDEM_RT;
+  void on_tpdo(Node& node, int number, const canopen::Frame& frame,
+               std::int64_t at_ns) noexcept TANDEM_RT;
+  void on_echo(Node& node, std::uint8_t echo, std::int64_t at_ns) noexcept TANDEM_RT;
   void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
   void process_nodes() noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
@@ -109,7 +117,7 @@ struct DriveMaster::Impl {
   std::array<canopen::Frame, 64> inbox{};  ///< what is taken from a bus at once; no state
   std::vector<AxisMaster> axes;          ///< by joint
   std::vector<std::size_t> joint_node;   ///< by joint: index in nodes
-  std::vector<std::uint8_t> joint_fresh; ///< by joint: feedback came in this cycle
+  std::vector<std::uint8_t> joint_fresh; ///< by joint: a whole sample came in this cycle
   std::vector<PidGains> file_gains;      ///< by joint and loop: what the configuration writes
   std::vector<PidGains> sent_gains;      ///< by joint and loop: what the drive has
   std::vector<std::uint32_t> sent_revision;
@@ -120,6 +128,7 @@ struct DriveMaster::Impl {
   bool resetting = false;                       ///< reset() is not through yet
   bool begun = false;
   bool shutting_down = false;
+  std::uint8_t counter = 0;              ///< of SYNCs; goes out with the commands
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;

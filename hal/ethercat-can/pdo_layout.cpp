@@ -49,11 +49,31 @@ constexpr std::array kSlowFeedbackFields{
     FieldSpec{WireField::kErrorCode, object::kErrorCode, 2},
 };
 
+// Classic CAN: one axis, a PDO each.
+constexpr std::array kClassicCommand1{kCommandFields[0], kCommandFields[2], kCommandFields[4]};
+constexpr std::array kClassicCommand2{kCommandFields[3], kCommandFields[1]};
+constexpr std::array kClassicSlowCommand1{kSlowCommandFields[0], kSlowCommandFields[1],
+                                          kSlowCommandFields[2]};
+constexpr std::array kClassicSlowCommand2{kSlowCommandFields[3]};
+constexpr std::array kClassicFeedback1{kFeedbackFields[0], kFeedbackFields[1],
+                                       kFeedbackFields[3]};
+constexpr std::array kClassicFeedback2{kFeedbackFields[2], kFeedbackFields[4]};
+constexpr std::array kClassicSlowFeedback1{kSlowFeedbackFields[0], kSlowFeedbackFields[1],
+                                           kSlowFeedbackFields[2]};
+constexpr std::array kClassicSlowFeedback2{kSlowFeedbackFields[3], kSlowFeedbackFields[4],
+                                           kSlowFeedbackFields[5]};
+
+std::size_t most_bytes(bool fd) {
+  return fd ? canopen::kMaxFrameBytes : canopen::kClassicFrameBytes;
+}
+
 /// Appends blocks to a node's PDOs: one block stays whole.
 class Packer {
  public:
-  Packer(NodePlan& node, PdoDirection direction) : node_(node), direction_(direction) {}
+  Packer(NodePlan& node, PdoDirection direction, bool fd)
+      : node_(node), direction_(direction), most_bytes_(most_bytes(fd)) {}
 
+  /// The next block opens a PDO.
   void begin(PdoGroup group, std::uint8_t transmission) {
     group_ = group;
     transmission_ = transmission;
@@ -62,17 +82,18 @@ class Packer {
   void add(std::span<const MappedField> block) {
     std::size_t bytes = 0;
     for (const MappedField& field : block) bytes += field.size;
-    const bool fits = current_ != nullptr &&
-                      current_->bytes + bytes <= canopen::kMaxFrameBytes &&
+    const bool fits = current_ != nullptr && current_->bytes + bytes <= most_bytes_ &&
                       current_->fields.size() + block.size() <= canopen::kMaxMappedObjects;
     if (!fits) open();
-    for (MappedField field : block) {
-      field.offset = current_->bytes;
-      current_->bytes = static_cast<std::uint8_t>(current_->bytes + field.size);
-      current_->fields.push_back(field);
-    }
+    for (const MappedField& field : block) append(*current_, field);
   }
   [[nodiscard]] bool ok() const { return number_ <= canopen::kPdosPerNode; }
+
+  static void append(PdoPlan& pdo, MappedField field) {
+    field.offset = pdo.bytes;
+    pdo.bytes = static_cast<std::uint8_t>(pdo.bytes + field.size);
+    pdo.fields.push_back(field);
+  }
 
  private:
   void open() {
@@ -89,6 +110,7 @@ class Packer {
 
   NodePlan& node_;
   PdoDirection direction_;
+  std::size_t most_bytes_;
   PdoGroup group_ = PdoGroup::kCommand;
   std::uint8_t transmission_ = canopen::kEverySync;
   int number_ = 0;
@@ -108,6 +130,55 @@ void add_axes(Packer& packer, std::size_t axes, std::span<const FieldSpec> specs
   }
 }
 
+/// Several axes share a frame.
+void lay_out_fd(NodePlan& node, std::uint8_t slow) {
+  const std::size_t axes = node.joints.size();
+  Packer receive(node, PdoDirection::kReceive, true);
+  receive.begin(PdoGroup::kCommand, canopen::kEverySync);
+  add_axes(receive, axes, kCommandFields);
+  receive.begin(PdoGroup::kSlowCommand, canopen::kEverySync);
+  add_axes(receive, axes, kSlowCommandFields);
+  Packer transmit(node, PdoDirection::kTransmit, true);
+  transmit.begin(PdoGroup::kFeedback, canopen::kEverySync);
+  add_axes(transmit, axes, kFeedbackFields);
+  transmit.begin(PdoGroup::kSlowFeedback, slow);
+  add_axes(transmit, axes, kSlowFeedbackFields);
+}
+
+/// One axis takes every PDO.
+void lay_out_classic(NodePlan& node, std::uint8_t slow) {
+  using Pdo = std::pair<PdoGroup, std::span<const FieldSpec>>;
+  Packer receive(node, PdoDirection::kReceive, false);
+  for (const auto& [group, fields] : {Pdo{PdoGroup::kCommand, kClassicCommand1},
+                                      Pdo{PdoGroup::kCommand, kClassicCommand2},
+                                      Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand1},
+                                      Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand2}}) {
+    receive.begin(group, canopen::kEverySync);
+    add_axes(receive, 1, fields);
+  }
+  Packer transmit(node, PdoDirection::kTransmit, false);
+  for (const auto& [group, fields] : {Pdo{PdoGroup::kFeedback, kClassicFeedback1},
+                                      Pdo{PdoGroup::kFeedback, kClassicFeedback2},
+                                      Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback1},
+                                      Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback2}}) {
+    transmit.begin(group, group == PdoGroup::kFeedback ? canopen::kEverySync : slow);
+    add_axes(transmit, 1, fields);
+  }
+  node.parts = 2;
+  for (PdoPlan& pdo : node.pdos) {
+    if (pdo.group == PdoGroup::kFeedback) pdo.part = static_cast<std::uint8_t>(pdo.number - 1);
+  }
+}
+
+/// The counter ends the first frame of its group that has a byte left.
+void add_counter(NodePlan& node, PdoGroup group, WireField field, bool fd) {
+  for (PdoPlan& pdo : node.pdos) {
+    if (pdo.group != group || pdo.bytes >= most_bytes(fd)) continue;
+    Packer::append(pdo, {.field = field, .size = 1, .index = object::kCycleCounter});
+    return;
+  }
+}
+
 Error node_error(const NodePlan& node, const char* kind, std::string message, std::string hint) {
   return {.message = std::move(message),
           .hint = std::move(hint),
@@ -115,15 +186,21 @@ Error node_error(const NodePlan& node, const char* kind, std::string message, st
           .key = std::string(kind) + " '" + node.name + "'"};
 }
 
-Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
-  const BoardConfig& board = robot.boards[index];
-  NodePlan node{.name = board.name,
-                .id = board.node_id,
-                .heartbeat_ms = board.heartbeat_ms,
-                .board = static_cast<int>(index)};
+Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& name,
+                                const char* kind, NodePlan& node) {
+  const BusConfig* bus = robot.bus(name);
+  if (bus == nullptr) {
+    return std::unexpected(node_error(node, kind, "is on the unknown bus '" + name + "'",
+                                      "name one of the [[bus]] tables"));
+  }
+  node.bus = static_cast<std::size_t>(bus - robot.buses.data());
+  return bus;
+}
+
+Status seat_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
   std::vector<std::pair<int, std::size_t>> axes;
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-    if (robot.joints[j].board == board.name) axes.emplace_back(robot.joints[j].axis, j);
+    if (robot.joints[j].board == node.name) axes.emplace_back(robot.joints[j].axis, j);
   }
   std::ranges::sort(axes);
   for (std::size_t a = 0; a < axes.size(); ++a) {
@@ -138,24 +215,46 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
     return std::unexpected(node_error(node, "board", "has more than 8 axes",
                                       "move joints to another board"));
   }
+  if (!fd && axes.size() > 1) {
+    return std::unexpected(node_error(
+        node, "board",
+        "has " + std::to_string(axes.size()) + " axes, and its bus is classic CAN: in frames of " +
+            "8 bytes one axis takes all eight PDOs of a node",
+        "give each axis a board of its own, or set fd = true for the bus"));
+  }
+  return {};
+}
+
+Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
+  const BoardConfig& board = robot.boards[index];
+  NodePlan node{.name = board.name,
+                .id = board.node_id,
+                .heartbeat_ms = board.heartbeat_ms,
+                .board = static_cast<int>(index)};
+  const auto bus = attach(robot, board.bus, "board", node);
+  if (!bus) return std::unexpected(bus.error());
+  const bool fd = (*bus)->fd;
+  if (auto seated = seat_axes(robot, fd, node); !seated) {
+    return std::unexpected(seated.error());
+  }
   const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
-  Packer receive(node, PdoDirection::kReceive);
-  receive.begin(PdoGroup::kCommand, canopen::kEverySync);
-  add_axes(receive, axes.size(), kCommandFields);
-  receive.begin(PdoGroup::kSlowCommand, canopen::kEverySync);
-  add_axes(receive, axes.size(), kSlowCommandFields);
-  Packer transmit(node, PdoDirection::kTransmit);
-  transmit.begin(PdoGroup::kFeedback, canopen::kEverySync);
-  add_axes(transmit, axes.size(), kFeedbackFields);
-  transmit.begin(PdoGroup::kSlowFeedback, slow);
-  add_axes(transmit, axes.size(), kSlowFeedbackFields);
+  if (fd) {
+    lay_out_fd(node, slow);
+  } else if (!node.joints.empty()) {
+    lay_out_classic(node, slow);
+  }
+  add_counter(node, PdoGroup::kCommand, WireField::kCycleCounter, fd);
+  add_counter(node, PdoGroup::kSlowFeedback, WireField::kCycleEcho, fd);
   return node;
 }
 
 Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
   const SensorConfig& sensor = robot.sensors[index];
   NodePlan node{.name = sensor.name, .id = sensor.node_id, .sensor = static_cast<int>(index)};
-  Packer transmit(node, PdoDirection::kTransmit);
+  const auto bus = attach(robot, sensor.bus, "sensor", node);
+  if (!bus) return std::unexpected(bus.error());
+  const bool fd = (*bus)->fd;
+  Packer transmit(node, PdoDirection::kTransmit, fd);
   transmit.begin(PdoGroup::kSensor, canopen::kEverySync);
   for (std::size_t channel = 0; channel < sensor.channels(); ++channel) {
     const MappedField field{.field = WireField::kSensorChannel,
@@ -166,26 +265,16 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
     transmit.add({&field, 1});
   }
   if (!transmit.ok()) {
-    return std::unexpected(node_error(node, "sensor", "has more channels than four PDOs carry",
-                                      "at most 64 channels of 4 bytes"));
+    const std::size_t most = canopen::kPdosPerNode * most_bytes(fd) / 4;
+    return std::unexpected(node_error(
+        node, "sensor",
+        "has " + std::to_string(sensor.channels()) + " channels, and four PDOs on a " +
+            (fd ? "CAN FD" : "classic CAN") + " bus carry " + std::to_string(most),
+        fd ? "split the sensor" : "move it to a bus with fd = true"));
   }
+  node.parts = static_cast<int>(node.pdos.size());
+  for (PdoPlan& pdo : node.pdos) pdo.part = static_cast<std::uint8_t>(pdo.number - 1);
   return node;
-}
-
-Status attach(const RobotConfig& robot, const std::string& bus_name, const char* kind,
-              NodePlan& node) {
-  const BusConfig* bus = robot.bus(bus_name);
-  if (bus == nullptr) {
-    return std::unexpected(node_error(node, kind, "is on the unknown bus '" + bus_name + "'",
-                                      "name one of the [[bus]] tables"));
-  }
-  if (!bus->fd) {
-    return std::unexpected(node_error(node, kind,
-                                      "is on bus '" + bus_name + "', which is classic CAN",
-                                      "PDOs are laid out for CAN FD only: set fd = true"));
-  }
-  node.bus = static_cast<std::size_t>(bus - robot.buses.data());
-  return {};
 }
 
 }  // namespace
@@ -195,17 +284,11 @@ Result<PdoLayout> make_pdo_layout(const RobotConfig& robot) {
   for (std::size_t i = 0; i < robot.boards.size(); ++i) {
     auto node = plan_board(robot, i);
     if (!node) return std::unexpected(node.error());
-    if (auto ok = attach(robot, robot.boards[i].bus, "board", *node); !ok) {
-      return std::unexpected(ok.error());
-    }
     layout.nodes.push_back(std::move(*node));
   }
   for (std::size_t i = 0; i < robot.sensors.size(); ++i) {
     auto node = plan_sensor(robot, i);
     if (!node) return std::unexpected(node.error());
-    if (auto ok = attach(robot, robot.sensors[i].bus, "sensor", *node); !ok) {
-      return std::unexpected(ok.error());
-    }
     layout.nodes.push_back(std::move(*node));
   }
   return layout;

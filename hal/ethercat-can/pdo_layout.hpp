@@ -26,6 +26,7 @@ enum class WireField : std::uint8_t {
   kTargetCurrent,
   kStiffness,
   kDamping,
+  kCycleCounter,  ///< command: the low byte of the master's count of SYNCs; of the board
   // Feedback: TPDO, every SYNC
   kStatusword,
   kPosition,
@@ -39,6 +40,7 @@ enum class WireField : std::uint8_t {
   kTemperature,
   kModeDisplay,
   kErrorCode,
+  kCycleEcho,  ///< slow feedback: the counter of the command in force; of the board
   // Sensor: TPDO, every SYNC
   kSensorChannel,
 };
@@ -64,6 +66,7 @@ struct PdoPlan {
   std::uint32_t cob_id = 0;
   std::uint8_t transmission = canopen::kEverySync;
   std::uint8_t bytes = 0;      ///< mapped; the frame may be longer
+  std::uint8_t part = 0;       ///< feedback, sensor: of the NodePlan::parts of a sample, from 0
   std::vector<MappedField> fields;
 };
 
@@ -75,6 +78,7 @@ struct NodePlan {
   int heartbeat_ms = 50;
   int board = -1;              ///< index in RobotConfig::boards; -1: a sensor
   int sensor = -1;             ///< index in RobotConfig::sensors; -1: a board
+  int parts = 1;               ///< TPDOs that one sample of an axis, or of the sensor, takes
   std::vector<std::size_t> joints{};  ///< by axis: index in RobotConfig::joints
   std::vector<PdoPlan> pdos{};  ///< commands first, then slow commands, feedback, slow feedback
 };
@@ -84,10 +88,11 @@ struct PdoLayout {
   std::vector<NodePlan> nodes;
 };
 
-/// Lays the PDOs of every board and sensor out: an axis' block stays whole, blocks follow one
-/// another in frames of at most 64 bytes, numbers and COB-IDs are the pre-defined ones.
-/// Errors: a classic (not FD) bus, axes of a board with gaps, more axes or channels than a node's
-/// four PDOs each way can carry.
+/// Lays the PDOs of every board and sensor out; numbers and COB-IDs are the pre-defined ones. On
+/// CAN FD an axis' block stays whole, and blocks follow one another in frames of at most 64 bytes.
+/// On classic CAN one axis takes all eight PDOs of its board, two of them for each sample.
+/// Errors: axes of a board with gaps, more axes or channels than a node's four PDOs each way can
+/// carry on its bus.
 [[nodiscard]] Result<PdoLayout> make_pdo_layout(const RobotConfig& robot);
 
 }  // namespace tandem::hal::can

@@ -39,6 +39,29 @@ TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
   }
 }
 
+TEST_F(Check, ShowsTheLoadOfEveryBus) {
+  const Outcome outcome = tandem("check --bus hold.toml --json -");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("slow commands, if all changed"), std::string::npos) << outcome.err;
+  const auto bus = nlohmann::json::parse(outcome.out)["buses"][0];
+  EXPECT_EQ(bus["bus"], "arm");
+  EXPECT_EQ(bus["ok"], true);
+  EXPECT_EQ(bus["rows"][0]["what"], "SYNC");
+  EXPECT_EQ(bus["rows"][0]["time_us"], 55.0);
+}
+
+TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
+  edit("robot.toml", "data_bitrate = 8_000_000", "max_load = 0.1");
+  for (const std::string command : {"check hold.toml", "check --bus robot.toml", "run hold.toml"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2) << command;
+    EXPECT_NE(outcome.err.find("cannot carry its mean load"), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("any of these fits: period_ns ="), std::string::npos)
+        << outcome.err;
+  }
+  EXPECT_FALSE(has_log());
+}
+
 TEST_F(Check, SaysOkAsJson) {
   const Outcome outcome = tandem("check hold.toml --json -");
   EXPECT_EQ(outcome.status, 0);

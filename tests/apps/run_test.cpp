@@ -39,6 +39,13 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   EXPECT_TRUE(json["faults"].empty());
 }
 
+TEST_F(Run, FollowsATrajectoryOverClassicCan) {
+  const auto json = run(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml --no-log");
+  EXPECT_EQ(json["period_ns"], 2'000'000);
+  EXPECT_TRUE(json["faults"].empty());
+  EXPECT_LT(json["joints"]["joint2"]["max_tracking_error_rad"].get<double>(), 0.02);
+}
+
 TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
   const auto first = run("trajectory.toml --duration 0.5");
   const auto second = run("trajectory.toml --duration 0.5");

@@ -25,7 +25,7 @@ const Rules& rules() {
       {"canopen", {"base"}},
       {"firmware_emu", {"base", "canopen"}},
       {"hal", {"base"}},
-      {"hal/ethercat-can", {"base", "canopen", "hal"}},
+      {"hal/ethercat-can", {"base", "canopen", "hal", "rt/histogram.hpp"}},
       {"hal/sim", {"base", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can"}},
       {"controllers", {"base", "hal", "model/kernels.h"}},
       {"log", {"base", "hal"}},

@@ -78,6 +78,19 @@ inline RobotConfig robot_config() {
   return robot;
 }
 
+/// The same on classic CAN: three boards of one axis.
+inline RobotConfig classic_config() {
+  RobotConfig robot = robot_config();
+  for (BusConfig& bus : robot.buses) bus.fd = false;
+  robot.joints.resize(3);
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    robot.joints[j].board = robot.boards[j].name;
+    robot.joints[j].axis = 0;
+  }
+  robot.sensors[0].joint = "Joint2";
+  return robot;
+}
+
 inline firmware::BoardSetup board_setup(const RobotConfig& robot, std::size_t b) {
   firmware::BoardSetup setup;
   setup.node_id = robot.boards[b].node_id;
@@ -86,7 +99,7 @@ inline firmware::BoardSetup board_setup(const RobotConfig& robot, std::size_t b)
   axis.controller.voltage_limit_V = 40.0;
   axis.controller.current_limit_A = 50.0;
   axis.controller.torque_limit_Nm = 100.0;
-  setup.axes.assign(2, axis);
+  setup.axes.assign(robot.joints.size() / robot.boards.size(), axis);
   return setup;
 }
 
@@ -180,8 +193,9 @@ class Rig {
     steps(5);
   }
   [[nodiscard]] const firmware::Axis& axis(std::size_t joint) const {
-    return boards[joint / 2]->axis(joint % 2);
+    return boards[joint / axes()]->axis(joint % axes());
   }
+  [[nodiscard]] std::size_t axes() const { return boards[0]->axes(); }
   void archive(Archive& ar) {
     ar(*master, legs, arms, sensor, cycle);
     for (auto& board : boards) ar(*board);
@@ -214,11 +228,11 @@ class Rig {
       for (const canopen::Frame& frame : legs.to_boards()) board.receive(frame);
       std::array<firmware::AxisSense, 2> sense;
       std::array<firmware::AxisDrive, 2> drive;
-      for (std::size_t a = 0; a < 2; ++a) {
-        const double q = position_rad[2 * b + a];
+      for (std::size_t a = 0; a < axes(); ++a) {
+        const double q = position_rad[axes() * b + a];
         sense[a] = {.link_position_rad = q, .motor_position_rad = q, .bus_voltage_V = bus_V};
       }
-      board.step(1'000'000, sense, drive);
+      board.step(1'000'000, std::span(sense).first(axes()), std::span(drive).first(axes()));
       (void)legs.boards().send(board.outgoing());
       board.clear_outgoing();
     }

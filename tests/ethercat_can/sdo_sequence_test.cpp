@@ -41,13 +41,13 @@ TEST(SdoSequence, MapsAPdoByTheStandardsProcedure) {
       cob_ids.push_back(canopen::get<std::uint32_t>(step.bytes.data()));
     }
   }
-  ASSERT_EQ(order.size(), 15u);
+  ASSERT_EQ(order.size(), 16u);
   EXPECT_EQ(order[0], (std::pair{0x1400, 1}));
   EXPECT_EQ(order[1], (std::pair{0x1600, 0}));
   EXPECT_EQ(order[2], (std::pair{0x1600, 1}));
-  EXPECT_EQ(order[12], (std::pair{0x1600, 0}));
-  EXPECT_EQ(order[13], (std::pair{0x1400, 2}));
-  EXPECT_EQ(order[14], (std::pair{0x1400, 1}));
+  EXPECT_EQ(order[13], (std::pair{0x1600, 0}));
+  EXPECT_EQ(order[14], (std::pair{0x1400, 2}));
+  EXPECT_EQ(order[15], (std::pair{0x1400, 1}));
   EXPECT_EQ(cob_ids, (std::vector<std::uint32_t>{0x8000020A, 0x0000020A}));
   EXPECT_EQ(find(steps, 0x1600, 3)->bytes, (std::array<std::uint8_t, 4>{0x20, 0x00, 0x7A, 0x60}));
 }

@@ -5,10 +5,9 @@
 namespace tandem::hal::test {
 namespace {
 
-template <int order>
-ConformanceRobot make_swing() {
+ConformanceRobot make(RobotConfig robot, int order) {
   ConformanceRobot made;
-  made.robot = tandem::test::swing_robot(order);
+  made.robot = std::move(robot);
   auto backend = sim::SimRobot::create(made.robot, tandem::test::swing_kernels(order), {});
   EXPECT_TRUE(backend.has_value()) << backend.error().to_string();
   made.provoke_fault = [raw = backend->get()](std::size_t j) {
@@ -22,11 +21,19 @@ ConformanceRobot make_swing() {
   return made;
 }
 
+template <int order>
+ConformanceRobot make_swing() {
+  return make(tandem::test::swing_robot(order), order);
+}
+
+ConformanceRobot make_classic() { return make(tandem::test::classic_swing_robot(), 2); }
+
 INSTANTIATE_TEST_SUITE_P(SimRobot, BackendConformance,
                          testing::Values(ConformanceCase{"rigid", make_swing<0>},
                                          ConformanceCase{"electrical", make_swing<1>},
                                          ConformanceCase{"elastic", make_swing<2>},
-                                         ConformanceCase{"both", make_swing<3>}),
+                                         ConformanceCase{"both", make_swing<3>},
+                                         ConformanceCase{"classic", make_classic}),
                          [](const auto& made) { return made.param.name; });
 
 }  // namespace

@@ -93,6 +93,18 @@ swing = 0.5
   return *robot;
 }
 
+/// The same on classic CAN: a bus for the board, one for the force/torque sensor. The IMU has more
+/// channels than a classic node can send, so its bus is CAN FD.
+inline hal::RobotConfig classic_swing_robot() {
+  hal::RobotConfig robot = swing_robot(2);
+  robot.buses[0].fd = false;
+  robot.buses.push_back({.name = "root", .interface = "can1", .fd = false});
+  robot.buses.push_back({.name = "tip", .interface = "can2"});
+  robot.sensors[0].bus = "tip";
+  robot.sensors[1].bus = "root";
+  return robot;
+}
+
 inline const tandem_kernels* swing_kernels(int order) {
   return order < 2 ? pendulum_kernels<139>() : pendulum_kernels<0>();
 }

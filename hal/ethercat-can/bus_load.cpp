@@ -1,0 +1,235 @@
+#include "hal/ethercat-can/bus_load.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "canopen/frame.hpp"
+#include "hal/ethercat-can/node_master.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using Kind = BusLoadRow::Kind;
+using Nodes = std::vector<const NodePlan*>;
+
+FrameBits worst_of(std::size_t bytes) {
+  const int length = canopen::frame_length(bytes);
+  return worst_frame_bits(length, bytes > canopen::kClassicFrameBytes);
+}
+
+/// Adds frames up to a row, and rows up to a bus.
+class Sum {
+ public:
+  Sum(const BusConfig& bus, std::int64_t period_ns) {
+    load_.bus = bus.name;
+    load_.fd = bus.fd;
+    load_.rates = {.nominal = bus.bitrate, .data = bus.data_bitrate};
+    load_.period_ns = period_ns;
+    load_.max_load = bus.max_load;
+  }
+  /// @param per_cycle  of such frames, mean
+  void frame(std::size_t bytes, double per_cycle) {
+    const FrameBits bits = worst_of(bytes);
+    row_.frames += per_cycle;
+    row_.bits += per_cycle * (bits.nominal + bits.data);
+    row_.time_us += per_cycle * static_cast<double>(duration_ns(bits, load_.rates)) * 1e-3;
+  }
+  void row(std::string what, Kind kind) {
+    row_.what = std::move(what);
+    row_.kind = kind;
+    if (row_.frames > 0.0) load_.rows.push_back(row_);
+    const double share = row_.time_us / load_.period_us();
+    if (kind == Kind::kUrgent) load_.urgent_us += row_.time_us;
+    if (kind != Kind::kOnChange) load_.load += share;
+    load_.most_load += share;
+    row_ = {};
+  }
+  void pdos(const Nodes& nodes, PdoGroup group, std::string what, Kind kind) {
+    for (const NodePlan* node : nodes) {
+      for (const PdoPlan& pdo : node->pdos) {
+        if (pdo.group == group) frame(pdo.bytes, 1.0 / pdo.transmission);
+      }
+    }
+    row(std::move(what), kind);
+  }
+  [[nodiscard]] const BusLoad& load() const { return load_; }
+
+ private:
+  BusLoad load_;
+  BusLoadRow row_;
+};
+
+BusLoad load_of(const BusConfig& bus, const Nodes& nodes, std::int64_t period_ns) {
+  Sum sum(bus, period_ns);
+  sum.frame(0, 1.0);
+  sum.row("SYNC", Kind::kUrgent);
+  sum.pdos(nodes, PdoGroup::kCommand, "commands", Kind::kUrgent);
+  sum.pdos(nodes, PdoGroup::kFeedback, "feedback", Kind::kUrgent);
+  sum.pdos(nodes, PdoGroup::kSensor, "sensors", Kind::kUrgent);
+  sum.pdos(nodes, PdoGroup::kSlowFeedback, "slow feedback", Kind::kMean);
+  const double period_ms = static_cast<double>(period_ns) * 1e-6;
+  int shortest_ms = 0;
+  for (const NodePlan* node : nodes) {
+    sum.frame(1, period_ms / node->heartbeat_ms);
+    shortest_ms = shortest_ms == 0 ? node->heartbeat_ms : std::min(shortest_ms, node->heartbeat_ms);
+  }
+  if (shortest_ms > 0) sum.frame(1, period_ms / shortest_ms);
+  sum.row("heartbeats", Kind::kMean);
+  // Every node's exchange within the time that the master waits for an answer.
+  const double exchanges = static_cast<double>(period_ns) / NodeMaster::kSdoAnswerNs;
+  for (std::size_t n = 0; n < nodes.size(); ++n) sum.frame(8, 2.0 * exchanges);
+  sum.row("SDO, reserved", Kind::kMean);
+  sum.pdos(nodes, PdoGroup::kSlowCommand, "slow commands", Kind::kOnChange);
+  return sum.load();
+}
+
+Nodes nodes_of(const PdoLayout& layout, std::size_t bus) {
+  Nodes nodes;
+  for (const NodePlan& node : layout.nodes) {
+    if (node.bus == bus) nodes.push_back(&node);
+  }
+  return nodes;
+}
+
+/// The shortest longer period, in steps of 50 us up to 100 ms.
+std::optional<std::int64_t> feasible_period(const BusConfig& bus, const Nodes& nodes,
+                                            std::int64_t period_ns) {
+  constexpr std::int64_t kStepNs = 50'000;
+  constexpr std::int64_t kMostNs = 100'000'000;
+  for (std::int64_t ns = (period_ns / kStepNs + 1) * kStepNs; ns <= kMostNs; ns += kStepNs) {
+    if (load_of(bus, nodes, ns).fits()) return ns;
+  }
+  return {};
+}
+
+/// The lowest higher data bit rate that transceivers are sold for.
+std::optional<std::int64_t> feasible_data_rate(BusConfig bus, const Nodes& nodes,
+                                               std::int64_t period_ns) {
+  for (const std::int64_t rate : {2'000'000, 4'000'000, 5'000'000, 8'000'000}) {
+    if (!bus.fd || rate <= bus.data_bitrate) continue;
+    bus.data_bitrate = rate;
+    if (load_of(bus, nodes, period_ns).fits()) return rate;
+  }
+  return {};
+}
+
+/// Whether the same nodes would do on CAN FD: their PDOs are laid out anew.
+bool feasible_as_fd(const RobotConfig& robot, std::size_t index, std::int64_t period_ns) {
+  if (robot.buses[index].fd) return false;
+  RobotConfig other = robot;
+  other.buses[index].fd = true;
+  const auto layout = make_pdo_layout(other);
+  return layout && load_of(other.buses[index], nodes_of(*layout, index), period_ns).fits();
+}
+
+/// First fit in the configuration's order. @return the nodes of each bus; empty when one node
+/// alone is too much.
+std::vector<Nodes> spread(const BusConfig& bus, const Nodes& nodes, std::int64_t period_ns) {
+  std::vector<Nodes> buses;
+  for (const NodePlan* node : nodes) {
+    const auto takes = [&](const Nodes& on) {
+      Nodes with = on;
+      with.push_back(node);
+      return load_of(bus, with, period_ns).fits();
+    };
+    const auto found = std::ranges::find_if(buses, takes);
+    if (found != buses.end()) {
+      found->push_back(node);
+    } else if (takes({})) {
+      buses.push_back({node});
+    } else {
+      return {};
+    }
+  }
+  return buses;
+}
+
+std::string spread_text(const std::vector<Nodes>& buses) {
+  std::string text = fmt::format("{} buses, with", buses.size());
+  for (std::size_t b = 1; b < buses.size(); ++b) {
+    text += b > 1 ? "; on another" : "";
+    for (const NodePlan* node : buses[b]) {
+      text += (node == buses[b].front() ? " " : ", ") + node->name;
+    }
+  }
+  return text + " moved";
+}
+
+std::string remedy_of(const RobotConfig& robot, std::size_t index, const Nodes& nodes,
+                      std::int64_t period_ns) {
+  const BusConfig& bus = robot.buses[index];
+  std::vector<std::string> ways;
+  if (const auto ns = feasible_period(bus, nodes, period_ns)) {
+    ways.push_back(fmt::format("period_ns = {} or longer", *ns));
+  }
+  if (const auto rate = feasible_data_rate(bus, nodes, period_ns)) {
+    ways.push_back(fmt::format("data_bitrate = {}", *rate));
+  }
+  if (feasible_as_fd(robot, index, period_ns)) ways.emplace_back("fd = true");
+  if (const auto buses = spread(bus, nodes, period_ns); buses.size() > 1) {
+    ways.push_back(spread_text(buses));
+  }
+  return ways.empty() ? "no period up to 100 ms would do: move boards to other buses"
+                      : fmt::format("any of these fits: {}", fmt::join(ways, "; "));
+}
+
+std::string rates_text(const BusLoad& load) {
+  const double nominal = static_cast<double>(load.rates.nominal) * 1e-6;
+  const double data = static_cast<double>(load.rates.data) * 1e-6;
+  return load.fd ? fmt::format("CAN FD {:g}/{:g} Mbit/s", nominal, data)
+                 : fmt::format("classic CAN {:g} Mbit/s", nominal);
+}
+
+/// "SYNC 55 + commands 540 + … = 1130 us of 1000 us".
+std::string arithmetic(const BusLoad& load, bool urgent_only) {
+  std::vector<std::string> terms;
+  for (const BusLoadRow& row : load.rows) {
+    if (row.kind == Kind::kOnChange || (urgent_only && row.kind != Kind::kUrgent)) continue;
+    terms.push_back(fmt::format("{} {:.1f}", row.what, row.time_us));
+  }
+  const double sum_us = urgent_only ? load.urgent_us : load.load * load.period_us();
+  return fmt::format("{} = {:.1f} us of {:g} us", fmt::join(terms, " + "), sum_us,
+                     load.period_us());
+}
+
+}  // namespace
+
+Result<std::vector<BusLoad>> bus_loads(const RobotConfig& robot, std::int64_t period_ns) {
+  const auto layout = make_pdo_layout(robot);
+  if (!layout) return std::unexpected(layout.error());
+  std::vector<BusLoad> loads;
+  for (std::size_t b = 0; b < robot.buses.size(); ++b) {
+    const Nodes nodes = nodes_of(*layout, b);
+    loads.push_back(load_of(robot.buses[b], nodes, period_ns));
+    if (!loads.back().fits()) loads.back().remedy = remedy_of(robot, b, nodes, period_ns);
+  }
+  return loads;
+}
+
+Diagnostics check_bus_load(const RobotConfig& robot, std::int64_t period_ns) {
+  const auto loads = bus_loads(robot, period_ns);
+  if (!loads) return {loads.error()};
+  Diagnostics errors;
+  for (std::size_t b = 0; b < loads->size(); ++b) {
+    const BusLoad& load = (*loads)[b];
+    if (load.fits()) continue;
+    const bool urgent = load.urgent_us > load.period_us();
+    errors.push_back(
+        {.message = fmt::format(
+             "{} cannot carry {}: {}{}", rates_text(load),
+             urgent ? "what every cycle needs" : "its mean load", arithmetic(load, urgent),
+             urgent ? ""
+                    : fmt::format(", {:.1f} % with at most {:g} %", 100.0 * load.load,
+                                  100.0 * load.max_load)),
+         .hint = load.remedy,
+         .file = robot.file,
+         .line = robot.buses[b].line,
+         .key = "bus '" + load.bus + "'"});
+  }
+  return errors;
+}
+
+}  // namespace tandem::hal::can
