@@ -26,7 +26,7 @@ struct Overrides {
   std::optional<std::uint64_t> seed;
   std::optional<double> duration_s;
   std::string kernel_variant;
-  std::optional<runtime::BackendKind> backend;
+  std::optional<runtime::BackendKind> backend = std::nullopt;
   bool lockstep = false;                ///< true: whatever the experiment says
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
 };

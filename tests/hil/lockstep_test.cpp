@@ -61,7 +61,7 @@ TEST_P(HilLockstep, ASquatOverCanIsTheInProcessRunBitForBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, HilLockstep, testing::Values("coman", "walkman"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& robot) { return std::string(robot.param); });
 
 }  // namespace
 }  // namespace tandem

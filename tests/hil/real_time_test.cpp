@@ -1,0 +1,86 @@
+// Both processes on the wall clock: SYNC paces the boards, whose own clocks go on without it.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/hil/witness.hpp"
+
+namespace tandem::test {
+namespace {
+
+/// The double pendulum at 100 Hz, patient enough for a machine that does other things as well.
+class RealTime : public OwnFolder {
+ protected:
+  static constexpr double kPeriodS = 0.01;
+
+  void SetUp() override {
+    const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/double_pendulum";
+    std::filesystem::copy_file(source / "double_pendulum.urdf", folder_ / "double_pendulum.urdf");
+    write("robot.toml", text_of(source / "robot.toml"), "slow_pdo_every = 4",
+          "slow_pdo_every = 4\nheartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
+    write("hold.toml", text_of(source / "hold.toml"), "seed = 1",
+          "seed = 1\nperiod_ns = 10_000_000");
+  }
+  void write(const std::string& name, std::string text, const std::string& from,
+             const std::string& to) const {
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << name << " has no '" << from << "'";
+    std::ofstream(folder_ / name) << text.replace(at, from.size(), to);
+  }
+  [[nodiscard]] std::vector<std::string> run_words(const std::string& duration_s) const {
+    return tandem({"run", file("hold.toml"), "--hal", "can", "--no-log", "--no-socket",
+                   "--duration", duration_s, "--json", file("run.json")});
+  }
+  [[nodiscard]] std::vector<std::string> emulate_words() const {
+    return tandem({"emulate", file("hold.toml"), "--no-socket", "--json", file("emulate.json")});
+  }
+  [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] nlohmann::json json(const std::string& name) const {
+    return nlohmann::json::parse(text_of(folder_ / name));
+  }
+};
+
+TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
+  Candump candump("can0", folder_ / "candump.log");
+  Process robot(emulate_words(), folder_ / "emulate.txt");
+  ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
+  for (int time = 0; time < 2; ++time) {  // the second finds the robot as the first one left it
+    Process master(run_words("1"), folder_ / "run.txt");
+    EXPECT_EQ(master.wait(), 0) << master.output();
+    EXPECT_NE(master.output().find("over CAN, in real time"), std::string::npos);
+    EXPECT_GT(json("run.json")["cycles"], 0) << "100, less those that this machine slept through";
+  }
+  EXPECT_EQ(robot.interrupt(), 0) << robot.output();
+  const nlohmann::json emulated = json("emulate.json");
+  EXPECT_GT(emulated["steps_without_sync"], 0) << "between the runs";
+  EXPECT_EQ(emulated["frames_lost"], 0);
+
+  std::vector<double> syncs;
+  std::size_t answers = 0;
+  for (const LoggedFrame& frame : candump.stop()) {
+    if (frame.id() == "080") syncs.push_back(frame.time_s);
+    if (frame.id() == "181") ++answers;
+  }
+  ASSERT_GT(syncs.size(), 200U);
+  EXPECT_GT(answers, 200U);
+  // A free run is fifty times faster.
+  EXPECT_GT(syncs.back() - syncs.front(), 0.5 * kPeriodS * static_cast<double>(syncs.size()));
+}
+
+TEST_F(RealTime, AnInterfaceThatIsTakenDownEndsTheRunWithItsName) {
+  Process robot(emulate_words(), folder_ / "emulate.txt");
+  ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
+  Process master(run_words("10"), folder_ / "run.txt");
+  EXPECT_TRUE(master.says(" 10 %")) << master.output();
+  shell("ip link set can0 down");
+  EXPECT_EQ(master.wait(), 1);
+  shell("ip link set can0 up");
+  EXPECT_NE(master.output().find("can0 is down"), std::string::npos) << master.output();
+
+  Process again(run_words("0.5"), folder_ / "again.txt");  // the same robot, without a restart
+  EXPECT_EQ(again.wait(), 0) << again.output();
+  EXPECT_EQ(robot.interrupt(), 0) << robot.output();
+}
+
+}  // namespace
+}  // namespace tandem::test
