@@ -100,6 +100,10 @@ class EmulatedRobot {
   [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
   /// The joint that it is about: its own, or the first of its board; -1: none.
   [[nodiscard]] std::int32_t joint_of(const Fault& fault) const noexcept TANDEM_RT;
+  /// False while a fault keeps the board without power.
+  [[nodiscard]] bool powered(std::size_t board) const noexcept {
+    return boards_[board].powered != 0;
+  }
   [[nodiscard]] const firmware::Board& board(std::size_t index) const noexcept {
     return *boards_[index].board;
   }
