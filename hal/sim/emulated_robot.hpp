@@ -92,6 +92,11 @@ class EmulatedRobot {
   /// True when every axis of every board is in Operation Enabled.
   [[nodiscard]] bool all_enabled() const noexcept;
 
+  /// No motor drives: every winding is shorted, or its bridge open.
+  [[nodiscard]] bool safe() const noexcept TANDEM_RT;
+  /// Every bridge is open: no motor has a voltage or a current.
+  [[nodiscard]] bool powerless() const noexcept TANDEM_RT;
+
   /// Adds a fault, between two steps. A start that has passed is the next step.
   /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: a second board
   ///         with a node id has to be known when the robot is made.
@@ -100,10 +105,6 @@ class EmulatedRobot {
   [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
   /// The joint that it is about: its own, or the first of its board; -1: none.
   [[nodiscard]] std::int32_t joint_of(const Fault& fault) const noexcept TANDEM_RT;
-  /// False while a fault keeps the board without power.
-  [[nodiscard]] bool powered(std::size_t board) const noexcept {
-    return boards_[board].powered != 0;
-  }
   [[nodiscard]] const firmware::Board& board(std::size_t index) const noexcept {
     return *boards_[index].board;
   }

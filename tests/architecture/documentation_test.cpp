@@ -75,8 +75,9 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
 
 TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
   const auto named = matches(text_of(kRoot / "docs/faults.md"), "`FaultRow\\.(\\w+)`");
-  const auto tests =
-      matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp"), "TEST\\(FaultRow, (\\w+)\\)");
+  const auto tests = matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp") +
+                                 text_of(kRoot / "tests/runtime/fault_rows_wire_test.cpp"),
+                             "TEST\\(FaultRow, (\\w+)\\)");
   EXPECT_GT(tests.size(), 20U);
   EXPECT_EQ(named, tests);
 }

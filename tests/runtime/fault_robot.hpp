@@ -144,17 +144,6 @@ struct FaultRig {
   [[nodiscard]] const firmware::Axis& axis(std::size_t b, std::size_t a = 0) const {
     return board(b).axis(a);
   }
-  [[nodiscard]] bool safe() const {
-    for (std::size_t b = 0; b < robot.boards.size(); ++b) {
-      if (!backend->emulated->powered(b)) continue;
-      for (std::size_t a = 0; a < board(b).axes(); ++a) {
-        const canopen::DriveMotion motion = axis(b, a).machine().motion();
-        const bool brakes = motion == canopen::DriveMotion::kQuickStop;
-        if (!brakes && motion != canopen::DriveMotion::kNone) return false;
-      }
-    }
-    return true;
-  }
   /// No motor has a voltage or a current any more.
   [[nodiscard]] bool powerless() const {
     const sim::Plant& plant = backend->emulated->plant();
@@ -177,7 +166,7 @@ struct FaultRig {
   }
   void note(Outcome& found, int i, bool notices) const {
     if (found.noticed < 0 && notices) found.noticed = i;
-    if (found.noticed >= 0 && found.safe < 0 && safe()) found.safe = i;
+    if (found.noticed >= 0 && found.safe < 0 && backend->emulated->safe()) found.safe = i;
     if (found.safe >= 0 && found.open < 0 && powerless()) found.open = i;
   }
   [[nodiscard]] std::string causes() const {
