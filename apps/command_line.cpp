@@ -91,11 +91,11 @@ const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; 
 const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
 
 const char kInjectExamples[] = R"(Examples:
-  tandem inject kind=board_kill board=left_leg for_s=0.5
+  tandem inject kind=board_kill board=left_leg_1 for_s=0.5
   tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
-  tandem inject kind=frame_drop board=left_arm direction=to_master probability=0.01
+  tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
   tandem inject 'kind = "bus_down"
-                 bus = "legs"'
+                 bus = "left_leg"'
 Every kind and key: docs/configuration.md, scenario.toml. What follows: docs/faults.md.)";
 
 const char kEmulateExamples[] = R"(Examples:
