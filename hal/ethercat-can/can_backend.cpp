@@ -115,6 +115,7 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
   if (silent_) return;
   for (const auto& bus : buses_) {
     if (!begun_) bus->forget();  // what was said before there was a master
+    if (!config_.lockstep) bus->collect();  // late answers to the last SYNC are none to this one
     bus->begin_cycle();
   }
   begun_ = true;

@@ -14,7 +14,7 @@ namespace tandem::runtime::test {
 class LockstepRobot final : private hal::can::FrameWait {
  public:
   LockstepRobot(const hal::RobotConfig& robot, const tandem_kernels* kernels,
-                const sim::SimRobotConfig& config) {
+                const sim::SimRobotConfig& config, bool lockstep = true) {
     auto made = sim::EmulatedRobot::create(robot, kernels, config);
     EXPECT_TRUE(made.has_value()) << made.error().to_string();
     emulated = std::move(*made);
@@ -24,10 +24,10 @@ class LockstepRobot final : private hal::can::FrameWait {
       near.push_back(&wires.back()->master());
       far.push_back(&wires.back()->boards());
     }
-    emulator = std::make_unique<sim::Emulator>(
-        *emulated, far, nothing_, sim::EmulatorConfig{config.period_ns, true});
+    emulator = std::make_unique<sim::Emulator>(*emulated, far, nothing_,
+                                               sim::EmulatorConfig{config.period_ns, true});
     auto can = hal::can::CanBackend::create(robot, near, *this,
-                                            {.lockstep = true, .lockstep_timeout_ns = 1000});
+                                            {.lockstep = lockstep, .lockstep_timeout_ns = 1000});
     EXPECT_TRUE(can.has_value()) << can.error().to_string();
     backend = std::move(*can);
   }
@@ -37,6 +37,7 @@ class LockstepRobot final : private hal::can::FrameWait {
   std::unique_ptr<sim::Emulator> emulator;
   std::unique_ptr<hal::can::CanBackend> backend;
   bool emulator_runs = true;
+  std::int64_t waits = 0;  ///< so far; the time that the backend sees
 
  private:
   /// The emulator never has to wait: it is polled when there is something to do.
@@ -46,14 +47,13 @@ class LockstepRobot final : private hal::can::FrameWait {
     void wait(std::int64_t, int) noexcept override {}
   };
 
-  std::int64_t now_ns() noexcept override { return waited_; }
+  std::int64_t now_ns() noexcept override { return waits; }
   void wait(std::int64_t, int) noexcept override {
-    ++waited_;
+    ++waits;
     if (emulator_runs) (void)emulator->poll(0);
   }
 
   Nothing nothing_;
-  std::int64_t waited_ = 0;
 };
 
 }  // namespace tandem::runtime::test

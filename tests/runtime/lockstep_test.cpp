@@ -1,4 +1,5 @@
 // In lockstep a run over CAN is the in-process run, bit for bit.
+#include "tests/runtime/lockstep.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "log/compare.hpp"
 #include "model/kernel_library.hpp"
@@ -6,7 +7,6 @@
 #include "runtime/experiment.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
-#include "tests/runtime/lockstep.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -90,7 +90,7 @@ TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, Lockstep, testing::Values("coman", "walkman"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& robot) { return std::string(robot.param); });
 
 TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
   const log::ScratchFolder folder;
@@ -98,12 +98,38 @@ TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
   LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
   robot.emulator_runs = false;
   rt::WallClock clock;
-  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr}, {.running_cycles = 10});
+  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr},
+                   {.running_cycles = 10});
   cycle.run();
   ASSERT_FALSE(cycle.faults().empty());
   EXPECT_NE(cycle.faults()[0].text.find("start `tandem emulate"), std::string::npos)
       << cycle.faults()[0].text;
   EXPECT_EQ(cycle.running_cycles(), 0U);
+}
+
+TEST(RealTimeRun, DoesNotTakeALateAnswerForTheNextOne) {
+  Squat squat("coman");
+  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config(), false);
+  rt::WallClock clock;
+  RobotCycle cycle({squat.e.robot, *robot.backend, *squat.host, clock, nullptr, nullptr},
+                   {.running_cycles = 100});
+  while (cycle.phase() == RunPhase::kBringUp) {
+    ASSERT_TRUE(cycle.step());
+    (void)robot.emulator->poll(0);  // boards that nobody waits for answer all the same
+  }
+  const auto waits_of_a_cycle = [&] {
+    const std::int64_t before = robot.waits;
+    EXPECT_TRUE(cycle.step());
+    return robot.waits - before;
+  };
+  EXPECT_GT(waits_of_a_cycle(), 0);
+  robot.emulator_runs = false;
+  (void)waits_of_a_cycle();
+  EXPECT_EQ(cycle.state().age_cycles()[0], 1U);
+  robot.emulator_runs = true;
+  (void)robot.emulator->poll(0);  // too late for its own cycle
+  for (int k = 0; k < 5; ++k) EXPECT_GT(waits_of_a_cycle(), 0) << k;
+  EXPECT_EQ(cycle.state().age_cycles()[0], 0U);
 }
 
 }  // namespace
