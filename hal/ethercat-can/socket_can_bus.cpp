@@ -107,10 +107,8 @@ std::size_t SocketCanBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
   int errors = 0;
   while (received_ < frames.size() && budget > 0) {
     const std::size_t wanted = std::min({frames.size() - received_, kBatchFrames, budget});
-    in_->expect(wanted);
     ++system_calls_;
-    const int count = ::recvmmsg(socket_, in_->messages.data(), static_cast<unsigned>(wanted),
-                                 MSG_DONTWAIT, nullptr);
+    const int count = in_->receive(socket_, wanted);
     if (count < 0 && errno != EAGAIN && errno != EINTR) {
       note_link_error(errno);
       if (++errors > kMaxErrors) break;
@@ -243,12 +241,8 @@ SocketCanBus::Link SocketCanBus::look_for_link() noexcept {
 void SocketCanBus::discard_waiting() noexcept {
   const std::size_t batches = options_.receive_queue * 2 / kBatchFrames + 1;
   for (std::size_t i = 0; i < batches; ++i) {
-    in_->expect(kBatchFrames);
     ++system_calls_;
-    if (::recvmmsg(socket_, in_->messages.data(), kBatchFrames, MSG_DONTWAIT, nullptr) <
-        static_cast<int>(kBatchFrames)) {
-      return;
-    }
+    if (in_->receive(socket_, kBatchFrames) < static_cast<int>(kBatchFrames)) return;
   }
 }
 

@@ -32,6 +32,7 @@ struct SocketCanBus::Batch {
   std::array<iovec, kBatchFrames> parts{};
   std::array<canfd_frame, kBatchFrames> frames{};
   std::array<Control, kBatchFrames> control{};
+  std::size_t used = kBatchFrames;  ///< messages whose control part the kernel has written over
 
   Batch() noexcept {
     for (std::size_t i = 0; i < kBatchFrames; ++i) {
@@ -43,11 +44,17 @@ struct SocketCanBus::Batch {
   Batch(const Batch&) = delete;
   Batch& operator=(const Batch&) = delete;
 
-  void expect(std::size_t count) noexcept {
-    for (std::size_t i = 0; i < count; ++i) {
+  /// One recvmmsg() of at most `count`. Only what the last one has used is made ready again: in a
+  /// cycle few messages come, and the others' memory is better left out of the caches.
+  int receive(int socket, std::size_t count) noexcept {
+    for (std::size_t i = 0; i < used; ++i) {
       messages[i].msg_hdr.msg_control = control[i].bytes.data();
       messages[i].msg_hdr.msg_controllen = control[i].bytes.size();
     }
+    const int got =
+        ::recvmmsg(socket, messages.data(), static_cast<unsigned>(count), MSG_DONTWAIT, nullptr);
+    used = got < 0 ? 1 : static_cast<std::size_t>(got);
+    return got;
   }
 };
 
