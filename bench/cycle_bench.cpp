@@ -3,20 +3,15 @@
 //   cycle_bench [EXPERIMENT] [KERNELS.so]      (default: COMAN's squat)
 // Times mean something on an idle machine only; the head says which one it was.
 #include <fmt/core.h>
-#include <sched.h>
-#include <sys/utsname.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <numeric>
 #include <vector>
 
-#include "controllers/plugin_loader.hpp"
-#include "model/kernel_library.hpp"
+#include "bench/rig.hpp"
 #include "rt/clock.hpp"
-#include "runtime/experiment.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::bench {
@@ -39,30 +34,12 @@ struct SimStages {
 constexpr const char* kSimStages[sim::kStages] = {"master: SYNC",     "plant",          "sensors",
                                                   "boards' firmware", "master: decode", "truth"};
 
-std::string first_value(const char* file, const std::string& key) {
-  std::ifstream in(file);
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with(key)) return line.substr(line.find(':') + 2);
-  }
-  return "?";
-}
-
-void print_machine() {
-  utsname system{};
-  uname(&system);
-  fmt::print("machine    {}\nkernel     {} {}\nscheduler  {}\n",
-             first_value("/proc/cpuinfo", "model name"), system.sysname, system.release,
-             sched_getscheduler(0) == SCHED_OTHER ? "SCHED_OTHER" : "real-time");
-}
-
 void row(const std::string& name, std::int64_t sum_ns, std::uint64_t cycles,
          std::int64_t total_ns) {
   fmt::print("{:24} {:9.2f} {:8.1f} %\n", name,
              static_cast<double>(sum_ns) * 1e-3 / static_cast<double>(cycles),
              100.0 * static_cast<double>(sum_ns) / static_cast<double>(total_ns));
 }
-
-double us(std::int64_t ns) { return static_cast<double>(ns) * 1e-3; }
 
 void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
   using runtime::Stage;
@@ -88,57 +65,38 @@ void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
              us(work.max));
 }
 
-int fail_with(const Error& error) {
-  fmt::print(stderr, "{}\n", error.to_string());
-  return 2;
-}
-
-/// Everything of a run but its loop.
-struct Rig {
-  runtime::Experiment experiment;
-  model::KernelLibrary kernels;
-  std::unique_ptr<runtime::ControllerHost> host;
+/// A run of the simulated robot but its loop.
+struct SimRig {
+  std::unique_ptr<Rig> run;
   std::unique_ptr<sim::SimRobot> robot;
   rt::WallClock clock;
 
   std::unique_ptr<runtime::RobotCycle> cycle(std::size_t trace_cycles, log::Recorder* recorder) {
-    const runtime::CycleParts parts{experiment.robot, *robot,         *host, clock,
-                                    recorder,         &robot->truth()};
+    const runtime::Experiment& e = run->experiment;
+    const runtime::CycleParts parts{e.robot, *robot, *run->host, clock, recorder, &robot->truth()};
     return std::make_unique<runtime::RobotCycle>(
-        parts, runtime::CycleConfig{.loop = experiment.loop,
-                                    .running_cycles = experiment.cycles(),
-                                    .settle_cycles = experiment.settle_cycles(),
+        parts, runtime::CycleConfig{.loop = e.loop,
+                                    .running_cycles = e.cycles(),
+                                    .settle_cycles = e.settle_cycles(),
                                     .trace_cycles = trace_cycles});
   }
 };
 
-Result<std::unique_ptr<Rig>> make_rig(const std::string& file, const std::string& library) {
-  auto rig = std::make_unique<Rig>();
-  auto e = runtime::read_experiment(file);
-  if (!e) return std::unexpected(e.error().front());
-  rig->experiment = std::move(*e);
-  auto kernels = model::load_kernels(library);
-  if (!kernels) return std::unexpected(kernels.error());
-  rig->kernels = std::move(*kernels);
-  const runtime::Experiment& experiment = rig->experiment;
-  rig->host = std::make_unique<runtime::ControllerHost>(experiment.robot, rig->kernels.get(),
-                                                        experiment.loop.period_ns);
-  for (const runtime::ControllerSpec& spec : experiment.controllers) {
-    auto plugin = load_controller(spec.plugin, {TANDEM_CONTROLLER_FOLDER});
-    if (!plugin) return std::unexpected(plugin.error());
-    const Status added = rig->host->add(spec.name, std::move(*plugin), spec.parameters);
-    if (!added) return std::unexpected(added.error());
-  }
-  auto robot =
-      sim::SimRobot::create(experiment.robot, rig->kernels.get(), experiment.sim_robot_config());
+Result<std::unique_ptr<SimRig>> make_sim_rig(const std::string& file, const std::string& library) {
+  auto run = make_rig(file, library);
+  if (!run) return std::unexpected(run.error());
+  const runtime::Experiment& e = (*run)->experiment;
+  auto robot = sim::SimRobot::create(e.robot, (*run)->kernels.get(), e.sim_robot_config());
   if (!robot) return std::unexpected(robot.error());
+  auto rig = std::make_unique<SimRig>();
+  rig->run = std::move(*run);
   rig->robot = std::move(*robot);
   return rig;
 }
 
 /// One run, printed. @return the exit status.
 int run(const std::string& file, const std::string& library, bool logged) {
-  auto rig = make_rig(file, library);
+  auto rig = make_sim_rig(file, library);
   if (!rig) return fail_with(rig.error());
   const std::string path = std::filesystem::temp_directory_path() / "tandem_cycle_bench.mcap";
   std::unique_ptr<log::Recorder> recorder;
@@ -149,7 +107,7 @@ int run(const std::string& file, const std::string& library, bool logged) {
   }
   SimStages stages;
   (*rig)->robot->set_stage_hook({SimStages::hook, &stages});
-  const runtime::Experiment& e = (*rig)->experiment;
+  const runtime::Experiment& e = (*rig)->run->experiment;
   const auto cycle = (*rig)->cycle(e.cycles() + e.cycles() / 2, recorder.get());
   const std::int64_t begin_ns = stages.clock.now_ns();
   bool more = true;
@@ -169,17 +127,11 @@ int run(const std::string& file, const std::string& library, bool logged) {
   return 0;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// What tracing costs: two equal runs, one of them traced, in turns of 20 cycles.
 int trace_cost(const std::string& file, const std::string& library) {
   constexpr int kTurn = 20;
-  auto plain_rig = make_rig(file, library);
-  auto traced_rig = make_rig(file, library);
+  auto plain_rig = make_sim_rig(file, library);
+  auto traced_rig = make_sim_rig(file, library);
   if (!plain_rig || !traced_rig) return fail_with((plain_rig ? traced_rig : plain_rig).error());
   const auto plain = (*plain_rig)->cycle(0, nullptr);
   const auto traced = (*traced_rig)->cycle(10'000, nullptr);
@@ -213,7 +165,7 @@ int trace_cost(const std::string& file, const std::string& library) {
 int main(int count, char** arguments) {
   const std::string file = count > 1 ? arguments[1] : TANDEM_CONFIG_FOLDER "/coman/squat.toml";
   const std::string library = count > 2 ? arguments[2] : TANDEM_MODEL_FOLDER "/coman_kernels.so";
-  tandem::bench::print_machine();
+  fmt::print("{}", tandem::bench::machine_text());
   for (const bool logged : {false, true}) {
     const int status = tandem::bench::run(file, library, logged);
     if (status != 0) return status;
