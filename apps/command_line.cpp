@@ -88,6 +88,16 @@ const char kSocketHelp[] =
 
 const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
 
+const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
+
+const char kInjectExamples[] = R"(Examples:
+  tandem inject kind=board_kill board=left_leg_1 for_s=0.5
+  tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
+  tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
+  tandem inject 'kind = "bus_down"
+                 bus = "left_leg"'
+Every kind and key: docs/configuration.md, scenario.toml. What follows: docs/faults.md.)";
+
 const char kEmulateExamples[] = R"(Examples:
   tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
   tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
@@ -112,6 +122,7 @@ void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
+  app.add_option("--scenario", o.scenario, kScenarioHelp);
   CLI::Option* log =
       app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
@@ -136,9 +147,16 @@ void add_ask(CLI::App& app, AskOptions& o) {
   app.footer(kAskExamples);
 }
 
+void add_inject(CLI::App& app, InjectOptions& o) {
+  app.add_option("fault", o.fault, "key=value words, or TOML")->required();
+  app.add_option("--socket", o.socket, kSocketHelp);
+  app.footer(kInjectExamples);
+}
+
 void add_emulate(CLI::App& app, EmulateOptions& o) {
   app.add_option("file", o.file, "Robot or experiment TOML")->required();
   app.add_flag("--lockstep", o.lockstep, "A step per SYNC, whatever the clock says");
+  app.add_option("--scenario", o.scenario, kScenarioHelp);
   app.add_option("--posture", o.posture,
                  "Where it starts (default: the experiment's, or the robot's first)");
   app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
@@ -302,6 +320,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   RunOptions run;
   EmulateOptions emulate;
   AskOptions ask;
+  InjectOptions inject;
   CheckOptions check;
   ModelOptions model;
   LogOptions log;
@@ -317,11 +336,14 @@ Command parse_command_line(int argc, const char* const* argv) {
   CLI::App* doctor_app = app.add_subcommand("doctor", "Is this machine fit for real time?");
   CLI::App* latency_app =
       app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
+  CLI::App* inject_app =
+      app.add_subcommand("inject", "Inject a fault into a running emulated or simulated robot");
   CLI::App* emulate_app =
       app.add_subcommand("emulate", "The robot on the other end of CAN: boards' firmware and plant");
   add_run(*run_app, run);
   add_emulate(*emulate_app, emulate);
   add_ask(*ask_app, ask);
+  add_inject(*inject_app, inject);
   add_check(*check_app, check);
   add_model(*model_app, model);
   add_log(*log_app, log);
@@ -339,6 +361,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (run_app->parsed()) return run;
   if (emulate_app->parsed()) return emulate;
   if (ask_app->parsed()) return ask;
+  if (inject_app->parsed()) return inject;
   if (check_app->parsed()) return check;
   if (model_app->parsed()) return model;
   if (log_app->parsed()) return log;

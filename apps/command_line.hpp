@@ -24,6 +24,7 @@ struct RunOptions {
   std::optional<std::uint64_t> seed;  ///< instead of the experiment's
   std::optional<double> duration_s;   ///< instead of the experiment's
   std::string log_folder;             ///< empty: the experiment's
+  std::string scenario;               ///< TOML of faults to inject; empty: none
   bool no_log = false;
   std::string kernel_variant;         ///< empty: the best that this CPU runs
   std::string hal;                    ///< "sim", "can"; empty: the experiment's
@@ -45,6 +46,12 @@ struct AskOptions {
   std::string socket;    ///< empty: that of the only running process
 };
 
+/// tandem inject FAULT
+struct InjectOptions {
+  std::vector<std::string> fault;  ///< key=value words, or TOML
+  std::string socket;              ///< empty: that of the only running process
+};
+
 /// tandem check FILE
 struct CheckOptions {
   std::string file;  ///< an experiment or a robot
@@ -59,6 +66,7 @@ struct EmulateOptions {
   std::optional<std::uint64_t> seed;     ///< instead of the experiment's
   std::optional<std::int64_t> period_ns; ///< instead of the experiment's
   bool lockstep = false;                 ///< a step per SYNC, whatever the clock says
+  std::string scenario;                  ///< TOML of faults to inject; empty: none
   std::vector<std::string> interfaces;   ///< "can0=vcan0"
   std::string kernel_variant;            ///< empty: the best that this CPU runs
   std::string socket;                    ///< of the control socket; empty: the default path
@@ -123,6 +131,7 @@ struct DoctorOptions {
 using Command = std::variant<Exit,
                              RunOptions,
                              AskOptions,
+                             InjectOptions,
                              CheckOptions,
                              ModelOptions,
                              LogOptions,

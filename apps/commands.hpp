@@ -17,6 +17,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit emulate_command(const EmulateOptions& options);
 /// Reads every file, says what a run would do, moves nothing.
 [[nodiscard]] Exit check_command(const CheckOptions& options);
+/// Asks a running `tandem emulate` or `run` to inject a fault.
+[[nodiscard]] Exit inject_command(const InjectOptions& options);
 [[nodiscard]] Exit model_command(const ModelOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);

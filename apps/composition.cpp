@@ -8,6 +8,7 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
+#include "hal/sim/scenario.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -98,9 +99,23 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   add_controllers(*c, errors);
   if (!errors.empty()) return errors.give();
-  if (e.hal.backend == runtime::BackendKind::kCan) return c;
+  if (e.hal.backend == runtime::BackendKind::kCan) {
+    if (overrides.scenario.empty()) return c;
+    errors.add({.message = "faults are injected on the other end of the wire",
+                .hint = "give --scenario to `tandem emulate`",
+                .file = overrides.scenario,
+                .key = {}},
+               overrides.scenario, 0);
+    return errors.give();
+  }
 
-  auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), e.sim_robot_config());
+  sim::SimRobotConfig sim = e.sim_robot_config();
+  if (!overrides.scenario.empty()) {
+    auto faults = sim::read_scenario(overrides.scenario, e.robot, e.loop.period_ns);
+    if (!faults) return std::unexpected(faults.error());
+    sim.faults = std::move(*faults);
+  }
+  auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), sim);
   if (!backend) {
     errors.add(backend.error(), e.robot.file, 0);
     return errors.give();

@@ -29,6 +29,7 @@ struct Overrides {
   std::optional<runtime::BackendKind> backend = std::nullopt;
   bool lockstep = false;                ///< true: whatever the experiment says
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
+  std::string scenario = {};            ///< faults to inject into the simulation
 };
 
 /// A controller as `check` tells of it.

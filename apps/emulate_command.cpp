@@ -4,10 +4,12 @@
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
 #include "apps/errands.hpp"
+#include "apps/inject.hpp"
 #include "apps/kernel_store.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
 #include "hal/sim/emulator.hpp"
+#include "hal/sim/scenario.hpp"
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/experiment.hpp"
@@ -44,6 +46,11 @@ std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) 
   if (Status done = replace_interfaces(subject.robot, options.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
+  if (!options.scenario.empty()) {
+    auto faults = sim::read_scenario(options.scenario, subject.robot, subject.sim.period_ns);
+    if (!faults) return std::unexpected(faults.error());
+    subject.sim.faults = std::move(*faults);
+  }
   return subject;
 }
 
@@ -54,6 +61,7 @@ struct Emulation {
   std::unique_ptr<sim::EmulatedRobot> robot;
   std::unique_ptr<CanSockets> sockets;
   std::unique_ptr<sim::Emulator> emulator;
+  std::uint64_t injected = 0;  ///< faults that have begun
 };
 
 Diagnostics in_file(Error error, const std::string& file) {
@@ -102,6 +110,10 @@ Json summary_json(const Emulation& e, bool lockstep) {
   json["steps_without_sync"] = s.steps_without_sync;
   json["slipped"] = s.slipped;
   json["sim_seconds"] = static_cast<double>(e.emulator->time_ns()) * 1e-9;
+  json["silent_steps"] = s.silent_steps;
+  json["safe_after_steps"] = s.safe_after_steps;
+  json["open_after_steps"] = s.open_after_steps;
+  json["injected"] = e.injected;
   json["frames_in"] = s.frames_in;
   json["frames_out"] = s.frames_out;
   json["frames_lost"] = s.frames_lost;
@@ -126,7 +138,26 @@ void print_summary(const Emulation& e, std::FILE* out) {
   if (e.robot->plant().diverged()) {
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
   }
+  if (s.silent_steps > 0) {
+    facts.add("without SYNC at the end",
+              fmt::format("{} steps; no motor drove after {}, every bridge was open after {}",
+                          s.silent_steps, s.safe_after_steps, s.open_after_steps));
+  }
   facts.print(out);
+}
+
+/// Faults that have begun since.
+void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
+  while (const sim::Fault* fault = e.robot->next_begun_fault()) {
+    ++e.injected;
+    if (quiet) continue;
+    const std::int32_t joint = e.robot->joint_of(*fault);
+    const auto& joints = e.subject.robot.joints;
+    fmt::print(out, "{:.3f} s: injected {}{}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
+               to_string(fault->kind),
+               joint < 0 ? "" : " of " + joints[static_cast<std::size_t>(joint)].name);
+    std::fflush(out);
+  }
 }
 
 /// Emulates until it is asked to stop, or the plant diverges.
@@ -136,6 +167,7 @@ void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
   while (!rt::stop_requested()) {
     if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
     errands.do_all();
+    tell_injected(e, out, quiet);
     if (quiet || !line.due()) continue;
     const sim::EmulatorStatistics& s = e.emulator->statistics();
     line.show(fmt::format("{:.1f} s simulated, {} steps ({} without SYNC), {}",
@@ -173,6 +205,15 @@ Exit emulate_command(const EmulateOptions& options) {
   ControlRegistry commands;
   commands.add("status", "steps, frames and simulated time so far", {}, [&](const Json&) {
     return errands.ask([&] { return summary_json(e, options.lockstep); });
+  });
+  add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
+    const auto done = errands.ask([&]() -> Result<Json> {
+      if (Status added = injected(e.robot->inject(fault)); !added) {
+        return std::unexpected(added.error());
+      }
+      return Json::object();
+    });
+    return done ? Status() : Status(std::unexpected(done.error()));
   });
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "emulate");
   emulate(e, errands, out, options.quiet);

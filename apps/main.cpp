@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
                      [](const RunOptions& options) { return run_command(options); },
                      [](const EmulateOptions& options) { return emulate_command(options); },
                      [](const AskOptions& options) { return ask_command(options); },
+                     [](const InjectOptions& options) { return inject_command(options); },
                      [](const CheckOptions& options) { return check_command(options); },
                      [](const ModelOptions& options) { return model_command(options); },
                      [](const LogOptions& options) { return log_command(options); },

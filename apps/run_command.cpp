@@ -7,6 +7,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/inject.hpp"
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
@@ -183,6 +184,12 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle);
+  if (c.sim != nullptr) {
+    add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
+      if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
+      return injected(c.sim->post(fault) ? Code::kOk : Code::kQueueFull);
+    });
+  }
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
   rt::install_stop_signals();
   LoopThread loop(cycle, e.thread);
@@ -224,7 +231,8 @@ Exit run_command(const RunOptions& options) {
                       .duration_s = options.duration_s,
                       .kernel_variant = options.kernel_variant,
                       .lockstep = options.lockstep,
-                      .interfaces = options.interfaces};
+                      .interfaces = options.interfaces,
+                      .scenario = options.scenario};
   if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
   const auto composition = compose(options.experiment, overrides);

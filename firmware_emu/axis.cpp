@@ -74,18 +74,21 @@ void Axis::apply_settings() noexcept TANDEM_RT {
 
 void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
   if (settings_changed_) apply_settings();
+  const bool link_valid = link_encoder_.sample(sense.link_position_rad);
+  const bool motor_valid = motor_encoder_.sample(sense.motor_position_rad);
+  if (motor_valid) {  // by itself: a stop ends when the motor rests
+    measured_.motor_position_rad = motor_encoder_.position_rad();
+    measured_.motor_velocity_rad_s = motor_velocity_.update(measured_.motor_position_rad);
+  }
   sensors_valid_ = std::isfinite(sense.spring_torque_Nm) && std::isfinite(sense.current_A) &&
                    std::isfinite(sense.temperature_C) && std::isfinite(sense.bus_voltage_V) &&
-                   link_encoder_.sample(sense.link_position_rad) &&
-                   motor_encoder_.sample(sense.motor_position_rad);
+                   link_valid && motor_valid;
   if (!sensors_valid_) return;  // the last good values stay, and a fault follows
   const double velocity_before = measured_.link_velocity_rad_s;
   measured_.link_position_rad = link_encoder_.position_rad();
   measured_.link_velocity_rad_s = link_velocity_.update(measured_.link_position_rad);
   measured_.link_acceleration_rad_s2 =
       (measured_.link_velocity_rad_s - velocity_before) / period_s_;
-  measured_.motor_position_rad = motor_encoder_.position_rad();
-  measured_.motor_velocity_rad_s = motor_velocity_.update(measured_.motor_position_rad);
   measured_.torque_Nm = torque_sensor_.sample(sense.spring_torque_Nm);
   measured_.torque_rate_Nm_s = torque_rate_.update(measured_.torque_Nm);
   measured_.current_A = sense.current_A;

@@ -173,6 +173,22 @@ bool EmulatedRobot::all_enabled() const noexcept {
   });
 }
 
+bool EmulatedRobot::safe() const noexcept TANDEM_RT {
+  return std::ranges::all_of(boards_, [](const BoardNode& node) {
+    if (node.powered == 0) return true;
+    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      const canopen::DriveMotion motion = node.board->axis(axis).machine().motion();
+      const bool brakes = motion == canopen::DriveMotion::kQuickStop;
+      if (!brakes && motion != canopen::DriveMotion::kNone) return false;
+    }
+    return true;
+  });
+}
+
+bool EmulatedRobot::powerless() const noexcept TANDEM_RT {
+  return std::ranges::none_of(drive_, &firmware::AxisDrive::enabled);
+}
+
 void EmulatedRobot::sense() noexcept {
   plant_.evaluate();
   sensors_.sample(plant_, sensor_truth_);

@@ -92,6 +92,11 @@ class EmulatedRobot {
   /// True when every axis of every board is in Operation Enabled.
   [[nodiscard]] bool all_enabled() const noexcept;
 
+  /// No motor drives: every winding is shorted, or its bridge open.
+  [[nodiscard]] bool safe() const noexcept TANDEM_RT;
+  /// Every bridge is open: no motor has a voltage or a current.
+  [[nodiscard]] bool powerless() const noexcept TANDEM_RT;
+
   /// Adds a fault, between two steps. A start that has passed is the next step.
   /// @return kOk; kQueueFull: there are FaultInjection::kMostFaults; kOutOfRange: a second board
   ///         with a node id has to be known when the robot is made.

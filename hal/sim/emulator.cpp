@@ -80,6 +80,7 @@ Code Emulator::step(std::int64_t now_ns) noexcept {
   }
   stepped_ns_ = now_ns;
   running_ = true;
+  bool synced = first_sync_ns_ != 0;
   first_sync_ns_ = 0;
   for (Port& port : ports_) port.sync = false;
   for (; periods > 0; --periods) {
@@ -87,9 +88,22 @@ Code Emulator::step(std::int64_t now_ns) noexcept {
     if (code != Code::kOk) return code;
     next_time_ns_ += config_.period_ns;
     ++statistics_.steps;
+    if (synced) {
+      statistics_.silent_steps = statistics_.safe_after_steps = statistics_.open_after_steps = 0;
+    } else {
+      watch_silence();
+    }
+    synced = false;  // SYNC was for the first of them
     answer();
   }
   return Code::kOk;
+}
+
+void Emulator::watch_silence() noexcept {
+  EmulatorStatistics& s = statistics_;
+  ++s.silent_steps;
+  if (s.safe_after_steps == 0 && robot_->safe()) s.safe_after_steps = s.silent_steps;
+  if (s.open_after_steps == 0 && robot_->powerless()) s.open_after_steps = s.silent_steps;
 }
 
 void Emulator::answer() noexcept {

@@ -22,6 +22,11 @@ struct EmulatorStatistics {
   std::uint64_t steps = 0;
   std::uint64_t steps_without_sync = 0;  ///< real time: the boards' own clocks went on
   std::uint64_t slipped = 0;             ///< real time: periods that were too many to be made up
+  // Since SYNC came last: steps, and after how many of them no motor drove any more, and every
+  // bridge was open. 0: not (yet).
+  std::uint64_t silent_steps = 0;
+  std::uint64_t safe_after_steps = 0;
+  std::uint64_t open_after_steps = 0;
   std::uint64_t frames_in = 0;
   std::uint64_t frames_out = 0;
   std::uint64_t frames_lost = 0;         ///< answers that a bus did not take
@@ -65,6 +70,7 @@ class Emulator {
   [[nodiscard]] Code step(std::int64_t now_ns) noexcept;
   [[nodiscard]] std::int64_t periods_to(std::int64_t now_ns) noexcept;
   void answer() noexcept;
+  void watch_silence() noexcept;
 
   EmulatedRobot* robot_;
   std::vector<Port> ports_;

@@ -1,5 +1,7 @@
 #include "hal/sim/sim_robot.hpp"
 
+#include <cstring>
+
 #include "base/archive.hpp"
 
 namespace tandem::sim {
@@ -37,6 +39,12 @@ std::string SimRobot::status_text() const {
 }
 
 Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
+  for (auto waiting = posted_.front(); !waiting.empty(); waiting = posted_.front()) {
+    Fault fault;
+    std::memcpy(&fault, waiting.data(), sizeof fault);
+    (void)robot_->inject(fault);  // beyond the most that there can be: left out
+    posted_.pop();
+  }
   master_->cycle_begin(time);
   hook_(Stage::kMasterSync);
   if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
@@ -52,6 +60,14 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
 Code SimRobot::write(const hal::CommandImage& command,
                      const hal::ParameterImage& parameters) noexcept TANDEM_RT {
   return master_->send(command, parameters);
+}
+
+bool SimRobot::post(const Fault& fault) {
+  const std::span<std::byte> slot = posted_.begin_push();
+  if (slot.empty()) return false;
+  std::memcpy(slot.data(), &fault, sizeof fault);
+  posted_.end_push();
+  return true;
 }
 
 hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {

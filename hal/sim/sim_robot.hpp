@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "base/spsc_ring.hpp"
 #include "hal/backend.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/sim/emulated_robot.hpp"
@@ -40,6 +41,10 @@ class SimRobot final : public hal::Backend {
   [[nodiscard]] const hal::can::DriveMaster& master() const noexcept { return *master_; }
   [[nodiscard]] EmulatedRobot& robot() noexcept { return *robot_; }
 
+  /// Injects a fault from one other thread: it is added before the next cycle.
+  /// @return false: too many wait.
+  [[nodiscard]] bool post(const Fault& fault);
+
   void set_stage_hook(StageHook hook) noexcept {
     hook_ = hook;
     robot_->set_stage_hook(hook);
@@ -54,6 +59,7 @@ class SimRobot final : public hal::Backend {
   TruthFiller truth_filler_;
   hal::TruthImage truth_;
   bool keep_truth_;
+  SpscRing posted_{sizeof(Fault), 16};
   StageHook hook_;
 };
 

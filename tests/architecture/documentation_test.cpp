@@ -35,7 +35,8 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 std::set<std::string> keys_read() {
   std::set<std::string> keys;
   for (const char* file :
-       {"hal/robot_config.cpp", "hal/robot_config_drives.cpp", "runtime/experiment.cpp"}) {
+       {"hal/robot_config.cpp", "hal/robot_config_drives.cpp", "hal/sim/scenario.cpp",
+        "runtime/experiment.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(
         source,
@@ -70,6 +71,15 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
       }
     }
   }
+}
+
+TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
+  const auto named = matches(text_of(kRoot / "docs/faults.md"), "`FaultRow\\.(\\w+)`");
+  const auto tests = matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp") +
+                                 text_of(kRoot / "tests/runtime/fault_rows_wire_test.cpp"),
+                             "TEST\\(FaultRow, (\\w+)\\)");
+  EXPECT_GT(tests.size(), 20U);
+  EXPECT_EQ(named, tests);
 }
 
 TEST(Documentation, LinksLeadToFilesThatExist) {

@@ -1,0 +1,186 @@
+// A simulated robot in its loop, with what can go wrong outside of the emulated robot, too: a
+// master that sleeps or dies, a bus that fails at the master's end.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/ethercat-can/drive_master.hpp"
+#include "hal/sim/emulated_robot.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/runtime/test_controllers.hpp"
+
+namespace tandem::runtime::test {
+
+/// The master's end of a bus, that can be off, or take only so many frames a cycle.
+class FailingBus final : public hal::can::Bus {
+ public:
+  explicit FailingBus(hal::can::Bus& bus) : bus_(&bus) {}
+  std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
+    if (state_now != hal::can::BusState::kActive) return 0;
+    const std::size_t taken = std::min(frames.size(), room);
+    room -= taken;
+    return bus_->send(frames.first(taken));
+  }
+  std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override {
+    const std::size_t count = bus_->receive(frames);
+    return state_now == hal::can::BusState::kActive ? count : 0;
+  }
+  [[nodiscard]] hal::can::BusState state() const noexcept TANDEM_RT override { return state_now; }
+
+  hal::can::BusState state_now = hal::can::BusState::kActive;
+  std::size_t queue = 512;  ///< frames that a cycle takes
+  std::size_t room = 512;
+
+ private:
+  hal::can::Bus* bus_;
+};
+
+/// SimRobot with failing buses and a master that can sleep.
+class FaultRobot final : public hal::Backend {
+ public:
+  FaultRobot(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+             const sim::SimRobotConfig& config)
+      : period_ns_(config.period_ns) {
+    auto made = sim::EmulatedRobot::create(robot, kernels, config);
+    EXPECT_TRUE(made.has_value()) << made.error().to_string();
+    emulated = std::move(*made);
+    std::vector<hal::can::Bus*> ends;
+    for (std::size_t b = 0; b < robot.buses.size(); ++b) {
+      buses.push_back(std::make_unique<FailingBus>(emulated->bus(b).master()));
+      ends.push_back(buses.back().get());
+    }
+    auto drives = hal::can::DriveMaster::create(robot, ends);
+    EXPECT_TRUE(drives.has_value()) << drives.error().to_string();
+    master = std::move(*drives);
+  }
+
+  [[nodiscard]] hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
+  [[nodiscard]] hal::Phase phase() const noexcept override { return master->phase(); }
+  [[nodiscard]] std::string status_text() const override { return master->status_text(); }
+  [[nodiscard]] Code read(const hal::CycleTime& time,
+                          hal::StateImage& state) noexcept TANDEM_RT override {
+    for (const auto& bus : buses) bus->room = bus->queue;
+    hal::CycleTime late = time;
+    late.time_ns += slept_ns_;
+    master->cycle_begin(late);
+    const Code code = emulated->step(late.time_ns);
+    return code == Code::kOk ? master->receive(state) : code;
+  }
+  [[nodiscard]] Code write(const hal::CommandImage& command,
+                           const hal::ParameterImage& parameters) noexcept TANDEM_RT override {
+    return master->send(command, parameters);
+  }
+  void stop(hal::StopCategory category) noexcept TANDEM_RT override { master->stop(category); }
+  void reset() noexcept TANDEM_RT override { master->reset(); }
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master->shut_down(); }
+  [[nodiscard]] bool archive(Archive&) override { return false; }
+  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
+    const sim::Fault* fault = emulated->next_begun_fault();
+    if (fault == nullptr) return {};
+    return {fault->kind, emulated->joint_of(*fault)};
+  }
+
+  /// A period passes without the master.
+  void without_master() {
+    slept_ns_ += period_ns_;
+    (void)emulated->step(emulated->now_ns() + period_ns_);
+  }
+
+  std::unique_ptr<sim::EmulatedRobot> emulated;
+  std::vector<std::unique_ptr<FailingBus>> buses;
+  std::unique_ptr<hal::can::DriveMaster> master;
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t slept_ns_ = 0;
+};
+
+/// Cycles, the first one in which the fault acts being number 1. -1: not.
+struct Outcome {
+  int noticed = -1;  ///< a fault is latched
+  int safe = -1;     ///< no motor drives any more: its winding is shorted, or its bridge open
+  int open = -1;     ///< every bridge is open
+};
+
+/// A whole run: one joint moves on a sine, the others are held.
+struct FaultRig {
+  FaultRig(hal::RobotConfig config, const tandem_kernels* kernels, const std::string& posture,
+           std::vector<sim::Fault> scenario = {})
+      : robot(std::move(config)), host(robot, kernels, 1'000'000) {
+    backend = std::make_unique<FaultRobot>(
+        robot, kernels,
+        sim::SimRobotConfig{
+            .posture = posture, .release_ns = 100'000'000, .faults = std::move(scenario)});
+    auto moves = std::make_shared<Sine>(std::vector<std::size_t>{0});
+    sine = moves.get();
+    EXPECT_TRUE(host.add("sine", std::move(moves), parameters("amplitude_rad = 0.1")));
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{robot, *backend, host, clock},
+        CycleConfig{.loop = {.pacing = rt::Pacing::kSimulated}, .settle_cycles = 150});
+  }
+  /// Into the motion, at its fastest.
+  void run() {
+    while (cycle->phase() != RunPhase::kRunning && cycle->step()) {
+    }
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning) << backend->status_text();
+    for (int i = 0; i < 500; ++i) cycle->step();
+    ASSERT_TRUE(cycle->faults().empty()) << cycle->faults()[0].text;
+  }
+  /// Everybody lives on as far as he can.
+  void step() {
+    if (!cycle->step()) backend->without_master();
+  }
+  void inject(sim::Fault fault) { ASSERT_EQ(backend->emulated->inject(fault), Code::kOk); }
+
+  [[nodiscard]] const firmware::Board& board(std::size_t b) const {
+    return backend->emulated->board(b);
+  }
+  [[nodiscard]] const firmware::Axis& axis(std::size_t b, std::size_t a = 0) const {
+    return board(b).axis(a);
+  }
+  /// No motor has a voltage or a current any more.
+  [[nodiscard]] bool powerless() const {
+    const sim::Plant& plant = backend->emulated->plant();
+    for (std::size_t j = 0; j < plant.joints(); ++j) {
+      if (plant.joint(j).voltage_V != 0.0 || plant.joint(j).current_A != 0.0) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] bool noticed() const {
+    return backend->phase() == hal::Phase::kFault || !cycle->faults().empty();
+  }
+  /// The run with what has just been injected, until all is powerless, 4 s at most.
+  Outcome watch(int cycles = 4000) {
+    Outcome found;
+    for (int i = 1; i <= cycles && found.open < 0; ++i) {
+      step();
+      note(found, i, noticed());
+    }
+    return found;
+  }
+  void note(Outcome& found, int i, bool notices) const {
+    if (found.noticed < 0 && notices) found.noticed = i;
+    if (found.noticed >= 0 && found.safe < 0 && backend->emulated->safe()) found.safe = i;
+    if (found.safe >= 0 && found.open < 0 && powerless()) found.open = i;
+  }
+  [[nodiscard]] std::string causes() const {
+    std::string all = backend->status_text();
+    for (const Fault& fault : cycle->faults()) all += "\n" + fault.joint + ": " + fault.text;
+    return all;
+  }
+
+  hal::RobotConfig robot;
+  ControllerHost host;
+  std::unique_ptr<FaultRobot> backend;
+  Sine* sine;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+}  // namespace tandem::runtime::test

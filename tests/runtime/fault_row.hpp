@@ -1,0 +1,114 @@
+// A row of docs/faults.md, the robots that its test runs on, and what the rows have in common.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tests/runtime/fault_robot.hpp"
+#include "tests/sim/swing_robot.hpp"
+#include "tests/support/test_robot.hpp"
+
+namespace tandem::runtime::test {
+
+using canopen::DriveMotion;
+using hal::FaultKind;
+using sim::Fault;
+
+/// The page's line of the running test, cell by cell: what | noticed by | reaction | noticed |
+/// safe | test.
+inline std::vector<std::string> row_of_this_test() {
+  const std::string name =
+      std::string("`FaultRow.") +
+      testing::UnitTest::GetInstance()->current_test_info()->name() + "`";
+  std::ifstream page(std::filesystem::path(TANDEM_SOURCE_DIR) / "docs/faults.md");
+  for (std::string line; std::getline(page, line);) {
+    if (line.find(name) == std::string::npos) continue;
+    std::vector<std::string> cells;
+    std::istringstream in(line);
+    for (std::string cell; std::getline(in, cell, '|');) cells.push_back(cell);
+    return cells;
+  }
+  ADD_FAILURE() << "docs/faults.md has no row with the test " << name;
+  return {};
+}
+
+/// Object 2036, 1 s, and a cycle for the master's reaction.
+inline constexpr int kLongestStop = 1002;
+
+inline int number_in(const std::string& cell) {
+  const std::size_t digit = cell.find_first_of("0123456789");
+  return digit == std::string::npos ? -1 : std::stoi(cell.substr(digit));
+}
+
+/// The outcome is the one that the page declares.
+inline void expect_row(const Outcome& outcome) {
+  const std::vector<std::string> row = row_of_this_test();
+  ASSERT_EQ(row.size(), 7U);
+  EXPECT_EQ(outcome.noticed, number_in(row[4])) << "noticed after so many cycles";
+  EXPECT_EQ(outcome.safe, number_in(row[5])) << "safe after so many cycles";
+  if (outcome.safe < 0) return;
+  EXPECT_GE(outcome.open, outcome.safe) << "every bridge opens in the end";
+  EXPECT_LE(outcome.open, outcome.safe + kLongestStop);
+}
+
+/// UR5e: six joints on three boards, a force/torque sensor, one bus. Joint 0, on board 0, moves.
+struct Ur5e {
+  tandem::test::TestRobot loaded = tandem::test::load_test_robot("ur5e");
+};
+struct ArmRig : private Ur5e, FaultRig {
+  explicit ArmRig(std::vector<Fault> scenario = {},
+                  hal::StopCategory on_fault = hal::StopCategory::kCategory1)
+      : FaultRig(with(loaded.robot, on_fault), loaded.kernels.get(), "ready", std::move(scenario)) {}
+  static hal::RobotConfig with(hal::RobotConfig config, hal::StopCategory on_fault) {
+    for (hal::JointConfig& joint : config.joints) joint.on_fault = on_fault;
+    return config;
+  }
+};
+
+inline Fault of(FaultKind kind) {
+  Fault fault;
+  fault.kind = kind;
+  const bool joint = kind >= FaultKind::kEncoderFreeze && kind <= FaultKind::kSpringBreak;
+  const bool board = kind >= FaultKind::kBoardKill && kind <= FaultKind::kSupplySag;
+  if (joint) fault.joint = 0;
+  if (board) fault.board = 0;
+  if (kind == FaultKind::kBusDown || sim::is_frame_fault(kind)) fault.bus = 0;
+  return fault;
+}
+
+/// `count` frames of one identifier are lost; 0: all from now on.
+inline Fault lose(std::uint32_t cob_id, std::uint32_t count) {
+  Fault fault = of(FaultKind::kFrameDrop);
+  fault.cob_id = cob_id;
+  fault.cob_mask = 0x7FF;
+  fault.count = count;
+  return fault;
+}
+
+inline constexpr std::uint32_t kFeedbackOfBoard0 = 0x181, kCommandOfBoard0 = 0x201;
+inline constexpr std::uint32_t kSync = 0x080;
+
+/// The joints of the other boards stop by the declared category, and all of it stays latched with
+/// cause and time.
+inline void expect_stopped(FaultRig& rig, const std::string& cause) {
+  for (std::size_t b = 1; b < 3; ++b) {
+    for (std::size_t a = 0; a < 2; ++a) {
+      EXPECT_EQ(rig.axis(b, a).machine().motion(), DriveMotion::kNone) << b << "." << a;
+      EXPECT_EQ(rig.axis(b, a).objects().error_code, 0) << "it stopped in order";
+    }
+  }
+  EXPECT_EQ(rig.backend->phase(), hal::Phase::kFault) << "latched";
+  EXPECT_NE(rig.causes().find(cause), std::string::npos) << rig.causes();
+  EXPECT_NE(rig.backend->status_text().find(" s"), std::string::npos) << "with its time";
+}
+
+inline void expect_running(FaultRig& rig) {
+  EXPECT_FALSE(rig.noticed()) << rig.causes();
+  EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning);
+  for (std::size_t b = 0; b < 3; ++b) {
+    EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kFollow);
+  }
+}
+
+}  // namespace tandem::runtime::test
