@@ -121,6 +121,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
     return errors.give();
   }
   c->sim = backend->get();
+  c->master = &c->sim->master();
   c->backend = std::move(*backend);
   return c;
 }
@@ -150,6 +151,7 @@ Diagnostics connect(Composition& c, const std::string& record_frames) {
       e.robot, buses, *c.sockets,
       {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
   if (!backend) return {backend.error()};
+  c.master = &(*backend)->master();
   c.backend = std::move(*backend);
   return {};
 }

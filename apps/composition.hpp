@@ -41,10 +41,11 @@ struct ControllerNote {
 struct Composition {
   runtime::Experiment experiment;  ///< overrides applied; its robot is completed
   model::KernelLibrary kernels;
-  std::unique_ptr<CanSockets> sockets;   ///< of the CAN backend
+  std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
-  std::unique_ptr<hal::Backend> backend; ///< the CAN backend only after connect()
-  sim::SimRobot* sim = nullptr;          ///< the backend, when it is the simulation
+  std::unique_ptr<hal::Backend> backend;          ///< the CAN backend only after connect()
+  sim::SimRobot* sim = nullptr;                   ///< the backend, when it is the simulation
+  const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::vector<ControllerNote> notes;
 };

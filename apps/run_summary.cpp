@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "apps/round_trips.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -105,6 +107,7 @@ Json RunSummary::json() const {
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["base"] = base_json(cycle.statistics().base());
+  json["round_trips"] = round_trips_json(composition.master->round_trips());
   json["faults"] = faults;
   json["kernel_variant"] = composition.kernels->variant;
   return json;
@@ -113,6 +116,10 @@ Json RunSummary::json() const {
 void RunSummary::print(std::FILE* out) const {
   print_worst_joints(*this, out);
   fmt::print(out, "\n");
+  if (composition.backend->waits_for_bus()) {
+    print_slowest_nodes(composition.master->round_trips(), out);
+    fmt::print(out, "\n");
+  }
   Facts facts;
   if (const auto ground = cycle.statistics().ground(weight_N(*composition.kernels))) {
     facts.add("force on the ground",
@@ -129,8 +136,8 @@ void RunSummary::print(std::FILE* out) const {
   const rt::LoopStatistics& loop = cycle.loop();
   const bool wall_clock = composition.experiment.loop.pacing == rt::Pacing::kWallClock;
   if (wall_clock) {
-    facts.add("ran", fmt::format("{:.3f} s, {} cycles, {} skipped", wall_s,
-                                 cycle.running_cycles(), loop.skipped));
+    facts.add("ran", fmt::format("{:.3f} s, {} cycles, {} skipped", wall_s, cycle.running_cycles(),
+                                 loop.skipped));
   } else {
     facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
                                        wall_s > 0.0 ? sim_s() / wall_s : 0.0));

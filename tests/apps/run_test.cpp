@@ -18,7 +18,7 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   for (const std::string key :
        {"robot", "hal", "seed", "cycles", "period_ns", "sim_seconds", "wall_seconds",
         "realtime_factor", "overruns", "wakeup_ns", "bus_ns", "cycle_ns", "log", "joints", "ground", "base",
-        "faults", "kernel_variant"}) {
+        "round_trips", "faults", "kernel_variant"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   EXPECT_EQ(json["robot"], "double_pendulum");
