@@ -56,6 +56,29 @@ TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
   EXPECT_EQ(first["joints"], paced["joints"]);
 }
 
+TEST_F(Run, OfAScenarioEndsInItsFaultWhichTheLogTells) {
+  std::ofstream(folder_ / "faults.toml")
+      << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint2\"\nafter_enabled_s = 1.2\n";
+  const Outcome outcome =
+      tandem("run hold.toml --duration 1 --quiet --scenario faults.toml --json -");
+  EXPECT_EQ(outcome.status, 1);
+  const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
+  const std::string log = folder_ / json["log"]["path"].get<std::string>();
+  const Outcome events = tandem("log csv " + log + " --topic event");
+  EXPECT_NE(events.out.find("injected encoder_unplug of joint2"), std::string::npos)
+      << events.out << events.err;
+}
+
+TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
+  std::ofstream(folder_ / "faults.toml")
+      << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint3\"\n";
+  const Outcome outcome = tandem("run hold.toml --scenario faults.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("faults.toml:3: fault[0].joint: the robot has no joint 'joint3'"),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(Run, WithoutALogWritesNone) {
   const auto json = run("hold.toml --duration 0.1 --no-log");
   EXPECT_TRUE(json["log"].is_null());
