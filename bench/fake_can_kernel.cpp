@@ -119,8 +119,8 @@ void FakeCanKernel::step() noexcept {
   for (std::size_t b = 0; b < ports_.size(); ++b) {
     Port& port = ports_[b];
     port.sync = false;
-    port.coming.resize(kRoom);
-    port.coming.resize(robot_->bus(b).master().receive(port.coming));
+    canopen::Frame frame;
+    while (robot_->bus(b).master().receive({&frame, 1}) == 1) port.coming.push_back(frame);
   }
 }
 
