@@ -271,12 +271,16 @@ void DriveMaster::Impl::send_parameter(Node& node,
     refused_code = sdo.abort_code();
   }
   node.sending = -1;
+  const auto changed = [&](std::size_t joint) {
+    return parameters.revision(joint) != sent_revision[joint];
+  };
+  if (std::ranges::none_of(node.plan.joints, changed)) return;  // nearly always
   const std::size_t items = node.plan.joints.size() * kItemsPerAxis;
   for (std::size_t i = 0; i < items; ++i) {
     const std::size_t now = (node.next_item + i) % items;
     const std::size_t axis = now / kItemsPerAxis;
     const std::size_t joint = node.plan.joints[axis];
-    if (parameters.revision(joint) == sent_revision[joint]) continue;
+    if (!changed(joint)) continue;
     const auto loop = static_cast<PidLoop>(now % kItemsPerAxis / kItemsPerLoop);
     const std::size_t which = now % kItemsPerLoop;
     PidGains wanted = parameters.gains(joint, loop);
