@@ -17,6 +17,8 @@ namespace {
 
 /// A sensor has no time-out of its own in the configuration.
 constexpr int kSensorTimeoutCycles = 10;
+/// Cycles in succession with two answers of one node that are borne.
+constexpr std::uint32_t kDoubledCycles = 10;
 /// Items of one axis' parameters: kp, ki, kd of each loop.
 constexpr std::size_t kItemsPerLoop = 3;
 constexpr std::size_t kItemsPerAxis = kPidLoops * kItemsPerLoop;
@@ -150,6 +152,7 @@ void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
   if (p < 0 || !listening) return;
   const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
   if (frame.length < pdo.bytes) return;
+  if (number == 1) ++node.answers;
   const bool sampled = pdo.group != PdoGroup::kSlowFeedback;
   if (sampled) {
     if (pdo.part != 0 && pdo.part != node.next_part) return;
@@ -192,6 +195,15 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TA
   }
 }
 
+/// A late answer and the next may come in one cycle; time and again it is two nodes that answer.
+void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
+  node.doubled_cycles = node.answers > 1 ? node.doubled_cycles + 1 : 0;
+  node.answers = 0;
+  if (node.master.running() && node.doubled_cycles > kDoubledCycles) {
+    node.master.fail(NodeTrouble::kTwoNodes, now_ns);
+  }
+}
+
 void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
@@ -200,6 +212,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
             ? std::ranges::all_of(node.plan.joints, [&](auto j) { return joint_fresh[j] != 0; })
             : node.next_part == node.plan.parts;
     node.next_part = 0;
+    watch_doubles(node);
     node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
     if (!node.master.running() || node.timeout_cycles == 0) continue;
     if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
@@ -428,7 +441,7 @@ void DriveMaster::Impl::archive(Archive& ar) {
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
-    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.counters_sent, node.recovering,
+    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.doubled_cycles, node.counters_sent, node.recovering,
        node.sending, node.next_item);
   }
 }

@@ -52,6 +52,8 @@ struct DriveMaster::Impl {
     std::size_t first_channel = 0;                   ///< of them in StateImage::sensor()
     int next_part = 0;                               ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
+    std::uint32_t answers = 0;                       ///< this cycle's first TPDOs
+    std::uint32_t doubled_cycles = 0;                ///< in succession, with several of them
     std::uint8_t counters_sent = 0;                  ///< since its start; stays at 255
     bool recovering = false;                         ///< a lost node that is configured anew
     // Parameters at run time
@@ -72,6 +74,7 @@ struct DriveMaster::Impl {
                std::int64_t at_ns) noexcept TANDEM_RT;
   void on_echo(Node& node, std::uint8_t echo, std::int64_t at_ns) noexcept TANDEM_RT;
   void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
+  void watch_doubles(Node& node) noexcept TANDEM_RT;
   void process_nodes() noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
   void write_pdos() noexcept TANDEM_RT;

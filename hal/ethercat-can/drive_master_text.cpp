@@ -79,6 +79,9 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
     case NodeTrouble::kLeftOperational:
       return fmt::format("{}: went to {} by itself at {:.3f} s", who,
                          canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));
+    case NodeTrouble::kTwoNodes:
+      return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
+                         who, seconds(m.trouble_time_ns()));
     case NodeTrouble::kFeedbackLost:
       return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who,
                          node.timeout_cycles, seconds(m.trouble_time_ns()));

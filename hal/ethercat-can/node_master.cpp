@@ -38,6 +38,9 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
   heard_ns_ = now_ns;
   if (state == NmtState::kBootUp) {
     if (stage_ == Stage::kDown) return;
+    const bool again = booted_ns_ == now_ns;  // no node boots twice in a cycle
+    booted_ns_ = now_ns;
+    if (again) return fail(NodeTrouble::kTwoNodes, now_ns);
     const bool expected = stage_ == Stage::kWaitBootUp;
     const bool too_often = !expected && ++reboots_ > kReboots;
     if (stage_ == Stage::kRunning || too_often) return fail(NodeTrouble::kRebooted, now_ns);
@@ -144,7 +147,7 @@ void NodeMaster::enter(Stage stage, std::int64_t now_ns) noexcept {
 
 void NodeMaster::archive(Archive& ar) {
   ar(stage_, trouble_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
-     heard_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
+     heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
 }
 
 }  // namespace tandem::hal::can

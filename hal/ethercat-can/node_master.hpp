@@ -23,6 +23,7 @@ enum class NodeTrouble : std::uint8_t {
   kHeartbeatLost,
   kLeftOperational,  ///< its heartbeat says another NMT state
   kFeedbackLost,     ///< its heartbeat is there, its TPDOs are not
+  kTwoNodes,         ///< two answer under its id
 };
 
 /// Non-blocking: frames and time in, frames out, at most one SDO request per call.
@@ -97,6 +98,7 @@ class NodeMaster {
   std::int64_t since_ns_ = 0;       ///< when the stage began
   std::int64_t next_reset_ns_ = 0;
   std::int64_t heard_ns_ = 0;       ///< last heartbeat
+  std::int64_t booted_ns_ = -1;     ///< last boot-up
   std::int64_t trouble_ns_ = 0;
   canopen::AbortCode abort_code_ = canopen::AbortCode::kNone;
   std::uint32_t read_value_ = 0;

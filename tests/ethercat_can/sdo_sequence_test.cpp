@@ -165,11 +165,19 @@ TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
 TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
   boot();
   for (int i = 0; i < 3; ++i) {
+    now_ns += 1'000'000;
     boot();
     EXPECT_EQ(node.stage(), NodeMaster::Stage::kConfigure);
   }
+  now_ns += 1'000'000;
   boot();
   EXPECT_EQ(node.trouble(), NodeTrouble::kRebooted);
+}
+
+TEST_F(ScriptedNode, ThatBootsTwiceInACycleIsTwoNodes) {
+  boot();
+  boot();
+  EXPECT_EQ(node.trouble(), NodeTrouble::kTwoNodes);
 }
 
 }  // namespace

@@ -80,6 +80,23 @@ TEST(FaultRow, BoardDies) {
   expect_stopped(rig, "no complete TPDO for 10 cycles");
 }
 
+TEST(FaultRow, TwoBoardsShareANodeId) {
+  ArmRig rig({of(FaultKind::kBoardDuplicate)});
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("two nodes answer under this id"), std::string::npos)
+      << rig.causes();
+}
+
+TEST(FaultRow, AnswersComeTwice) {
+  ArmRig rig;
+  rig.run();
+  Fault fault = lose(kFeedbackOfBoard0, 0);
+  fault.kind = FaultKind::kFrameDuplicate;
+  rig.inject(fault);
+  expect_row(rig.watch());
+  expect_stopped(rig, "two nodes answer under this id");
+}
+
 TEST(FaultRow, WrongIdentity) {
   Fault fault = of(FaultKind::kBoardIdentity);
   fault.number = 0x1234;
