@@ -48,6 +48,12 @@ struct Composition {
   const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::vector<ControllerNote> notes;
+
+  /// Empty without a CAN backend.
+  [[nodiscard]] std::span<hal::can::SocketCanBus* const> can_buses() const {
+    if (sockets == nullptr) return {};
+    return sockets->sockets();
+  }
 };
 
 /// "sim", "can", "can lockstep", for logs and summaries.

@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include "apps/bus_watch.hpp"
 #include "apps/can_sockets.hpp"
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
@@ -117,6 +118,7 @@ Json summary_json(const Emulation& e, bool lockstep) {
   json["frames_in"] = s.frames_in;
   json["frames_out"] = s.frames_out;
   json["frames_lost"] = s.frames_lost;
+  json["buses"] = buses_json(e.sockets->sockets());
   json["all_enabled"] = e.robot->all_enabled();
   json["diverged"] = e.robot->plant().diverged();
   return json;
@@ -130,11 +132,7 @@ void print_summary(const Emulation& e, std::FILE* out) {
                                      s.steps_without_sync, s.slipped));
   facts.add("frames",
             fmt::format("{} in, {} out, {} lost", s.frames_in, s.frames_out, s.frames_lost));
-  for (const hal::can::SocketCanBus* bus : e.sockets->sockets()) {
-    if (std::string text = bus->status_text(); !text.empty()) {
-      facts.add(bus->interface(), std::move(text));
-    }
-  }
+  add_bus_facts(e.sockets->sockets(), facts);
   if (e.robot->plant().diverged()) {
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
   }
@@ -164,10 +162,12 @@ void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
 void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
   constexpr std::int64_t kPatienceNs = 100'000'000;
   StatusLine line(out);
+  BusWatch buses(e.sockets->sockets(), stderr);
   while (!rt::stop_requested()) {
     if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
     errands.do_all();
     tell_injected(e, out, quiet);
+    if (!quiet) buses.look();
     if (quiet || !line.due()) continue;
     const sim::EmulatorStatistics& s = e.emulator->statistics();
     line.show(fmt::format("{:.1f} s simulated, {} steps ({} without SYNC), {}",

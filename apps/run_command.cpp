@@ -4,6 +4,7 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/bus_watch.hpp"
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
@@ -64,13 +65,16 @@ std::string progress_note(const runtime::Progress& progress) {
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
-void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const runtime::Experiment& e,
+void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
            std::FILE* out, bool quiet) {
+  const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
   Progress bar(out, static_cast<double>(e.cycles()) * period_s);
+  BusWatch buses(c.can_buses(), stderr);
   while (!loop.done()) {
     if (rt::stop_requested()) cycle.request_stop();
+    if (!quiet) buses.look();
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(progress));
@@ -193,7 +197,7 @@ Exit run(Composition& c, const RunOptions& options) {
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
   rt::install_stop_signals();
   LoopThread loop(cycle, e.thread);
-  watch(cycle, loop, e, out, options.quiet);
+  watch(cycle, loop, c, out, options.quiet);
   loop.join();
   if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "apps/bus_watch.hpp"
 #include "apps/round_trips.hpp"
 
 namespace tandem::apps {
@@ -99,6 +100,7 @@ Json RunSummary::json() const {
   json["cycle_ns"] = percentiles_json(loop.work.percentiles());
   json["log"] = log_json(log);
   json["frames"] = frames_json(frames);
+  json["buses"] = buses_json(composition.can_buses());
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
@@ -156,6 +158,7 @@ void RunSummary::print(std::FILE* out) const {
               fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
                           log->dropped, static_cast<double>(log->bytes) * 1e-6));
   }
+  add_bus_facts(composition.can_buses(), facts);
   if (frames) {
     const std::string trouble = frames->error.empty() ? "" : "; " + frames->error;
     facts.add("frames", fmt::format("{} ({} frames, {} lost{})", frames->path, frames->frames,

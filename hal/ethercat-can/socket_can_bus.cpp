@@ -191,6 +191,7 @@ void SocketCanBus::note_loss(int error) noexcept {
   loss_error_ = error;
   now_ns_ = clock_ns(CLOCK_MONOTONIC);
   lossy_until_ns_ = now_ns_ + kLossyNs;
+  tell();
 }
 
 void SocketCanBus::change(Link link, BusState controller) noexcept {
@@ -198,11 +199,19 @@ void SocketCanBus::change(Link link, BusState controller) noexcept {
   link_ = link;
   controller_ = controller;
   if (!was_usable && usable(state())) ++statistics_.recoveries;
+  tell();
+}
+
+void SocketCanBus::tell() noexcept {
+  told_.store({state(), link_, static_cast<std::uint16_t>(loss_error_)}, std::memory_order_relaxed);
 }
 
 void SocketCanBus::read_clock(bool stamp) noexcept {
   if (stamp || link_ != Link::kUp || lossy_until_ns_ != 0) now_ns_ = clock_ns(CLOCK_MONOTONIC);
-  if (lossy_until_ns_ != 0 && now_ns_ >= lossy_until_ns_) lossy_until_ns_ = 0;
+  if (lossy_until_ns_ != 0 && now_ns_ >= lossy_until_ns_) {
+    lossy_until_ns_ = 0;
+    tell();
+  }
 }
 
 bool SocketCanBus::linked() noexcept {

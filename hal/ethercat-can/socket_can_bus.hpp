@@ -2,6 +2,7 @@
 // Layer: hal/ethercat-can.  Thread: open() and the texts non-RT; the rest one RT thread.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -30,7 +31,7 @@ struct SocketCanOptions {
   bool fd = true;         ///< frames of up to 64 bytes
   SocketSide side = SocketSide::kMaster;
   std::size_t receive_queue = 512;  ///< frames that wait in the socket until they are taken
-  bool stamps = true;                    ///< tell received_ns() and sent_ns(): clock reads
+  bool stamps = true;               ///< tell received_ns() and sent_ns(): clock reads
   std::size_t send_queue = 256;     ///< frames that wait until the interface has taken them
 };
 
@@ -71,6 +72,7 @@ class SocketCanBus final : public Bus {
   /// CLOCK_MONOTONIC, just before the frames were handed over.
   [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return sent_ns_; }
   [[nodiscard]] BusStatistics statistics() const noexcept override { return statistics_; }
+  /// As after the last send() or receive(); any thread may ask.
   [[nodiscard]] std::string status_text() const override;
 
   [[nodiscard]] const std::string& interface() const noexcept { return options_.interface; }
@@ -82,6 +84,12 @@ class SocketCanBus final : public Bus {
  private:
   enum class Link : std::uint8_t { kUp, kDown, kGone, kClassicOnly };
   struct Batch;
+  /// What status_text() tells of.
+  struct Told {
+    BusState state = BusState::kActive;
+    Link link = Link::kUp;
+    std::uint16_t loss_error = 0;
+  };
 
   SocketCanBus(const SocketCanOptions& options, std::vector<can_filter> filters, int socket,
                int index);
@@ -94,6 +102,7 @@ class SocketCanBus final : public Bus {
   void note_link_error(int error) noexcept;
   void note_loss(int error) noexcept;
   void change(Link link, BusState controller) noexcept;
+  void tell() noexcept;
   /// Reads the clock, when somebody needs to know the time: stamps, or an end to what is wrong.
   void read_clock(bool stamp) noexcept;
   /// Whether the link is up; looks for it when it is time to.
@@ -120,6 +129,7 @@ class SocketCanBus final : public Bus {
   std::int64_t sent_ns_ = 0;
   std::uint64_t system_calls_ = 0;
   BusStatistics statistics_;
+  std::atomic<Told> told_{};
 };
 
 /// Most buses that one wait_for_frames() takes.

@@ -195,13 +195,14 @@ Result<std::unique_ptr<SocketCanBus>> SocketCanBus::open(const SocketCanOptions&
 
 std::string SocketCanBus::status_text() const {
   const std::string& name = options_.interface;
-  switch (state()) {
+  const Told told = told_.load(std::memory_order_relaxed);
+  switch (told.state) {
     case BusState::kActive: return {};
     case BusState::kGone:
       return fmt::format("CAN interface {0} was removed; waiting for it to come back ({1})", name,
                          set_up(options_));
     case BusState::kDown:
-      if (link_ == Link::kClassicOnly) {
+      if (told.link == Link::kClassicOnly) {
         return fmt::format(
             "CAN interface {0} carries classic frames only; waiting for CAN FD "
             "(down, then fd on or mtu 72, then up: docs/can.md)",
@@ -221,21 +222,18 @@ std::string SocketCanBus::status_text() const {
           name);
     case BusState::kOverloaded: break;
   }
-  if (loss_error_ == 0) {
+  if (told.loss_error == 0) {
     return fmt::format(
-        "CAN interface {}: {} received frames were lost so far: they came faster "
-        "than they were taken",
-        name, statistics_.receive_lost);
+        "CAN interface {}: received frames were lost: they came faster than they were taken", name);
   }
-  if (loss_error_ == ENOBUFS || loss_error_ == EAGAIN) {
+  if (told.loss_error == ENOBUFS || told.loss_error == EAGAIN) {
     return fmt::format(
-        "CAN interface {0}: its transmit queue is full, {1} frames were lost so far "
-        "(sudo ip link set {0} txqueuelen 1000; check the bus load: tandem check "
-        "--bus)",
-        name, statistics_.send_refused);
+        "CAN interface {0}: its transmit queue is full, frames were lost "
+        "(sudo ip link set {0} txqueuelen 1000; check the bus load: tandem check --bus)",
+        name);
   }
   return fmt::format("CAN interface {}: the kernel refuses frames: {}", name,
-                     std::strerror(loss_error_));
+                     std::strerror(told.loss_error));
 }
 
 int read_interface(int socket, const std::string& name, InterfaceFacts& facts) noexcept {

@@ -1,5 +1,6 @@
 // Both processes on the wall clock: SYNC paces the boards, whose own clocks go on without it.
 #include <gtest/gtest.h>
+#include <linux/can/error.h>
 
 #include <nlohmann/json.hpp>
 
@@ -67,11 +68,16 @@ TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
   EXPECT_GT(syncs.back() - syncs.front(), 0.5 * kPeriodS * static_cast<double>(syncs.size()));
 }
 
-TEST_F(RealTime, AnInterfaceThatIsTakenDownEndsTheRunWithItsName) {
+TEST_F(RealTime, TellsOfAnIllBusAndEndsWhenItsInterfaceIsTakenDown) {
   Process robot(emulate_words(), folder_ / "emulate.txt");
   ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
   Process master(run_words("10"), folder_ / "run.txt");
   EXPECT_TRUE(master.says(" 10 %")) << master.output();
+  const RawCan controller("can0");
+  controller.write(CAN_ERR_FLAG | CAN_ERR_CRTL, {0, CAN_ERR_CRTL_TX_PASSIVE, 0, 0, 0, 0, 0, 0});
+  EXPECT_TRUE(master.says("note: CAN interface can0 is error-passive")) << "and the run goes on";
+  controller.write(CAN_ERR_FLAG | CAN_ERR_CRTL, {0, CAN_ERR_CRTL_ACTIVE, 0, 0, 0, 0, 0, 0});
+  EXPECT_TRUE(master.says("note: CAN interface can0 is well again"));
   shell("ip link set can0 down");
   EXPECT_EQ(master.wait(), 1);
   shell("ip link set can0 up");
@@ -80,6 +86,8 @@ TEST_F(RealTime, AnInterfaceThatIsTakenDownEndsTheRunWithItsName) {
   Process again(run_words("0.5"), folder_ / "again.txt");  // the same robot, without a restart
   EXPECT_EQ(again.wait(), 0) << again.output();
   EXPECT_EQ(robot.interrupt(), 0) << robot.output();
+  EXPECT_EQ(json("emulate.json")["buses"][0]["recoveries"], 1);
+  EXPECT_EQ(json("emulate.json")["buses"][0]["status"], "");
 }
 
 }  // namespace
