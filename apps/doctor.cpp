@@ -114,7 +114,9 @@ Finding sleep_states(const Machine& m) {
   if (worst_us <= kLongest_us) return ok(name, value);
   return warning(
       name, value, "a wake-up waits that long",
-      fmt::format("cpupower idle-set -D {}   (apt-get install linux-cpupower)", kLongest_us));
+      fmt::format("cpupower idle-set -D {}   (apt-get install linux-cpupower), or let a run see "
+                  "to it: chmod o+rw /dev/cpu_dma_latency",
+                  kLongest_us));
 }
 
 Finding clock_source(const Machine& m) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "apps/bus_watch.hpp"
@@ -13,6 +14,7 @@
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
 #include "rt/clock.hpp"
+#include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -196,6 +198,8 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
   rt::install_stop_signals();
+  std::optional<rt::NoCpuSleep> awake;
+  if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
   LoopThread loop(cycle, e.thread);
   watch(cycle, loop, c, out, options.quiet);
   loop.join();
