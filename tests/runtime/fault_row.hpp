@@ -41,12 +41,23 @@ inline int number_in(const std::string& cell) {
   return digit == std::string::npos ? -1 : std::stoi(cell.substr(digit));
 }
 
+/// "12": exactly; "≤ 150": as the phase of a heartbeat (50 cycles) wants it.
+inline void expect_cycles(int measured, const std::string& cell, const char* what) {
+  const int declared = number_in(cell);
+  if (cell.find("≤") == std::string::npos) {
+    EXPECT_EQ(measured, declared) << what;
+    return;
+  }
+  EXPECT_LE(measured, declared) << what;
+  EXPECT_GT(measured, declared - 50) << what;
+}
+
 /// The outcome is the one that the page declares.
 inline void expect_row(const Outcome& outcome) {
   const std::vector<std::string> row = row_of_this_test();
   ASSERT_EQ(row.size(), 7U);
-  EXPECT_EQ(outcome.noticed, number_in(row[4])) << "noticed after so many cycles";
-  EXPECT_EQ(outcome.safe, number_in(row[5])) << "safe after so many cycles";
+  expect_cycles(outcome.noticed, row[4], "noticed after so many cycles");
+  expect_cycles(outcome.safe, row[5], "safe after so many cycles");
   if (outcome.safe < 0) return;
   EXPECT_GE(outcome.open, outcome.safe) << "every bridge opens in the end";
   EXPECT_LE(outcome.open, outcome.safe + kLongestStop);
@@ -87,7 +98,7 @@ inline Fault lose(std::uint32_t cob_id, std::uint32_t count) {
 }
 
 inline constexpr std::uint32_t kFeedbackOfBoard0 = 0x181, kCommandOfBoard0 = 0x201;
-inline constexpr std::uint32_t kSync = 0x080;
+inline constexpr std::uint32_t kSync = 0x080, kHeartbeat = 0x700;
 
 /// The joints of the other boards stop by the declared category, and all of it stays latched with
 /// cause and time.

@@ -87,6 +87,22 @@ TEST(FaultRow, SyncLostForEver) {
   for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(rig.axis(b).objects().error_code, 0x8700);
 }
 
+TEST(FaultRow, HeartbeatOfTheMasterLost) {
+  ArmRig rig;
+  rig.run();
+  rig.inject(lose(kHeartbeat + 127, 0));
+  expect_row(rig.watch());
+  for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(rig.axis(b).objects().error_code, 0x8130);
+}
+
+TEST(FaultRow, HeartbeatOfABoardLost) {
+  ArmRig rig;
+  rig.run();
+  rig.inject(lose(kHeartbeat + 1, 0));
+  expect_row(rig.watch());
+  expect_stopped(rig, "heartbeat lost");
+}
+
 TEST(FaultRow, FrameCorruptedOnce) {
   ArmRig rig;
   rig.run();
