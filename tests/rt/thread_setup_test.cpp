@@ -1,8 +1,11 @@
 #include "rt/thread_setup.hpp"
 
 #include <sched.h>
+#include <unistd.h>
 
 #include <thread>
+
+#include "rt/cpu_latency.hpp"
 
 namespace tandem::rt {
 namespace {
@@ -65,6 +68,11 @@ TEST(ThreadSetup, NamesAPriorityOutOfRange) {
   const ThreadReport report = set_up(config);
   ASSERT_EQ(report.missing.size(), 1U);
   EXPECT_NE(report.missing[0].how.find("1 to 99"), std::string::npos);
+}
+
+TEST(NoCpuSleep, IsGrantedToWhoMayWriteTheDevice) {
+  const NoCpuSleep awake;
+  EXPECT_EQ(awake.granted(), access("/dev/cpu_dma_latency", W_OK) == 0);
 }
 
 }  // namespace
