@@ -9,6 +9,7 @@
 #include "apps/kernel_store.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/scenario.hpp"
 #include "rt/stop_signal.hpp"
@@ -77,6 +78,10 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   if (!subject) return std::unexpected(subject.error());
   e->subject = std::move(*subject);
   const hal::RobotConfig& robot = e->subject.robot;
+  const std::int64_t period_ns = e->subject.sim.period_ns;
+  if (Diagnostics errors = hal::can::check_bus_load(robot, period_ns); !errors.empty()) {
+    return std::unexpected(std::move(errors));
+  }
   const auto description = with_description(robot);
   if (!description) return std::unexpected(description.error());
   auto kernels = find_kernels(*description, options.kernel_variant);

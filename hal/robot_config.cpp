@@ -58,6 +58,11 @@ void read_bus(TomlTable table, RobotConfig& robot) {
   robot.buses.push_back(bus);
 }
 
+std::optional<std::uint32_t> read_identity(TomlTable& table, const char* key) {
+  if (!table.has(key)) return {};
+  return static_cast<std::uint32_t>(table.integer(key, 0, 0xFFFFFFFF));
+}
+
 void read_board(TomlTable table, NodeIds& ids, RobotConfig& robot) {
   BoardConfig board;
   board.name = table.text("name");
@@ -71,6 +76,10 @@ void read_board(TomlTable table, NodeIds& ids, RobotConfig& robot) {
   board.command_timeout_cycles =
       static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
   board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
+  board.vendor_id = read_identity(table, "vendor_id");
+  board.product_code = read_identity(table, "product_code");
+  board.revision = read_identity(table, "revision");
+  board.serial = read_identity(table, "serial");
   table.finish();
   robot.boards.push_back(board);
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -52,6 +53,9 @@ struct ActuatorConfig {
   double voltage_limit_V = 0.0;
   double thermal_resistance_K_W = 1.0;  ///< winding to ambient
   double thermal_time_constant_s = 60.0;
+  double continuous_current_A = 0.0;    ///< the drive's I2t limit; 0: not watched
+  double thermal_time_s = 30.0;         ///< time constant of that watch
+  double temperature_limit_C = 120.0;   ///< of the winding
 };
 
 /// What its order lacks ("inductance_H must be positive"), or empty.
@@ -102,6 +106,8 @@ struct JointConfig {
   double encoder_counts_per_rev = 0.0;  ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
   double torque_noise_Nm = 0.0;         ///< standard deviation of the spring torque's measurement
+  double following_error_rad = 0.5;     ///< in CSP, beyond it for longer than the next: a fault;
+  double following_timeout_s = 0.1;     ///< 0 rad: not watched
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                         ///< in the TOML, for messages
 };
@@ -126,6 +132,10 @@ struct BoardConfig {
   int heartbeat_ms = 50;                ///< both ways; time-out is three of them
   int command_timeout_cycles = 10;      ///< SYNCs without a command until the safe state
   int slow_pdo_every = 1;               ///< motor velocity, current, … every n-th SYNC
+  // 1018, as the board has to tell it; without a value that of the emulated boards, or any serial
+  std::optional<std::uint32_t> vendor_id, product_code;
+  std::optional<std::uint32_t> revision;  ///< major << 16 | minor: that major, at least that minor
+  std::optional<std::uint32_t> serial;
 };
 
 enum class SensorType : std::uint8_t { kForceTorque, kImu };

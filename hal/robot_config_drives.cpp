@@ -24,6 +24,10 @@ void read_actuator(TomlTable table, const std::string& name, RobotConfig& robot)
   a.voltage_limit_V = table.number("voltage_limit_V", kPositive);
   a.thermal_resistance_K_W = table.number_or("thermal_resistance_K_W", 1.0, kPositive);
   a.thermal_time_constant_s = table.number_or("thermal_time_constant_s", 60.0, kPositive);
+  a.continuous_current_A = table.number_or("continuous_current_A", 0.0, kNotNegative);
+  a.thermal_time_s = table.number_or("thermal_time_s", a.thermal_time_s, kPositive);
+  a.temperature_limit_C =
+      table.number_or("temperature_limit_C", a.temperature_limit_C, {-50.0, 3000.0});
   const std::string problem = actuator_problem(a);
   if (!problem.empty()) {
     table.error("", "of order " + std::to_string(a.order) + ": " + problem,
@@ -75,6 +79,13 @@ StopCategory read_stop_category(TomlTable& table, StopCategory value) {
   return static_cast<StopCategory>(found - kNames.begin());
 }
 
+void read_following(TomlTable& table, JointConfig& joint) {
+  joint.following_error_rad =
+      table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
+  joint.following_timeout_s =
+      table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
+}
+
 /// [joint_defaults]: what every [[joint]] has that does not say otherwise.
 JointConfig read_joint_defaults(TomlTable table) {
   JointConfig joint;
@@ -82,6 +93,7 @@ JointConfig read_joint_defaults(TomlTable table) {
   joint.motor_encoder_counts_per_rev =
       table.number_or("motor_encoder_counts_per_rev", kUnset, kPositive);
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
+  read_following(table, joint);
   joint.on_fault = read_stop_category(table, StopCategory::kCategory1);
   table.finish();
   return joint;
@@ -143,6 +155,7 @@ void read_joint(TomlTable table, const JointConfig& defaults, RobotConfig& robot
   joint.motor_encoder_counts_per_rev =
       number_or_default(table, "motor_encoder_counts_per_rev", joint.motor_encoder_counts_per_rev);
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", joint.torque_noise_Nm, kNotNegative);
+  read_following(table, joint);
   joint.on_fault = read_stop_category(table, joint.on_fault);
   check_seat(table, joint, robot);
   table.finish();

@@ -51,6 +51,8 @@ SimOptions read_sim(TomlTable table) {
   sim.order = static_cast<int>(table.integer_or("order", -1, 0, 3));
   sim.noise = table.boolean_or("noise", sim.noise);
   sim.ground_truth = table.boolean_or("ground_truth", sim.ground_truth);
+  sim.bus_timing = table.boolean_or("bus_timing", sim.bus_timing);
+  sim.bus_latency_ns = table.integer_or("bus_latency_ns", sim.bus_latency_ns, 0, 10'000'000);
   TomlTable hoist = table.table_or_empty("hoist");
   sim.hoist = hoist.boolean_or("enabled", sim.hoist);
   sim.hoist_release_s = hoist.number_or("release_s", sim.hoist_release_s, {0.0, 60.0});
@@ -234,7 +236,11 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .hold = sim.hoist,
           .release_ns = std::llround(sim.hoist_release_s * 1e9),
           .seed = seed,
-          .truth = sim.ground_truth};
+          .truth = sim.ground_truth,
+          .bus_timing = sim.bus_timing,
+          .bus_latency_ns = sim.bus_latency_ns,
+          .answer_window_ns =
+              std::llround(hal.answer_window * static_cast<double>(loop.period_ns))};
 }
 
 namespace {

@@ -38,6 +38,8 @@ struct SimOptions {
   bool noise = true;                  ///< false: sensors and torque measurement without noise
   bool ground_truth = true;           ///< log the plant's true state beside the measured one
   bool hoist = true;                  ///< hold base and joints until every drive is enabled
+  bool bus_timing = false;            ///< frames take the time that they need on a real bus
+  std::int64_t bus_latency_ns = 0;    ///< with it: of every node's driver or firmware
   double hoist_release_s = 1.0;       ///< then let the base down over this time
 };
 

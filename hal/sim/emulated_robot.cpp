@@ -100,6 +100,7 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
     : plant_(std::move(plant)),
       sensors_(std::move(sensors)),
       sensor_truth_(sensors_.channels(), 0.0),
+      answer_window_ns_(config.answer_window_ns),
       faults_(config.seed),
       disturbances_(robot.joints.size()),
       period_ns_(config.period_ns),
@@ -134,13 +135,16 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
                              bus_index(robot, robot.sensors[s].bus), channel, setup.channels});
     channel += setup.channels;
   }
-  return add_faults(robot, config);
+  Status added = add_faults(robot, config);
+  if (config.bus_timing) add_wires(robot, config);
+  return added;
 }
 
 Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
   if (started_ == 0) now_ns_ = first_ns_ = time_ns;
   started_ = 1;
   if (faults_.any()) begin_faults(time_ns);
+  if (!wires_.empty()) load_wires(time_ns);
   while (now_ns_ < time_ns) {
     if (const Code code = plant_.advance(tick_ns_); code != Code::kOk) return code;
     now_ns_ += tick_ns_;
@@ -154,6 +158,7 @@ Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
   hook_(Stage::kSense);
   deliver(true);
   run_boards();
+  for (std::size_t b = 0; b < wires_.size(); ++b) carry(b, time_ns + answer_window_ns_, false);
   if (let_down_ == 0 && all_enabled()) {
     let_down_ = 1;
     enabled_ns_ = now_ns_ - first_ns_;
@@ -208,30 +213,39 @@ void EmulatedRobot::sense() noexcept {
   }
 }
 
+/// How many of the frames that wait come up to the last SYNC; without one, all: there is nothing
+/// to wait for.
+std::size_t EmulatedRobot::up_to_sync(std::span<const canopen::Frame> waiting) noexcept {
+  std::size_t count = waiting.size();
+  while (count > 0 && !is_sync(waiting[count - 1])) --count;
+  return count == 0 ? waiting.size() : count;
+}
+
 /// What has come before SYNC and, at the step's end, SYNC itself. Frames after it stay.
 void EmulatedRobot::deliver(bool at_sync) noexcept {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
-    const std::span<const canopen::Frame> waiting = buses_[b]->to_boards();
-    const auto is_sync = [](const canopen::Frame& frame) {
-      return frame.id == canopen::cob::kSync;
-    };
-    std::size_t count = waiting.size();
-    while (count > 0 && !is_sync(waiting[count - 1])) --count;
-    if (count == 0) count = waiting.size();  // no SYNC: nothing to wait for
-    if (!at_sync && is_sync(waiting[count - 1])) --count;
     canopen::Frame late;
     while (at_sync && faults_.next_due(Direction::kToBoards, b, late)) receive(b, late);
-    for (const canopen::Frame& frame : waiting.first(count)) {
-      if (!faults_.any()) {
-        receive(b, frame);
-        continue;
-      }
-      canopen::FrameSink out(passed_);
-      faults_.pass(Direction::kToBoards, b, frame, out);
-      for (const canopen::Frame& one : out.frames()) receive(b, one);
+    if (!wires_.empty()) {
+      Wire& wire = wires_[b];
+      wire.answers_ns = now_ns_;
+      carry(b, now_ns_, false);
+      if (at_sync && wire.sync_waits != 0) carry(b, now_ns_ + answer_window_ns_, true);
+      continue;
     }
+    const std::span<const canopen::Frame> waiting = buses_[b]->to_boards();
+    std::size_t count = up_to_sync(waiting);
+    if (!at_sync && count > 0 && is_sync(waiting[count - 1])) --count;
+    for (const canopen::Frame& frame : waiting.first(count)) pass_to_boards(b, frame);
     buses_[b]->take_to_boards(count);
   }
+}
+
+void EmulatedRobot::pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept {
+  if (!faults_.any()) return receive(bus, frame);
+  canopen::FrameSink out(passed_);
+  faults_.pass(Direction::kToBoards, bus, frame, out);
+  for (const canopen::Frame& one : out.frames()) receive(bus, one);
 }
 
 /// Everybody on the bus who has power hears it.
@@ -249,12 +263,14 @@ void EmulatedRobot::receive(std::size_t bus, const canopen::Frame& frame) noexce
 
 void EmulatedRobot::run_boards() noexcept {
   if (faults_.any()) release_late_answers();
+  std::size_t sender = kMasterSender;
   for (BoardNode& node : boards_) {
+    ++sender;
     const std::size_t axes = node.joints.size();
     const std::span<firmware::AxisDrive> drives(drive_.data() + node.first, axes);
     if (node.powered != 0) {
       node.board->step(tick_ns_, {sense_.data() + node.first, axes}, drives);
-      answer(node.bus, node.board->outgoing());
+      answer(node.bus, sender, node.board->outgoing());
       node.board->clear_outgoing();
     } else {
       std::ranges::fill(drives, firmware::AxisDrive{});
@@ -269,23 +285,22 @@ void EmulatedRobot::run_boards() noexcept {
     }
   }
   for (SensorNode& node : sensor_nodes_) {
+    ++sender;
     if (node.powered == 0) continue;
     node.board->step(tick_ns_, {sensor_truth_.data() + node.first, node.channels});
-    answer(node.bus, node.board->outgoing());
+    answer(node.bus, sender, node.board->outgoing());
     node.board->clear_outgoing();
   }
   run_twins();
 }
 
-void EmulatedRobot::answer(std::size_t bus, std::span<const canopen::Frame> frames) noexcept {
-  if (!faults_.any()) {
-    (void)buses_[bus]->boards().send(frames);
-    return;
-  }
+void EmulatedRobot::answer(std::size_t bus, std::size_t sender,
+                           std::span<const canopen::Frame> frames) noexcept {
+  if (!faults_.any()) return put_out(bus, sender, frames);
   for (const canopen::Frame& frame : frames) {
     canopen::FrameSink out(passed_);
     faults_.pass(Direction::kToMaster, bus, frame, out);
-    (void)buses_[bus]->boards().send(out.frames());
+    put_out(bus, sender, out.frames());
   }
 }
 
@@ -296,6 +311,7 @@ void EmulatedRobot::archive(Archive& ar) {
   for (SensorNode& node : sensor_nodes_) ar(*node.board, node.powered);
   for (const Twin& twin : twins_) ar(*twin.board);
   for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled);
+  for (Wire& wire : wires_) ar(wire.model, wire.answers_ns, wire.sync_waits);
   ar(faults_, disturbances_, now_ns_, first_ns_, enabled_ns_, started_, let_down_);
 }
 

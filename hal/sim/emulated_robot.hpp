@@ -13,6 +13,7 @@
 #include "firmware_emu/board.hpp"
 #include "firmware_emu/sensor_board.hpp"
 #include "hal/ethercat-can/loopback.hpp"
+#include "hal/ethercat-can/wire_model.hpp"
 #include "hal/robot_config.hpp"
 #include "hal/sim/fault_injection.hpp"
 #include "hal/sim/plant.hpp"
@@ -31,6 +32,9 @@ struct SimRobotConfig {
   std::uint64_t seed = 1;                   ///< of every measurement's noise
   bool truth = true;                        ///< keep truth() up to date
   double rate_limit = 1000.0;  ///< any rate beyond it [rad/s or m/s] counts as diverged
+  bool bus_timing = false;     ///< frames take the time that they need on a real bus
+  std::int64_t bus_latency_ns = 0;          ///< with it: of every node's driver or firmware
+  std::int64_t answer_window_ns = 500'000;  ///< with it: after SYNC, until the master goes on
   std::vector<Fault> faults = {};  ///< a scenario: read_scenario()
 };
 
@@ -65,6 +69,12 @@ struct StageHook {
 /// before SYNC k. A board with a shorter control period than the loop's runs in between. Frames
 /// after SYNC k wait for the next step. Nothing but frames and time passes between the robot and
 /// its master, so that it does not matter what carries them.
+///
+/// With `bus_timing` each bus is a WireModel. What the master sent since SYNC k-1 is ready at the
+/// end of its answer window, SYNC k at its time, a node's answer when SYNC has reached it. What is
+/// complete by the end of the answer window of cycle k is the master's in this step, the rest in
+/// the next. Boards still sample and control on the tick grid: SYNC's delay is the frames', not
+/// the sample's.
 ///
 /// With `hold` the robot powers on hanging from a hoist, every joint whose bridge is off held by a
 /// brake. When all axes are in Operation Enabled the hoist lets it down.
@@ -150,9 +160,28 @@ class EmulatedRobot {
 
   void sense() noexcept;
   void deliver(bool at_sync) noexcept;
+  void pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept;
   void receive(std::size_t bus, const canopen::Frame& frame) noexcept;
   void run_boards() noexcept;
-  void answer(std::size_t bus, std::span<const canopen::Frame> frames) noexcept;
+  void answer(std::size_t bus, std::size_t sender,
+              std::span<const canopen::Frame> frames) noexcept;
+  void put_out(std::size_t bus, std::size_t sender,
+               std::span<const canopen::Frame> frames) noexcept;
+
+  // bus_timing: emulated_robot_wires.cpp
+  void add_wires(const hal::RobotConfig& robot, const SimRobotConfig& config);
+  void load_wires(std::int64_t time_ns) noexcept;
+  void carry(std::size_t bus, std::int64_t until_ns, bool to_sync) noexcept;
+
+  /// Senders of a WireModel: the master, boards, sensors, and one for what faults add.
+  static constexpr std::size_t kMasterSender = hal::can::WireModel::kMaster;
+  [[nodiscard]] std::size_t other_sender() const noexcept {
+    return boards_.size() + sensor_nodes_.size() + 1;
+  }
+  [[nodiscard]] static bool is_sync(const canopen::Frame& frame) noexcept {
+    return frame.id == canopen::cob::kSync;
+  }
+  [[nodiscard]] static std::size_t up_to_sync(std::span<const canopen::Frame> waiting) noexcept;
 
   // emulated_robot_faults.cpp
   Status add_faults(const hal::RobotConfig& robot, const SimRobotConfig& config);
@@ -173,6 +202,14 @@ class EmulatedRobot {
   std::vector<firmware::AxisSense> sense_;
   std::vector<firmware::AxisDrive> drive_;
   std::vector<double> sensor_truth_;
+  /// A bus with times.
+  struct Wire {
+    hal::can::WireModel model;
+    std::int64_t answers_ns = 0;  // when its nodes' answers are ready
+    std::uint8_t sync_waits = 0;  // a SYNC is on its way
+  };
+  std::vector<Wire> wires_;  // by bus; empty without bus_timing
+  std::int64_t answer_window_ns_;
   FaultInjection faults_;
   std::vector<Disturbance> disturbances_;  // per joint
   std::vector<Twin> twins_;

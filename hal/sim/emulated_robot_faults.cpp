@@ -159,7 +159,7 @@ void EmulatedRobot::release_late_answers() noexcept {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     canopen::Frame late;
     while (faults_.next_due(Direction::kToMaster, b, late)) {
-      (void)buses_[b]->boards().send({&late, 1});
+      put_out(b, other_sender(), {&late, 1});
     }
   }
 }
@@ -169,7 +169,7 @@ void EmulatedRobot::run_twins() noexcept {
   for (Twin& twin : twins_) {
     if (faults_.slots()[twin.slot].active == 0) continue;
     twin.board->step(tick_ns_, twin.sense, twin.drive);
-    answer(twin.bus, twin.board->outgoing());
+    answer(twin.bus, other_sender(), twin.board->outgoing());
     twin.board->clear_outgoing();
   }
 }

@@ -147,6 +147,31 @@ TEST(RobotConfig, IsReadWithItsDefaults) {
   EXPECT_EQ(robot->posture("away"), nullptr);
 }
 
+std::string with(std::string text, const std::string& at, const std::string& more) {
+  return text.insert(text.find(at), more);
+}
+
+TEST(RobotConfig, ReadsTheIdentityOfABoardAndProtections) {
+  std::string text = with(kRobot, "[joint_defaults]", "product_code = 0x77\nserial = 5\n");
+  text = with(text, "[gains.big]", "continuous_current_A = 12\nthermal_time_s = 60\n");
+  text = with(text, "[[sensor]]", "following_error_rad = 0.2\nfollowing_timeout_s = 0.5\n");
+  text = with(text, "[[joint]]", "following_error_rad = 0.3\n");
+  text = with(text, "[[board]]", "max_load = 0.8\n");
+  const auto robot = parse_robot_config(text, "leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->boards[0].product_code, 0x77u);
+  EXPECT_EQ(robot->boards[0].serial, 5u);
+  EXPECT_FALSE(robot->boards[0].vendor_id.has_value());
+  EXPECT_FALSE(robot->boards[0].revision.has_value());
+  EXPECT_EQ(robot->actuators[0].continuous_current_A, 12.0);
+  EXPECT_EQ(robot->actuators[0].thermal_time_s, 60.0);
+  EXPECT_EQ(robot->actuators[0].temperature_limit_C, 120.0);
+  EXPECT_EQ(robot->joints[0].following_error_rad, 0.3) << "the default's";
+  EXPECT_EQ(robot->joints[1].following_error_rad, 0.2);
+  EXPECT_EQ(robot->joints[1].following_timeout_s, 0.5);
+  EXPECT_EQ(robot->buses[0].max_load, 0.8);
+}
+
 TEST(RobotConfig, OfABareModelNeedsNoJoints) {
   EXPECT_EQ(errors_of("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n"), "");
 }
