@@ -153,7 +153,7 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
 }
 
 double Axis::mismatch_rad() const noexcept {
-  const double spring = objects_.motor_data[kSpring - 1];
+  const double spring = objects_.motor_data[canopen::kMotorSpring - 1];
   const double twist = spring > 0.0 ? measured_.torque_Nm / spring : 0.0;
   return measured_.motor_position_rad - measured_.link_position_rad - twist;
 }

@@ -91,9 +91,9 @@ ControllerConfig AxisObjects::controller() const noexcept TANDEM_RT {
           .current = pid_of(gains[3]),
           .torque_to_voltage_V_Nm = feed_forward[kTorqueToVoltage - 1],
           .emf_compensation_Vs_rad = feed_forward[kEmfCompensation - 1],
-          .resistance_ohm = motor_data[kResistance - 1],
-          .motor_constant_Nm_A = motor_data[kMotorConstant - 1],
-          .spring_Nm_rad = motor_data[kSpring - 1],
+          .resistance_ohm = motor_data[kMotorResistance - 1],
+          .motor_constant_Nm_A = motor_data[kMotorTorqueConstant - 1],
+          .spring_Nm_rad = motor_data[kMotorSpring - 1],
           .voltage_limit_V = limits[kVoltageLimit - 1],
           .current_limit_A = limits[kCurrentLimit - 1],
           .torque_limit_Nm = std::min(torque_limit_Nm, max_torque * 1.0e-3 * rated_torque_Nm()),
@@ -184,9 +184,9 @@ bool AxisObjects::add_settings(ObjectDictionary& od, int axis, ObjectOwner& owne
          add_array(od, at(co::kTorqueGains), gains[2], kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kCurrentGains), gains[3], kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kFeedForward), feed_forward, kReadWrite, kNotNegative, &owner) &&
-         add_array(od, at(own::kMotorData), motor_data, kReadWrite, kNotNegative, &owner) &&
+         add_array(od, at(co::kMotorData), motor_data, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(own::kEstimators), cutoffs_Hz, kReadWrite, kNotNegative, &owner) &&
-         od.add(at(own::kPositionFeedback), 0, position_feedback, kReadWrite, {0, 1}, &owner) &&
+         od.add(at(co::kPositionFeedback), 0, position_feedback, kReadWrite, {0, 1}, &owner) &&
          od.add(at(own::kTransferTime), 0, transfer_time_s, kReadWrite, kNotNegative, &owner);
 }
 

@@ -16,8 +16,6 @@ namespace tandem::firmware {
 
 /// Manufacturer's objects that only the firmware knows; axis 0, see canopen::of_axis().
 namespace object {
-inline constexpr std::uint16_t kPositionFeedback = 0x2025;  // u8: PositionFeedback
-inline constexpr std::uint16_t kMotorData = 0x2026;         // f32: MotorDataSub
 inline constexpr std::uint16_t kEstimators = 0x2027;        // f32 [Hz]: EstimatorSub
 inline constexpr std::uint16_t kTransferTime = 0x2028;      // f32 [s]
 inline constexpr std::uint16_t kUndervoltage = 0x2035;      // f32 [V]
@@ -30,11 +28,6 @@ inline constexpr std::uint16_t kRefusedValues = 0x2041;     // u32: values by PD
 inline constexpr std::uint16_t kIgnoredFrames = 0x2050;     // u32: no frame of CAN or CAN FD
 }  // namespace object
 
-enum MotorDataSub : std::uint8_t {
-  kResistance = 1,  ///< [ohm]
-  kMotorConstant,   ///< N K [Nm/A], also [Vs/rad], at the link
-  kSpring,          ///< Ks [Nm/rad]; 0: rigid
-};
 enum EstimatorSub : std::uint8_t {
   kLinkVelocityCutoff = 1,
   kMotorVelocityCutoff,

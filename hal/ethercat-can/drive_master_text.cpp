@@ -23,7 +23,12 @@ std::uint32_t number(const SdoStep& step) {
 
 const char* identity_name(const SdoStep& step) {
   if (step.index == canopen::object::kDeviceType) return "device type";
-  return step.sub == canopen::kVendor ? "vendor id" : "product code";
+  switch (step.sub) {
+    case canopen::kVendor: return "vendor id";
+    case canopen::kProduct: return "product code";
+    case canopen::kRevision: return "revision";
+    default: return "serial number";
+  }
 }
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
@@ -58,13 +63,14 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
                          "and is its node id {}?", who, limit_s, node.plan.id);
     case NodeTrouble::kWrongIdentity: {
       const SdoStep& step = m.steps()[m.step()];
-      return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}", who,
-                         identity_name(step), step.index, step.sub, m.read_value(), number(step));
+      return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}{}", who,
+                         identity_name(step), step.index, step.sub, m.read_value(), number(step),
+                         step.use == SdoUse::kCheckRevision ? " or a later minor of it" : "");
     }
     case NodeTrouble::kSdoAbort: {
       const SdoStep& step = m.steps()[m.step()];
       return fmt::format("{} {} failed: {} (abort code 0x{:08X})",
-                         step.check ? "reading" : "writing", step_text(node, step),
+                         step.use != SdoUse::kWrite ? "reading" : "writing", step_text(node, step),
                          canopen::to_string(m.abort_code()),
                          static_cast<std::uint32_t>(m.abort_code()));
     }

@@ -91,7 +91,7 @@ void NodeMaster::configure(std::int64_t now_ns, std::int64_t dt_ns, FrameSink& o
 
 void NodeMaster::request(FrameSink& out) noexcept {
   const SdoStep& step = steps_[step_];
-  if (step.check) {
+  if (step.use != SdoUse::kWrite) {
     sdo_.upload(step.index, step.sub, out);
   } else {
     sdo_.download(step.index, step.sub, step.value(), out);
@@ -106,7 +106,7 @@ void NodeMaster::step_answered(std::int64_t now_ns) noexcept {
     return fail(NodeTrouble::kSdoAbort, now_ns);
   }
   const SdoStep& step = steps_[step_];
-  if (step.check && !std::ranges::equal(sdo_.value(), step.value())) {
+  if (step.use != SdoUse::kWrite && !step.accepts(sdo_.value())) {
     std::array<std::uint8_t, 4> bytes{};
     std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()),
                 bytes.begin());

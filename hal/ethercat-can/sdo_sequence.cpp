@@ -17,15 +17,25 @@ using Steps = std::vector<SdoStep>;
 
 float real32(double value) { return static_cast<float>(value); }
 
-void add_identity(Steps& steps, bool board) {
-  const auto check = [&](std::uint16_t index, std::uint8_t sub, std::uint32_t value) {
-    SdoStep step = write_step(index, sub, value);
-    step.check = true;
-    steps.push_back(step);
-  };
-  check(object::kDeviceType, 0, board ? kDriveDeviceType : kSensorDeviceType);
-  check(object::kIdentity, kVendor, kTandemVendor);
-  check(object::kIdentity, kProduct, board ? kBoardProduct : kSensorProduct);
+void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
+               SdoUse use = SdoUse::kCheck) {
+  steps.push_back(write_step(index, sub, value));
+  steps.back().use = use;
+}
+
+void add_identity(Steps& steps, const BoardConfig& board) {
+  add_check(steps, object::kDeviceType, 0, kDriveDeviceType);
+  add_check(steps, object::kIdentity, kVendor, board.vendor_id.value_or(kTandemVendor));
+  add_check(steps, object::kIdentity, kProduct, board.product_code.value_or(kBoardProduct));
+  add_check(steps, object::kIdentity, kRevision, board.revision.value_or(kTandemRevision),
+            SdoUse::kCheckRevision);
+  if (board.serial) add_check(steps, object::kIdentity, kSerial, *board.serial);
+}
+
+void add_sensor_identity(Steps& steps) {
+  add_check(steps, object::kDeviceType, 0, kSensorDeviceType);
+  add_check(steps, object::kIdentity, kVendor, kTandemVendor);
+  add_check(steps, object::kIdentity, kProduct, kSensorProduct);
 }
 
 /// CiA 301's procedure: out of use, no entries, the entries, their number, in use.
@@ -103,6 +113,17 @@ void add_loops(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& m
   add(object::kDamping, 0, real32(gains.damping_Nms_rad));
 }
 
+void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor) {
+  add(object::kI2t, kContinuousCurrent, real32(motor.continuous_current_A));
+  add(object::kI2t, kThermalTime, real32(motor.thermal_time_s));
+  add(object::kTemperatureLimit, 0,
+      clamp_round<std::int16_t>(motor.temperature_limit_C / kKelvinPerUnit));
+  add(object::kFollowingErrorWindow, 0,
+      clamp_round<std::uint32_t>(joint.following_error_rad * AxisScale::of(joint).counts_per_rad));
+  add(object::kFollowingErrorTimeout, 0,
+      clamp_round<std::uint16_t>(1000.0 * joint.following_timeout_s));
+}
+
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
   const JointConfig& joint = robot.joints[node.joints[axis]];
   const ActuatorConfig& motor = robot.actuator_of(joint);
@@ -114,15 +135,28 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   add(object::kLimits, kCurrentLimit, real32(motor.current_limit_A));
   add(object::kLimits, kTorqueLimit, real32(joint.max_torque_Nm));
   add(object::kLimits, kVelocityLimit, real32(joint.max_velocity_rad_s));
+  add_protections(add, joint, motor);
   const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
   add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
 }
 
 }  // namespace
 
+bool SdoStep::accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_RT {
+  if (use != SdoUse::kCheckRevision) return std::ranges::equal(read, value());
+  if (read.size() != sizeof(std::uint32_t) || size != sizeof(std::uint32_t)) return false;
+  const auto found = get<std::uint32_t>(read.data());
+  const auto wanted = get<std::uint32_t>(bytes.data());
+  return found >> 16 == wanted >> 16 && found >= wanted;
+}
+
 std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan& node) {
   Steps steps;
-  add_identity(steps, node.board >= 0);
+  if (node.board >= 0) {
+    add_identity(steps, robot.boards[static_cast<std::size_t>(node.board)]);
+  } else {
+    add_sensor_identity(steps);
+  }
   for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo);
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
   steps.push_back(write_step(object::kSyncPeriod, 0, std::uint32_t{0}));

@@ -13,9 +13,16 @@
 
 namespace tandem::hal::can {
 
+/// What a transfer is for.
+enum class SdoUse : std::uint8_t {
+  kWrite,          ///< download
+  kCheck,          ///< upload, and compare with `bytes`
+  kCheckRevision,  ///< the same, but a later minor (the lower 16 bits) is right too
+};
+
 /// One transfer of 1 to 4 bytes.
 struct SdoStep {
-  bool check = false;        ///< true: upload, and compare with `bytes`
+  SdoUse use = SdoUse::kWrite;
   std::uint8_t sub = 0;
   std::uint16_t index = 0;
   std::int8_t axis = -1;     ///< for messages; -1: the node's own object
@@ -25,6 +32,8 @@ struct SdoStep {
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {bytes.data(), size};
   }
+  /// Whether a check that read this is passed.
+  [[nodiscard]] bool accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_RT;
 };
 
 template <class T>

@@ -36,6 +36,11 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.stiffness_Nm_rad = gains.stiffness_Nm_rad;
   axis.damping_Nms_rad = gains.damping_Nms_rad;
   axis.torque_noise_Nm = joint.torque_noise_Nm;
+  axis.following_window_rad = joint.following_error_rad;
+  axis.following_timeout_s = joint.following_timeout_s;
+  axis.continuous_current_A = actuator.continuous_current_A;
+  axis.thermal_time_s = actuator.thermal_time_s;
+  axis.temperature_limit_C = actuator.temperature_limit_C;
   axis.mismatch_window_rad = kMismatchWindow_rad;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
@@ -105,7 +110,10 @@ firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t inde
   firmware::BoardSetup board;
   board.node_id = config.node_id;
   board.name = config.name;
-  board.serial = static_cast<std::uint32_t>(index + 1);
+  board.vendor = config.vendor_id.value_or(board.vendor);
+  board.product = config.product_code.value_or(board.product);
+  board.revision = config.revision.value_or(board.revision);
+  board.serial = config.serial.value_or(static_cast<std::uint32_t>(index + 1));
   board.control_period_ns = config.control_period_ns;
   board.command_timeout_syncs = config.command_timeout_cycles;
   board.seed = seed_of(seed, 1, index);

@@ -92,6 +92,48 @@ TEST(BringUp, NamesAWrongIdentity) {
             "instead of 0x402");
 }
 
+/// What a board says of itself, and what bring-up makes of it.
+std::string with_identity(std::uint32_t revision, std::uint32_t serial, BoardConfig expected) {
+  RobotConfig robot = robot_config();
+  robot.boards[1].vendor_id = expected.vendor_id;
+  robot.boards[1].revision = expected.revision;
+  robot.boards[1].serial = expected.serial;
+  Rig rig(robot, [=](firmware::BoardSetup& setup, std::size_t b) {
+    if (b != 1) return;
+    setup.revision = revision;
+    setup.serial = serial;
+  });
+  rig.leave(Phase::kBringUp);
+  return rig.master->phase() == Phase::kOperational ? "" : rig.master->status_text();
+}
+
+TEST(BringUp, TakesALaterMinorRevisionButNoOtherMajor) {
+  const std::string who = "board board_1 (node 11, bus legs): ";
+  EXPECT_EQ(with_identity(0x00010000, 0, {}), "") << "the emulated boards' own";
+  EXPECT_EQ(with_identity(0x00010007, 0, {}), "");
+  EXPECT_EQ(with_identity(0x00020000, 0, {}),
+            who + "wrong revision: object 1018:03 is 0x20000 instead of 0x10000 or a later minor "
+                  "of it");
+  BoardConfig later;
+  later.revision = 0x00010002;
+  EXPECT_EQ(with_identity(0x00010001, 0, later),
+            who + "wrong revision: object 1018:03 is 0x10001 instead of 0x10002 or a later minor "
+                  "of it");
+}
+
+TEST(BringUp, ChecksVendorAndSerialAsConfigured) {
+  const std::string who = "board board_1 (node 11, bus legs): ";
+  BoardConfig other;
+  other.vendor_id = 0x99;
+  EXPECT_EQ(with_identity(0x00010000, 0, other),
+            who + "wrong vendor id: object 1018:01 is 0x7A4D instead of 0x99");
+  BoardConfig seventh;
+  seventh.serial = 7;
+  EXPECT_EQ(with_identity(0x00010000, 7, seventh), "");
+  EXPECT_EQ(with_identity(0x00010000, 8, seventh),
+            who + "wrong serial number: object 1018:04 is 0x8 instead of 0x7");
+}
+
 TEST(BringUp, NamesTheObjectAndTheJointOfAnSdoAbort) {
   RobotConfig robot = robot_config();
   robot.joints[3].min_position_rad = 2.0;  // above the maximum: 607D is refused

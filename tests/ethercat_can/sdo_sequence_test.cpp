@@ -52,6 +52,26 @@ TEST(SdoSequence, MapsAPdoByTheStandardsProcedure) {
   EXPECT_EQ(find(steps, 0x1600, 3)->bytes, (std::array<std::uint8_t, 4>{0x20, 0x00, 0x7A, 0x60}));
 }
 
+TEST(SdoSequence, WritesTheProtections) {
+  RobotConfig robot = robot_config();
+  robot.actuators[0].continuous_current_A = 12.0;
+  robot.actuators[0].thermal_time_s = 60.0;
+  robot.actuators[0].temperature_limit_C = 110.0;
+  robot.joints[1].following_error_rad = 0.25 * testing::kPi;
+  robot.joints[1].following_timeout_s = 0.05;
+  const auto layout = make_pdo_layout(robot);
+  ASSERT_TRUE(layout);
+  const auto steps = make_configuration(robot, layout->nodes[0]);
+  const auto value = [&](std::uint16_t index, std::uint8_t sub) {
+    return canopen::get<std::uint32_t>(find(steps, index, sub)->bytes.data());
+  };
+  EXPECT_EQ(value(0x2031, 1), 0x41400000u) << "12.0";
+  EXPECT_EQ(value(0x2031, 2), 0x42700000u) << "60.0";
+  EXPECT_EQ(value(0x2034, 0), 1100u);
+  EXPECT_EQ(value(0x6865, 0), 4500u) << "45 degrees of 36000 counts";
+  EXPECT_EQ(value(0x6866, 0), 50u);
+}
+
 TEST(SdoSequence, WritesTheSecondAxis800Higher) {
   const RobotConfig robot = robot_config();
   const auto layout = make_pdo_layout(robot);
@@ -70,7 +90,7 @@ TEST(SdoSequence, WritesTheSecondAxis800Higher) {
 struct ScriptedNode : ::testing::Test {
   std::vector<SdoStep> steps = {[] {
                                   SdoStep step = write_step(0x1018, 2, std::uint32_t{0x402});
-                                  step.check = true;
+                                  step.use = SdoUse::kCheck;
                                   return step;
                                 }(),
                                 write_step(0x1017, 0, std::uint16_t{50})};

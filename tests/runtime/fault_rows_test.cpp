@@ -105,6 +105,14 @@ TEST(FaultRow, WrongIdentity) {
   EXPECT_NE(rig.causes().find("wrong product code"), std::string::npos) << rig.causes();
 }
 
+TEST(FaultRow, WrongFirmwareVersion) {
+  Fault fault = of(FaultKind::kBoardRevision);
+  fault.number = 0x00020000;
+  ArmRig rig({fault});
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("wrong revision"), std::string::npos) << rig.causes();
+}
+
 TEST(FaultRow, NodeMissingAtStart) {
   ArmRig rig({of(FaultKind::kBoardKill)});
   expect_row(rig.watch(6000));
