@@ -63,6 +63,10 @@ const char kLogDiffExamples[] = R"(Examples:
 
 Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
 
+const char kEdsExamples[] = R"(Examples:
+  tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
+  tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for)";
+
 const char kReportExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
   tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
@@ -218,6 +222,13 @@ void add_log(CLI::App& app, LogOptions& o) {
   diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
 }
 
+void add_eds(CLI::App& app, EdsOptions& o) {
+  app.add_option("robot", o.robot, "Robot TOML")->required();
+  app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kEdsExamples);
+}
+
 void add_report(CLI::App& app, ReportOptions& o) {
   app.add_option("log", o.log, "MCAP file")->required();
   app.add_option("other", o.other, "A second log, laid over the first");
@@ -324,6 +335,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   CheckOptions check;
   ModelOptions model;
   LogOptions log;
+  EdsOptions eds;
   ReportOptions report;
   LatencyOptions latency;
   DoctorOptions doctor;
@@ -332,6 +344,8 @@ Command parse_command_line(int argc, const char* const* argv) {
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
   CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv, diff");
+  CLI::App* eds_app =
+      app.add_subcommand("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
   CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
   CLI::App* doctor_app = app.add_subcommand("doctor", "Is this machine fit for real time?");
   CLI::App* latency_app =
@@ -347,6 +361,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   add_check(*check_app, check);
   add_model(*model_app, model);
   add_log(*log_app, log);
+  add_eds(*eds_app, eds);
   add_report(*report_app, report);
   add_latency(*latency_app, latency);
   add_doctor(*doctor_app, doctor);
@@ -367,6 +382,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (log_app->parsed()) return log;
   if (latency_app->parsed()) return latency;
   if (doctor_app->parsed()) return doctor;
+  if (eds_app->parsed()) return eds;
   return report;
 }
 

@@ -97,6 +97,13 @@ struct LogOptions {
   std::string json;
 };
 
+/// tandem eds ROBOT
+struct EdsOptions {
+  std::string robot;           ///< robot.toml
+  std::string output = "eds";  ///< folder
+  std::string json;
+};
+
 /// tandem report LOG [LOG_B]
 struct ReportOptions {
   std::string log;
@@ -135,7 +142,7 @@ using Command = std::variant<Exit,
                              CheckOptions,
                              ModelOptions,
                              LogOptions,
-                             ReportOptions,
+                             EdsOptions, ReportOptions,
                              LatencyOptions,
                              DoctorOptions,
                              EmulateOptions>;

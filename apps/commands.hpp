@@ -21,6 +21,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit inject_command(const InjectOptions& options);
 [[nodiscard]] Exit model_command(const ModelOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
+/// Writes a data sheet per type of board and sensor.
+[[nodiscard]] Exit eds_command(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
 /// Says what of the machine stands in the way of real time; exit status 0 whatever it finds.
 [[nodiscard]] Exit doctor_command(const DoctorOptions& options);

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
                      [](const CheckOptions& options) { return check_command(options); },
                      [](const ModelOptions& options) { return model_command(options); },
                      [](const LogOptions& options) { return log_command(options); },
+                     [](const EdsOptions& options) { return eds_command(options); },
                      [](const ReportOptions& options) { return report_command(options); },
                      [](const DoctorOptions& options) { return doctor_command(options); },
                      [](const LatencyOptions& options) { return latency_command(options); },

@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/eds_files.hpp"
+#include "apps/robot_files.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Status write_file(const std::filesystem::path& file, const std::string& text) {
+  std::error_code problem;
+  std::filesystem::create_directories(file.parent_path(), problem);
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) return {};
+  return std::unexpected(Error{.message = "the file cannot be written",
+                               .hint = "choose another folder with --output",
+                               .file = file.string(),
+                               .key = {}});
+}
+
+Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files) {
+  const auto robot = read_robot(options.robot);
+  if (!robot) return robot.error();
+  auto made = make_eds_files(robot->config);
+  if (!made) {
+    made.error().file = options.robot;
+    return {made.error()};
+  }
+  files = std::move(*made);
+  for (const EdsFile& file : files) {
+    const Status written = write_file(std::filesystem::path(options.output) / file.name, file.text);
+    if (!written) return {written.error()};
+  }
+  return {};
+}
+
+}  // namespace
+
+Exit eds_command(const EdsOptions& options) {
+  std::vector<EdsFile> files;
+  Diagnostics errors = write_sheets(options, files);
+  Json json = Json::array();
+  Facts facts;
+  for (const EdsFile& file : files) {
+    const std::string path = (std::filesystem::path(options.output) / file.name).string();
+    facts.add(path, fmt::format("{} objects, for {}", file.objects, fmt::join(file.nodes, ", ")));
+    json.push_back({{"file", path}, {"objects", file.objects}, {"nodes", file.nodes}});
+  }
+  if (errors.empty()) {
+    facts.print(human_output(options.json));
+    if (const Status written = write_json(options.json, json); !written) {
+      errors.push_back(written.error());
+    }
+  }
+  print_errors(errors);
+  return errors.empty() ? Exit::kDone : Exit::kUsage;
+}
+
+}  // namespace tandem::apps
