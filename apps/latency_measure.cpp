@@ -19,6 +19,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
+/// By which cyclictest begins earlier and ends later than our loop, where both run at once.
+constexpr milliseconds kMargin{100};
+
 std::string text_of(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
@@ -93,8 +96,12 @@ class Measurement {
       run_loop(sample, ours);
       return {};
     }
-    auto other = start_cyclictest(theirs);
+    // Starting and ending a process disturbs: it measures before our loop begins, and after its
+    // end.
+    const auto margin = static_cast<std::uint64_t>(kMargin.count() * 1000 / plan_.period_us);
+    auto other = start_cyclictest(theirs, cycles_ + 2 * margin);
     if (!other) return std::unexpected(other.error());
+    std::this_thread::sleep_for(kMargin);
     run_loop(sample, ours);
     return finish_cyclictest(sample, *other, theirs);
   }
@@ -107,14 +114,14 @@ class Measurement {
   }
 
   Status run_cyclictest(LatencySample& sample, int cpu) {
-    auto other = start_cyclictest(cpu);
+    auto other = start_cyclictest(cpu, cycles_);
     if (!other) return std::unexpected(other.error());
     return finish_cyclictest(sample, *other, cpu);
   }
 
-  Result<ChildProcess> start_cyclictest(int cpu) {
+  Result<ChildProcess> start_cyclictest(int cpu, std::uint64_t cycles) {
     return ChildProcess::start(cyclictest_command({.period_us = plan_.period_us,
-                                                   .cycles = cycles_,
+                                                   .cycles = cycles,
                                                    .policy = plan_.policy,
                                                    .priority = plan_.priority,
                                                    .cpu = cpu,
