@@ -28,6 +28,7 @@ std::vector<std::string> cyclictest_command(const CyclictestPlan& plan) {
   std::vector<std::string> command{"cyclictest",
                                    "--threads=1",
                                    fmt::format("--affinity={}", plan.cpu),
+                                   fmt::format("--mainaffinity={}", plan.cpu),
                                    "--policy=" + policy_name(plan.policy),
                                    fmt::format("--interval={}", plan.period_us),
                                    fmt::format("--loops={}", plan.cycles),
