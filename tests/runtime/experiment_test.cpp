@@ -125,6 +125,8 @@ settle_s = 0.003
 [sim]
 integrator = "rk4"
 substep_ns = 250_000
+bus_timing = true
+bus_latency_ns = 20_000
 order = 0
 noise = false
 ground_truth = false
@@ -156,6 +158,9 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->settle_cycles(), 2u);
   EXPECT_EQ(e->sim.integrator, sim::Integrator::kRungeKutta4);
   EXPECT_EQ(e->sim.substep_ns, 250'000);
+  EXPECT_TRUE(e->sim_robot_config().bus_timing);
+  EXPECT_EQ(e->sim_robot_config().bus_latency_ns, 20'000);
+  EXPECT_EQ(e->sim_robot_config().answer_window_ns, 1'400'000);
   EXPECT_EQ(e->robot.actuators[0].order, 0);
   EXPECT_TRUE(e->robot.sensors[0].noise.empty());
   EXPECT_EQ(e->robot.joints[0].torque_noise_Nm, 0.0);

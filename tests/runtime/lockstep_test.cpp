@@ -66,17 +66,19 @@ class Squat {
 
 class Lockstep : public testing::TestWithParam<const char*> {};
 
-TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
+/// `cycles` of a squat in process and over the wire, compared; 0: all of it.
+void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_timing) {
   const log::ScratchFolder folder;
-  Squat in_process(GetParam());
-  auto sim = sim::SimRobot::create(in_process.e.robot, in_process.kernels.get(),
-                                   in_process.e.sim_robot_config());
+  Squat in_process(name);
+  sim::SimRobotConfig config = in_process.e.sim_robot_config();
+  config.bus_timing = bus_timing;
+  auto sim = sim::SimRobot::create(in_process.e.robot, in_process.kernels.get(), config);
   ASSERT_TRUE(sim) << sim.error().to_string();
-  const log::LogFile a = in_process.run(**sim, folder / "a.mcap");
+  const log::LogFile a = in_process.run(**sim, folder / "a.mcap", cycles);
 
-  Squat over_wire(GetParam());
-  LockstepRobot robot(over_wire.e.robot, over_wire.kernels.get(), over_wire.e.sim_robot_config());
-  const log::LogFile b = over_wire.run(*robot.backend, folder / "b.mcap");
+  Squat over_wire(name);
+  LockstepRobot robot(over_wire.e.robot, over_wire.kernels.get(), config);
+  const log::LogFile b = over_wire.run(*robot.backend, folder / "b.mcap", cycles);
 
   const auto compared = log::compare(a, b);
   ASSERT_TRUE(compared) << compared.error().to_string();
@@ -87,6 +89,14 @@ TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
                               << topic.first->b;
     EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
   }
+}
+
+TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
+  expect_same_squat(GetParam(), 0, false);
+}
+
+TEST_P(Lockstep, TheTimeOfFramesOnTheWireIsTheSameOnEitherSide) {
+  expect_same_squat(GetParam(), 1000, true);
 }
 
 TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
