@@ -130,6 +130,7 @@ class SocketCanBus final : public Bus {
   std::uint64_t system_calls_ = 0;
   BusStatistics statistics_;
   std::atomic<Told> told_{};
+  static_assert(std::atomic<Told>::is_always_lock_free);
 };
 
 /// Most buses that one wait_for_frames() takes.
