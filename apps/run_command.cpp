@@ -75,7 +75,6 @@ void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition
   Progress bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.can_buses(), stderr);
   while (!loop.done()) {
-    if (rt::stop_requested()) cycle.request_stop();
     if (!quiet) buses.look();
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,

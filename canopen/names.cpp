@@ -57,6 +57,7 @@ const char* to_string(ErrorCode code) noexcept {
     case ErrorCode::kFollowingError: return "following error";
     case ErrorCode::kPositionLimit: return "position limit exceeded";
     case ErrorCode::kCommandTimeout: return "command time-out";
+    case ErrorCode::kEmergencyInput: return "emergency stop input active";
   }
   return "error";
 }

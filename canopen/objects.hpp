@@ -88,6 +88,7 @@ inline constexpr std::uint16_t kVelocityOffset = 0x60B1;         // i32 [link co
 inline constexpr std::uint16_t kTorqueOffset = 0x60B2;           // i16 [per mille of rated]
 inline constexpr std::uint16_t kInterpolationPeriod = 0x60C2;    // u8 units, i8 power of ten [s]
 inline constexpr std::uint16_t kFollowingError = 0x60F4;         // i32 [link counts]
+inline constexpr std::uint16_t kDigitalInputs = 0x60FD;          // u32: digital_input
 inline constexpr std::uint16_t kTargetVelocity = 0x60FF;         // i32 [link counts/s]
 inline constexpr std::uint16_t kSupportedModes = 0x6502;         // u32
 
@@ -212,6 +213,11 @@ inline constexpr std::uint16_t kFollowsCommand = 1u << 12;  ///< CSP, CSV, CST a
 inline constexpr std::uint16_t kFollowingError = 1u << 13;  ///< CSP
 }  // namespace statusword
 
+/// Bits of the digital inputs (60FD).
+namespace digital_input {
+inline constexpr std::uint32_t kInterlock = 1u << 3;  ///< the emergency stop's
+}  // namespace digital_input
+
 /// Emergency and drive error codes (EMCY, 1003, 603F): CiA 301 and 402.
 enum class ErrorCode : std::uint16_t {
   kNone = 0x0000,
@@ -231,6 +237,7 @@ enum class ErrorCode : std::uint16_t {
   kPdoTooLong = 0x8220,
   kSyncLost = 0x8700,             ///< sync controller
   kCommandTimeout = 0xFF01,       ///< ours: SYNCs came without commands
+  kEmergencyInput = 0xFF02,       ///< ours: the interlock input (60FD bit 3) is active
   kVelocityControl = 0x8400,      ///< velocity (limit) exceeded
   kFollowingError = 0x8611,
   kPositionLimit = 0x8612,        ///< reference or position limit

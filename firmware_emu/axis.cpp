@@ -74,6 +74,7 @@ void Axis::apply_settings() noexcept TANDEM_RT {
 
 void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
   if (settings_changed_) apply_settings();
+  objects_.digital_inputs = sense.emergency_stop ? canopen::digital_input::kInterlock : 0;
   const bool link_valid = link_encoder_.sample(sense.link_position_rad);
   const bool motor_valid = motor_encoder_.sample(sense.motor_position_rad);
   if (motor_valid) {  // by itself: a stop ends when the motor rests
@@ -146,6 +147,8 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
        .powered = powered(),
        .follows_position = follows},
       period_s_);
+  const bool interlock = (objects_.digital_inputs & canopen::digital_input::kInterlock) != 0;
+  if (interlock) return ErrorCode::kEmergencyInput;
   if (cause != ErrorCode::kNone) return cause;
   // A lost connection is a fault of an axis that runs, and stays one until it is back.
   const bool latched = objects_.error_code == static_cast<std::uint16_t>(connection);

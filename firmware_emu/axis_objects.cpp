@@ -155,6 +155,7 @@ bool AxisObjects::add_actual(ObjectDictionary& od, int axis) {
          od.add(at(co::kVelocity), 0, velocity, kReadTpdo) &&
          od.add(at(co::kTorque), 0, torque, kReadTpdo) &&
          od.add(at(co::kFollowingError), 0, following_error, kReadTpdo) &&
+         od.add(at(co::kDigitalInputs), 0, digital_inputs, kReadTpdo) &&
          od.add(at(co::kMotorPosition), 0, motor_position, kReadTpdo) &&
          od.add(at(co::kMotorVelocity), 0, motor_velocity, kReadTpdo) &&
          od.add(at(co::kCurrent), 0, current, kReadTpdo) &&

@@ -70,6 +70,7 @@ struct AxisObjects {
   std::uint32_t link_counts = 1;
   std::uint32_t motor_counts = 1;
   std::uint32_t refused_values = 0;
+  std::uint32_t digital_inputs = 0;
   float stiffness = 0.0F;
   float damping = 0.0F;
   std::array<std::array<float, 4>, 4> gains{};  ///< position, velocity, torque, current; PidSub

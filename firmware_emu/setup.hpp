@@ -20,6 +20,7 @@ struct AxisSense {
   double current_A = 0.0;
   double temperature_C = 25.0;    ///< of the winding
   double bus_voltage_V = 0.0;
+  bool emergency_stop = false;    ///< the board's interlock input is active
 };
 
 /// What one axis does to its motor until the next control period.

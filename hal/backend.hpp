@@ -2,6 +2,7 @@
 // Layer: hal.  Thread: open/close non-RT; read/write RT.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -73,6 +74,13 @@ class Backend {
   /// @pre `command` has passed the command limits: finite and in range.
   [[nodiscard]] virtual Code write(const CommandImage& command,
                                    const ParameterImage& parameters) noexcept TANDEM_RT = 0;
+
+  /// Why `joint` is in fault. @pre its fault code is not 0
+  [[nodiscard]] virtual FaultCause fault_cause(std::size_t /*joint*/) const noexcept TANDEM_RT {
+    return FaultCause::kDrive;
+  }
+  /// A cause and its joint's fault code in words: "following error (0x8611)". Any thread.
+  [[nodiscard]] virtual std::string fault_text(FaultCause cause, std::uint32_t code) const;
 
   /// Latches a stop of every joint, kept until reset(): write() has no effect and phase() is kFault
   /// from now on. Of several the hardest is carried out; kWarn changes nothing. During bring-up it

@@ -23,6 +23,7 @@ enum class FaultKind : std::uint8_t {
   kBoardIdentity,   ///< another product code
   kBoardRevision,   ///< another firmware revision
   kBoardDuplicate,  ///< a second board with the same node id
+  kEmergencyStop,   ///< the board's emergency stop input is active
   kSupplySag,       ///< of the bridges; the logic has its own
   // joints
   kEncoderFreeze,
@@ -33,10 +34,10 @@ enum class FaultKind : std::uint8_t {
   // buses
   kBusDown,  ///< a cut cable, or a switched-off interface
 };
-inline constexpr std::array<std::string_view, 18> kFaultNames = {
+inline constexpr std::array<std::string_view, 19> kFaultNames = {
     "none",           "frame_drop",     "frame_delay",     "frame_duplicate", "frame_corrupt",
     "frame_reorder",  "board_kill",     "board_reset",     "board_identity",  "board_revision",
-    "board_duplicate", "supply_sag",    "encoder_freeze",  "encoder_jump",    "encoder_unplug",
+    "board_duplicate", "emergency_stop", "supply_sag",    "encoder_freeze",  "encoder_jump",    "encoder_unplug",
     "motor_overheat", "spring_break",   "bus_down"};
 
 /// As a scenario's `kind` says it.

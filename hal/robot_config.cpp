@@ -180,6 +180,12 @@ void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) 
   robot.postures.push_back(posture);
 }
 
+void read_safety(TomlTable table, RobotConfig& robot) {
+  const std::string stop = table.choice_or("emergency_stop", "category1", {"category0", "category1"});
+  robot.emergency_stop = stop == "category0" ? StopCategory::kCategory0 : StopCategory::kCategory1;
+  table.finish();
+}
+
 /// A board's axes are numbered from 0 without a gap, and there is at least one.
 void check_boards(TomlTable& root, const RobotConfig& robot) {
   std::vector<TomlTable> tables = root.tables("board");
@@ -219,6 +225,7 @@ RobotConfig read(const TomlDocument& document) {
     read_posture(postures.table(name), name, robot);
   }
   postures.finish();
+  read_safety(root.table_or_empty("safety"), robot);
   root.finish();
   return robot;
 }

@@ -200,6 +200,7 @@ struct RobotConfig {
   std::vector<SensorConfig> sensors;    ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
+  StopCategory emergency_stop = StopCategory::kCategory1;  ///< [safety]; 0 or 1
 
   [[nodiscard]] ImageShape shape() const;
   /// Index in `joints`, or -1.
@@ -207,6 +208,11 @@ struct RobotConfig {
   [[nodiscard]] int sensor_index(std::string_view name) const;
   [[nodiscard]] const ActuatorConfig& actuator_of(const JointConfig& joint) const;
   [[nodiscard]] const GainsConfig& gains_of(const JointConfig& joint) const;
+  /// What a fault of joint `joint` for `cause` stops: an emergency stop the robot, any other fault
+  /// what the joint says.
+  [[nodiscard]] StopCategory category_of(std::size_t joint, FaultCause cause) const noexcept {
+    return cause == FaultCause::kEmergencyInput ? emergency_stop : joints[joint].on_fault;
+  }
   [[nodiscard]] const BoardConfig* board(std::string_view name) const;
   [[nodiscard]] const BusConfig* bus(std::string_view name) const;
   [[nodiscard]] const PostureConfig* posture(std::string_view name) const;

@@ -1,4 +1,5 @@
-// How a robot is stopped: the categories of IEC 60204-1, and two that stop less.
+// Why a joint is in fault, and how the robot is stopped: the categories of IEC 60204-1, and two
+// that stop less.
 // Layer: hal.  Thread: any.
 #pragma once
 
@@ -12,6 +13,19 @@ enum class StopCategory : std::uint8_t {
   kCategory1 = 1,  ///< every axis is brought to rest, then its torque is taken away
   kHold = 2,       ///< every axis stays under control where it is
   kWarn = 3,       ///< nothing is stopped: it is told
+};
+
+/// Why a joint is in fault.
+enum class FaultCause : std::uint8_t {
+  kDrive,           ///< the drive itself: its error code tells
+  kEmergencyInput,  ///< the emergency stop input of its board
+  kNotEnabled,      ///< it was not enabled in time
+  kLeftEnabled,     ///< it was disabled, and not by us
+  kBoardSilent,     ///< no feedback of its board
+  kHeartbeatLost,   ///< of its board
+  kBoardRebooted,
+  kBoardStopped,    ///< its board left NMT operational by itself
+  kBoardRefused,    ///< its board cannot be configured
 };
 
 /// As the TOML has it: "category0".

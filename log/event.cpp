@@ -19,6 +19,10 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kStopRequested: return "stop requested";
     case EventKind::kShutDown: return "shut down";
     case EventKind::kInjected: return "injected";
+    case EventKind::kEmergencyStop: return "emergency stop";
+    case EventKind::kResetRequested: return "reset requested";
+    case EventKind::kResetDone: return "reset done";
+    case EventKind::kResetFailed: return "reset failed";
   }
   return "?";
 }
@@ -30,6 +34,9 @@ std::string describe(const Event& event, std::span<const std::string> joints) {
   }
   const bool has_joint = event.joint >= 0 && static_cast<std::size_t>(event.joint) < joints.size();
   if (has_joint) text += " of " + joints[static_cast<std::size_t>(event.joint)];
+  if (event.kind == EventKind::kEmergencyStop) {
+    return text + (event.code == 1 ? " by a signal" : " on request");
+  }
   if (event.code == 0 || event.kind == EventKind::kInjected) return text;
   char code[32];
   if (event.kind == EventKind::kOverrun) {

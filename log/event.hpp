@@ -23,6 +23,10 @@ enum class EventKind : std::uint8_t {
   kStopRequested,    ///< from outside: signal or caller
   kShutDown,         ///< the drives are disabled
   kInjected,         ///< a fault was injected: `code` is its hal::FaultKind
+  kEmergencyStop,    ///< `code`: 1 by a signal, 2 on request
+  kResetRequested,   ///< of the latched faults
+  kResetDone,        ///< every joint is enabled again
+  kResetFailed,      ///< a cause is still there
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 

@@ -84,6 +84,8 @@ class CyclicLoop {
 
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next
   /// wait(); statistics go on.
+  /// The overruns so far count no more towards OverrunPolicy::kStop.
+  void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
   void archive(Archive& ar);
 
  private:

@@ -10,6 +10,9 @@ namespace {
 std::atomic<bool> stop_flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
+std::atomic<bool> emergency_flag{false};
+
+extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memory_order_relaxed); }
 extern "C" void on_stop_signal(int) { stop_flag.store(true, std::memory_order_relaxed); }
 
 }  // namespace
@@ -21,6 +24,19 @@ void install_stop_signals() {
   sigemptyset(&action.sa_mask);
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+}
+
+void install_emergency_signal() {
+  struct sigaction action {};
+  action.sa_handler = on_emergency_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  ::sigaction(SIGUSR1, &action, nullptr);
+}
+
+bool take_emergency_stop() noexcept TANDEM_RT {
+  return emergency_flag.load(std::memory_order_relaxed) &&
+         emergency_flag.exchange(false, std::memory_order_relaxed);
 }
 
 bool stop_requested() noexcept TANDEM_RT { return stop_flag.load(std::memory_order_relaxed); }

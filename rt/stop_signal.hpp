@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as a flag that the loop looks at once per cycle.
+// Ctrl-C and SIGTERM, and SIGUSR1 as emergency stop: flags that the loop looks at once per cycle.
 // Layer: rt.  Thread: any.
 #pragma once
 
@@ -18,5 +18,11 @@ void request_stop() noexcept;
 
 /// Clears the flag, before the next run of the same process.
 void clear_stop() noexcept;
+
+/// From now on each SIGUSR1 is an emergency stop.
+void install_emergency_signal();
+
+/// True once for the emergency stops that were signalled since the last call.
+[[nodiscard]] bool take_emergency_stop() noexcept TANDEM_RT;
 
 }  // namespace tandem::rt

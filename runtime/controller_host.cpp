@@ -75,7 +75,9 @@ void ControllerHost::hold(const hal::StateImage& state,
       command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kIdle);
       continue;
     }
-    if (command.mode()[j] != kPosition) {
+    const bool enabled =
+        state.drive_state()[j] == static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
+    if (command.mode()[j] != kPosition || !enabled) {
       command.mode()[j] = kPosition;
       command.interaction()[j] = kStiff;
       command.position_rad()[j] = state.position_rad()[j];
@@ -105,6 +107,7 @@ void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& st
   release(command);  // so that hold() takes every measured position
   hold(state, command);
   set_modes(command);
+  std::ranges::fill(done_, std::uint8_t{0});
   for (const Hosted& one : hosted_) one.controller->start(time, state, command);
 }
 

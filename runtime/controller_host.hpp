@@ -36,7 +36,8 @@ class ControllerHost {
   [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters);
 
   /// Writes "stay where you are" for every joint: position control at the measured position.
-  /// A joint whose last command was in position control keeps its reference and feed-forward.
+  /// A joint that is enabled and whose last command was in position control keeps its reference
+  /// and feed-forward.
   void hold(const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
   /// Every joint idle: no torque.
   void release(hal::CommandImage& command) const noexcept TANDEM_RT;

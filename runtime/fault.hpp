@@ -1,24 +1,33 @@
-// What ended or disturbed a run, noted in the cycle without heap.
-// Layer: runtime.  Thread: RT to note, any to read afterwards.
+// What ended or disturbed a run: noted in the cycle without heap, readable while it runs.
+// Layer: runtime.  Thread: RT to note and clear, any to read.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <cstdint>
 #include <string>
 
+#include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/backend.hpp"
+#include "hal/stop_category.hpp"
 
 namespace tandem::runtime {
 
 enum class FaultSource : std::uint8_t {
-  kDrive,       ///< a drive reports an error; `code` is its CiA 402 error code
-  kJointLost,   ///< no feedback of a joint for too long; `code` is its age in cycles
-  kSensorLost,  ///< the same of a sensor
-  kBackend,     ///< read, write or the backend as a whole; `code` is a Code
-  kController,  ///< a controller gave up; `code` is a Code
-  kCommand,     ///< a controller's command was not finite
-  kOverrun,     ///< too many late cycles
-  kBringUp,     ///< the drives were not enabled in time
+  kDrive,          ///< a drive is in fault; `code` is its CiA 402 error code
+  kJointLost,      ///< no feedback of a joint for too long; `code` is its age in cycles
+  kSensorLost,     ///< the same of a sensor
+  kBackend,        ///< read, write or the backend as a whole; `code` is a Code
+  kController,     ///< a controller gave up; `code` is a Code
+  kCommand,        ///< a controller's command was not finite
+  kOverrun,        ///< too many late cycles
+  kBringUp,        ///< the drives were not enabled in time
+  kEmergencyStop,  ///< asked for from outside; `code` is an EmergencyInput
 };
+
+/// Where an emergency stop came from. That of a board's input is a fault of its drives.
+enum class EmergencyInput : std::uint32_t { kSignal = 1, kRequest = 2 };
 
 struct FaultRecord {
   std::uint64_t cycle = 0;
@@ -26,15 +35,55 @@ struct FaultRecord {
   std::int32_t index = -1;  ///< joint, sensor or controller, as the source says
   std::uint32_t code = 0;
   FaultSource source = FaultSource::kBackend;
-  std::uint8_t padding[7] = {};
+  hal::FaultCause cause = hal::FaultCause::kDrive;  ///< kDrive only
+  hal::StopCategory category = hal::StopCategory::kWarn;
+  std::uint8_t padding[5] = {};
 };
 
-/// A fault as the result tells it.
+/// Every fault of a run, in the order of their times. What does not fit is counted.
+class FaultLog {
+ public:
+  static constexpr std::size_t kCapacity = 256;
+  static constexpr std::int64_t kLatched = -1;
+
+  // The loop's.
+  void note(const FaultRecord& record) noexcept TANDEM_RT;
+  void clear(std::size_t index, std::int64_t time_ns) noexcept TANDEM_RT;
+  void archive(Archive& ar);
+
+  // Any thread's.
+  [[nodiscard]] std::size_t size() const noexcept { return size_.load(std::memory_order_acquire); }
+  /// @pre index < size()
+  [[nodiscard]] const FaultRecord& operator[](std::size_t index) const noexcept {
+    return records_[index];
+  }
+  /// When a reset cleared it, or kLatched.
+  [[nodiscard]] std::int64_t cleared_ns(std::size_t index) const noexcept {
+    return cleared_ns_[index].load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::size_t latched() const noexcept TANDEM_RT;
+  /// Faults that did not fit.
+  [[nodiscard]] std::uint64_t lost() const noexcept {
+    return lost_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  std::array<FaultRecord, kCapacity> records_{};
+  std::array<std::atomic<std::int64_t>, kCapacity> cleared_ns_{};
+  std::atomic<std::size_t> size_{0};
+  std::atomic<std::uint64_t> lost_{0};
+};
+
+/// A fault in words.
 struct Fault {
   std::uint64_t cycle = 0;
   double time_s = 0.0;
-  std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole
-  std::string text;   ///< one sentence, without `joint`
+  std::string joint;     ///< joint, sensor or controller; empty when the robot as a whole
+  std::string board;     ///< the joint's; may be empty
+  std::string text;      ///< one sentence, without `joint`
+  hal::StopCategory category = hal::StopCategory::kWarn;
+  bool latched = true;
+  double cleared_s = 0.0;  ///< when it is not latched
 };
 
 }  // namespace tandem::runtime

@@ -11,7 +11,8 @@ enum class RunPhase : std::uint8_t {
   kBringUp,   ///< the backend configures and enables its drives
   kSettling,  ///< every joint is held where it was enabled, until the robot has been let down
   kRunning,   ///< controllers run
-  kHolding,   ///< a joint with stop category "hold" is in fault: every joint stays where it is
+  kFaulted,   ///< a stop of category "hold", 1 or 0 is latched
+  kResetting, ///< faults are cleared, and every joint enabled where it is
   kShutDown,  ///< the drives stop and are disabled
   kDone,
 };
@@ -25,6 +26,9 @@ struct Progress {
   std::atomic<std::uint64_t> total_cycles{0};    ///< that kRunning will have; 0: until stopped
   std::atomic<std::uint64_t> overruns{0};
   std::atomic<std::uint64_t> dropped{0};  ///< messages the log lost
+  std::atomic<std::uint64_t> latched{0};  ///< faults
+  std::atomic<std::uint64_t> resets{0};   ///< that were carried out
+  std::atomic<std::uint64_t> failed_resets{0};
 };
 
 }  // namespace tandem::runtime

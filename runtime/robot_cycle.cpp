@@ -1,7 +1,6 @@
 #include "runtime/robot_cycle.hpp"
 
 #include "rt/scoped_realtime.hpp"
-#include "rt/stop_signal.hpp"
 
 namespace tandem::runtime {
 
@@ -40,7 +39,7 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
 /// is simulated, for the log.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
-  const std::size_t most = 3 + 8 + 3 * joint_faulted_.size() + sensor_lost_.size();
+  const std::size_t most = 3 + 12 + 3 * joint_faulted_.size() + sensor_lost_.size();
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
   if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
   return loop_.wait();
@@ -67,16 +66,20 @@ void RobotCycle::read() noexcept TANDEM_RT {
 
 void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (tick.skipped > 0) event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
-  if (tick.stop) fault(FaultSource::kOverrun, -1, 0);
+  const bool stopping = phase_ == RunPhase::kFaulted || phase_ == RunPhase::kShutDown;
+  if (tick.stop && !stopping) {
+    fault({.source = FaultSource::kOverrun, .category = hal::StopCategory::kCategory1});
+  }
   if (phase_ != RunPhase::kBringUp && phase_ != RunPhase::kShutDown) {
     check_joints();
     check_sensors();
   }
   check_backend(read_code_);
   advance_phase();
+  take_requests();
 }
 
-/// The run's course when nothing goes wrong, and the request to end it.
+/// The run's course when nobody asks for anything.
 void RobotCycle::advance_phase() noexcept TANDEM_RT {
   const std::uint64_t in_phase = time_.cycle - phase_began_;
   if (phase_ == RunPhase::kBringUp) {
@@ -84,20 +87,23 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
       event(EventKind::kBringUpDone);
       go(config_.settle_cycles > 0 ? RunPhase::kSettling : RunPhase::kRunning);
     } else if (in_phase >= config_.bring_up_cycles) {
-      fault(FaultSource::kBringUp, -1, 0);
+      fault({.source = FaultSource::kBringUp, .category = hal::StopCategory::kCategory1});
     }
   } else if (phase_ == RunPhase::kSettling) {
     if (in_phase >= config_.settle_cycles) go(RunPhase::kRunning);
-  } else if (phase_ != RunPhase::kShutDown && config_.running_cycles != 0 &&
-             in_phase >= config_.running_cycles) {
+  } else if (phase_ == RunPhase::kResetting) {
+    watch_reset();
+  } else if (time_is_over(in_phase)) {
     event(EventKind::kControllersDone);
     go(RunPhase::kShutDown);
   }
-  const bool stop = stop_requested_.load(std::memory_order_relaxed) || rt::stop_requested();
-  if (stop && phase_ != RunPhase::kShutDown) {
-    event(EventKind::kStopRequested);
-    go(RunPhase::kShutDown);
-  }
+}
+
+/// A robot that holds its joints until the end has its time go on.
+bool RobotCycle::time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT {
+  const bool holds = phase_ == RunPhase::kFaulted && config_.after_stop == AfterStop::kEnd;
+  if (config_.running_cycles == 0 || (phase_ != RunPhase::kRunning && !holds)) return false;
+  return spent_ + in_phase >= config_.running_cycles;
 }
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
@@ -108,13 +114,14 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       controllers_->release(command_);  // every reference follows its joint until it is enabled
       controllers_->hold(state_, command_);
       break;
-    case RunPhase::kSettling: controllers_->hold(state_, command_); break;
+    case RunPhase::kSettling:
+    case RunPhase::kResetting: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;
-    case RunPhase::kHolding:
+    case RunPhase::kFaulted:
     case RunPhase::kShutDown:
-      if (disable_) {
+      if (reaction_ == hal::StopCategory::kCategory0) {
         controllers_->release(command_);
       } else {
         controllers_->hold(state_, command_);
@@ -125,7 +132,8 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
 }
 
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
-  if (ran_ == 0) controllers_->start(time_, state_, command_);
+  if (!controlling_) controllers_->start(time_, state_, command_);
+  controlling_ = true;
   ++ran_;
   const Code code = controllers_->update(time_, state_, command_);
   if (code == Code::kOk) return;
@@ -135,8 +143,10 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
     go(RunPhase::kShutDown);
     return;
   }
-  fault(FaultSource::kController, static_cast<std::int32_t>(controllers_->culprit()),
-        static_cast<std::uint32_t>(code));
+  fault({.index = static_cast<std::int32_t>(controllers_->culprit()),
+         .code = static_cast<std::uint32_t>(code),
+         .source = FaultSource::kController,
+         .category = hal::StopCategory::kCategory1});
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
@@ -150,7 +160,10 @@ void RobotCycle::limit() noexcept TANDEM_RT {
       joint_limited_[j] = 1;
     }
     if (codes[j] == Code::kNotFinite && phase_ == RunPhase::kRunning) {
-      fault(FaultSource::kCommand, joint, static_cast<std::uint32_t>(codes[j]));
+      fault({.index = joint,
+             .code = static_cast<std::uint32_t>(codes[j]),
+             .source = FaultSource::kCommand,
+             .category = hal::StopCategory::kCategory1});
     }
   }
 }
@@ -178,82 +191,14 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   progress_.phase.store(phase_, std::memory_order_relaxed);
   progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
   progress_.running_cycles.store(ran_, std::memory_order_relaxed);
+  progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
 }
 
-/// A missed sample shows as age, a lost command as the board's own time-out, and a drive's fault
-/// as its joint's: the joint's stop category decides then. All else ends the run.
-void RobotCycle::check_backend(Code code) noexcept TANDEM_RT {
-  if (phase_ == RunPhase::kShutDown) return;
-  const bool latched = backend_->phase() == hal::Phase::kFault;
-  if (latched && code == Code::kOk) code = Code::kFault;
-  if (code == Code::kOk || code == Code::kTimeout || code == Code::kQueueFull) return;
-  if (code == Code::kFault && joint_fault_) return;
-  fault(FaultSource::kBackend, -1, static_cast<std::uint32_t>(code));
-}
-
-void RobotCycle::check_joints() noexcept TANDEM_RT {
-  for (std::size_t j = 0; j < joint_faulted_.size(); ++j) {
-    if (joint_faulted_[j] != 0) continue;
-    const auto drive = static_cast<hal::DriveState>(state_.drive_state()[j]);
-    const bool faulted = drive == hal::DriveState::kFault ||
-                         drive == hal::DriveState::kFaultReactionActive || state_.fault()[j] != 0;
-    const bool lost = state_.age_cycles()[j] > config_.lost_after_cycles;
-    if (!faulted && !lost) continue;
-    joint_faulted_[j] = 1;
-    joint_fault_ = true;
-    const auto joint = static_cast<std::int32_t>(j);
-    if (faulted) {
-      fault(FaultSource::kDrive, joint, state_.fault()[j]);
-    } else {
-      fault(FaultSource::kJointLost, joint, state_.age_cycles()[j]);
-    }
-  }
-}
-
-void RobotCycle::check_sensors() noexcept TANDEM_RT {
-  const auto ages = state_.sensor_age_cycles();
-  for (std::size_t s = 0; s < ages.size(); ++s) {
-    const std::uint8_t lost = ages[s] > config_.lost_after_cycles ? 1 : 0;
-    if (lost != 0 && sensor_lost_[s] == 0) {
-      fault(FaultSource::kSensorLost, static_cast<std::int32_t>(s), ages[s]);
-    }
-    sensor_lost_[s] = lost;
-  }
-}
-
-void RobotCycle::fault(FaultSource source, std::int32_t index,
-                       std::uint32_t code) noexcept TANDEM_RT {
-  const bool of_joint = source == FaultSource::kDrive || source == FaultSource::kJointLost ||
-                        source == FaultSource::kCommand;
-  const bool of_sensor = source == FaultSource::kSensorLost;
-  event(of_sensor ? EventKind::kSensorLost : EventKind::kFault, of_joint ? index : -1, code);
-  if (fault_count_ < faults_.size()) {
-    faults_[fault_count_++] = {time_.cycle, time_.time_ns, index, code, source, {}};
-  }
-  if (of_sensor) return;  // told, but the joints can still be controlled
-  const bool of_drive = source == FaultSource::kDrive || source == FaultSource::kJointLost;
-  react(of_drive ? robot_->joints[static_cast<std::size_t>(index)].on_fault
-                 : hal::StopCategory::kCategory1);
-}
-
-void RobotCycle::react(hal::StopCategory category) noexcept TANDEM_RT {
-  switch (category) {
-    case hal::StopCategory::kWarn: return;
-    case hal::StopCategory::kHold:
-      if (phase_ == RunPhase::kRunning) controllers_->stop();
-      if (phase_ == RunPhase::kRunning || phase_ == RunPhase::kSettling) {
-        phase_ = RunPhase::kHolding;  // the run's time goes on: phase_began_ stays
-      }
-      return;
-    case hal::StopCategory::kCategory0: disable_ = true; [[fallthrough]];
-    case hal::StopCategory::kCategory1:
-      if (phase_ != RunPhase::kShutDown) go(RunPhase::kShutDown);
-  }
-}
-
 void RobotCycle::go(RunPhase next) noexcept TANDEM_RT {
-  if (phase_ == RunPhase::kRunning && ran_ > 0) controllers_->stop();
+  if (controlling_) controllers_->stop();
+  controlling_ = false;
+  if (phase_ == RunPhase::kRunning) spent_ += time_.cycle - phase_began_;
   phase_ = next;
   phase_began_ = time_.cycle;
 }

@@ -2,8 +2,6 @@
 // Start here to read the runtime. Layer: runtime.  Thread: made non-RT; step() the RT thread's.
 #pragma once
 
-#include <array>
-#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -19,9 +17,16 @@
 #include "runtime/cycle_trace.hpp"
 #include "runtime/fault.hpp"
 #include "runtime/progress.hpp"
+#include "runtime/requests.hpp"
 #include "runtime/run_statistics.hpp"
 
 namespace tandem::runtime {
+
+/// What comes after a stop of category 0 or 1. During bring-up it is always the end.
+enum class AfterStop : std::uint8_t {
+  kEnd,   ///< the run: the robot is shut down. After "hold" when the run's time is over.
+  kWait,  ///< latched, for a reset or the request to end the run
+};
 
 struct CycleConfig {
   rt::LoopConfig loop{};
@@ -29,6 +34,7 @@ struct CycleConfig {
   std::uint64_t bring_up_cycles = 20'000;  ///< at most, then the run ends in a fault
   std::uint64_t settle_cycles = 0;         ///< every joint is held, from enabled to kRunning
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
+  AfterStop after_stop = AfterStop::kEnd;
   std::uint32_t lost_after_cycles = 10;    ///< feedback older than this is a lost joint or sensor
   std::size_t trace_cycles = 0;            ///< the last that trace() keeps: 6 clock reads each
 };
@@ -47,10 +53,12 @@ struct CycleParts {
 ///
 ///   kBringUp   -> kSettling   when the backend says that every axis follows the command
 ///   kSettling  -> kRunning    after settle_cycles, in which every joint is held where it is
-///   kRunning   -> kShutDown   after running_cycles, when every controller is done, when a stop
-///                             is requested, or in a fault (stop category 0 or 1)
-///   kRunning   -> kHolding    in a fault of a joint with stop category "hold"; then, when the
-///                             time is over or a stop is requested, kShutDown
+///   kRunning   -> kShutDown   after running_cycles, when every controller is done, when the end
+///                             is requested, or in a fault with AfterStop::kEnd
+///   any        -> kFaulted    in a fault of category "hold", 0 or 1: the stop is carried out and
+///                             latched. Bring-up and shut-down excepted.
+///   kFaulted   -> kResetting  when a reset is requested: every joint is enabled where it is
+///   kResetting -> kSettling   when they follow; back to kFaulted when a cause is still there
 ///   kShutDown  -> kDone       when the drives are disabled
 class RobotCycle {
  public:
@@ -64,19 +72,22 @@ class RobotCycle {
     while (step()) {
     }
   }
-  /// Asks for the end, from any thread: the robot is shut down in order.
-  void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
+  /// For any thread: the end of the run, a reset, an emergency stop.
+  [[nodiscard]] Requests& requests() noexcept { return requests_; }
 
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return phase_; }
   [[nodiscard]] const hal::StateImage& state() const noexcept { return state_; }
   [[nodiscard]] const hal::CommandImage& command() const noexcept { return command_; }
 
+  /// Every fault so far, in the order of their times. Any thread.
+  [[nodiscard]] std::vector<Fault> faults() const;
+  [[nodiscard]] const FaultLog& fault_log() const noexcept { return faults_; }
+
   // Results, for when the run has stopped.
   [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return loop_.statistics(); }
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
   [[nodiscard]] const hal::CommandLimits& limits() const noexcept { return limits_; }
-  [[nodiscard]] std::vector<Fault> faults() const;
   [[nodiscard]] std::uint64_t running_cycles() const noexcept { return ran_; }
   [[nodiscard]] const CycleTrace& trace() const noexcept { return trace_; }
 
@@ -101,8 +112,21 @@ class RobotCycle {
   void check_backend(Code code) noexcept TANDEM_RT;
   void check_joints() noexcept TANDEM_RT;
   void check_sensors() noexcept TANDEM_RT;
-  void fault(FaultSource source, std::int32_t index, std::uint32_t code) noexcept TANDEM_RT;
+  [[nodiscard]] bool time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT;
+
+  // robot_cycle_faults.cpp
+  void take_requests() noexcept TANDEM_RT;
+  void emergency_stop(EmergencyInput input, hal::StopCategory category) noexcept TANDEM_RT;
+  [[nodiscard]] bool in_fault(std::size_t joint) const noexcept TANDEM_RT;
+  [[nodiscard]] bool is_lost(std::size_t joint) const noexcept TANDEM_RT;
+  void fault(FaultRecord record) noexcept TANDEM_RT;
   void react(hal::StopCategory category) noexcept TANDEM_RT;
+  void begin_reset() noexcept TANDEM_RT;
+  void watch_reset() noexcept TANDEM_RT;
+  void reset_done() noexcept TANDEM_RT;
+  void reset_failed() noexcept TANDEM_RT;
+  [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
+
   void run_controllers() noexcept TANDEM_RT;
   void go(RunPhase next) noexcept TANDEM_RT;
   void event(log::EventKind kind, std::int32_t joint = -1,
@@ -111,7 +135,7 @@ class RobotCycle {
   void mark(Stage stage) noexcept TANDEM_RT;
   void mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT;
   void archive(Archive& ar);
-  [[nodiscard]] Fault tell(const FaultRecord& record) const;
+  [[nodiscard]] Fault tell(std::size_t number) const;
 
   const hal::RobotConfig* robot_;
   hal::Backend* backend_;
@@ -131,17 +155,18 @@ class RobotCycle {
   hal::CycleTime time_;
   RunPhase phase_ = RunPhase::kBringUp;
   bool started_ = false;      // the first cycle was
-  bool disable_ = false;      // stop category 0: no torque at once
-  bool joint_fault_ = false;  // some joint is or was in fault
+  bool controlling_ = false;  // controllers are started
+  bool joint_fault_ = false;  // of some joint one is latched
+  hal::StopCategory reaction_ = hal::StopCategory::kWarn;  // the hardest that is latched
   Code read_code_ = Code::kOk;
   std::uint64_t phase_began_ = 0;                                          // cycle
+  std::uint64_t spent_ = 0;                                                // of running_cycles
   std::uint64_t ran_ = 0;                                                  // cycles of kRunning
   std::vector<std::uint8_t> joint_faulted_, sensor_lost_, joint_limited_;  // noted once each
-  std::array<FaultRecord, 64> faults_{};
-  std::size_t fault_count_ = 0;
+  FaultLog faults_;
 
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;
-  std::atomic<bool> stop_requested_{false};
+  Requests requests_;
   Progress progress_;
   CycleTrace trace_;
   CycleStamps* stamps_ = nullptr;  // this cycle's; null: not traced

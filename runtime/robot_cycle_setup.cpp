@@ -1,6 +1,4 @@
 // Construction, snapshots and results of RobotCycle: everything outside of the cycle itself.
-#include <cstdio>
-
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::runtime {
@@ -10,7 +8,8 @@ const char* to_string(RunPhase phase) noexcept {
     case RunPhase::kBringUp: return "bring-up";
     case RunPhase::kSettling: return "settling";
     case RunPhase::kRunning: return "running";
-    case RunPhase::kHolding: return "holding";
+    case RunPhase::kFaulted: return "faulted";
+    case RunPhase::kResetting: return "resetting";
     case RunPhase::kShutDown: return "shut-down";
     case RunPhase::kDone: return "done";
   }
@@ -54,8 +53,9 @@ void RobotCycle::archive(Archive& ar) {
   limits_.archive(ar);
   statistics_.archive(ar);
   controllers_->archive(ar);
-  ar(time_, phase_, started_, disable_, joint_fault_, read_code_, phase_began_, ran_);
-  ar(joint_faulted_, sensor_lost_, joint_limited_, faults_, fault_count_);
+  ar(time_, phase_, started_, controlling_, joint_fault_, reaction_, read_code_, phase_began_, spent_,
+     ran_);
+  ar(joint_faulted_, sensor_lost_, joint_limited_, faults_);
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {
@@ -78,54 +78,64 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
               "restore it with the configuration that it was saved with");
 }
 
-Fault RobotCycle::tell(const FaultRecord& record) const {
-  Fault fault{.cycle = record.cycle,
-              .time_s = static_cast<double>(record.time_ns) * 1e-9,
-              .joint = {},
-              .text = {}};
+Fault RobotCycle::tell(std::size_t number) const {
+  const FaultRecord& record = faults_[number];
+  const std::int64_t cleared_ns = faults_.cleared_ns(number);
+  Fault fault;
+  fault.cycle = record.cycle;
+  fault.time_s = static_cast<double>(record.time_ns) * 1e-9;
+  fault.category = record.category;
+  fault.latched = cleared_ns == FaultLog::kLatched;
+  fault.cleared_s = fault.latched ? 0.0 : static_cast<double>(cleared_ns) * 1e-9;
   const auto index = static_cast<std::size_t>(record.index);
   const char* code = tandem::to_string(static_cast<Code>(record.code));
-  char number[16];
-  std::snprintf(number, sizeof number, "0x%04X", record.code);
   switch (record.source) {
-    case FaultSource::kDrive:
-      fault.joint = robot_->joints[index].name;
-      fault.text = "the drive reports error " + std::string(number);
-      break;
+    case FaultSource::kDrive: fault.text = backend_->fault_text(record.cause, record.code); break;
     case FaultSource::kJointLost:
-      fault.joint = robot_->joints[index].name;
       fault.text = "no feedback for " + std::to_string(record.code) + " cycles";
       break;
     case FaultSource::kSensorLost:
       fault.joint = robot_->sensors[index].name;
       fault.text = "no sample for " + std::to_string(record.code) + " cycles";
       break;
-    case FaultSource::kBackend:
-      fault.text = backend_->status_text();
-      if (fault.text.empty()) fault.text = "the robot answered " + std::string(code);
-      break;
+    case FaultSource::kBackend: fault.text = "the robot answered " + std::string(code); break;
     case FaultSource::kController:
       fault.joint = controllers_->name(index);
       fault.text = "the controller gave up: " + std::string(code);
       break;
     case FaultSource::kCommand:
-      fault.joint = robot_->joints[index].name;
       fault.text = "a controller's command was not a finite number";
       break;
     case FaultSource::kOverrun:
       fault.text = std::to_string(config_.loop.stop_late) + " of the last " +
                    std::to_string(config_.loop.stop_window) + " cycles were late";
       break;
-    case FaultSource::kBringUp:
-      fault.text = "the drives were not enabled in time: " + backend_->status_text();
+    case FaultSource::kBringUp: fault.text = "the drives were not enabled in time"; break;
+    case FaultSource::kEmergencyStop:
+      fault.text = static_cast<EmergencyInput>(record.code) == EmergencyInput::kSignal
+                       ? "emergency stop by a signal"
+                       : "emergency stop on request";
       break;
+  }
+  if (record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
+      record.source == FaultSource::kCommand) {
+    fault.joint = robot_->joints[index].name;
+    fault.board = robot_->joints[index].board;
   }
   return fault;
 }
 
 std::vector<Fault> RobotCycle::faults() const {
   std::vector<Fault> out;
-  for (std::size_t i = 0; i < fault_count_; ++i) out.push_back(tell(faults_[i]));
+  for (std::size_t i = 0; i < faults_.size(); ++i) out.push_back(tell(i));
+  // The backend's own words are the loop's until the loop has stopped.
+  if (progress_.phase.load() != RunPhase::kDone) return out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::string status = out[i].latched ? backend_->status_text() : std::string();
+    if (status.empty()) continue;
+    if (faults_[i].source == FaultSource::kBackend) out[i].text = status;
+    if (faults_[i].source == FaultSource::kBringUp) out[i].text += ": " + status;
+  }
   return out;
 }
 

@@ -48,6 +48,12 @@ class CanBackend final : public Backend {
   [[nodiscard]] Code read(const CycleTime& time, StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const CommandImage& command,
                            const ParameterImage& parameters) noexcept TANDEM_RT override;
+  [[nodiscard]] FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
+    return master_->fault_cause(joint);
+  }
+  [[nodiscard]] std::string fault_text(FaultCause cause, std::uint32_t code) const override {
+    return cause == FaultCause::kDrive ? DriveMaster::error_text(code) : Backend::fault_text(cause, code);
+  }
   void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;

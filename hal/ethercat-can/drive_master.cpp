@@ -334,6 +334,10 @@ Code DriveMaster::send(const CommandImage& command,
   return taken ? Code::kOk : Code::kQueueFull;
 }
 
+FaultCause DriveMaster::fault_cause(std::size_t joint) const noexcept TANDEM_RT {
+  return impl_->cause(joint);
+}
+
 void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT { impl_->stop(category); }
 void DriveMaster::reset() noexcept TANDEM_RT { impl_->reset(); }
 

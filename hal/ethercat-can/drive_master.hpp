@@ -104,6 +104,9 @@ class DriveMaster {
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
 
   [[nodiscard]] Phase phase() const noexcept;
+  [[nodiscard]] FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT;
+  /// A drive's error code: "following error (error code 0x8611)".
+  [[nodiscard]] static std::string error_text(std::uint32_t code);
   /// Nodes on bus `bus` that answer every SYNC with their TPDOs.
   [[nodiscard]] std::size_t nodes_in_operation(std::size_t bus) const noexcept TANDEM_RT;
   /// Share of the bring-up that is done, 0 to 1.

@@ -99,6 +99,10 @@ struct DriveMaster::Impl {
   void fail() noexcept TANDEM_RT;
   void make_commands(const CommandImage* image) noexcept TANDEM_RT;
   [[nodiscard]] bool all_enabled() const noexcept TANDEM_RT;
+  [[nodiscard]] FaultCause cause(std::size_t joint) const noexcept TANDEM_RT;
+  [[nodiscard]] StopCategory category(std::size_t joint) const noexcept TANDEM_RT {
+    return robot.category_of(joint, cause(joint));
+  }
   [[nodiscard]] bool stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT;
   [[nodiscard]] Node& node_of(std::size_t joint) noexcept { return nodes[joint_node[joint]]; }

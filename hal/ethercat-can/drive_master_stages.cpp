@@ -12,6 +12,21 @@ namespace {
 
 /// How long shut_down() waits for the drives to come to rest.
 constexpr std::int64_t kShutDownNs = 3'000'000'000;
+FaultCause node_cause(NodeTrouble trouble) noexcept {
+  switch (trouble) {
+    case NodeTrouble::kHeartbeatLost: return FaultCause::kHeartbeatLost;
+    case NodeTrouble::kRebooted: return FaultCause::kBoardRebooted;
+    case NodeTrouble::kLeftOperational: return FaultCause::kBoardStopped;
+    case NodeTrouble::kWrongIdentity:
+    case NodeTrouble::kSdoAbort:
+    case NodeTrouble::kNotOperational: return FaultCause::kBoardRefused;
+    case NodeTrouble::kNone:
+    case NodeTrouble::kNoBootUp:
+    case NodeTrouble::kFeedbackLost: return FaultCause::kBoardSilent;
+  }
+  return FaultCause::kBoardSilent;
+}
+
 constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kHeartbeatLost);
 
 }  // namespace
@@ -63,8 +78,22 @@ void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
 
 /// A joint whose category is "warn" never keeps the others from moving.
 bool DriveMaster::Impl::stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT {
-  return axes[joint].trouble() != AxisTrouble::kNone &&
-         robot.joints[joint].on_fault != StopCategory::kWarn;
+  return axes[joint].trouble() != AxisTrouble::kNone && category(joint) != StopCategory::kWarn;
+}
+
+FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT {
+  const AxisMaster& axis = axes[joint];
+  switch (axis.trouble()) {
+    case AxisTrouble::kNone: break;
+    case AxisTrouble::kDriveFault:
+      return axis.fault_code() == static_cast<std::uint16_t>(canopen::ErrorCode::kEmergencyInput)
+                 ? FaultCause::kEmergencyInput
+                 : FaultCause::kDrive;
+    case AxisTrouble::kNotEnabled: return FaultCause::kNotEnabled;
+    case AxisTrouble::kLeftEnabled: return FaultCause::kLeftEnabled;
+    case AxisTrouble::kNodeLost: return node_cause(nodes[joint_node[joint]].master.trouble());
+  }
+  return FaultCause::kDrive;
 }
 
 /// reset() is through when every joint follows again, or when nothing is under way any more and a
@@ -117,7 +146,7 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
     } else {
       is_new = axis.check(now_ns);
     }
-    if (is_new) worst = std::min(worst, robot.joints[joint].on_fault);
+    if (is_new) worst = std::min(worst, category(joint));
   }
   if (worst != StopCategory::kWarn) react(worst);
 }
@@ -242,7 +271,7 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM
     if (axis.goal() == Goal::kReset) {  // the cause is still there: stays latched
       axis.set_goal(Goal::kNothing, now_ns);
     } else {
-      worst = std::min(worst, robot.joints[joint].on_fault);
+      worst = std::min(worst, category(joint));
       if (stage == Stage::kEnabling) return fail();
     }
   }

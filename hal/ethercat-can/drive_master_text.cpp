@@ -35,6 +35,11 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 }  // namespace
 
+std::string DriveMaster::error_text(std::uint32_t code) {
+  return fmt::format("{} (error code 0x{:04X})",
+                     canopen::to_string(static_cast<canopen::ErrorCode>(code)), code);
+}
+
 std::string DriveMaster::Impl::joint_name(std::size_t joint) const {
   const Node& node = nodes[joint_node[joint]];
   return fmt::format("joint {} (board {}, node {}, axis {})", robot.joints[joint].name,
@@ -108,9 +113,8 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
   switch (axis.trouble()) {
     case AxisTrouble::kNone: return {};
     case AxisTrouble::kDriveFault:
-      return fmt::format("{}: {} (error code 0x{:04X}) at {:.3f} s", joint_name(joint),
-                         canopen::to_string(static_cast<canopen::ErrorCode>(axis.fault_code())),
-                         axis.fault_code(), at_s);
+      return fmt::format("{}: {} at {:.3f} s", joint_name(joint), error_text(axis.fault_code()),
+                         at_s);
     case AxisTrouble::kNotEnabled:
       return fmt::format("{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
                          "0x{:04X}", joint_name(joint), canopen::to_string(axis.drive()),

@@ -152,6 +152,7 @@ class EmulatedRobot {
     double supply_V = 0.0;      // most that there is
     std::uint32_t frozen[2] = {};
     std::uint32_t unplugged[2] = {};
+    std::uint32_t emergency_stop = 0, padding = 0;
   };
 
   EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig& config, Plant plant,

@@ -66,6 +66,7 @@ void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
   for (std::size_t j = 0; j < disturbances_.size(); ++j) {
     Disturbance& one = disturbances_[j];
     one.supply_V = supply_V_[j];
+    one.emergency_stop = 0;
     for (std::size_t side : {0u, 1u}) {
       one.jump_rad[side] = 0.0;
       one.frozen[side] = one.unplugged[side] = 0;
@@ -86,6 +87,10 @@ void EmulatedRobot::apply(const FaultSlot& slot, std::int64_t time_ns) noexcept 
     for (const std::size_t j : boards_[static_cast<std::size_t>(fault.board)].joints) {
       const double volts = ramp(supply_V_[j], fault.value, since_ns, fault.ramp_ns);
       disturbances_[j].supply_V = std::min(disturbances_[j].supply_V, volts);
+    }
+  } else if (fault.kind == FaultKind::kEmergencyStop) {
+    for (const std::size_t j : boards_[static_cast<std::size_t>(fault.board)].joints) {
+      disturbances_[j].emergency_stop |= slot.active;
     }
   } else {
     apply_to_board(slot);
@@ -153,6 +158,7 @@ void EmulatedRobot::disturb(std::size_t joint, firmware::AxisSense& pins) const 
     if (one.unplugged[side] != 0) *angle[side] = kNaN;
   }
   pins.bus_voltage_V = one.supply_V;
+  pins.emergency_stop = one.emergency_stop != 0;
 }
 
 void EmulatedRobot::release_late_answers() noexcept {

@@ -144,7 +144,8 @@ void read_target(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
       fault.number = static_cast<std::uint32_t>(table.integer(
           fault.kind == FaultKind::kBoardIdentity ? "product" : "revision", 0, kAnyU32));
       return;
-    case FaultKind::kBoardDuplicate: fault.board = index_of(table, "board", robot.boards); return;
+    case FaultKind::kBoardDuplicate:
+    case FaultKind::kEmergencyStop: fault.board = index_of(table, "board", robot.boards); return;
     case FaultKind::kSupplySag:
       fault.board = index_of(table, "board", robot.boards);
       fault.value = table.number("volts", {0.0, 1e4});

@@ -29,6 +29,12 @@ class SimRobot final : public hal::Backend {
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
+  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
+    return master_->fault_cause(joint);
+  }
+  [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
+    return cause == hal::FaultCause::kDrive ? hal::can::DriveMaster::error_text(code) : Backend::fault_text(cause, code);
+  }
   void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master_->shut_down(); }

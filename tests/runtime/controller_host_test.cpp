@@ -119,6 +119,7 @@ TEST_F(ControllerHostOfFake, HoldKeepsAPositionReferenceAndItsFeedForward) {
   command_.torque_Nm()[1] = 9.0;
   state_.position_rad()[0] = 0.45;
   state_.position_rad()[1] = -0.2;
+  state_.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kOperationEnabled);
   host_.hold(state_, command_);
   EXPECT_EQ(command_.position_rad()[0], 0.5);
   EXPECT_EQ(command_.torque_Nm()[0], 7.0);
@@ -126,6 +127,17 @@ TEST_F(ControllerHostOfFake, HoldKeepsAPositionReferenceAndItsFeedForward) {
   EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kPosition));
   EXPECT_EQ(command_.position_rad()[1], -0.2);
   EXPECT_EQ(command_.torque_Nm()[1], 0.0);
+}
+
+TEST_F(ControllerHostOfFake, HoldFollowsAJointWhoseDriveIsOff) {
+  command_.mode()[0] = static_cast<std::int8_t>(ControlMode::kPosition);
+  command_.position_rad()[0] = 0.5;
+  command_.torque_Nm()[0] = 7.0;
+  state_.position_rad()[0] = 0.45;
+  state_.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kFault);
+  host_.hold(state_, command_);
+  EXPECT_EQ(command_.position_rad()[0], 0.45);
+  EXPECT_EQ(command_.torque_Nm()[0], 0.0);
 }
 
 }  // namespace

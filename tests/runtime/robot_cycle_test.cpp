@@ -136,7 +136,7 @@ TEST(RobotCycle, MeasuresHowWellEachJointFollows) {
 TEST(RobotCycle, StopsInOrderOnRequest) {
   TestRun run;
   run.steps(100);
-  run.cycle->request_stop();
+  run.cycle->requests().end_run();
   run.cycle->run();
   EXPECT_EQ(run.controller->stops, 1);
   EXPECT_LT(run.cycle->running_cycles(), kRunning);
@@ -188,7 +188,7 @@ TEST(RobotCycle, HoldsEveryJointWhenTheFaultyOneAsksForIt) {
   run.backend.faulted_joint = 1;
   run.backend.latch_on_fault = true;
   run.steps(1);
-  EXPECT_EQ(run.cycle->phase(), RunPhase::kHolding);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
   const double held = run.cycle->command().position_rad()[0];
   run.steps(50);
   EXPECT_EQ(run.cycle->command().position_rad()[0], held);

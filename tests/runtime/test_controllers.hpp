@@ -24,6 +24,7 @@ class Sine : public Controller {
   }
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage&) noexcept override {
+    ++starts;
     began_ns_ = time.time_ns;
     for (std::size_t i = 0; i < joints_.size(); ++i) middle_[i] = state.position_rad()[joints_[i]];
   }
@@ -46,7 +47,7 @@ class Sine : public Controller {
 
   Code answer = Code::kOk;
   bool not_finite = false, allocates = false;
-  int updates = 0, stops = 0;
+  int updates = 0, starts = 0, stops = 0;
 
  private:
   std::vector<std::size_t> joints_;

@@ -1,0 +1,24 @@
+#include "hal/backend.hpp"
+
+#include <cstdio>
+
+namespace tandem::hal {
+
+std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
+  switch (cause) {
+    case FaultCause::kDrive: break;
+    case FaultCause::kEmergencyInput: return "the emergency stop input of its board is active";
+    case FaultCause::kNotEnabled: return "the drive was not enabled in time";
+    case FaultCause::kLeftEnabled: return "the drive was disabled by itself";
+    case FaultCause::kBoardSilent: return "its board sends no feedback any more";
+    case FaultCause::kHeartbeatLost: return "its board's heartbeat was lost";
+    case FaultCause::kBoardRebooted: return "its board booted again by itself";
+    case FaultCause::kBoardStopped: return "its board left operation by itself";
+    case FaultCause::kBoardRefused: return "its board cannot be configured";
+  }
+  char text[48];
+  std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);
+  return text;
+}
+
+}  // namespace tandem::hal

@@ -1,0 +1,303 @@
+// Faults that wait, the reset that clears them, and the emergency stop, on first-order joints.
+#include <csignal>
+
+#include "log/log_file.hpp"
+#include "rt/clock.hpp"
+#include "rt/stop_signal.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/log/scratch_folder.hpp"
+#include "tests/rt/fake_clock.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/support/rt_trap.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::StopCategory;
+
+/// Past bring-up, with faults that wait for a reset.
+struct Waiting : ::testing::Test {
+  Waiting() { start({.settle_cycles = 10, .after_stop = AfterStop::kWait}); }
+  ~Waiting() override { (void)rt::take_emergency_stop(); }
+
+  void start(CycleConfig config, StopCategory category = StopCategory::kCategory1,
+             rt::Clock* other_clock = nullptr, log::Recorder* recorder = nullptr) {
+    robot = hal::test::fake_robot();
+    for (hal::JointConfig& joint : robot.joints) joint.on_fault = category;
+    backend = std::make_unique<test::FirstOrderRobot>(robot);
+    backend->latch_on_fault = category != StopCategory::kWarn;
+    host = std::make_unique<ControllerHost>(robot, nullptr, 1'000'000);
+    auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{0});
+    controller = sine.get();
+    ASSERT_TRUE(host->add("sine", std::move(sine), test::parameters()));
+    if (config.running_cycles == 0) config.running_cycles = 1000;
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{robot, *backend, *host, other_clock == nullptr ? clock : *other_clock, recorder},
+        config);
+    steps(100);
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+  }
+  /// Until `phase` is reached. @return cycles taken
+  int until(RunPhase phase, int most = 200) {
+    int taken = 0;
+    while (taken < most && cycle->phase() != phase) {
+      (void)cycle->step();
+      ++taken;
+    }
+    EXPECT_EQ(cycle->phase(), phase);
+    return taken;
+  }
+
+  hal::RobotConfig robot;
+  rt::WallClock clock;
+  std::unique_ptr<test::FirstOrderRobot> backend;
+  std::unique_ptr<ControllerHost> host;
+  test::Sine* controller = nullptr;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST_F(Waiting, AFaultLatchesAndTheLoopGoesOn) {
+  backend->faulted_joint = 1;
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory1);
+  backend->faulted_joint = -1;
+  steps(3000);  // longer than the run
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(controller->stops, 1);
+  EXPECT_EQ(cycle->progress().latched.load(), 1U);
+  cycle->requests().end_run();
+  until(RunPhase::kDone);
+  EXPECT_TRUE(cycle->faults().at(0).latched);
+}
+
+TEST_F(Waiting, AResetHoldsEveryJointThenStartsTheControllersAgain) {
+  backend->faulted_joint = 1;
+  steps(50);
+  const int updates = controller->updates;
+  cycle->requests().reset_faults();
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kResetting);
+  EXPECT_EQ(until(RunPhase::kSettling), 5);
+  EXPECT_EQ(until(RunPhase::kRunning), 10);
+  EXPECT_EQ(controller->starts, 2);
+  EXPECT_EQ(controller->updates, updates + 1);
+  const Fault fault = cycle->faults().at(0);
+  EXPECT_FALSE(fault.latched);
+  EXPECT_DOUBLE_EQ(fault.time_s, 0.1);
+  EXPECT_DOUBLE_EQ(fault.cleared_s, 0.155);
+  EXPECT_EQ(fault.category, StopCategory::kCategory1);
+  EXPECT_EQ(fault.joint, "elbow");
+  EXPECT_EQ(fault.board, "board");
+  until(RunPhase::kDone, 2000);
+  EXPECT_EQ(cycle->running_cycles(), 1000U) << "the time in fault is not the run's";
+}
+
+TEST_F(Waiting, AResetWhoseCauseIsStillThereStaysLatchedAndIsTold) {
+  backend->faulted_joint = 1;
+  steps(10);
+  backend->reset_clears = false;
+  cycle->requests().reset_faults();
+  until(RunPhase::kResetting);
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(cycle->progress().failed_resets.load(), 1U);
+  EXPECT_EQ(cycle->progress().resets.load(), 0U);
+  EXPECT_TRUE(cycle->faults().at(0).latched);
+  EXPECT_EQ(controller->starts, 1);
+}
+
+TEST_F(Waiting, AResetWhileNothingIsLatchedChangesNothing) {
+  const int updates = controller->updates;
+  cycle->requests().reset_faults();
+  steps(10);
+  EXPECT_EQ(controller->updates, updates + 10);
+  EXPECT_EQ(controller->starts, 1);
+  EXPECT_EQ(cycle->progress().resets.load(), 0U);
+}
+
+TEST_F(Waiting, ASecondFaultIsNotedToo) {
+  backend->faulted_joint = 1;
+  steps(10);
+  robot.joints[2].on_fault = StopCategory::kCategory0;
+  backend->lost_joint = 2;
+  steps(20);
+  EXPECT_EQ(cycle->faults().size(), 2U);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory0) << "the harder one is carried out";
+  for (const std::int8_t mode : cycle->command().mode()) EXPECT_EQ(mode, 0);
+}
+
+TEST_F(Waiting, AJointThatOnlyWarnsIsResetToo) {
+  start({.settle_cycles = 10, .after_stop = AfterStop::kWait}, StopCategory::kWarn);
+  backend->faulted_joint = 1;
+  steps(10);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(backend->stops, 0U);
+  cycle->requests().reset_faults();
+  until(RunPhase::kResetting);
+  until(RunPhase::kRunning);
+  EXPECT_EQ(controller->starts, 2);
+  EXPECT_FALSE(cycle->faults().at(0).latched);
+}
+
+TEST_F(Waiting, ASensorThatCameBackIsClearedWithoutStoppingAnything) {
+  backend->lost_sensor = 0;
+  steps(20);
+  backend->lost_sensor = -1;
+  steps(20);
+  EXPECT_TRUE(cycle->faults().at(0).latched);
+  cycle->requests().reset_faults();
+  steps(1);
+  EXPECT_FALSE(cycle->faults().at(0).latched);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(controller->starts, 1);
+}
+
+TEST_F(Waiting, WhatTheLoopFindsByItselfUsesTheSameStop) {
+  controller->answer = Code::kOutOfRange;
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory1);
+  controller->answer = Code::kOk;
+  cycle->requests().reset_faults();
+  until(RunPhase::kRunning);
+
+  controller->not_finite = true;
+  until(RunPhase::kFaulted);
+  controller->not_finite = false;
+  cycle->requests().reset_faults();
+  until(RunPhase::kRunning);
+
+  backend->answer = Code::kBusOff;
+  until(RunPhase::kFaulted);
+  backend->answer = Code::kOk;
+  cycle->requests().reset_faults();
+  until(RunPhase::kRunning);
+  EXPECT_EQ(cycle->faults().size(), 3U);
+  EXPECT_EQ(controller->starts, 4);
+}
+
+TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
+  rt::FakeClock slow;
+  start({.loop = {.pacing = rt::Pacing::kWallClock,
+                  .on_overrun = rt::OverrunPolicy::kStop,
+                  .stop_late = 2,
+                  .stop_window = 64},
+         .after_stop = AfterStop::kWait},
+        StopCategory::kCategory1, &slow);
+  for (int i = 0; i < 2; ++i) {
+    slow.now += 1'500'000;
+    steps(1);
+  }
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  cycle->requests().reset_faults();
+  until(RunPhase::kRunning);
+  slow.now += 1'500'000;
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+}
+
+TEST_F(Waiting, AnEmergencyStopOnRequestStopsInTheNextCycle) {
+  for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1}) {
+    start({.after_stop = AfterStop::kWait});
+    cycle->requests().emergency_stop(category);
+    steps(1);
+    EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+    EXPECT_EQ(backend->latched, category);
+    EXPECT_EQ(cycle->faults().at(0).text, "emergency stop on request");
+    EXPECT_EQ(cycle->faults().at(0).category, category);
+    cycle->requests().reset_faults();
+    until(RunPhase::kRunning);
+  }
+}
+
+TEST_F(Waiting, AnEmergencyStopBySignalFollowsTheRobotsCategory) {
+  rt::install_emergency_signal();
+  robot.emergency_stop = StopCategory::kCategory0;
+  ASSERT_EQ(::raise(SIGUSR1), 0);
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory0);
+  EXPECT_EQ(cycle->faults().at(0).text, "emergency stop by a signal");
+  steps(20);
+  EXPECT_EQ(cycle->faults().size(), 1U) << "once per signal";
+  ASSERT_EQ(::raise(SIGUSR1), 0);
+  steps(1);
+  EXPECT_EQ(cycle->faults().size(), 2U);
+}
+
+TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
+  start({});
+  cycle->requests().emergency_stop(StopCategory::kCategory0);
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kShutDown);
+  EXPECT_EQ(backend->latched, StopCategory::kCategory0);
+}
+
+TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
+  backend = std::make_unique<test::FirstOrderRobot>(robot);
+  cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, *host, clock},
+                                       CycleConfig{.after_stop = AfterStop::kWait});
+  steps(5);
+  cycle->requests().emergency_stop(StopCategory::kCategory1);
+  until(RunPhase::kDone);
+  EXPECT_EQ(cycle->faults().size(), 1U);
+}
+
+TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
+  const log::ScratchFolder folder;
+  auto recorder = log::Recorder::open(folder / "a.mcap", {}, {});
+  ASSERT_TRUE(recorder);
+  start({.after_stop = AfterStop::kWait}, StopCategory::kCategory1, nullptr, recorder->get());
+  cycle->requests().emergency_stop(StopCategory::kCategory1);
+  until(RunPhase::kFaulted);
+  backend->reset_clears = false;
+  cycle->requests().reset_faults();
+  until(RunPhase::kResetting);
+  until(RunPhase::kFaulted);
+  backend->reset_clears = true;
+  cycle->requests().reset_faults();
+  until(RunPhase::kRunning);
+  cycle->requests().end_run();
+  until(RunPhase::kDone);
+  (void)(*recorder)->close();
+  const auto log = log::LogFile::open(folder / "a.mcap");
+  ASSERT_TRUE(log);
+  std::vector<std::string> texts;
+  const auto events = log->events();
+  ASSERT_TRUE(events);
+  for (const auto& event : *events) texts.push_back(event.text);
+  EXPECT_EQ(texts,
+            (std::vector<std::string>{"started", "bring-up done", "emergency stop on request",
+                                      "reset requested", "reset failed", "reset requested",
+                                      "reset done", "stop requested", "shut down"}));
+}
+
+TEST(FaultLog, CountsWhatDoesNotFit) {
+  FaultLog log;
+  for (std::size_t i = 0; i < FaultLog::kCapacity + 3; ++i) log.note({.cycle = i});
+  EXPECT_EQ(log.size(), FaultLog::kCapacity);
+  EXPECT_EQ(log.lost(), 3U);
+  log.clear(0, 5);
+  EXPECT_EQ(log.latched(), FaultLog::kCapacity - 1);
+}
+
+TEST(Requests, KeepTheHardestUntilTheyAreTaken) {
+  Requests requests;
+  requests.emergency_stop(StopCategory::kCategory1);
+  requests.emergency_stop(StopCategory::kCategory0);
+  requests.reset_faults();
+  const Requests::Asked asked = requests.take();
+  EXPECT_EQ(asked.emergency_stop, StopCategory::kCategory0);
+  EXPECT_TRUE(asked.reset);
+  EXPECT_FALSE(asked.end);
+  EXPECT_FALSE(requests.take().reset);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
