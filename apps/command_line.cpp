@@ -30,6 +30,16 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
 The same experiment and seed give the same bytes at every rate.)";
 
+const char kFaultExamples[] = R"(Examples:
+  tandem fault show                                  what has been latched, and what was cleared
+  tandem fault reset                                 exit status 1: a cause is still there
+Without --socket it is the only `tandem run` of this user.)";
+
+const char kEstopExamples[] = R"(Examples:
+  tandem estop                                       with the category of robot.toml's [safety]
+  tandem estop --category 0                          take the torque away at once
+`kill -USR1 PID` does the same without a socket.)";
+
 const char kAskExamples[] = R"(Examples:
   tandem ask '{"do": "help"}'                        what the running process can be asked
   tandem ask '{"do": "status"}' --socket /tmp/run.sock
@@ -142,7 +152,31 @@ void add_run(CLI::App& app, RunOptions& o) {
   app.add_option("--json", o.json, kJsonHelp);
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
+  app.add_option("--on-fault", o.on_fault,
+                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
+                 "the wall clock, end else)")
+      ->check(CLI::IsMember({"end", "wait"}));
   app.footer(kRunExamples);
+}
+
+void add_fault(CLI::App& app, FaultOptions& o) {
+  app.require_subcommand(1);
+  CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
+  CLI::App* reset = app.add_subcommand("reset", "Clear what is latched and go on where it stands");
+  for (CLI::App* one : {show, reset}) {
+    one->add_option("--socket", o.socket, kSocketHelp);
+    one->add_option("--json", o.json, kJsonHelp);
+    one->footer(kFaultExamples);
+  }
+  show->callback([&o] { o.action = FaultOptions::Action::kShow; });
+  reset->callback([&o] { o.action = FaultOptions::Action::kReset; });
+}
+
+void add_estop(CLI::App& app, EstopOptions& o) {
+  app.add_option("--category", o.category, "0 or 1, instead of the robot's [safety]")
+      ->check(CLI::IsMember({0, 1}));
+  app.add_option("--socket", o.socket, kSocketHelp);
+  app.footer(kEstopExamples);
 }
 
 void add_ask(CLI::App& app, AskOptions& o) {
@@ -331,6 +365,8 @@ Command parse_command_line(int argc, const char* const* argv) {
   RunOptions run;
   EmulateOptions emulate;
   AskOptions ask;
+  FaultOptions fault;
+  EstopOptions estop;
   InjectOptions inject;
   CheckOptions check;
   ModelOptions model;
@@ -341,6 +377,8 @@ Command parse_command_line(int argc, const char* const* argv) {
   DoctorOptions doctor;
   CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
   CLI::App* ask_app = app.add_subcommand("ask", "Ask a running process, in JSON");
+  CLI::App* fault_app = app.add_subcommand("fault", "Faults of a running run: show, reset");
+  CLI::App* estop_app = app.add_subcommand("estop", "Emergency stop of a running run");
   CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
   CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
   CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv, diff");
@@ -357,6 +395,8 @@ Command parse_command_line(int argc, const char* const* argv) {
   add_run(*run_app, run);
   add_emulate(*emulate_app, emulate);
   add_ask(*ask_app, ask);
+  add_fault(*fault_app, fault);
+  add_estop(*estop_app, estop);
   add_inject(*inject_app, inject);
   add_check(*check_app, check);
   add_model(*model_app, model);
@@ -376,6 +416,8 @@ Command parse_command_line(int argc, const char* const* argv) {
   if (run_app->parsed()) return run;
   if (emulate_app->parsed()) return emulate;
   if (ask_app->parsed()) return ask;
+  if (fault_app->parsed()) return fault;
+  if (estop_app->parsed()) return estop;
   if (inject_app->parsed()) return inject;
   if (check_app->parsed()) return check;
   if (model_app->parsed()) return model;

@@ -38,6 +38,20 @@ struct RunOptions {
   std::string json;                   ///< file, "-" for standard output, empty for none
   std::string socket;                 ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
+  std::string on_fault;               ///< "end", "wait"; empty: the experiment's
+};
+
+/// tandem fault show|reset
+struct FaultOptions {
+  enum class Action : std::uint8_t { kShow, kReset } action = Action::kShow;
+  std::string socket;  ///< empty: that of the only running `tandem run`
+  std::string json;
+};
+
+/// tandem estop
+struct EstopOptions {
+  std::optional<int> category;  ///< 0, 1; empty: the robot's
+  std::string socket;
 };
 
 /// tandem ask QUESTION
@@ -138,6 +152,8 @@ struct DoctorOptions {
 using Command = std::variant<Exit,
                              RunOptions,
                              AskOptions,
+                             FaultOptions,
+                             EstopOptions,
                              InjectOptions,
                              CheckOptions,
                              ModelOptions,

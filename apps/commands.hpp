@@ -11,6 +11,9 @@ namespace tandem::apps {
 
 /// Reads every file first, and runs only when all is right.
 [[nodiscard]] Exit run_command(const RunOptions& options);
+/// What a run has latched, and the request to clear it. Exit::kFault: a cause is still there.
+[[nodiscard]] Exit fault_command(const FaultOptions& options);
+[[nodiscard]] Exit estop_command(const EstopOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
 /// The robot on the other end of the wire, until it is asked to stop.

@@ -18,6 +18,8 @@ int main(int argc, char** argv) {
                      [](const RunOptions& options) { return run_command(options); },
                      [](const EmulateOptions& options) { return emulate_command(options); },
                      [](const AskOptions& options) { return ask_command(options); },
+                     [](const FaultOptions& options) { return fault_command(options); },
+                     [](const EstopOptions& options) { return estop_command(options); },
                      [](const InjectOptions& options) { return inject_command(options); },
                      [](const CheckOptions& options) { return check_command(options); },
                      [](const ModelOptions& options) { return model_command(options); },

@@ -92,7 +92,9 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
   std::vector<std::string> texts;
   for (const runtime::Fault& fault : cycle.faults()) {
-    texts.push_back(fmt::format("{:.3f} s: {}", fault.time_s, fault.text));
+    if (!fault.latched) continue;
+    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
+                                fault.joint.empty() ? "" : ": ", fault.text));
   }
   if (log && !log->error.empty()) {
     texts.push_back(fmt::format("the log lost {} messages: {}", log->failed, log->error));
@@ -109,6 +111,10 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   config.loop = e.loop;
   config.running_cycles = e.cycles();
   config.settle_cycles = e.settle_cycles();
+  config.after_stop = simulated ? runtime::AfterStop::kEnd : runtime::AfterStop::kWait;
+  if (e.after_stop) config.after_stop = *e.after_stop;
+  if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
+  if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
 }
@@ -188,7 +194,7 @@ Exit run(Composition& c, const RunOptions& options) {
                pace_text(c, options));
   }
   ControlRegistry commands;
-  add_run_commands(commands, cycle);
+  add_run_commands(commands, cycle, e.robot);
   if (c.sim != nullptr) {
     add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
       if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
@@ -197,6 +203,7 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
   rt::install_stop_signals();
+  rt::install_emergency_signal();
   std::optional<rt::NoCpuSleep> awake;
   if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
   LoopThread loop(cycle, e.thread);

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "apps/fault_table.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -11,15 +13,60 @@ Json status(const runtime::Progress& progress) {
           {"running_cycles", progress.running_cycles.load()},
           {"total_cycles", progress.total_cycles.load()},
           {"overruns", progress.overruns.load()},
-          {"dropped", progress.dropped.load()}};
+          {"dropped", progress.dropped.load()},
+          {"latched", progress.latched.load()},
+          {"resets", progress.resets.load()},
+          {"failed_resets", progress.failed_resets.load()}};
+}
+
+Result<Json> reset(runtime::RobotCycle& cycle) {
+  using runtime::RunPhase;
+  const RunPhase phase = cycle.progress().phase.load();
+  Json answer = status(cycle.progress());
+  if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
+  if (phase == RunPhase::kBringUp || phase == RunPhase::kShutDown || phase == RunPhase::kDone) {
+    return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
+                "a fault is reset while the run waits for it: tandem run --on-fault wait");
+  }
+  cycle.requests().reset_faults();
+  return answer;
+}
+
+Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCategory category) {
+  if (request.contains("category")) {
+    const auto number = request["category"].get<std::int64_t>();
+    if (number != 0 && number != 1) return fail("estop: \"category\" is not 0 or 1");
+    category = number == 0 ? hal::StopCategory::kCategory0 : hal::StopCategory::kCategory1;
+  }
+  cycle.requests().emergency_stop(category);
+  return Json{{"category", hal::to_string(category)}};
 }
 
 }  // namespace
 
-void add_run_commands(ControlRegistry& registry, const runtime::RobotCycle& cycle) {
+void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
+                      const hal::RobotConfig& robot) {
+  registry.add("status", "phase and counts of the run", {},
+               [&cycle](const Json&) -> Result<Json> { return status(cycle.progress()); });
+  registry.add("fault.show", "every fault of the run, latched or cleared", {},
+               [&cycle](const Json&) -> Result<Json> {
+                 Json answer = status(cycle.progress());
+                 answer["faults"] = faults_json(cycle.faults());
+                 answer["lost"] = cycle.fault_log().lost();
+                 return answer;
+               });
+  registry.add("fault.reset", "clears what is latched; resets or failed_resets counts on when done",
+               {}, [&cycle](const Json&) { return reset(cycle); });
   registry.add(
-      "status", "phase and counts of the run", {},
-      [&progress = cycle.progress()](const Json&) -> Result<Json> { return status(progress); });
+      "estop", "emergency stop, latched",
+      {{.name = "category",
+        .type = ControlKey::Type::kInteger,
+        .doc = "0 or 1; else what robot.toml's [safety] says"}},
+      [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
+  registry.add("run.stop", "ends the run in order", {}, [&cycle](const Json&) -> Result<Json> {
+    cycle.requests().end_run();
+    return Json::object();
+  });
 }
 
 std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry, const std::string& path,

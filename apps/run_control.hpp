@@ -11,8 +11,10 @@
 
 namespace tandem::apps {
 
-/// Adds "status". The cycle outlives the registry.
-void add_run_commands(ControlRegistry& registry, const runtime::RobotCycle& cycle);
+/// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop". Cycle and robot outlive the
+/// registry.
+void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
+                      const hal::RobotConfig& robot);
 
 /// Serves `registry` at `path`, the default one of `kind` when it is empty. A socket that cannot be
 /// opened is told on standard error and left out: it never stops a run.

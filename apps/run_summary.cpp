@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "apps/fault_table.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -111,12 +113,14 @@ Json RunSummary::json() const {
   json["base"] = base_json(cycle.statistics().base());
   json["round_trips"] = round_trips_json(composition.master->round_trips());
   json["faults"] = faults;
+  json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
   return json;
 }
 
 void RunSummary::print(std::FILE* out) const {
   print_worst_joints(*this, out);
+  print_faults(faults_json(cycle.faults()), out);
   fmt::print(out, "\n");
   if (composition.backend->waits_for_bus()) {
     print_slowest_nodes(composition.master->round_trips(), out);

@@ -87,6 +87,16 @@ rt::ThreadConfig read_realtime(TomlTable& root) {
   return thread;
 }
 
+std::optional<AfterStop> read_faults(TomlTable table) {
+  std::optional<AfterStop> after_stop;
+  if (table.has("after_stop")) {
+    const bool ends = table.choice("after_stop", {"end", "wait"}) == "end";
+    after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
+  }
+  table.finish();
+  return after_stop;
+}
+
 LogOptions read_log(TomlTable table) {
   LogOptions log;
   log.folder = table.text_or("folder", log.folder);
@@ -140,6 +150,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.hal = read_hal(root.table_or_empty("hal"), e.sim);
   read_overrun(root.table_or_empty("overrun"), e.loop);
   e.thread = read_realtime(root);
+  e.after_stop = read_faults(root.table_or_empty("faults"));
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
   read_controllers(root, e.controllers);

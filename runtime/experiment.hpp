@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "model/urdf.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
+#include "runtime/after_stop.hpp"
 
 namespace tandem::runtime {
 
@@ -78,6 +80,7 @@ struct Experiment {
   SimOptions sim;
   rt::LoopConfig loop;      ///< period and [overrun]; the caller sets pacing and rate
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
+  std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   LogOptions log;
   ReportOptions report;
   std::vector<ControllerSpec> controllers;

@@ -13,6 +13,7 @@
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
 #include "rt/cyclic_loop.hpp"
+#include "runtime/after_stop.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_trace.hpp"
 #include "runtime/fault.hpp"
@@ -21,12 +22,6 @@
 #include "runtime/run_statistics.hpp"
 
 namespace tandem::runtime {
-
-/// What comes after a stop of category 0 or 1. During bring-up it is always the end.
-enum class AfterStop : std::uint8_t {
-  kEnd,   ///< the run: the robot is shut down. After "hold" when the run's time is over.
-  kWait,  ///< latched, for a reset or the request to end the run
-};
 
 struct CycleConfig {
   rt::LoopConfig loop{};

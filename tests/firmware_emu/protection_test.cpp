@@ -322,5 +322,41 @@ TEST_F(Guard, DoesNotBumpTheJointWhenAFaultIsResetAndTheDriveEnabledAgain) {
   EXPECT_LT(std::abs(rig.drives[0].voltage_V), 1.0);
 }
 
+TEST(Emergency, InputFaultsEveryAxisAndIsNotResetWhileItIsActive) {
+  Rig rig(board_setup(2));
+  rig.start();
+  rig.enable();
+  rig.seen.clear();
+  rig.tamper = [](std::vector<AxisSense>& sense) {
+    for (AxisSense& pins : sense) pins.emergency_stop = true;
+  };
+  rig.cycle();
+  EXPECT_EQ(rig.object<std::uint32_t>(0x60FD), 0x8U);
+  for (int axis = 0; axis < 2; ++axis) {
+    EXPECT_EQ(rig.state(axis), canopen::DriveState::kFaultReactionActive);
+    EXPECT_EQ(rig.error(axis), 0xFF02);
+  }
+  const auto told = rig.frames_of(0x085);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].data[0], 0x02);
+  EXPECT_EQ(told[1].data[1], 0xFF);
+  EXPECT_EQ(told[1].data[3], 1) << "axis";
+  rig.cycles(2000);
+  const auto reset = [&rig] {
+    for (const int word : {0x00, 0x80, 0x00}) {
+      for (auto& command : rig.commands) command.controlword = static_cast<std::uint16_t>(word);
+      rig.cycles(3);
+    }
+  };
+  reset();
+  EXPECT_EQ(rig.state(0), canopen::DriveState::kFault);
+  rig.tamper = nullptr;
+  rig.cycles(10);
+  EXPECT_EQ(rig.state(0), canopen::DriveState::kFault) << "latched";
+  reset();
+  EXPECT_EQ(rig.state(0), canopen::DriveState::kSwitchOnDisabled);
+  EXPECT_EQ(rig.state(1), canopen::DriveState::kSwitchOnDisabled);
+}
+
 }  // namespace
 }  // namespace tandem::firmware::testing

@@ -7,6 +7,7 @@ namespace tandem::runtime {
 namespace {
 
 using hal::ControlMode;
+using hal::DriveState;
 using test::parameters;
 using test::Sine;
 

@@ -1,0 +1,89 @@
+// tandem fault show|reset and tandem estop: what they ask a running process, and its answer.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/control_client.hpp"
+#include "apps/fault_table.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+/// A board that is configured anew takes some seconds.
+constexpr std::chrono::seconds kResetTime{30};
+
+Exit refused(const Error& error) {
+  print_errors({error});
+  return Exit::kUsage;
+}
+
+void print_answer(const Json& answer) {
+  fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
+  print_faults(answer.value("faults", Json::array()), stdout);
+}
+
+Exit show(const FaultOptions& options) {
+  const Result<Json> answer = ask(options.socket, "run", {{"do", "fault.show"}});
+  if (!answer) return refused(answer.error());
+  if (options.json != "-") print_answer(*answer);
+  if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
+  return Exit::kDone;
+}
+
+/// The run's answer once a reset is through; the last one when it takes too long.
+Result<Json> wait_for_reset(const std::string& path, const Json& before) {
+  const auto deadline = SteadyClock::now() + kResetTime;
+  for (;;) {
+    Result<Json> now = ask(path, {{"do", "fault.show"}});
+    if (!now) return now;
+    const bool through = now->value("resets", 0) > before.value("resets", 0) ||
+                         now->value("failed_resets", 0) > before.value("failed_resets", 0);
+    if (through || SteadyClock::now() > deadline) return now;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+Exit reset(const FaultOptions& options) {
+  const Result<std::string> path = find_control_socket(options.socket, "run");
+  if (!path) return refused(path.error());
+  const Result<Json> asked = ask(*path, {{"do", "fault.reset"}});
+  if (!asked) return refused(asked.error());
+  Json answer = *asked;
+  if (asked->value("latched", 0) > 0) {
+    const Result<Json> through = wait_for_reset(*path, *asked);
+    if (!through) return refused(through.error());
+    answer = *through;
+  }
+  const bool done = answer.value("resets", 0) > asked->value("resets", 0);
+  const bool nothing = asked->value("latched", 0) == 0;
+  if (options.json != "-") {
+    fmt::print("{}\n", nothing ? "nothing is latched"
+                       : done  ? "reset: every joint is enabled where it is"
+                               : "not reset: a cause is still there");
+    if (!nothing) print_answer(answer);
+  }
+  if (Status written = write_json(options.json, answer); !written) return refused(written.error());
+  return nothing || done ? Exit::kDone : Exit::kFault;
+}
+
+}  // namespace
+
+Exit fault_command(const FaultOptions& options) {
+  return options.action == FaultOptions::Action::kShow ? show(options) : reset(options);
+}
+
+Exit estop_command(const EstopOptions& options) {
+  Json question{{"do", "estop"}};
+  if (options.category) question["category"] = *options.category;
+  const Result<Json> answer = ask(options.socket, "run", question);
+  if (!answer) return refused(answer.error());
+  fmt::print("emergency stop, {}\n", answer->value("category", "?"));
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,50 @@
+#include "apps/fault_table.hpp"
+
+#include <fmt/core.h>
+
+namespace tandem::apps {
+namespace {
+
+const char* reaction(hal::StopCategory category) {
+  switch (category) {
+    case hal::StopCategory::kCategory0: return "torque off";
+    case hal::StopCategory::kCategory1: return "stop, then torque off";
+    case hal::StopCategory::kHold: return "every joint held";
+    case hal::StopCategory::kWarn: return "told";
+  }
+  return "?";
+}
+
+}  // namespace
+
+Json faults_json(const std::vector<runtime::Fault>& faults) {
+  Json list = Json::array();
+  for (const runtime::Fault& fault : faults) {
+    list.push_back({{"time_s", fault.time_s},
+                    {"cycle", fault.cycle},
+                    {"joint", fault.joint},
+                    {"board", fault.board},
+                    {"cause", fault.text},
+                    {"category", hal::to_string(fault.category)},
+                    {"reaction", reaction(fault.category)},
+                    {"latched", fault.latched},
+                    {"cleared_s", fault.latched ? Json(nullptr) : Json(fault.cleared_s)}});
+  }
+  return list;
+}
+
+void print_faults(const Json& faults, std::FILE* out) {
+  if (faults.empty()) return;
+  Table table({"faults", "joint", "board", "cause", "category", "reaction", "state"});
+  for (const Json& fault : faults) {
+    const bool latched = fault.value("latched", true);
+    table.add({fmt::format("{:.3f} s", fault.value("time_s", 0.0)), fault.value("joint", ""),
+               fault.value("board", ""), fault.value("cause", ""), fault.value("category", ""),
+               fault.value("reaction", ""),
+               latched ? std::string("latched")
+                       : fmt::format("cleared at {:.3f} s", fault["cleared_s"].get<double>())});
+  }
+  table.print(out);
+}
+
+}  // namespace tandem::apps
