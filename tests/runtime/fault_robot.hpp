@@ -80,6 +80,9 @@ class FaultRobot final : public hal::Backend {
   void reset() noexcept TANDEM_RT override { master->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master->shut_down(); }
   [[nodiscard]] bool archive(Archive&) override { return false; }
+  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
+    return master->fault_cause(joint);
+  }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
     const sim::Fault* fault = emulated->next_begun_fault();
     if (fault == nullptr) return {};

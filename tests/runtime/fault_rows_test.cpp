@@ -1,6 +1,9 @@
 // The rows of docs/faults.md, one test each: what goes wrong, how it is noticed, what follows, and
 // after how many cycles. The page's numbers are what is expected here.
 // Master, loop, controllers, boards, sensor nodes and joints.
+#include <csignal>
+
+#include "rt/stop_signal.hpp"
 #include "tests/runtime/fault_row.hpp"
 
 namespace tandem::runtime {
@@ -59,6 +62,42 @@ TEST(FaultRow, LoopStallsForLonger) {
   }
   expect_row(found);
   EXPECT_NE(rig.causes().find("0x8700"), std::string::npos) << rig.causes();
+}
+
+// --- emergency stop ---
+
+TEST(FaultRow, EmergencyStopByABoardsInput) {
+  ArmRig rig;
+  rig.run();
+  rig.inject(of(FaultKind::kEmergencyStop));
+  expect_row(rig.watch());
+  expect_stopped(rig, "emergency stop");
+}
+
+TEST(FaultRow, EmergencyStopByRequest) {
+  ArmRig rig;
+  rig.run();
+  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("emergency stop on request"), std::string::npos) << rig.causes();
+}
+
+TEST(FaultRow, EmergencyStopOfCategory0) {
+  ArmRig rig;
+  rig.run();
+  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory0);
+  const Outcome found = rig.watch();
+  expect_row(found);
+  EXPECT_EQ(found.open, found.safe) << "no braking";
+}
+
+TEST(FaultRow, EmergencyStopBySignal) {
+  rt::install_emergency_signal();
+  ArmRig rig;
+  rig.run();
+  ASSERT_EQ(::raise(SIGUSR1), 0);
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("emergency stop by a signal"), std::string::npos) << rig.causes();
 }
 
 // --- boards and sensor nodes ---
