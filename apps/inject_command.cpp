@@ -13,9 +13,8 @@ void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::i
   const ControlKey text{"scenario", ControlKey::Type::kText, true, "[[fault]] tables, TOML"};
   registry.add("inject", "inject faults, from the next cycle on", {text},
                [&robot, period_ns, add](const Json& request) -> Result<Json> {
-                 const auto faults =
-                     sim::parse_scenario(request["scenario"].get<std::string>(), "inject", robot,
-                                         period_ns);
+                 const auto faults = sim::parse_scenario(request["scenario"].get<std::string>(),
+                                                         "inject", robot, period_ns);
                  if (!faults) return std::unexpected(faults.error().front());
                  for (const sim::Fault& fault : *faults) {
                    if (Status added = add(fault); !added) return std::unexpected(added.error());
@@ -42,7 +41,8 @@ Exit inject_command(const InjectOptions& options) {
     print_errors({answer.error()});
     return Exit::kUsage;
   }
-  fmt::print("{} injected\n", answer->value("injected", 0) == 1 ? "the fault is" : "the faults are");
+  fmt::print("{} injected\n",
+             answer->value("injected", 0) == 1 ? "the fault is" : "the faults are");
   return Exit::kDone;
 }
 

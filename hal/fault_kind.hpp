@@ -35,9 +35,10 @@ enum class FaultKind : std::uint8_t {
   kBusDown,  ///< a cut cable, or a switched-off interface
 };
 inline constexpr std::array<std::string_view, 19> kFaultNames = {
-    "none",           "frame_drop",     "frame_delay",     "frame_duplicate", "frame_corrupt",
-    "frame_reorder",  "board_kill",     "board_reset",     "board_identity",  "board_revision",
-    "board_duplicate", "emergency_stop", "supply_sag",    "encoder_freeze",  "encoder_jump",    "encoder_unplug",
+    "none",           "frame_drop",     "frame_delay",     "frame_duplicate",
+    "frame_corrupt",  "frame_reorder",  "board_kill",      "board_reset",
+    "board_identity", "board_revision", "board_duplicate", "emergency_stop",
+    "supply_sag",     "encoder_freeze", "encoder_jump",    "encoder_unplug",
     "motor_overheat", "spring_break",   "bus_down"};
 
 /// As a scenario's `kind` says it.

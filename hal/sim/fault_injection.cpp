@@ -26,7 +26,8 @@ bool goes(Direction which, Direction frame) noexcept {
   return (static_cast<unsigned>(which) & static_cast<unsigned>(frame)) != 0;
 }
 
-bool selects(const Fault& fault, Direction direction, std::size_t bus, const Frame& frame) noexcept {
+bool selects(const Fault& fault, Direction direction, std::size_t bus,
+             const Frame& frame) noexcept {
   if (!goes(fault.direction, direction)) return false;
   if (fault.bus >= 0 && static_cast<std::size_t>(fault.bus) != bus) return false;
   // Identifiers without a node are those of NMT, SYNC and TIME.
@@ -114,8 +115,7 @@ void FaultInjection::pass(Direction direction, std::size_t bus, const Frame& in,
     if (kind == FaultKind::kFrameDrop) copies = 0;
     if (kind == FaultKind::kFrameDuplicate) copies = 2;
     if (kind == FaultKind::kFrameCorrupt) corrupt(slot, frame);
-    const std::uint64_t due =
-        kind == FaultKind::kFrameReorder ? kNever : step_ + slot.fault.steps;
+    const std::uint64_t due = kind == FaultKind::kFrameReorder ? kNever : step_ + slot.fault.steps;
     const bool waits = kind == FaultKind::kFrameReorder || kind == FaultKind::kFrameDelay;
     if (waits && hold(s, due, direction, bus, frame)) copies = 0;
   }
@@ -137,8 +137,8 @@ bool FaultInjection::next_due(Direction direction, std::size_t bus,
   return false;
 }
 
-bool FaultInjection::hold(std::size_t slot, std::uint64_t due, Direction direction,
-                          std::size_t bus, const Frame& frame) noexcept {
+bool FaultInjection::hold(std::size_t slot, std::uint64_t due, Direction direction, std::size_t bus,
+                          const Frame& frame) noexcept {
   if (held_count_ == held_.size()) return false;
   Held& held = held_[held_count_++];
   held = {};
@@ -161,8 +161,8 @@ void FaultInjection::take_held(std::size_t index, Frame& frame) noexcept {
 std::size_t FaultInjection::held_by(std::size_t slot, Direction direction,
                                     std::size_t bus) const noexcept {
   std::size_t i = 0;
-  while (i < held_count_ && (held_[i].slot != slot || held_[i].direction != direction ||
-                             held_[i].bus != bus)) {
+  while (i < held_count_ &&
+         (held_[i].slot != slot || held_[i].direction != direction || held_[i].bus != bus)) {
     ++i;
   }
   return i;

@@ -30,24 +30,24 @@ enum class EncoderSide : std::uint8_t { kLink, kMotor };
 
 /// One fault, its target by index in the robot's configuration. Plain data without padding.
 struct Fault {
-  std::int64_t start_ns = 0;       ///< after `from`
-  std::int64_t duration_ns = -1;   ///< -1: for good
-  std::int64_t ramp_ns = 0;        ///< in which a sag or a temperature is reached
-  double value = 0.0;              ///< jump [rad, or m of a slide], supply [V], winding [degC]
-  double probability = 1.0;        ///< that a selected frame is struck
-  std::uint64_t seed = 0;          ///< of what is random in it
-  std::int32_t bus = -1;           ///< -1: any
+  std::int64_t start_ns = 0;      ///< after `from`
+  std::int64_t duration_ns = -1;  ///< -1: for good
+  std::int64_t ramp_ns = 0;       ///< in which a sag or a temperature is reached
+  double value = 0.0;             ///< jump [rad, or m of a slide], supply [V], winding [degC]
+  double probability = 1.0;       ///< that a selected frame is struck
+  std::uint64_t seed = 0;         ///< of what is random in it
+  std::int32_t bus = -1;          ///< -1: any
   std::int32_t board = -1;
   std::int32_t sensor = -1;
   std::int32_t joint = -1;
-  std::uint32_t node_id = 0;       ///< frames whose COB-ID carries it; 0: any
+  std::uint32_t node_id = 0;  ///< frames whose COB-ID carries it; 0: any
   std::uint32_t cob_id = 0;
-  std::uint32_t cob_mask = 0;      ///< bits of the COB-ID that have to agree; 0: any
-  std::uint32_t count = 0;         ///< most frames that are struck; 0: no limit
-  std::uint32_t steps = 1;         ///< that a frame is delayed
-  std::uint32_t bits = 1;          ///< that are flipped in a frame
-  std::int32_t length = -1;        ///< that a frame gets; -1: its own
-  std::uint32_t number = 0;        ///< product code, revision
+  std::uint32_t cob_mask = 0;  ///< bits of the COB-ID that have to agree; 0: any
+  std::uint32_t count = 0;     ///< most frames that are struck; 0: no limit
+  std::uint32_t steps = 1;     ///< that a frame is delayed
+  std::uint32_t bits = 1;      ///< that are flipped in a frame
+  std::int32_t length = -1;    ///< that a frame gets; -1: its own
+  std::uint32_t number = 0;    ///< product code, revision
   hal::FaultKind kind = hal::FaultKind::kNone;
   FaultFrom from = FaultFrom::kPowerOn;
   Direction direction = Direction::kBoth;
@@ -85,7 +85,7 @@ static_assert(sizeof(FaultSlot) == 128);
 class FaultInjection {
  public:
   static constexpr std::size_t kMostFaults = 64;
-  static constexpr std::size_t kMostHeld = 256;  ///< frames; beyond it a frame is not delayed
+  static constexpr std::size_t kMostHeld = 256;     ///< frames; beyond it a frame is not delayed
   static constexpr std::size_t kMostFramesOut = 8;  ///< that one pass() gives
 
   explicit FaultInjection(std::uint64_t seed) noexcept : seed_(seed) {}
@@ -128,8 +128,8 @@ class FaultInjection {
   static_assert(sizeof(Held) == 96);
 
   [[nodiscard]] bool strikes(FaultSlot& slot) noexcept;
-  [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, Direction direction,
-                          std::size_t bus, const canopen::Frame& frame) noexcept;
+  [[nodiscard]] bool hold(std::size_t slot, std::uint64_t due, Direction direction, std::size_t bus,
+                          const canopen::Frame& frame) noexcept;
   void take_held(std::size_t index, canopen::Frame& frame) noexcept;
   [[nodiscard]] std::size_t held_by(std::size_t slot, Direction direction,
                                     std::size_t bus) const noexcept;

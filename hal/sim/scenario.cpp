@@ -174,8 +174,7 @@ Fault read_fault(TomlTable& table, const Context& context) {
   fault.kind = read_kind(table);
   read_times(table, context, fault);
   read_target(table, context.robot, fault);
-  const bool ramps =
-      fault.kind == FaultKind::kSupplySag || fault.kind == FaultKind::kMotorOverheat;
+  const bool ramps = fault.kind == FaultKind::kSupplySag || fault.kind == FaultKind::kMotorOverheat;
   if (ramps) fault.ramp_ns = ns(table.number_or("ramp_s", 0.0, {0.0, kLongest_s}));
   // Once and for all, so that an end would have no meaning.
   const bool momentary =
@@ -193,10 +192,10 @@ Fault read_fault(TomlTable& table, const Context& context) {
 bool is_literal(std::string_view value) {
   if (value == "true" || value == "false" || value.starts_with('"')) return true;
   const bool digit = std::ranges::any_of(value, [](char c) { return c >= '0' && c <= '9'; });
-  const bool number = value.find_first_not_of("0123456789+-._eExabcdefABCDEF") ==
-                      std::string_view::npos;
-  const bool starts = !value.empty() && (value[0] == '-' || value[0] == '+' ||
-                                         (value[0] >= '0' && value[0] <= '9'));
+  const bool number =
+      value.find_first_not_of("0123456789+-._eExabcdefABCDEF") == std::string_view::npos;
+  const bool starts = !value.empty() &&
+                      (value[0] == '-' || value[0] == '+' || (value[0] >= '0' && value[0] <= '9'));
   return digit && number && starts;
 }
 

@@ -86,12 +86,8 @@ TEST_P(Category, IsWhatTheOtherJointsDoWhenABoardDies) {
   for (int i = 0; i < 40; ++i) rig.step();
   const DriveMotion others = rig.axis(1).machine().motion();
   switch (GetParam()) {
-    case hal::StopCategory::kCategory0:
-      EXPECT_EQ(others, DriveMotion::kNone);
-      break;
-    case hal::StopCategory::kCategory1:
-      EXPECT_NE(others, DriveMotion::kFollow);
-      break;
+    case hal::StopCategory::kCategory0: EXPECT_EQ(others, DriveMotion::kNone); break;
+    case hal::StopCategory::kCategory1: EXPECT_NE(others, DriveMotion::kFollow); break;
     case hal::StopCategory::kHold:
       EXPECT_EQ(others, DriveMotion::kFollow);
       EXPECT_EQ(rig.backend->phase(), hal::Phase::kFault);

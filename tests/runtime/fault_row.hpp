@@ -18,9 +18,8 @@ using sim::Fault;
 /// The page's line of the running test, cell by cell: what | noticed by | reaction | noticed |
 /// safe | test.
 inline std::vector<std::string> row_of_this_test() {
-  const std::string name =
-      std::string("`FaultRow.") +
-      testing::UnitTest::GetInstance()->current_test_info()->name() + "`";
+  const std::string name = std::string("`FaultRow.") +
+                           testing::UnitTest::GetInstance()->current_test_info()->name() + "`";
   std::ifstream page(std::filesystem::path(TANDEM_SOURCE_DIR) / "docs/faults.md");
   for (std::string line; std::getline(page, line);) {
     if (line.find(name) == std::string::npos) continue;
@@ -70,7 +69,8 @@ struct Ur5e {
 struct ArmRig : private Ur5e, FaultRig {
   explicit ArmRig(std::vector<Fault> scenario = {},
                   hal::StopCategory on_fault = hal::StopCategory::kCategory1)
-      : FaultRig(with(loaded.robot, on_fault), loaded.kernels.get(), "ready", std::move(scenario)) {}
+      : FaultRig(with(loaded.robot, on_fault), loaded.kernels.get(), "ready", std::move(scenario)) {
+  }
   static hal::RobotConfig with(hal::RobotConfig config, hal::StopCategory on_fault) {
     for (hal::JointConfig& joint : config.joints) joint.on_fault = on_fault;
     return config;

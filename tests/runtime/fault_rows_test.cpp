@@ -122,8 +122,7 @@ TEST(FaultRow, BoardDies) {
 TEST(FaultRow, TwoBoardsShareANodeId) {
   ArmRig rig({of(FaultKind::kBoardDuplicate)});
   expect_row(rig.watch());
-  EXPECT_NE(rig.causes().find("two nodes answer under this id"), std::string::npos)
-      << rig.causes();
+  EXPECT_NE(rig.causes().find("two nodes answer under this id"), std::string::npos) << rig.causes();
 }
 
 TEST(FaultRow, AnswersComeTwice) {

@@ -112,7 +112,8 @@ TEST(FaultInjection, FlipsBitsOrShortens) {
   const Frame sent = frame(0x181, 0x55);
   const Frame got = line.step({sent}).at(0);
   int flipped = 0;
-  for (std::size_t i = 0; i < 8; ++i) flipped += std::popcount<std::uint8_t>(got.data[i] ^ sent.data[i]);
+  for (std::size_t i = 0; i < 8; ++i)
+    flipped += std::popcount<std::uint8_t>(got.data[i] ^ sent.data[i]);
   EXPECT_EQ(flipped, 1);
   EXPECT_EQ(got.length, sent.length);
   fault.length = 2;

@@ -15,7 +15,7 @@ namespace tandem::test {
 /// The swing in its loop, which holds the position that it finds.
 struct SwingLoop {
   explicit SwingLoop(const hal::RobotConfig& config, sim::SimRobotConfig sim = {.posture = "up"},
-                int order = 2)
+                     int order = 2)
       : robot(config),
         state(config.shape()),
         command(config.shape()),
