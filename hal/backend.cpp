@@ -15,6 +15,7 @@ std::string Backend::fault_text(FaultCause cause, std::uint32_t code) const {
     case FaultCause::kBoardRebooted: return "its board booted again by itself";
     case FaultCause::kBoardStopped: return "its board left operation by itself";
     case FaultCause::kBoardRefused: return "its board cannot be configured";
+    case FaultCause::kTwoBoards: return "two boards answer under its board's id";
   }
   char text[48];
   std::snprintf(text, sizeof text, "the drive reports error 0x%04X", code);

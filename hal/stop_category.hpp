@@ -26,6 +26,7 @@ enum class FaultCause : std::uint8_t {
   kBoardRebooted,
   kBoardStopped,    ///< its board left NMT operational by itself
   kBoardRefused,    ///< its board cannot be configured
+  kTwoBoards,       ///< two boards answer under its board's id
 };
 
 /// As the TOML has it: "category0".

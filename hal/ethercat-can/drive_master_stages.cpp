@@ -20,6 +20,7 @@ FaultCause node_cause(NodeTrouble trouble) noexcept {
     case NodeTrouble::kWrongIdentity:
     case NodeTrouble::kSdoAbort:
     case NodeTrouble::kNotOperational: return FaultCause::kBoardRefused;
+    case NodeTrouble::kTwoNodes: return FaultCause::kTwoBoards;
     case NodeTrouble::kNone:
     case NodeTrouble::kNoBootUp:
     case NodeTrouble::kFeedbackLost: return FaultCause::kBoardSilent;
