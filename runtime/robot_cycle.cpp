@@ -111,11 +111,11 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
   command_.time_ns()[0] = time_.time_ns;
   switch (phase_) {
     case RunPhase::kBringUp:
+    case RunPhase::kResetting:
       controllers_->release(command_);  // every reference follows its joint until it is enabled
       controllers_->hold(state_, command_);
       break;
-    case RunPhase::kSettling:
-    case RunPhase::kResetting: controllers_->hold(state_, command_); break;
+    case RunPhase::kSettling: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;

@@ -1,4 +1,4 @@
-// Emergency stops through the whole chain, of a joint in motion under gravity.
+// Stop, reset and emergency stop through the whole chain, of a joint in motion under gravity.
 #include "hal/sim/sim_robot.hpp"
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -8,9 +8,10 @@
 namespace tandem::runtime {
 namespace {
 
+using hal::FaultKind;
 using hal::StopCategory;
 
-/// The swing on a sine of 0.2 rad, whose faults wait for a reset.
+/// The swing on a sine of 0.5 rad, whose faults wait for a reset.
 struct Swing : ::testing::Test {
   void begin(StopCategory on_fault) {
     robot = tandem::test::swing_robot();
@@ -28,14 +29,44 @@ struct Swing : ::testing::Test {
         CycleParts{robot, *backend, *host, clock},
         CycleConfig{.settle_cycles = 200, .after_stop = AfterStop::kWait});
     until(RunPhase::kRunning);
-    steps(1030);  // in full motion
+    first_start_Nm = torque_step(50);
+    steps(980);  // in full motion
   }
   void steps(int count) {
     for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
   }
-  void until(RunPhase phase) {
-    for (int i = 0; i < 6000 && cycle->phase() != phase; ++i) (void)cycle->step();
+  int until(RunPhase phase, int most = 6000) {
+    int taken = 0;
+    while (taken < most && cycle->phase() != phase && cycle->step()) ++taken;
     EXPECT_EQ(cycle->phase(), phase) << backend->status_text();
+    return taken;
+  }
+  void inject(FaultKind kind, int cycles) {
+    sim::Fault fault;
+    fault.kind = kind;
+    (kind == FaultKind::kEncoderUnplug ? fault.joint : fault.board) = 0;
+    fault.duration_ns = std::int64_t{cycles} * 1'000'000;
+    ASSERT_EQ(backend->robot().inject(fault), Code::kOk);
+  }
+  /// Until the joint hangs still: nothing but friction brakes it once its bridge is open.
+  void come_to_rest() {
+    for (int still = 0, taken = 0; still < 500 && taken < 60'000; ++taken) {
+      ASSERT_TRUE(cycle->step());
+      still = std::abs(backend->plant().joint(0).velocity_rad_s) < 1e-3 ? still + 1 : 0;
+    }
+    ASSERT_LT(std::abs(backend->plant().joint(0).velocity_rad_s), 1e-3);
+  }
+  /// The largest change of the spring's torque in a cycle, over `count` cycles.
+  [[nodiscard]] double torque_step(int count) {
+    double largest = 0.0;
+    double before = cycle->state().torque_Nm()[0];
+    for (int i = 0; i < count; ++i) {
+      EXPECT_TRUE(cycle->step());
+      const double now = cycle->state().torque_Nm()[0];
+      largest = std::max(largest, std::abs(now - before));
+      before = now;
+    }
+    return largest;
   }
   [[nodiscard]] bool powered() const {
     return backend->robot().board(0).axis(0).machine().motion() != canopen::DriveMotion::kNone;
@@ -46,7 +77,70 @@ struct Swing : ::testing::Test {
   std::unique_ptr<ControllerHost> host;
   rt::WallClock clock;
   std::unique_ptr<RobotCycle> cycle;
+  double first_start_Nm = 0.0;  ///< torque_step() of the controller's own beginning, at first
 };
+
+// A jump of the reference by a hundredth of a radian would be 6 Nm at once (kp = 600 Nm/rad). At
+// rest, what a cycle may change is the torque sensor's quantum of 0.05 Nm, twice.
+TEST_F(Swing, GoesOnWithoutABumpAfterTheResetOfAFaultOfAnyCategory) {
+  constexpr double kBump_Nm = 0.11;
+  for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1,
+                                      StopCategory::kHold, StopCategory::kWarn}) {
+    SCOPED_TRACE(to_string(category));
+    begin(category);
+    inject(FaultKind::kEncoderUnplug, 5);
+    const double before = cycle->state().position_rad()[0];
+    come_to_rest();
+    const double rest = cycle->state().position_rad()[0];
+    ASSERT_GT(std::abs(rest - before), 0.05) << "the reference from before would be a bump";
+    ASSERT_EQ(cycle->fault_log().latched(), 1U);
+    cycle->requests().reset_faults();
+    until(RunPhase::kSettling);
+    EXPECT_NEAR(cycle->command().position_rad()[0], rest, 1e-4);
+    EXPECT_LT(torque_step(199), kBump_Nm) << "while it is held";
+    until(RunPhase::kRunning);
+    EXPECT_NEAR(cycle->command().position_rad()[0], cycle->state().position_rad()[0], 1e-4);
+    EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
+    EXPECT_EQ(cycle->fault_log().latched(), 0U);
+  }
+}
+
+// A joint that swings when it is enabled again is caught where it is, not where it was.
+TEST_F(Swing, IsCaughtInMotionWhereItIs) {
+  begin(StopCategory::kCategory0);
+  inject(FaultKind::kEncoderUnplug, 5);
+  steps(60);
+  cycle->requests().reset_faults();
+  until(RunPhase::kSettling);
+  const double way = std::abs(cycle->state().velocity_rad_s()[0]) * 2e-3 + 1e-4;
+  EXPECT_NEAR(cycle->command().position_rad()[0], cycle->state().position_rad()[0], way);
+}
+
+TEST_F(Swing, IsStoppedByItsBoardsEmergencyInputAndNotResetWhileThatIsActive) {
+  for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1}) {
+    SCOPED_TRACE(to_string(category));
+    begin(category);
+    inject(FaultKind::kEmergencyStop, 3000);
+    steps(1);
+    EXPECT_EQ(cycle->phase(), RunPhase::kFaulted) << "in the cycle of the input";
+    EXPECT_EQ(cycle->faults().at(0).text, "the emergency stop input of its board is active");
+    EXPECT_EQ(cycle->faults().at(0).category, category);
+    EXPECT_EQ(cycle->faults().at(0).board, "board");
+    steps(1400);
+    EXPECT_FALSE(powered());
+    cycle->requests().reset_faults();
+    until(RunPhase::kResetting);
+    until(RunPhase::kFaulted);
+    EXPECT_EQ(cycle->progress().failed_resets.load(), 1U);
+    EXPECT_FALSE(powered());
+    steps(2000);  // the input is inactive again
+    EXPECT_EQ(cycle->phase(), RunPhase::kFaulted) << "latched";
+    cycle->requests().reset_faults();
+    until(RunPhase::kResetting);
+    until(RunPhase::kRunning);
+    EXPECT_FALSE(cycle->faults().at(0).latched);
+  }
+}
 
 TEST_F(Swing, LosesItsTorqueACycleAfterAnEmergencyStopOfCategory0) {
   begin(StopCategory::kCategory1);
