@@ -219,6 +219,9 @@ Exit run(Composition& c, const RunOptions& options) {
     fmt::print(out, "\n");
     summary.print(out);
   }
+  for (const std::string& warning : c.master->warnings()) {
+    fmt::print(stderr, "warning: {}\n", warning);
+  }
   for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
   add_report(options, summary, out);
   if (const Status traced = add_trace(options, summary, out); !traced) {

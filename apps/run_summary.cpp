@@ -113,6 +113,7 @@ Json RunSummary::json() const {
   json["base"] = base_json(cycle.statistics().base());
   json["round_trips"] = round_trips_json(composition.master->round_trips());
   json["faults"] = faults;
+  json["warnings"] = composition.master->warnings();
   json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
   return json;

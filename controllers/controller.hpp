@@ -3,7 +3,9 @@
 // Layer: controllers.  Thread: configure non-RT; start, update, stop RT.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <span>
 #include <string>
@@ -77,8 +79,21 @@ class Controller {
   virtual void archive(Archive&) {}
 };
 
-/// Raised whenever a plugin built before the change could misbehave after it.
-inline constexpr std::uint32_t kControllerAbi = 1;
+/// FNV-1a of some numbers, folded to 32 bits.
+[[nodiscard]] constexpr std::uint32_t abi_of(std::initializer_list<std::size_t> numbers) noexcept {
+  std::uint64_t hash = 0xCBF29CE484222325U;
+  for (const std::size_t number : numbers) hash = (hash ^ number) * 0x100000001B3U;
+  return static_cast<std::uint32_t>(hash ^ (hash >> 32));
+}
+
+/// Another number whenever a plugin built before a change could misbehave after it: a size that a
+/// plugin sees changes it by itself, the first number is raised for everything else.
+inline constexpr std::uint32_t kControllerAbi =
+    abi_of({2, sizeof(ControllerSetup), sizeof(hal::RobotConfig), sizeof(hal::JointConfig),
+            sizeof(hal::ActuatorConfig), sizeof(hal::GainsConfig), sizeof(hal::BoardConfig),
+            sizeof(hal::BusConfig), sizeof(hal::SensorConfig), sizeof(hal::ContactConfig),
+            sizeof(hal::PostureConfig), sizeof(hal::StateImage), sizeof(hal::CommandImage),
+            sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

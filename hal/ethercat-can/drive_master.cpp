@@ -207,6 +207,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     node.next_part = 0;
     watch_doubles(node);
     node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
+    if (!complete && stage == Stage::kRunning && !shutting_down) ++node.missed;
     if (!node.master.running() || node.timeout_cycles == 0) continue;
     if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
       node.master.fail(NodeTrouble::kFeedbackLost, now_ns);
@@ -331,6 +332,7 @@ Code DriveMaster::send(const CommandImage& command,
   m.send_parameters(parameters);
   const bool taken = m.flush();
   if (m.stage == Impl::Stage::kFaulted) return Code::kFault;
+  if (!taken) ++m.unsent;
   return taken ? Code::kOk : Code::kQueueFull;
 }
 
@@ -368,6 +370,8 @@ std::size_t DriveMaster::nodes_in_operation(std::size_t bus) const noexcept TAND
 double DriveMaster::progress() const noexcept { return impl_->progress(); }
 std::string DriveMaster::status_text() const { return impl_->status(); }
 std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
+
+std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
 
 std::vector<RoundTrip> DriveMaster::round_trips() const {
   std::vector<RoundTrip> trips;

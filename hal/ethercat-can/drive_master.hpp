@@ -116,6 +116,11 @@ class DriveMaster {
   /// Values that a node refused at run time (gains), with the object and why; empty when none.
   [[nodiscard]] std::string parameter_error() const;
 
+  /// What went wrong and was borne, a sentence each: feedback that did not come, counted by node;
+  /// commands that a bus did not take; a refused value. Empty when nothing did. A measurement, no
+  /// state: not in a snapshot. Not RT.
+  [[nodiscard]] std::vector<std::string> warnings() const;
+
   /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.
   /// Not RT.
   [[nodiscard]] std::vector<RoundTrip> round_trips() const;

@@ -62,6 +62,7 @@ struct DriveMaster::Impl {
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
     rt::Histogram trip_time;
+    std::uint64_t missed = 0;  ///< cycles of operation without its whole feedback
   };
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
@@ -113,6 +114,7 @@ struct DriveMaster::Impl {
   [[nodiscard]] std::string step_text(const Node& node, const SdoStep& step) const;
   [[nodiscard]] std::string axis_text(std::size_t joint) const;
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
+  [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::string refused_text() const;
   [[nodiscard]] double progress() const noexcept;
 
@@ -143,6 +145,7 @@ struct DriveMaster::Impl {
   std::int32_t refused_node = -1;
   SdoStep refused_step;
   canopen::AbortCode refused_code = canopen::AbortCode::kNone;
+  std::uint64_t unsent = 0;  ///< cycles whose commands a bus did not take whole; no state
 };
 
 }  // namespace tandem::hal::can

@@ -167,6 +167,19 @@ std::string DriveMaster::Impl::status() const {
   return text;
 }
 
+std::vector<std::string> DriveMaster::Impl::warnings() const {
+  std::vector<std::string> texts;
+  for (const Node& node : nodes) {
+    if (node.missed == 0) continue;
+    texts.push_back(fmt::format("{} (node {} on bus {}): {} cycles without its feedback",
+                                node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
+                                node.missed));
+  }
+  if (unsent > 0) texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
+  if (refused_node >= 0) texts.push_back("a value was refused: " + refused_text());
+  return texts;
+}
+
 std::string DriveMaster::Impl::refused_text() const {
   if (refused_node < 0) return {};
   return fmt::format("{}: {} (abort code 0x{:08X})",

@@ -156,6 +156,33 @@ TEST(Exchange, AGainThatTheDriveRefusesIsNamed) {
             "object 2821:01 of joint Joint3 (board board_1, node 11, axis 1): value too low "
             "(abort code 0x06090032)");
   EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+  ASSERT_EQ(rig.master->warnings().size(), 1u);
+  EXPECT_EQ(rig.master->warnings()[0], "a value was refused: " + rig.master->parameter_error());
+}
+
+TEST(Exchange, FeedbackThatDoesNotComeIsCountedByNode) {
+  Rig rig;
+  rig.bring_up();
+  EXPECT_TRUE(rig.master->warnings().empty());
+  rig.present[1] = false;
+  rig.steps(3);
+  rig.present[1] = true;
+  rig.steps(5);
+  ASSERT_EQ(rig.master->warnings().size(), 1u);
+  EXPECT_EQ(rig.master->warnings()[0],
+            "board_1 (node 11 on bus legs): 3 cycles without its feedback");
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+}
+
+TEST(Exchange, CommandsThatABusDoesNotTakeAreCounted) {
+  Rig rig;
+  rig.bring_up();
+  const std::vector<canopen::Frame> many(512, canopen::make_heartbeat(127, {}));
+  (void)rig.read();
+  (void)rig.legs.master().send(many);  // the queue is full now
+  EXPECT_EQ(rig.write(), Code::kQueueFull);
+  ASSERT_EQ(rig.master->warnings().size(), 1u);
+  EXPECT_EQ(rig.master->warnings()[0], "a bus did not take the commands of 1 cycles");
 }
 
 TEST(Exchange, AnIdleJointIsDisabledAndComesBackWhereItIs) {
