@@ -15,7 +15,8 @@ std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
   std::unique_ptr<CanSockets> all(new CanSockets);
   Diagnostics errors;
   for (const hal::BusConfig& bus : robot.buses) {
-    auto opened = SocketCanBus::open({.interface = bus.interface, .fd = bus.fd, .side = side, .stamps = stamps});
+    auto opened = SocketCanBus::open(
+        {.interface = bus.interface, .fd = bus.fd, .side = side, .stamps = stamps});
     if (!opened) {
       Error error = opened.error();
       error.key = "bus '" + bus.name + "'" + (error.key.empty() ? "" : ", ") + error.key;

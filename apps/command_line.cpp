@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
 
+#include "apps/command_flags.hpp"
 #include "base/nearest.hpp"
 
 namespace tandem::apps {
@@ -12,8 +14,9 @@ namespace {
 const char kExamples[] = R"(Examples:
   tandem run config/coman/squat.toml                 simulate, as fast as the machine goes
   tandem run config/coman/squat.toml --realtime      at the speed of a clock
+  tandem emulate config/coman/squat.toml --lockstep  the robot on the other end of CAN
   tandem check config/coman/squat.toml               read every file, move nothing
-  tandem report runs/coman-squat-001.mcap                draw the plots of a run
+  tandem report runs/coman-squat-001.mcap            draw the plots of a run
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
@@ -21,291 +24,6 @@ const char kExamples[] = R"(Examples:
 `tandem COMMAND --help` tells more, with examples.
 
 Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
-
-const char kRunExamples[] = R"(Examples:
-  tandem run config/coman/squat.toml --report        and draw the plots
-  tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
-  tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
-  tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
-  tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
-The same experiment and seed give the same bytes at every rate.)";
-
-const char kFaultExamples[] = R"(Examples:
-  tandem fault show                                  what has been latched, and what was cleared
-  tandem fault reset                                 exit status 1: a cause is still there
-Without --socket it is the only `tandem run` of this user.)";
-
-const char kEstopExamples[] = R"(Examples:
-  tandem estop                                       with the category of robot.toml's [safety]
-  tandem estop --category 0                          take the torque away at once
-`kill -USR1 PID` does the same without a socket.)";
-
-const char kAskExamples[] = R"(Examples:
-  tandem ask '{"do": "help"}'                        what the running process can be asked
-  tandem ask '{"do": "status"}' --socket /tmp/run.sock
-Without --socket it is the only running process of this user.)";
-
-const char kCheckExamples[] = R"(Examples:
-  tandem check config/coman/squat.toml               an experiment: robot, description, plugins
-  tandem check config/coman/robot.toml               a robot by itself
-  tandem check --bus config/coman/squat.toml         the load of every bus, worst case
-  tandem check my_robot.toml --json -                errors with file, line, key and hint)";
-
-const char kModelBuildExamples[] = R"(Examples:
-  tandem model build config/coman/robot.toml
-  tandem model build my_robot/robot.toml -o /tmp/my_robot.so
-Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models), where
-`tandem run` finds it. A library that is up to date is left alone.)";
-
-const char kModelInfoExamples[] = R"(Examples:
-  tandem model info config/walkman/robot.toml
-  tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
-
-const char kLogInfoExamples[] = R"(Examples:
-  tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest)";
-
-const char kLogCsvExamples[] = R"(Examples:
-  tandem log csv runs/coman-squat-001.mcap > state.csv
-  tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
-
-const char kLogDiffExamples[] = R"(Examples:
-  tandem log diff runs/a.mcap runs/b.mcap            the same to the last bit, or where they part
-
-Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
-
-const char kEdsExamples[] = R"(Examples:
-  tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
-  tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for)";
-
-const char kReportExamples[] = R"(Examples:
-  tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
-  tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
-
-const char kLatencyExamples[] = R"(Examples:
-  tandem latency                                     ours beside cyclictest, idle, then under load
-  tandem latency --load idle --duration 60 --cpu 2,3
-  tandem latency --mode turns --cpu 3                one after the other on one CPU
-  tandem latency --json - --quiet | jq '.loads[].ratio'
-In mode `swap` both run at once and exchange their CPUs each slice; in `together` each keeps its
-own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. Nothing is judged.)";
-
-const char kDoctorExamples[] = R"(Examples:
-  tandem doctor                                      kernel, CPUs, interrupts, limits, memory
-  tandem doctor config/coman/robot.toml              and the CAN interfaces of its buses
-  tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
-Each finding comes with the command that mends it. The exit status does not depend on them.)";
-
-const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
-
-const char kSocketHelp[] =
-    "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
-
-const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
-
-const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
-
-const char kInjectExamples[] = R"(Examples:
-  tandem inject kind=board_kill board=left_leg_1 for_s=0.5
-  tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
-  tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
-  tandem inject 'kind = "bus_down"
-                 bus = "left_leg"'
-Every kind and key: docs/configuration.md, scenario.toml. What follows: docs/faults.md.)";
-
-const char kEmulateExamples[] = R"(Examples:
-  tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
-  tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
-  tandem emulate config/coman/robot.toml                   in real time, for `run --hal can`
-Interfaces without hardware:
-  ip link add can0 type vcan && ip link set can0 mtu 72 up)";
-
-void add_run(CLI::App& app, RunOptions& o) {
-  app.add_option("experiment", o.experiment, "Experiment TOML")->required();
-  CLI::Option* rate =
-      app.add_option("--rate", o.rate, "Simulated seconds per wall second (default: free running)")
-          ->check(CLI::PositiveNumber);
-  app.add_flag_callback(
-         "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
-      ->excludes(rate);
-  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
-  app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
-      ->check(CLI::IsMember({"sim", "can"}));
-  app.add_flag("--lockstep", o.lockstep, "CAN: wait for `tandem emulate --lockstep`, at any speed");
-  app.add_option("--interface", o.interfaces, kInterfaceHelp);
-  app.add_option("--record-frames", o.record_frames,
-                 "CAN: write every frame to this file, as candump -L does");
-  app.add_option("--scenario", o.scenario, kScenarioHelp);
-  CLI::Option* log =
-      app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
-  app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
-  app.add_option("--kernel-variant", o.kernel_variant,
-                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
-  app.add_flag("--report", o.report, "Draw the report after the run");
-  CLI::Option* trace =
-      app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
-  app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
-      ->needs(trace)
-      ->check(CLI::Range(1, 1'000'000));
-  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
-  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
-  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
-  app.add_option("--on-fault", o.on_fault,
-                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
-                 "the wall clock, end else)")
-      ->check(CLI::IsMember({"end", "wait"}));
-  app.footer(kRunExamples);
-}
-
-void add_fault(CLI::App& app, FaultOptions& o) {
-  app.require_subcommand(1);
-  CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
-  CLI::App* reset = app.add_subcommand("reset", "Clear what is latched and go on where it stands");
-  for (CLI::App* one : {show, reset}) {
-    one->add_option("--socket", o.socket, kSocketHelp);
-    one->add_option("--json", o.json, kJsonHelp);
-    one->footer(kFaultExamples);
-  }
-  show->callback([&o] { o.action = FaultOptions::Action::kShow; });
-  reset->callback([&o] { o.action = FaultOptions::Action::kReset; });
-}
-
-void add_estop(CLI::App& app, EstopOptions& o) {
-  app.add_option("--category", o.category, "0 or 1, instead of the robot's [safety]")
-      ->check(CLI::IsMember({0, 1}));
-  app.add_option("--socket", o.socket, kSocketHelp);
-  app.footer(kEstopExamples);
-}
-
-void add_ask(CLI::App& app, AskOptions& o) {
-  app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
-  app.add_option("--socket", o.socket, kSocketHelp);
-  app.footer(kAskExamples);
-}
-
-void add_inject(CLI::App& app, InjectOptions& o) {
-  app.add_option("fault", o.fault, "key=value words, or TOML")->required();
-  app.add_option("--socket", o.socket, kSocketHelp);
-  app.footer(kInjectExamples);
-}
-
-void add_emulate(CLI::App& app, EmulateOptions& o) {
-  app.add_option("file", o.file, "Robot or experiment TOML")->required();
-  app.add_flag("--lockstep", o.lockstep, "A step per SYNC, whatever the clock says");
-  app.add_option("--scenario", o.scenario, kScenarioHelp);
-  app.add_option("--posture", o.posture,
-                 "Where it starts (default: the experiment's, or the robot's first)");
-  app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
-  app.add_option("--period-ns", o.period_ns, "Of a step (default: the experiment's, or 1 ms)")
-      ->check(CLI::Range(10'000, 1'000'000'000));
-  app.add_option("--interface", o.interfaces, kInterfaceHelp);
-  app.add_option("--kernel-variant", o.kernel_variant,
-                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
-  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
-  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
-  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kEmulateExamples);
-}
-
-void add_check(CLI::App& app, CheckOptions& o) {
-  app.add_option("file", o.file, "Experiment or robot TOML")->required();
-  app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kCheckExamples);
-}
-
-void add_model(CLI::App& app, ModelOptions& o) {
-  app.require_subcommand(1);
-  CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
-  build->add_option("robot", o.robot, "Robot TOML")->required();
-  build->add_option("-o,--output", o.output, "Shared library to write");
-  build->add_flag("--force", o.force, "Build even when the library is up to date");
-  build->footer(kModelBuildExamples);
-  build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
-  CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
-  info->add_option("robot", o.robot, "Robot TOML")->required();
-  info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
-  info->add_option("--json", o.json, kJsonHelp);
-  info->footer(kModelInfoExamples);
-  info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
-}
-
-void add_log(CLI::App& app, LogOptions& o) {
-  app.require_subcommand(1);
-  CLI::App* info = app.add_subcommand("info", "What a log holds");
-  info->add_option("log", o.log, "MCAP file")->required();
-  info->add_option("--json", o.json, kJsonHelp);
-  info->footer(kLogInfoExamples);
-  info->callback([&o] { o.action = LogOptions::Action::kInfo; });
-  CLI::App* csv = app.add_subcommand("csv", "One topic as comma-separated values");
-  csv->add_option("log", o.log, "MCAP file")->required();
-  csv->add_option("--topic", o.topic, "Topic to write (default: the state)");
-  csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")->delimiter(',');
-  csv->add_option("--every", o.every, "Write each n-th message")->check(CLI::PositiveNumber);
-  csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
-  csv->footer(kLogCsvExamples);
-  csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
-  CLI::App* diff = app.add_subcommand("diff", "Compare two runs bit by bit");
-  diff->add_option("log", o.log, "MCAP file")->required();
-  diff->add_option("other", o.other, "MCAP file")->required();
-  diff->add_option("--json", o.json, kJsonHelp);
-  diff->footer(kLogDiffExamples);
-  diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
-}
-
-void add_eds(CLI::App& app, EdsOptions& o) {
-  app.add_option("robot", o.robot, "Robot TOML")->required();
-  app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kEdsExamples);
-}
-
-void add_report(CLI::App& app, ReportOptions& o) {
-  app.add_option("log", o.log, "MCAP file")->required();
-  app.add_option("other", o.other, "A second log, laid over the first");
-  app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kReportExamples);
-}
-
-void add_latency(CLI::App& app, LatencyOptions& o) {
-  app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
-      ->check(CLI::Range(50, 1'000'000));
-  app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--mode", o.mode, "Who has which CPU when (default: swap)")
-      ->check(CLI::IsMember({"swap", "together", "turns"}));
-  app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--cpu", o.cpus, "CPUs: ours,cyclictest's (default: the first two)")
-      ->delimiter(',')
-      ->expected(1, 2)
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--policy", o.policy, "Scheduling of both (default: fifo)")
-      ->check(CLI::IsMember({"fifo", "rr", "other"}));
-  app.add_option("--priority", o.priority, "Real-time priority of both (default: 80)")
-      ->check(CLI::Range(1, 99));
-  CLI::Option* load = app.add_option("--load", o.load,
-                                     "idle, stress, both (default: both if stress-ng is installed)")
-                          ->check(CLI::IsMember({"idle", "stress", "both"}));
-  app.add_flag_callback(
-         "--stress", [&o] { o.load = "stress"; }, "The same as --load stress")
-      ->excludes(load);
-  app.add_option("-o,--output", o.output, "Folder of page and plots (default: runs/latency)");
-  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kLatencyExamples);
-}
-
-void add_doctor(CLI::App& app, DoctorOptions& o) {
-  app.add_option("robot", o.robot, "Robot TOML, to look at the CAN interfaces of its buses");
-  app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
-  app.add_option("--json", o.json, kJsonHelp);
-  app.footer(kDoctorExamples);
-}
 
 /// The innermost subcommand that was named.
 const CLI::App& innermost(const CLI::App& app) {
@@ -353,6 +71,33 @@ Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
   return Exit::kUsage;
 }
 
+/// The subcommands with their options; the one that was named, once the line is parsed.
+class Subcommands {
+ public:
+  explicit Subcommands(CLI::App& app) : app_(app) {}
+
+  template <class Options>
+  void add(const char* name, const char* doc) {
+    const auto options = std::make_shared<Options>();
+    CLI::App* command = app_.add_subcommand(name, doc);
+    add_flags(*command, *options);
+    choices_.push_back([command, options]() -> std::optional<Command> {
+      if (!command->parsed()) return std::nullopt;
+      return *options;
+    });
+  }
+  [[nodiscard]] Command chosen() const {
+    for (const auto& choice : choices_) {
+      if (auto command = choice()) return std::move(*command);
+    }
+    return Exit::kUsage;
+  }
+
+ private:
+  CLI::App& app_;
+  std::vector<std::function<std::optional<Command>()>> choices_;
+};
+
 }  // namespace
 
 Command parse_command_line(int argc, const char* const* argv) {
@@ -362,49 +107,22 @@ Command parse_command_line(int argc, const char* const* argv) {
   app.set_version_flag("--version", "tandem " TANDEM_VERSION);
   app.get_formatter()->column_width(34);
 
-  RunOptions run;
-  EmulateOptions emulate;
-  AskOptions ask;
-  FaultOptions fault;
-  EstopOptions estop;
-  InjectOptions inject;
-  CheckOptions check;
-  ModelOptions model;
-  LogOptions log;
-  EdsOptions eds;
-  ReportOptions report;
-  LatencyOptions latency;
-  DoctorOptions doctor;
-  CLI::App* run_app = app.add_subcommand("run", "Run an experiment");
-  CLI::App* ask_app = app.add_subcommand("ask", "Ask a running process, in JSON");
-  CLI::App* fault_app = app.add_subcommand("fault", "Faults of a running run: show, reset");
-  CLI::App* estop_app = app.add_subcommand("estop", "Emergency stop of a running run");
-  CLI::App* check_app = app.add_subcommand("check", "Validate an experiment's or robot's files");
-  CLI::App* model_app = app.add_subcommand("model", "A robot's generated kernels: build, info");
-  CLI::App* log_app = app.add_subcommand("log", "Logs: info, csv, diff");
-  CLI::App* eds_app =
-      app.add_subcommand("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
-  CLI::App* report_app = app.add_subcommand("report", "Draw the plots of a log, or of two");
-  CLI::App* doctor_app = app.add_subcommand("doctor", "Is this machine fit for real time?");
-  CLI::App* latency_app =
-      app.add_subcommand("latency", "How late the loop wakes up, beside cyclictest");
-  CLI::App* inject_app =
-      app.add_subcommand("inject", "Inject a fault into a running emulated or simulated robot");
-  CLI::App* emulate_app =
-      app.add_subcommand("emulate", "The robot on the other end of CAN: boards' firmware and plant");
-  add_run(*run_app, run);
-  add_emulate(*emulate_app, emulate);
-  add_ask(*ask_app, ask);
-  add_fault(*fault_app, fault);
-  add_estop(*estop_app, estop);
-  add_inject(*inject_app, inject);
-  add_check(*check_app, check);
-  add_model(*model_app, model);
-  add_log(*log_app, log);
-  add_eds(*eds_app, eds);
-  add_report(*report_app, report);
-  add_latency(*latency_app, latency);
-  add_doctor(*doctor_app, doctor);
+  Subcommands commands(app);
+  commands.add<RunOptions>("run", "Run an experiment");
+  commands.add<EmulateOptions>("emulate",
+                               "The robot on the other end of CAN: boards' firmware and plant");
+  commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
+  commands.add<ReportOptions>("report", "Draw the plots of a log, or of two");
+  commands.add<LogOptions>("log", "Logs: info, csv, diff");
+  commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
+  commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
+  commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
+  commands.add<EstopOptions>("estop", "Emergency stop of a running run");
+  commands.add<InjectOptions>("inject",
+                              "Inject a fault into a running emulated or simulated robot");
+  commands.add<AskOptions>("ask", "Ask a running process, in JSON");
+  commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
+  commands.add<LatencyOptions>("latency", "How late the loop wakes up, beside cyclictest");
 
   try {
     app.parse(argc, argv);
@@ -413,19 +131,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     app.exit(error);  // prints help or version
     return Exit::kDone;
   }
-  if (run_app->parsed()) return run;
-  if (emulate_app->parsed()) return emulate;
-  if (ask_app->parsed()) return ask;
-  if (fault_app->parsed()) return fault;
-  if (estop_app->parsed()) return estop;
-  if (inject_app->parsed()) return inject;
-  if (check_app->parsed()) return check;
-  if (model_app->parsed()) return model;
-  if (log_app->parsed()) return log;
-  if (latency_app->parsed()) return latency;
-  if (doctor_app->parsed()) return doctor;
-  if (eds_app->parsed()) return eds;
-  return report;
+  return commands.chosen();
 }
 
 }  // namespace tandem::apps

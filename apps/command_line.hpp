@@ -26,19 +26,19 @@ struct RunOptions {
   std::string log_folder;             ///< empty: the experiment's
   std::string scenario;               ///< TOML of faults to inject; empty: none
   bool no_log = false;
-  std::string kernel_variant;         ///< empty: the best that this CPU runs
-  std::string hal;                    ///< "sim", "can"; empty: the experiment's
-  bool lockstep = false;              ///< CAN: wait for an emulated robot
+  std::string kernel_variant;           ///< empty: the best that this CPU runs
+  std::string hal;                      ///< "sim", "can"; empty: the experiment's
+  bool lockstep = false;                ///< CAN: wait for an emulated robot
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string record_frames;            ///< file of the bus' frames; empty: none
-  bool report = false;                ///< draw the report after the run
-  std::string trace;                  ///< file of trace events; empty: none
-  std::size_t trace_cycles = 10'000;  ///< the last that `trace` holds
-  bool quiet = false;                 ///< neither progress nor table
-  std::string json;                   ///< file, "-" for standard output, empty for none
-  std::string socket;                 ///< of the run's control; empty: default_control_path("run")
+  bool report = false;                  ///< draw the report after the run
+  std::string trace;                    ///< file of trace events; empty: none
+  std::size_t trace_cycles = 10'000;    ///< the last that `trace` holds
+  bool quiet = false;                   ///< neither progress nor table
+  std::string json;                     ///< file, "-" for standard output, empty for none
+  std::string socket;  ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
-  std::string on_fault;               ///< "end", "wait"; empty: the experiment's
+  std::string on_fault;  ///< "end", "wait"; empty: the experiment's
 };
 
 /// tandem fault show|reset
@@ -75,15 +75,15 @@ struct CheckOptions {
 
 /// tandem emulate ROBOT|EXPERIMENT
 struct EmulateOptions {
-  std::string file;                      ///< a robot, or an experiment for posture, seed and [sim]
-  std::optional<std::string> posture;    ///< instead of the experiment's
-  std::optional<std::uint64_t> seed;     ///< instead of the experiment's
-  std::optional<std::int64_t> period_ns; ///< instead of the experiment's
-  bool lockstep = false;                 ///< a step per SYNC, whatever the clock says
-  std::string scenario;                  ///< TOML of faults to inject; empty: none
-  std::vector<std::string> interfaces;   ///< "can0=vcan0"
-  std::string kernel_variant;            ///< empty: the best that this CPU runs
-  std::string socket;                    ///< of the control socket; empty: the default path
+  std::string file;                       ///< a robot, or an experiment for posture, seed and [sim]
+  std::optional<std::string> posture;     ///< instead of the experiment's
+  std::optional<std::uint64_t> seed;      ///< instead of the experiment's
+  std::optional<std::int64_t> period_ns;  ///< instead of the experiment's
+  bool lockstep = false;                  ///< a step per SYNC, whatever the clock says
+  std::string scenario;                   ///< TOML of faults to inject; empty: none
+  std::vector<std::string> interfaces;    ///< "can0=vcan0"
+  std::string kernel_variant;             ///< empty: the best that this CPU runs
+  std::string socket;                     ///< of the control socket; empty: the default path
   bool no_socket = false;
   bool quiet = false;  ///< neither progress nor table
   std::string json;
@@ -149,19 +149,9 @@ struct DoctorOptions {
 };
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command = std::variant<Exit,
-                             RunOptions,
-                             AskOptions,
-                             FaultOptions,
-                             EstopOptions,
-                             InjectOptions,
-                             CheckOptions,
-                             ModelOptions,
-                             LogOptions,
-                             EdsOptions, ReportOptions,
-                             LatencyOptions,
-                             DoctorOptions,
-                             EmulateOptions>;
+using Command = std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions,
+                             InjectOptions, CheckOptions, ModelOptions, LogOptions, EdsOptions,
+                             ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

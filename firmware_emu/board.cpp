@@ -48,15 +48,32 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
   for (const Pid::Config& pid : {c.position, c.velocity, c.torque, c.current}) {
     if (!not_negative(pid)) return bad(key, "a gain is negative or not finite");
   }
-  for (const double value :
-       {c.torque_to_voltage_V_Nm, c.emf_compensation_Vs_rad, c.resistance_ohm,
-        c.motor_constant_Nm_A, c.spring_Nm_rad, c.voltage_limit_V, c.current_limit_A,
-        c.torque_limit_Nm, c.velocity_limit_rad_s, c.transfer_time_s, axis.stiffness_Nm_rad,
-        axis.damping_Nms_rad, axis.torque_noise_Nm, axis.torque_quantum_Nm,
-        axis.link_velocity_cutoff_Hz, axis.motor_velocity_cutoff_Hz, axis.torque_rate_cutoff_Hz,
-        axis.position_margin_rad, axis.following_window_rad, axis.following_timeout_s,
-        axis.continuous_current_A, axis.thermal_time_s, axis.undervoltage_V, axis.stop_time_s,
-        axis.mismatch_window_rad, axis.mismatch_timeout_s}) {
+  for (const double value : {c.torque_to_voltage_V_Nm,
+                             c.emf_compensation_Vs_rad,
+                             c.resistance_ohm,
+                             c.motor_constant_Nm_A,
+                             c.spring_Nm_rad,
+                             c.voltage_limit_V,
+                             c.current_limit_A,
+                             c.torque_limit_Nm,
+                             c.velocity_limit_rad_s,
+                             c.transfer_time_s,
+                             axis.stiffness_Nm_rad,
+                             axis.damping_Nms_rad,
+                             axis.torque_noise_Nm,
+                             axis.torque_quantum_Nm,
+                             axis.link_velocity_cutoff_Hz,
+                             axis.motor_velocity_cutoff_Hz,
+                             axis.torque_rate_cutoff_Hz,
+                             axis.position_margin_rad,
+                             axis.following_window_rad,
+                             axis.following_timeout_s,
+                             axis.continuous_current_A,
+                             axis.thermal_time_s,
+                             axis.undervoltage_V,
+                             axis.stop_time_s,
+                             axis.mismatch_window_rad,
+                             axis.mismatch_timeout_s}) {
     if (!std::isfinite(value) || value < 0.0) {
       return bad(key, "a setting is negative or not finite");
     }
@@ -207,8 +224,7 @@ void Board::supervise(std::size_t axis) noexcept {
   const AxisEvents events = axes_[axis]->supervise(connection(axis), heartbeat_lost_);
   // The node itself has told of a lost heartbeat.
   if (events.raised != ErrorCode::kNone && events.raised != ErrorCode::kHeartbeatLost) {
-    node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis),
-                      outbox_);
+    node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis), outbox_);
   }
   if (!events.reset) return;
   const bool all_clear =
@@ -240,8 +256,8 @@ void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,
 void Board::archive(Archive& ar) {
   ar(od_, node_);
   for (const auto& axis : axes_) axis->archive(ar);
-  ar(commands_, ignored_frames_, cycle_counter_, until_control_ns_, since_sync_ns_, offline_, heartbeat_lost_,
-     sync_pending_);
+  ar(commands_, ignored_frames_, cycle_counter_, until_control_ns_, since_sync_ns_, offline_,
+     heartbeat_lost_, sync_pending_);
   for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled);
   archive_outbox(ar, outbox_, kOutboxFrames);
 }

@@ -21,8 +21,8 @@ struct ProtectionConfig {
   double continuous_current_A = 0.0;  ///< 0: not watched
   double thermal_time_s = 1.0;
   double temperature_limit_C = 0.0;
-  double undervoltage_V = 0.0;        ///< 0: not watched
-  double mismatch_window_rad = 0.0;   ///< 0: not watched
+  double undervoltage_V = 0.0;       ///< 0: not watched
+  double mismatch_window_rad = 0.0;  ///< 0: not watched
   double mismatch_timeout_s = 0.0;
 };
 
@@ -35,8 +35,8 @@ struct ProtectionInputs {
   double bus_voltage_V = 0.0;
   /// Motor angle less link angle less what the spring's torque accounts for.
   double mismatch_rad = 0.0;
-  bool sensors_valid = true;   ///< every reading is a number
-  bool powered = false;        ///< the bridge is on
+  bool sensors_valid = true;      ///< every reading is a number
+  bool powered = false;           ///< the bridge is on
   bool follows_position = false;  ///< CSP: position_error_rad means something
 };
 
@@ -53,7 +53,8 @@ class Protection {
   /// them, or comes back, may be powered.
   static constexpr double kOutward_rad_s = 0.02;
 
-  /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature, under-voltage, following
+  /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature,
+  /// under-voltage, following
   ///         error, position limit.
   canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
                             double dt_s) noexcept TANDEM_RT {
@@ -68,8 +69,8 @@ class Protection {
     const bool lags = in.powered && in.follows_position && config.following_window_rad > 0.0 &&
                       std::abs(in.position_error_rad) > config.following_window_rad;
     state_.lagging_s = lags ? state_.lagging_s + dt_s : 0.0;
-    const bool contradicts = config.mismatch_window_rad > 0.0 &&
-                             std::abs(in.mismatch_rad) > config.mismatch_window_rad;
+    const bool contradicts =
+        config.mismatch_window_rad > 0.0 && std::abs(in.mismatch_rad) > config.mismatch_window_rad;
     state_.mismatch_s = contradicts ? state_.mismatch_s + dt_s : 0.0;
 
     if (state_.mismatch_s > config.mismatch_timeout_s) return ErrorCode::kSensorMismatch;

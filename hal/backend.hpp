@@ -28,9 +28,9 @@ enum class Pace : std::uint8_t {
 
 /// Where a backend stands between power-on and power-off.
 enum class Phase : std::uint8_t {
-  kBringUp,     ///< nodes are being configured and drives enabled, at first or by reset()
-  kOperational, ///< every axis follows the command
-  kFault,       ///< latched; `fault_text()` says the cause
+  kBringUp,      ///< nodes are being configured and drives enabled, at first or by reset()
+  kOperational,  ///< every axis follows the command
+  kFault,        ///< latched; `fault_text()` says the cause
 };
 
 /// Exact nominal time of a cycle. `time_ns == cycle * period_ns`.
@@ -92,7 +92,8 @@ class Backend {
   /// follows the command again, kFault when a cause is still there.
   virtual void reset() noexcept TANDEM_RT = 0;
 
-  /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle until it answers true.
+  /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle
+  /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
 
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot

@@ -181,7 +181,8 @@ void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) 
 }
 
 void read_safety(TomlTable table, RobotConfig& robot) {
-  const std::string stop = table.choice_or("emergency_stop", "category1", {"category0", "category1"});
+  const std::string stop =
+      table.choice_or("emergency_stop", "category1", {"category0", "category1"});
   robot.emergency_stop = stop == "category0" ? StopCategory::kCategory0 : StopCategory::kCategory1;
   table.finish();
 }

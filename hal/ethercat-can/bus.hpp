@@ -28,14 +28,14 @@ enum class BusState : std::uint8_t {
 
 /// What has passed since the bus was opened.
 struct BusStatistics {
-  std::uint64_t sent = 0;           ///< frames taken for sending
-  std::uint64_t received = 0;       ///< data frames
-  std::uint64_t send_refused = 0;   ///< frames that were lost because the queue or the bus was down
-  std::uint64_t queue_full = 0;     ///< times that the transmit queue took less than was given
-  std::uint64_t receive_lost = 0;   ///< frames that came faster than they were taken
-  std::uint64_t error_frames = 0;   ///< that the controller's driver told of
-  std::uint64_t ignored = 0;        ///< frames that no node of ours sends: 29-bit, remote, malformed
-  std::uint64_t recoveries = 0;     ///< times that the bus became usable again
+  std::uint64_t sent = 0;          ///< frames taken for sending
+  std::uint64_t received = 0;      ///< data frames
+  std::uint64_t send_refused = 0;  ///< frames that were lost because the queue or the bus was down
+  std::uint64_t queue_full = 0;    ///< times that the transmit queue took less than was given
+  std::uint64_t receive_lost = 0;  ///< frames that came faster than they were taken
+  std::uint64_t error_frames = 0;  ///< that the controller's driver told of
+  std::uint64_t ignored = 0;       ///< frames that no node of ours sends: 29-bit, remote, malformed
+  std::uint64_t recoveries = 0;    ///< times that the bus became usable again
 };
 
 /// One end of a bus. Never blocks.

@@ -17,8 +17,8 @@
 namespace tandem::hal::can {
 
 struct CanBackendConfig {
-  bool lockstep = false;        ///< wait for an emulated robot's TIME, at any speed
-  double answer_window = 0.5;   ///< in real time: share of the period to wait for answers
+  bool lockstep = false;       ///< wait for an emulated robot's TIME, at any speed
+  double answer_window = 0.5;  ///< in real time: share of the period to wait for answers
   std::int64_t lockstep_timeout_ns = 10'000'000'000;  ///< then the emulated robot is gone
 };
 
@@ -52,7 +52,8 @@ class CanBackend final : public Backend {
     return master_->fault_cause(joint);
   }
   [[nodiscard]] std::string fault_text(FaultCause cause, std::uint32_t code) const override {
-    return cause == FaultCause::kDrive ? DriveMaster::error_text(code) : Backend::fault_text(cause, code);
+    return cause == FaultCause::kDrive ? DriveMaster::error_text(code)
+                                       : Backend::fault_text(cause, code);
   }
   void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
@@ -85,9 +86,7 @@ class CanBackend final : public Backend {
     [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override {
       return bus_->sent_ns();
     }
-    [[nodiscard]] BusStatistics statistics() const noexcept override {
-      return bus_->statistics();
-    }
+    [[nodiscard]] BusStatistics statistics() const noexcept override { return bus_->statistics(); }
     [[nodiscard]] std::string status_text() const override { return bus_->status_text(); }
 
    private:

@@ -17,9 +17,7 @@ constexpr std::size_t kMostCauses = 8;  // named in one text
 const char* label(const NodePlan& plan) { return plan.board >= 0 ? "board" : "sensor"; }
 
 /// The value of a step of 1 to 4 bytes as a number, for messages about identity.
-std::uint32_t number(const SdoStep& step) {
-  return canopen::get<std::uint32_t>(step.bytes.data());
-}
+std::uint32_t number(const SdoStep& step) { return canopen::get<std::uint32_t>(step.bytes.data()); }
 
 const char* identity_name(const SdoStep& step) {
   if (step.index == canopen::object::kDeviceType) return "device type";
@@ -50,10 +48,10 @@ std::string DriveMaster::Impl::joint_name(std::size_t joint) const {
 std::string DriveMaster::Impl::step_text(const Node& node, const SdoStep& step) const {
   const bool of_joint =
       step.axis >= 0 && static_cast<std::size_t>(step.axis) < node.plan.joints.size();
-  return fmt::format("object {:04X}:{:02X} of {}", step.index, step.sub,
-                     of_joint ? joint_name(node.plan.joints[static_cast<std::size_t>(step.axis)])
-                              : fmt::format("{} {} (node {})", label(node.plan), node.plan.name,
-                                            node.plan.id));
+  return fmt::format(
+      "object {:04X}:{:02X} of {}", step.index, step.sub,
+      of_joint ? joint_name(node.plan.joints[static_cast<std::size_t>(step.axis)])
+               : fmt::format("{} {} (node {})", label(node.plan), node.plan.name, node.plan.id));
 }
 
 std::string DriveMaster::Impl::node_text(const Node& node) const {
@@ -64,8 +62,10 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
   switch (m.trouble()) {
     case NodeTrouble::kNone: break;
     case NodeTrouble::kNoBootUp:
-      return fmt::format("{}: no boot-up message within {:.0f} s; is it powered and connected, "
-                         "and is its node id {}?", who, limit_s, node.plan.id);
+      return fmt::format(
+          "{}: no boot-up message within {:.0f} s; is it powered and connected, "
+          "and is its node id {}?",
+          who, limit_s, node.plan.id);
     case NodeTrouble::kWrongIdentity: {
       const SdoStep& step = m.steps()[m.step()];
       return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}{}", who,
@@ -94,8 +94,8 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
       return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
                          who, seconds(m.trouble_time_ns()));
     case NodeTrouble::kFeedbackLost:
-      return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who,
-                         node.timeout_cycles, seconds(m.trouble_time_ns()));
+      return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who, node.timeout_cycles,
+                         seconds(m.trouble_time_ns()));
   }
   switch (m.stage()) {
     case NodeStage::kWaitBootUp: return who + ": waiting for its boot-up message";
@@ -116,10 +116,12 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
       return fmt::format("{}: {} at {:.3f} s", joint_name(joint), error_text(axis.fault_code()),
                          at_s);
     case AxisTrouble::kNotEnabled:
-      return fmt::format("{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
-                         "0x{:04X}", joint_name(joint), canopen::to_string(axis.drive()),
-                         canopen::of_axis(canopen::object::kStatusword, robot.joints[joint].axis),
-                         axis.feedback().statusword, axis.raw().controlword);
+      return fmt::format(
+          "{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
+          "0x{:04X}",
+          joint_name(joint), canopen::to_string(axis.drive()),
+          canopen::of_axis(canopen::object::kStatusword, robot.joints[joint].axis),
+          axis.feedback().statusword, axis.raw().controlword);
     case AxisTrouble::kLeftEnabled:
       return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
                          joint_name(joint), canopen::to_string(axis.drive()), at_s);
@@ -175,7 +177,8 @@ std::vector<std::string> DriveMaster::Impl::warnings() const {
                                 node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
                                 node.missed));
   }
-  if (unsent > 0) texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
+  if (unsent > 0)
+    texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
   if (refused_node >= 0) texts.push_back("a value was refused: " + refused_text());
   return texts;
 }
@@ -197,8 +200,8 @@ double DriveMaster::Impl::progress() const noexcept {
   }
   const auto enabled = std::ranges::count_if(axes, &AxisMaster::enabled);
   const double configured = all == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(all);
-  const double up = axes.empty() ? 1.0
-                                 : static_cast<double>(enabled) / static_cast<double>(axes.size());
+  const double up =
+      axes.empty() ? 1.0 : static_cast<double>(enabled) / static_cast<double>(axes.size());
   return kConfigurationShare * configured + (1.0 - kConfigurationShare) * up;
 }
 

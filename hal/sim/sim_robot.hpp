@@ -33,7 +33,8 @@ class SimRobot final : public hal::Backend {
     return master_->fault_cause(joint);
   }
   [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
-    return cause == hal::FaultCause::kDrive ? hal::can::DriveMaster::error_text(code) : Backend::fault_text(cause, code);
+    return cause == hal::FaultCause::kDrive ? hal::can::DriveMaster::error_text(code)
+                                            : Backend::fault_text(cause, code);
   }
   void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }

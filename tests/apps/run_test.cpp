@@ -17,8 +17,8 @@ TEST_F(Run, WritesTheDocumentedKeys) {
   const auto json = run("hold.toml --duration 0.5 --seed 7");
   for (const std::string key :
        {"robot", "hal", "seed", "cycles", "period_ns", "sim_seconds", "wall_seconds",
-        "realtime_factor", "overruns", "wakeup_ns", "bus_ns", "cycle_ns", "log", "joints", "ground", "base",
-        "round_trips", "faults", "kernel_variant"}) {
+        "realtime_factor", "overruns", "wakeup_ns", "bus_ns", "cycle_ns", "log", "joints", "ground",
+        "base", "round_trips", "faults", "kernel_variant"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   EXPECT_EQ(json["robot"], "double_pendulum");
@@ -40,7 +40,8 @@ TEST_F(Run, WritesTheDocumentedKeys) {
 }
 
 TEST_F(Run, FollowsATrajectoryOverClassicCan) {
-  const auto json = run(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml --no-log");
+  const auto json =
+      run(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml --no-log");
   EXPECT_EQ(json["period_ns"], 2'000'000);
   EXPECT_TRUE(json["faults"].empty());
   EXPECT_LT(json["joints"]["joint2"]["max_tracking_error_rad"].get<double>(), 0.02);

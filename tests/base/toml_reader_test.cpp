@@ -3,7 +3,9 @@
 namespace tandem {
 namespace {
 
-TomlDocument parse(std::string_view text) { return TomlDocument::parse(text, "robot.toml").value(); }
+TomlDocument parse(std::string_view text) {
+  return TomlDocument::parse(text, "robot.toml").value();
+}
 
 TEST(TomlReader, ReadsWhatIsThere) {
   const TomlDocument document = parse("mass_kg = 2.5\nname = 'x'\n[a]\nlist = [1, 2.0]\n");

@@ -28,11 +28,11 @@ class FirstOrderRobot : public hal::Backend {
   std::uint64_t shut_down_cycles = 3;
   Code answer = Code::kOk;  // of read()
   int faulted_joint = -1, lost_joint = -1, lost_sensor = -1;
-  bool latch_on_fault = false;    // phase() turns kFault with a joint
-  hal::TruthImage truth;          // its feet and base are the test's to set
-  std::uint64_t idle_writes = 0;  // commands with every joint idle
-  bool reset_clears = true;       // false: the cause is still there
-  std::uint64_t stops = 0;        // calls of stop()
+  bool latch_on_fault = false;                           // phase() turns kFault with a joint
+  hal::TruthImage truth;                                 // its feet and base are the test's to set
+  std::uint64_t idle_writes = 0;                         // commands with every joint idle
+  bool reset_clears = true;                              // false: the cause is still there
+  std::uint64_t stops = 0;                               // calls of stop()
   hal::StopCategory latched = hal::StopCategory::kWarn;  // by stop()
 
   hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
@@ -53,7 +53,8 @@ class FirstOrderRobot : public hal::Backend {
     const double dt = static_cast<double>(time.period_ns) * 1e-9;
     for (std::size_t j = 0; j < position_.size(); ++j) {
       const double before = position_[j];
-      if (follows() && command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
+      if (follows() &&
+          command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
         position_[j] += kShare * (command_.position_rad()[j] - position_[j]);
       }
       velocity_[j] = (position_[j] - before) / dt;
@@ -65,10 +66,10 @@ class FirstOrderRobot : public hal::Backend {
       state.mode()[j] = command_.mode()[j];
       const bool faulted = faulted_joint == static_cast<int>(j);
       state.fault()[j] = faulted ? 0x7310 : 0;
-      state.drive_state()[j] = static_cast<std::uint8_t>(
-          faulted   ? hal::DriveState::kFault
-          : follows() ? hal::DriveState::kOperationEnabled
-                      : hal::DriveState::kSwitchOnDisabled);
+      state.drive_state()[j] =
+          static_cast<std::uint8_t>(faulted     ? hal::DriveState::kFault
+                                    : follows() ? hal::DriveState::kOperationEnabled
+                                                : hal::DriveState::kSwitchOnDisabled);
     }
     for (std::size_t s = 0; s < state.sensor_age_cycles().size(); ++s) {
       const bool lost = lost_sensor == static_cast<int>(s);

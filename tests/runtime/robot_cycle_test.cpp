@@ -76,7 +76,8 @@ TEST(RobotCycle, HoldsEveryJointUntilTheRobotHasSettled) {
     run.steps(1);
     EXPECT_EQ(run.cycle->phase(), RunPhase::kSettling);
     EXPECT_EQ(run.cycle->command().position_rad()[0], held);
-    EXPECT_EQ(run.cycle->command().mode()[0], static_cast<std::int8_t>(hal::ControlMode::kPosition));
+    EXPECT_EQ(run.cycle->command().mode()[0],
+              static_cast<std::int8_t>(hal::ControlMode::kPosition));
   }
   EXPECT_EQ(run.controller->updates, 0);
   run.steps(1);

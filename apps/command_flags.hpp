@@ -1,0 +1,27 @@
+// The flags, arguments and help of each command of `tandem`.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "apps/command_line.hpp"
+
+namespace tandem::apps {
+
+/// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
+/// has to outlive the parsing.
+void add_flags(CLI::App& app, RunOptions& o);
+void add_flags(CLI::App& app, FaultOptions& o);
+void add_flags(CLI::App& app, EstopOptions& o);
+void add_flags(CLI::App& app, AskOptions& o);
+void add_flags(CLI::App& app, InjectOptions& o);
+void add_flags(CLI::App& app, EmulateOptions& o);
+void add_flags(CLI::App& app, CheckOptions& o);
+void add_flags(CLI::App& app, ModelOptions& o);
+void add_flags(CLI::App& app, LogOptions& o);
+void add_flags(CLI::App& app, EdsOptions& o);
+void add_flags(CLI::App& app, ReportOptions& o);
+void add_flags(CLI::App& app, LatencyOptions& o);
+void add_flags(CLI::App& app, DoctorOptions& o);
+
+}  // namespace tandem::apps
