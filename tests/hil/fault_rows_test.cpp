@@ -110,12 +110,12 @@ class HilRealTimeFault : public HilFault {
     insert(experiment, "seed = 1", "\nperiod_ns = 10_000_000");
     std::ofstream(file("experiment.toml")) << experiment;
 
-    robot_.emplace(tandem({"emulate", file("experiment.toml"), "--socket", socket_,
-                           "--json", file("robot.json")}),
+    robot_.emplace(tandem({"emulate", file("experiment.toml"), "--socket", socket_, "--json",
+                           file("robot.json")}),
                    file("robot.txt"));
     ASSERT_TRUE(robot_->says("Ctrl-C")) << robot_->output();
-    master_.emplace(tandem({"run", file("experiment.toml"), "--hal", "can", "--no-log",
-                            "--no-socket", "--json", file("run.json")}),
+    master_.emplace(tandem({"run", file("experiment.toml"), "--hal", "can", "--on-fault", "end",
+                            "--no-log", "--no-socket", "--json", file("run.json")}),
                     file("run.txt"));
     ASSERT_TRUE(master_->says(" 10 %")) << master_->output() << robot_->output();
   }
@@ -126,8 +126,7 @@ class HilRealTimeFault : public HilFault {
   }
   /// What the emulated robot has on record.
   [[nodiscard]] json status() const {
-    Process asked(tandem({"ask", R"({"do": "status"})", "--socket", socket_}),
-                  file("status.txt"));
+    Process asked(tandem({"ask", R"({"do": "status"})", "--socket", socket_}), file("status.txt"));
     EXPECT_EQ(asked.wait(), 0) << asked.output();
     return json::parse(asked.output());
   }
@@ -159,9 +158,8 @@ TEST_F(HilRealTimeFault, ARunEndsWhenTheRobotIsKilled) {
 }
 
 TEST_F(HilRealTimeFault, AnInjectedDeathOfABoardStopsTheRun) {
-  Process inject(
-      tandem({"inject", "kind=board_kill", "board=board_1", "--socket", socket_}),
-      file("inject.txt"));
+  Process inject(tandem({"inject", "kind=board_kill", "board=board_1", "--socket", socket_}),
+                 file("inject.txt"));
   EXPECT_EQ(inject.wait(), 0) << inject.output();
   EXPECT_TRUE(robot_->says("injected board_kill of joint1")) << robot_->output();
   EXPECT_EQ(master_->wait(), 1) << master_->output();

@@ -29,8 +29,8 @@ class RealTime : public OwnFolder {
     std::ofstream(folder_ / name) << text.replace(at, from.size(), to);
   }
   [[nodiscard]] std::vector<std::string> run_words(const std::string& duration_s) const {
-    return tandem({"run", file("hold.toml"), "--hal", "can", "--no-log", "--no-socket",
-                   "--duration", duration_s, "--json", file("run.json")});
+    return tandem({"run", file("hold.toml"), "--hal", "can", "--on-fault", "end", "--no-log",
+                   "--no-socket", "--duration", duration_s, "--json", file("run.json")});
   }
   [[nodiscard]] std::vector<std::string> emulate_words() const {
     return tandem({"emulate", file("hold.toml"), "--no-socket", "--json", file("emulate.json")});
