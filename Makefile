@@ -2,7 +2,7 @@
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 
-.PHONY: demo test unit hil rtsan fuzz bench clean help
+.PHONY: demo test unit hil rtsan fuzz clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 5 minutes the first time)"
@@ -16,9 +16,10 @@ demo:
 	@cmake --build --preset demo --parallel $(JOBS)
 	@build/release/bin/tandem run config/coman/squat.toml --report
 
-# What CI runs: all tests, those on a real CAN stack apart, the real-time proof, and a minute of
-# each fuzz target.
-test: unit hil rtsan fuzz
+# What CI runs: all tests, the real-time proof, and side by side, for each takes one core, the
+# tests on a real CAN stack and a minute of each fuzz target.
+test: unit rtsan
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
 
 unit:
 	@scripts/install-dependencies test
