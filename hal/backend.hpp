@@ -30,7 +30,7 @@ enum class Pace : std::uint8_t {
 enum class Phase : std::uint8_t {
   kBringUp,      ///< nodes are being configured and drives enabled, at first or by reset()
   kOperational,  ///< every axis follows the command
-  kFault,        ///< latched; `fault_text()` says the cause
+  kFault,        ///< latched; `status_text()` says the cause
 };
 
 /// Exact nominal time of a cycle. `time_ns == cycle * period_ns`.
