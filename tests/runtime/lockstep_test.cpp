@@ -4,6 +4,7 @@
 #include "log/compare.hpp"
 #include "model/kernel_library.hpp"
 #include "rt/clock.hpp"
+#include "rt/scoped_realtime.hpp"
 #include "runtime/experiment.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
@@ -140,6 +141,27 @@ TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
 
 INSTANTIATE_TEST_SUITE_P(Robots, Lockstep, testing::Values("coman", "walkman"),
                          [](const auto& robot) { return std::string(robot.param); });
+
+// exchange() may block, so the cycle's trap leaves it out. What waits here is the emulator's step,
+// which may not allocate either: so the whole of it can stand under the trap.
+TEST(LockstepRun, TheExchangeItselfAllocatesAndLocksNothing) {
+  Squat squat("coman");
+  LockstepRobot robot(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
+  hal::StateImage state(squat.e.robot.shape());
+  const hal::CommandImage idle(squat.e.robot.shape());
+  const hal::ParameterImage gains = hal::initial_parameters(squat.e.robot);
+  hal::CycleTime time;
+  for (; time.cycle < 500; ++time.cycle) {
+    time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
+    {
+      const rt::ScopedRealtime in_exchange;
+      robot.backend->exchange(time);
+    }
+    ASSERT_EQ(robot.backend->read(time, state), Code::kOk) << robot.backend->status_text();
+    ASSERT_EQ(robot.backend->write(idle, gains), Code::kOk);
+  }
+  EXPECT_EQ(robot.backend->phase(), hal::Phase::kOperational);
+}
 
 TEST(LockstepRun, AnEmulatorThatIsGoneIsAFaultThatSaysWhatToDo) {
   const log::ScratchFolder folder;
