@@ -5,7 +5,7 @@
 #include "base/nearest.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
-#include "log/sha256.hpp"
+#include "base/sha256.hpp"
 
 namespace tandem::log {
 namespace {

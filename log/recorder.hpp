@@ -18,7 +18,7 @@
 #include "log/event.hpp"
 #include "log/info.hpp"
 #include "log/mcap_writer.hpp"
-#include "log/sha256.hpp"
+#include "base/sha256.hpp"
 
 namespace tandem::log {
 

@@ -81,14 +81,16 @@ void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {
 
 std::int64_t CyclicLoop::exchanged() noexcept TANDEM_RT {
   const std::int64_t now_ns = clock_->now_ns();
-  statistics_.bus.record(now_ns - begin_ns_);
+  last_bus_ns_ = now_ns - begin_ns_;
+  statistics_.bus.record(last_bus_ns_);
   begin_ns_ = now_ns;
   return now_ns;
 }
 
 std::int64_t CyclicLoop::finish() noexcept TANDEM_RT {
   const std::int64_t now_ns = clock_->now_ns();
-  statistics_.work.record(now_ns - begin_ns_);
+  last_work_ns_ = now_ns - begin_ns_;
+  statistics_.work.record(last_work_ns_);
   return now_ns;
 }
 

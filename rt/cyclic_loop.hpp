@@ -81,6 +81,10 @@ class CyclicLoop {
   [[nodiscard]] std::uint64_t next_cycle() const noexcept { return next_cycle_; }
   [[nodiscard]] const LoopConfig& config() const noexcept { return config_; }
   [[nodiscard]] const LoopStatistics& statistics() const noexcept { return statistics_; }
+  /// Of the newest cycle that waited for a bus; -1: none did.
+  [[nodiscard]] std::int64_t last_bus_ns() const noexcept { return last_bus_ns_; }
+  /// Of the newest cycle that finished.
+  [[nodiscard]] std::int64_t last_work_ns() const noexcept { return last_work_ns_; }
 
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next
   /// wait(); statistics go on.
@@ -98,7 +102,8 @@ class CyclicLoop {
   std::int64_t grid_ns_ = 0;  // clock time of the next grid point
   bool started_ = false;
   std::uint64_t next_cycle_ = 0;
-  std::int64_t begin_ns_ = 0;    // clock time at which the current cycle's work began
+  std::int64_t begin_ns_ = 0;  // clock time at which the current cycle's work began
+  std::int64_t last_bus_ns_ = -1, last_work_ns_ = 0;
   std::uint64_t late_mask_ = 0;  // bit 0: the newest cycle was late
   LoopStatistics statistics_;
 };

@@ -5,18 +5,12 @@
 #include <atomic>
 #include <cstdint>
 
+#include "hal/run_phase.hpp"
+
 namespace tandem::runtime {
 
-enum class RunPhase : std::uint8_t {
-  kBringUp,   ///< the backend configures and enables its drives
-  kSettling,  ///< every joint is held where it was enabled, until the robot has been let down
-  kRunning,   ///< controllers run
-  kFaulted,   ///< a stop of category "hold", 1 or 0 is latched
-  kResetting, ///< faults are cleared, and every joint enabled where it is
-  kShutDown,  ///< the drives stop and are disabled
-  kDone,
-};
-[[nodiscard]] const char* to_string(RunPhase phase) noexcept;
+using hal::RunPhase;
+using hal::to_string;
 
 /// Each value is current by itself; together they may be of neighbouring cycles.
 struct Progress {

@@ -12,6 +12,7 @@ bool RobotCycle::step() noexcept {
   if (phase_ == RunPhase::kDone) return false;
   const rt::Tick tick = wait();
   time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+  wakeup_ns_ = tick.wakeup_ns;
   trace_wait(tick);
   exchange();
   cycle(tick);
@@ -193,6 +194,22 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   progress_.running_cycles.store(ran_, std::memory_order_relaxed);
   progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
+  show();
+}
+
+void RobotCycle::show() noexcept TANDEM_RT {
+  if (tap_ == nullptr) return;
+  tap_->take({.time = time_,
+              .phase = phase_,
+              .read_code = read_code_,
+              .state = state_,
+              .command = command_,
+              .truth = truth_,
+              .times = {.wakeup_ns = wakeup_ns_,
+                        .bus_ns = loop_.last_bus_ns(),
+                        .work_ns = loop_.last_work_ns(),
+                        .overruns = loop_.statistics().overruns,
+                        .skipped = loop_.statistics().skipped}});
 }
 
 void RobotCycle::go(RunPhase next) noexcept TANDEM_RT {

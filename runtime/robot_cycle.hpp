@@ -9,6 +9,7 @@
 #include "base/result.hpp"
 #include "hal/backend.hpp"
 #include "hal/command_limits.hpp"
+#include "hal/cycle_tap.hpp"
 #include "hal/robot_config.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
@@ -30,8 +31,8 @@ struct CycleConfig {
   std::uint64_t settle_cycles = 0;         ///< every joint is held, from enabled to kRunning
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   AfterStop after_stop = AfterStop::kEnd;
-  std::uint32_t lost_after_cycles = 10;    ///< feedback older than this is a lost joint or sensor
-  std::size_t trace_cycles = 0;            ///< the last that trace() keeps: 6 clock reads each
+  std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
+  std::size_t trace_cycles = 0;          ///< the last that trace() keeps: 6 clock reads each
 };
 
 /// The parts that a cycle joins. All outlive it.
@@ -42,6 +43,7 @@ struct CycleParts {
   rt::Clock& clock;
   log::Recorder* recorder = nullptr;       ///< null: nothing is logged. Not started yet.
   const hal::TruthImage* truth = nullptr;  ///< the simulation's, filled by backend.read()
+  hal::CycleTap* tap = nullptr;            ///< null: nobody watches
 };
 
 /// A run from bring-up to shut-down, cycle by cycle:
@@ -101,6 +103,7 @@ class RobotCycle {
   void limit() noexcept TANDEM_RT;
   void write() noexcept TANDEM_RT;
   void hand_over() noexcept TANDEM_RT;
+  void show() noexcept TANDEM_RT;
   void cycle(const rt::Tick& tick) noexcept TANDEM_RT;
 
   void advance_phase() noexcept TANDEM_RT;
@@ -138,6 +141,7 @@ class RobotCycle {
   rt::Clock* clock_;
   log::Recorder* recorder_;
   const hal::TruthImage* truth_;
+  hal::CycleTap* tap_;
   CycleConfig config_;
 
   rt::CyclicLoop loop_;
@@ -148,10 +152,11 @@ class RobotCycle {
   RunStatistics statistics_;
 
   hal::CycleTime time_;
+  std::int64_t wakeup_ns_ = -1;
   RunPhase phase_ = RunPhase::kBringUp;
-  bool started_ = false;      // the first cycle was
-  bool controlling_ = false;  // controllers are started
-  bool joint_fault_ = false;  // of some joint one is latched
+  bool started_ = false;                                   // the first cycle was
+  bool controlling_ = false;                               // controllers are started
+  bool joint_fault_ = false;                               // of some joint one is latched
   hal::StopCategory reaction_ = hal::StopCategory::kWarn;  // the hardest that is latched
   Code read_code_ = Code::kOk;
   std::uint64_t phase_began_ = 0;                                          // cycle

@@ -3,19 +3,6 @@
 
 namespace tandem::runtime {
 
-const char* to_string(RunPhase phase) noexcept {
-  switch (phase) {
-    case RunPhase::kBringUp: return "bring-up";
-    case RunPhase::kSettling: return "settling";
-    case RunPhase::kRunning: return "running";
-    case RunPhase::kFaulted: return "faulted";
-    case RunPhase::kResetting: return "resetting";
-    case RunPhase::kShutDown: return "shut-down";
-    case RunPhase::kDone: return "done";
-  }
-  return "?";
-}
-
 RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
     : robot_(&parts.robot),
       backend_(&parts.backend),
@@ -23,6 +10,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       clock_(&parts.clock),
       recorder_(parts.recorder),
       truth_(parts.truth),
+      tap_(parts.tap),
       config_(config),
       loop_(config.loop, parts.clock),
       state_(parts.robot.shape()),

@@ -1,10 +1,10 @@
-#include "log/sha256.hpp"
+#include "base/sha256.hpp"
 
 #include <openssl/evp.h>
 
 #include <array>
 
-namespace tandem::log {
+namespace tandem {
 
 void Sha256::Free::operator()(evp_md_ctx_st* context) const noexcept { EVP_MD_CTX_free(context); }
 
@@ -34,4 +34,4 @@ std::string sha256(std::span<const std::byte> bytes) {
   return hash.finish();
 }
 
-}  // namespace tandem::log
+}  // namespace tandem

@@ -1,6 +1,6 @@
-#include "log/sha256.hpp"
+#include "base/sha256.hpp"
 
-namespace tandem::log {
+namespace tandem {
 namespace {
 
 std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
@@ -19,4 +19,4 @@ TEST(Sha256, DependsOnTheBytesNotOnThePieces) {
 }
 
 }  // namespace
-}  // namespace tandem::log
+}  // namespace tandem

@@ -1,5 +1,5 @@
 // SHA-256 of a stream of bytes (FIPS 180-4), by OpenSSL.
-// Layer: log.  Thread: one at a time.
+// Layer: base.  Thread: one at a time.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 struct evp_md_ctx_st;
 
-namespace tandem::log {
+namespace tandem {
 
 class Sha256 {
  public:
@@ -29,4 +29,4 @@ class Sha256 {
 /// Of one block.
 [[nodiscard]] std::string sha256(std::span<const std::byte> bytes);
 
-}  // namespace tandem::log
+}  // namespace tandem
