@@ -84,13 +84,30 @@ Status check_keys(const Json& request, const std::string& command,
 
 }  // namespace
 
-ControlRegistry::ControlRegistry() {
-  add("help", "lists the commands", {}, [this](const Json&) { return help(); });
+const char* to_string(ControlEffect effect) {
+  switch (effect) {
+    case ControlEffect::kReads: return "reads";
+    case ControlEffect::kChanges: return "changes";
+    case ControlEffect::kStops: return "stops";
+  }
+  return "?";
 }
 
-void ControlRegistry::add(std::string name, std::string doc, std::vector<ControlKey> keys,
-                          Handler handler) {
-  commands_.push_back({std::move(name), std::move(doc), std::move(keys), std::move(handler)});
+ControlRegistry::ControlRegistry() {
+  add("help", ControlEffect::kReads, "lists the commands", {},
+      [this](const Json&) { return help(); });
+}
+
+void ControlRegistry::add(std::string name, ControlEffect effect, std::string doc,
+                          std::vector<ControlKey> keys, Handler handler) {
+  commands_.push_back(
+      {std::move(name), effect, std::move(doc), std::move(keys), std::move(handler)});
+}
+
+std::optional<ControlEffect> ControlRegistry::effect(std::string_view name) const {
+  const auto found = std::ranges::find(commands_, name, &Command::name);
+  if (found == commands_.end()) return std::nullopt;
+  return found->effect;
 }
 
 Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& request) const {
@@ -142,7 +159,10 @@ Json ControlRegistry::help() const {
       keys[key.name] =
           fmt::format("{}{}: {}", to_string(key.type), key.required ? "" : ", optional", key.doc);
     }
-    list.push_back({{"do", command.name}, {"doc", command.doc}, {"keys", std::move(keys)}});
+    list.push_back({{"do", command.name},
+                    {"effect", to_string(command.effect)},
+                    {"doc", command.doc},
+                    {"keys", std::move(keys)}});
   }
   return {{"commands", std::move(list)}};
 }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,15 @@
 #include "base/result.hpp"
 
 namespace tandem::apps {
+
+/// What a command does to the process that is asked, which decides who may ask for it.
+enum class ControlEffect : std::uint8_t {
+  kReads,    ///< nothing
+  kChanges,  ///< something: not for everybody over a network
+  kStops,    ///< it takes the robot to a stop, which everybody may always
+};
+
+[[nodiscard]] const char* to_string(ControlEffect effect);
 
 /// A key of a command's request, beside "do".
 struct ControlKey {
@@ -37,7 +47,11 @@ class ControlRegistry {
   ControlRegistry& operator=(const ControlRegistry&) = delete;
 
   /// @param doc  one line, for "help".  @pre `name` is new
-  void add(std::string name, std::string doc, std::vector<ControlKey> keys, Handler handler);
+  void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
+           Handler handler);
+
+  /// What the command `name` does; empty when there is none.
+  [[nodiscard]] std::optional<ControlEffect> effect(std::string_view name) const;
 
   /// The answer to `question`, a JSON text. Answered as errors: what is no JSON object, a key
   /// twice, an unknown command or key (with the nearest), a missing key, a wrong type, and
@@ -46,7 +60,9 @@ class ControlRegistry {
 
  private:
   struct Command {
-    std::string name, doc;
+    std::string name;
+    ControlEffect effect;
+    std::string doc;
     std::vector<ControlKey> keys;
     Handler handler;
   };

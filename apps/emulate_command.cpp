@@ -201,16 +201,16 @@ Exit emulate_command(const EmulateOptions& options) {
   if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
   if (!options.quiet) {
     fmt::print(out, "{}: {} boards and {} sensors on {}, {}; Ctrl-C ends it\n",
-               e.subject.robot.name, e.subject.robot.boards.size(),
-               e.subject.robot.sensors.size(), interfaces_of(e.subject.robot),
+               e.subject.robot.name, e.subject.robot.boards.size(), e.subject.robot.sensors.size(),
+               interfaces_of(e.subject.robot),
                options.lockstep ? "a step per SYNC" : "in real time");
     std::fflush(out);
   }
   Errands errands;
   ControlRegistry commands;
-  commands.add("status", "steps, frames and simulated time so far", {}, [&](const Json&) {
-    return errands.ask([&] { return summary_json(e, options.lockstep); });
-  });
+  commands.add(
+      "status", ControlEffect::kReads, "steps, frames and simulated time so far", {},
+      [&](const Json&) { return errands.ask([&] { return summary_json(e, options.lockstep); }); });
   add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
     const auto done = errands.ask([&]() -> Result<Json> {
       if (Status added = injected(e.robot->inject(fault)); !added) {

@@ -11,7 +11,7 @@ namespace tandem::apps {
 void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::int64_t period_ns,
                 std::function<Status(const sim::Fault&)> add) {
   const ControlKey text{"scenario", ControlKey::Type::kText, true, "[[fault]] tables, TOML"};
-  registry.add("inject", "inject faults, from the next cycle on", {text},
+  registry.add("inject", ControlEffect::kChanges, "inject faults, from the next cycle on", {text},
                [&robot, period_ns, add](const Json& request) -> Result<Json> {
                  const auto faults = sim::parse_scenario(request["scenario"].get<std::string>(),
                                                          "inject", robot, period_ns);

@@ -46,27 +46,29 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot) {
-  registry.add("status", "phase and counts of the run", {},
+  registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
                [&cycle](const Json&) -> Result<Json> { return status(cycle.progress()); });
-  registry.add("fault.show", "every fault of the run, latched or cleared", {},
-               [&cycle](const Json&) -> Result<Json> {
+  registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
+               {}, [&cycle](const Json&) -> Result<Json> {
                  Json answer = status(cycle.progress());
                  answer["faults"] = faults_json(cycle.faults());
                  answer["lost"] = cycle.fault_log().lost();
                  return answer;
                });
-  registry.add("fault.reset", "clears what is latched; resets or failed_resets counts on when done",
-               {}, [&cycle](const Json&) { return reset(cycle); });
+  registry.add("fault.reset", ControlEffect::kChanges,
+               "clears what is latched; resets or failed_resets counts on when done", {},
+               [&cycle](const Json&) { return reset(cycle); });
   registry.add(
-      "estop", "emergency stop, latched",
+      "estop", ControlEffect::kStops, "emergency stop, latched",
       {{.name = "category",
         .type = ControlKey::Type::kInteger,
         .doc = "0 or 1; else what robot.toml's [safety] says"}},
       [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
-  registry.add("run.stop", "ends the run in order", {}, [&cycle](const Json&) -> Result<Json> {
-    cycle.requests().end_run();
-    return Json::object();
-  });
+  registry.add("run.stop", ControlEffect::kChanges, "ends the run in order", {},
+               [&cycle](const Json&) -> Result<Json> {
+                 cycle.requests().end_run();
+                 return Json::object();
+               });
 }
 
 std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry, const std::string& path,

@@ -20,7 +20,7 @@ namespace {
 using std::string_literals::operator""s;
 
 void add_commands(ControlRegistry& registry) {
-  registry.add("echo", "says it again",
+  registry.add("echo", ControlEffect::kChanges, "says it again",
                {{.name = "text", .required = true, .doc = "what to say"},
                 {.name = "times", .type = ControlKey::Type::kInteger, .doc = "1 to 3"}},
                [](const Json& request) -> Result<Json> {
@@ -28,10 +28,11 @@ void add_commands(ControlRegistry& registry) {
                  if (times > 3) return fail("too often", "three times at most");
                  return Json{{"text", request["text"]}, {"times", times}};
                });
-  registry.add("long", "an answer of 200 kB", {}, [](const Json&) -> Result<Json> {
-    return Json{{"text", std::string(200'000, 'x')}};
-  });
-  registry.add("throw", "throws", {},
+  registry.add("long", ControlEffect::kReads, "an answer of 200 kB", {},
+               [](const Json&) -> Result<Json> {
+                 return Json{{"text", std::string(200'000, 'x')}};
+               });
+  registry.add("throw", ControlEffect::kReads, "throws", {},
                [](const Json&) -> Result<Json> { throw std::runtime_error("out of luck"); });
 }
 
@@ -55,6 +56,14 @@ TEST_F(Answers, ListTheCommandsWithTheirKeys) {
   ASSERT_EQ(answer["commands"].size(), 4U);
   EXPECT_EQ(answer["commands"][0]["do"], "help");
   EXPECT_EQ(answer["commands"][1]["keys"]["times"], "integer, optional: 1 to 3");
+  EXPECT_EQ(answer["commands"][0]["effect"], "reads");
+  EXPECT_EQ(answer["commands"][1]["effect"], "changes");
+}
+
+TEST_F(Answers, KnowWhatACommandDoesBeforeItIsAsked) {
+  EXPECT_EQ(registry.effect("help"), ControlEffect::kReads);
+  EXPECT_EQ(registry.effect("echo"), ControlEffect::kChanges);
+  EXPECT_EQ(registry.effect("nothing"), std::nullopt);
 }
 
 TEST_F(Answers, ToWhatIsNoJsonObjectAreErrors) {
