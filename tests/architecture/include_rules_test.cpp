@@ -27,14 +27,17 @@ const Rules& rules() {
       {"hal", {"base"}},
       {"hal/ethercat-can", {"base", "canopen", "hal", "rt/histogram.hpp"}},
       {"hal/sim", {"base", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can"}},
+      {"hal/remote", {"base", "hal", "dds"}},
+      {"dds", {"base", "hal", "model", "rt/histogram.hpp"}},
       {"controllers", {"base", "hal", "model/kernels.h"}},
       {"log", {"base", "hal"}},
       {"report", {"base", "hal", "log", "model"}},
       {"runtime",
-       {"base", "rt", "model", "hal", "hal/ethercat-can", "hal/sim", "controllers", "log"}},
+       {"base", "rt", "model", "hal", "hal/ethercat-can", "hal/sim", "hal/remote", "dds",
+        "controllers", "log"}},
       {"apps",
        {"base", "rt", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can", "hal/sim",
-        "controllers", "log", "report", "runtime"}},
+        "hal/remote", "dds", "controllers", "log", "report", "runtime"}},
   };
   return table;
 }

@@ -1,0 +1,134 @@
+#include "dds/config.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <regex>
+
+namespace tandem::dds {
+namespace {
+
+/// Participants of one domain on one machine that find each other without multicast.
+constexpr int kMostParticipants = 120;
+
+void check_all(TomlTable& table, const std::string& key, const std::vector<std::string>& texts,
+               const std::regex& pattern, const std::string& hint) {
+  for (const std::string& text : texts) {
+    if (!std::regex_match(text, pattern)) table.error(key, "'" + text + "' is none", hint);
+  }
+}
+
+std::string resolved(const std::string& folder, const std::string& file) {
+  return (std::filesystem::path(folder) / file).lexically_normal().string();
+}
+
+SecurityConfig read_security(TomlTable table, const std::string& folder) {
+  const auto file = [&](const char* key) {
+    std::string path = resolved(folder, table.text(key));
+    if (table.has(key) && !std::filesystem::is_regular_file(path)) {
+      table.error(key, "there is no file " + path, "docs/ros2.md says how to make them");
+    }
+    return path;
+  };
+  SecurityConfig security{.identity_ca = file("identity_ca"),
+                          .identity_certificate = file("identity_certificate"),
+                          .private_key = file("private_key"),
+                          .permissions_ca = file("permissions_ca"),
+                          .governance = file("governance"),
+                          .permissions = file("permissions")};
+  table.finish();
+  return security;
+}
+
+std::string text_of(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+std::string security_xml(const SecurityConfig& s) {
+  return fmt::format(
+      R"(<Security>
+  <Authentication>
+    <IdentityCA>file:{}</IdentityCA>
+    <IdentityCertificate>file:{}</IdentityCertificate>
+    <PrivateKey>file:{}</PrivateKey>
+  </Authentication>
+  <AccessControl>
+    <PermissionsCA>file:{}</PermissionsCA>
+    <Governance>file:{}</Governance>
+    <Permissions>file:{}</Permissions>
+  </AccessControl>
+</Security>
+)",
+      text_of(s.identity_ca), text_of(s.identity_certificate), text_of(s.private_key),
+      text_of(s.permissions_ca), text_of(s.governance), text_of(s.permissions));
+}
+
+}  // namespace
+
+Config read_config(TomlTable table, const std::string& folder) {
+  static const std::regex kAddress("[A-Za-z0-9_.:%-]+");
+  static const std::regex kNameSpace("[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*");
+  Config config;
+  config.enabled = table.boolean_or("enabled", true);
+  config.domain = static_cast<int>(table.integer_or("domain", config.domain, 0, 232));
+  config.name_space = table.text_or("namespace", config.name_space);
+  if (!config.name_space.empty()) {
+    check_all(table, "namespace", {config.name_space}, kNameSpace,
+              "letters, digits and _, in parts with / between: \"left\", \"robots/left\"");
+  }
+  config.interfaces = table.texts_or("interfaces", config.interfaces);
+  if (config.interfaces.empty()) {
+    table.error("interfaces", "is empty", "[\"lo\"] keeps all on this machine");
+  }
+  check_all(table, "interfaces", config.interfaces, kAddress, "`ip link` lists the interfaces");
+  config.peers = table.texts_or("peers", config.peers);
+  check_all(table, "peers", config.peers, kAddress, "addresses: \"192.168.1.20\"");
+  if (table.has("security")) config.security = read_security(table.table("security"), folder);
+  table.finish();
+  return config;
+}
+
+/// On the loopback interface there is no multicast: others are looked for at its address.
+std::string to_xml(const Config& config) {
+  std::string interfaces, peers;
+  for (const std::string& name : config.interfaces) {
+    const bool multicast = name != "lo";
+    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", text_of(name),
+                              multicast ? "default" : "false");
+  }
+  std::vector<std::string> addresses = config.peers;
+  if (std::ranges::find(config.interfaces, "lo") != config.interfaces.end()) {
+    addresses.insert(addresses.begin(), "127.0.0.1");
+  }
+  for (const std::string& peer : addresses) {
+    peers += fmt::format("<Peer Address=\"{}\"/>", text_of(peer));
+  }
+  return fmt::format(
+      R"(<CycloneDDS><Domain>
+<General>
+  <Interfaces>{}</Interfaces>
+  <AllowMulticast>{}</AllowMulticast>
+</General>
+<Discovery>
+  <ParticipantIndex>auto</ParticipantIndex>
+  <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>
+  <Peers>{}</Peers>
+</Discovery>
+{}</Domain></CycloneDDS>
+)",
+      interfaces, config.loopback_only() ? "false" : "spdp", kMostParticipants - 1, peers,
+      config.security.on() ? security_xml(config.security) : "");
+}
+
+}  // namespace tandem::dds

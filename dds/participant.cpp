@@ -1,0 +1,33 @@
+#include "dds/participant.hpp"
+
+#include <fmt/core.h>
+
+#include <string_view>
+
+namespace tandem::dds {
+
+Result<std::unique_ptr<Participant>> Participant::open(std::shared_ptr<Domain> domain,
+                                                       std::string node) {
+  constexpr std::string_view kEnclave = "enclave=/;";  // as every ROS 2 participant says
+  const std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)> qos(dds_create_qos(),
+                                                                  &dds_delete_qos);
+  dds_qset_userdata(qos.get(), kEnclave.data(), kEnclave.size());
+  const int number = domain->config().domain;
+  Entity entity(dds_create_participant(static_cast<dds_domainid_t>(number), qos.get(), nullptr));
+  if (!entity.ok()) {
+    return std::unexpected(dds_error(fmt::format("take part in the DDS domain {}", number),
+                                     entity.get(), "are too many processes in it?"));
+  }
+  return std::unique_ptr<Participant>(
+      new Participant(std::move(domain), std::move(node), std::move(entity)));
+}
+
+Participant::Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity)
+    : domain_(std::move(domain)), node_(std::move(node)), entity_(std::move(entity)) {}
+
+std::string Participant::topic_name(const std::string& ros_name) const {
+  const std::string& name_space = config().name_space;
+  return name_space.empty() ? "rt/" + ros_name : "rt/" + name_space + "/" + ros_name;
+}
+
+}  // namespace tandem::dds

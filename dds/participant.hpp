@@ -1,0 +1,36 @@
+// This process as others in the domain see it: a ROS 2 node with its topics.
+// Layer: dds.  Thread: any, non-RT.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.hpp"
+#include "dds/domain.hpp"
+
+namespace tandem::dds {
+
+class Participant {
+ public:
+  /// @param node  its name in ROS 2's graph: "tandem_run"
+  /// Errors: no participant of the domain can be made (too many are on this machine).
+  [[nodiscard]] static Result<std::unique_ptr<Participant>> open(std::shared_ptr<Domain> domain,
+                                                                 std::string node);
+
+  [[nodiscard]] dds_entity_t get() const noexcept { return entity_.get(); }
+  [[nodiscard]] const Config& config() const noexcept { return domain_->config(); }
+  [[nodiscard]] const std::string& node() const noexcept { return node_; }
+
+  /// The DDS topic of a ROS 2 topic in the configured namespace: "joint_states" is
+  /// "rt/joint_states", or "rt/left/joint_states".
+  [[nodiscard]] std::string topic_name(const std::string& ros_name) const;
+
+ private:
+  Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity);
+
+  std::shared_ptr<Domain> domain_;  // outlives the participant's entity
+  std::string node_;
+  Entity entity_;
+};
+
+}  // namespace tandem::dds
