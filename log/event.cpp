@@ -23,6 +23,7 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kResetRequested: return "reset requested";
     case EventKind::kResetDone: return "reset done";
     case EventKind::kResetFailed: return "reset failed";
+    case EventKind::kControllersSwitched: return "controllers switched";
   }
   return "?";
 }

@@ -27,6 +27,7 @@ enum class EventKind : std::uint8_t {
   kResetRequested,   ///< of the latched faults
   kResetDone,        ///< every joint is enabled again
   kResetFailed,      ///< a cause is still there
+  kControllersSwitched,  ///< on request: some were stopped, some started
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 

@@ -1,3 +1,4 @@
+// What is loaded, who is active, and their calls in the cycle.
 #include "runtime/controller_host.hpp"
 
 #include <algorithm>
@@ -5,9 +6,6 @@
 
 namespace tandem::runtime {
 namespace {
-
-constexpr auto kPosition = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-constexpr auto kStiff = static_cast<std::uint8_t>(hal::InteractionMode::kStiff);
 
 Error about(const std::string& key, std::string message, std::string hint) {
   return {.message = std::move(message), .hint = std::move(hint), .file = {}, .key = key};
@@ -20,46 +18,92 @@ ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kerne
     : robot_(&robot),
       kernels_(kernels),
       period_ns_(period_ns),
-      capabilities_(hal::joint_capabilities(robot)) {}
+      capabilities_(hal::joint_capabilities(robot)),
+      owner_(robot.joints.size(), -1),
+      take_over_(robot.joints.size(), period_ns) {
+  for (const hal::JointCapabilities& joint : capabilities_) {
+    impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
+  }
+}
 
-Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters) {
+Status ControllerHost::add(const std::string& name, LoadedController plugin, TomlTable parameters,
+                           bool active) {
+  const std::string path = plugin.path();
   auto owner = std::make_shared<LoadedController>(std::move(plugin));
-  return add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters));
+  const std::size_t slot = size();
+  Status added =
+      add(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters), active);
+  if (added) owned_[slot]->plugin = path;
+  return added;
 }
 
 Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters) {
+                           TomlTable parameters, bool active) {
+  const std::size_t slot = size();
+  if (slot == kMostControllers) {
+    return std::unexpected(about(name, "is one controller more than there can be",
+                                 "at most " + std::to_string(kMostControllers)));
+  }
+  auto made = configure(name, std::move(controller), std::move(parameters));
+  if (!made) return std::unexpected(made.error());
+  table_[slot] = made->get();
+  const ControllerSet after = active_ | only(slot);
+  if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
+    table_[slot] = nullptr;
+    return std::unexpected(about(
+        robot_->joints[conflict->joint].name,
+        "is claimed by the controllers '" + owned_[conflict->one]->name + "' and '" + name + "'",
+        "let one controller have the joint, or give one of them "
+        "active = false"));
+  }
+  owned_[slot] = std::move(*made);
+  if (active) set_active(after);
+  return {};
+}
+
+Result<std::unique_ptr<HostedController>> ControllerHost::configure(const std::string& name,
+                                                                    LoadedController plugin,
+                                                                    TomlTable parameters) {
+  const std::string path = plugin.path();
+  auto owner = std::make_shared<LoadedController>(std::move(plugin));
+  auto made = configure(name, std::shared_ptr<Controller>(owner, &**owner), std::move(parameters));
+  if (made) (*made)->plugin = path;
+  return made;
+}
+
+Result<std::unique_ptr<HostedController>> ControllerHost::configure(
+    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters) {
   ControllerSetup setup(*robot_, kernels_, period_ns_, std::move(parameters));
   Status configured = controller->configure(setup);
   setup.parameters.finish();
   if (configured) configured = check_claims(name, setup.claims());
-  if (!configured) return configured;
-  const auto claims = setup.claims();
-  hosted_.push_back({name, std::move(controller), {claims.begin(), claims.end()}});
-  done_.push_back(0);
-  return {};
+  if (!configured) return std::unexpected(configured.error());
+  auto made = std::make_unique<HostedController>();
+  made->name = name;
+  made->controller = std::move(controller);
+  made->claims.assign(setup.claims().begin(), setup.claims().end());
+  made->claimed.assign(robot_->joints.size(), 0);
+  for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
+  made->id = new_id(name);
+  return made;
 }
 
 Status ControllerHost::check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const {
-  std::vector<std::string> owner(robot_->joints.size());
-  for (const Hosted& one : hosted_) {
-    for (const auto& claim : one.claims) owner[claim.joint] = one.name;
-  }
+  std::vector<std::uint8_t> claimed(robot_->joints.size());
   for (const auto& claim : claims) {
-    if (claim.joint >= owner.size()) {
+    if (claim.joint >= claimed.size()) {
       return std::unexpected(about(name,
                                    "claims joint number " + std::to_string(claim.joint) + " of " +
-                                       std::to_string(owner.size()),
+                                       std::to_string(claimed.size()),
                                    "joints are numbered from 0 in the robot.toml's order"));
     }
-    const std::string& joint = robot_->joints[claim.joint].name;
-    if (!owner[claim.joint].empty()) {
-      return std::unexpected(about(
-          joint, "is claimed by the controllers '" + owner[claim.joint] + "' and '" + name + "'",
-          "let one controller have the joint"));
+    if (claimed[claim.joint] != 0) {
+      return std::unexpected(about(robot_->joints[claim.joint].name,
+                                   "is claimed twice by the controller '" + name + "'",
+                                   "claim each joint once"));
     }
-    owner[claim.joint] = name;
+    claimed[claim.joint] = 1;
     if (Status able = hal::check_capability(*robot_, claim.joint, claim.mode, claim.interaction);
         !able) {
       return able;
@@ -68,73 +112,126 @@ Status ControllerHost::check_claims(const std::string& name,
   return {};
 }
 
-void ControllerHost::hold(const hal::StateImage& state,
-                          hal::CommandImage& command) const noexcept TANDEM_RT {
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    if (!capabilities_[j].can(hal::Capability::kPosition)) {
-      command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kIdle);
-      continue;
-    }
-    const bool enabled =
-        state.drive_state()[j] == static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
-    if (command.mode()[j] != kPosition || !enabled) {
-      command.mode()[j] = kPosition;
-      command.interaction()[j] = kStiff;
-      command.position_rad()[j] = state.position_rad()[j];
-      command.torque_Nm()[j] = 0.0;
-    }
-    command.velocity_rad_s()[j] = 0.0;
-  }
-}
-
-void ControllerHost::release(hal::CommandImage& command) const noexcept TANDEM_RT {
-  std::ranges::fill(command.mode(), static_cast<std::int8_t>(hal::ControlMode::kIdle));
-}
-
-void ControllerHost::set_modes(hal::CommandImage& command) const noexcept TANDEM_RT {
-  for (const Hosted& one : hosted_) {
-    for (const auto& claim : one.claims) {
-      command.mode()[claim.joint] = static_cast<std::int8_t>(claim.mode);
-      command.interaction()[claim.joint] = static_cast<std::uint8_t>(claim.interaction);
-      command.stiffness_Nm_rad()[claim.joint] = capabilities_[claim.joint].stiffness_Nm_rad;
-      command.damping_Nms_rad()[claim.joint] = capabilities_[claim.joint].damping_Nms_rad;
+std::optional<ClaimConflict> ControllerHost::find_conflict(
+    const Table& table, ControllerSet active) noexcept TANDEM_RT {
+  for (std::size_t b = 0; b < table.size(); ++b) {
+    if (table[b] == nullptr || (active & only(b)) == 0) continue;
+    for (const auto& claim : table[b]->claims) {
+      for (std::size_t a = 0; a < b; ++a) {
+        if (table[a] == nullptr || (active & only(a)) == 0) continue;
+        if (table[a]->claimed[claim.joint] != 0) return ClaimConflict{claim.joint, a, b};
+      }
     }
   }
+  return std::nullopt;
+}
+
+std::uint32_t ControllerHost::new_id(const std::string& name) {
+  const std::lock_guard lock(names_mutex_);
+  names_.push_back(name);
+  return static_cast<std::uint32_t>(names_.size() - 1);
+}
+
+std::string ControllerHost::name(std::size_t id) const {
+  const std::lock_guard lock(names_mutex_);
+  return names_.at(id);
+}
+
+std::size_t ControllerHost::size() const noexcept {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(owned_, [](const auto& one) { return one != nullptr; }));
+}
+
+ControllerHost::Shown ControllerHost::shown() const noexcept {
+  const std::uint64_t both = shown_.load(std::memory_order_acquire);
+  return {static_cast<ControllerSet>(both), static_cast<ControllerSet>(both >> 32)};
+}
+
+void ControllerHost::show() noexcept TANDEM_RT {
+  shown_.store(active_ | (std::uint64_t{done_} << 32), std::memory_order_release);
+}
+
+void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
+  active_ = active;
+  std::ranges::fill(owner_, -1);
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (!is_active(slot)) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      owner_[claim.joint] = static_cast<std::int32_t>(slot);
+    }
+  }
+  show();
 }
 
 void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& state,
                            hal::CommandImage& command) noexcept TANDEM_RT {
+  take_over_.clear();
   release(command);  // so that hold() takes every measured position
   hold(state, command);
-  set_modes(command);
-  std::ranges::fill(done_, std::uint8_t{0});
-  for (const Hosted& one : hosted_) one.controller->start(time, state, command);
+  done_ = 0;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (is_active(slot)) set_modes(*table_[slot], command);
+  }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (is_active(slot)) table_[slot]->controller->start(time, state, command);
+  }
 }
 
 Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT {
-  bool all_done = true;
-  for (std::size_t i = 0; i < hosted_.size(); ++i) {
-    if (done_[i] != 0) continue;
-    const Code code = hosted_[i].controller->update(time, state, command);
-    if (code == Code::kStopped) {
-      done_[i] = 1;
-    } else if (code != Code::kOk) {
-      culprit_ = i;
-      return code;
+  take_over_.before_update(command);
+  bool ends = active_ != 0;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (!is_active(slot)) continue;
+    const HostedController& one = *table_[slot];
+    if ((done_ & only(slot)) == 0) {
+      const Code code = one.controller->update(time, state, command);
+      if (code == Code::kStopped) {
+        done_ |= only(slot);
+      } else if (code != Code::kOk) {
+        culprit_ = one.id;
+        return code;
+      }
     }
-    all_done = all_done && done_[i] != 0;
+    ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
-  return all_done ? Code::kStopped : Code::kOk;
+  take_over_.after_update(state, command);
+  show();
+  return ends ? Code::kStopped : Code::kOk;
 }
 
 void ControllerHost::stop() noexcept TANDEM_RT {
-  for (const Hosted& one : hosted_) one.controller->stop();
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (is_active(slot)) table_[slot]->controller->stop();
+  }
+  take_over_.clear();
+}
+
+std::uint64_t ControllerHost::fingerprint() const noexcept {
+  std::uint64_t hash = 0xCBF29CE484222325U;  // FNV-1a
+  const auto add = [&hash](std::uint64_t value) { hash = (hash ^ value) * 0x100000001B3U; };
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (table_[slot] == nullptr) continue;
+    add(slot);
+    for (const char letter : table_[slot]->name) add(static_cast<unsigned char>(letter));
+    for (const auto& claim : table_[slot]->claims) {
+      add(claim.joint);
+      add(static_cast<std::uint64_t>(claim.mode));
+      add(static_cast<std::uint64_t>(claim.interaction));
+    }
+  }
+  return hash;
 }
 
 void ControllerHost::archive(Archive& ar) {
-  for (const Hosted& one : hosted_) one.controller->archive(ar);
-  ar(done_, culprit_);
+  for (HostedController* one : table_) {
+    if (one != nullptr) one->controller->archive(ar);
+  }
+  ar(active_, done_, impedance_, culprit_, take_over_);
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
+  }
+  set_active(active_);
 }
 
 }  // namespace tandem::runtime

@@ -1,9 +1,15 @@
 // Hosts the controllers of a run: their claims on joints, and their calls in the cycle.
-// Layer: runtime.  Thread: add/configure non-RT; start, update, hold, stop RT.
+// Loaded ones are active or inactive; runtime/run_services.hpp changes that while the run goes on.
+// Layer: runtime.  Thread: add, configure, name non-RT; the cycle's part RT; shown() any.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,26 +20,106 @@
 #include "hal/capabilities.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
+#include "runtime/loop_mailbox.hpp"
+#include "runtime/take_over.hpp"
 
 namespace tandem::runtime {
 
-/// Controllers run in the order in which they were added, each on the joints that it claimed.
-/// A joint that nobody claims is held where it was measured when the controllers started.
+/// Controllers that may be loaded at a time; the bits of a set of them.
+inline constexpr std::size_t kMostControllers = 32;
+using ControllerSet = std::uint32_t;
+[[nodiscard]] constexpr ControllerSet only(std::size_t slot) { return ControllerSet{1} << slot; }
+
+/// A configured controller.
+struct HostedController {
+  std::string name;
+  std::string plugin;                      ///< its library's path; empty: it has none
+  std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
+  std::vector<ControllerSetup::Claim> claims;
+  std::vector<std::uint8_t> claimed;  ///< by joint
+  std::uint32_t id = 0;               ///< of its name, for the fault log
+  bool of_experiment = true;          ///< not loaded while the run went on
+  bool leaves = false;                ///< the asking side's: the loop was asked to let it go
+};
+
+/// Two controllers that want one joint.
+struct ClaimConflict {
+  std::size_t joint = 0;
+  std::size_t one = 0, other = 0;  ///< slots
+};
+
+/// Controllers run in the order of their slots, each on the joints that it claimed. A joint that
+/// no active controller claims is held where it was measured when the controllers started, or is
+/// in the mode that an operator has given it since.
 class ControllerHost {
  public:
+  using Table = std::array<HostedController*, kMostControllers>;
+
   /// The robot must outlive the host. `kernels` may be null.
   ControllerHost(const hal::RobotConfig& robot, const tandem_kernels* kernels,
                  std::int64_t period_ns);
+  ControllerHost(const ControllerHost&) = delete;
+  ControllerHost& operator=(const ControllerHost&) = delete;
+
+  // Before the run.
 
   /// Configures a controller and takes its claims.
+  /// @param active  false: it is loaded, and waits for its start.
   ///
-  /// Errors (nothing has moved then): what the controller's configure() says; a joint index or
-  /// mode that the robot lacks; a joint that another controller claimed (both are named).
+  /// Errors (nothing has moved then): those of configure(); a joint that another active
+  /// controller claimed (both are named); too many controllers.
   /// Errors in `parameters` go to the document's diagnostics: the caller looks there, too.
   [[nodiscard]] Status add(const std::string& name, std::shared_ptr<Controller> controller,
-                           TomlTable parameters);
+                           TomlTable parameters, bool active = true);
   /// The same for a plugin; the host keeps its library open.
-  [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters);
+  [[nodiscard]] Status add(const std::string& name, LoadedController plugin, TomlTable parameters,
+                           bool active = true);
+
+  // Any thread but the loop's.
+
+  /// A controller that is ready to be inserted.
+  /// Errors: what its configure() says; a joint index or mode that the robot lacks; a joint that
+  /// it claims twice.
+  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
+      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters);
+  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(const std::string& name,
+                                                                    LoadedController plugin,
+                                                                    TomlTable parameters);
+  /// The first joint that two of `active` claim.
+  [[nodiscard]] static std::optional<ClaimConflict> find_conflict(
+      const Table& table, ControllerSet active) noexcept TANDEM_RT;
+  /// Of a controller that is or was loaded.
+  [[nodiscard]] std::string name(std::size_t id) const;
+  /// Who is active, and done, after the last cycle.
+  struct Shown {
+    ControllerSet active = 0, done = 0;
+  };
+  [[nodiscard]] Shown shown() const noexcept;
+  [[nodiscard]] const std::vector<hal::JointCapabilities>& capabilities() const noexcept {
+    return capabilities_;
+  }
+
+  using Owned = std::array<std::unique_ptr<HostedController>, kMostControllers>;
+  /// What is loaded, by slot: add()'s before the run, RunServices' while it goes on.
+  [[nodiscard]] Owned& owned() noexcept { return owned_; }
+
+  // The loop's, at a cycle's boundary. Each answers why it did nothing.
+
+  [[nodiscard]] LoopAnswer insert(std::size_t slot,
+                                  HostedController& controller) noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer remove(std::size_t slot) noexcept TANDEM_RT;
+  /// Stops and starts controllers, all or none. When they are `running`, what they leave is held
+  /// and every joint that changes hands is led over (TakeOver); else it is who will start.
+  [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
+                                       const hal::CycleTime& time, const hal::StateImage& state,
+                                       hal::CommandImage& command) noexcept TANDEM_RT;
+  /// Sets a joint's impedance, and the mode of one that no active controller claims: position at
+  /// the measured one, velocity 0, torque (reference or feed-forward) the measured one.
+  [[nodiscard]] LoopAnswer set_joint(std::size_t joint, const JointWish& wish, bool running,
+                                     const hal::StateImage& state,
+                                     hal::CommandImage& command) noexcept TANDEM_RT;
+
+  // The cycle.
 
   /// Writes "stay where you are" for every joint: position control at the measured position.
   /// A joint that is enabled and whose last command was in position control keeps its reference
@@ -42,40 +128,69 @@ class ControllerHost {
   /// Every joint idle: no torque.
   void release(hal::CommandImage& command) const noexcept TANDEM_RT;
 
-  /// First cycle: holds every joint, sets the claimed modes, lets the controllers seed theirs.
+  /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
+  /// theirs.
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage& command) noexcept TANDEM_RT;
   /// Every cycle, the first included.
-  /// @return kOk; kStopped once every controller is done (one that is done keeps its last
-  ///         references); else the first code that is neither, culprit() says whose.
+  /// @return kOk; kStopped when a controller is active, and every active one is done (one that is
+  ///         done keeps its last references) and came with the experiment; else the first code
+  ///         that is neither, culprit() says whose.
   [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT;
   void stop() noexcept TANDEM_RT;
 
-  [[nodiscard]] std::size_t size() const noexcept { return hosted_.size(); }
-  /// Index of the controller whose code update() returned last.
+  /// That are loaded.
+  [[nodiscard]] std::size_t size() const noexcept;
+  /// For name(): the controller whose code update() returned last.
   [[nodiscard]] std::size_t culprit() const noexcept { return culprit_; }
-  [[nodiscard]] const std::string& name(std::size_t index) const { return hosted_[index].name; }
-
+  /// The slot of the active controller that claims `joint`, or -1.
+  [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
+    return owner_[joint];
+  }
+  /// A number of what is loaded: slots, names and claims.
+  [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
 
  private:
-  struct Hosted {
-    std::string name;
-    std::shared_ptr<Controller> controller;  // a plugin's shares its library's life
-    std::vector<ControllerSetup::Claim> claims;
-  };
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
-  void set_modes(hal::CommandImage& command) const noexcept TANDEM_RT;
+  [[nodiscard]] std::uint32_t new_id(const std::string& name);
+  void seat(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
+            const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
+  void leave(std::size_t joint, const hal::StateImage& state,
+             hal::CommandImage& command) const noexcept TANDEM_RT;
+  void set_modes(const HostedController& one, hal::CommandImage& command) const noexcept TANDEM_RT;
+  [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
+    return (active_ & only(slot)) != 0;
+  }
+  [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
+  void set_active(ControllerSet active) noexcept TANDEM_RT;
+  void show() noexcept TANDEM_RT;
+
+  struct Impedance {
+    double stiffness_Nm_rad = 0.0;
+    double damping_Nms_rad = 0.0;
+  };
 
   const hal::RobotConfig* robot_;
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
   std::vector<hal::JointCapabilities> capabilities_;
-  std::vector<Hosted> hosted_;
-  std::vector<std::uint8_t> done_;  // by controller
+
+  // The loop's.
+  Table table_{};
+  ControllerSet active_ = 0, done_ = 0;
+  std::vector<std::int32_t> owner_;   // by joint: an active one's slot, or -1
+  std::vector<Impedance> impedance_;  // by joint: that a start gives it
+  TakeOver take_over_;
   std::size_t culprit_ = 0;
+  std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
+
+  mutable std::mutex names_mutex_;
+  std::vector<std::string> names_;  // by id; of all that ever were
+
+  Owned owned_;
 };
 
 }  // namespace tandem::runtime

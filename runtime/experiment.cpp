@@ -113,7 +113,8 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
       if (name.empty() || other.name != name) continue;
       table.error("name", "two controllers are called '" + name + "'", "rename one of them");
     }
-    controllers.push_back({plugin, name, table.table_or_empty("parameters")});
+    const bool active = table.boolean_or("active", true);
+    controllers.push_back({plugin, name, active, table.table_or_empty("parameters")});
     table.finish();
   }
   if (controllers.empty()) {

@@ -63,6 +63,7 @@ struct ReportOptions {
 struct ControllerSpec {
   std::string plugin;    ///< "squat", or a path to a shared library
   std::string name;      ///< unique; default: the plugin's
+  bool active = true;    ///< false: it waits until it is started while the run goes on
   TomlTable parameters;  ///< for ControllerSetup; its errors go to `document`
 };
 

@@ -40,7 +40,8 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
 /// is simulated, for the log.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
-  const std::size_t most = 3 + 12 + 3 * joint_faulted_.size() + sensor_lost_.size();
+  const std::size_t most = 3 + 12 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() +
+                           sensor_lost_.size();
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
   if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
   return loop_.wait();
@@ -139,7 +140,6 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   const Code code = controllers_->update(time_, state_, command_);
   if (code == Code::kOk) return;
   if (code == Code::kStopped) {
-    if (controllers_->size() == 0) return;  // nobody to be done: hold for the duration
     event(EventKind::kControllersDone);
     go(RunPhase::kShutDown);
     return;
@@ -194,6 +194,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   progress_.running_cycles.store(ran_, std::memory_order_relaxed);
   progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
+  show_joints();
   show();
 }
 

@@ -20,6 +20,7 @@
 #include "runtime/fault.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/requests.hpp"
+#include "runtime/run_services.hpp"
 #include "runtime/run_statistics.hpp"
 
 namespace tandem::runtime {
@@ -50,8 +51,9 @@ struct CycleParts {
 ///
 ///   kBringUp   -> kSettling   when the backend says that every axis follows the command
 ///   kSettling  -> kRunning    after settle_cycles, in which every joint is held where it is
-///   kRunning   -> kShutDown   after running_cycles, when every controller is done, when the end
-///                             is requested, or in a fault with AfterStop::kEnd
+///   kRunning   -> kShutDown   after running_cycles, when every active controller is done (there is
+///                             one, and all came with the experiment), when the end is requested,
+///                             or in a fault with AfterStop::kEnd
 ///   any        -> kFaulted    in a fault of category "hold", 0 or 1: the stop is carried out and
 ///                             latched. Bring-up and shut-down excepted.
 ///   kFaulted   -> kResetting  when a reset is requested: every joint is enabled where it is
@@ -72,6 +74,9 @@ class RobotCycle {
   /// For any thread: the end of the run, a reset, an emergency stop.
   [[nodiscard]] Requests& requests() noexcept { return requests_; }
 
+  /// For any other thread: controllers and joints, while the run goes on.
+  [[nodiscard]] RunServices& services() noexcept { return services_; }
+
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return phase_; }
   [[nodiscard]] const hal::StateImage& state() const noexcept { return state_; }
@@ -90,7 +95,8 @@ class RobotCycle {
 
   /// Everything that the next step() depends on: backend, controllers, images, counters.
   /// Between two steps, with a simulated robot only; the log goes on where it is.
-  /// Errors: a backend that cannot be rewound; bytes of another configuration.
+  /// Errors: a backend that cannot be rewound; bytes of another configuration; other controllers
+  /// than those that were loaded then (nothing has changed after that one).
   [[nodiscard]] Result<std::vector<std::byte>> save();
   [[nodiscard]] Status restore(std::span<const std::byte> snapshot);
 
@@ -111,6 +117,11 @@ class RobotCycle {
   void check_joints() noexcept TANDEM_RT;
   void check_sensors() noexcept TANDEM_RT;
   [[nodiscard]] bool time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT;
+
+  // robot_cycle_services.cpp
+  void take_services() noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer carry_out(const LoopRequest& request) noexcept TANDEM_RT;
+  void show_joints() noexcept TANDEM_RT;
 
   // robot_cycle_faults.cpp
   void take_requests() noexcept TANDEM_RT;
@@ -168,6 +179,9 @@ class RobotCycle {
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;
   Requests requests_;
   Progress progress_;
+  LoopMailbox mailbox_;
+  RunServices services_;
+  std::vector<JointLook> looks_;
   CycleTrace trace_;
   CycleStamps* stamps_ = nullptr;  // this cycle's; null: not traced
   std::int64_t finished_ns_ = 0;   // clock time at which the last cycle was done; 0: none was

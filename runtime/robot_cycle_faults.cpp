@@ -22,6 +22,7 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
     event(EventKind::kStopRequested);
     go(RunPhase::kShutDown);
   }
+  take_services();
 }
 
 void RobotCycle::emergency_stop(EmergencyInput input, StopCategory category) noexcept TANDEM_RT {

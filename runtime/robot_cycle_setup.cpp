@@ -21,6 +21,8 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       joint_faulted_(parts.robot.joints.size()),
       sensor_lost_(parts.robot.sensors.size()),
       joint_limited_(parts.robot.joints.size()),
+      services_(parts.robot, parts.controllers, mailbox_, progress_, parameters_),
+      looks_(parts.robot.joints.size()),
       trace_(config.trace_cycles) {
   progress_.total_cycles = config.running_cycles;
   if (recorder_ == nullptr) return;
@@ -34,6 +36,8 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
 }
 
 void RobotCycle::archive(Archive& ar) {
+  std::uint64_t controllers = controllers_->fingerprint();
+  ar(controllers);  // first: restore() looks at it before anything changes
   loop_.archive(ar);
   state_.archive(ar);
   command_.archive(ar);
@@ -57,7 +61,15 @@ Result<std::vector<std::byte>> RobotCycle::save() {
 
 Status RobotCycle::restore(std::span<const std::byte> snapshot) {
   Archive ar(snapshot);
+  std::uint64_t controllers = 0;
+  Archive first(snapshot);
+  first(controllers);
+  if (controllers != controllers_->fingerprint()) {
+    return fail("the snapshot was taken with other controllers than are loaded now",
+                "load and unload, in the same order, what was loaded then");
+  }
   archive(ar);
+  services_.restored(parameters_);
   if (!backend_->archive(ar)) {
     return fail("this robot cannot be rewound", "snapshots need a simulated robot");
   }

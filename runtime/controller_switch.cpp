@@ -1,0 +1,186 @@
+// ControllerHost's references: who holds a joint, and what changes when it changes hands.
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/controller_host.hpp"
+
+namespace tandem::runtime {
+
+using hal::ControlMode;
+using hal::InteractionMode;
+
+namespace {
+
+constexpr auto kPosition = static_cast<std::int8_t>(ControlMode::kPosition);
+constexpr auto kStiff = static_cast<std::uint8_t>(InteractionMode::kStiff);
+
+bool is_enabled(const hal::StateImage& state, std::size_t joint) noexcept TANDEM_RT {
+  return state.drive_state()[joint] ==
+         static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
+}
+
+LoopAnswer refuse(Refusal why, std::size_t one) noexcept TANDEM_RT {
+  return {.refusal = why, .one = static_cast<std::int32_t>(one)};
+}
+
+}  // namespace
+
+void ControllerHost::hold(const hal::StateImage& state,
+                          hal::CommandImage& command) const noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    if (!capabilities_[j].can(hal::Capability::kPosition)) {
+      command.mode()[j] = static_cast<std::int8_t>(ControlMode::kIdle);
+      continue;
+    }
+    if (command.mode()[j] != kPosition || !is_enabled(state, j)) {
+      command.mode()[j] = kPosition;
+      command.interaction()[j] = kStiff;
+      command.position_rad()[j] = state.position_rad()[j];
+      command.torque_Nm()[j] = 0.0;
+    }
+    command.velocity_rad_s()[j] = 0.0;
+  }
+}
+
+void ControllerHost::release(hal::CommandImage& command) const noexcept TANDEM_RT {
+  std::ranges::fill(command.mode(), static_cast<std::int8_t>(ControlMode::kIdle));
+}
+
+void ControllerHost::set_modes(const HostedController& one,
+                               hal::CommandImage& command) const noexcept TANDEM_RT {
+  for (const auto& claim : one.claims) {
+    command.mode()[claim.joint] = static_cast<std::int8_t>(claim.mode);
+    command.interaction()[claim.joint] = static_cast<std::uint8_t>(claim.interaction);
+    command.stiffness_Nm_rad()[claim.joint] = impedance_[claim.joint].stiffness_Nm_rad;
+    command.damping_Nms_rad()[claim.joint] = impedance_[claim.joint].damping_Nms_rad;
+  }
+}
+
+/// Every reference at what is measured. The torque is that of the spring now: what carries the
+/// load goes on to carry it, as reference or as feed-forward.
+void ControllerHost::seat(std::size_t joint, ControlMode mode, InteractionMode interaction,
+                          const hal::StateImage& state,
+                          hal::CommandImage& command) const noexcept TANDEM_RT {
+  const bool carries = is_enabled(state, joint) && mode != ControlMode::kIdle &&
+                       command.mode()[joint] != static_cast<std::int8_t>(ControlMode::kIdle);
+  command.mode()[joint] = static_cast<std::int8_t>(mode);
+  command.interaction()[joint] = static_cast<std::uint8_t>(interaction);
+  command.position_rad()[joint] = state.position_rad()[joint];
+  command.velocity_rad_s()[joint] = 0.0;
+  command.torque_Nm()[joint] = carries ? state.torque_Nm()[joint] : 0.0;
+  command.voltage_V()[joint] = mode == ControlMode::kOpenLoop ? state.voltage_V()[joint] : 0.0;
+  command.current_A()[joint] = mode == ControlMode::kCurrent ? state.current_A()[joint] : 0.0;
+  command.stiffness_Nm_rad()[joint] = impedance_[joint].stiffness_Nm_rad;
+  command.damping_Nms_rad()[joint] = impedance_[joint].damping_Nms_rad;
+}
+
+/// A joint that nobody has any more stays: with its reference, when that was a stiff position.
+void ControllerHost::leave(std::size_t joint, const hal::StateImage& state,
+                           hal::CommandImage& command) const noexcept TANDEM_RT {
+  const bool keeps = command.mode()[joint] == kPosition && command.interaction()[joint] == kStiff &&
+                     is_enabled(state, joint);
+  if (keeps) {
+    command.velocity_rad_s()[joint] = 0.0;
+    return;
+  }
+  const bool can = capabilities_[joint].can(hal::Capability::kPosition);
+  seat(joint, can ? ControlMode::kPosition : ControlMode::kIdle, InteractionMode::kStiff, state,
+       command);
+}
+
+bool ControllerHost::is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT {
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((by & only(slot)) != 0 && table_[slot]->claimed[joint] != 0) return true;
+  }
+  return false;
+}
+
+LoopAnswer ControllerHost::insert(std::size_t slot,
+                                  HostedController& controller) noexcept TANDEM_RT {
+  table_[slot] = &controller;
+  return {};
+}
+
+LoopAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
+  if (table_[slot] == nullptr) return refuse(Refusal::kGone, slot);
+  if (is_active(slot)) return refuse(Refusal::kActive, slot);
+  table_[slot] = nullptr;
+  return {};
+}
+
+LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, bool running,
+                                       const hal::CycleTime& time, const hal::StateImage& state,
+                                       hal::CommandImage& command) noexcept TANDEM_RT {
+  const ControllerSet after = (active_ & ~stop) | start;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    const bool named = ((stop | start) & only(slot)) != 0;
+    if (named && table_[slot] == nullptr) return refuse(Refusal::kGone, slot);
+    if (named && is_active(slot) != ((stop & only(slot)) != 0)) {
+      return refuse(Refusal::kActive, slot);
+    }
+  }
+  if (const auto conflict = find_conflict(table_, after)) {
+    return {.refusal = Refusal::kConflict,
+            .joint = static_cast<std::int32_t>(conflict->joint),
+            .one = static_cast<std::int32_t>(conflict->one),
+            .other = static_cast<std::int32_t>(conflict->other)};
+  }
+  done_ &= ~(stop | start);
+  set_active(after);
+  if (!running) return {};
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
+    if (is_claimed(j, stop | start)) take_over_.begin(j, state, command);
+  }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((stop & only(slot)) == 0) continue;
+    table_[slot]->controller->stop();
+    for (const auto& claim : table_[slot]->claims) leave(claim.joint, state, command);
+  }
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0) continue;
+    set_modes(*table_[slot], command);
+    table_[slot]->controller->start(time, state, command);
+  }
+  return {};
+}
+
+LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, bool running,
+                                     const hal::StateImage& state,
+                                     hal::CommandImage& command) noexcept TANDEM_RT {
+  const auto number = static_cast<std::int32_t>(joint);
+  const bool moves = wish.mode >= 0 || wish.interaction >= 0;
+  const std::int32_t owned_by = owner(joint);
+  const auto mode = static_cast<ControlMode>(wish.mode >= 0 ? wish.mode : command.mode()[joint]);
+  const auto interaction = static_cast<InteractionMode>(
+      wish.interaction >= 0 ? wish.interaction : command.interaction()[joint]);
+  if (moves) {
+    LoopAnswer refused{.joint = number, .one = owned_by};
+    if (owned_by >= 0) {
+      refused.refusal = Refusal::kClaimed;
+    } else if (!running) {
+      refused.refusal = Refusal::kNotRunning;
+    } else if (!capabilities_[joint].can(mode, interaction)) {
+      refused.refusal = Refusal::kIncapable;
+    }
+    if (refused.refusal != Refusal::kNone) return refused;
+  }
+  Impedance& impedance = impedance_[joint];
+  const Impedance before = impedance;
+  if (std::isfinite(wish.stiffness_Nm_rad)) impedance.stiffness_Nm_rad = wish.stiffness_Nm_rad;
+  if (std::isfinite(wish.damping_Nms_rad)) impedance.damping_Nms_rad = wish.damping_Nms_rad;
+  const bool same = command.mode()[joint] == static_cast<std::int8_t>(mode) &&
+                    command.interaction()[joint] == static_cast<std::uint8_t>(interaction);
+  const bool yields = impedance.stiffness_Nm_rad != before.stiffness_Nm_rad ||
+                      impedance.damping_Nms_rad != before.damping_Nms_rad;
+  if (!running || (same && !yields)) return {.joint = number, .one = owned_by};
+  take_over_.begin(joint, state, command);
+  if (same) {
+    command.stiffness_Nm_rad()[joint] = impedance.stiffness_Nm_rad;
+    command.damping_Nms_rad()[joint] = impedance.damping_Nms_rad;
+  } else {
+    seat(joint, mode, interaction, state, command);
+  }
+  return {.joint = number, .one = owned_by};
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,59 @@
+// The loop's part of what can be asked of a run: taken, done and answered at a cycle's boundary.
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+
+/// Before the controllers of this cycle, and after everything that may change its phase.
+void RobotCycle::take_services() noexcept TANDEM_RT {
+  for (std::size_t most = LoopMailbox::kCapacity; most > 0; --most) {
+    const std::optional<LoopRequest> request = mailbox_.take();
+    if (!request) return;
+    const bool ending = phase_ == RunPhase::kShutDown || phase_ == RunPhase::kDone;
+    LoopAnswer answer = ending ? LoopAnswer{.refusal = Refusal::kEnding} : carry_out(*request);
+    answer.number = request->number;
+    answer.cycle = time_.cycle;
+    mailbox_.answer(answer);
+  }
+}
+
+LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT {
+  using Kind = LoopRequest::Kind;
+  switch (request.kind) {
+    case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
+    case Kind::kRemove: return controllers_->remove(request.slot);
+    case Kind::kSwitch: {
+      const LoopAnswer answer = controllers_->switch_over(request.stop, request.start, controlling_,
+                                                          time_, state_, command_);
+      if (answer.refusal == Refusal::kNone) {
+        event(log::EventKind::kControllersSwitched);
+      }
+      return answer;
+    }
+    case Kind::kJoint:
+      return controllers_->set_joint(request.joint, request.wish, controlling_, state_, command_);
+    case Kind::kGains: break;
+  }
+  parameters_.set_gains(request.joint, request.loop, request.gains);
+  return {};
+}
+
+void RobotCycle::show_joints() noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < looks_.size(); ++j) {
+    looks_[j] = {.cycle = time_.cycle,
+                 .position_rad = state_.position_rad()[j],
+                 .velocity_rad_s = state_.velocity_rad_s()[j],
+                 .torque_Nm = state_.torque_Nm()[j],
+                 .stiffness_Nm_rad = command_.stiffness_Nm_rad()[j],
+                 .damping_Nms_rad = command_.damping_Nms_rad()[j],
+                 .fault = state_.fault()[j],
+                 .age_cycles = state_.age_cycles()[j],
+                 .owner = controllers_->owner(j),
+                 .mode = command_.mode()[j],
+                 .interaction = command_.interaction()[j],
+                 .drive_mode = state_.mode()[j],
+                 .drive_state = state_.drive_state()[j]};
+  }
+  services_.show(looks_);
+}
+
+}  // namespace tandem::runtime

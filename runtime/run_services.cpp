@@ -1,0 +1,307 @@
+// Asking the loop for controllers.
+#include "runtime/run_services.hpp"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "base/nearest.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::microseconds kLook{200};  // between two looks for an answer
+
+std::unexpected<Error> about(const std::string& key, std::string message, std::string hint) {
+  return std::unexpected(
+      Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = key});
+}
+
+/// Every error of a document in one.
+Status errors_of(const TomlDocument& document) {
+  std::string all;
+  for (const Error& error : document.diagnostics()) {
+    all += (all.empty() ? "" : "; ") + error.to_string();
+  }
+  if (all.empty()) return {};
+  return fail(all, "the parameters of each controller are in docs/controllers.md");
+}
+
+}  // namespace
+
+RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
+                         const Progress& progress, hal::ParameterImage parameters)
+    : robot_(&robot),
+      host_(&host),
+      mailbox_(&mailbox),
+      progress_(&progress),
+      looks_(robot.joints.size()),
+      gains_(std::move(parameters)) {}
+
+// Asking the loop.
+
+Status RunServices::check_phase() const {
+  const RunPhase phase = progress_->phase.load();
+  if (phase != RunPhase::kShutDown && phase != RunPhase::kDone) return {};
+  return fail(std::string("the run is in the phase ") + to_string(phase), "start another run");
+}
+
+/// Takes the answers that are there: frees what the loop has let go, keeps what is awaited.
+void RunServices::collect() {
+  while (const auto answer = mailbox_->take_answer()) {
+    const auto request = asked_.extract(answer->number);
+    if (!request.empty()) free_what_left(request.mapped(), *answer);
+    const auto waiter = awaited_.find(answer->number);
+    if (waiter != awaited_.end()) waiter->second = *answer;
+  }
+}
+
+void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& answer) {
+  using Kind = LoopRequest::Kind;
+  const bool done = answer.refusal == Refusal::kNone;
+  if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
+    host_->owned()[request.slot].reset();
+  } else if (request.kind == Kind::kRemove) {
+    host_->owned()[request.slot]->leaves = false;
+  }
+}
+
+Result<Asked> RunServices::ask(Lock& lock, LoopRequest request, Patience patience) {
+  request.number = ++number_;
+  if (!mailbox_->ask(request)) {
+    if (request.kind == LoopRequest::Kind::kInsert) host_->owned()[request.slot].reset();
+    if (request.kind == LoopRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
+    return fail(
+        "the loop has not come to the last " + std::to_string(LoopMailbox::kCapacity) + " requests",
+        "is it paused? Let it go on");
+  }
+  asked_[request.number] = request;
+  const auto deadline = SteadyClock::now() + patience;
+  auto& answer = awaited_[request.number];
+  while (!answer && SteadyClock::now() < deadline && progress_->phase.load() != RunPhase::kDone) {
+    lock.unlock();
+    std::this_thread::sleep_for(kLook);
+    lock.lock();
+    collect();
+  }
+  const std::optional<LoopAnswer> found = answer;
+  awaited_.erase(request.number);
+  if (!found) {
+    if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+    return Asked{};
+  }
+  if (found->refusal != Refusal::kNone) return std::unexpected(refusal(*found));
+  return Asked{.done = true, .cycle = found->cycle};
+}
+
+std::string RunServices::controller_name(std::int32_t slot) const {
+  if (slot < 0 || static_cast<std::size_t>(slot) >= kMostControllers) return {};
+  const auto& one = host_->owned()[static_cast<std::size_t>(slot)];
+  return one == nullptr ? std::string() : one->name;
+}
+
+Error RunServices::refusal(const LoopAnswer& answer) const {
+  Error error{.message = {}, .hint = {}, .file = {}, .key = {}};
+  const std::string joint =
+      answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
+  const std::string one = controller_name(answer.one);
+  switch (answer.refusal) {
+    case Refusal::kNone: break;
+    case Refusal::kEnding:
+      error.message = "the run shuts down";
+      error.hint = "start another run";
+      break;
+    case Refusal::kNotRunning:
+      error.message = "every joint is held until the controllers run";
+      error.hint = "ask again in the phase running";
+      break;
+    case Refusal::kConflict:
+      error.message =
+          "is claimed by the controllers '" + one + "' and '" + controller_name(answer.other) + "'";
+      error.hint = "stop one of them in the same switch";
+      break;
+    case Refusal::kGone:
+      error.message = "there is no such controller any more";
+      error.hint = "tandem controller list shows what is loaded";
+      break;
+    case Refusal::kActive:
+      error.message = "the controller '" + one + "' is active, or is not, already";
+      error.hint = "tandem controller list shows which are";
+      break;
+    case Refusal::kClaimed:
+      error.message = "is claimed by the controller '" + one + "', which sets its mode";
+      error.hint = "stop it first: tandem controller stop " + one;
+      break;
+    case Refusal::kIncapable:
+      error.message = "cannot be put into this mode";
+      error.hint = "its [gains] table lacks the loop";
+      break;
+  }
+  error.key = joint;
+  return error;
+}
+
+void RunServices::restored(const hal::ParameterImage& parameters) {
+  const std::lock_guard lock(mutex_);
+  gains_ = parameters;
+}
+
+// Controllers.
+
+std::vector<ControllerLook> RunServices::controllers() {
+  const Lock lock(mutex_);
+  collect();
+  const ControllerHost::Shown shown = host_->shown();
+  std::vector<ControllerLook> all;
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    const auto& one = host_->owned()[slot];
+    if (one == nullptr || one->leaves) continue;
+    const bool active = (shown.active & only(slot)) != 0;
+    all.push_back({.name = one->name,
+                   .plugin = one->plugin,
+                   .active = active,
+                   .done = active && (shown.done & only(slot)) != 0,
+                   .of_experiment = one->of_experiment,
+                   .claims = one->claims});
+  }
+  return all;
+}
+
+Result<std::size_t> RunServices::slot_of(const std::string& name) const {
+  std::vector<std::string> names;
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    const auto& one = host_->owned()[slot];
+    if (one == nullptr || one->leaves) continue;
+    if (one->name == name) return slot;
+    names.push_back(one->name);
+  }
+  return about(name, "no controller '" + name + "' is loaded", suggest(name, names));
+}
+
+/// Who is active once the loop has done all that it was asked for.
+ControllerSet RunServices::planned() const {
+  ControllerSet active = host_->shown().active;
+  for (const auto& [number, request] : asked_) {
+    if (request.kind != LoopRequest::Kind::kSwitch) continue;
+    active = (active & ~request.stop) | request.start;
+  }
+  return active;
+}
+
+Status RunServices::check_name(const std::string& name) {
+  if (name.empty()) return about("name", "the controller's name is empty", "give it one");
+  if (slot_of(name)) {
+    return about(name, "a controller of this name is loaded already", "give this one another name");
+  }
+  return {};
+}
+
+Result<Asked> RunServices::load(const std::string& name, LoadedController plugin,
+                                const TomlDocument& parameters, Patience patience) {
+  auto made = host_->configure(name, std::move(plugin), parameters.root());
+  if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
+  if (!made) return std::unexpected(made.error());
+  return load(std::move(*made), patience);
+}
+
+Result<Asked> RunServices::load(const std::string& name, std::shared_ptr<Controller> controller,
+                                const TomlDocument& parameters, Patience patience) {
+  auto made = host_->configure(name, std::move(controller), parameters.root());
+  if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
+  if (!made) return std::unexpected(made.error());
+  return load(std::move(*made), patience);
+}
+
+Result<Asked> RunServices::load(std::unique_ptr<HostedController> controller, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  if (Status fresh = check_name(controller->name); !fresh) return std::unexpected(fresh.error());
+  ControllerHost::Owned& owned = host_->owned();
+  const auto free = std::ranges::find_if(owned, [](const auto& one) { return one == nullptr; });
+  if (free == owned.end()) {
+    return about(
+        controller->name,
+        std::to_string(kMostControllers) + " controllers are loaded, the most there can be",
+        "unload one first");
+  }
+  controller->of_experiment = false;
+  LoopRequest request{.kind = LoopRequest::Kind::kInsert,
+                      .slot = static_cast<std::uint32_t>(free - owned.begin()),
+                      .controller = controller.get()};
+  *free = std::move(controller);
+  return ask(lock, request, patience);
+}
+
+Result<Asked> RunServices::unload(const std::string& name, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<std::size_t> slot = slot_of(name);
+  if (!slot) return std::unexpected(slot.error());
+  if ((planned() & only(*slot)) != 0) {
+    return about(name, "the controller is active", "stop it first: tandem controller stop " + name);
+  }
+  host_->owned()[*slot]->leaves = true;
+  return ask(lock, {.kind = LoopRequest::Kind::kRemove, .slot = static_cast<std::uint32_t>(*slot)},
+             patience);
+}
+
+Result<ControllerSet> RunServices::set_of(const std::vector<std::string>& names) const {
+  ControllerSet set = 0;
+  for (const std::string& name : names) {
+    const Result<std::size_t> slot = slot_of(name);
+    if (!slot) return std::unexpected(slot.error());
+    if ((set & only(*slot)) != 0) return about(name, "is named twice", "name each once");
+    set |= only(*slot);
+  }
+  return set;
+}
+
+Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const {
+  const ControllerSet active = planned();
+  ControllerHost::Table table{};
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    table[slot] = host_->owned()[slot].get();
+    const std::string name = table[slot] == nullptr ? "" : table[slot]->name;
+    const ControllerSet bit = only(slot);
+    if ((stop & start & bit) != 0) {
+      return about(name, "is to be stopped and started", "name it once");
+    }
+    if ((stop & ~active & bit) != 0) {
+      return about(name, "is not active", "tandem controller list shows which are");
+    }
+    if ((start & active & bit) != 0) {
+      return about(name, "is active already", "tandem controller list shows which are");
+    }
+  }
+  if (const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start)) {
+    return std::unexpected(refusal({.refusal = Refusal::kConflict,
+                                    .joint = static_cast<std::int32_t>(conflict->joint),
+                                    .one = static_cast<std::int32_t>(conflict->one),
+                                    .other = static_cast<std::int32_t>(conflict->other)}));
+  }
+  return {};
+}
+
+Result<Asked> RunServices::switch_controllers(const std::vector<std::string>& stop,
+                                              const std::vector<std::string>& start,
+                                              Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<ControllerSet> leaving = set_of(stop);
+  if (!leaving) return std::unexpected(leaving.error());
+  const Result<ControllerSet> coming = set_of(start);
+  if (!coming) return std::unexpected(coming.error());
+  if ((*leaving | *coming) == 0) {
+    return fail("no controller is named", "name those to stop, to start, or both");
+  }
+  if (Status able = check_switch(*leaving, *coming); !able) return std::unexpected(able.error());
+  return ask(lock, {.kind = LoopRequest::Kind::kSwitch, .start = *coming, .stop = *leaving},
+             patience);
+}
+
+}  // namespace tandem::runtime

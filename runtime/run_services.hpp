@@ -1,0 +1,156 @@
+// What a run can be asked for while it goes on: controllers come, go and change; joints are set.
+// Start here to command a running loop from another thread.
+// Layer: runtime.  Thread: any but the loop's; the loop's part is RobotCycle::take_services().
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+#include "base/seqlock.hpp"
+#include "base/toml_reader.hpp"
+#include "controllers/plugin_loader.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+#include "runtime/controller_host.hpp"
+#include "runtime/loop_mailbox.hpp"
+#include "runtime/progress.hpp"
+
+namespace tandem::runtime {
+
+/// What became of a request that nothing speaks against.
+struct Asked {
+  bool done = false;  ///< false: the loop has not come to it yet, and does it in its next cycle
+  std::uint64_t cycle = 0;  ///< in which it was done
+};
+
+/// A loaded controller.
+struct ControllerLook {
+  std::string name;
+  std::string plugin;  ///< its library's path; may be empty
+  bool active = false;
+  bool done = false;           ///< it is active, and says that its task is done
+  bool of_experiment = false;  ///< it came with it
+  std::vector<ControllerSetup::Claim> claims;
+};
+
+/// A joint after the last cycle: plain words, as the loop shows them.
+struct JointLook {
+  std::uint64_t cycle = 0;
+  double position_rad = 0.0, velocity_rad_s = 0.0, torque_Nm = 0.0;  ///< measured
+  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;              ///< commanded
+  std::uint32_t fault = 0;       ///< 0, or the drive's CiA 402 error code
+  std::uint32_t age_cycles = 0;  ///< of the sample
+  std::int32_t owner = -1;       ///< slot of the active controller that claims it
+  std::int8_t mode = 0;          ///< hal::ControlMode commanded
+  std::uint8_t interaction = 0;  ///< hal::InteractionMode commanded
+  std::int8_t drive_mode = 0;    ///< hal::ControlMode in force
+  std::uint8_t drive_state = 0;  ///< hal::DriveState
+};
+
+/// The same with what is known of it besides.
+struct JointInfo {
+  std::string name;
+  std::string owner;  ///< controller; empty: nobody
+  JointLook look;
+  std::array<hal::PidGains, hal::kPidLoops> gains{};  ///< by hal::PidLoop, as asked for last
+};
+
+/// Gains to set; what is empty stays.
+struct GainsWish {
+  std::optional<double> kp, ki, kd;
+};
+
+/// Each request is judged before it reaches the loop, then done by the loop at a cycle's boundary,
+/// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop that
+/// is paused, or very slow, comes to it with its next cycle, and the answer says so.
+///
+/// Errors of all: the run shuts down or is done; kCapacity requests wait already.
+class RunServices {
+ public:
+  using Patience = std::chrono::milliseconds;
+  static constexpr Patience kPatience{1000};
+
+  /// All outlive it.
+  RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
+              const Progress& progress, hal::ParameterImage parameters);
+
+  /// Loaded controllers, in the order in which they run.
+  [[nodiscard]] std::vector<ControllerLook> controllers();
+
+  /// Configures a controller and hands it to the loop, inactive.
+  /// Errors: ControllerHost::configure()'s; those of its parameters, all of them; a name that is
+  /// taken; too many controllers. The run goes on as if nothing had been asked.
+  [[nodiscard]] Result<Asked> load(const std::string& name, LoadedController plugin,
+                                   const TomlDocument& parameters, Patience patience = kPatience);
+  [[nodiscard]] Result<Asked> load(const std::string& name, std::shared_ptr<Controller> controller,
+                                   const TomlDocument& parameters, Patience patience = kPatience);
+  /// Takes an inactive controller from the loop and frees it.
+  /// Errors: unknown (with the nearest name); active.
+  [[nodiscard]] Result<Asked> unload(const std::string& name, Patience patience = kPatience);
+
+  /// Stops some controllers and starts others in one cycle, all or none. Before the controllers
+  /// have started, and after a stop, it sets who will start.
+  /// Errors: unknown; named twice; stopped and not active; started and active; a joint that two
+  /// would claim (both and the joint are named).
+  [[nodiscard]] Result<Asked> switch_controllers(const std::vector<std::string>& stop,
+                                                 const std::vector<std::string>& start,
+                                                 Patience patience = kPatience);
+
+  /// Every joint, in the image's order.
+  [[nodiscard]] std::vector<JointInfo> joints();
+  /// Mode and interaction of a joint that no active controller claims, impedance of any.
+  /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
+  /// that the joint lacks; a value beyond its limit (which is named).
+  [[nodiscard]] Result<Asked> set_joint(const std::string& joint, const JointWish& wish,
+                                        Patience patience = kPatience);
+  /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
+  /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
+  [[nodiscard]] Result<Asked> set_gains(const std::string& joint, hal::PidLoop loop,
+                                        const GainsWish& wish, Patience patience = kPatience);
+
+  /// The loop's: shows the joints. @rt wait-free.
+  void show(std::span<const JointLook> joints) noexcept TANDEM_RT { looks_.write(joints); }
+  /// Between two steps: the run has been set back to a snapshot.
+  void restored(const hal::ParameterImage& parameters);
+
+ private:
+  using Lock = std::unique_lock<std::mutex>;
+
+  [[nodiscard]] Result<Asked> load(std::unique_ptr<HostedController> controller, Patience patience);
+  [[nodiscard]] Status check_name(const std::string& name);
+  [[nodiscard]] Result<Asked> ask(Lock& lock, LoopRequest request, Patience patience);
+  void collect();
+  void free_what_left(const LoopRequest& request, const LoopAnswer& answer);
+  [[nodiscard]] Error refusal(const LoopAnswer& answer) const;
+  [[nodiscard]] Status check_phase() const;
+  [[nodiscard]] Result<std::size_t> slot_of(const std::string& name) const;
+  [[nodiscard]] Result<ControllerSet> set_of(const std::vector<std::string>& names) const;
+  [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
+  [[nodiscard]] ControllerSet planned() const;
+  [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
+  [[nodiscard]] std::vector<JointLook> looks() const;
+  [[nodiscard]] std::string controller_name(std::int32_t slot) const;
+
+  const hal::RobotConfig* robot_;
+  ControllerHost* host_;
+  LoopMailbox* mailbox_;
+  const Progress* progress_;
+  Seqlock<JointLook> looks_;
+
+  std::mutex mutex_;           // of all below, and of the asking side of mailbox and host
+  hal::ParameterImage gains_;  // as asked for last
+  std::uint64_t number_ = 0;   // of the last request
+  std::map<std::uint64_t, LoopRequest> asked_;                  // not answered yet
+  std::map<std::uint64_t, std::optional<LoopAnswer>> awaited_;  // that somebody waits for
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,152 @@
+// Asking the loop for joints: what they are, and what can be set of them.
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <thread>
+#include <utility>
+
+#include "base/nearest.hpp"
+#include "runtime/run_services.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+std::unexpected<Error> about(const std::string& joint, std::string message, std::string hint) {
+  return std::unexpected(
+      Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = joint});
+}
+
+const char* name_of(hal::PidLoop loop) {
+  switch (loop) {
+    case hal::PidLoop::kPosition: return "position";
+    case hal::PidLoop::kVelocity: return "velocity";
+    case hal::PidLoop::kTorque: return "torque";
+    case hal::PidLoop::kCurrent: return "current";
+  }
+  return "?";
+}
+
+hal::Capability needed_by(hal::PidLoop loop) {
+  switch (loop) {
+    case hal::PidLoop::kPosition: return hal::Capability::kPosition;
+    case hal::PidLoop::kVelocity: return hal::Capability::kVelocity;
+    case hal::PidLoop::kTorque: return hal::Capability::kTorque;
+    case hal::PidLoop::kCurrent: break;
+  }
+  return hal::Capability::kCurrent;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+Status check_range(const std::string& joint, const std::string& what, double value, double max) {
+  if (value >= 0.0 && value <= max) return {};
+  return about(joint, what + " " + number(value) + " is beyond the joint's limit",
+               "give 0 to " + number(max));
+}
+
+}  // namespace
+
+Result<std::size_t> RunServices::joint_of(const std::string& name) const {
+  const int index = robot_->joint_index(name);
+  if (index >= 0) return static_cast<std::size_t>(index);
+  std::vector<std::string> names;
+  for (const hal::JointConfig& joint : robot_->joints) names.push_back(joint.name);
+  return about(name, "the robot has no joint '" + name + "'", suggest(name, names));
+}
+
+std::vector<JointLook> RunServices::looks() const {
+  std::vector<JointLook> looks(robot_->joints.size());
+  while (!looks_.read(looks)) std::this_thread::yield();
+  return looks;
+}
+
+std::vector<JointInfo> RunServices::joints() {
+  const Lock lock(mutex_);
+  collect();
+  const std::vector<JointLook> now = looks();
+  std::vector<JointInfo> all;
+  for (std::size_t j = 0; j < now.size(); ++j) {
+    JointInfo& joint = all.emplace_back();
+    joint.name = robot_->joints[j].name;
+    joint.owner = controller_name(now[j].owner);
+    joint.look = now[j];
+    for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop) {
+      joint.gains[loop] = gains_.gains(j, static_cast<hal::PidLoop>(loop));
+    }
+  }
+  return all;
+}
+
+Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& wish,
+                                     Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<std::size_t> index = joint_of(joint);
+  if (!index) return std::unexpected(index.error());
+  const hal::JointCapabilities& limit = host_->capabilities()[*index];
+  const JointLook now = looks()[*index];
+  if (wish.mode >= 0 || wish.interaction >= 0) {
+    const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
+    const auto interaction = static_cast<hal::InteractionMode>(
+        wish.interaction >= 0 ? wish.interaction : now.interaction);
+    if (Status able = hal::check_capability(*robot_, *index, mode, interaction); !able) {
+      return std::unexpected(able.error());
+    }
+  }
+  const bool yields = !std::isnan(wish.stiffness_Nm_rad) || !std::isnan(wish.damping_Nms_rad);
+  if (yields && !limit.can(hal::Capability::kCompliant)) {
+    return about(joint, "this joint cannot be compliant", "it has no torque control");
+  }
+  if (!std::isnan(wish.stiffness_Nm_rad)) {
+    const Status in_range =
+        check_range(joint, "stiffness_Nm_rad", wish.stiffness_Nm_rad, limit.max_stiffness_Nm_rad);
+    if (!in_range) return std::unexpected(in_range.error());
+  }
+  if (!std::isnan(wish.damping_Nms_rad)) {
+    const Status in_range =
+        check_range(joint, "damping_Nms_rad", wish.damping_Nms_rad, limit.max_damping_Nms_rad);
+    if (!in_range) return std::unexpected(in_range.error());
+  }
+  return ask(lock,
+             {.kind = LoopRequest::Kind::kJoint,
+              .joint = static_cast<std::uint32_t>(*index),
+              .wish = wish},
+             patience);
+}
+
+Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
+                                     const GainsWish& wish, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<std::size_t> index = joint_of(joint);
+  if (!index) return std::unexpected(index.error());
+  if (!host_->capabilities()[*index].can(needed_by(loop))) {
+    return about(joint, std::string("this joint has no ") + name_of(loop) + " loop",
+                 "give [gains." + robot_->joints[*index].gains + "] one");
+  }
+  constexpr double kMost = std::numeric_limits<float>::max();  // they travel as 32-bit numbers
+  for (const auto& [what, value] : {std::pair{"kp", wish.kp}, {"ki", wish.ki}, {"kd", wish.kd}}) {
+    const Status in_range = check_range(joint, what, value.value_or(0.0), kMost);
+    if (!in_range) return std::unexpected(in_range.error());
+  }
+  const hal::PidGains before = gains_.gains(*index, loop);
+  const hal::PidGains gains{wish.kp.value_or(before.kp), wish.ki.value_or(before.ki),
+                            wish.kd.value_or(before.kd)};
+  gains_.set_gains(*index, loop, gains);  // before the wait, in which others may ask
+  auto asked = ask(lock,
+                   {.kind = LoopRequest::Kind::kGains,
+                    .joint = static_cast<std::uint32_t>(*index),
+                    .loop = loop,
+                    .gains = gains},
+                   patience);
+  if (!asked) gains_.set_gains(*index, loop, before);
+  return asked;
+}
+
+}  // namespace tandem::runtime
