@@ -97,6 +97,16 @@ std::optional<AfterStop> read_faults(TomlTable table) {
   return after_stop;
 }
 
+RemoteOptions read_remote(TomlTable table) {
+  RemoteOptions remote;
+  if (table.has("command")) {
+    remote.command =
+        read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
+  }
+  table.finish();
+  return remote;
+}
+
 LogOptions read_log(TomlTable table) {
   LogOptions log;
   log.folder = table.text_or("folder", log.folder);
@@ -152,6 +162,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   read_overrun(root.table_or_empty("overrun"), e.loop);
   e.thread = read_realtime(root);
   e.after_stop = read_faults(root.table_or_empty("faults"));
+  e.remote = read_remote(root.table_or_empty("remote"));
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
   read_controllers(root, e.controllers);

@@ -45,6 +45,16 @@ struct SimOptions {
   double hoist_release_s = 1.0;       ///< then let the base down over this time
 };
 
+/// [remote]: what peers may ask over DDS. Reading, and stopping the robot, they may always.
+enum class RemoteCommand : std::uint8_t {
+  kOff,      ///< nothing that changes the run
+  kLocal,    ///< everything; nobody on another machine can reach it, or the files are refused
+  kNetwork,  ///< everything, from wherever [dds] reaches
+};
+struct RemoteOptions {
+  std::optional<RemoteCommand> command;  ///< empty: off in `run`, local in `serve`
+};
+
 /// [log]
 enum class LogCompression : std::uint8_t { kNone, kLz4, kZstd };
 struct LogOptions {
@@ -82,6 +92,7 @@ struct Experiment {
   rt::LoopConfig loop;      ///< period and [overrun]; the caller sets pacing and rate
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
+  RemoteOptions remote;
   LogOptions log;
   ReportOptions report;
   std::vector<ControllerSpec> controllers;

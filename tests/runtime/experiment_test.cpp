@@ -107,6 +107,7 @@ TEST(Experiment, IsReadWithItsDefaults) {
   EXPECT_FALSE(e->thread.lock_memory);
   EXPECT_EQ(e->sim.integrator, sim::Integrator::kSemiImplicitEuler);
   EXPECT_TRUE(e->sim.hoist);
+  EXPECT_FALSE(e->remote.command.has_value());
   EXPECT_EQ(e->log.folder, "runs");
   ASSERT_EQ(e->controllers.size(), 1u);
   EXPECT_EQ(e->controllers[0].name, "hold");
@@ -140,6 +141,8 @@ policy = "rr"
 priority = 42
 cpu = 1
 lock_memory = false
+[remote]
+command = "local"
 [log]
 folder = "logs"
 compression = "zstd"
@@ -182,6 +185,7 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->thread.priority, 42);
   EXPECT_EQ(e->thread.cpu, 1);
   EXPECT_FALSE(e->thread.lock_memory);
+  EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
   EXPECT_EQ(e->log.folder, "logs");
   EXPECT_EQ(e->log.compression, LogCompression::kZstd);
   EXPECT_EQ(e->report.foot, "wrist_ft");
