@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <ctime>
 
+#include "rt/doorbell.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::rt {
@@ -11,6 +12,10 @@ namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 }  // namespace
+
+void Clock::sleep_until_rung(std::int64_t deadline_ns, const Doorbell&, std::uint32_t) noexcept {
+  sleep_until(deadline_ns);
+}
 
 std::int64_t WallClock::now_ns() noexcept TANDEM_RT {
   timespec now{};
@@ -23,6 +28,11 @@ void WallClock::sleep_until(std::int64_t deadline_ns) noexcept {
   while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
     if (stop_requested()) return;
   }
+}
+
+void WallClock::sleep_until_rung(std::int64_t deadline_ns, const Doorbell& bell,
+                                 std::uint32_t seen) noexcept {
+  bell.wait(seen, deadline_ns);
 }
 
 }  // namespace tandem::rt

@@ -8,6 +8,8 @@
 
 namespace tandem::rt {
 
+class Doorbell;
+
 /// A monotonic clock in nanoseconds since an arbitrary origin.
 class Clock {
  public:
@@ -17,6 +19,10 @@ class Clock {
   /// Blocks until `deadline_ns`, or returns at once when it has passed. Absolute, so that the
   /// time between the decision to sleep and the sleep does not add up.
   virtual void sleep_until(std::int64_t deadline_ns) noexcept = 0;
+  /// The same, and returns early once the bell has rung more often than `seen`. A clock that is
+  /// not the system's hears no bell.
+  virtual void sleep_until_rung(std::int64_t deadline_ns, const Doorbell& bell,
+                                std::uint32_t seen) noexcept;
 };
 
 /// CLOCK_MONOTONIC.
@@ -26,6 +32,8 @@ class WallClock final : public Clock {
   /// clock_nanosleep(TIMER_ABSTIME); resumes after signals, returns early once a stop was
   /// requested (stop_signal.hpp).
   void sleep_until(std::int64_t deadline_ns) noexcept override;
+  void sleep_until_rung(std::int64_t deadline_ns, const Doorbell& bell,
+                        std::uint32_t seen) noexcept override;
 };
 
 }  // namespace tandem::rt

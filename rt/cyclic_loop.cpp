@@ -6,17 +6,20 @@
 #include <cmath>
 
 #include "base/archive.hpp"
+#include "rt/clock_control.hpp"
 
 namespace tandem::rt {
 namespace {
 
+std::int64_t scaled(std::int64_t period_ns, double rate) {
+  if (rate <= 0.0) return 0;
+  return std::max<std::int64_t>(1, std::llround(static_cast<double>(period_ns) / rate));
+}
+
 std::int64_t grid_step(const LoopConfig& config) {
   switch (config.pacing) {
     case Pacing::kWallClock: return config.period_ns;
-    case Pacing::kSimulated:
-      if (config.rate <= 0.0) return 0;
-      return std::max<std::int64_t>(
-          1, std::llround(static_cast<double>(config.period_ns) / config.rate));
+    case Pacing::kSimulated: return scaled(config.period_ns, config.rate);
     case Pacing::kExternal: return 0;
   }
   return 0;
@@ -24,8 +27,11 @@ std::int64_t grid_step(const LoopConfig& config) {
 
 }  // namespace
 
-CyclicLoop::CyclicLoop(const LoopConfig& config, Clock& clock)
-    : config_(config), clock_(&clock), step_ns_(grid_step(config)) {
+CyclicLoop::CyclicLoop(const LoopConfig& config, Clock& clock, ClockControl* control)
+    : config_(config),
+      clock_(&clock),
+      control_(config.pacing == Pacing::kSimulated ? control : nullptr),
+      step_ns_(grid_step(config)) {
   assert(config.period_ns > 0 && config.rate >= 0.0);
   assert(1 <= config.stop_late && config.stop_late <= config.stop_window);
   assert(config.stop_window <= 64);
@@ -33,24 +39,16 @@ CyclicLoop::CyclicLoop(const LoopConfig& config, Clock& clock)
 
 Tick CyclicLoop::wait() noexcept {
   Tick tick;
-  if (paced()) {
-    const std::int64_t now_ns = clock_->now_ns();
-    if (!started_) {
-      grid_ns_ = now_ns;
-    } else if (now_ns <= grid_ns_) {
-      late_mask_ <<= 1;
-      clock_->sleep_until(grid_ns_);
-    } else {
-      // The last cycle ran into this grid point: the next one in the future takes its place.
-      const std::int64_t missed = (now_ns - grid_ns_ + step_ns_ - 1) / step_ns_;
-      grid_ns_ += missed * step_ns_;
-      judge(tick, static_cast<std::uint64_t>(missed));
-      clock_->sleep_until(grid_ns_);
-    }
+  if (control_ == nullptr) {
+    pace(tick);
+  } else {
+    do {
+      obey();
+    } while (!pace(tick) || !control_->begin());
   }
   tick.cycle = next_cycle_++;
   tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
-  tick.begin_ns = begin_ns_ = clock_->now_ns();
+  tick.begin_ns = begin_ns_;
   if (paced()) {
     if (started_) {
       tick.wakeup_ns = begin_ns_ - grid_ns_;
@@ -61,6 +59,49 @@ Tick CyclicLoop::wait() noexcept {
   started_ = true;
   ++statistics_.cycles;
   return tick;
+}
+
+/// What was asked of simulated time; blocks while it is paused.
+void CyclicLoop::obey() noexcept {
+  const bool hurries = paced() && stop_requested();
+  if (started_ && !hurries && !control_->changed()) return;
+  const ClockControl::Pace pace = control_->attend(*clock_, next_cycle_, !started_);
+  if (pace.stood) started_ = false;
+  set_step(scaled(config_.period_ns, pace.rate));
+}
+
+/// The next grid point follows from the last. Nothing is made good, nothing counts as late: where
+/// that point has passed, the grid restarts.
+void CyclicLoop::set_step(std::int64_t step_ns) noexcept {
+  if (step_ns == step_ns_) return;
+  grid_ns_ += step_ns - step_ns_;
+  if (!paced() || grid_ns_ < clock_->now_ns()) started_ = false;
+  step_ns_ = step_ns;
+}
+
+/// Sleeps until the cycle's grid point. False: it was woken before.
+bool CyclicLoop::pace(Tick& tick) noexcept {
+  begin_ns_ = clock_->now_ns();
+  if (!paced()) return true;
+  if (!started_) {
+    grid_ns_ = begin_ns_;
+    return true;
+  }
+  if (begin_ns_ <= grid_ns_) {
+    late_mask_ <<= 1;
+  } else {
+    // The last cycle ran into this grid point: the next one in the future takes its place.
+    const std::int64_t missed = (begin_ns_ - grid_ns_ + step_ns_ - 1) / step_ns_;
+    grid_ns_ += missed * step_ns_;
+    judge(tick, static_cast<std::uint64_t>(missed));
+  }
+  if (control_ == nullptr) {
+    clock_->sleep_until(grid_ns_);
+  } else {
+    control_->sleep_until(*clock_, grid_ns_);
+  }
+  begin_ns_ = clock_->now_ns();
+  return begin_ns_ >= grid_ns_;
 }
 
 void CyclicLoop::judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT {

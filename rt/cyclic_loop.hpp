@@ -14,6 +14,8 @@ class Archive;
 
 namespace tandem::rt {
 
+class ClockControl;
+
 /// Who makes time pass.
 enum class Pacing : std::uint8_t {
   kWallClock,  ///< cycle k starts at start + k * period; a missed grid point is a missed cycle
@@ -32,7 +34,8 @@ enum class OverrunPolicy : std::uint8_t {
 struct LoopConfig {
   std::int64_t period_ns = 1'000'000;
   Pacing pacing = Pacing::kSimulated;
-  double rate = 0.0;  ///< simulated only: times real time; 0 runs as fast as it can
+  double rate = 0.0;          ///< simulated only: times real time; 0 runs as fast as it can
+  bool start_paused = false;  ///< simulated only: no cycle before a ClockControl lets it
   OverrunPolicy on_overrun = OverrunPolicy::kSkip;
   int stop_late = 5;     ///< 1 to stop_window
   int stop_window = 50;  ///< 1 to 64 cycles
@@ -65,11 +68,12 @@ struct LoopStatistics {
 class CyclicLoop {
  public:
   /// @pre config.period_ns > 0, rate >= 0, 1 <= stop_late <= stop_window <= 64.
-  /// The clock must outlive the loop.
-  CyclicLoop(const LoopConfig& config, Clock& clock);
+  /// Clock and control outlive the loop; null: nobody pauses it. Real time obeys no control.
+  CyclicLoop(const LoopConfig& config, Clock& clock, ClockControl* control = nullptr);
 
   /// Blocks until the next cycle's start. The first call starts the grid and returns cycle
-  /// `next_cycle()` at once. One sleep and one clock read; no allocation or lock.
+  /// `next_cycle()` at once, and so does the first after a pause, which is no overrun. One sleep
+  /// and one or two clock reads; no allocation, and no lock unless something was asked for.
   [[nodiscard]] Tick wait() noexcept;
   /// The answers of the bus are there: what follows is the cycle's own work.
   /// @return the clock's time [ns]. @rt one clock read.
@@ -86,18 +90,22 @@ class CyclicLoop {
   /// Of the newest cycle that finished.
   [[nodiscard]] std::int64_t last_work_ns() const noexcept { return last_work_ns_; }
 
-  /// The cycle counter, which is all that simulated time is. The grid restarts at the next
-  /// wait(); statistics go on.
   /// The overruns so far count no more towards OverrunPolicy::kStop.
   void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
+  /// The cycle counter, which is all that simulated time is. The grid restarts at the next
+  /// wait(); statistics go on.
   void archive(Archive& ar);
 
  private:
   [[nodiscard]] bool paced() const noexcept { return step_ns_ > 0; }
+  void obey() noexcept;
+  void set_step(std::int64_t step_ns) noexcept;
+  bool pace(Tick& tick) noexcept;
   void judge(Tick& tick, std::uint64_t missed) noexcept TANDEM_RT;
 
   LoopConfig config_;
   Clock* clock_;
+  ClockControl* control_;
   std::int64_t step_ns_ = 0;  // between grid points on the clock; 0: not paced
   std::int64_t grid_ns_ = 0;  // clock time of the next grid point
   bool started_ = false;

@@ -16,6 +16,7 @@ using hal::to_string;
 struct Progress {
   std::atomic<RunPhase> phase{RunPhase::kBringUp};
   std::atomic<std::uint64_t> cycles{0};          ///< done, all phases
+  std::atomic<std::int64_t> time_ns{0};          ///< of the newest of them
   std::atomic<std::uint64_t> running_cycles{0};  ///< of the phase kRunning
   std::atomic<std::uint64_t> total_cycles{0};    ///< that kRunning will have; 0: until stopped
   std::atomic<std::uint64_t> overruns{0};

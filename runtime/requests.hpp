@@ -7,20 +7,28 @@
 
 #include "base/realtime.hpp"
 #include "hal/stop_category.hpp"
+#include "rt/doorbell.hpp"
 
 namespace tandem::runtime {
 
-/// Wait-free both ways. A request waits until the loop takes it; the same one twice is one.
+/// Wait-free both ways. A request waits until the loop takes it; the same one twice is one. A loop
+/// that blocks hears of it by its doorbell.
 class Requests {
  public:
   /// What was asked for since the last take().
   struct Asked {
-    bool end = false;    ///< of the run, in order
-    bool reset = false;  ///< of every latched fault
+    bool end = false;                                             ///< of the run, in order
+    bool reset = false;                                           ///< of every latched fault
     hal::StopCategory emergency_stop = hal::StopCategory::kWarn;  ///< the hardest; kWarn: none
   };
 
-  void end_run() noexcept { ask(kEnd); }
+  /// @param bell  rings with every request, and knows when the run is to end; outlives this
+  explicit Requests(rt::Doorbell& bell) : bell_(&bell) {}
+
+  void end_run() noexcept {
+    asked_.fetch_or(kEnd, std::memory_order_relaxed);
+    bell_->end();
+  }
   void reset_faults() noexcept { ask(kReset); }
   /// kCategory0; every other category stops as category 1.
   void emergency_stop(hal::StopCategory category) noexcept {
@@ -39,8 +47,12 @@ class Requests {
 
  private:
   static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8;
-  void ask(std::uint32_t what) noexcept { asked_.fetch_or(what, std::memory_order_relaxed); }
+  void ask(std::uint32_t what) noexcept {
+    asked_.fetch_or(what, std::memory_order_relaxed);
+    bell_->ring();
+  }
 
+  rt::Doorbell* bell_;
   std::atomic<std::uint32_t> asked_{0};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 };

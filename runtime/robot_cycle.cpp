@@ -37,7 +37,7 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
 }
 
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
-/// is simulated, for the log.
+/// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
   const std::size_t most = 3 + 12 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() +
@@ -191,6 +191,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   }
   progress_.phase.store(phase_, std::memory_order_relaxed);
   progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
+  progress_.time_ns.store(time_.time_ns, std::memory_order_relaxed);
   progress_.running_cycles.store(ran_, std::memory_order_relaxed);
   progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);

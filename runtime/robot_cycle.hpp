@@ -13,6 +13,7 @@
 #include "hal/robot_config.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
+#include "rt/clock_control.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "runtime/after_stop.hpp"
 #include "runtime/controller_host.hpp"
@@ -76,6 +77,9 @@ class RobotCycle {
 
   /// For any other thread: controllers and joints, while the run goes on.
   [[nodiscard]] RunServices& services() noexcept { return services_; }
+
+  /// For any thread: pause, resume, step and rate of simulated time.
+  [[nodiscard]] rt::ClockControl& clock_control() noexcept { return clock_control_; }
 
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return phase_; }
@@ -155,6 +159,8 @@ class RobotCycle {
   hal::CycleTap* tap_;
   CycleConfig config_;
 
+  rt::Doorbell bell_;  // rings when a loop that blocks has something to look at
+  rt::ClockControl clock_control_;
   rt::CyclicLoop loop_;
   hal::StateImage state_;
   hal::CommandImage command_;
@@ -177,7 +183,7 @@ class RobotCycle {
   FaultLog faults_;
 
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;
-  Requests requests_;
+  Requests requests_{bell_};
   Progress progress_;
   LoopMailbox mailbox_;
   RunServices services_;

@@ -288,7 +288,8 @@ TEST(FaultLog, CountsWhatDoesNotFit) {
 }
 
 TEST(Requests, KeepTheHardestUntilTheyAreTaken) {
-  Requests requests;
+  rt::Doorbell bell;
+  Requests requests(bell);
   requests.emergency_stop(StopCategory::kCategory1);
   requests.emergency_stop(StopCategory::kCategory0);
   requests.reset_faults();

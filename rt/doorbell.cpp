@@ -1,0 +1,48 @@
+#include "rt/doorbell.hpp"
+
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <climits>
+#include <ctime>
+
+namespace tandem::rt {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+/// A signal only sets a flag, and mostly on another thread: it wakes nobody.
+constexpr std::int64_t kPatience_ns = 20'000'000;
+
+std::int64_t monotonic_ns() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * kSecond_ns + now.tv_nsec;
+}
+
+}  // namespace
+
+void Doorbell::ring() noexcept {
+  count_.fetch_add(1, std::memory_order_release);
+  ::syscall(SYS_futex, &count_, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
+}
+
+void Doorbell::end() noexcept {
+  ended_.store(true, std::memory_order_relaxed);
+  ring();
+}
+
+void Doorbell::wait(std::uint32_t seen, std::int64_t deadline_ns) const noexcept {
+  while (count() == seen && !stop_requested()) {
+    const std::int64_t now_ns = monotonic_ns();
+    if (now_ns >= deadline_ns) return;
+    const std::int64_t until_ns = std::min(deadline_ns, now_ns + kPatience_ns);
+    const timespec until{.tv_sec = until_ns / kSecond_ns, .tv_nsec = until_ns % kSecond_ns};
+    // FUTEX_WAIT_BITSET: an absolute time on CLOCK_MONOTONIC.
+    ::syscall(SYS_futex, &count_, FUTEX_WAIT_BITSET_PRIVATE, seen, &until, nullptr,
+              FUTEX_BITSET_MATCH_ANY);
+  }
+}
+
+}  // namespace tandem::rt
