@@ -5,6 +5,7 @@
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/played_clock.hpp"
 #include "tests/runtime/test_controllers.hpp"
 #include "tests/sim/swing_robot.hpp"
 
@@ -17,7 +18,8 @@ constexpr std::uint64_t kRunning = 600;
 
 /// The swing, moved on a sine for 0.6 s.
 struct SimRun {
-  explicit SimRun(std::uint64_t seed = 1, double rate = 0.0, log::Recorder* recorder = nullptr)
+  explicit SimRun(std::uint64_t seed = 1, double rate = 0.0, log::Recorder* recorder = nullptr,
+                  bool start_paused = false)
       : robot(tandem::test::swing_robot()), host(robot, tandem::test::swing_kernels(2), 1'000'000) {
     auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
                                       {.posture = "up", .release_ns = 100'000'000, .seed = seed});
@@ -25,8 +27,9 @@ struct SimRun {
     backend = std::move(*made);
     EXPECT_TRUE(host.add("sine", std::make_unique<Sine>(std::vector<std::size_t>{0}),
                          test::parameters("amplitude_rad = 0.1")));
-    const CycleConfig config{.loop = {.pacing = rt::Pacing::kSimulated, .rate = rate},
-                             .running_cycles = kRunning};
+    const CycleConfig config{
+        .loop = {.pacing = rt::Pacing::kSimulated, .rate = rate, .start_paused = start_paused},
+        .running_cycles = kRunning};
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, *backend, host, clock, recorder, &backend->truth()}, config);
   }
@@ -107,6 +110,22 @@ TEST(SimRun, LogsTheSameDataForTheSameSeedWhateverTheRate) {
   EXPECT_EQ(hash_of_run(folder / "2.mcap", 7, 0.0), first);
   EXPECT_EQ(hash_of_run(folder / "3.mcap", 7, 5.0), first);
   EXPECT_NE(hash_of_run(folder / "4.mcap", 8, 0.0), first);
+}
+
+/// Played at random, with standing at the start and some cycles a hundred times slower than real
+/// time.
+TEST(SimRun, LogsTheSameDataHoweverItsClockIsPlayed) {
+  const log::ScratchFolder folder;
+  const std::string free = hash_of_run(folder / "free.mcap", 7, 0.0);
+  for (const std::uint32_t seed : {1U, 2U, 3U}) {
+    const std::string path = folder / ("played" + std::to_string(seed) + ".mcap");
+    auto recorder = log::Recorder::open(path, {.joints = {"swing"}}, {});
+    ASSERT_TRUE(recorder);
+    SimRun run(7, 1.0, recorder->get(), true);
+    EXPECT_GE(test::run_with_played_clock(*run.cycle, seed), 6);
+    EXPECT_EQ((*recorder)->close().data_sha256, free) << seed;
+    EXPECT_EQ(run.cycle->running_cycles(), kRunning);
+  }
 }
 
 TEST(SimRun, EndsInAFaultThatNamesTheJointWhenTheCableIsCut) {

@@ -12,6 +12,7 @@
 #include "runtime/experiment.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/played_clock.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -130,7 +131,8 @@ TEST(SquatRun, WithBusTimingIsOnTime) {
   }
 }
 
-std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded = false) {
+std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded = false,
+                        bool played = false) {
   auto recorder = log::Recorder::open(path, {}, {});
   EXPECT_TRUE(recorder);
   Squat squat("coman", kRunning, rate, recorder->get());
@@ -140,7 +142,11 @@ std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded 
     double sum = 0.0;
     while (loaded && !done.load()) sum += std::sin(sum + 1.0);
   });
-  squat.cycle->run();
+  if (played) {
+    EXPECT_GE(test::run_with_played_clock(*squat.cycle, 1), 6);
+  } else {
+    squat.cycle->run();
+  }
   done = true;
   load.join();
   const log::RecordingResult result = (*recorder)->close();
@@ -149,12 +155,13 @@ std::string hash_of_run(const std::string& path, double rate = 0.0, bool loaded 
   return result.data_sha256;
 }
 
-TEST(SquatRun, LogsTheSameDataForTheSameSeedWhateverTheRateAndTheLoad) {
+TEST(SquatRun, LogsTheSameDataForTheSameSeedWhateverTheClockAndTheLoad) {
   const log::ScratchFolder folder;
   const std::string first = hash_of_run(folder / "1.mcap");
   EXPECT_EQ(hash_of_run(folder / "2.mcap"), first);
   EXPECT_EQ(hash_of_run(folder / "rate.mcap", 5.0), first);
   EXPECT_EQ(hash_of_run(folder / "load.mcap", 0.0, true), first);
+  EXPECT_EQ(hash_of_run(folder / "played.mcap", 0.0, false, true), first);
 }
 
 TEST(SquatRun, RepeatsItsBytesAfterARestore) {
