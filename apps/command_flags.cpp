@@ -139,6 +139,15 @@ void add_flags(CLI::App& app, RunOptions& o) {
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
                  "the wall clock, end else)")
       ->check(CLI::IsMember({"end", "wait"}));
+  CLI::Option* dds = app.add_flag_callback(
+      "--dds", [&o] { o.dds = true; }, "Show the robot to ROS 2 and `tandem topic`");
+  CLI::Option* no_dds =
+      app.add_flag_callback(
+             "--no-dds", [&o] { o.dds = false; }, "Do not, whatever the experiment says")
+          ->excludes(dds);
+  app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
+      ->excludes(no_dds)
+      ->check(CLI::Range(0, 232));
   app.footer(kRunExamples);
 }
 

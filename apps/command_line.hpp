@@ -39,6 +39,8 @@ struct RunOptions {
   std::string socket;  ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
   std::string on_fault;  ///< "end", "wait"; empty: the experiment's
+  std::optional<bool> dds;    ///< instead of the experiment's
+  std::optional<int> domain;  ///< of DDS, instead of the experiment's
 };
 
 /// tandem fault show|reset

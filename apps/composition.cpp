@@ -82,6 +82,8 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
   e.hal.backend = overrides.backend.value_or(e.hal.backend);
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
+  e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
+  e.dds.domain = overrides.domain.value_or(e.dds.domain);
 
   Collector errors;
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
@@ -89,6 +91,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   }
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
+  c->tree = robot->tree;
   if (auto kernels = find_kernels(*robot, e.kernel_variant)) {
     c->kernels = std::move(*kernels);
     c->controllers =

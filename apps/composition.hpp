@@ -30,6 +30,8 @@ struct Overrides {
   bool lockstep = false;                ///< true: whatever the experiment says
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string scenario = {};            ///< faults to inject into the simulation
+  std::optional<bool> dds = std::nullopt;
+  std::optional<int> domain = std::nullopt;  ///< of DDS
 };
 
 /// A controller as `check` tells of it.
@@ -40,6 +42,7 @@ struct ControllerNote {
 
 struct Composition {
   runtime::Experiment experiment;  ///< overrides applied; its robot is completed
+  model::Tree tree;                ///< the robot's description
   model::KernelLibrary kernels;
   std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for

@@ -1,92 +1,25 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
-#include <thread>
 
-#include "apps/bus_watch.hpp"
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/dds_run.hpp"
 #include "apps/inject.hpp"
+#include "apps/loop_thread.hpp"
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
-#include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "runtime/trace_file.hpp"
 
 namespace tandem::apps {
 namespace {
-
-using SteadyClock = std::chrono::steady_clock;
-
-/// The loop on its own thread, and how long its controllers took.
-class LoopThread {
- public:
-  LoopThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
-      : thread_([this, &cycle, config] { run(cycle, config); }) {}
-  [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
-  void join() { thread_.join(); }
-  // For when it has joined.
-  [[nodiscard]] double wall_s() const { return wall_s_; }
-  [[nodiscard]] const rt::ThreadReport& report() const { return report_; }
-
- private:
-  void run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
-    report_ = rt::set_up_thread(config);
-    SteadyClock::time_point began = SteadyClock::now();
-    auto before = runtime::RunPhase::kBringUp;
-    bool more = true;
-    while (more) {
-      more = cycle.step();
-      const runtime::RunPhase now = cycle.phase();
-      if (now == before) continue;
-      const SteadyClock::time_point time = SteadyClock::now();
-      if (now == runtime::RunPhase::kRunning) began = time;
-      if (before == runtime::RunPhase::kRunning) {
-        wall_s_ = std::chrono::duration<double>(time - began).count();
-      }
-      before = now;
-    }
-    done_.store(true, std::memory_order_release);
-  }
-
-  double wall_s_ = 0.0;
-  rt::ThreadReport report_;
-  std::atomic<bool> done_{false};
-  std::thread thread_;  // last: it uses the others
-};
-
-std::string progress_note(const runtime::Progress& progress) {
-  const runtime::RunPhase phase = progress.phase.load();
-  return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
-}
-
-void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           std::FILE* out, bool quiet) {
-  const runtime::Experiment& e = c.experiment;
-  const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
-  const runtime::Progress& progress = cycle.progress();
-  Progress bar(out, static_cast<double>(e.cycles()) * period_s);
-  BusWatch buses(c.can_buses(), stderr);
-  while (!loop.done()) {
-    if (!quiet) buses.look();
-    if (!quiet) {
-      bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
-                 progress_note(progress));
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  if (!quiet) {
-    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s, "");
-    bar.finish();
-  }
-}
 
 std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
@@ -182,6 +115,11 @@ Exit run(Composition& c, const RunOptions& options) {
     }
     recorder = std::move(*opened);
   }
+  const auto dds = DdsRun::open(c, "tandem_run");
+  if (!dds) {
+    print_errors({dds.error()});
+    return Exit::kUsage;
+  }
   rt::WallClock clock;
   const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
   const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
@@ -190,8 +128,7 @@ Exit run(Composition& c, const RunOptions& options) {
   if (!options.quiet) {
     fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
                e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
-               1e6 / static_cast<double>(e.loop.period_ns),
-               pace_text(c, options));
+               1e6 / static_cast<double>(e.loop.period_ns), pace_text(c, options));
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle, e.robot);
@@ -249,7 +186,9 @@ Exit run_command(const RunOptions& options) {
                       .kernel_variant = options.kernel_variant,
                       .lockstep = options.lockstep,
                       .interfaces = options.interfaces,
-                      .scenario = options.scenario};
+                      .scenario = options.scenario,
+                      .dds = options.dds,
+                      .domain = options.domain};
   if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
   const auto composition = compose(options.experiment, overrides);

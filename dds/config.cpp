@@ -41,6 +41,15 @@ SecurityConfig read_security(TomlTable table, const std::string& folder) {
   return security;
 }
 
+void read_every(TomlTable table, Config& config) {
+  for (std::size_t i = 0; i < kTopicRates.size(); ++i) {
+    const std::string_view key = kTopicRates[i].key;
+    if (!table.has(key)) continue;
+    config.every[i] = static_cast<std::uint64_t>(table.integer(key, 0, 1'000'000));
+  }
+  table.finish();
+}
+
 std::string text_of(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -95,8 +104,17 @@ Config read_config(TomlTable table, const std::string& folder) {
   config.peers = table.texts_or("peers", config.peers);
   check_all(table, "peers", config.peers, kAddress, "addresses: \"192.168.1.20\"");
   if (table.has("security")) config.security = read_security(table.table("security"), folder);
+  read_every(table.table_or_empty("every"), config);
   table.finish();
   return config;
+}
+
+std::uint64_t Config::cycles_between(Topic topic, std::int64_t period_ns) const {
+  const auto index = static_cast<std::size_t>(topic);
+  if (every[index]) return *every[index];
+  const std::int64_t wanted = kTopicRates[index].default_ns;
+  if (wanted == 0) return 0;
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(1, wanted / period_ns));
 }
 
 /// On the loopback interface there is no multicast: others are looked for at its address.

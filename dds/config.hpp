@@ -3,7 +3,11 @@
 // Layer: dds.  Thread: non-RT only.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.hpp"
@@ -23,6 +27,38 @@ struct SecurityConfig {
   [[nodiscard]] bool on() const { return !identity_ca.empty(); }
 };
 
+/// The topics whose rate can be chosen.
+enum class Topic : std::uint8_t {
+  kJointStates,
+  kDynamicJointStates,
+  kImu,
+  kWrench,
+  kClock,
+  kTf,
+  kOdom,
+  kDiagnostics,
+  kState,
+  kCommand,
+  kStatistics,
+};
+struct TopicRate {
+  std::string_view key;     ///< of [dds.every]
+  std::int64_t default_ns;  ///< between two samples, unless the key says otherwise; 0: none
+};
+inline constexpr std::array<TopicRate, 11> kTopicRates{{
+    {"joint_states", 10'000'000},
+    {"dynamic_joint_states", 0},
+    {"imu", 10'000'000},
+    {"wrench", 10'000'000},
+    {"clock", 10'000'000},
+    {"tf", 20'000'000},
+    {"odom", 20'000'000},
+    {"diagnostics", 1'000'000'000},
+    {"state", 10'000'000},
+    {"command", 10'000'000},
+    {"statistics", 1'000'000'000},
+}};
+
 /// [dds]
 struct Config {
   bool enabled = false;                       ///< the table is there, or --dds was given
@@ -31,6 +67,11 @@ struct Config {
   std::vector<std::string> interfaces{"lo"};  ///< names or addresses of network interfaces
   std::vector<std::string> peers;             ///< addresses to look for others at, beside multicast
   SecurityConfig security;
+  /// [dds.every]: cycles of the loop between two samples, 0: none; empty: kTopicRates' default.
+  std::array<std::optional<std::uint64_t>, kTopicRates.size()> every;
+
+  /// A sample of `topic` belongs to every cycle whose number this divides; 0: to none.
+  [[nodiscard]] std::uint64_t cycles_between(Topic topic, std::int64_t period_ns) const;
 
   /// Whether nothing leaves this machine.
   [[nodiscard]] bool loopback_only() const {

@@ -165,6 +165,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.remote = read_remote(root.table_or_empty("remote"));
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
+  if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());
   read_controllers(root, e.controllers);
   root.finish();
   return e;

@@ -12,6 +12,7 @@
 
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
+#include "dds/config.hpp"
 #include "hal/robot_config.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/urdf.hpp"
@@ -95,6 +96,7 @@ struct Experiment {
   RemoteOptions remote;
   LogOptions log;
   ReportOptions report;
+  dds::Config dds;  ///< off without the table
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

@@ -1,0 +1,60 @@
+#include "apps/loop_thread.hpp"
+
+#include <chrono>
+
+#include "apps/bus_watch.hpp"
+#include "apps/console.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+std::string progress_note(const runtime::Progress& progress) {
+  const runtime::RunPhase phase = progress.phase.load();
+  return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
+}
+
+}  // namespace
+
+void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
+  report_ = rt::set_up_thread(config);
+  SteadyClock::time_point began = SteadyClock::now();
+  auto before = runtime::RunPhase::kBringUp;
+  bool more = true;
+  while (more) {
+    more = cycle.step();
+    const runtime::RunPhase now = cycle.phase();
+    if (now == before) continue;
+    const SteadyClock::time_point time = SteadyClock::now();
+    if (now == runtime::RunPhase::kRunning) began = time;
+    if (before == runtime::RunPhase::kRunning) {
+      wall_s_ = std::chrono::duration<double>(time - began).count();
+    }
+    before = now;
+  }
+  done_.store(true, std::memory_order_release);
+}
+
+void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
+           std::FILE* out, bool quiet) {
+  const runtime::Experiment& e = c.experiment;
+  const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
+  const runtime::Progress& progress = cycle.progress();
+  Progress bar(out, static_cast<double>(e.cycles()) * period_s);
+  BusWatch buses(c.can_buses(), stderr);
+  while (!loop.done()) {
+    if (!quiet) buses.look();
+    if (!quiet) {
+      bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
+                 progress_note(progress));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  if (!quiet) {
+    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s, "");
+    bar.finish();
+  }
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,56 @@
+#include "dds/config.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace tandem::dds {
+namespace {
+
+Config read(const std::string& text, Diagnostics* errors = nullptr) {
+  const auto document = TomlDocument::parse(text, "test.toml");
+  EXPECT_TRUE(document);
+  Config config = read_config(document->root().table("dds"), document->folder());
+  if (errors != nullptr) {
+    *errors = document->diagnostics();
+  } else {
+    EXPECT_TRUE(document->diagnostics().empty()) << document->diagnostics().front().to_string();
+  }
+  return config;
+}
+
+TEST(DdsConfig, HasRatesThatFollowThePeriodAndKeysThatDoNot) {
+  const Config config = read("[dds]\n[dds.every]\njoint_states = 7\ntf = 0\n");
+  EXPECT_TRUE(config.enabled);
+  EXPECT_TRUE(config.loopback_only());
+  EXPECT_EQ(config.cycles_between(Topic::kJointStates, 1'000'000), 7U);
+  EXPECT_EQ(config.cycles_between(Topic::kJointStates, 500'000), 7U);
+  EXPECT_EQ(config.cycles_between(Topic::kTf, 1'000'000), 0U);
+  EXPECT_EQ(config.cycles_between(Topic::kImu, 1'000'000), 10U);
+  EXPECT_EQ(config.cycles_between(Topic::kImu, 250'000), 40U);
+  EXPECT_EQ(config.cycles_between(Topic::kImu, 50'000'000), 1U);
+  EXPECT_EQ(config.cycles_between(Topic::kDynamicJointStates, 1'000'000), 0U);
+}
+
+TEST(DdsConfig, RefusesAnUnknownTopicAndANegativeRate) {
+  Diagnostics errors;
+  (void)read("[dds.every]\njoint_state = 7\ntf = -1\n", &errors);
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_EQ(errors[0].key, "dds.every.tf");
+  EXPECT_EQ(errors[1].key, "dds.every.joint_state");
+}
+
+TEST(DdsConfig, OfEveryTopicIsDocumented) {
+  std::ifstream in(TANDEM_SOURCE_DIR "/docs/configuration.md");
+  std::ostringstream page;
+  page << in.rdbuf();
+  for (const TopicRate& rate : kTopicRates) {
+    std::string key(1, '`');
+    key.append(rate.key).append(1, '`');
+    EXPECT_NE(page.str().find(key), std::string::npos) << key;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::dds
