@@ -20,6 +20,9 @@ QosPointer to_dds(const Qos& qos) {
   if (qos.transient_local) {
     dds_qset_durability_service(out.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth, -1, -1, -1);
   }
+  if (!qos.user_data.empty()) {
+    dds_qset_userdata(out.get(), qos.user_data.data(), qos.user_data.size());
+  }
   return out;
 }
 
