@@ -5,11 +5,24 @@
 #include <vector>
 
 namespace tandem::dds {
+namespace {
+
+Type row(const dds_topic_descriptor_t& descriptor, const char* ros_name) {
+  const MessageDefinition* tree = find_definition(ros_name);
+  assert(tree != nullptr);  // a test looks up every one
+  return {.descriptor = &descriptor,
+          .ros_name = ros_name,
+          .tree = tree,
+          .definition = full_text(*tree),
+          .hash = type_hash(*tree)};
+}
+
+}  // namespace
 
 std::span<const Type> types() {
   static const std::vector<Type> table{
 #define TANDEM_DDS_TYPE(package, kind, Name) \
-  {&package##_##kind##_dds__##Name##__desc, #package "/" #kind "/" #Name},
+  row(package##_##kind##_dds__##Name##__desc, #package "/" #kind "/" #Name),
 #include "dds/type_list.inc"
 #undef TANDEM_DDS_TYPE
   };

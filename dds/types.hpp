@@ -1,5 +1,5 @@
-// The message types that Tandem knows, as table: what a topic's type is called, and how its
-// samples are encoded.
+// The message types that Tandem knows, as table: what a topic's type is called, how its samples are
+// encoded, and its definition as ROS 2 has it.
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
@@ -11,12 +11,17 @@
 #include <string>
 #include <string_view>
 
+#include "dds/message_definition.hpp"
+
 namespace tandem::dds {
 
 /// One type.
 struct Type {
   const dds_topic_descriptor_t* descriptor;
-  std::string ros_name;  ///< "sensor_msgs/msg/JointState"
+  std::string ros_name;           ///< "sensor_msgs/msg/JointState"
+  const MessageDefinition* tree;  ///< its fields
+  std::string definition;         ///< the .msg text with those that it needs ("ros2msg")
+  std::string hash;               ///< "RIHS01_…", what both ends must agree on
 
   [[nodiscard]] const char* dds_name() const { return descriptor->m_typename; }
 };
