@@ -37,8 +37,9 @@ Endpoint::Endpoint(Kind kind, std::string topic_name, Entity topic, Entity entit
 Result<Endpoint> Endpoint::create(Kind kind, Participant& participant, const Type& type,
                                   const std::string& topic, const Qos& qos) {
   const QosPointer settings = to_dds(qos);
+  // Without settings: they are the endpoint's, and may be others for the next one of this topic.
   Entity made(
-      dds_create_topic(participant.get(), type.descriptor, topic.c_str(), settings.get(), nullptr));
+      dds_create_topic(participant.get(), type.descriptor, topic.c_str(), nullptr, nullptr));
   if (!made.ok()) {
     return std::unexpected(
         dds_error("make the topic " + topic + " of type " + type.ros_name, made.get()));

@@ -2,23 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <functional>
-#include <thread>
-
 #include "tests/support/dds_domain.hpp"
+#include "tests/support/eventually.hpp"
 
 namespace tandem::dds {
 namespace {
 
-bool eventually(const std::function<bool()>& condition) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (std::chrono::steady_clock::now() < end) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  return false;
-}
+using tandem::test::eventually;
 
 TEST(Endpoint, CarriesASampleFromOneParticipantToAnother) {
   const auto domain = Domain::open(test::own_config());

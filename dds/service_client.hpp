@@ -1,0 +1,94 @@
+// Asks a ROS 2 service.
+// Layer: dds.  Thread: any, non-RT; one at a time.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "dds/service.hpp"
+
+namespace tandem::dds {
+
+/// A service of a Tandem process, wherever it is.
+struct FoundService {
+  std::string name_space;  ///< "left"; empty: none
+  std::string node;        ///< of its participant; empty: it is no Tandem
+  std::string pid;         ///< on its machine
+};
+/// Every service of this name and any namespace in the participant's domain, as far as they have
+/// been found until now. `finder` is new in the domain for some tens of milliseconds.
+class ServiceFinder {
+ public:
+  [[nodiscard]] static Result<ServiceFinder> create(Participant& participant);
+  /// @param service  ROS 2's name, without the namespace: "tandem/ask"
+  [[nodiscard]] std::vector<FoundService> find(const std::string& service) const;
+
+ private:
+  explicit ServiceFinder(Entity reader) : reader_(std::move(reader)) {}
+  Entity reader_;
+};
+
+/// The part of a client that does not know its types.
+class ServiceClientBase {
+ public:
+  /// How many processes serve it.
+  [[nodiscard]] std::size_t servers() const;
+  /// Replies that were nobody's here: to another client, or too late.
+  [[nodiscard]] std::uint64_t ignored() const { return ignored_; }
+
+ protected:
+  using Patience = std::chrono::milliseconds;
+  using Use = std::function<void(const void* reply)>;
+
+  [[nodiscard]] static Result<ServiceClientBase> create(Participant& participant,
+                                                        const std::string& service,
+                                                        const Type& request, const Type& response);
+  [[nodiscard]] Status call(void* request, Patience patience, const Use& use);
+
+ private:
+  using Deadline = std::chrono::steady_clock::time_point;
+  ServiceClientBase(std::string name, Endpoint requests, Endpoint replies, Entity waiting,
+                    Entity waitset);
+  [[nodiscard]] bool connected() const;
+  [[nodiscard]] Status find_server(Deadline deadline) const;
+  [[nodiscard]] bool take(const ServiceHeader& header, const Use& use);
+
+  std::string name_;  // for errors
+  Endpoint requests_, replies_;
+  Entity waiting_, waitset_;
+  std::uint64_t guid_ = 0;
+  std::int64_t sequence_ = 0;
+  std::uint64_t ignored_ = 0;
+};
+
+template <ServiceSample Request, ServiceSample Response>
+class ServiceClient : public ServiceClientBase {
+ public:
+  /// @param service  ROS 2's name, without the namespace: "tandem/ask". The participant outlives
+  ///                 the client.
+  [[nodiscard]] static Result<ServiceClient> create(Participant& participant,
+                                                    const std::string& service) {
+    auto base = ServiceClientBase::create(participant, service, type<Request>(), type<Response>());
+    if (!base) return std::unexpected(base.error());
+    return ServiceClient(std::move(*base));
+  }
+
+  /// Waits for the service to be there, asks, waits for the reply and shows it to `use`.
+  /// @param patience  for all of it.  @param request  its header is filled in
+  /// Errors: nobody serves it; several do; no reply in time; the server went away.
+  [[nodiscard]] Status call(Request request, Patience patience,
+                            const std::function<void(const Response&)>& use) {
+    return ServiceClientBase::call(&request, patience, [&use](const void* reply) {
+      use(*static_cast<const Response*>(reply));
+    });
+  }
+
+ private:
+  explicit ServiceClient(ServiceClientBase&& base) : ServiceClientBase(std::move(base)) {}
+};
+
+}  // namespace tandem::dds

@@ -1,0 +1,206 @@
+#include "dds/service_server.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include <fmt/core.h>
+
+namespace tandem::dds {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+/// Requests and replies that DDS keeps: more than ROS 2's 10, since all clients share them.
+constexpr std::int32_t kDepth = 64;
+/// How often the reader of a client that has just come is looked for.
+constexpr dds_duration_t kLookAgain = DDS_MSECS(5);
+
+}  // namespace
+
+void* ReplyMemory::zeroed(std::size_t bytes) {
+  constexpr std::size_t kBlock = sizeof(std::max_align_t);
+  blocks_.push_back(std::make_unique<std::max_align_t[]>((bytes + kBlock - 1) / kBlock));
+  return std::memset(blocks_.back().get(), 0, bytes);
+}
+
+char* ReplyMemory::text(std::string_view text) {
+  char* copy = static_cast<char*>(zeroed(text.size() + 1));
+  std::memcpy(copy, text.data(), text.size());
+  return copy;
+}
+
+Result<std::unique_ptr<ServiceServer>> ServiceServer::open(Participant& participant) {
+  std::unique_ptr<ServiceServer> server(new ServiceServer(participant));
+  server->wake_ = Entity(dds_create_guardcondition(participant.get()));
+  server->waitset_ = Entity(dds_create_waitset(participant.get()));
+  if (!server->wake_.ok() || !server->waitset_.ok()) {
+    return std::unexpected(dds_error("make a waitset", server->waitset_.get()));
+  }
+  dds_waitset_attach(server->waitset_.get(), server->wake_.get(), 0);
+  return server;
+}
+
+Status ServiceServer::add(const std::string& name, const Type& request, const Type& response,
+                          std::size_t response_size, Read read) {
+  const std::string id = new_service_id(*participant_);
+  const Qos qos = service_qos(
+      kDepth, fmt::format("serviceid={};node={};pid={};", id, participant_->node(), ::getpid()));
+  // Replies first: who finds the service by its requests may ask at once.
+  auto replies = Endpoint::create(Endpoint::Kind::kWriter, *participant_, response,
+                                  reply_topic(*participant_, name), qos);
+  if (!replies) return std::unexpected(replies.error());
+  auto requests = Endpoint::create(Endpoint::Kind::kReader, *participant_, request,
+                                   request_topic(*participant_, name), qos);
+  if (!requests) return std::unexpected(requests.error());
+  Entity waiting(dds_create_readcondition(requests->get(), DDS_ANY_STATE));
+  if (!waiting.ok()) return std::unexpected(dds_error("wait for requests", waiting.get()));
+  services_.push_back(
+      std::make_unique<Service>(Service{id, std::move(*requests), std::move(*replies),
+                                        std::move(waiting), response_size, std::move(read)}));
+  dds_waitset_attach(waitset_.get(), services_.back()->waiting.get(), 0);
+  return {};
+}
+
+Status ServiceServer::start() {
+  receiver_ = std::thread([this] { receive(); });
+  worker_ = std::thread([this] { work(); });
+  return {};
+}
+
+ServiceServer::~ServiceServer() {
+  {
+    const std::scoped_lock lock(mutex_);
+    ending_ = true;
+  }
+  more_.notify_all();
+  dds_set_guardcondition(wake_.get(), true);
+  if (receiver_.joinable()) receiver_.join();
+  if (worker_.joinable()) worker_.join();
+}
+
+ServiceServer::Counts ServiceServer::counts() const {
+  const std::scoped_lock lock(mutex_);
+  return counts_;
+}
+
+void ServiceServer::receive() {
+  bool holding = false;
+  for (;;) {
+    dds_waitset_wait(waitset_.get(), nullptr, 0, holding ? kLookAgain : DDS_INFINITY);
+    bool woken = false;
+    dds_take_guardcondition(wake_.get(), &woken);
+    for (const auto& service : services_) take(*service);
+    holding = send_held();
+    const std::scoped_lock lock(mutex_);
+    if (ending_) return;
+  }
+}
+
+/// Some of a service's requests, so that the others get their turn.
+void ServiceServer::take(Service& service) {
+  constexpr std::size_t kBatch = 8;
+  std::array<void*, kBatch> samples{};
+  std::array<dds_sample_info_t, kBatch> infos{};
+  const dds_return_t taken =
+      dds_take(service.requests.get(), samples.data(), infos.data(), kBatch, kBatch);
+  if (taken <= 0) return;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
+    if (!infos[i].valid_data) continue;
+    Job job{.service = &service, .header = {}, .asker = infos[i].publication_handle, .answer = {}};
+    std::memcpy(&job.header, samples[i], sizeof job.header);
+    Work work = service.read(samples[i]);
+    job.answer = std::move(work.answer);
+    accept(std::move(job), work.at_once);
+  }
+  dds_return_loan(service.requests.get(), samples.data(), taken);
+}
+
+void ServiceServer::accept(Job job, bool at_once) {
+  {
+    const std::scoped_lock lock(mutex_);
+    ++counts_.requests;
+    if (!at_once) {
+      const auto of_this = std::ranges::count(jobs_, job.asker, &Job::asker);
+      if (jobs_.size() == kMostWaiting || of_this == static_cast<std::ptrdiff_t>(kMostOfOne)) {
+        ++counts_.dropped;
+        return;
+      }
+      jobs_.push_back(std::move(job));
+      more_.notify_one();
+      return;
+    }
+  }
+  answer(job);
+}
+
+void ServiceServer::work() {
+  for (;;) {
+    Job job;
+    {
+      std::unique_lock lock(mutex_);
+      more_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
+      if (ending_) return;
+      job = std::move(jobs_.front());
+      jobs_.pop_front();
+    }
+    answer(job);
+  }
+}
+
+void ServiceServer::answer(const Job& job) {
+  Reply reply{.service = job.service,
+              .asker = job.asker,
+              .memory = {},
+              .sample = nullptr,
+              .until = SteadyClock::now() + kReplyPatience};
+  reply.sample = reply.memory.zeroed(job.service->reply_size);
+  std::memcpy(reply.sample, &job.header, sizeof job.header);
+  job.answer(reply.sample, reply.memory);
+  if (send(reply)) return;
+  const std::scoped_lock lock(mutex_);
+  if (held_.size() == kMostWaiting) {
+    ++counts_.unclaimed;
+    return;
+  }
+  held_.push_back(std::move(reply));
+  dds_set_guardcondition(wake_.get(), true);
+}
+
+/// A client may have found the service before the service has found the client.
+ServiceServer::Reach ServiceServer::reach(const Reply& reply) {
+  const auto asker = matched_writer(reply.service->requests.get(), reply.asker);
+  if (!asker) return Reach::kGone;
+  for (const Peer& reader : matched_readers(reply.service->replies.get())) {
+    if (belong_together(*asker, reader, "clientid")) return Reach::kConnected;
+  }
+  return Reach::kNotYet;
+}
+
+/// @return false: not yet.
+bool ServiceServer::send(const Reply& reply) {
+  const Reach found = reach(reply);
+  if (found == Reach::kNotYet && SteadyClock::now() < reply.until) return false;
+  const bool sent = found != Reach::kGone &&
+                    dds_write(reply.service->replies.get(), reply.sample) == DDS_RETCODE_OK;
+  const std::scoped_lock lock(mutex_);
+  ++(sent ? counts_.replies : counts_.unclaimed);
+  return true;
+}
+
+/// @return whether something is still held.
+bool ServiceServer::send_held() {
+  std::deque<Reply> held;
+  {
+    const std::scoped_lock lock(mutex_);
+    held.swap(held_);
+  }
+  std::erase_if(held, [this](const Reply& reply) { return send(reply); });
+  const std::scoped_lock lock(mutex_);
+  for (Reply& reply : held) held_.push_back(std::move(reply));
+  return !held_.empty();
+}
+
+}  // namespace tandem::dds

@@ -1,0 +1,148 @@
+// Serves ROS 2 services on threads of its own: one takes requests, one does what they ask for.
+// Layer: dds.  Thread: open and close main; what is served says which.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "base/result.hpp"
+#include "dds/service.hpp"
+
+namespace tandem::dds {
+
+/// What a reply's pointers lead to; it lives until the reply is out.
+class ReplyMemory {
+ public:
+  /// A copy of `text`.
+  [[nodiscard]] char* text(std::string_view text);
+  /// `count` zeroed elements, aligned for every type; null for none.
+  template <class T>
+  [[nodiscard]] T* array(std::size_t count) {
+    return count == 0 ? nullptr : static_cast<T*>(zeroed(count * sizeof(T)));
+  }
+  [[nodiscard]] void* zeroed(std::size_t bytes);
+
+ private:
+  std::vector<std::unique_ptr<std::max_align_t[]>> blocks_;
+};
+
+/// What one request asks for, taken out of its sample.
+template <class Response>
+struct ServiceWork {
+  /// Done by the thread that takes requests, at once: it has to be short, and safe beside other
+  /// work. Else it is done in its turn.
+  bool at_once = false;
+  /// Fills in the reply, which is zeroed but for its header: every text has to be set.
+  std::function<void(Response& reply, ReplyMemory& memory)> answer;
+};
+
+/// Requests are done one after another, whoever asks. Nothing that a client does or leaves undone
+/// reaches others: who floods has at most kMostOfOne requests waiting, who does not take replies
+/// loses them, who is gone is forgotten. What there is no room for is dropped and counted, as a
+/// request that got lost: the client asks again.
+class ServiceServer {
+ public:
+  static constexpr std::size_t kMostWaiting = 64;  ///< requests
+  static constexpr std::size_t kMostOfOne = 8;     ///< of one client
+  /// A reply waits so long for its client's reader to be found, and is sent then in any case.
+  static constexpr std::chrono::milliseconds kReplyPatience{1000};
+
+  struct Counts {
+    std::uint64_t requests = 0;
+    std::uint64_t replies = 0;
+    std::uint64_t dropped = 0;    ///< requests: too many waited
+    std::uint64_t unclaimed = 0;  ///< replies: who asked is gone
+  };
+
+  /// The participant outlives it.
+  [[nodiscard]] static Result<std::unique_ptr<ServiceServer>> open(Participant& participant);
+  /// Ends the threads, after the request that is at work.
+  ~ServiceServer();
+  ServiceServer(const ServiceServer&) = delete;
+  ServiceServer& operator=(const ServiceServer&) = delete;
+
+  /// Adds a service before start().
+  /// @param name  ROS 2's, without the namespace: "tandem/ask"
+  /// @param read  called on the taking thread; the request is gone when it returns
+  template <ServiceSample Request, ServiceSample Response>
+  [[nodiscard]] Status add(const std::string& name,
+                           std::function<ServiceWork<Response>(const Request&)> read) {
+    return add(name, type<Request>(), type<Response>(), sizeof(Response),
+               [read = std::move(read)](const void* request) -> Work {
+                 ServiceWork<Response> work = read(*static_cast<const Request*>(request));
+                 return {work.at_once,
+                         [answer = std::move(work.answer)](void* reply, ReplyMemory& memory) {
+                           answer(*static_cast<Response*>(reply), memory);
+                         }};
+               });
+  }
+  [[nodiscard]] Status start();
+
+  [[nodiscard]] Counts counts() const;
+
+ private:
+  struct Work {
+    bool at_once = false;
+    std::function<void(void* reply, ReplyMemory& memory)> answer;
+  };
+  using Read = std::function<Work(const void* request)>;
+  struct Service {
+    std::string id;
+    Endpoint requests, replies;
+    Entity waiting;  // the condition of `requests`
+    std::size_t reply_size;
+    Read read;
+  };
+  struct Job {
+    Service* service;
+    ServiceHeader header;
+    dds_instance_handle_t asker;  // the writer of the request
+    std::function<void(void*, ReplyMemory&)> answer;
+  };
+  struct Reply {
+    Service* service;
+    dds_instance_handle_t asker;
+    ReplyMemory memory;
+    void* sample;
+    std::chrono::steady_clock::time_point until;
+  };
+  enum class Reach : std::uint8_t { kConnected, kNotYet, kGone };
+
+  explicit ServiceServer(Participant& participant) : participant_(&participant) {}
+  [[nodiscard]] Status add(const std::string& name, const Type& request, const Type& response,
+                           std::size_t response_size, Read read);
+  void receive();
+  void take(Service& service);
+  void accept(Job job, bool at_once);
+  void work();
+  void answer(const Job& job);
+  [[nodiscard]] static Reach reach(const Reply& reply);
+  bool send(const Reply& reply);
+  bool send_held();
+
+  Participant* participant_;
+  std::vector<std::unique_ptr<Service>> services_;
+  Entity wake_;     // guard condition: something is held, or the end
+  Entity waitset_;  // after what is attached to it, so that it goes first
+
+  mutable std::mutex mutex_;  // of all below
+  std::condition_variable more_;
+  bool ending_ = false;
+  Counts counts_;
+  std::deque<Job> jobs_;
+  std::deque<Reply> held_;  // until their readers are found
+
+  std::thread receiver_, worker_;
+};
+
+}  // namespace tandem::dds
