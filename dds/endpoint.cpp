@@ -7,7 +7,7 @@ namespace {
 
 using QosPointer = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
 
-QosPointer to_dds(const Qos& qos) {
+QosPointer to_dds(const Qos& qos, const Type& type) {
   QosPointer out(dds_create_qos(), &dds_delete_qos);
   const dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(out.get(), 1, &plain);
@@ -20,9 +20,8 @@ QosPointer to_dds(const Qos& qos) {
   if (qos.transient_local) {
     dds_qset_durability_service(out.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth, -1, -1, -1);
   }
-  if (!qos.user_data.empty()) {
-    dds_qset_userdata(out.get(), qos.user_data.data(), qos.user_data.size());
-  }
+  const std::string user_data = qos.user_data + "typehash=" + type.hash + ";";
+  dds_qset_userdata(out.get(), user_data.data(), user_data.size());
   return out;
 }
 
@@ -36,7 +35,7 @@ Endpoint::Endpoint(Kind kind, std::string topic_name, Entity topic, Entity entit
 
 Result<Endpoint> Endpoint::create(Kind kind, Participant& participant, const Type& type,
                                   const std::string& topic, const Qos& qos) {
-  const QosPointer settings = to_dds(qos);
+  const QosPointer settings = to_dds(qos, type);
   // Without settings: they are the endpoint's, and may be others for the next one of this topic.
   Entity made(
       dds_create_topic(participant.get(), type.descriptor, topic.c_str(), nullptr, nullptr));

@@ -1,0 +1,150 @@
+#include "dds/cdr.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace tandem::dds {
+namespace {
+
+/// Reads forward; the first failure sticks, and everything after it reads as zero.
+class Cursor {
+ public:
+  Cursor(std::span<const std::byte> bytes, bool big_endian)
+      : bytes_(bytes), swap_(big_endian != (std::endian::native == std::endian::big)) {}
+
+  template <class T>
+  T number() {
+    at_ = std::min(bytes_.size(), (at_ + sizeof(T) - 1) / sizeof(T) * sizeof(T));
+    if (rest() < sizeof(T)) fail("it ends too early");
+    if (failed()) return {};
+    std::array<std::byte, sizeof(T)> raw;
+    std::ranges::copy(bytes_.subspan(at_, sizeof(T)), raw.begin());
+    if (swap_) std::ranges::reverse(raw);
+    at_ += sizeof(T);
+    return std::bit_cast<T>(raw);
+  }
+
+  /// @param most  characters, 0: any number
+  std::string text(std::uint64_t most) {
+    const auto size = number<std::uint32_t>();  // with the zero at its end
+    if (failed()) return {};
+    if (size == 0 || size > rest() || bytes_[at_ + size - 1] != std::byte{0}) {
+      fail("a string does not end");
+      return {};
+    }
+    if (most != 0 && size - 1 > most) fail("a string is too long");
+    std::string out(reinterpret_cast<const char*>(&bytes_[at_]), size - 1);
+    at_ += size;
+    return out;
+  }
+
+  bool boolean() {
+    const auto value = number<std::uint8_t>();
+    if (value > 1) fail("a bool is neither 0 nor 1");
+    return value == 1;
+  }
+
+  void fail(std::string_view reason) {
+    if (reason_.empty()) reason_ = reason;
+  }
+  [[nodiscard]] bool failed() const { return !reason_.empty(); }
+  [[nodiscard]] std::string_view reason() const { return reason_; }
+  [[nodiscard]] std::size_t at() const { return at_; }
+  [[nodiscard]] std::size_t rest() const { return bytes_.size() - at_; }
+
+ private:
+  std::span<const std::byte> bytes_;
+  bool swap_;
+  std::size_t at_ = 0;
+  std::string_view reason_;
+};
+
+Value::Message message(Cursor& cursor, const MessageDefinition& definition);
+
+Value element(Cursor& cursor, const Field& field) {
+  switch (field.type) {
+    case FieldType::kMessage: return {message(cursor, *field.message)};
+    case FieldType::kInt8: return {std::int64_t{cursor.number<std::int8_t>()}};
+    case FieldType::kInt16: return {std::int64_t{cursor.number<std::int16_t>()}};
+    case FieldType::kInt32: return {std::int64_t{cursor.number<std::int32_t>()}};
+    case FieldType::kInt64: return {cursor.number<std::int64_t>()};
+    case FieldType::kByte:
+    case FieldType::kUint8: return {std::uint64_t{cursor.number<std::uint8_t>()}};
+    case FieldType::kUint16: return {std::uint64_t{cursor.number<std::uint16_t>()}};
+    case FieldType::kUint32: return {std::uint64_t{cursor.number<std::uint32_t>()}};
+    case FieldType::kUint64: return {cursor.number<std::uint64_t>()};
+    case FieldType::kFloat32: return {double{cursor.number<float>()}};
+    case FieldType::kFloat64: return {cursor.number<double>()};
+    case FieldType::kBool: return {cursor.boolean()};
+    case FieldType::kString:
+    case FieldType::kBoundedString: return {cursor.text(field.string_capacity)};
+  }
+  return {};
+}
+
+Value field_value(Cursor& cursor, const Field& field) {
+  if (field.repeat == Repeat::kOne) return element(cursor, field);
+  std::uint64_t count = field.capacity;
+  if (field.repeat != Repeat::kArray) {
+    count = cursor.number<std::uint32_t>();
+    const bool bounded = field.repeat == Repeat::kBoundedSequence;
+    if (bounded && count > field.capacity) cursor.fail("a sequence is too long");
+  }
+  // Each element has at least one byte: what claims more is refused before it takes memory.
+  if (count > cursor.rest()) cursor.fail("a sequence has more elements than bytes are there");
+  Value::List list;
+  for (std::uint64_t i = 0; i < count && !cursor.failed(); ++i) {
+    list.push_back(element(cursor, field));
+  }
+  return {std::move(list)};
+}
+
+Value::Message message(Cursor& cursor, const MessageDefinition& definition) {
+  Value::Message out;
+  const auto add = [&](std::string_view name, Value value) {
+    out.push_back({.name = name, .value = {}});
+    out.back().value.of.swap(value.of);
+  };
+  if (definition.request_or_response) {
+    add("request_guid", {cursor.number<std::uint64_t>()});
+    add("request_sequence", {cursor.number<std::int64_t>()});
+  }
+  for (const Field& field : definition.fields) {
+    if (cursor.failed()) break;
+    add(field.name, field_value(cursor, field));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<Value> decode(const MessageDefinition& definition, std::span<const std::byte> bytes) {
+  constexpr std::size_t kHeader = 4;
+  constexpr std::size_t kMostPadding = 3;
+  const auto refuse = [&](const std::string& why) {
+    return fail(fmt::format("{} bytes are no {}: {}", bytes.size(), definition.name, why));
+  };
+  if (bytes.size() < kHeader) return refuse("it ends too early");
+  if (bytes[0] != std::byte{0} || bytes[1] > std::byte{1}) return refuse("it is not plain CDR");
+  Cursor cursor(bytes.subspan(kHeader), bytes[1] == std::byte{0});
+  Value value{message(cursor, definition)};
+  if (cursor.failed()) {
+    return refuse(fmt::format("{} (byte {})", cursor.reason(), cursor.at() + kHeader));
+  }
+  if (cursor.rest() > kMostPadding) {
+    return refuse(fmt::format("{} bytes follow its end", cursor.rest()));
+  }
+  return value;
+}
+
+const Value* find(const Value& value, std::string_view name) {
+  const auto* members = std::get_if<Value::Message>(&value.of);
+  if (members == nullptr) return nullptr;
+  const auto found = std::ranges::find(*members, name, &Member::name);
+  return found == members->end() ? nullptr : &found->value;
+}
+
+}  // namespace tandem::dds
