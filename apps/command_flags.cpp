@@ -76,11 +76,6 @@ const char kDoctorExamples[] = R"(Examples:
   tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
 Each finding comes with the command that mends it. The exit status does not depend on them.)";
 
-const char kJsonHelp[] = "Write the result as JSON (docs/json.md); '-' is standard output";
-
-const char kSocketHelp[] =
-    "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
-
 const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
 
 const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";

@@ -8,6 +8,12 @@
 
 namespace tandem::apps {
 
+// Help of what several commands have.
+inline constexpr char kJsonHelp[] =
+    "Write the result as JSON (docs/json.md); '-' is standard output";
+inline constexpr char kSocketHelp[] =
+    "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
+
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.
 void add_flags(CLI::App& app, RunOptions& o);
@@ -15,6 +21,8 @@ void add_flags(CLI::App& app, FaultOptions& o);
 void add_flags(CLI::App& app, EstopOptions& o);
 void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, InjectOptions& o);
+void add_flags(CLI::App& app, ControllerOptions& o);
+void add_flags(CLI::App& app, JointOptions& o);
 void add_flags(CLI::App& app, EmulateOptions& o);
 void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, ModelOptions& o);

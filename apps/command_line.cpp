@@ -118,6 +118,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
   commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
   commands.add<EstopOptions>("estop", "Emergency stop of a running run");
+  commands.add<ControllerOptions>(
+      "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
+  commands.add<JointOptions>("joint", "Joints of a running run: list, set, gains");
   commands.add<InjectOptions>("inject",
                               "Inject a fault into a running emulated or simulated robot");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");

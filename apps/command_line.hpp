@@ -56,6 +56,34 @@ struct EstopOptions {
   std::string socket;
 };
 
+/// tandem controller list|load|unload|start|stop|switch
+struct ControllerOptions {
+  enum class Action : std::uint8_t { kList, kLoad, kUnload, kSwitch } action = Action::kList;
+  std::string plugin;              ///< load: name or path
+  std::string name;                ///< load, unload; empty: the plugin's
+  std::string parameters;          ///< load: TOML file; empty: none
+  std::vector<std::string> set;    ///< load: lines of TOML, after those of the file
+  std::vector<std::string> start;  ///< start, switch; load --start
+  std::vector<std::string> stop;   ///< stop, switch
+  bool start_it = false;           ///< load: start it, too
+  std::string socket;              ///< empty: that of the only running `tandem run`
+  std::string json;
+};
+
+/// tandem joint list|set|gains
+struct JointOptions {
+  enum class Action : std::uint8_t { kList, kSet, kGains } action = Action::kList;
+  std::vector<std::string> joints;  ///< list: only these; empty: all
+  bool gains = false;               ///< list: the gains instead of what is measured
+  std::string joint;                ///< set, gains
+  std::string mode, interaction;    ///< empty: as it is
+  std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
+  std::string loop;
+  std::optional<double> kp, ki, kd;
+  std::string socket;  ///< empty: that of the only running `tandem run`
+  std::string json;
+};
+
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
@@ -151,9 +179,10 @@ struct DoctorOptions {
 };
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command = std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions,
-                             InjectOptions, CheckOptions, ModelOptions, LogOptions, EdsOptions,
-                             ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions>;
+using Command =
+    std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions, ControllerOptions,
+                 JointOptions, InjectOptions, CheckOptions, ModelOptions, LogOptions, EdsOptions,
+                 ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

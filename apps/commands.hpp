@@ -14,6 +14,10 @@ namespace tandem::apps {
 /// What a run has latched, and the request to clear it. Exit::kFault: a cause is still there.
 [[nodiscard]] Exit fault_command(const FaultOptions& options);
 [[nodiscard]] Exit estop_command(const EstopOptions& options);
+/// Controllers of a running run: what is loaded, and changes of it.
+[[nodiscard]] Exit controller_command(const ControllerOptions& options);
+/// Joints of a running run: what they are, and changes of them.
+[[nodiscard]] Exit joint_command(const JointOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
 /// The robot on the other end of the wire, until it is asked to stop.

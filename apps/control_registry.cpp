@@ -19,6 +19,8 @@ const char* to_string(ControlKey::Type type) {
     case ControlKey::Type::kNumber: return "number";
     case ControlKey::Type::kBoolean: return "true or false";
     case ControlKey::Type::kObject: return "object";
+    case ControlKey::Type::kTexts: return "list of texts";
+    case ControlKey::Type::kTextOrObject: return "text or object";
   }
   return "?";
 }
@@ -30,6 +32,10 @@ bool is_of(const Json& value, ControlKey::Type type) {
     case ControlKey::Type::kNumber: return value.is_number();
     case ControlKey::Type::kBoolean: return value.is_boolean();
     case ControlKey::Type::kObject: return value.is_object();
+    case ControlKey::Type::kTexts:
+      return value.is_array() &&
+             std::ranges::all_of(value, [](const Json& one) { return one.is_string(); });
+    case ControlKey::Type::kTextOrObject: return value.is_string() || value.is_object();
   }
   return false;
 }
@@ -145,7 +151,8 @@ Json ControlRegistry::answer(std::string_view question) const {
   if (result) {
     answer.update(*result);
   } else {
-    answer["error"] = result.error().message;
+    const Error& error = result.error();
+    answer["error"] = error.key.empty() ? error.message : error.key + ": " + error.message;
     answer["hint"] = result.error().hint;
   }
   return answer;

@@ -25,7 +25,15 @@ enum class ControlEffect : std::uint8_t {
 
 /// A key of a command's request, beside "do".
 struct ControlKey {
-  enum class Type : std::uint8_t { kText, kInteger, kNumber, kBoolean, kObject };
+  enum class Type : std::uint8_t {
+    kText,
+    kInteger,
+    kNumber,
+    kBoolean,
+    kObject,
+    kTexts,         ///< a list of texts
+    kTextOrObject,  ///< TOML, or the same as an object
+  };
 
   std::string name;
   Type type = Type::kText;

@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include "apps/controller_control.hpp"
 #include "apps/fault_table.hpp"
+#include "apps/joint_control.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -69,6 +71,8 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  cycle.requests().end_run();
                  return Json::object();
                });
+  add_controller_commands(registry, cycle.services(), robot);
+  add_joint_commands(registry, cycle.services());
 }
 
 std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry, const std::string& path,

@@ -37,6 +37,16 @@ const char* to_string(InteractionMode mode) noexcept {
   return mode == InteractionMode::kStiff ? "stiff" : "compliant";
 }
 
+const char* to_string(PidLoop loop) noexcept {
+  switch (loop) {
+    case PidLoop::kPosition: return "position";
+    case PidLoop::kVelocity: return "velocity";
+    case PidLoop::kTorque: return "torque";
+    case PidLoop::kCurrent: return "current";
+  }
+  return "?";
+}
+
 const char* to_string(DriveState state) noexcept {
   switch (state) {
     case DriveState::kUnknown: return "unknown";

@@ -207,6 +207,7 @@ struct PidGains {
 /// The loops whose gains can be set at run time.
 enum class PidLoop : std::uint8_t { kPosition = 0, kVelocity, kTorque, kCurrent };
 inline constexpr std::size_t kPidLoops = 4;
+[[nodiscard]] const char* to_string(PidLoop loop) noexcept;
 
 /// The gains of every joint: what changes seldom and travels by SDO. A change raises the
 /// joint's revision; the backend sends what it has not sent yet.

@@ -86,6 +86,10 @@ Result<Asked> RunServices::ask(Lock& lock, LoopRequest request, Patience patienc
     lock.lock();
     collect();
   }
+  // What is looked at next shows it.
+  while (answer && looks().front().cycle < answer->cycle && SteadyClock::now() < deadline) {
+    std::this_thread::sleep_for(kLook);
+  }
   const std::optional<LoopAnswer> found = answer;
   awaited_.erase(request.number);
   if (!found) {

@@ -137,6 +137,8 @@ class RunServices {
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
+  [[nodiscard]] Status check_mode(std::size_t joint, const JointWish& wish,
+                                  const JointLook& now) const;
   [[nodiscard]] std::vector<JointLook> looks() const;
   [[nodiscard]] std::string controller_name(std::int32_t slot) const;
 

@@ -16,16 +16,6 @@ std::unexpected<Error> about(const std::string& joint, std::string message, std:
       Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = joint});
 }
 
-const char* name_of(hal::PidLoop loop) {
-  switch (loop) {
-    case hal::PidLoop::kPosition: return "position";
-    case hal::PidLoop::kVelocity: return "velocity";
-    case hal::PidLoop::kTorque: return "torque";
-    case hal::PidLoop::kCurrent: return "current";
-  }
-  return "?";
-}
-
 hal::Capability needed_by(hal::PidLoop loop) {
   switch (loop) {
     case hal::PidLoop::kPosition: return hal::Capability::kPosition;
@@ -81,6 +71,27 @@ std::vector<JointInfo> RunServices::joints() {
   return all;
 }
 
+/// Whether the loop would put the joint into the mode. The loop looks again.
+Status RunServices::check_mode(std::size_t joint, const JointWish& wish,
+                               const JointLook& now) const {
+  const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
+  const auto interaction = static_cast<hal::InteractionMode>(
+      wish.interaction >= 0 ? wish.interaction : now.interaction);
+  if (Status able = hal::check_capability(*robot_, joint, mode, interaction); !able) return able;
+  LoopAnswer refused{.joint = static_cast<std::int32_t>(joint)};
+  const ControllerSet active = planned();
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    const auto& one = host_->owned()[slot];
+    if ((active & only(slot)) == 0 || one == nullptr || one->claimed[joint] == 0) continue;
+    refused.refusal = Refusal::kClaimed;
+    refused.one = static_cast<std::int32_t>(slot);
+    return std::unexpected(refusal(refused));
+  }
+  if (progress_->phase.load() == RunPhase::kRunning) return {};
+  refused.refusal = Refusal::kNotRunning;
+  return std::unexpected(refusal(refused));
+}
+
 Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& wish,
                                      Patience patience) {
   Lock lock(mutex_);
@@ -91,12 +102,7 @@ Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& 
   const hal::JointCapabilities& limit = host_->capabilities()[*index];
   const JointLook now = looks()[*index];
   if (wish.mode >= 0 || wish.interaction >= 0) {
-    const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
-    const auto interaction = static_cast<hal::InteractionMode>(
-        wish.interaction >= 0 ? wish.interaction : now.interaction);
-    if (Status able = hal::check_capability(*robot_, *index, mode, interaction); !able) {
-      return std::unexpected(able.error());
-    }
+    if (Status free = check_mode(*index, wish, now); !free) return std::unexpected(free.error());
   }
   const bool yields = !std::isnan(wish.stiffness_Nm_rad) || !std::isnan(wish.damping_Nms_rad);
   if (yields && !limit.can(hal::Capability::kCompliant)) {
@@ -127,7 +133,7 @@ Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop
   const Result<std::size_t> index = joint_of(joint);
   if (!index) return std::unexpected(index.error());
   if (!host_->capabilities()[*index].can(needed_by(loop))) {
-    return about(joint, std::string("this joint has no ") + name_of(loop) + " loop",
+    return about(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",
                  "give [gains." + robot_->joints[*index].gains + "] one");
   }
   constexpr double kMost = std::numeric_limits<float>::max();  // they travel as 32-bit numbers

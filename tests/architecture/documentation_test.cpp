@@ -62,7 +62,8 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   for (const char* file :
        {"apps/run_summary.cpp", "apps/bus_table.cpp", "apps/check_command.cpp",
         "apps/model_command.cpp", "apps/log_command.cpp", "apps/latency_report.cpp",
-        "apps/doctor_command.cpp", "apps/round_trips.cpp"}) {
+        "apps/doctor_command.cpp", "apps/round_trips.cpp", "apps/controller_control.cpp",
+        "apps/joint_control.cpp"}) {
     const std::string source = text_of(kRoot / file);
     for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
       for (const std::string& key : matches(source, pattern)) {

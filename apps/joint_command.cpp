@@ -1,0 +1,122 @@
+// tandem joint: what it asks a running run, and its answer.
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/control_client.hpp"
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Exit refused(const Error& error) {
+  print_errors({error});
+  return Exit::kUsage;
+}
+
+std::string number(const Json& joint, const char* key) {
+  return joint[key].is_number() ? fmt::format("{:.4g}", joint[key].get<double>()) : "-";
+}
+
+/// "position", or "position (idle)" while the drive is not there yet.
+std::string mode_of(const Json& joint) {
+  const std::string mode = joint.value("mode", "");
+  const std::string in_force = joint.value("mode_in_force", "");
+  const std::string yields = joint.value("interaction", "") == "compliant" ? ", compliant" : "";
+  return mode + yields + (in_force == mode ? "" : " (" + in_force + ")");
+}
+
+void print_joints(const Json& joints) {
+  Table table({"joint", "controller", "mode", "position [rad]", "velocity [rad/s]", "torque [Nm]",
+               "drive"});
+  for (const Json& joint : joints) {
+    const auto fault = joint.value("fault", 0U);
+    const std::string drive = joint.value("drive_state", "");
+    const std::string owner = joint.value("controller", "");
+    table.add({joint.value("joint", ""), owner.empty() ? "-" : owner, mode_of(joint),
+               number(joint, "position_rad"), number(joint, "velocity_rad_s"),
+               number(joint, "torque_Nm"),
+               fault == 0 ? drive : fmt::format("{} (0x{:04X})", drive, fault)});
+  }
+  table.print(stdout);
+}
+
+void print_gains(const Json& joints) {
+  Table table({"joint", "loop", "kp", "ki", "kd"});
+  for (const Json& joint : joints) {
+    for (const auto& [loop, gains] : joint["gains"].items()) {
+      table.add({joint.value("joint", ""), loop, number(gains, "kp"), number(gains, "ki"),
+                 number(gains, "kd")});
+    }
+  }
+  table.print(stdout);
+}
+
+/// The joints of `wanted`, in its order; all when it is empty.
+Result<Json> only(const Json& joints, const std::vector<std::string>& wanted) {
+  if (wanted.empty()) return joints;
+  std::vector<std::string> names;
+  for (const Json& joint : joints) names.push_back(joint.value("joint", ""));
+  Json some = Json::array();
+  for (const std::string& name : wanted) {
+    const auto found = std::ranges::find(names, name);
+    if (found == names.end()) {
+      return fail(fmt::format("the robot has no joint '{}'", name), suggest(name, names));
+    }
+    some.push_back(joints[static_cast<std::size_t>(found - names.begin())]);
+  }
+  return some;
+}
+
+Json question_of(const JointOptions& o) {
+  Json question{{"do", "joint.list"}};
+  if (o.action == JointOptions::Action::kList) return question;
+  question["do"] = o.action == JointOptions::Action::kSet ? "joint.set" : "joint.gains";
+  question["joint"] = o.joint;
+  if (!o.mode.empty()) question["mode"] = o.mode;
+  if (!o.interaction.empty()) question["interaction"] = o.interaction;
+  if (o.stiffness_Nm_rad) question["stiffness_Nm_rad"] = *o.stiffness_Nm_rad;
+  if (o.damping_Nms_rad) question["damping_Nms_rad"] = *o.damping_Nms_rad;
+  if (!o.loop.empty()) question["loop"] = o.loop;
+  if (o.kp) question["kp"] = *o.kp;
+  if (o.ki) question["ki"] = *o.ki;
+  if (o.kd) question["kd"] = *o.kd;
+  return question;
+}
+
+void print_answer(const JointOptions& options, const Json& answer) {
+  if (answer.contains("joints")) {
+    options.gains ? print_gains(answer["joints"]) : print_joints(answer["joints"]);
+    return;
+  }
+  if (answer.value("done", false)) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
+  if (answer.contains("note")) fmt::print("{}\n", answer.value("note", ""));
+  if (options.action == JointOptions::Action::kGains) {
+    print_gains(Json::array({answer}));
+    return;
+  }
+  Facts facts;
+  facts.add("mode", mode_of(answer));
+  facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " Nm/rad");
+  facts.add("damping", number(answer, "damping_Nms_rad") + " Nms/rad");
+  facts.print(stdout);
+}
+
+}  // namespace
+
+Exit joint_command(const JointOptions& options) {
+  Result<Json> answer = ask(options.socket, "run", question_of(options));
+  if (!answer) return refused(answer.error());
+  if (answer->contains("joints")) {
+    const Result<Json> some = only((*answer)["joints"], options.joints);
+    if (!some) return refused(some.error());
+    (*answer)["joints"] = *some;
+  }
+  if (options.json != "-") print_answer(options, *answer);
+  if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,126 @@
+// `tandem controller` and `tandem joint` against a running `tandem run`.
+#include "tests/apps/running.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Controllers : public Running {
+ protected:
+  [[nodiscard]] nlohmann::json asked(const std::string& command) const {
+    const Outcome outcome = to_run(command + " --json -");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+  /// The exit status is 2; what standard error says.
+  [[nodiscard]] std::string refused(const std::string& command) const {
+    const Outcome outcome = to_run(command);
+    EXPECT_EQ(outcome.status, 2) << outcome.out;
+    return outcome.err;
+  }
+  void expect(const std::string& text, const std::string& part) const {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  }
+};
+
+TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
+  begin("");
+  expect(to_run("controller list").out, "hold        active  joint1, joint2");
+  EXPECT_EQ(asked("controller load hold --name rest --set 'duration_s = 2.0'")["active"],
+            nlohmann::json({"hold"}));
+  expect(refused("controller start rest"),
+         "joint1: is claimed by the controllers 'hold' and 'rest'");
+  const auto change = asked("controller switch --stop hold --start rest");
+  EXPECT_EQ(change["done"], true);
+  EXPECT_GT(change["cycle"], 0);
+  EXPECT_EQ(change["active"], nlohmann::json({"rest"}));
+  expect(refused("controller unload rest"), "rest: the controller is active");
+  expect(to_run("controller stop rest").out, "active: none");
+  EXPECT_EQ(to_run("controller unload rest").status, 0);
+  const auto list = asked("controller list")["controllers"];
+  ASSERT_EQ(list.size(), 1U);
+  EXPECT_EQ(list[0]["name"], "hold");
+  EXPECT_EQ(list[0]["active"], false);
+  EXPECT_EQ(list[0]["claims"][1]["joint"], "joint2");
+  EXPECT_EQ(to_run("controller start hold").status, 0);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
+  begin("");
+  const std::string broken = TANDEM_BINARY_DIR "/tests/broken_plugins/";
+  expect(refused("controller load " + broken + "no_entry.so"), "has no entry point");
+  expect(refused("controller load " + broken + "other_abi.so"), "was built for controller ABI 999");
+  expect(refused("controller load hodl"), "did you mean 'hold'?");
+  expect(refused("controller load hold"), "of this name is loaded already");
+  expect(refused("controller load hold --name x --set 'durtion_s = 2'"), "durtion_s");
+  expect(refused("controller load hold --name x --set 'durtion_s = '"), "parameters:1");
+  EXPECT_EQ(asked("controller list")["controllers"].size(), 1U);
+  EXPECT_EQ(end(), 0);
+  EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+
+TEST_F(Controllers, TakeTheirParametersAsAnObjectToo) {
+  begin("");
+  const Outcome outcome = to_run(
+      "ask '{\"do\": \"controller.load\", \"plugin\": \"hold\", \"name\": \"one\", "
+      "\"parameters\": {\"joints\": [\"joint2\"], \"duration_s\": 1.5}}'");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const auto list = asked("controller list")["controllers"];
+  ASSERT_EQ(list[1]["claims"].size(), 1U);
+  EXPECT_EQ(list[1]["claims"][0]["joint"], "joint2");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, OfAnExperimentMayWaitToBeStarted) {
+  write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") +
+                                        "[[controller]]\nplugin = \"hold\"\nname = \"rest\"\n"
+                                        "active = false\n");
+  begin("");
+  EXPECT_EQ(asked("controller switch --stop hold --start rest")["active"],
+            nlohmann::json({"rest"}));
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, ThatAreActiveMayNotShareAJoint) {
+  write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") +
+                                        "[[controller]]\nplugin = \"hold\"\nname = \"rest\"\n");
+  const Outcome outcome = tandem("check hold.toml");
+  EXPECT_EQ(outcome.status, 2);
+  expect(outcome.err, "is claimed by the controllers 'hold' and 'rest'");
+}
+
+TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
+  begin("");
+  expect(refused("joint set joint1 --mode torque"),
+         "joint1: is claimed by the controller 'hold', which sets its mode");
+  EXPECT_EQ(to_run("controller stop hold").status, 0);
+  const auto torque = asked("joint set joint1 --mode torque");
+  EXPECT_EQ(torque["mode"], "torque");
+  EXPECT_EQ(torque["controller"], "");
+  const auto soft =
+      asked("joint set joint2 --mode position --interaction compliant --stiffness 2.5");
+  EXPECT_EQ(soft["interaction"], "compliant");
+  EXPECT_EQ(soft["stiffness_Nm_rad"], 2.5);
+  expect(refused("joint set joint2 --stiffness 1e6"), "joint2: stiffness_Nm_rad 1e+06 is beyond");
+  expect(refused("joint set joint2 --damping -1"), "joint2: damping_Nms_rad -1 is beyond");
+  expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
+  expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
+  expect(refused("joint set joint2"), "nothing is to be set");
+  expect(to_run("joint list joint1").out, "joint1           -  torque");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, GainsAreKeptAndShown) {
+  begin("");
+  const auto gains = asked("joint gains joint1 position --kp 7.5");
+  EXPECT_EQ(gains["gains"]["position"]["kp"], 7.5);
+  EXPECT_EQ(gains["gains"]["position"]["ki"], 12.0) << "what is not named stays";
+  expect(to_run("joint list joint1 --gains").out, "7.5  12  0.25");
+  expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
+  expect(refused("joint gains joint1 speed --kp 1"), "there is no 'speed'");
+  expect(refused("joint gains joint1 position"), "nothing is to be set");
+  EXPECT_EQ(end(), 0);
+}
+
+}  // namespace
+}  // namespace tandem::apps
