@@ -53,7 +53,10 @@ Result<TomlDocument> parameters_of(const Json& request) {
   const Result<std::string> text =
       found->is_string() ? Result<std::string>(found->get<std::string>()) : toml_of(*found);
   if (!text) return std::unexpected(text.error());
-  return TomlDocument::parse(*text, "parameters");
+  auto document = TomlDocument::parse(*text, "parameters");
+  if (document) return document;
+  const Error& error = document.error();
+  return fail("parameters:" + std::to_string(error.line) + ": " + error.message, error.hint);
 }
 
 Result<Json> load(RunServices& services, const Json& request) {

@@ -115,7 +115,7 @@ TEST_F(Controllers, GainsAreKeptAndShown) {
   const auto gains = asked("joint gains joint1 position --kp 7.5");
   EXPECT_EQ(gains["gains"]["position"]["kp"], 7.5);
   EXPECT_EQ(gains["gains"]["position"]["ki"], 12.0) << "what is not named stays";
-  expect(to_run("joint list joint1 --gains").out, "7.5  12  0.25");
+  expect(to_run("joint list joint1 --gains").out, "joint1  position   7.5    12  0.25");
   expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
   expect(refused("joint gains joint1 speed --kp 1"), "there is no 'speed'");
   expect(refused("joint gains joint1 position"), "nothing is to be set");
