@@ -129,7 +129,7 @@ Result<const ControlRegistry::Command*> ControlRegistry::find(const Json& reques
   return fail(fmt::format("unknown command \"{}\"", wanted), suggest(wanted, names));
 }
 
-Result<Json> ControlRegistry::run(std::string_view question) const {
+Result<Json> ControlRegistry::run(std::string_view question, const Gate& gate) const {
   const Result<Json> request = parse(question);
   if (!request) return request;
   const Result<const Command*> command = find(*request);
@@ -137,6 +137,13 @@ Result<Json> ControlRegistry::run(std::string_view question) const {
   if (Status keys = check_keys(*request, (*command)->name, (*command)->keys); !keys) {
     return std::unexpected(keys.error());
   }
+  if (gate) {
+    if (Status open = gate((*command)->name, (*command)->effect); !open) {
+      return std::unexpected(open.error());
+    }
+  }
+  std::unique_lock lock(working_, std::defer_lock);
+  if ((*command)->effect != ControlEffect::kStops) lock.lock();
   try {
     return (*command)->handler(*request);
   } catch (const std::exception& error) {
@@ -144,8 +151,15 @@ Result<Json> ControlRegistry::run(std::string_view question) const {
   }
 }
 
-Json ControlRegistry::answer(std::string_view question) const {
-  const Result<Json> result = run(question);
+bool ControlRegistry::stops(std::string_view question) const {
+  const Result<Json> request = parse(question);
+  if (!request) return false;
+  const Result<const Command*> command = find(*request);
+  return command && (*command)->effect == ControlEffect::kStops;
+}
+
+Json ControlRegistry::answer(std::string_view question, const Gate& gate) const {
+  const Result<Json> result = run(question, gate);
   Json answer;
   answer["ok"] = result.has_value();
   if (result) {

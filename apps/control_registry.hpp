@@ -1,9 +1,10 @@
 // What a running process can be asked for: commands by name, whatever carries them to it.
-// Layer: apps.  Thread: filled before it is served; answer() the serving thread's.
+// Layer: apps.  Thread: filled before it is served; then any, which does one thing at a time.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -48,12 +49,16 @@ class ControlRegistry {
   /// Gets a request whose keys are known, there when required, and of the right type.
   /// @return an object: its keys follow "ok" in the answer.
   using Handler = std::function<Result<Json>(const Json& request)>;
+  /// Says whether a command may be asked for; the error is the answer otherwise.
+  using Gate = std::function<Status(const std::string& command, ControlEffect effect)>;
 
   /// The command "help" is there from the start: it lists the others.
   ControlRegistry();
   ControlRegistry(const ControlRegistry&) = delete;
   ControlRegistry& operator=(const ControlRegistry&) = delete;
 
+  /// One handler runs at a time, except those that stop the robot: they wait for no other, so they
+  /// have to be safe beside them.
   /// @param doc  one line, for "help".  @pre `name` is new
   void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
            Handler handler);
@@ -64,7 +69,10 @@ class ControlRegistry {
   /// The answer to `question`, a JSON text. Answered as errors: what is no JSON object, a key
   /// twice, an unknown command or key (with the nearest), a missing key, a wrong type, and
   /// whatever a handler says or throws.
-  [[nodiscard]] Json answer(std::string_view question) const;
+  /// @param gate  of who asks; empty: everything may be asked for
+  [[nodiscard]] Json answer(std::string_view question, const Gate& gate = {}) const;
+  /// Whether `question` asks for a command that stops the robot.
+  [[nodiscard]] bool stops(std::string_view question) const;
 
  private:
   struct Command {
@@ -74,11 +82,12 @@ class ControlRegistry {
     std::vector<ControlKey> keys;
     Handler handler;
   };
-  [[nodiscard]] Result<Json> run(std::string_view question) const;
+  [[nodiscard]] Result<Json> run(std::string_view question, const Gate& gate) const;
   [[nodiscard]] Result<const Command*> find(const Json& request) const;
   [[nodiscard]] Json help() const;
 
   std::vector<Command> commands_;
+  mutable std::mutex working_;
 };
 
 }  // namespace tandem::apps

@@ -66,6 +66,39 @@ TEST_F(Answers, KnowWhatACommandDoesBeforeItIsAsked) {
   EXPECT_EQ(registry.effect("nothing"), std::nullopt);
 }
 
+TEST_F(Answers, RefuseWhatTheGateOfWhoAsksDoesNotLetThrough) {
+  const ControlRegistry::Gate gate = [](const std::string& name, ControlEffect effect) -> Status {
+    if (effect == ControlEffect::kReads) return {};
+    return fail(name + " is not for everybody", "ask somebody else");
+  };
+  EXPECT_EQ(registry.answer(R"({"do": "help"})", gate)["ok"], true);
+  const Json refused = registry.answer(R"({"do": "echo", "text": "x"})", gate);
+  EXPECT_EQ(refused["ok"], false);
+  EXPECT_EQ(refused["error"], "echo is not for everybody");
+  EXPECT_EQ(registry.answer(R"({"do": "echo"})", gate)["error"], "echo: \"text\" is missing");
+}
+
+TEST_F(Answers, ToAStopComeWhileAnotherCommandIsAtWork) {
+  std::atomic<bool> at_work{false}, stopped{false};
+  registry.add("slow", ControlEffect::kChanges, "ends after a stop", {},
+               [&](const Json&) -> Result<Json> {
+                 at_work = true;
+                 while (!stopped) std::this_thread::yield();
+                 return Json::object();
+               });
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    stopped = true;
+    return Json::object();
+  });
+  EXPECT_TRUE(registry.stops(R"({"do": "stop"})"));
+  EXPECT_FALSE(registry.stops(R"({"do": "slow"})"));
+  EXPECT_FALSE(registry.stops("rubbish"));
+  std::thread slow([&] { EXPECT_EQ(registry.answer(R"({"do": "slow"})")["ok"], true); });
+  while (!at_work) std::this_thread::yield();
+  EXPECT_EQ(registry.answer(R"({"do": "stop"})")["ok"], true);
+  slow.join();
+}
+
 TEST_F(Answers, ToWhatIsNoJsonObjectAreErrors) {
   for (const char* text : {"", "help", "{\"do\": \"help\"", "{\"do\": \"help\"} x", "\xff\xfe",
                            "[]", "null", "3", "{'do': 'help'}", "{\"do\": \"help\",}"}) {
