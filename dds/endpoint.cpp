@@ -1,66 +1,28 @@
 #include "dds/endpoint.hpp"
 
-#include <memory>
-
 namespace tandem::dds {
-namespace {
 
-using QosPointer = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
-
-QosPointer to_dds(const Qos& qos, const Type& type) {
-  QosPointer out(dds_create_qos(), &dds_delete_qos);
-  const dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(out.get(), 1, &plain);
-  // A writer never waits: what a slow reader has no room for is not sent, and said so.
-  dds_qset_reliability(out.get(),
-                       qos.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
-  dds_qset_durability(
-      out.get(), qos.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  dds_qset_history(out.get(), DDS_HISTORY_KEEP_LAST, qos.depth);
-  if (qos.transient_local) {
-    dds_qset_durability_service(out.get(), 0, DDS_HISTORY_KEEP_LAST, qos.depth, -1, -1, -1);
-  }
-  const std::string user_data = qos.user_data + "typehash=" + type.hash + ";";
-  dds_qset_userdata(out.get(), user_data.data(), user_data.size());
-  return out;
-}
-
-}  // namespace
-
-Endpoint::Endpoint(Kind kind, std::string topic_name, Entity topic, Entity entity)
+Endpoint::Endpoint(Kind kind, std::string topic, RawEndpoint raw, RosGraph& graph)
     : kind_(kind),
-      topic_name_(std::move(topic_name)),
       topic_(std::move(topic)),
-      entity_(std::move(entity)) {}
+      raw_(std::move(raw)),
+      entry_(graph, kind, raw_.entity.get()) {}
 
 Result<Endpoint> Endpoint::create(Kind kind, Participant& participant, const Type& type,
                                   const std::string& topic, const Qos& qos) {
-  const QosPointer settings = to_dds(qos, type);
-  // Without settings: they are the endpoint's, and may be others for the next one of this topic.
-  Entity made(
-      dds_create_topic(participant.get(), type.descriptor, topic.c_str(), nullptr, nullptr));
-  if (!made.ok()) {
-    return std::unexpected(
-        dds_error("make the topic " + topic + " of type " + type.ros_name, made.get()));
-  }
-  const bool writes = kind == Kind::kWriter;
-  Entity end(writes ? dds_create_writer(participant.get(), made.get(), settings.get(), nullptr)
-                    : dds_create_reader(participant.get(), made.get(), settings.get(), nullptr));
-  if (!end.ok()) {
-    return std::unexpected(dds_error(
-        std::string("make a ") + (writes ? "writer" : "reader") + " of " + topic, end.get()));
-  }
-  return Endpoint(kind, topic, std::move(made), std::move(end));
+  auto raw = RawEndpoint::create(kind, participant.get(), type, topic, qos);
+  if (!raw) return std::unexpected(raw.error());
+  return Endpoint(kind, topic, std::move(*raw), participant.graph());
 }
 
 std::uint32_t Endpoint::matched() const {
   if (kind_ == Kind::kWriter) {
     dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(entity_.get(), &status);
+    dds_get_publication_matched_status(get(), &status);
     return status.current_count;
   }
   dds_subscription_matched_status_t status{};
-  dds_get_subscription_matched_status(entity_.get(), &status);
+  dds_get_subscription_matched_status(get(), &status);
   return status.current_count;
 }
 

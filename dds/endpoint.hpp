@@ -8,42 +8,34 @@
 
 #include "base/result.hpp"
 #include "dds/participant.hpp"
+#include "dds/raw_endpoint.hpp"
 #include "dds/types.hpp"
 
 namespace tandem::dds {
 
-/// Quality of service of one endpoint. Both ends must fit: a reader that is reliable or transient
-/// local finds no writer that is less.
-struct Qos {
-  bool reliable = true;
-  bool transient_local = false;  ///< late readers get the last `depth` samples
-  std::int32_t depth = 10;       ///< samples that are kept for readers, or until they are taken
-  std::string user_data;         ///< "key=value;…": what it says of itself before its type's hash
-};
-
-/// A topic with its writer or reader. The participant outlives it.
+/// A topic with its writer or reader, one of the participant's node. The participant outlives it.
 class Endpoint {
  public:
-  enum class Kind : std::uint8_t { kWriter, kReader };
+  using Kind = EndpointKind;
 
   /// @param topic  the DDS name: Participant::topic_name()
-  /// Errors: what Cyclone DDS refuses, such as a topic that has another type in this process.
+  /// Errors: RawEndpoint::create()'s.
   [[nodiscard]] static Result<Endpoint> create(Kind kind, Participant& participant,
                                                const Type& type, const std::string& topic,
                                                const Qos& qos);
 
-  [[nodiscard]] dds_entity_t get() const noexcept { return entity_.get(); }
-  [[nodiscard]] const std::string& topic() const noexcept { return topic_name_; }
+  [[nodiscard]] dds_entity_t get() const noexcept { return raw_.entity.get(); }
+  [[nodiscard]] const std::string& topic() const noexcept { return topic_; }
   /// How many of the other kind are connected.
   [[nodiscard]] std::uint32_t matched() const;
 
  private:
-  Endpoint(Kind kind, std::string topic_name, Entity topic, Entity entity);
+  Endpoint(Kind kind, std::string topic, RawEndpoint raw, RosGraph& graph);
 
   Kind kind_;
-  std::string topic_name_;
-  Entity topic_;
-  Entity entity_;  // after the topic, so that it goes first
+  std::string topic_;
+  RawEndpoint raw_;
+  GraphEntry entry_;  // after the entity, so that it leaves the graph first
 };
 
 template <class T>

@@ -18,12 +18,18 @@ Result<std::unique_ptr<Participant>> Participant::open(std::shared_ptr<Domain> d
     return std::unexpected(dds_error(fmt::format("take part in the DDS domain {}", number),
                                      entity.get(), "are too many processes in it?"));
   }
+  auto graph = RosGraph::open(entity.get(), "/" + domain->config().name_space, node);
+  if (!graph) return std::unexpected(graph.error());
   return std::unique_ptr<Participant>(
-      new Participant(std::move(domain), std::move(node), std::move(entity)));
+      new Participant(std::move(domain), std::move(node), std::move(entity), std::move(*graph)));
 }
 
-Participant::Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity)
-    : domain_(std::move(domain)), node_(std::move(node)), entity_(std::move(entity)) {}
+Participant::Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity,
+                         std::unique_ptr<RosGraph> graph)
+    : domain_(std::move(domain)),
+      node_(std::move(node)),
+      entity_(std::move(entity)),
+      graph_(std::move(graph)) {}
 
 std::string Participant::topic_name(const std::string& ros_name) const {
   const std::string& name_space = config().name_space;

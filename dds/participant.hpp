@@ -7,13 +7,15 @@
 
 #include "base/result.hpp"
 #include "dds/domain.hpp"
+#include "dds/ros_graph.hpp"
 
 namespace tandem::dds {
 
 class Participant {
  public:
   /// @param node  its name in ROS 2's graph: "tandem_run"
-  /// Errors: no participant of the domain can be made (too many are on this machine).
+  /// Errors: no participant of the domain can be made (too many are on this machine);
+  /// RosGraph::open()'s.
   [[nodiscard]] static Result<std::unique_ptr<Participant>> open(std::shared_ptr<Domain> domain,
                                                                  std::string node);
 
@@ -21,16 +23,21 @@ class Participant {
   [[nodiscard]] const Config& config() const noexcept { return domain_->config(); }
   [[nodiscard]] const std::string& node() const noexcept { return node_; }
 
+  /// Its node's endpoints, which enter and leave by themselves.
+  [[nodiscard]] RosGraph& graph() noexcept { return *graph_; }
+
   /// The DDS topic of a ROS 2 topic in the configured namespace: "joint_states" is
   /// "rt/joint_states", or "rt/left/joint_states".
   [[nodiscard]] std::string topic_name(const std::string& ros_name) const;
 
  private:
-  Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity);
+  Participant(std::shared_ptr<Domain> domain, std::string node, Entity entity,
+              std::unique_ptr<RosGraph> graph);
 
   std::shared_ptr<Domain> domain_;  // outlives the participant's entity
   std::string node_;
   Entity entity_;
+  std::unique_ptr<RosGraph> graph_;
 };
 
 }  // namespace tandem::dds
