@@ -1,11 +1,14 @@
 #include "apps/command_flags.hpp"
 
+#include "rt/clock_control.hpp"
+
 namespace tandem::apps {
 namespace {
 
 const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --report        and draw the plots
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
+  tandem run config/coman/squat.toml --start-paused  then `tandem clock step 10`, `clock resume`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
@@ -20,6 +23,16 @@ const char kEstopExamples[] = R"(Examples:
   tandem estop                                       with the category of robot.toml's [safety]
   tandem estop --category 0                          take the torque away at once
 `kill -USR1 PID` does the same without a socket.)";
+
+const char kClockExamples[] = R"(Examples:
+  tandem clock show                                  time, paused or not, rate, measured speed
+  tandem clock pause
+  tandem clock step 10                               ten cycles, then it stands again
+  tandem clock rate 0.1                              ten times slower than real time
+  tandem clock rate 0                                as fast as the machine goes
+  tandem clock resume
+The results are the same bits. A run in real time refuses: a robot's time cannot be paused.
+Without --socket it is the only `tandem run` of this user.)";
 
 const char kAskExamples[] = R"(Examples:
   tandem ask '{"do": "help"}'                        what the running process can be asked
@@ -95,16 +108,26 @@ const char kEmulateExamples[] = R"(Examples:
 Interfaces without hardware:
   ip link add can0 type vcan && ip link set can0 mtu 72 up)";
 
+CLI::Validator is_rate() {
+  const auto check = [](const std::string& text) -> std::string {
+    double rate = -1.0;
+    if (CLI::detail::lexical_cast(text, rate) && rt::check_rate(rate)) return "";
+    return "'" + text + "' is neither 0 nor from 0.01 to 1000";
+  };
+  return {check, "0, 0.01 to 1000"};
+}
+
 }  // namespace
 
 void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
-  CLI::Option* rate =
-      app.add_option("--rate", o.rate, "Simulated seconds per wall second (default: free running)")
-          ->check(CLI::PositiveNumber);
+  CLI::Option* rate = app.add_option("--rate", o.rate,
+                                     "Simulated seconds per wall second; 0: free running (default)")
+                          ->check(is_rate());
   app.add_flag_callback(
          "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
       ->excludes(rate);
+  app.add_flag("--start-paused", o.start_paused, "Stand before the first cycle: tandem clock step");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
       ->check(CLI::PositiveNumber);
@@ -164,6 +187,29 @@ void add_flags(CLI::App& app, EstopOptions& o) {
       ->check(CLI::IsMember({0, 1}));
   app.add_option("--socket", o.socket, kSocketHelp);
   app.footer(kEstopExamples);
+}
+
+void add_flags(CLI::App& app, ClockOptions& o) {
+  using Action = ClockOptions::Action;
+  app.require_subcommand(1);
+  app.footer(kClockExamples);  // its subcommands', too
+  const auto add = [&](const char* name, const char* doc, Action action) {
+    CLI::App* one = app.add_subcommand(name, doc);
+    one->add_option("--socket", o.socket, kSocketHelp);
+    one->add_option("--json", o.json, kJsonHelp);
+    one->callback([&o, action] { o.action = action; });
+    return one;
+  };
+  add("show", "Time, paused or not, rate, measured speed", Action::kShow);
+  add("pause", "No cycle begins any more", Action::kPause);
+  add("resume", "Time goes on at its rate", Action::kResume);
+  add("step", "While paused: so many cycles, then it stands again", Action::kStep)
+      ->add_option("cycles", o.cycles, "Cycles (default: 1)")
+      ->check(CLI::Range(std::uint64_t{1}, rt::kMostSteps));
+  add("rate", "Simulated seconds per wall second", Action::kRate)
+      ->add_option("rate", o.rate, "0.01 to 1000; 0: as fast as the machine goes")
+      ->required()
+      ->check(is_rate());
 }
 
 void add_flags(CLI::App& app, AskOptions& o) {

@@ -19,6 +19,7 @@ inline constexpr char kSocketHelp[] =
 void add_flags(CLI::App& app, RunOptions& o);
 void add_flags(CLI::App& app, FaultOptions& o);
 void add_flags(CLI::App& app, EstopOptions& o);
+void add_flags(CLI::App& app, ClockOptions& o);
 void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, InjectOptions& o);
 void add_flags(CLI::App& app, ControllerOptions& o);

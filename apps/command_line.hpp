@@ -20,7 +20,8 @@ enum class Exit : int {
 /// tandem run EXPERIMENT
 struct RunOptions {
   std::string experiment;
-  std::optional<double> rate;         ///< 1: real time; empty: as fast as it goes
+  std::optional<double> rate;         ///< 1: real time, 0: as fast as it goes; else as [clock]
+  bool start_paused = false;          ///< true: whatever the experiment says
   std::optional<std::uint64_t> seed;  ///< instead of the experiment's
   std::optional<double> duration_s;   ///< instead of the experiment's
   std::string log_folder;             ///< empty: the experiment's
@@ -38,7 +39,7 @@ struct RunOptions {
   std::string json;                     ///< file, "-" for standard output, empty for none
   std::string socket;  ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
-  std::string on_fault;  ///< "end", "wait"; empty: the experiment's
+  std::string on_fault;       ///< "end", "wait"; empty: the experiment's
   std::optional<bool> dds;    ///< instead of the experiment's
   std::optional<int> domain;  ///< of DDS, instead of the experiment's
 };
@@ -81,6 +82,15 @@ struct JointOptions {
   std::string loop;
   std::optional<double> kp, ki, kd;
   std::string socket;  ///< empty: that of the only running `tandem run`
+  std::string json;
+};
+
+/// tandem clock show|pause|resume|step|rate
+struct ClockOptions {
+  enum class Action : std::uint8_t { kShow, kPause, kResume, kStep, kRate } action = Action::kShow;
+  std::uint64_t cycles = 1;  ///< step
+  double rate = 0.0;         ///< rate; 0: as fast as it goes
+  std::string socket;        ///< empty: that of the only running `tandem run`
   std::string json;
 };
 
@@ -179,10 +189,10 @@ struct DoctorOptions {
 };
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command =
-    std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions, ControllerOptions,
-                 JointOptions, InjectOptions, CheckOptions, ModelOptions, LogOptions, EdsOptions,
-                 ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions>;
+using Command = std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions, ClockOptions,
+                             ControllerOptions, JointOptions, InjectOptions, CheckOptions,
+                             ModelOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
+                             DoctorOptions, EmulateOptions>;
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

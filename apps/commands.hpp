@@ -18,6 +18,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit controller_command(const ControllerOptions& options);
 /// Joints of a running run: what they are, and changes of them.
 [[nodiscard]] Exit joint_command(const JointOptions& options);
+/// Pauses and steps until simulated time stands.
+[[nodiscard]] Exit clock_command(const ClockOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
 /// The robot on the other end of the wire, until it is asked to stop.

@@ -17,6 +17,8 @@ using SteadyClock = std::chrono::steady_clock;
 /// A board that is configured anew takes some seconds.
 constexpr std::chrono::seconds kResetTime{30};
 
+const char kKept[] = "simulated time stands: it is done in the next cycle (tandem clock resume)";
+
 Exit refused(const Error& error) {
   print_errors({error});
   return Exit::kUsage;
@@ -54,21 +56,23 @@ Exit reset(const FaultOptions& options) {
   const Result<Json> asked = ask(*path, {{"do", "fault.reset"}});
   if (!asked) return refused(asked.error());
   Json answer = *asked;
-  if (asked->value("latched", 0) > 0) {
+  const bool nothing = asked->value("latched", 0) == 0;
+  const bool kept = !nothing && asked->value("paused", false);
+  if (!nothing && !kept) {
     const Result<Json> through = wait_for_reset(*path, *asked);
     if (!through) return refused(through.error());
     answer = *through;
   }
   const bool done = answer.value("resets", 0) > asked->value("resets", 0);
-  const bool nothing = asked->value("latched", 0) == 0;
   if (options.json != "-") {
     fmt::print("{}\n", nothing ? "nothing is latched"
+                       : kept  ? kKept
                        : done  ? "reset: every joint is enabled where it is"
                                : "not reset: a cause is still there");
     if (!nothing) print_answer(answer);
   }
   if (Status written = write_json(options.json, answer); !written) return refused(written.error());
-  return nothing || done ? Exit::kDone : Exit::kFault;
+  return nothing || kept || done ? Exit::kDone : Exit::kFault;
 }
 
 }  // namespace
@@ -83,6 +87,7 @@ Exit estop_command(const EstopOptions& options) {
   const Result<Json> answer = ask(options.socket, "run", question);
   if (!answer) return refused(answer.error());
   fmt::print("emergency stop, {}\n", answer->value("category", "?"));
+  if (answer->value("paused", false)) fmt::print("{}\n", kKept);
   return Exit::kDone;
 }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "apps/bus_watch.hpp"
+#include "apps/clock_control.hpp"
 #include "apps/console.hpp"
 
 namespace tandem::apps {
@@ -10,8 +11,9 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-std::string progress_note(const runtime::Progress& progress) {
-  const runtime::RunPhase phase = progress.phase.load();
+std::string progress_note(const runtime::RobotCycle& cycle) {
+  if (time_stands(cycle)) return "paused";
+  const runtime::RunPhase phase = cycle.progress().phase.load();
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
@@ -47,7 +49,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
     if (!quiet) buses.look();
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
-                 progress_note(progress));
+                 progress_note(cycle));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

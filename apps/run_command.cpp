@@ -39,7 +39,8 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   runtime::Experiment& e = c.experiment;
   const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
   e.loop.pacing = simulated ? rt::Pacing::kSimulated : rt::Pacing::kWallClock;
-  e.loop.rate = options.rate.value_or(0.0);
+  e.loop.rate = options.rate.value_or(simulated ? e.loop.rate : 0.0);
+  e.loop.start_paused = simulated && (options.start_paused || e.loop.start_paused);
   runtime::CycleConfig config;
   config.loop = e.loop;
   config.running_cycles = e.cycles();
@@ -52,19 +53,24 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   return config;
 }
 
-std::string pace_text(const Composition& c, const RunOptions& options) {
+std::string pace_text(const Composition& c) {
   const runtime::HalOptions& hal = c.experiment.hal;
   const std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
   if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
   const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
-  return where + how + (options.rate ? fmt::format("rate {:g}", *options.rate) : "free running");
+  const rt::LoopConfig& loop = c.experiment.loop;
+  return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
+         (loop.start_paused ? ", paused: tandem clock resume" : "");
 }
 
 /// Boards have clocks of their own.
 Status check_pace(const Composition& c, const RunOptions& options) {
-  if (c.backend->pace() == hal::Pace::kSimulatedClock || options.rate.value_or(1.0) == 1.0) {
-    return {};
+  if (c.backend->pace() == hal::Pace::kSimulatedClock) return {};
+  if (options.start_paused) {
+    return fail("boards on a bus keep real time, which cannot be paused",
+                "leave --start-paused out, or add --lockstep for emulated boards");
   }
+  if (options.rate.value_or(1.0) == 1.0) return {};
   return fail("boards on a bus keep real time, so --rate cannot be other than 1",
               "leave --rate out, or add --lockstep for emulated boards");
 }
@@ -128,7 +134,7 @@ Exit run(Composition& c, const RunOptions& options) {
   if (!options.quiet) {
     fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
                e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
-               1e6 / static_cast<double>(e.loop.period_ns), pace_text(c, options));
+               1e6 / static_cast<double>(e.loop.period_ns), pace_text(c));
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle, e.robot);

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include "apps/clock_control.hpp"
 #include "apps/controller_control.hpp"
 #include "apps/fault_table.hpp"
 #include "apps/joint_control.hpp"
@@ -9,8 +10,10 @@
 namespace tandem::apps {
 namespace {
 
-Json status(const runtime::Progress& progress) {
+Json status(const runtime::RobotCycle& cycle) {
+  const runtime::Progress& progress = cycle.progress();
   return {{"phase", runtime::to_string(progress.phase.load())},
+          {"paused", time_stands(cycle)},
           {"cycles", progress.cycles.load()},
           {"running_cycles", progress.running_cycles.load()},
           {"total_cycles", progress.total_cycles.load()},
@@ -24,7 +27,7 @@ Json status(const runtime::Progress& progress) {
 Result<Json> reset(runtime::RobotCycle& cycle) {
   using runtime::RunPhase;
   const RunPhase phase = cycle.progress().phase.load();
-  Json answer = status(cycle.progress());
+  Json answer = status(cycle);
   if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
   if (phase == RunPhase::kBringUp || phase == RunPhase::kShutDown || phase == RunPhase::kDone) {
     return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
@@ -41,7 +44,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
     category = number == 0 ? hal::StopCategory::kCategory0 : hal::StopCategory::kCategory1;
   }
   cycle.requests().emergency_stop(category);
-  return Json{{"category", hal::to_string(category)}};
+  return Json{{"category", hal::to_string(category)}, {"paused", time_stands(cycle)}};
 }
 
 }  // namespace
@@ -49,10 +52,10 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot) {
   registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
-               [&cycle](const Json&) -> Result<Json> { return status(cycle.progress()); });
+               [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
                {}, [&cycle](const Json&) -> Result<Json> {
-                 Json answer = status(cycle.progress());
+                 Json answer = status(cycle);
                  answer["faults"] = faults_json(cycle.faults());
                  answer["lost"] = cycle.fault_log().lost();
                  return answer;
@@ -73,6 +76,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                });
   add_controller_commands(registry, cycle.services(), robot);
   add_joint_commands(registry, cycle.services());
+  add_clock_commands(registry, cycle);
 }
 
 std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry, const std::string& path,

@@ -153,7 +153,7 @@ void RunSummary::print(std::FILE* out) const {
   if (composition.backend->waits_for_bus()) {
     facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
   }
-  if (wall_clock || composition.experiment.loop.rate > 0.0) {
+  if (wall_clock || loop.wakeup.count() > 0) {
     facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
     facts.add("overruns", std::to_string(loop.overruns));
   }

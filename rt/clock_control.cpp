@@ -17,6 +17,7 @@ ClockControl::ClockControl(const LoopConfig& config, Doorbell& bell)
       gated_(config.start_paused && config.pacing == Pacing::kSimulated),
       seen_(bell.count()) {
   state_.pacing = pacing_;
+  state_.period_ns = config.period_ns;
   state_.paused = gated_;
   state_.rate = config.rate;
 }

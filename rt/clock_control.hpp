@@ -21,6 +21,7 @@ inline constexpr std::uint64_t kMostSteps = 1'000'000'000;
 /// Where simulated time stands.
 struct ClockState {
   Pacing pacing = Pacing::kSimulated;
+  std::int64_t period_ns = 0;
   bool paused = false;              ///< no cycle but those of a step
   bool standing = false;            ///< the loop waits: for a resume, a step, or the end
   double rate = 0.0;                ///< times real time; 0: free running

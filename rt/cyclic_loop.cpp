@@ -11,6 +11,10 @@
 namespace tandem::rt {
 namespace {
 
+/// Simulated time that is late by less makes it good, which holds the rate where a sleep is long
+/// against a cycle; by more, and the grid moves: there is never a burst.
+constexpr std::int64_t kMostMadeGood_ns = 1'000'000;
+
 std::int64_t scaled(std::int64_t period_ns, double rate) {
   if (rate <= 0.0) return 0;
   return std::max<std::int64_t>(1, std::llround(static_cast<double>(period_ns) / rate));
@@ -87,13 +91,17 @@ bool CyclicLoop::pace(Tick& tick) noexcept {
     grid_ns_ = begin_ns_;
     return true;
   }
-  if (begin_ns_ <= grid_ns_) {
-    late_mask_ <<= 1;
-  } else {
+  if (begin_ns_ > grid_ns_) {
     // The last cycle ran into this grid point: the next one in the future takes its place.
     const std::int64_t missed = (begin_ns_ - grid_ns_ + step_ns_ - 1) / step_ns_;
-    grid_ns_ += missed * step_ns_;
     judge(tick, static_cast<std::uint64_t>(missed));
+    if (config_.pacing == Pacing::kSimulated) {
+      grid_ns_ = std::max(grid_ns_, begin_ns_ - kMostMadeGood_ns);
+      return true;
+    }
+    grid_ns_ += missed * step_ns_;
+  } else {
+    late_mask_ <<= 1;
   }
   if (control_ == nullptr) {
     clock_->sleep_until(grid_ns_);

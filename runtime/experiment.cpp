@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/nearest.hpp"
+#include "rt/clock_control.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -68,6 +69,15 @@ void read_overrun(TomlTable table, rt::LoopConfig& loop) {
   if (loop.stop_late > loop.stop_window) {
     table.error("n", "is more than m", "the policy stops after n late cycles of the last m");
   }
+  table.finish();
+}
+
+void read_clock(TomlTable table, rt::LoopConfig& loop) {
+  loop.rate = table.number_or("rate", loop.rate, {0.0, rt::kFastest});
+  if (const Status right = rt::check_rate(loop.rate); !right) {
+    table.error("rate", right.error().message, right.error().hint);
+  }
+  loop.start_paused = table.boolean_or("start_paused", loop.start_paused);
   table.finish();
 }
 
@@ -160,6 +170,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.sim = read_sim(root.table_or_empty("sim"));
   e.hal = read_hal(root.table_or_empty("hal"), e.sim);
   read_overrun(root.table_or_empty("overrun"), e.loop);
+  read_clock(root.table_or_empty("clock"), e.loop);
   e.thread = read_realtime(root);
   e.after_stop = read_faults(root.table_or_empty("faults"));
   e.remote = read_remote(root.table_or_empty("remote"));

@@ -90,7 +90,7 @@ struct Experiment {
   std::string kernel_variant;  ///< empty: the best that this CPU runs
   HalOptions hal;
   SimOptions sim;
-  rt::LoopConfig loop;      ///< period and [overrun]; the caller sets pacing and rate
+  rt::LoopConfig loop;      ///< period, [overrun] and [clock]; the caller sets the pacing
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   RemoteOptions remote;

@@ -80,6 +80,7 @@ class RobotCycle {
 
   /// For any thread: pause, resume, step and rate of simulated time.
   [[nodiscard]] rt::ClockControl& clock_control() noexcept { return clock_control_; }
+  [[nodiscard]] const rt::ClockControl& clock_control() const noexcept { return clock_control_; }
 
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return phase_; }

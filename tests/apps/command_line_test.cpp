@@ -53,8 +53,8 @@ TEST_F(CommandLine, AMissingArgumentIsNamed) {
   EXPECT_NE(outcome.err.find("experiment"), std::string::npos) << outcome.err;
 }
 
-TEST_F(CommandLine, ARateThatIsNotPositiveIsRefused) {
-  EXPECT_EQ(tandem("run hold.toml --rate 0").status, 2);
+TEST_F(CommandLine, ARateBeyondItsRangeIsRefused) {
+  EXPECT_EQ(tandem("run hold.toml --rate=-1").status, 2);
   EXPECT_EQ(tandem("run hold.toml --rate fast").status, 2);
 }
 

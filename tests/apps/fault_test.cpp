@@ -29,7 +29,7 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
 
 TEST_F(Faults, BySignalAreOfTheRobotsCategory) {
   begin("--on-fault wait");
-  ASSERT_EQ(std::system(("kill -USR1 $(cat '" + (folder_ / "pid").string() + "')").c_str()), 0);
+  signal("USR1");
   until(R"("phase": "faulted")");
   const Outcome shown = to_run("fault show --json -");
   const auto answer = nlohmann::json::parse(shown.out, nullptr, false);
@@ -41,8 +41,7 @@ TEST_F(Faults, BySignalAreOfTheRobotsCategory) {
 TEST_F(Faults, EndASimulatedRunThatWasNotToldToWait) {
   begin("");
   EXPECT_EQ(to_run("estop").status, 0);
-  run_.join();
-  EXPECT_EQ(status_, 1);
+  EXPECT_EQ(join(), 1);
   EXPECT_NE(read_text(folder_ / "run.txt").find("emergency stop on request"), std::string::npos);
 }
 

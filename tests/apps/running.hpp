@@ -17,16 +17,20 @@ class Running : public Program {
   }
   /// `tandem run hold.toml MORE`, twenty times faster than a clock, until its controllers run.
   void begin(const std::string& more) {
-    run_ = std::thread([this, more] {
+    start("--rate 20 --duration 2000 " + more);
+    until(R"("phase": "running")");
+  }
+  /// The same with no flags but these, and without waiting.
+  void start(const std::string& flags) {
+    run_ = std::thread([this, flags] {
       const std::string command =
           "cd '" + folder_.string() + "' && echo $$ >pid && exec '" + TANDEM_BINARY_DIR +
-          "/bin/tandem' run hold.toml --rate 20 --duration 2000 --no-log -q --json run.json "
+          "/bin/tandem' run hold.toml --no-log -q --json run.json "
           "--socket " +
-          socket_ + " " + more + " 2>run.txt";
+          socket_ + " " + flags + " 2>run.txt";
       const int raw = std::system(command.c_str());
       status_ = WIFEXITED(raw) ? WEXITSTATUS(raw) : -1;
     });
-    until(R"("phase": "running")");
   }
   /// Asks for the status until the answer holds `text`.
   void until(const std::string& text) const {
@@ -40,10 +44,18 @@ class Running : public Program {
   [[nodiscard]] Outcome to_run(const std::string& command) const {
     return tandem(command + " --socket " + socket_);
   }
-  int end() {
-    (void)to_run("ask '{\"do\": \"run.stop\"}'");
+  void signal(const std::string& name) const {
+    const std::string pid = (folder_ / "pid").string();
+    EXPECT_EQ(std::system(("kill -" + name + " $(cat '" + pid + "')").c_str()), 0);
+  }
+  /// Waits for the run's end. @return its exit status.
+  int join() {
     run_.join();
     return status_;
+  }
+  int end() {
+    (void)to_run("ask '{\"do\": \"run.stop\"}'");
+    return join();
   }
 
   std::string socket_;

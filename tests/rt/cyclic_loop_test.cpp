@@ -123,7 +123,21 @@ TEST(CyclicLoop, NeverMissesACycleOfSimulatedTimeHoweverLate) {
   }
   EXPECT_EQ(loop.statistics().overruns, 9U);
   EXPECT_EQ(loop.statistics().skipped, 0U);
-  EXPECT_EQ(clock.sleeps.back(), kStart + 9 * 4 * kMs);
+  EXPECT_TRUE(clock.sleeps.empty()) << "a rate that is too fast is no slower than a free run";
+  EXPECT_EQ(clock.now, kStart + 10 * 3'500'000);
+}
+
+TEST(CyclicLoop, MakesGoodAMillisecondOfSimulatedTimeAndNoMore) {
+  FakeClock clock;
+  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kSimulated, .rate = 1.0}, clock);
+  cycle(loop, clock, kMs + 900'000);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + kMs + 900'000);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 2 * kMs) << "on its grid again";
+  EXPECT_EQ(cycle(loop, clock, 12 * kMs).begin_ns, kStart + 3 * kMs);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs) << "the millisecond";
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 16 * kMs);
+  EXPECT_EQ(loop.statistics().overruns, 2U);
 }
 
 TEST(CyclicLoop, LeavesThePaceToABus) {

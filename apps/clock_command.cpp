@@ -1,0 +1,98 @@
+// tandem clock show|pause|resume|step|rate: what it asks a running process, and its answer.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/control_client.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using Action = ClockOptions::Action;
+
+Json question_of(const ClockOptions& options) {
+  switch (options.action) {
+    case Action::kShow: return {{"do", "clock.show"}};
+    case Action::kPause: return {{"do", "clock.pause"}};
+    case Action::kResume: return {{"do", "clock.resume"}};
+    case Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
+    case Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
+  }
+  return {};
+}
+
+/// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
+Result<Json> wait_until_it_stands(const std::string& path, std::FILE* out) {
+  StatusLine line(out);
+  for (;;) {
+    Result<Json> now = ask(path, {{"do", "clock.show"}});
+    if (!now || now->value("standing", true) || !now->value("paused", false) ||
+        now->value("phase", "") == "done") {
+      return now;
+    }
+    if (line.due()) {
+      line.show(fmt::format("{:.3f} s, {} cycles to go", now->value("time_s", 0.0),
+                            now->value("pending_steps", 0)));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+std::string rate_text(const Json& answer) {
+  const double rate = answer.value("rate", 0.0);
+  return rate > 0.0 ? fmt::format("{:g} x real time", rate) : "free running";
+}
+
+std::string state_text(const Json& answer) {
+  if (answer.value("clock", "") != "simulated") return "real time, which nobody can pause";
+  if (!answer.value("paused", false)) return "running";
+  const std::uint64_t steps = answer.value("pending_steps", std::uint64_t{0});
+  if (answer.value("standing", false)) return "paused";
+  return steps > 0 ? fmt::format("paused, {} cycles to go", steps) : "paused after this cycle";
+}
+
+void print_answer(const Json& answer) {
+  Facts facts;
+  facts.add("time", fmt::format("{:.6f} s", answer.value("time_s", 0.0)));
+  facts.add("cycles", std::to_string(answer.value("cycles", std::uint64_t{0})));
+  facts.add("phase", answer.value("phase", "?"));
+  facts.add("clock", state_text(answer));
+  facts.add("rate", rate_text(answer));
+  const Json& factor = answer["realtime_factor"];
+  facts.add("measured",
+            factor.is_number() ? fmt::format("{:.3g} x real time", factor.get<double>()) : "-");
+  facts.print(stdout);
+}
+
+Result<Json> carry_out(const ClockOptions& options) {
+  const Result<std::string> path = find_control_socket(options.socket, "run");
+  if (!path) return std::unexpected(path.error());
+  Result<Json> answer = ask(*path, question_of(options));
+  const bool waits = options.action == Action::kPause || options.action == Action::kStep;
+  if (!answer || !waits) return answer;
+  Result<Json> stands = wait_until_it_stands(*path, human_output(options.json));
+  if (!stands) return fail("the run ended before its clock stood still", "it has told why");
+  if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
+  return stands;
+}
+
+}  // namespace
+
+Exit clock_command(const ClockOptions& options) {
+  const Result<Json> answer = carry_out(options);
+  if (!answer) {
+    print_errors({answer.error()});
+    return Exit::kUsage;
+  }
+  if (options.json != "-") print_answer(*answer);
+  if (Status written = write_json(options.json, *answer); !written) {
+    print_errors({written.error()});
+    return Exit::kUsage;
+  }
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

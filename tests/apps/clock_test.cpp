@@ -1,0 +1,102 @@
+// `tandem clock` against a running `tandem run`.
+#include "tests/apps/running.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Clock : public Running {
+ protected:
+  [[nodiscard]] nlohmann::json clock(const std::string& command) const {
+    const Outcome outcome = to_run("clock " + command + " --json -");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+};
+
+TEST_F(Clock, StartsPausedAndRunsExactlyTheCyclesOfAStep) {
+  start("--start-paused --duration 2000");
+  until(R"("paused": true)");
+  auto answer = clock("show");
+  EXPECT_EQ(answer["cycles"], 0);
+  EXPECT_EQ(answer["clock"], "simulated");
+  EXPECT_TRUE(answer["realtime_factor"].is_null());
+  std::uint64_t expected = 0;
+  for (const std::uint64_t n : {1, 10, 300}) {
+    answer = clock("step " + std::to_string(n));
+    expected += n;
+    EXPECT_EQ(answer["cycles"], expected);
+    EXPECT_EQ(answer["standing"], true);
+    EXPECT_EQ(answer["pending_steps"], 0);
+    EXPECT_DOUBLE_EQ(answer["time_s"].get<double>(), static_cast<double>(expected - 1) * 1e-3);
+  }
+  const Outcome table = to_run("clock show");
+  for (const char* text :
+       {"time      0.310000 s", "cycles    311", "clock     paused", "rate      free running"}) {
+    EXPECT_NE(table.out.find(text), std::string::npos) << text << "\nin: " << table.out;
+  }
+  EXPECT_EQ(end(), 0) << "a run that is asked to end is not kept";
+}
+
+TEST_F(Clock, ChangesTheRateAndPausesWhileTheRunGoesOn) {
+  begin("");
+  EXPECT_EQ(clock("rate 2.5")["rate"], 2.5);
+  EXPECT_TRUE(clock("show")["realtime_factor"].is_number());
+  EXPECT_EQ(to_run("clock step").err,
+            "error: time is running (pause it first: tandem clock pause)\n");
+  const auto paused = clock("pause");
+  EXPECT_EQ(paused["standing"], true);
+  EXPECT_EQ(paused["dropped_steps"], 0);
+  EXPECT_EQ(clock("show")["cycles"], paused["cycles"]);
+  EXPECT_EQ(clock("resume")["paused"], false);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Clock, KeepsAnEmergencyStopForTheNextCycle) {
+  begin("--on-fault wait");
+  (void)clock("pause");
+  const Outcome stop = to_run("estop");
+  EXPECT_NE(stop.out.find("in the next cycle"), std::string::npos) << stop.out;
+  EXPECT_EQ(clock("show")["phase"], "running");
+  EXPECT_EQ(clock("step 1")["phase"], "faulted");
+  const Outcome reset = to_run("fault reset");
+  EXPECT_EQ(reset.status, 0) << reset.err;
+  EXPECT_NE(reset.out.find("in the next cycle"), std::string::npos) << reset.out;
+  (void)clock("resume");
+  until(R"("resets": 1)");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Clock, EndsInOrderWhenItIsSignalledWhilePaused) {
+  for (const char* name : {"INT", "TERM"}) {
+    begin("");
+    (void)clock("pause");
+    signal(name);
+    EXPECT_EQ(join(), 0) << name;
+  }
+}
+
+TEST_F(Clock, ReadsItsStartFromTheExperiment) {
+  const std::string text = read_text(folder_ / "hold.toml");
+  std::ofstream(folder_ / "hold.toml") << text << "\n[clock]\nstart_paused = true\nrate = 5\n";
+  start("");
+  until(R"("paused": true)");
+  EXPECT_EQ(clock("show")["rate"], 5.0);
+  EXPECT_EQ(end(), 0);
+  start("--rate 0");
+  until(R"("paused": true)");
+  EXPECT_EQ(clock("show")["rate"], 0.0);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Clock, RefusesWhatIsNoRate) {
+  for (const char* rate : {"0.001", "1001", "nan", "fast"}) {
+    const Outcome outcome = tandem("clock rate " + std::string(rate));
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_NE(outcome.err.find("neither 0 nor from 0.01 to 1000"), std::string::npos)
+        << outcome.err;
+  }
+  EXPECT_NE(tandem("run hold.toml --rate 0.001").err.find("0.01 to 1000"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::apps
