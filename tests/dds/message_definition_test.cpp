@@ -1,17 +1,228 @@
 #include "dds/message_definition.hpp"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <sstream>
 
 #include "dds/types.hpp"
 
 namespace tandem::dds {
 namespace {
 
-TEST(MessageDefinition, OfStringHasThePublishedHash) {
-  EXPECT_EQ(type<std_msgs::String>().hash,
-            "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18");
-  EXPECT_EQ(type<sensor_msgs::JointState>().hash,
-            "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e");
+struct Published {
+  const char* type;
+  const char* hash;
+};
+
+/// Of public copies of what ROS 2's own generator wrote (…__description.c, …__struct.h), and of
+/// tables that others keep, by GitHub repository.
+constexpr Published kPublished[] = {
+    // kuenem/Group-12_MotionPlanning-New: build/tf2_msgs/…/tf_message__description.c
+    {"tf2_msgs/msg/TFMessage", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},
+    {"builtin_interfaces/msg/Time",
+     "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"},
+    {"geometry_msgs/msg/Quaternion",
+     "8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684"},
+    {"geometry_msgs/msg/Transform",
+     "beb83fbe698636351461f6f35d1abb20010c43d55374d81bd041f1ba2581fddc"},
+    {"geometry_msgs/msg/TransformStamped",
+     "0a241f87d04668d94099cbb5ba11691d5ad32c2f29682e4eb5653424bd275206"},
+    {"geometry_msgs/msg/Vector3",
+     "cc12fe83e4c02719f1ce8070bfd14aecd40f75a96696a67a2a1f37f7dbb0765d"},
+    {"std_msgs/msg/Header", "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"},
+    // dhruvigoradia/ros2-warehouse-robot: build/control_msgs/…/dynamic_joint_state__description.c
+    {"control_msgs/msg/DynamicJointState",
+     "18024c98a62697680f581108eeed40b28fb4542fa0ac5a8e36f56c62b6813d26"},
+    {"control_msgs/msg/InterfaceValue",
+     "74a12144ef6b7af67533195cb30f7f607d3301b66950208a72d280695f3e190c"},
+    // hpmicro/hpm_sdk: middleware/microros/kilted/include/std_srvs/…/trigger__description.c
+    {"std_srvs/srv/Trigger", "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"},
+    {"std_srvs/srv/Trigger_Request",
+     "d010825374ce8918e72bfd826c82603e60f45419e932ea976f807b74a863a199"},
+    {"std_srvs/srv/Trigger_Response",
+     "2d946c21e2fc3f1e9ca6986a8191d85fcc70097a8bb7771a053564bc47009cdf"},
+    {"std_srvs/srv/Trigger_Event",
+     "ec4a1d26b0575e61906890342aba9523a2360e9845857c5590fa6e23bc39e1c2"},
+    {"service_msgs/msg/ServiceEventInfo",
+     "41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"},
+    // Pico-ROS/Pico-ROS-software: examples/example_types.h
+    {"std_msgs/msg/String", "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"},
+    {"geometry_msgs/msg/Point", "6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881"},
+    {"geometry_msgs/msg/Pose", "d501954e9476cea2996984e812054b68026ae0bfae789d9a10b23daf35cc90fa"},
+    {"geometry_msgs/msg/Twist", "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"},
+    {"geometry_msgs/msg/PoseWithCovariance",
+     "9a7c0fd234b7f45c6098745ecccd773ca1085670e64107135397aee31c02e1bb"},
+    {"geometry_msgs/msg/TwistWithCovariance",
+     "49f574f033f095d8b6cd1beaca5ca7925e296e84af1716d16c89d38b059c8c18"},
+    {"nav_msgs/msg/Odometry", "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"},
+    // several: wrench_stamped__, imu__, joint_state__ and clock__description.c,
+    // diagnostic_array__struct.h
+    {"geometry_msgs/msg/Wrench",
+     "018e8519d57c16adbe97c9fe1460ef21fec7e31bc541de3d653a35895677ce52"},
+    {"geometry_msgs/msg/WrenchStamped",
+     "8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77"},
+    {"sensor_msgs/msg/Imu", "7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"},
+    {"sensor_msgs/msg/JointState",
+     "a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"},
+    {"rosgraph_msgs/msg/Clock", "692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"},
+    {"diagnostic_msgs/msg/DiagnosticArray",
+     "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
+    // rmw_dds_common's participant_entities_info__description.c
+    {"rmw_dds_common/msg/ParticipantEntitiesInfo",
+     "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"},
+    {"rmw_dds_common/msg/Gid", "ab6f21cfbb0a6dbb837161e1110c2051a2850ed9f9c53944d7115d9bcebedf71"},
+};
+
+TEST(MessageDefinition, HasThePublishedHash) {
+  for (const Published& one : kPublished) {
+    const MessageDefinition* definition = find_definition(one.type);
+    ASSERT_NE(definition, nullptr) << one.type;
+    EXPECT_EQ(type_hash(*definition), std::string("RIHS01_") + one.hash) << one.type;
+  }
+}
+
+TEST(MessageDefinition, OfEveryStandardTypeIsAmongThePublished) {
+  for (const Type& type : types()) {
+    if (type.ros_name.starts_with("tandem_msgs/")) continue;
+    EXPECT_TRUE(std::ranges::any_of(kPublished, [&](const Published& one) {
+      return type.ros_name == one.type;
+    })) << type.ros_name;
+  }
+}
+
+TEST(MessageDefinition, CarriesThoseThatItNeeds) {
+  const std::string line(80, '=');
+  EXPECT_EQ(type<rosgraph_msgs::Clock>().definition,
+            "builtin_interfaces/Time clock\n" + line +
+                "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n");
+}
+
+TEST(MessageDefinition, ReadsEveryFormOfAField) {
+  const auto read = parse_definition("a_msgs/msg/B",
+                                     "# a comment\n"
+                                     "int32 LIMIT=3  # a constant\n"
+                                     "\n"
+                                     "float64 w 1  # a default\n"
+                                     "char[4]   c\n"
+                                     "string<=8[<=2] names\n"
+                                     "C[] own\n"
+                                     "std_msgs/Header other\n");
+  ASSERT_TRUE(read) << read.error().to_string();
+  ASSERT_EQ(read->size(), 1u);
+  const std::vector<Field>& fields = read->front().fields;
+  ASSERT_EQ(fields.size(), 5u);
+  EXPECT_EQ(fields[0].type, FieldType::kFloat64);
+  EXPECT_EQ(fields[1].type, FieldType::kUint8);
+  EXPECT_EQ(fields[1].repeat, Repeat::kArray);
+  EXPECT_EQ(fields[1].capacity, 4u);
+  EXPECT_EQ(fields[2].type, FieldType::kBoundedString);
+  EXPECT_EQ(fields[2].string_capacity, 8u);
+  EXPECT_EQ(fields[2].repeat, Repeat::kBoundedSequence);
+  EXPECT_EQ(fields[2].capacity, 2u);
+  EXPECT_EQ(fields[3].message_name, "a_msgs/msg/C");
+  EXPECT_EQ(fields[3].repeat, Repeat::kSequence);
+  EXPECT_EQ(fields[4].message_name, "std_msgs/msg/Header");
+}
+
+TEST(MessageDefinition, RefusesWhatIsNoneWithItsLine) {
+  for (const char* line : {"float64", "float64[ x", "float64[0] x", "string<=x y", "float64 2x",
+                           "std_msgs/msg/Header h", "1a b"}) {
+    const auto read = parse_definition("a_msgs/msg/B", "bool a\n" + std::string(line) + "\n");
+    ASSERT_FALSE(read) << line;
+    EXPECT_EQ(read.error().line, 2) << line;
+    EXPECT_EQ(read.error().file, "a_msgs/msg/B");
+  }
+  EXPECT_FALSE(parse_definition("a_msgs/srv/B", "bool a\n"));
+  auto unknown = *parse_definition("a_msgs/msg/B", "C c\n");
+  EXPECT_FALSE(resolve(unknown));
+  auto circle = *parse_definition("a_msgs/msg/B", "B[] b\n");
+  EXPECT_FALSE(resolve(circle));
+}
+
+// ---- the IDL of idlc and the definitions are two texts of one thing ----
+
+std::string idl_element(const Field& field) {
+  switch (field.type) {
+    case FieldType::kMessage: {
+      return field.message_name.substr(field.message_name.rfind('/') + 1) + "_";
+    }
+    case FieldType::kInt8: return "int8";
+    case FieldType::kUint8:
+    case FieldType::kByte: return "octet";
+    case FieldType::kInt16: return "short";
+    case FieldType::kUint16: return "unsigned short";
+    case FieldType::kInt32: return "long";
+    case FieldType::kUint32: return "unsigned long";
+    case FieldType::kInt64: return "long long";
+    case FieldType::kUint64: return "unsigned long long";
+    case FieldType::kFloat32: return "float";
+    case FieldType::kFloat64: return "double";
+    case FieldType::kBool: return "boolean";
+    case FieldType::kString: return "string";
+    case FieldType::kBoundedString: return fmt::format("string<{}>", field.string_capacity);
+  }
+  return "";
+}
+
+/// Its members as IDL: "double x; sequence<octet, 3> y;"
+std::string idl_members(const MessageDefinition& definition) {
+  std::string out;
+  if (definition.request_or_response) {
+    out = "unsigned long long request_guid; long long request_sequence;";
+  }
+  for (const Field& field : definition.fields) {
+    const std::string element = idl_element(field);
+    if (!out.empty()) out += " ";
+    switch (field.repeat) {
+      case Repeat::kOne: out += element + " " + field.name + ";"; break;
+      case Repeat::kArray:
+        out += fmt::format("{} {}[{}];", element, field.name, field.capacity);
+        break;
+      case Repeat::kBoundedSequence:
+        out += fmt::format("sequence<{}, {}> {};", element, field.capacity, field.name);
+        break;
+      case Repeat::kSequence: out += fmt::format("sequence<{}> {};", element, field.name); break;
+    }
+  }
+  return out;
+}
+
+/// Every structure of dds/idl: "std_msgs/msg/String" -> "string data;"
+std::map<std::string, std::string> structures() {
+  static const std::regex kToken(R"(module (\w+) \{ module (\w+) \{|struct (\w+)_ \{ ([^}]*?) \})");
+  std::map<std::string, std::string> out;
+  for (const char* file : {"ros2.idl", "tandem_msgs.idl"}) {
+    std::stringstream in;
+    in << std::ifstream(std::string(TANDEM_SOURCE_DIR) + "/dds/idl/" + file).rdbuf();
+    std::string text = std::regex_replace(in.str(), std::regex("//[^\n]*"), "");
+    text = std::regex_replace(text, std::regex("\\s+"), " ");
+    text = std::regex_replace(text, std::regex(R"(\w+::msg::dds_::)"), "");
+    std::string place;
+    for (std::sregex_iterator one(text.begin(), text.end(), kToken), end; one != end; ++one) {
+      const std::smatch& match = *one;
+      if (match[1].matched) {
+        place = match[1].str() + "/" + match[2].str() + "/";
+      } else {
+        out[place + match[3].str()] = match[4].str();
+      }
+    }
+  }
+  return out;
+}
+
+TEST(MessageDefinition, SaysTheSameAsTheIdl) {
+  const auto idl = structures();
+  EXPECT_GT(idl.size(), 40u);
+  for (const auto& [name, members] : idl) {
+    const MessageDefinition* definition = find_definition(name);
+    ASSERT_NE(definition, nullptr) << name;
+    EXPECT_EQ(members, idl_members(*definition)) << name;
+  }
 }
 
 }  // namespace

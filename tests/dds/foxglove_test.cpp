@@ -1,0 +1,92 @@
+// Another project's decoder and the published definitions, on samples as readers get them.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "tests/dds/raw_topic.hpp"
+#include "tests/support/dds_domain.hpp"
+
+namespace tandem::dds {
+namespace {
+
+#ifdef TANDEM_NODE
+constexpr const char* kNode = TANDEM_NODE;
+#else
+constexpr const char* kNode = nullptr;
+#endif
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '\n': out += "\\n"; break;
+      case '"': out += "\\\""; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+std::string hex(const test::Bytes& bytes) {
+  std::string out;
+  for (const std::byte byte : bytes) out += fmt::format("{:02x}", static_cast<unsigned>(byte));
+  return out;
+}
+
+std::string content(const std::string& path) {
+  std::stringstream out;
+  out << std::ifstream(path).rdbuf();
+  return out.str();
+}
+
+/// What @foxglove/rosmsg-msgs-common has of ours.
+const std::set<std::string> kPublished{
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "geometry_msgs/msg/WrenchStamped",
+    "nav_msgs/msg/Odometry",
+    "rosgraph_msgs/msg/Clock",
+    "sensor_msgs/msg/Imu",
+    "sensor_msgs/msg/JointState",
+    "std_msgs/msg/String",
+    "tf2_msgs/msg/TFMessage",
+};
+
+TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {
+  const std::string folder = TANDEM_SOURCE_DIR "/tests/dds";
+  if (kNode == nullptr) GTEST_SKIP() << "node is not installed";
+  if (!std::filesystem::exists(TANDEM_SOURCE_DIR
+                               "/tests/dds/node_modules/@foxglove/rosmsg2-serialization")) {
+    GTEST_SKIP() << "@foxglove/rosmsg2-serialization is not installed (run `npm ci` in tests/dds)";
+  }
+  auto domain = Domain::open(test::own_config());
+  ASSERT_TRUE(domain) << domain.error().to_string();
+  const auto participant = Participant::open(std::move(*domain), "codec");
+  const std::string path = fmt::format("{}tandem-samples-{}", testing::TempDir(), ::getpid());
+  std::ofstream file(path);
+  for (const Type& type : types()) {
+    if (type.tree->request_or_response) continue;  // no message's encoding: who asked goes first
+    const test::Codec codec(**participant, type);
+    const auto sample = codec.sample(test::CdrWriter(test::pattern()).sample(*type.tree));
+    ASSERT_TRUE(sample) << type.ros_name;
+    file << fmt::format(R"({{"type":"{}","definition":"{}","published":{},"cdr":"{}"}})",
+                        type.ros_name, escaped(type.definition), kPublished.contains(type.ros_name),
+                        hex(codec.bytes(*sample)))
+         << "\n";
+  }
+  file.close();
+  const std::string command =
+      fmt::format("cd {} && {} decode_samples.mjs {} > {}.out 2>&1", folder, kNode, path, path);
+  EXPECT_EQ(std::system(command.c_str()), 0) << content(path + ".out");
+  std::printf("%s", content(path + ".out").c_str());
+  std::filesystem::remove(path);
+  std::filesystem::remove(path + ".out");
+}
+
+}  // namespace
+}  // namespace tandem::dds
