@@ -23,6 +23,7 @@ test: unit rtsan
 
 unit:
 	@scripts/install-dependencies test
+	@scripts/install-node-modules
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
 	@scripts/run-tests build/release $(JOBS) -LE hil
