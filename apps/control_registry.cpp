@@ -42,6 +42,9 @@ bool is_of(const Json& value, ControlKey::Type type) {
 
 /// A JSON object without a key twice.
 Result<Json> parse(std::string_view text) {
+  if (text.size() > kMaxQuestion) {
+    return fail(fmt::format("a question of more than {} bytes", kMaxQuestion), "ask shorter ones");
+  }
   std::vector<std::set<std::string>> open;
   std::string twice;
   const Json::parser_callback_t watch = [&](int, Json::parse_event_t event, Json& value) {

@@ -2,6 +2,7 @@
 // Layer: apps.  Thread: filled before it is served; then any, which does one thing at a time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -23,6 +24,9 @@ enum class ControlEffect : std::uint8_t {
 };
 
 [[nodiscard]] const char* to_string(ControlEffect effect);
+
+/// Longest question [bytes].
+inline constexpr std::size_t kMaxQuestion = 256 * 1024;
 
 /// A key of a command's request, beside "do".
 struct ControlKey {
@@ -66,9 +70,9 @@ class ControlRegistry {
   /// What the command `name` does; empty when there is none.
   [[nodiscard]] std::optional<ControlEffect> effect(std::string_view name) const;
 
-  /// The answer to `question`, a JSON text. Answered as errors: what is no JSON object, a key
-  /// twice, an unknown command or key (with the nearest), a missing key, a wrong type, and
-  /// whatever a handler says or throws.
+  /// The answer to `question`, a JSON text. Answered as errors: what is longer than
+  /// kMaxQuestion, or no JSON object, a key twice, an unknown command or key (with the nearest), a
+  /// missing key, a wrong type, and whatever a handler says or throws.
   /// @param gate  of who asks; empty: everything may be asked for
   [[nodiscard]] Json answer(std::string_view question, const Gate& gate = {}) const;
   /// Whether `question` asks for a command that stops the robot.

@@ -15,8 +15,8 @@
 
 namespace tandem::apps {
 
-/// Longest question or answer [bytes], its end of line included.
-inline constexpr std::size_t kMaxControlLine = 256 * 1024;
+/// Longest question [bytes], its end of line included.
+inline constexpr std::size_t kMaxControlLine = kMaxQuestion + 1;
 /// Clients at once. A further one takes the place of the one that has been quiet the longest, so
 /// that an emergency stop always finds its way in.
 inline constexpr std::size_t kMaxControlClients = 16;

@@ -7,8 +7,10 @@
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
 #include "apps/dds_run.hpp"
+#include "apps/dds_services.hpp"
 #include "apps/inject.hpp"
 #include "apps/loop_thread.hpp"
+#include "apps/remote_gate.hpp"
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
@@ -108,6 +110,14 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
   return {};
 }
 
+/// Null without DDS.
+Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
+                                                   const runtime::RemoteOptions& remote) {
+  if (run == nullptr) return nullptr;
+  const auto command = remote.command.value_or(runtime::RemoteCommand::kOff);
+  return DdsServices::open(run->participant(), commands, remote_gate(command, {}));
+}
+
 Exit run(Composition& c, const RunOptions& options) {
   std::FILE* out = human_output(options.json);
   runtime::Experiment& e = c.experiment;
@@ -145,6 +155,11 @@ Exit run(Composition& c, const RunOptions& options) {
     });
   }
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
+  const auto services = open_services(dds->get(), commands, e.remote);
+  if (!services) {
+    print_errors({services.error()});
+    return Exit::kUsage;
+  }
   rt::install_stop_signals();
   rt::install_emergency_signal();
   std::optional<rt::NoCpuSleep> awake;

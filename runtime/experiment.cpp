@@ -117,6 +117,14 @@ RemoteOptions read_remote(TomlTable table) {
   return remote;
 }
 
+/// @param remote  its table
+void check_remote(const Experiment& e, TomlTable remote) {
+  if (e.remote.command != RemoteCommand::kLocal || e.dds.loopback_only()) return;
+  remote.error("command", "\"local\", but [dds] reaches beyond this machine",
+               "set interfaces = [\"lo\"] in [dds], or command = \"network\" to let every machine "
+               "there command the robot");
+}
+
 LogOptions read_log(TomlTable table) {
   LogOptions log;
   log.folder = table.text_or("folder", log.folder);
@@ -177,6 +185,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
   if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());
+  check_remote(e, root.table_or_empty("remote"));
   read_controllers(root, e.controllers);
   root.finish();
   return e;

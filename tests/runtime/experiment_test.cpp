@@ -253,6 +253,16 @@ TEST(Experiment, RefusesAnOrderThatTheActuatorsLackDataFor) {
             "be positive (complete it in the robot's file, or leave the order to it)\n");
 }
 
+TEST(Experiment, RefusesLocalCommandsOverANetwork) {
+  const std::string dds = "[dds]\ninterfaces = ['lo', 'eth0']\n[remote]\ncommand = ";
+  EXPECT_NE(errors_of(with(dds + "'local'"))
+                .find("remote.command: \"local\", but [dds] reaches beyond this machine"),
+            std::string::npos);
+  for (const char* fine : {"'off'", "'network'"}) EXPECT_EQ(errors_of(with(dds + fine)), "");
+  EXPECT_EQ(errors_of(with("[dds]\n[remote]\ncommand = 'local'")), "");
+  EXPECT_NE(errors_of(with("[remote]\ncommand = 'all'")).find("remote.command"), std::string::npos);
+}
+
 TEST(Experiment, RefusesARunWithoutController) {
   EXPECT_NE(errors_of("robot = 'robot.toml'\nduration_s = 1\n").find("there is no controller"),
             std::string::npos);

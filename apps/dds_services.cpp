@@ -1,0 +1,83 @@
+#include "apps/dds_services.hpp"
+
+#include "apps/dds_service_types.hpp"
+
+namespace tandem::apps {
+namespace {
+
+std::string to_text(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& participant,
+                                                       const ControlRegistry& registry,
+                                                       ControlRegistry::Gate gate) {
+  std::unique_ptr<DdsServices> services(new DdsServices(registry, std::move(gate)));
+  auto server = dds::ServiceServer::open(participant);
+  if (!server) return std::unexpected(server.error());
+  services->server_ = std::move(*server);
+  if (Status added = services->add_all(); !added) return std::unexpected(added.error());
+  if (Status started = services->server_->start(); !started) {
+    return std::unexpected(started.error());
+  }
+  return services;
+}
+
+Status DdsServices::add_all() {
+  using namespace dds::tandem_msgs;
+  const Status added[]{
+      add_ask(),
+      add("tandem/emergency_stop", "estop", &emergency_stop_question, &fill_emergency_stop),
+      add("tandem/clear_faults", "fault.reset", &clear_faults_question, &fill_clear_faults),
+      add("tandem/list_controllers", "controller.list", &list_controllers_question,
+          &fill_controllers),
+      add("tandem/load_controller", "controller.load", &load_controller_question,
+          &fill_switched<LoadController_Response>),
+      add("tandem/unload_controller", "controller.unload", &unload_controller_question,
+          &fill_switched<UnloadController_Response>),
+      add("tandem/switch_controllers", "controller.switch", &switch_controllers_question,
+          &fill_switched<SwitchControllers_Response>),
+      add("tandem/set_joint", "joint.set", &set_joint_question, &fill_done<SetJoint_Response>),
+      add("tandem/set_gains", "joint.gains", &set_gains_question, &fill_done<SetGains_Response>),
+      add("tandem/clock", "clock.show", &clock_question, &fill_clock),
+  };
+  for (const Status& one : added) {
+    if (!one) return one;
+  }
+  return {};
+}
+
+Json DdsServices::ask(const std::string& question) const {
+  return registry_->answer(question, gate_);
+}
+
+Status DdsServices::add_ask() {
+  using Request = dds::tandem_msgs::Ask_Request;
+  using Response = dds::tandem_msgs::Ask_Response;
+  return server_->add<Request, Response>("tandem/ask", [this](const Request& request) {
+    const std::string question = request.request;
+    return dds::ServiceWork<Response>{
+        .at_once = registry_->stops(question),
+        .answer = [this, question](Response& reply, dds::ReplyMemory& memory) {
+          reply.answer = memory.text(to_text(ask(question)));
+        }};
+  });
+}
+
+template <class Request, class Response>
+Status DdsServices::add(const char* name, const char* needs, Json (*question)(const Request&),
+                        void (*fill)(const Json&, Response&, dds::ReplyMemory&)) {
+  if (!registry_->effect(needs)) return {};
+  return server_->add<Request, Response>(name, [this, question, fill](const Request& request) {
+    const std::string text = to_text(question(request));
+    return dds::ServiceWork<Response>{
+        .at_once = registry_->stops(text),
+        .answer = [this, text, fill](Response& reply, dds::ReplyMemory& memory) {
+          fill(ask(text), reply, memory);
+        }};
+  });
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,19 @@
+// What others may ask of this process over DDS. The Unix socket is the local operator's: no gate.
+// Layer: apps.  Thread: any.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "apps/control_registry.hpp"
+#include "runtime/experiment.hpp"
+
+namespace tandem::apps {
+
+/// Reading and stopping the robot are always let through. What changes something is refused unless
+/// `command` allows it; and while somebody owns the robot, what changes controllers and joints.
+/// @param owner  who commands the robot from afar, called at each request; empty text: nobody
+[[nodiscard]] ControlRegistry::Gate remote_gate(runtime::RemoteCommand command,
+                                                std::function<std::string()> owner);
+
+}  // namespace tandem::apps
