@@ -1,0 +1,210 @@
+// A run's services over DDS do what its registry's commands do, and no more than [remote] allows.
+#include "dds/service_client.hpp"
+#include "tests/apps/running.hpp"
+#include "tests/support/dds_domain.hpp"
+#include "tests/support/eventually.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using namespace dds::tandem_msgs;
+using dds::std_srvs::Trigger_Request;
+using dds::std_srvs::Trigger_Response;
+using tandem::test::eventually;
+using Texts = std::vector<std::string>;
+
+class DdsServices : public Running {
+ protected:
+  void SetUp() override {
+    Running::SetUp();
+    dds::Config config = dds::test::own_config();
+    auto domain = dds::Domain::open(config);
+    ASSERT_TRUE(domain) << domain.error().to_string();
+    auto joined = dds::Participant::open(std::move(*domain), "tester");
+    ASSERT_TRUE(joined) << joined.error().to_string();
+    participant_ = std::move(*joined);
+  }
+  /// A run in this program's domain. @param remote  [remote] command; empty: none
+  void begin_with(const std::string& remote) {
+    if (!remote.empty()) {
+      write_text(folder_ / "hold.toml",
+                 read_text(folder_ / "hold.toml") + "[remote]\ncommand = \"" + remote + "\"\n");
+    }
+    begin("--on-fault wait --dds --domain " + std::to_string(dds::test::own_domain()));
+  }
+  /// Calls a service; `use` sees the reply.
+  template <class Response, class Request>
+  void call(const std::string& name, const Request& request,
+            const std::function<void(const Response&)>& use) {
+    auto client = dds::ServiceClient<Request, Response>::create(*participant_, "tandem/" + name);
+    ASSERT_TRUE(client) << client.error().to_string();
+    const Status done = client->call(request, std::chrono::seconds(30), use);
+    EXPECT_TRUE(done) << done.error().to_string();
+  }
+  nlohmann::json ask(const std::string& question) {
+    nlohmann::json answer;
+    std::string text = question;
+    call<Ask_Response>("ask", Ask_Request{0, 0, text.data()}, [&](const Ask_Response& reply) {
+      answer = nlohmann::json::parse(reply.answer, nullptr, false);
+    });
+    return answer;
+  }
+  /// The same over the control socket, which is the local operator's.
+  [[nodiscard]] nlohmann::json ask_local(const std::string& question) const {
+    const Outcome outcome = to_run("ask '" + question + "'");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+  /// "success message" of a trigger.
+  std::string trigger(const std::string& name) {
+    std::string text;
+    call<Trigger_Response>(name, Trigger_Request{}, [&text](const Trigger_Response& reply) {
+      text = std::string(reply.success ? "yes: " : "no: ") + reply.message;
+    });
+    return text;
+  }
+  Texts active_after(Texts stop, Texts start) {
+    std::vector<char*> stops, starts;
+    for (std::string& name : stop) stops.push_back(name.data());
+    for (std::string& name : start) starts.push_back(name.data());
+    const auto sequence = [](std::vector<char*>& names) {
+      const auto count = static_cast<std::uint32_t>(names.size());
+      return dds_sequence_string{count, count, names.data(), false};
+    };
+    Texts active;
+    call<SwitchControllers_Response>(
+        "switch_controllers", SwitchControllers_Request{0, 0, sequence(stops), sequence(starts)},
+        [&](const SwitchControllers_Response& reply) {
+          if (!reply.success) active.emplace_back(reply.message);
+          for (std::uint32_t i = 0; i < reply.active._length; ++i) {
+            active.emplace_back(reply.active._buffer[i]);
+          }
+          EXPECT_EQ(reply.done, reply.success);
+          EXPECT_EQ(reply.cycle > 0, reply.success);
+        });
+    return active;
+  }
+
+  std::unique_ptr<dds::Participant> participant_;
+};
+
+TEST_F(DdsServices, AnswerAsTheControlSocketDoes) {
+  begin_with("");
+  EXPECT_EQ(ask(R"({"do": "help"})"), ask_local(R"({"do": "help"})"));
+  EXPECT_EQ(ask(R"({"do": "fault.show"})")["faults"], nlohmann::json::array());
+  EXPECT_EQ(ask(R"({"do": "stattus"})")["hint"], "did you mean 'status'?");
+  EXPECT_EQ(ask("rubbish")["ok"], false);
+  EXPECT_EQ(ask("\xff\xfe")["ok"], false);
+  EXPECT_NE(ask(std::string(300'000, ' '))["error"].dump().find("of more than"), std::string::npos);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(DdsServices, ChangeNothingUnlessTheExperimentAllowsIt) {
+  begin_with("");
+  const auto refused = ask(R"({"do": "controller.stop", "name": "hold"})");
+  EXPECT_EQ(refused["ok"], false);
+  EXPECT_NE(refused["error"].dump().find("takes no commands over DDS"), std::string::npos);
+  EXPECT_NE(refused["hint"].dump().find("[remote] command"), std::string::npos);
+  EXPECT_EQ(ask(R"({"do": "run.stop"})")["ok"], false);
+  EXPECT_NE(trigger("clear_faults").find("no: fault.reset: this process takes no commands"),
+            std::string::npos);
+  EXPECT_NE(active_after({"hold"}, {})[0].find("takes no commands"), std::string::npos);
+  EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], true);
+  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category1");
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1) << "it is latched";
+}
+
+TEST_F(DdsServices, LoadSwitchListAndUnloadControllers) {
+  begin_with("local");
+  std::string plugin = "hold", name = "rest", parameters = "joints = ['joint2']";
+  LoadController_Request load{0, 0, plugin.data(), name.data(), parameters.data()};
+  const auto loaded = [](const LoadController_Response& reply) {
+    EXPECT_TRUE(reply.success) << reply.message;
+    ASSERT_EQ(reply.active._length, 1U);
+    EXPECT_STREQ(reply.active._buffer[0], "hold");
+  };
+  call<LoadController_Response>("load_controller", load, loaded);
+  EXPECT_NE(active_after({}, {"rest"})[0].find("claimed by the controllers"), std::string::npos);
+  EXPECT_EQ(active_after({"hold"}, {"rest"}), Texts{"rest"});
+  const auto local = ask_local(R"({"do": "controller.list"})")["controllers"];
+  call<ListControllers_Response>(
+      "list_controllers", ListControllers_Request{}, [&](const ListControllers_Response& reply) {
+        EXPECT_TRUE(reply.success);
+        ASSERT_EQ(reply.controllers._length, local.size());
+        for (std::uint32_t i = 0; i < reply.controllers._length; ++i) {
+          const auto& one = reply.controllers._buffer[i];
+          EXPECT_EQ(one.name, local[i]["name"]);
+          EXPECT_EQ(one.plugin, local[i]["plugin"]);
+          EXPECT_EQ(one.active, local[i]["active"]);
+          EXPECT_EQ(one.finished, local[i]["finished"]);
+          EXPECT_EQ(one.of_experiment, local[i]["of_experiment"]);
+          ASSERT_EQ(one.claims._length, local[i]["claims"].size());
+          for (std::uint32_t c = 0; c < one.claims._length; ++c) {
+            EXPECT_EQ(one.claims._buffer[c].joint, local[i]["claims"][c]["joint"]);
+            EXPECT_EQ(one.claims._buffer[c].mode, local[i]["claims"][c]["mode"]);
+            EXPECT_EQ(one.claims._buffer[c].interaction, local[i]["claims"][c]["interaction"]);
+          }
+        }
+      });
+  EXPECT_EQ(active_after({"rest"}, {}), Texts{});
+  call<UnloadController_Response>(
+      "unload_controller", UnloadController_Request{0, 0, name.data()},
+      [](const UnloadController_Response& reply) { EXPECT_TRUE(reply.success) << reply.message; });
+  EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"].size(), 1U);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(DdsServices, SetJointsAndTheirGains) {
+  begin_with("local");
+  ASSERT_EQ(active_after({"hold"}, {}), Texts{});
+  std::string joint = "joint2", mode = "position", interaction = "compliant", none;
+  double stiffness = 2.5, kp = 7.5;
+  SetJoint_Request set{0,
+                       0,
+                       joint.data(),
+                       mode.data(),
+                       interaction.data(),
+                       {1, 1, &stiffness, false},
+                       {0, 0, nullptr, false}};
+  std::string message;
+  const auto was_set = [&](const SetJoint_Response& reply) {
+    message = reply.message;
+    EXPECT_EQ(reply.done, reply.success);
+  };
+  const auto before = ask_local(R"({"do": "joint.list"})")["joints"][1];
+  call<SetJoint_Response>("set_joint", set, was_set);
+  EXPECT_EQ(message, "");
+  auto now = ask_local(R"({"do": "joint.list"})")["joints"][1];
+  EXPECT_EQ(now["interaction"], "compliant");
+  EXPECT_EQ(now["stiffness_Nm_rad"], 2.5);
+  EXPECT_EQ(now["damping_Nms_rad"], before["damping_Nms_rad"]) << "what is empty stays";
+  set.mode = set.interaction = none.data();
+  stiffness = 1e6;
+  call<SetJoint_Response>("set_joint", set, was_set);
+  EXPECT_NE(message.find("joint2: stiffness_Nm_rad 1e+06 is beyond"), std::string::npos);
+
+  std::string loop = "position";
+  const dds_sequence_double stays{0, 0, nullptr, false};
+  call<SetGains_Response>(
+      "set_gains",
+      SetGains_Request{0, 0, joint.data(), loop.data(), {1, 1, &kp, false}, stays, stays},
+      [](const SetGains_Response& reply) { EXPECT_TRUE(reply.success) << reply.message; });
+  now = ask_local(R"({"do": "joint.list"})")["joints"][1];
+  EXPECT_EQ(now["gains"]["position"]["kp"], 7.5);
+  EXPECT_EQ(now["gains"]["position"]["ki"], before["gains"]["position"]["ki"]);
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(DdsServices, StopTheRobotAndClearItsFaults) {
+  begin_with("local");
+  EXPECT_EQ(trigger("clear_faults"), "yes: nothing is latched");
+  EXPECT_EQ(ask(R"({"do": "estop", "category": 0})")["category"], "category0");
+  until(R"("phase": "faulted")");
+  EXPECT_NE(trigger("clear_faults").find("yes: the reset of 1 is asked for"), std::string::npos);
+  EXPECT_TRUE(eventually([&] { return ask(R"({"do": "status"})").value("resets", 0) == 1; }));
+  EXPECT_EQ(end(), 0);
+}
+
+}  // namespace
+}  // namespace tandem::apps
