@@ -1,0 +1,182 @@
+// A peer that shares nothing with Tandem but the IDL: Fast DDS, with types of fastddsgen.
+//   fastdds_peer DOMAIN [hear|say QOS TYPE TOPIC]…
+// QOS: reliable, best_effort, latched (reliable, transient local). It says its pattern on each
+// `say` topic ten times a second, and prints a line for each sample of a `hear` topic: its name,
+// "pattern" or "other", and the number of values. It ends when its standard input does.
+#include <poll.h>
+#include <unistd.h>
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <cstdio>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pattern.hpp"
+#include "ros2PubSubTypes.h"
+
+namespace {
+
+namespace fdds = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+
+fdds::DomainParticipant* join(unsigned domain) {
+  fdds::DomainParticipantQos qos;
+  qos.name("fastdds_peer");
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList.push_back("127.0.0.1");
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(udp);
+  // On the loopback interface without multicast: others are looked for one by one.
+  constexpr unsigned kMostPeers = 20;
+  for (unsigned i = 0; i < kMostPeers; ++i) {
+    rtps::Locator_t peer;
+    peer.kind = LOCATOR_KIND_UDPv4;
+    rtps::IPLocator::setIPv4(peer, "127.0.0.1");
+    peer.port = 7410 + 250 * domain + 2 * i;
+    qos.wire_protocol().builtin.initialPeersList.push_back(peer);
+  }
+  return fdds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
+}
+
+template <class Qos>
+Qos with(Qos qos, const std::string& name) {
+  qos.reliability().kind =
+      name == "best_effort" ? fdds::BEST_EFFORT_RELIABILITY_QOS : fdds::RELIABLE_RELIABILITY_QOS;
+  qos.durability().kind =
+      name == "latched" ? fdds::TRANSIENT_LOCAL_DURABILITY_QOS : fdds::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = fdds::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = 10;
+  qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  return qos;
+}
+
+/// What the peer does with one topic.
+struct Part {
+  virtual ~Part() = default;
+  virtual void say() {}
+};
+
+template <class T>
+class Speaker : public Part {
+ public:
+  explicit Speaker(fdds::DataWriter* writer) : writer_(writer) {
+    peer::Fill fill;
+    peer::visit(sample_, fill);
+  }
+  void say() override { writer_->write(&sample_); }
+
+ private:
+  fdds::DataWriter* writer_;
+  T sample_;
+};
+
+template <class T>
+class Hearer : public Part, public fdds::DataReaderListener {
+ public:
+  explicit Hearer(std::string topic) : topic_(std::move(topic)) {}
+
+  void on_data_available(fdds::DataReader* reader) override {
+    fdds::SampleInfo info;
+    while (reader->take_next_sample(&sample_, &info) == ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;
+      peer::Check check;
+      peer::visit(sample_, check);
+      std::printf("%s %s %llu\n", topic_.c_str(), check.same() ? "pattern" : "other",
+                  static_cast<unsigned long long>(check.leaves()));
+      std::fflush(stdout);
+    }
+  }
+
+ private:
+  std::string topic_;
+  T sample_;
+};
+
+using Make = std::function<std::unique_ptr<Part>(fdds::DomainParticipant&, bool says,
+                                                 const std::string& qos, const std::string& topic)>;
+
+template <class T, class Support>
+std::unique_ptr<Part> make(fdds::DomainParticipant& participant, bool says, const std::string& qos,
+                           const std::string& topic) {
+  const fdds::TypeSupport type(new Support);
+  type.register_type(&participant);
+  auto* description = participant.lookup_topicdescription(topic);
+  if (description == nullptr) {
+    description = participant.create_topic(topic, type.get_type_name(), fdds::TOPIC_QOS_DEFAULT);
+  }
+  if (says) {
+    auto* writer = participant.create_publisher(fdds::PUBLISHER_QOS_DEFAULT)
+                       ->create_datawriter(static_cast<fdds::Topic*>(description),
+                                           with(fdds::DATAWRITER_QOS_DEFAULT, qos));
+    return std::make_unique<Speaker<T>>(writer);
+  }
+  auto hearer = std::make_unique<Hearer<T>>(topic);
+  participant.create_subscriber(fdds::SUBSCRIBER_QOS_DEFAULT)
+      ->create_datareader(description, with(fdds::DATAREADER_QOS_DEFAULT, qos), hearer.get());
+  return hearer;
+}
+
+// A structure of fastddsgen with the name of its support class.
+#define TYPE(package, Name)           \
+  std::pair<const std::string, Make>( \
+      #package "/msg/" #Name,         \
+      &make<package::msg::dds_::Name##_, package::msg::dds_::Name##_##PubSubType>)
+
+const std::map<std::string, Make>& types() {
+  static const std::map<std::string, Make> table{
+      TYPE(std_msgs, String),
+      TYPE(rosgraph_msgs, Clock),
+      TYPE(geometry_msgs, WrenchStamped),
+      TYPE(sensor_msgs, JointState),
+      TYPE(sensor_msgs, Imu),
+      TYPE(tf2_msgs, TFMessage),
+      TYPE(nav_msgs, Odometry),
+      TYPE(diagnostic_msgs, DiagnosticArray),
+      TYPE(control_msgs, DynamicJointState),
+      TYPE(rmw_dds_common, ParticipantEntitiesInfo),
+  };
+  return table;
+}
+
+/// Waits for a tenth of a second. @return whether the standard input has ended
+bool ended() {
+  pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
+  char byte;
+  return poll(&input, 1, 100) > 0 && read(STDIN_FILENO, &byte, 1) <= 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return 2;
+  auto* participant = join(static_cast<unsigned>(std::stoul(argv[1])));
+  if (participant == nullptr) return 1;
+  std::vector<std::unique_ptr<Part>> parts;
+  for (int i = 2; i + 3 < argc; i += 4) {
+    const auto type = types().find(argv[i + 2]);
+    if (type == types().end()) {
+      std::fprintf(stderr, "no type %s\n", argv[i + 2]);
+      return 2;
+    }
+    parts.push_back(
+        type->second(*participant, std::string(argv[i]) == "say", argv[i + 1], argv[i + 3]));
+  }
+  while (!ended()) {
+    for (const auto& part : parts) part->say();
+  }
+  participant->delete_contained_entities();  // before the parts: their listeners
+  fdds::DomainParticipantFactory::get_instance()->delete_participant(participant);
+}

@@ -1,0 +1,136 @@
+// The rule of tests/dds/cdr_sample.hpp's pattern() for the classes of fastddsgen: fills a message,
+// or tells whether it is filled so.
+// Layer: tests.  Thread: any.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <fastrtps/utils/fixed_size_string.hpp>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "ros2.h"
+
+namespace peer {
+
+// The members of each structure, in the order of its definition.
+#define MEMBERS(Structure, ...)                                            \
+  template <class Leaf>                                                    \
+  void members(Structure& m, Leaf& leaf) {                                 \
+    const auto all = [&](auto&... member) { (visit(member, leaf), ...); }; \
+    all(__VA_ARGS__);                                                      \
+  }
+
+template <class T, class Leaf>
+void visit(T& value, Leaf& leaf);
+
+MEMBERS(builtin_interfaces::msg::dds_::Time_, m.sec(), m.nanosec())
+MEMBERS(std_msgs::msg::dds_::Header_, m.stamp(), m.frame_id())
+MEMBERS(std_msgs::msg::dds_::String_, m.data())
+MEMBERS(rosgraph_msgs::msg::dds_::Clock_, m.clock())
+MEMBERS(geometry_msgs::msg::dds_::Vector3_, m.x(), m.y(), m.z())
+MEMBERS(geometry_msgs::msg::dds_::Point_, m.x(), m.y(), m.z())
+MEMBERS(geometry_msgs::msg::dds_::Quaternion_, m.x(), m.y(), m.z(), m.w())
+MEMBERS(geometry_msgs::msg::dds_::Pose_, m.position(), m.orientation())
+MEMBERS(geometry_msgs::msg::dds_::Twist_, m.linear(), m.angular())
+MEMBERS(geometry_msgs::msg::dds_::Wrench_, m.force(), m.torque())
+MEMBERS(geometry_msgs::msg::dds_::WrenchStamped_, m.header(), m.wrench())
+MEMBERS(geometry_msgs::msg::dds_::Transform_, m.translation(), m.rotation())
+MEMBERS(geometry_msgs::msg::dds_::TransformStamped_, m.header(), m.child_frame_id(), m.transform())
+MEMBERS(geometry_msgs::msg::dds_::PoseWithCovariance_, m.pose(), m.covariance())
+MEMBERS(geometry_msgs::msg::dds_::TwistWithCovariance_, m.twist(), m.covariance())
+MEMBERS(sensor_msgs::msg::dds_::JointState_, m.header(), m.name(), m.position(), m.velocity(),
+        m.effort())
+MEMBERS(sensor_msgs::msg::dds_::Imu_, m.header(), m.orientation(), m.orientation_covariance(),
+        m.angular_velocity(), m.angular_velocity_covariance(), m.linear_acceleration(),
+        m.linear_acceleration_covariance())
+MEMBERS(tf2_msgs::msg::dds_::TFMessage_, m.transforms())
+MEMBERS(nav_msgs::msg::dds_::Odometry_, m.header(), m.child_frame_id(), m.pose(), m.twist())
+MEMBERS(diagnostic_msgs::msg::dds_::KeyValue_, m.key(), m.value())
+MEMBERS(diagnostic_msgs::msg::dds_::DiagnosticStatus_, m.level(), m.name(), m.message(),
+        m.hardware_id(), m.values())
+MEMBERS(diagnostic_msgs::msg::dds_::DiagnosticArray_, m.header(), m.status())
+MEMBERS(control_msgs::msg::dds_::InterfaceValue_, m.interface_names(), m.values())
+MEMBERS(control_msgs::msg::dds_::DynamicJointState_, m.header(), m.joint_names(),
+        m.interface_values())
+MEMBERS(rmw_dds_common::msg::dds_::Gid_, m.data())
+MEMBERS(rmw_dds_common::msg::dds_::NodeEntitiesInfo_, m.node_namespace(), m.node_name(),
+        m.reader_gid_seq(), m.writer_gid_seq())
+MEMBERS(rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_, m.gid(), m.node_entities_info_seq())
+#undef MEMBERS
+
+template <class T>
+struct IsList : std::false_type {};
+template <class T>
+struct IsList<std::vector<T>> : std::true_type {};
+template <class T, std::size_t N>
+struct IsList<std::array<T, N>> : std::true_type {};
+using Bounded = eprosima::fastrtps::fixed_string<256>;
+template <class T>
+constexpr bool kIsText = std::is_same_v<T, std::string> || std::is_same_v<T, Bounded>;
+
+template <class T, class Leaf>
+void visit(T& value, Leaf& leaf) {
+  if constexpr (std::is_arithmetic_v<T> || kIsText<T>) {
+    leaf(value);
+  } else if constexpr (IsList<T>::value) {
+    leaf.list(value);
+    for (auto& element : value) visit(element, leaf);
+  } else {
+    members(value, leaf);
+  }
+}
+
+/// The n-th leaf's value, for its type.
+template <class T>
+auto nth(std::uint64_t n) {
+  if constexpr (kIsText<T>) {
+    return T("s" + std::to_string(n));
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return static_cast<T>(n) / 4;
+  } else {
+    return static_cast<T>(n);
+  }
+}
+
+class Fill {
+ public:
+  template <class T>
+  void operator()(T& value) {
+    value = nth<T>(++n_);
+  }
+  template <class T>
+  void list(std::vector<T>& list) {
+    list.resize(2);
+  }
+  template <class T, std::size_t N>
+  void list(std::array<T, N>&) {}
+
+ private:
+  std::uint64_t n_ = 0;
+};
+
+class Check {
+ public:
+  template <class T>
+  void operator()(T& value) {
+    ++leaves_;
+    same_ = same_ && value == nth<T>(leaves_);
+  }
+  template <class T>
+  void list(std::vector<T>& list) {
+    same_ = same_ && list.size() == 2;
+  }
+  template <class T, std::size_t N>
+  void list(std::array<T, N>&) {}
+
+  [[nodiscard]] bool same() const { return same_; }
+  [[nodiscard]] std::uint64_t leaves() const { return leaves_; }
+
+ private:
+  std::uint64_t leaves_ = 0;
+  bool same_ = true;
+};
+
+}  // namespace peer
