@@ -22,7 +22,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       joint_faulted_(parts.robot.joints.size()),
       sensor_lost_(parts.robot.sensors.size()),
       joint_limited_(parts.robot.joints.size()),
-      services_(parts.robot, parts.controllers, mailbox_, progress_, parameters_),
+      services_(parts.robot, parts.controllers, mailbox_, progress_, clock_control_, parameters_),
       looks_(parts.robot.joints.size()),
       trace_(config.trace_cycles) {
   progress_.total_cycles = config.running_cycles;

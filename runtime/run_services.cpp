@@ -32,11 +32,13 @@ Status errors_of(const TomlDocument& document) {
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
-                         const Progress& progress, hal::ParameterImage parameters)
+                         const Progress& progress, const rt::ClockControl& clock,
+                         hal::ParameterImage parameters)
     : robot_(&robot),
       host_(&host),
       mailbox_(&mailbox),
       progress_(&progress),
+      clock_(&clock),
       looks_(robot.joints.size()),
       gains_(std::move(parameters)) {}
 
@@ -80,9 +82,11 @@ Result<Asked> RunServices::ask(Lock& lock, LoopRequest request, Patience patienc
   asked_[request.number] = request;
   const auto deadline = SteadyClock::now() + patience;
   auto& answer = awaited_[request.number];
-  while (!answer && SteadyClock::now() < deadline && progress_->phase.load() != RunPhase::kDone) {
+  bool stands = false;  // nothing comes any more, until somebody lets time go on
+  while (!answer && !stands && SteadyClock::now() < deadline) {
     lock.unlock();
     std::this_thread::sleep_for(kLook);
+    stands = clock_->state().standing || progress_->phase.load() == RunPhase::kDone;
     lock.lock();
     collect();
   }

@@ -20,6 +20,7 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
+#include "rt/clock_control.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/loop_mailbox.hpp"
 #include "runtime/progress.hpp"
@@ -70,8 +71,8 @@ struct GainsWish {
 };
 
 /// Each request is judged before it reaches the loop, then done by the loop at a cycle's boundary,
-/// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop that
-/// is paused, or very slow, comes to it with its next cycle, and the answer says so.
+/// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop whose
+/// time stands, or which is very slow, comes to it with its next cycle, and the answer says so.
 ///
 /// Errors of all: the run shuts down or is done; kCapacity requests wait already.
 class RunServices {
@@ -81,7 +82,8 @@ class RunServices {
 
   /// All outlive it.
   RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
-              const Progress& progress, hal::ParameterImage parameters);
+              const Progress& progress, const rt::ClockControl& clock,
+              hal::ParameterImage parameters);
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerLook> controllers();
@@ -146,6 +148,7 @@ class RunServices {
   ControllerHost* host_;
   LoopMailbox* mailbox_;
   const Progress* progress_;
+  const rt::ClockControl* clock_;
   Seqlock<JointLook> looks_;
 
   std::mutex mutex_;           // of all below, and of the asking side of mailbox and host

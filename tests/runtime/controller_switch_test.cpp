@@ -301,5 +301,99 @@ TEST(ControllerLoad, OfALoopThatStandsStillWaitsAndThenIsRefused) {
   EXPECT_EQ(run.active(), Names{"left"});
 }
 
+/// State, command and truth of the next `count` cycles.
+std::vector<std::byte> bytes_of(SwitchRun& run, int count) {
+  std::vector<std::byte> all;
+  for (int i = 0; i < count; ++i) {
+    run.cycle->step();
+    for (const auto bytes :
+         {std::as_const(*run.cycle).state().bytes(), run.cycle->command().bytes(),
+          std::as_const(run.backend.truth).bytes()}) {
+      all.insert(all.end(), bytes.begin(), bytes.end());
+    }
+  }
+  return all;
+}
+
+TEST(ControllerSnapshot, HoldsWhoIsActiveAndWhatIsLedOver) {
+  SwitchRun run;
+  run.run();
+  ASSERT_TRUE(run.change({"left"}, {"right"}));
+  run.steps(30);
+  const auto snapshot = run.cycle->save();
+  ASSERT_TRUE(snapshot);
+  const auto first = bytes_of(run, 150);
+  ASSERT_TRUE(run.change({"right"}, {"left"}));
+  run.steps(10);
+  ASSERT_TRUE(run.cycle->restore(*snapshot));
+  EXPECT_EQ(run.active(), Names{"right"});
+  EXPECT_TRUE(bytes_of(run, 150) == first);
+}
+
+TEST(ControllerSnapshot, OfOtherControllersIsRefusedAndChangesNothing) {
+  SwitchRun run;
+  run.run();
+  const auto snapshot = run.cycle->save();
+  ASSERT_TRUE(snapshot);
+  ASSERT_TRUE(run.services().load("late", std::make_shared<Sine>(std::vector<std::size_t>{2}),
+                                  no_parameters(), kNow));
+  run.steps(50);
+  const std::uint64_t cycle = run.cycle->state().cycle()[0];
+  const Status restored = run.cycle->restore(*snapshot);
+  ASSERT_FALSE(restored);
+  EXPECT_NE(restored.error().message.find("other controllers"), std::string::npos);
+  EXPECT_EQ(run.cycle->state().cycle()[0], cycle);
+  ASSERT_TRUE(run.services().unload("late", kNow));
+  run.steps(1);
+  EXPECT_TRUE(run.cycle->restore(*snapshot));
+}
+
+/// What the asking side and the loop make of random requests is what a simple model says.
+TEST(ControllerSwitch, KeepsClaimsExclusiveInAThousandRandomSequences) {
+  const std::vector<std::vector<std::size_t>> claims{{0, 1}, {1, 2}, {2}};
+  const Names names{"left", "right", "wrist"};
+  std::mt19937 random(7);
+  int switched = 0, refused = 0;
+  for (int sequence = 0; sequence < 1000; ++sequence) {
+    SwitchRun run;
+    std::vector<bool> active{true, false, false};
+    run.steps(15 + static_cast<int>(random() % 10));  // some before the controllers run
+    for (int i = 0; i < 8; ++i) {
+      Names stop, start;
+      std::vector<bool> after = active;
+      bool possible = false;
+      for (std::size_t c = 0; c < names.size(); ++c) {
+        const auto what = random() % 3;
+        if (what == 0) stop.push_back(names[c]);
+        if (what == 1) start.push_back(names[c]);
+        if (what != 2) after[c] = what == 1;
+        possible = possible || what != 2;
+      }
+      for (std::size_t c = 0; c < names.size(); ++c) {
+        const bool named = std::ranges::count(stop, names[c]) + std::ranges::count(start, names[c]);
+        possible = possible && (!named || after[c] != active[c]);
+      }
+      possible = possible && !(after[1] && (after[0] || after[2]));
+      ASSERT_EQ(run.change(stop, start).has_value(), possible);
+      (possible ? switched : refused) += 1;
+      if (possible) active = after;
+      run.steps(static_cast<int>(random() % 5));  // 0: the next one is judged before this is done
+    }
+    run.steps(1);
+    std::vector<std::string> owner(3);
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      for (const std::size_t joint : claims[c]) {
+        if (!active[c]) continue;
+        EXPECT_EQ(owner[joint], "") << "two have joint " << joint;
+        owner[joint] = names[c];
+      }
+    }
+    for (std::size_t j = 0; j < 3; ++j) EXPECT_EQ(run.services().joints()[j].owner, owner[j]);
+    EXPECT_TRUE(run.cycle->faults().empty());
+  }
+  EXPECT_GT(switched, 1000);
+  EXPECT_GT(refused, 1000);
+}
+
 }  // namespace
 }  // namespace tandem::runtime

@@ -1,0 +1,136 @@
+// COMAN changes controllers in the middle of its squat, where its legs move fastest: through the
+// whole chain, under the real-time trap.
+#include <algorithm>
+#include <cmath>
+
+#include "tests/runtime/squat_run.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+constexpr RunServices::Patience kNow{0};
+constexpr int kFastest = 2750;  // cycle of kRunning: a quarter of the first squat
+constexpr int kWatched = 200;   // cycles after a switch: twice what leading over takes
+
+/// The largest changes from one cycle to the next, over all joints.
+struct Steps {
+  double position = 0.0;        ///< commanded, in what its rate limit allows in a cycle
+  double torque = 0.0;          ///< commanded, in the joint's max torque
+  double velocity_rad_s = 0.0;  ///< commanded
+  double spring_Nm = 0.0;       ///< measured
+};
+
+void widen(double& most, double one, double other) { most = std::max(most, std::abs(other - one)); }
+
+/// Beside the squat there is "rest", which holds the joints without carrying the weight for them.
+struct SwitchedSquat : Squat {
+  SwitchedSquat() : Squat("coman", 20'000) {
+    auto rest = load_controller("hold", {std::string(TANDEM_BINARY_DIR) + "/lib/controllers"});
+    EXPECT_TRUE(rest.has_value());
+    const auto parameters = TomlDocument::parse("", "rest");
+    EXPECT_TRUE(host->add("rest", std::move(*rest), parameters->root(), false));
+    capabilities = hal::joint_capabilities(experiment->robot);
+    run_to(RunPhase::kRunning);
+    (void)go(kFastest);
+  }
+  /// Goes on for `count` cycles.
+  Steps go(int count) {
+    Steps most;
+    const double period_s = static_cast<double>(experiment->loop.period_ns) * 1e-9;
+    const hal::CommandImage& now = cycle->command();
+    for (int i = 0; i < count; ++i) {
+      const hal::CommandImage before = now;
+      const hal::StateImage measured = cycle->state();
+      EXPECT_TRUE(cycle->step());
+      for (std::size_t j = 0; j < capabilities.size(); ++j) {
+        const double way = capabilities[j].max_velocity_rad_s * period_s;
+        const double torque_Nm = capabilities[j].max_torque_Nm;
+        widen(most.position, before.position_rad()[j] / way, now.position_rad()[j] / way);
+        widen(most.torque, before.torque_Nm()[j] / torque_Nm, now.torque_Nm()[j] / torque_Nm);
+        widen(most.velocity_rad_s, before.velocity_rad_s()[j], now.velocity_rad_s()[j]);
+        widen(most.spring_Nm, measured.torque_Nm()[j], cycle->state().torque_Nm()[j]);
+      }
+    }
+    return most;
+  }
+  void change(const std::vector<std::string>& stop, const std::vector<std::string>& start) {
+    const auto asked = cycle->services().switch_controllers(stop, start, kNow);
+    ASSERT_TRUE(asked) << asked.error().to_string();
+  }
+  /// State, command and truth of the next `count` cycles.
+  std::vector<std::byte> bytes(int count) {
+    std::vector<std::byte> all;
+    for (int i = 0; i < count; ++i) {
+      cycle->step();
+      for (const auto bytes : {std::as_const(*cycle).state().bytes(), cycle->command().bytes(),
+                               backend->truth().bytes()}) {
+        all.insert(all.end(), bytes.begin(), bytes.end());
+      }
+    }
+    return all;
+  }
+
+  std::vector<hal::JointCapabilities> capabilities;
+};
+
+TEST(SquatSwitch, ChangesNothingInItsCycleAndNoMoreThanASquatInThoseAfterIt) {
+  SwitchedSquat run;
+  struct Change {
+    std::vector<std::string> stop, start;
+    int then;  // cycles until the next
+  };
+  const Change changes[] = {{{"squat"}, {}, 1000},
+                            {{}, {"squat"}, kFastest},
+                            {{"squat"}, {"rest"}, 1000},
+                            {{"rest"}, {"squat"}, kFastest}};
+  for (const Change& change : changes) {
+    const std::string what = (change.stop.empty() ? "held" : change.stop[0]) + " to " +
+                             (change.start.empty() ? "held" : change.start[0]);
+    SCOPED_TRACE(what);
+    run.change(change.stop, change.start);
+    const Steps boundary = run.go(1);
+    EXPECT_NEAR(boundary.position, 0.0, 1e-12);
+    EXPECT_NEAR(boundary.torque, 0.0, 1e-12);
+    EXPECT_NEAR(boundary.velocity_rad_s, 0.0, 1e-12);
+    EXPECT_LE(boundary.spring_Nm, 0.2);  // four quanta of the wire
+    const Steps after = run.go(kWatched);
+    EXPECT_LE(after.position, 0.2);  // of what the rate limit allows; the squat alone has 0.12
+    EXPECT_LE(after.torque, 0.02);   // of the joint's max torque
+    EXPECT_LE(after.velocity_rad_s, 0.02);
+    EXPECT_LE(after.spring_Nm, 0.2);
+    std::printf(
+        "%-14s position %.3f of its rate limit, torque %.4f of its maximum, spring %.2f "
+        "and then %.2f Nm\n",
+        what.c_str(), after.position, after.torque, boundary.spring_Nm, after.spring_Nm);
+    (void)run.go(change.then);
+  }
+  for (const Fault& fault : run.cycle->faults()) ADD_FAILURE() << fault.joint << fault.text;
+  const auto base = run.cycle->statistics().base();
+  ASSERT_TRUE(base);
+  EXPECT_LT(base->final_tilt_rad, 0.05) << "it stands";
+}
+
+TEST(SquatSwitch, AtTheSameCycleGivesTheSameBits) {
+  SwitchedSquat run;
+  const auto before = run.cycle->save();
+  ASSERT_TRUE(before);
+  run.change({"squat"}, {"rest"});
+  const auto first = run.bytes(50);  // amid leading over
+  const auto amid = run.cycle->save();
+  ASSERT_TRUE(amid);
+  const auto rest = run.bytes(200);
+
+  ASSERT_TRUE(run.cycle->restore(*before));
+  run.change({"squat"}, {"rest"});
+  EXPECT_TRUE(run.bytes(50) == first);
+  EXPECT_TRUE(run.bytes(200) == rest);
+  ASSERT_TRUE(run.cycle->restore(*amid));
+  EXPECT_TRUE(run.bytes(200) == rest);
+
+  SwitchedSquat other;
+  other.change({"squat"}, {"rest"});
+  EXPECT_TRUE(other.bytes(50) == first);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
