@@ -67,7 +67,7 @@ struct JointInfo {
 
 /// Gains to set; what is empty stays.
 struct GainsWish {
-  std::optional<double> kp, ki, kd;
+  std::optional<double> kp{}, ki{}, kd{};
 };
 
 /// Each request is judged before it reaches the loop, then done by the loop at a cycle's boundary,

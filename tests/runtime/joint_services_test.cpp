@@ -1,0 +1,201 @@
+// What an operator sets of joints while a run goes on: on first-order joints, between two steps.
+#include <cmath>
+#include <limits>
+
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::ControlMode;
+using hal::InteractionMode;
+using hal::PidLoop;
+
+constexpr RunServices::Patience kNow{0};
+
+/// The shoulder is a controller's, elbow and wrist are nobody's.
+struct JointServices : testing::Test {
+  void SetUp() override {
+    ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{0}),
+                         test::parameters()));
+    cycle = std::make_unique<RobotCycle>(CycleParts{robot, backend, host, clock},
+                                         CycleConfig{.settle_cycles = 20});
+    steps(100);
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+  }
+  [[nodiscard]] RunServices& services() const { return cycle->services(); }
+  [[nodiscard]] Result<Asked> mode(const std::string& joint, ControlMode mode) const {
+    return services().set_joint(joint, {.mode = static_cast<std::int32_t>(mode)}, kNow);
+  }
+  [[nodiscard]] JointLook look(std::size_t joint) const { return services().joints()[joint].look; }
+  [[nodiscard]] static std::string text(const Result<Asked>& refused) {
+    return refused ? "accepted" : refused.error().to_string();
+  }
+
+  hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend{robot};
+  ControllerHost host{robot, nullptr, 1'000'000};
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST_F(JointServices, ShowEveryJointAfterTheLastCycle) {
+  const auto joints = services().joints();
+  ASSERT_EQ(joints.size(), 3U);
+  EXPECT_EQ(joints[0].name, "shoulder");
+  EXPECT_EQ(joints[0].owner, "sine");
+  EXPECT_EQ(joints[1].owner, "");
+  EXPECT_EQ(joints[0].look.cycle, 99U);
+  EXPECT_EQ(joints[0].look.position_rad, cycle->state().position_rad()[0]);
+  EXPECT_EQ(joints[1].gains[0].kp, 200.0);
+}
+
+TEST_F(JointServices, PutAJointIntoEachModeWhereItStands) {
+  for (const ControlMode wanted :
+       {ControlMode::kTorque, ControlMode::kVelocity, ControlMode::kIdle, ControlMode::kOpenLoop,
+        ControlMode::kCurrent, ControlMode::kPosition}) {
+    ASSERT_TRUE(mode("elbow", wanted));
+    steps(1);
+    EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(wanted));
+    EXPECT_EQ(cycle->command().position_rad()[1], cycle->state().position_rad()[1]);
+    EXPECT_EQ(cycle->command().velocity_rad_s()[1], 0.0);
+    steps(5);
+    EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(wanted)) << "it stays";
+  }
+  EXPECT_TRUE(cycle->faults().empty());
+}
+
+TEST_F(JointServices, SetInteractionAndImpedanceTogether) {
+  ASSERT_TRUE(
+      services().set_joint("wrist",
+                           {.stiffness_Nm_rad = 20.0,
+                            .damping_Nms_rad = 3.0,
+                            .interaction = static_cast<std::int32_t>(InteractionMode::kCompliant)},
+                           kNow));
+  steps(1);
+  EXPECT_EQ(look(2).interaction, static_cast<std::uint8_t>(InteractionMode::kCompliant));
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
+  EXPECT_EQ(cycle->command().damping_Nms_rad()[2], 3.0);
+}
+
+TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1}, kNow));
+  steps(200);
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0}, kNow));
+  steps(1);
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
+  double before = 20.0;
+  for (int i = 0; i < 100; ++i) {
+    steps(1);
+    const double now = cycle->command().stiffness_Nm_rad()[2];
+    EXPECT_GE(now, before);
+    EXPECT_LT(now - before, 30.0 * 1.9 / 100.0);  // minimum jerk over a hundred cycles
+    before = now;
+  }
+  EXPECT_EQ(before, 50.0);
+}
+
+TEST_F(JointServices, RefuseTheModeOfAClaimedJointAndNameItsController) {
+  const std::string refused = text(mode("shoulder", ControlMode::kTorque));
+  EXPECT_NE(refused.find("shoulder: is claimed by the controller 'sine'"), std::string::npos)
+      << refused;
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
+  EXPECT_TRUE(mode("shoulder", ControlMode::kTorque)) << "nobody will have it";
+  steps(1);
+  EXPECT_EQ(look(0).mode, static_cast<std::int8_t>(ControlMode::kTorque));
+}
+
+TEST_F(JointServices, GiveAClaimedJointTheImpedanceThatItsControllerDoesNotWrite) {
+  ASSERT_TRUE(services().set_joint("shoulder", {.stiffness_Nm_rad = 30.0}, kNow));
+  steps(150);
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0);
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
+  steps(1);
+  ASSERT_TRUE(services().switch_controllers({}, {"sine"}, kNow));
+  steps(150);
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0) << "a start keeps it";
+}
+
+TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
+  EXPECT_NE(text(mode("elbwo", ControlMode::kIdle)).find("did you mean 'elbow'?"),
+            std::string::npos);
+  const auto stiff = [&](double value) {
+    return text(services().set_joint("elbow", {.stiffness_Nm_rad = value}, kNow));
+  };
+  EXPECT_NE(stiff(201.0).find("elbow: stiffness_Nm_rad 201 is beyond the joint's limit (give 0 "
+                              "to 200)"),
+            std::string::npos)
+      << stiff(201.0);
+  EXPECT_NE(stiff(-1.0).find("beyond"), std::string::npos);
+  EXPECT_NE(stiff(std::numeric_limits<double>::infinity()).find("beyond"), std::string::npos);
+  const auto gain = [&](double kp) {
+    return text(services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, kNow));
+  };
+  EXPECT_NE(gain(-1.0).find("elbow: kp -1 is beyond"), std::string::npos);
+  EXPECT_NE(gain(1e39).find("beyond"), std::string::npos);
+  EXPECT_NE(gain(std::nan("")).find("beyond"), std::string::npos);
+  steps(2);
+  EXPECT_EQ(services().joints()[1].gains[0].kp, 200.0);
+}
+
+TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.gains[0].current = {};
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  rt::WallClock clock;
+  RobotCycle cycle({robot, backend, host, clock}, {});
+  for (int i = 0; i < 50; ++i) cycle.step();
+  const auto mode = cycle.services().set_joint(
+      "elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)}, kNow);
+  ASSERT_FALSE(mode);
+  EXPECT_EQ(mode.error().message, "this joint has no current control (stiff)");
+  const auto gains = cycle.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, kNow);
+  ASSERT_FALSE(gains);
+  EXPECT_EQ(gains.error().message, "this joint has no current loop");
+}
+
+TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  rt::WallClock clock;
+  RobotCycle cycle({robot, backend, host, clock}, {.settle_cycles = 50});
+  for (int i = 0; i < 30; ++i) cycle.step();
+  ASSERT_EQ(cycle.phase(), RunPhase::kSettling);
+  const auto mode = cycle.services().set_joint("elbow", {.mode = 3}, kNow);
+  ASSERT_FALSE(mode);
+  EXPECT_EQ(mode.error().hint, "ask again in the phase running");
+  EXPECT_TRUE(cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, kNow));
+  EXPECT_TRUE(cycle.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0}, kNow));
+  cycle.step();
+  EXPECT_EQ(cycle.services().joints()[1].gains[0].kd, 9.0);
+  EXPECT_EQ(cycle.services().joints()[1].gains[0].kp, 200.0) << "what is not named stays";
+}
+
+TEST_F(JointServices, HoldJointsAgainAfterAReset) {
+  ASSERT_TRUE(mode("elbow", ControlMode::kTorque));
+  steps(10);
+  robot.joints[0].on_fault = hal::StopCategory::kHold;
+  backend.faulted_joint = 0;
+  backend.latch_on_fault = true;
+  steps(5);
+  ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
+  EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "joints are held";
+  cycle->requests().reset_faults();
+  steps(60);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
+  EXPECT_TRUE(mode("elbow", ControlMode::kTorque));
+}
+
+}  // namespace
+}  // namespace tandem::runtime

@@ -1,0 +1,100 @@
+// The same through the whole chain: a pendulum that its joint has to carry, its board, its spring.
+#include <algorithm>
+#include <cmath>
+
+#include "canopen/objects.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::ControlMode;
+using hal::PidLoop;
+
+constexpr RunServices::Patience kNow{0};
+
+/// The swing, led to a slope by a controller; then the joint is nobody's.
+struct SimServices : testing::Test {
+  void SetUp() override {
+    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
+                                      {.posture = "up", .release_ns = 100'000'000});
+    ASSERT_TRUE(made) << made.error().to_string();
+    backend = std::move(*made);
+    ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{0}),
+                         test::parameters("amplitude_rad = 0.4")));
+    cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, host, clock},
+                                         CycleConfig{.settle_cycles = 200});
+    while (cycle->phase() != RunPhase::kRunning && cycle->step()) {
+    }
+    (void)torque_step(250);  // at the far end of the sine
+    ASSERT_TRUE(cycle->services().switch_controllers({"sine"}, {}, kNow));
+    (void)torque_step(1000);
+    ASSERT_GT(std::abs(cycle->state().torque_Nm()[0]), 1.0) << "it carries nothing";
+  }
+  /// The largest change of the spring's torque in a cycle, over `count` cycles.
+  double torque_step(int count) {
+    double largest = 0.0;
+    for (int i = 0; i < count; ++i) {
+      const double before = cycle->state().torque_Nm()[0];
+      EXPECT_TRUE(cycle->step());
+      largest = std::max(largest, std::abs(cycle->state().torque_Nm()[0] - before));
+    }
+    return largest;
+  }
+  [[nodiscard]] float gain(std::uint16_t object, canopen::PidSub sub) const {
+    return backend->robot().board(0).dictionary().value<float>(object, sub);
+  }
+
+  const hal::RobotConfig robot = tandem::test::swing_robot();
+  ControllerHost host{robot, tandem::test::swing_kernels(2), 1'000'000};
+  std::unique_ptr<sim::SimRobot> backend;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST_F(SimServices, AJointThatCarriesAWeightChangesItsModeWithoutABump) {
+  const double at_rest_Nm = torque_step(300);
+  struct Step {
+    const char* what;
+    JointWish wish;
+  };
+  const Step steps[] = {{"to torque", {.mode = 3}},           {"to position", {.mode = 1}},
+                        {"to compliant", {.interaction = 1}}, {"to stiff", {.interaction = 0}},
+                        {"to velocity", {.mode = 2}},         {"to position again", {.mode = 1}},
+                        {"to current", {.mode = 5}},          {"back to position", {.mode = 1}}};
+  for (const Step& step : steps) {
+    ASSERT_TRUE(cycle->services().set_joint("swing", step.wish, kNow)) << step.what;
+    const double before_rad = cycle->state().position_rad()[0];
+    const double largest = torque_step(100);
+    const double moved_rad = std::abs(cycle->state().position_rad()[0] - before_rad);
+    std::printf("%-20s %.2f Nm a cycle (%.2f at rest), moved %.5f rad in 0.1 s\n", step.what,
+                largest, at_rest_Nm, moved_rad);
+    EXPECT_LE(largest, at_rest_Nm + 0.16) << step.what;  // three quanta of the wire
+    EXPECT_LE(moved_rad, 0.01) << step.what;
+  }
+  EXPECT_TRUE(cycle->faults().empty());
+}
+
+TEST_F(SimServices, GainsReachTheBoardsObjectDictionaryBySdo) {
+  namespace object = canopen::object;
+  EXPECT_EQ(gain(object::kPositionGains, canopen::kPidKp), 600.0F);
+  ASSERT_TRUE(cycle->services().set_gains("swing", PidLoop::kPosition, {.kp = 550.0}, kNow));
+  ASSERT_TRUE(
+      cycle->services().set_gains("swing", PidLoop::kTorque, {.ki = 2.5, .kd = 0.009}, kNow));
+  int cycles = 0;
+  while (gain(object::kTorqueGains, canopen::kPidKd) != 0.009F && cycles < 100) {
+    ASSERT_TRUE(cycle->step());
+    ++cycles;
+  }
+  EXPECT_LE(cycles, 20);
+  EXPECT_EQ(gain(object::kPositionGains, canopen::kPidKp), 550.0F);
+  EXPECT_EQ(gain(object::kPositionGains, canopen::kPidKi), 300.0F);
+  EXPECT_EQ(gain(object::kTorqueGains, canopen::kPidKi), 2.5F);
+  EXPECT_TRUE(cycle->faults().empty());
+}
+
+}  // namespace
+}  // namespace tandem::runtime
