@@ -91,12 +91,12 @@ TEST_F(Controllers, ThatAreActiveMayNotShareAJoint) {
 
 TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
   begin("");
-  expect(refused("joint set joint1 --mode torque"),
+  expect(refused("joint set joint1 --mode velocity"),
          "joint1: is claimed by the controller 'hold', which sets its mode");
   EXPECT_EQ(to_run("controller stop hold").status, 0);
-  const auto torque = asked("joint set joint1 --mode torque");
-  EXPECT_EQ(torque["mode"], "torque");
-  EXPECT_EQ(torque["controller"], "");
+  const auto still = asked("joint set joint1 --mode velocity");
+  EXPECT_EQ(still["mode"], "velocity");
+  EXPECT_EQ(still["controller"], "");
   const auto soft =
       asked("joint set joint2 --mode position --interaction compliant --stiffness 2.5");
   EXPECT_EQ(soft["interaction"], "compliant");
@@ -106,7 +106,7 @@ TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
   expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
   expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
   expect(refused("joint set joint2"), "nothing is to be set");
-  expect(to_run("joint list joint1").out, "joint1           -  torque");
+  expect(to_run("joint list joint1").out, "joint1           -  velocity");
   EXPECT_EQ(end(), 0);
 }
 
