@@ -48,7 +48,7 @@ void print_plan(const Composition& c, std::FILE* out) {
                              "process");
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
-    facts.add("controller " + note.name, note.doc);
+    facts.add("controller " + note.name, note.doc + (note.active ? "" : " Inactive at first."));
   }
   facts.add("loop", fmt::format("{:.3g} kHz, {} cycles, {:.3f} s after bring-up", 1e-3 / period_s,
                                 e.cycles(), e.duration_s));

@@ -58,7 +58,7 @@ void add_controllers(Composition& c, Collector& errors) {
       errors.add(added.error(), c.experiment.file, line);
       continue;
     }
-    c.notes.push_back({spec.name, doc});
+    c.notes.push_back({spec.name, doc, spec.active});
   }
   errors.add(c.experiment.document.diagnostics());
 }

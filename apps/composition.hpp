@@ -37,7 +37,8 @@ struct Overrides {
 /// A controller as `check` tells of it.
 struct ControllerNote {
   std::string name;
-  std::string doc;  ///< its plugin's one line
+  std::string doc;     ///< its plugin's one line
+  bool active = true;  ///< from the start
 };
 
 struct Composition {

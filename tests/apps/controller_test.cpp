@@ -75,6 +75,7 @@ TEST_F(Controllers, OfAnExperimentMayWaitToBeStarted) {
   write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") +
                                         "[[controller]]\nplugin = \"hold\"\nname = \"rest\"\n"
                                         "active = false\n");
+  expect(tandem("check hold.toml").out, "Inactive at first.");
   begin("");
   EXPECT_EQ(asked("controller switch --stop hold --start rest")["active"],
             nlohmann::json({"rest"}));
@@ -119,6 +120,21 @@ TEST_F(Controllers, GainsAreKeptAndShown) {
   expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
   expect(refused("joint gains joint1 speed --kp 1"), "there is no 'speed'");
   expect(refused("joint gains joint1 position"), "nothing is to be set");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, OfARunWhoseTimeStandsChangeWithItsNextCycle) {
+  begin("");
+  EXPECT_EQ(to_run("controller load hold --name rest").status, 0);
+  EXPECT_EQ(to_run("clock pause").status, 0);
+  const auto asked_for = asked("controller switch --stop hold --start rest");
+  EXPECT_EQ(asked_for["done"], false);
+  EXPECT_EQ(asked_for["active"], nlohmann::json({"hold"}));
+  expect(asked_for["note"], "next cycle");
+  expect(refused("controller start hold"), "is claimed by the controllers");
+  EXPECT_EQ(to_run("clock step").status, 0);
+  expect(to_run("controller list").out, "rest        active");
+  EXPECT_EQ(to_run("clock resume").status, 0);
   EXPECT_EQ(end(), 0);
 }
 
