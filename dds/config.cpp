@@ -11,6 +11,8 @@ namespace {
 
 /// Participants of one domain on one machine that find each other without multicast.
 constexpr int kMostParticipants = 120;
+/// What is larger is not received: a peer must not have this process allocate without limit.
+constexpr const char* kMostSampleBytes = "16 MiB";
 
 void check_all(TomlTable& table, const std::string& key, const std::vector<std::string>& texts,
                const std::regex& pattern, const std::string& hint) {
@@ -143,10 +145,11 @@ std::string to_xml(const Config& config) {
   <MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>
   <Peers>{}</Peers>
 </Discovery>
+<Internal><MaxSampleSize>{}</MaxSampleSize></Internal>
 {}</Domain></CycloneDDS>
 )",
       interfaces, config.loopback_only() ? "false" : "spdp", kMostParticipants - 1, peers,
-      config.security.on() ? security_xml(config.security) : "");
+      kMostSampleBytes, config.security.on() ? security_xml(config.security) : "");
 }
 
 }  // namespace tandem::dds

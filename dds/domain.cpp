@@ -2,12 +2,35 @@
 
 #include <fmt/core.h>
 
+#include <cstdio>
+
 namespace tandem::dds {
+namespace {
+
+constexpr std::uint64_t kMostLogLines = 40;
+
+}  // namespace
+
+DdsLog::DdsLog() { dds_set_log_sink(&DdsLog::write, this); }
+
+DdsLog::~DdsLog() {
+  dds_set_log_sink(nullptr, nullptr);
+  if (lines_ <= kMostLogLines) return;
+  fmt::print(stderr, "dds: and {} lines more\n", lines_ - kMostLogLines);
+}
+
+void DdsLog::write(void* self, const dds_log_data_t* data) {
+  const std::uint64_t line = ++static_cast<DdsLog*>(self)->lines_;
+  if (line <= kMostLogLines) fmt::print(stderr, "dds: {}", data->message);
+  if (line == kMostLogLines) fmt::print(stderr, "dds: more of this is only counted\n");
+}
 
 Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
+  auto log = std::make_unique<DdsLog>();
   Entity entity(
       dds_create_domain(static_cast<dds_domainid_t>(config.domain), to_xml(config).c_str()));
-  if (entity.ok()) return std::shared_ptr<Domain>(new Domain(config, std::move(entity)));
+  if (entity.ok())
+    return std::shared_ptr<Domain>(new Domain(config, std::move(log), std::move(entity)));
   const std::string what = fmt::format("enter the DDS domain {}", config.domain);
   if (entity.get() == DDS_RETCODE_PRECONDITION_NOT_MET) {
     return fail("cannot " + what + ": this process is in it already", "share its dds::Domain");

@@ -2,6 +2,10 @@
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
+#include <dds/ddsrt/log.h>
+
+#include <atomic>
+#include <cstdint>
 #include <memory>
 
 #include "base/result.hpp"
@@ -9,6 +13,20 @@
 #include "dds/entity.hpp"
 
 namespace tandem::dds {
+
+/// What Cyclone DDS has to say goes to stderr, as long as it is not too much: one line for each
+/// malformed packet would let a peer fill a disk. Of a process, the one made last.
+class DdsLog {
+ public:
+  DdsLog();
+  ~DdsLog();
+  DdsLog(const DdsLog&) = delete;
+  DdsLog& operator=(const DdsLog&) = delete;
+
+ private:
+  static void write(void* self, const dds_log_data_t* data);
+  std::atomic<std::uint64_t> lines_ = 0;
+};
 
 /// A process has at most one of each number; participants share it.
 class Domain {
@@ -19,9 +37,11 @@ class Domain {
   [[nodiscard]] const Config& config() const noexcept { return config_; }
 
  private:
-  Domain(Config config, Entity entity) : config_(std::move(config)), entity_(std::move(entity)) {}
+  Domain(Config config, std::unique_ptr<DdsLog> log, Entity entity)
+      : config_(std::move(config)), log_(std::move(log)), entity_(std::move(entity)) {}
 
   Config config_;
+  std::unique_ptr<DdsLog> log_;
   Entity entity_;
 };
 

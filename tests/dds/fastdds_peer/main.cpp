@@ -1,13 +1,16 @@
 // A peer that shares nothing with Tandem but the IDL: Fast DDS, with types of fastddsgen.
-//   fastdds_peer DOMAIN [hear|say QOS TYPE TOPIC]…
+//   fastdds_peer DOMAIN [hear|say|flood|huge QOS TYPE TOPIC]…
 // QOS: reliable, best_effort, latched (reliable, transient local). It says its pattern on each
 // `say` topic ten times a second, and prints a line for each sample of a `hear` topic: its name,
-// "pattern" or "other", and the number of values. It ends when its standard input does.
+// "pattern" or "other", and the number of values. On a `flood` topic it says texts of 60 kB, which
+// begin with their number, as fast as it can; on a `huge` one texts of 32 MB at times. It ends when
+// its standard input does.
 #include <poll.h>
 #include <unistd.h>
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <algorithm>
 #include <cstdio>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -67,6 +70,7 @@ Qos with(Qos qos, const std::string& name) {
 struct Part {
   virtual ~Part() = default;
   virtual void say() {}
+  [[nodiscard]] virtual bool pauses() const { return true; }
 };
 
 template <class T>
@@ -81,6 +85,26 @@ class Speaker : public Part {
  private:
   fdds::DataWriter* writer_;
   T sample_;
+};
+
+class Flooder : public Part {
+ public:
+  Flooder(fdds::DataWriter* writer, std::size_t characters, int at_once)
+      : writer_(writer), filler_(characters, ' '), at_once_(at_once) {}
+  void say() override {
+    for (int i = 0; i < at_once_; ++i) {
+      sample_.data(std::to_string(++number_) + filler_);
+      writer_->write(&sample_);
+    }
+  }
+  [[nodiscard]] bool pauses() const override { return at_once_ == 1; }
+
+ private:
+  fdds::DataWriter* writer_;
+  std::string filler_;
+  int at_once_;
+  std_msgs::msg::dds_::String_ sample_;
+  unsigned number_ = 0;
 };
 
 template <class T>
@@ -105,22 +129,24 @@ class Hearer : public Part, public fdds::DataReaderListener {
   T sample_;
 };
 
-using Make = std::function<std::unique_ptr<Part>(fdds::DomainParticipant&, bool says,
+using Make = std::function<std::unique_ptr<Part>(fdds::DomainParticipant&, const std::string& verb,
                                                  const std::string& qos, const std::string& topic)>;
 
 template <class T, class Support>
-std::unique_ptr<Part> make(fdds::DomainParticipant& participant, bool says, const std::string& qos,
-                           const std::string& topic) {
+std::unique_ptr<Part> make(fdds::DomainParticipant& participant, const std::string& verb,
+                           const std::string& qos, const std::string& topic) {
   const fdds::TypeSupport type(new Support);
   type.register_type(&participant);
   auto* description = participant.lookup_topicdescription(topic);
   if (description == nullptr) {
     description = participant.create_topic(topic, type.get_type_name(), fdds::TOPIC_QOS_DEFAULT);
   }
-  if (says) {
+  if (verb != "hear") {
     auto* writer = participant.create_publisher(fdds::PUBLISHER_QOS_DEFAULT)
                        ->create_datawriter(static_cast<fdds::Topic*>(description),
                                            with(fdds::DATAWRITER_QOS_DEFAULT, qos));
+    if (verb == "flood") return std::make_unique<Flooder>(writer, 60'000, 100);
+    if (verb == "huge") return std::make_unique<Flooder>(writer, 32'000'000, 1);
     return std::make_unique<Speaker<T>>(writer);
   }
   auto hearer = std::make_unique<Hearer<T>>(topic);
@@ -151,11 +177,11 @@ const std::map<std::string, Make>& types() {
   return table;
 }
 
-/// Waits for a tenth of a second. @return whether the standard input has ended
-bool ended() {
+/// @return whether the standard input has ended
+bool ended(int wait_ms) {
   pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
   char byte;
-  return poll(&input, 1, 100) > 0 && read(STDIN_FILENO, &byte, 1) <= 0;
+  return poll(&input, 1, wait_ms) > 0 && read(STDIN_FILENO, &byte, 1) <= 0;
 }
 
 }  // namespace
@@ -171,10 +197,11 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "no type %s\n", argv[i + 2]);
       return 2;
     }
-    parts.push_back(
-        type->second(*participant, std::string(argv[i]) == "say", argv[i + 1], argv[i + 3]));
+    parts.push_back(type->second(*participant, argv[i], argv[i + 1], argv[i + 3]));
   }
-  while (!ended()) {
+  const bool pauses =
+      std::all_of(parts.begin(), parts.end(), [](const auto& part) { return part->pauses(); });
+  while (!ended(pauses ? 100 : 0)) {
     for (const auto& part : parts) part->say();
   }
   participant->delete_contained_entities();  // before the parts: their listeners
