@@ -24,7 +24,7 @@ namespace {
 constexpr std::uint64_t kBringUp = 2, kShutDown = 3;  // cycles
 constexpr std::int64_t kLong_ns = 60'000'000'000;
 
-enum class Act : std::uint8_t { kPause, kResume, kStep, kRate, kLook, kAwait, kBell };
+enum class Act : std::uint8_t { kPause, kResume, kStep, kRate, kLook, kAwait, kReset, kGains };
 enum class End : std::uint8_t {
   kItself,   ///< time goes on until the run is over
   kSteps,    ///< the same, in steps
@@ -47,7 +47,8 @@ std::string in_words(const Ask& ask) {
     case Act::kRate: return fmt::format("rate {:g}", ask.rate);
     case Act::kLook: return "look";
     case Act::kAwait: return "await";
-    case Act::kBell: return "request";
+    case Act::kReset: return "reset";
+    case Act::kGains: return "gains";
   }
   return "?";
 }
@@ -80,7 +81,7 @@ Sequence::Sequence(std::uint32_t number) : seed(number) {
   running_cycles = 1 + below(200);
   const bool only_steps = start_paused && below(3) == 0;
   const auto ask = [&] {
-    Ask one{.act = static_cast<Act>(below(7))};
+    Ask one{.act = static_cast<Act>(below(8))};
     if (only_steps && one.act == Act::kResume) one.act = Act::kStep;
     one.steps = 1 + below(30);
     one.rate = rates[below(7)];
@@ -199,7 +200,11 @@ void Played::ask(const Ask& one) {
     case Act::kRate: (void)control().set_rate(one.rate); break;
     case Act::kLook: EXPECT_LE(control().state().rate, rt::kFastest); break;
     case Act::kAwait: (void)control().await_standing(100'000); break;
-    case Act::kBell: cycle->requests().reset_faults(); break;
+    case Act::kReset: cycle->requests().reset_faults(); break;
+    case Act::kGains:
+      (void)cycle->services().set_gains("elbow", hal::PidLoop::kPosition, {.kp = 1.0},
+                                        RunServices::Patience{0});
+      break;
   }
 }
 
