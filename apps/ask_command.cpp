@@ -15,7 +15,7 @@ Exit ask_command(const AskOptions& options) {
                    .key = {}}});
     return Exit::kUsage;
   }
-  const Result<Json> answer = ask(options.socket, "", question);
+  const Result<Json> answer = ask(options.target, "", question);
   if (!answer) {
     print_errors({answer.error()});
     return Exit::kUsage;

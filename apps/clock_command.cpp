@@ -25,10 +25,10 @@ Json question_of(const ClockOptions& options) {
 }
 
 /// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
-Result<Json> wait_until_it_stands(const std::string& path, std::FILE* out) {
+Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
   StatusLine line(out);
   for (;;) {
-    Result<Json> now = ask(path, {{"do", "clock.show"}});
+    Result<Json> now = run.ask({{"do", "clock.show"}});
     if (!now || now->value("standing", true) || !now->value("paused", false) ||
         now->value("phase", "") == "done") {
       return now;
@@ -68,12 +68,12 @@ void print_answer(const Json& answer) {
 }
 
 Result<Json> carry_out(const ClockOptions& options) {
-  const Result<std::string> path = find_control_socket(options.socket, "run");
-  if (!path) return std::unexpected(path.error());
-  Result<Json> answer = ask(*path, question_of(options));
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return std::unexpected(run.error());
+  Result<Json> answer = (*run)->ask(question_of(options));
   const bool waits = options.action == Action::kPause || options.action == Action::kStep;
   if (!answer || !waits) return answer;
-  Result<Json> stands = wait_until_it_stands(*path, human_output(options.json));
+  Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
   if (!stands) return fail("the run ended before its clock stood still", "it has told why");
   if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
   return stands;

@@ -17,7 +17,8 @@ The same experiment and seed give the same bytes at every rate.)";
 const char kFaultExamples[] = R"(Examples:
   tandem fault show                                  what has been latched, and what was cleared
   tandem fault reset                                 exit status 1: a cause is still there
-Without --socket it is the only `tandem run` of this user.)";
+  tandem fault show --dds --namespace left           of the run with this [dds] namespace
+Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kEstopExamples[] = R"(Examples:
   tandem estop                                       with the category of robot.toml's [safety]
@@ -32,12 +33,13 @@ const char kClockExamples[] = R"(Examples:
   tandem clock rate 0                                as fast as the machine goes
   tandem clock resume
 The results are the same bits. A run in real time refuses: a robot's time cannot be paused.
-Without --socket it is the only `tandem run` of this user.)";
+Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kAskExamples[] = R"(Examples:
   tandem ask '{"do": "help"}'                        what the running process can be asked
   tandem ask '{"do": "status"}' --socket /tmp/run.sock
-Without --socket it is the only running process of this user.)";
+  tandem ask '{"do": "status"}' --dds --domain 7     of the only run in that DDS domain
+Without --socket or --dds it is the only running process of this user.)";
 
 const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
@@ -119,6 +121,23 @@ CLI::Validator is_rate() {
 
 }  // namespace
 
+void add_target(CLI::App& app, ControlTarget& target) {
+  CLI::Option* socket = app.add_option("--socket", target.socket, kSocketHelp);
+  CLI::Option* dds =
+      app.add_flag("--dds", target.dds, "Ask over DDS instead: the service tandem/ask")
+          ->excludes(socket);
+  app.add_option("--domain", target.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
+      ->needs(dds)
+      ->check(CLI::Range(0, 232));
+  app.add_option("--namespace", target.name_space,
+                 "Of the process in its domain (default: that of the only one)")
+      ->needs(dds);
+  app.add_option("--interface", target.interfaces,
+                 "Network interface of DDS (default: lo); may be repeated")
+      ->needs(dds)
+      ->allow_extra_args(false);
+}
+
 void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -174,7 +193,7 @@ void add_flags(CLI::App& app, FaultOptions& o) {
   CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
   CLI::App* reset = app.add_subcommand("reset", "Clear what is latched and go on where it stands");
   for (CLI::App* one : {show, reset}) {
-    one->add_option("--socket", o.socket, kSocketHelp);
+    add_target(*one, o.target);
     one->add_option("--json", o.json, kJsonHelp);
     one->footer(kFaultExamples);
   }
@@ -185,7 +204,7 @@ void add_flags(CLI::App& app, FaultOptions& o) {
 void add_flags(CLI::App& app, EstopOptions& o) {
   app.add_option("--category", o.category, "0 or 1, instead of the robot's [safety]")
       ->check(CLI::IsMember({0, 1}));
-  app.add_option("--socket", o.socket, kSocketHelp);
+  add_target(app, o.target);
   app.footer(kEstopExamples);
 }
 
@@ -195,7 +214,7 @@ void add_flags(CLI::App& app, ClockOptions& o) {
   app.footer(kClockExamples);  // its subcommands', too
   const auto add = [&](const char* name, const char* doc, Action action) {
     CLI::App* one = app.add_subcommand(name, doc);
-    one->add_option("--socket", o.socket, kSocketHelp);
+    add_target(*one, o.target);
     one->add_option("--json", o.json, kJsonHelp);
     one->callback([&o, action] { o.action = action; });
     return one;
@@ -214,13 +233,13 @@ void add_flags(CLI::App& app, ClockOptions& o) {
 
 void add_flags(CLI::App& app, AskOptions& o) {
   app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
-  app.add_option("--socket", o.socket, kSocketHelp);
+  add_target(app, o.target);
   app.footer(kAskExamples);
 }
 
 void add_flags(CLI::App& app, InjectOptions& o) {
   app.add_option("fault", o.fault, "key=value words, or TOML")->required();
-  app.add_option("--socket", o.socket, kSocketHelp);
+  add_target(app, o.target);
   app.footer(kInjectExamples);
 }
 

@@ -14,6 +14,9 @@ inline constexpr char kJsonHelp[] =
 inline constexpr char kSocketHelp[] =
     "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
 
+/// The flags that say which running process is asked, and by which way.
+void add_target(CLI::App& app, ControlTarget& target);
+
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.
 void add_flags(CLI::App& app, RunOptions& o);

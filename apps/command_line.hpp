@@ -8,6 +8,8 @@
 #include <variant>
 #include <vector>
 
+#include "apps/control_target.hpp"
+
 namespace tandem::apps {
 
 /// Exit status of every command.
@@ -47,14 +49,14 @@ struct RunOptions {
 /// tandem fault show|reset
 struct FaultOptions {
   enum class Action : std::uint8_t { kShow, kReset } action = Action::kShow;
-  std::string socket;  ///< empty: that of the only running `tandem run`
+  ControlTarget target;
   std::string json;
 };
 
 /// tandem estop
 struct EstopOptions {
   std::optional<int> category;  ///< 0, 1; empty: the robot's
-  std::string socket;
+  ControlTarget target;
 };
 
 /// tandem controller list|load|unload|start|stop|switch
@@ -67,7 +69,7 @@ struct ControllerOptions {
   std::vector<std::string> start;  ///< start, switch; load --start
   std::vector<std::string> stop;   ///< stop, switch
   bool start_it = false;           ///< load: start it, too
-  std::string socket;              ///< empty: that of the only running `tandem run`
+  ControlTarget target;
   std::string json;
 };
 
@@ -81,7 +83,7 @@ struct JointOptions {
   std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
   std::string loop;
   std::optional<double> kp, ki, kd;
-  std::string socket;  ///< empty: that of the only running `tandem run`
+  ControlTarget target;
   std::string json;
 };
 
@@ -90,20 +92,20 @@ struct ClockOptions {
   enum class Action : std::uint8_t { kShow, kPause, kResume, kStep, kRate } action = Action::kShow;
   std::uint64_t cycles = 1;  ///< step
   double rate = 0.0;         ///< rate; 0: as fast as it goes
-  std::string socket;        ///< empty: that of the only running `tandem run`
+  ControlTarget target;
   std::string json;
 };
 
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
-  std::string socket;    ///< empty: that of the only running process
+  ControlTarget target;
 };
 
 /// tandem inject FAULT
 struct InjectOptions {
   std::vector<std::string> fault;  ///< key=value words, or TOML
-  std::string socket;              ///< empty: that of the only running process
+  ControlTarget target;
 };
 
 /// tandem check FILE

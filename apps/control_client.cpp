@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "apps/control_socket.hpp"
+#include "apps/dds_client.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -76,6 +77,15 @@ Result<std::string> exchange(int fd, std::string out, SteadyClock::time_point de
   }
   return in;
 }
+
+class SocketClient : public ControlClient {
+ public:
+  explicit SocketClient(std::string path) : path_(std::move(path)) {}
+  Result<Json> ask(const Json& question) override { return apps::ask(path_, question); }
+
+ private:
+  std::string path_;
+};
 
 }  // namespace
 
@@ -142,18 +152,30 @@ Result<Json> ask(const std::string& path, const Json& question) {
   const auto deadline = SteadyClock::now() + std::chrono::milliseconds(kControlAnswer_ms);
   const Result<std::string> line = exchange(descriptor.get(), question.dump() + "\n", deadline);
   if (!line) return std::unexpected(line.error());
-  Json answer = Json::parse(*line, nullptr, false);
+  return read_answer(*line, "what listens at " + path);
+}
+
+Result<Json> read_answer(std::string_view text, const std::string& who) {
+  Json answer = Json::parse(text, nullptr, false);
   if (!answer.is_object() || !answer.contains("ok") || !answer["ok"].is_boolean()) {
-    return fail("what listens at " + path + " is no tandem", "name another one with --socket");
+    return fail(who + " is no tandem", "name another one with --socket");
   }
   if (answer["ok"].get<bool>()) return answer;
   return fail(answer.value("error", std::string("refused")), answer.value("hint", std::string()));
 }
 
-Result<Json> ask(const std::string& path, const std::string& kind, const Json& question) {
-  const Result<std::string> found = find_control_socket(path, kind);
-  if (!found) return std::unexpected(found.error());
-  return ask(*found, question);
+Result<std::unique_ptr<ControlClient>> ControlClient::open(const ControlTarget& target,
+                                                           const std::string& kind) {
+  if (target.dds) return open_dds_client(target);
+  const Result<std::string> path = find_control_socket(target.socket, kind);
+  if (!path) return std::unexpected(path.error());
+  return std::make_unique<SocketClient>(*path);
+}
+
+Result<Json> ask(const ControlTarget& target, const std::string& kind, const Json& question) {
+  const auto client = ControlClient::open(target, kind);
+  if (!client) return std::unexpected(client.error());
+  return (*client)->ask(question);
 }
 
 }  // namespace tandem::apps

@@ -1,13 +1,16 @@
-// The other end of a control socket: finds a running process and asks it one thing.
+// The other end of a control socket, or of tandem/ask: finds a running process and asks it.
 // Layer: apps.  Thread: any, non-RT.
 #pragma once
 
 #include <sys/un.h>
 
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/console.hpp"
+#include "apps/control_target.hpp"
 #include "base/result.hpp"
 
 namespace tandem::apps {
@@ -35,8 +38,25 @@ inline constexpr int kControlAnswer_ms = 5000;
 /// Errors: nobody listens; no answer in time; {"ok": false}, with its error and hint.
 [[nodiscard]] Result<Json> ask(const std::string& path, const Json& question);
 
-/// find_control_socket() and ask() in one.
-[[nodiscard]] Result<Json> ask(const std::string& path, const std::string& kind,
+/// An answer's text. Errors: {"ok": false}, with its error and hint; what is no answer, which names
+/// `who` sent it.
+[[nodiscard]] Result<Json> read_answer(std::string_view text, const std::string& who);
+
+/// Asks one process, whichever way leads there.
+class ControlClient {
+ public:
+  virtual ~ControlClient() = default;
+  /// Finds the process.
+  /// @param kind  of the only one, over a socket: "run", "emulate"; empty: any
+  /// Errors: find_control_socket()'s, or open_dds_client()'s.
+  [[nodiscard]] static Result<std::unique_ptr<ControlClient>> open(const ControlTarget& target,
+                                                                   const std::string& kind);
+  /// Errors: nobody is there; no answer within kControlAnswer_ms; read_answer()'s.
+  [[nodiscard]] virtual Result<Json> ask(const Json& question) = 0;
+};
+
+/// Opens and asks once.
+[[nodiscard]] Result<Json> ask(const ControlTarget& target, const std::string& kind,
                                const Json& question);
 
 }  // namespace tandem::apps

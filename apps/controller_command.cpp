@@ -86,13 +86,13 @@ Result<Json> question_of(const ControllerOptions& options) {
 }  // namespace
 
 Exit controller_command(const ControllerOptions& options) {
-  const Result<std::string> path = find_control_socket(options.socket, "run");
-  if (!path) return refused(path.error());
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refused(run.error());
   const Result<Json> question = question_of(options);
   if (!question) return refused(question.error());
-  Result<Json> answer = ask(*path, *question);
+  Result<Json> answer = (*run)->ask(*question);
   if (answer && options.start_it) {
-    answer = ask(*path, {{"do", "controller.start"}, {"name", answer->value("name", "")}});
+    answer = (*run)->ask({{"do", "controller.start"}, {"name", answer->value("name", "")}});
   }
   if (!answer) return refused(answer.error());
   if (options.json != "-") {

@@ -10,7 +10,7 @@ const char kControllerExamples[] = R"(Examples:
   tandem controller switch --stop squat --start rest in one cycle, or not at all
   tandem controller stop rest                        its joints are held where they are
   tandem controller unload rest                      and its library is closed
-Without --socket it is the only `tandem run` of this user.)";
+Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kJointExamples[] = R"(Examples:
   tandem joint list                                  every joint: who has it, mode, measurements
@@ -18,14 +18,14 @@ const char kJointExamples[] = R"(Examples:
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
-Without --socket it is the only `tandem run` of this user.)";
+Without --socket or --dds it is the only `tandem run` of this user.)";
 
 /// What every subcommand has.
 template <class Options>
 CLI::App* add_command(CLI::App& app, const char* name, const char* doc, const char* examples,
                       Options& o) {
   CLI::App* command = app.add_subcommand(name, doc);
-  command->add_option("--socket", o.socket, kSocketHelp);
+  add_target(*command, o.target);
   command->add_option("--json", o.json, kJsonHelp);
   command->footer(examples);
   return command;

@@ -45,6 +45,11 @@ auto room(Sequence& sequence, const Json& list, ReplyMemory& memory) {
   return std::span(sequence._buffer, list.size());
 }
 
+/// What is asked of a loop whose time stands waits.
+const char* when(const Json& answer) {
+  return answer.value("paused", false) ? ", in the next cycle: simulated time stands" : "";
+}
+
 void fill_controller(const Json& from, tandem_msgs_msg_dds__Controller_& to, ReplyMemory& memory) {
   to.name = text_of(from, "name", memory);
   to.plugin = text_of(from, "plugin", memory);
@@ -122,8 +127,8 @@ std::string message_of(const Json& answer) {
 void fill_emergency_stop(const Json& answer, dds::std_srvs::Trigger_Response& reply,
                          ReplyMemory& memory) {
   reply.success = answer.value("ok", false);
-  reply.message = memory.text(reply.success ? "emergency stop, " +
-                                                  answer.value("category", std::string("category1"))
+  const std::string category = answer.value("category", std::string());
+  reply.message = memory.text(reply.success ? "emergency stop, " + category + when(answer)
                                             : message_of(answer));
 }
 
@@ -134,9 +139,9 @@ void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& repl
   reply.message = memory.text(
       !reply.success ? message_of(answer)
       : latched == 0 ? "nothing is latched"
-                     : fmt::format("the reset of {} is asked for; tandem/faults shows when it is "
+                     : fmt::format("the reset of {} is asked for{}; tandem/faults shows when it is "
                                    "through, which takes seconds",
-                                   latched));
+                                   latched, when(answer)));
 }
 
 void fill_controllers(const Json& answer, ListControllers_Response& reply, ReplyMemory& memory) {

@@ -30,7 +30,7 @@ void print_answer(const Json& answer) {
 }
 
 Exit show(const FaultOptions& options) {
-  const Result<Json> answer = ask(options.socket, "run", {{"do", "fault.show"}});
+  const Result<Json> answer = ask(options.target, "run", {{"do", "fault.show"}});
   if (!answer) return refused(answer.error());
   if (options.json != "-") print_answer(*answer);
   if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
@@ -38,10 +38,10 @@ Exit show(const FaultOptions& options) {
 }
 
 /// The run's answer once a reset is through; the last one when it takes too long.
-Result<Json> wait_for_reset(const std::string& path, const Json& before) {
+Result<Json> wait_for_reset(ControlClient& run, const Json& before) {
   const auto deadline = SteadyClock::now() + kResetTime;
   for (;;) {
-    Result<Json> now = ask(path, {{"do", "fault.show"}});
+    Result<Json> now = run.ask({{"do", "fault.show"}});
     if (!now) return now;
     const bool through = now->value("resets", 0) > before.value("resets", 0) ||
                          now->value("failed_resets", 0) > before.value("failed_resets", 0);
@@ -51,15 +51,15 @@ Result<Json> wait_for_reset(const std::string& path, const Json& before) {
 }
 
 Exit reset(const FaultOptions& options) {
-  const Result<std::string> path = find_control_socket(options.socket, "run");
-  if (!path) return refused(path.error());
-  const Result<Json> asked = ask(*path, {{"do", "fault.reset"}});
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refused(run.error());
+  const Result<Json> asked = (*run)->ask({{"do", "fault.reset"}});
   if (!asked) return refused(asked.error());
   Json answer = *asked;
   const bool nothing = asked->value("latched", 0) == 0;
   const bool kept = !nothing && asked->value("paused", false);
   if (!nothing && !kept) {
-    const Result<Json> through = wait_for_reset(*path, *asked);
+    const Result<Json> through = wait_for_reset(**run, *asked);
     if (!through) return refused(through.error());
     answer = *through;
   }
@@ -84,7 +84,7 @@ Exit fault_command(const FaultOptions& options) {
 Exit estop_command(const EstopOptions& options) {
   Json question{{"do", "estop"}};
   if (options.category) question["category"] = *options.category;
-  const Result<Json> answer = ask(options.socket, "run", question);
+  const Result<Json> answer = ask(options.target, "run", question);
   if (!answer) return refused(answer.error());
   fmt::print("emergency stop, {}\n", answer->value("category", "?"));
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);

@@ -36,7 +36,7 @@ Status injected(Code code) {
 
 Exit inject_command(const InjectOptions& options) {
   const Json question{{"do", "inject"}, {"scenario", sim::scenario_of_words(options.fault)}};
-  const Result<Json> answer = ask(options.socket, "", question);
+  const Result<Json> answer = ask(options.target, "", question);
   if (!answer) {
     print_errors({answer.error()});
     return Exit::kUsage;

@@ -107,7 +107,7 @@ void print_answer(const JointOptions& options, const Json& answer) {
 }  // namespace
 
 Exit joint_command(const JointOptions& options) {
-  Result<Json> answer = ask(options.socket, "run", question_of(options));
+  Result<Json> answer = ask(options.target, "run", question_of(options));
   if (!answer) return refused(answer.error());
   if (answer->contains("joints")) {
     const Result<Json> some = only((*answer)["joints"], options.joints);

@@ -10,12 +10,6 @@
 namespace tandem::dds {
 namespace {
 
-/// "left/tandem/ask", or "tandem/ask".
-std::string full_name(const Participant& participant, const std::string& service) {
-  const std::string& name_space = participant.config().name_space;
-  return name_space.empty() ? service : name_space + "/" + service;
-}
-
 std::optional<Peer> to_peer(dds_builtintopic_endpoint_t* endpoint) {
   if (endpoint == nullptr) return std::nullopt;
   const std::unique_ptr<dds_builtintopic_endpoint_t, decltype(&dds_builtintopic_free_endpoint)>
@@ -48,12 +42,18 @@ std::vector<Peer> all_of(dds_entity_t entity, List list, Look look) {
 
 }  // namespace
 
+std::string full_name(const Participant& participant, const std::string& service) {
+  if (service.starts_with('/')) return service;
+  const std::string& name_space = participant.config().name_space;
+  return name_space.empty() ? "/" + service : "/" + name_space + "/" + service;
+}
+
 std::string request_topic(const Participant& participant, const std::string& service) {
-  return "rq/" + full_name(participant, service) + "Request";
+  return "rq" + full_name(participant, service) + "Request";
 }
 
 std::string reply_topic(const Participant& participant, const std::string& service) {
-  return "rr/" + full_name(participant, service) + "Reply";
+  return "rr" + full_name(participant, service) + "Reply";
 }
 
 Qos service_qos(std::int32_t depth, std::string user_data) {

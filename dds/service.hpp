@@ -33,9 +33,13 @@ concept ServiceSample = requires(T sample) {
 };
 
 /// The DDS topics of a ROS 2 service in the participant's namespace: "tandem/ask" is
-/// "rq/left/tandem/askRequest" and "rr/left/tandem/askReply".
+/// "rq/left/tandem/askRequest" and "rr/left/tandem/askReply". A name that begins with / has its
+/// namespace already.
 [[nodiscard]] std::string request_topic(const Participant& participant, const std::string& service);
 [[nodiscard]] std::string reply_topic(const Participant& participant, const std::string& service);
+
+/// As ROS 2 writes it: "/left/tandem/ask".
+[[nodiscard]] std::string full_name(const Participant& participant, const std::string& service);
 
 /// Reliable and volatile, as ROS 2's services are.
 /// @param depth       of the history, which is each end's own matter: 10 in ROS 2

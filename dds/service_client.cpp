@@ -94,10 +94,8 @@ Result<ServiceClientBase> ServiceClientBase::create(Participant& participant,
   if (!waiting.ok() || !waitset.ok()) {
     return std::unexpected(dds_error("wait for replies", waitset.get()));
   }
-  const Config& config = participant.config();
-  const std::string name =
-      fmt::format("/{}{}{} in the DDS domain {}", config.name_space,
-                  config.name_space.empty() ? "" : "/", service, config.domain);
+  const std::string name = fmt::format("{} in the DDS domain {}", full_name(participant, service),
+                                       participant.config().domain);
   return ServiceClientBase(name, std::move(*requests), std::move(*replies), std::move(waiting),
                            std::move(waitset));
 }

@@ -1,4 +1,5 @@
 // A run's services over DDS do what its registry's commands do, and no more than [remote] allows.
+#include "apps/dds_services.hpp"
 #include "dds/service_client.hpp"
 #include "tests/apps/running.hpp"
 #include "tests/support/dds_domain.hpp"
@@ -13,7 +14,7 @@ using dds::std_srvs::Trigger_Response;
 using tandem::test::eventually;
 using Texts = std::vector<std::string>;
 
-class DdsServices : public Running {
+class RunOverDds : public Running {
  protected:
   void SetUp() override {
     Running::SetUp();
@@ -88,7 +89,7 @@ class DdsServices : public Running {
   std::unique_ptr<dds::Participant> participant_;
 };
 
-TEST_F(DdsServices, AnswerAsTheControlSocketDoes) {
+TEST_F(RunOverDds, AnswerAsTheControlSocketDoes) {
   begin_with("");
   EXPECT_EQ(ask(R"({"do": "help"})"), ask_local(R"({"do": "help"})"));
   EXPECT_EQ(ask(R"({"do": "fault.show"})")["faults"], nlohmann::json::array());
@@ -99,7 +100,7 @@ TEST_F(DdsServices, AnswerAsTheControlSocketDoes) {
   EXPECT_EQ(end(), 0);
 }
 
-TEST_F(DdsServices, ChangeNothingUnlessTheExperimentAllowsIt) {
+TEST_F(RunOverDds, ChangeNothingUnlessTheExperimentAllowsIt) {
   begin_with("");
   const auto refused = ask(R"({"do": "controller.stop", "name": "hold"})");
   EXPECT_EQ(refused["ok"], false);
@@ -115,7 +116,7 @@ TEST_F(DdsServices, ChangeNothingUnlessTheExperimentAllowsIt) {
   EXPECT_EQ(end(), 1) << "it is latched";
 }
 
-TEST_F(DdsServices, LoadSwitchListAndUnloadControllers) {
+TEST_F(RunOverDds, LoadSwitchListAndUnloadControllers) {
   begin_with("local");
   std::string plugin = "hold", name = "rest", parameters = "joints = ['joint2']";
   LoadController_Request load{0, 0, plugin.data(), name.data(), parameters.data()};
@@ -155,7 +156,7 @@ TEST_F(DdsServices, LoadSwitchListAndUnloadControllers) {
   EXPECT_EQ(end(), 0);
 }
 
-TEST_F(DdsServices, SetJointsAndTheirGains) {
+TEST_F(RunOverDds, SetJointsAndTheirGains) {
   begin_with("local");
   ASSERT_EQ(active_after({"hold"}, {}), Texts{});
   std::string joint = "joint2", mode = "position", interaction = "compliant", none;
@@ -196,13 +197,130 @@ TEST_F(DdsServices, SetJointsAndTheirGains) {
   EXPECT_EQ(end(), 0);
 }
 
-TEST_F(DdsServices, StopTheRobotAndClearItsFaults) {
+TEST_F(RunOverDds, PauseStepAndScaleTime) {
+  begin_with("local");
+  Clock_Response last{};
+  std::string message;
+  const auto clock = [&](std::string action, std::uint64_t cycles, double rate) {
+    call<Clock_Response>("clock", Clock_Request{0, 0, action.data(), cycles, rate},
+                         [&](const Clock_Response& reply) {
+                           last = reply;  // its text is gone after this
+                           message = reply.message;
+                         });
+    return last.success;
+  };
+  EXPECT_TRUE(clock("rate", 0, 50.0));
+  EXPECT_EQ(last.rate, 50.0);
+  EXPECT_FALSE(clock("step", 3, 0.0)) << "time is running";
+  EXPECT_NE(message, "");
+  EXPECT_TRUE(clock("pause", 0, 0.0));
+  EXPECT_TRUE(eventually([&] { return clock("show", 0, 0.0) && last.standing; }));
+  const Clock_Response before = last;
+  EXPECT_TRUE(clock("step", 3, 0.0));
+  EXPECT_TRUE(eventually([&] { return clock("", 0, 0.0) && last.standing; }));
+  EXPECT_EQ(last.cycles, before.cycles + 3);
+  EXPECT_NEAR(last.time_s, before.time_s + 0.003, 1e-9);
+  EXPECT_TRUE(last.paused);
+  const auto local = ask_local(R"({"do": "clock.show"})");
+  EXPECT_EQ(last.time_s, local["time_s"]);
+  EXPECT_EQ(last.cycles, local["cycles"]);
+  EXPECT_EQ(trigger("emergency_stop").find("yes: emergency stop, category1, in the next cycle"),
+            0U);
+  EXPECT_FALSE(clock("rewind", 0, 0.0));
+  EXPECT_NE(message.find("unknown command \"clock.rewind\""), std::string::npos) << message;
+  EXPECT_TRUE(clock("resume", 0, 0.0));
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1);
+}
+
+TEST_F(RunOverDds, StopTheRobotAndClearItsFaults) {
   begin_with("local");
   EXPECT_EQ(trigger("clear_faults"), "yes: nothing is latched");
   EXPECT_EQ(ask(R"({"do": "estop", "category": 0})")["category"], "category0");
   until(R"("phase": "faulted")");
   EXPECT_NE(trigger("clear_faults").find("yes: the reset of 1 is asked for"), std::string::npos);
   EXPECT_TRUE(eventually([&] { return ask(R"({"do": "status"})").value("resets", 0) == 1; }));
+  EXPECT_EQ(end(), 0);
+}
+
+/// The commands' other way to a run.
+class DdsCommands : public RunOverDds {
+ protected:
+  [[nodiscard]] Outcome over_dds(const std::string& command) const {
+    return tandem(command + " --dds --domain " + std::to_string(dds::test::own_domain()));
+  }
+  void expect_same(const std::string& command, const std::string& part) const {
+    const Outcome here = to_run(command), there = over_dds(command);
+    EXPECT_EQ(there.status, here.status) << there.err;
+    EXPECT_EQ(there.out, here.out);
+    EXPECT_EQ(there.err, here.err);
+    EXPECT_NE((there.out + there.err).find(part), std::string::npos) << there.out << there.err;
+  }
+};
+
+TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
+  begin_with("local");
+  expect_same("ask '{\"do\": \"help\"}'", "controller.load");
+  expect_same("ask '{\"do\": \"hlep\"}'", "did you mean 'help'?");
+  expect_same("controller list", "hold        active  joint1, joint2");
+  expect_same("controller start rest", "rest");
+  expect_same("joint set jiont2 --mode idle", "did you mean 'joint2'?");
+  expect_same("joint list --gains", "joint2");
+  expect_same("fault reset", "nothing is latched");
+  EXPECT_EQ(over_dds("clock rate 50").status, 0);
+  EXPECT_NE(over_dds("clock pause").out.find("paused"), std::string::npos);
+  expect_same("clock show", "50 x real time");
+  EXPECT_EQ(over_dds("clock step 5").status, 0);
+  EXPECT_EQ(over_dds("clock resume").status, 0);
+  EXPECT_EQ(over_dds("inject kind=supply_sag board=board1 volts=10").status, 2) << "no such board";
+  EXPECT_EQ(over_dds("estop --category 0").out, "emergency stop, category0\n");
+  until(R"("phase": "faulted")");
+  const Outcome reset = over_dds("fault reset");
+  EXPECT_EQ(reset.status, 0) << reset.err;
+  EXPECT_NE(reset.out.find("every joint is enabled where it is"), std::string::npos) << reset.out;
+  EXPECT_EQ(over_dds("ask '{\"do\": \"run.stop\"}'").status, 0);
+  run_.join();
+  EXPECT_EQ(status_, 0);
+}
+
+TEST_F(DdsCommands, SayWhatIsNotAllowedAndWhatWouldAllowIt) {
+  begin_with("");
+  EXPECT_EQ(over_dds("controller list").status, 0);
+  for (const char* command : {"controller stop hold", "joint set joint1 --stiffness 1",
+                              "clock pause", "fault reset", "ask '{\"do\": \"run.stop\"}'"}) {
+    const Outcome refused = over_dds(command);
+    EXPECT_EQ(refused.status, 2) << command;
+    EXPECT_NE(refused.err.find("takes no commands over DDS"), std::string::npos) << refused.err;
+    EXPECT_NE(refused.err.find("[remote] command = \"local\""), std::string::npos) << refused.err;
+  }
+  EXPECT_EQ(to_run("controller stop hold").status, 0) << "the local operator may";
+  EXPECT_EQ(over_dds("estop").status, 0);
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1);
+}
+
+TEST_F(DdsCommands, AreForOneOfSeveralRuns) {
+  const Outcome none = over_dds("controller list");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.err.find("nobody serves tandem/ask in the DDS domain"), std::string::npos)
+      << none.err;
+  EXPECT_NE(none.err.find("--dds"), std::string::npos) << none.err;
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") + "[dds]\nnamespace = \"left\"\n");
+  begin_with("");
+  EXPECT_EQ(over_dds("controller list").status, 0) << "the only one, whatever its namespace";
+  // A second one: the services of a registry in this process.
+  ControlRegistry registry;
+  const auto second = apps::DdsServices::open(*participant_, registry, {});
+  ASSERT_TRUE(second) << second.error().to_string();
+  const Outcome several = over_dds("controller list");
+  EXPECT_EQ(several.status, 2);
+  for (const char* part : {"2 processes serve tandem/ask", "--namespace 'left' is tandem_run",
+                           "--namespace '' is tester"}) {
+    EXPECT_NE(several.err.find(part), std::string::npos) << part << " in: " << several.err;
+  }
+  EXPECT_EQ(over_dds("controller list --namespace left").status, 0);
+  EXPECT_EQ(over_dds("ask '{\"do\": \"status\"}' --namespace right").status, 2);
   EXPECT_EQ(end(), 0);
 }
 

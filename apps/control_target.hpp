@@ -1,0 +1,19 @@
+// Which running process a command asks, and by which way: part of the command line's options.
+// Layer: apps.  Thread: main.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace tandem::apps {
+
+struct ControlTarget {
+  std::string socket;  ///< of the process; empty: the only one of this user
+  bool dds = false;    ///< ask over DDS instead
+  int domain = 0;
+  std::optional<std::string> name_space;      ///< "left"; empty: the only process of the domain
+  std::vector<std::string> interfaces{"lo"};  ///< network interfaces, of DDS
+};
+
+}  // namespace tandem::apps
