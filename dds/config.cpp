@@ -66,23 +66,44 @@ std::string text_of(const std::string& text) {
   return out;
 }
 
+#ifdef TANDEM_DDS_SECURITY_FOLDER
+constexpr std::string_view kPluginFolder = TANDEM_DDS_SECURITY_FOLDER;
+#else
+constexpr std::string_view kPluginFolder = "";
+#endif
+
+/// @param name      of the library: "auth"
+/// @param function  what its entry points end with: "authentication"
+std::string plugin_xml(std::string_view name, std::string_view function) {
+  const std::string path = kPluginFolder.empty()
+                               ? fmt::format("dds_security_{}", name)
+                               : fmt::format("{}/libdds_security_{}.so", kPluginFolder, name);
+  return fmt::format(
+      R"(<Library path="{}" initFunction="init_{}" finalizeFunction="finalize_{}"/>)", path,
+      function, function);
+}
+
 std::string security_xml(const SecurityConfig& s) {
   return fmt::format(
       R"(<Security>
   <Authentication>
+    {}
     <IdentityCA>file:{}</IdentityCA>
     <IdentityCertificate>file:{}</IdentityCertificate>
     <PrivateKey>file:{}</PrivateKey>
   </Authentication>
   <AccessControl>
+    {}
     <PermissionsCA>file:{}</PermissionsCA>
     <Governance>file:{}</Governance>
     <Permissions>file:{}</Permissions>
   </AccessControl>
+  <Cryptographic>{}</Cryptographic>
 </Security>
 )",
-      text_of(s.identity_ca), text_of(s.identity_certificate), text_of(s.private_key),
-      text_of(s.permissions_ca), text_of(s.governance), text_of(s.permissions));
+      plugin_xml("auth", "authentication"), text_of(s.identity_ca), text_of(s.identity_certificate),
+      text_of(s.private_key), plugin_xml("ac", "access_control"), text_of(s.permissions_ca),
+      text_of(s.governance), text_of(s.permissions), plugin_xml("crypto", "crypto"));
 }
 
 }  // namespace

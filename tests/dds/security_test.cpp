@@ -1,0 +1,142 @@
+// DDS Security with certificates that the openssl command line made: who has them talks, who has
+// not hears nothing.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "dds/domain.hpp"
+#include "dds/raw_endpoint.hpp"
+#include "tests/dds/raw_topic.hpp"
+#include "tests/support/dds_domain.hpp"
+#include "tests/support/eventually.hpp"
+
+namespace tandem::dds {
+namespace {
+
+using tandem::test::eventually;
+
+/// A participant with sockets of its own, as if it were another process.
+struct Peer {
+  /// @param number  of Cyclone DDS's domain in this process; on the wire it is own_domain()
+  Peer(dds_domainid_t number, const Config& config) {
+    std::string xml = to_xml(config);
+    const std::string place = "<Discovery>";
+    xml.insert(xml.find(place) + place.size(),
+               fmt::format("<ExternalDomainId>{}</ExternalDomainId>", config.domain));
+    domain = Entity(dds_create_domain(number, xml.c_str()));
+    participant = Entity(dds_create_participant(number, nullptr, nullptr));
+    if (!participant.ok()) return;
+    const Type& string = type<std_msgs::String>();
+    writer = std::move(*RawEndpoint::create(EndpointKind::kWriter, participant.get(), string,
+                                            "rt/from_" + std::to_string(number), {}));
+    for (int other = 1; other <= 3; ++other) {
+      readers.push_back(
+          std::move(*RawEndpoint::create(EndpointKind::kReader, participant.get(), string,
+                                         "rt/from_" + std::to_string(other), {})));
+    }
+  }
+
+  void say() {
+    std::string text = "spring";
+    const std_msgs::String sample{.data = text.data()};
+    dds_write(writer.entity.get(), &sample);
+  }
+  [[nodiscard]] bool hears(int other) const {
+    return !test::take_bytes(readers.at(static_cast<std::size_t>(other - 1)).entity.get()).empty();
+  }
+
+  Entity domain;
+  Entity participant;
+  RawEndpoint writer;
+  std::vector<RawEndpoint> readers;
+};
+
+class Security : public testing::Test {
+ protected:
+  void SetUp() override {
+#ifndef TANDEM_DDS_SECURITY
+    GTEST_SKIP() << "Cyclone DDS has no security plugins here";
+#endif
+    if (std::system("openssl version > /dev/null 2>&1") != 0) {
+      GTEST_SKIP() << "the openssl command is not installed";
+    }
+    folder_ = fmt::format("{}tandem-security-{}", testing::TempDir(), ::getpid());
+    const std::string command = fmt::format(
+        "{}/examples/dds_security/make-files {} > /dev/null 2>&1", TANDEM_SOURCE_DIR, folder_);
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  void TearDown() override {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+
+  [[nodiscard]] Config secured() const {
+    Config config = test::own_config();
+    config.security = {.identity_ca = folder_ + "/ca.pem",
+                       .identity_certificate = folder_ + "/robot.pem",
+                       .private_key = folder_ + "/robot.key",
+                       .permissions_ca = folder_ + "/ca.pem",
+                       .governance = folder_ + "/governance.p7s",
+                       .permissions = folder_ + "/permissions.p7s"};
+    return config;
+  }
+
+  std::string folder_;
+};
+
+TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
+  Peer one(1, secured());
+  Peer two(2, secured());
+  Peer stranger(3, test::own_config());
+  ASSERT_TRUE(one.participant.ok() && two.participant.ok() && stranger.participant.ok());
+  bool there = false, back = false;
+  EXPECT_TRUE(eventually([&] {
+    one.say();
+    two.say();
+    stranger.say();
+    there = there || two.hears(1);
+    back = back || one.hears(2);
+    return there && back;
+  }));
+  // The stranger has been there as long, saw them come, and had its chance.
+  Peer other_stranger(4, test::own_config());
+  EXPECT_TRUE(eventually([&] {
+    stranger.say();
+    return other_stranger.hears(3);
+  })) << "those without certificates hear each other";
+  EXPECT_FALSE(stranger.hears(1));
+  EXPECT_FALSE(stranger.hears(2));
+  EXPECT_FALSE(one.hears(3));
+  EXPECT_FALSE(two.hears(3));
+}
+
+TEST_F(Security, WithACertificateOfAnotherAuthorityIsAStranger) {
+  const std::string own = folder_;
+  Config foreign = secured();
+  const std::string other = own + "/other";
+  ASSERT_EQ(std::system(fmt::format("{}/examples/dds_security/make-files {} > /dev/null 2>&1",
+                                    TANDEM_SOURCE_DIR, other)
+                            .c_str()),
+            0);
+  for (std::string* file : {&foreign.security.identity_ca, &foreign.security.identity_certificate,
+                            &foreign.security.private_key, &foreign.security.permissions_ca,
+                            &foreign.security.governance, &foreign.security.permissions}) {
+    file->insert(own.size(), "/other");
+  }
+  Peer one(1, secured());
+  Peer two(2, secured());
+  Peer stranger(3, foreign);
+  ASSERT_TRUE(one.participant.ok() && two.participant.ok() && stranger.participant.ok());
+  EXPECT_TRUE(eventually([&] {
+    one.say();
+    stranger.say();
+    return two.hears(1);
+  }));
+  EXPECT_FALSE(stranger.hears(1));
+  EXPECT_FALSE(two.hears(3));
+}
+
+}  // namespace
+}  // namespace tandem::dds
