@@ -6,6 +6,7 @@
 #include <set>
 
 #include "dds/cdr.hpp"
+#include "dds/service_server.hpp"
 #include "tests/dds/peer_process.hpp"
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
@@ -155,6 +156,30 @@ TEST_F(FastDds, SubscribesWithRosQualitiesOfService) {
   }));
   EXPECT_EQ(heard, (std::set<std::string>{"rt/sensor pattern 1", "rt/plain pattern 1",
                                           "rt/robot_description pattern 1"}));
+}
+
+/// Its request and the reply that it waits for have the same header: leaves 1 and 2.
+TEST_F(FastDds, CallsAService) {
+  using Response = std_srvs::Trigger_Response;
+  const auto server = std::move(*ServiceServer::open(*participant_));
+  const auto added = server->add<std_srvs::Trigger_Request, Response>(
+      "reset", [](const std_srvs::Trigger_Request&) {
+        return ServiceWork<Response>{.at_once = false,
+                                     .answer = [](Response& reply, ReplyMemory& memory) {
+                                       reply.success = true;
+                                       reply.message = memory.text("s4");
+                                     }};
+      });
+  ASSERT_TRUE(added && server->start());
+  std::vector<std::string> arguments = peer_arguments();
+  for (const char* word : {"say", "reliable", "std_srvs/srv/Trigger_Request", "rq/resetRequest",
+                           "hear", "reliable", "std_srvs/srv/Trigger_Response", "rr/resetReply"}) {
+    arguments.emplace_back(word);
+  }
+  test::PeerProcess peer(arguments);
+  std::vector<std::string> heard;
+  ASSERT_TRUE(eventually([&] { return !(heard = peer.lines()).empty(); }));
+  EXPECT_EQ(heard.front(), "rr/resetReply pattern 4");
 }
 
 }  // namespace

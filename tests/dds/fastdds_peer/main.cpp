@@ -156,10 +156,11 @@ std::unique_ptr<Part> make(fdds::DomainParticipant& participant, const std::stri
 }
 
 // A structure of fastddsgen with the name of its support class.
-#define TYPE(package, Name)           \
+#define KIND(package, kind, Name)     \
   std::pair<const std::string, Make>( \
-      #package "/msg/" #Name,         \
-      &make<package::msg::dds_::Name##_, package::msg::dds_::Name##_##PubSubType>)
+      #package "/" #kind "/" #Name,   \
+      &make<package::kind::dds_::Name##_, package::kind::dds_::Name##_##PubSubType>)
+#define TYPE(package, Name) KIND(package, msg, Name)
 
 const std::map<std::string, Make>& types() {
   static const std::map<std::string, Make> table{
@@ -173,6 +174,8 @@ const std::map<std::string, Make>& types() {
       TYPE(diagnostic_msgs, DiagnosticArray),
       TYPE(control_msgs, DynamicJointState),
       TYPE(rmw_dds_common, ParticipantEntitiesInfo),
+      KIND(std_srvs, srv, Trigger_Request),
+      KIND(std_srvs, srv, Trigger_Response),
   };
   return table;
 }

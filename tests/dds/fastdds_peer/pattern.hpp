@@ -58,6 +58,10 @@ MEMBERS(rmw_dds_common::msg::dds_::Gid_, m.data())
 MEMBERS(rmw_dds_common::msg::dds_::NodeEntitiesInfo_, m.node_namespace(), m.node_name(),
         m.reader_gid_seq(), m.writer_gid_seq())
 MEMBERS(rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_, m.gid(), m.node_entities_info_seq())
+MEMBERS(std_srvs::srv::dds_::Trigger_Request_, m.request_guid(), m.request_sequence(),
+        m.structure_needs_at_least_one_member())
+MEMBERS(std_srvs::srv::dds_::Trigger_Response_, m.request_guid(), m.request_sequence(), m.success(),
+        m.message())
 #undef MEMBERS
 
 template <class T>
