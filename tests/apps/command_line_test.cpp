@@ -62,5 +62,17 @@ TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {
   EXPECT_EQ(tandem("run hold.toml --rate 2 --realtime").status, 2);
 }
 
+TEST_F(CommandLine, ARunIsAskedByOneWay) {
+  for (const char* command : {"estop", "fault show", "controller list", "joint list", "clock show",
+                              "ask '{}'", "inject kind=bus_down"}) {
+    const Outcome both = tandem(command + std::string(" --dds --socket /tmp/run.sock"));
+    EXPECT_EQ(both.status, 2) << command;
+    EXPECT_NE(both.err.find("--socket excludes --dds"), std::string::npos) << both.err;
+    const Outcome domain = tandem(command + std::string(" --domain 7"));
+    EXPECT_EQ(domain.status, 2) << command;
+    EXPECT_NE(domain.err.find("--domain requires --dds"), std::string::npos) << domain.err;
+  }
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -13,6 +13,7 @@
 
 #include "apps/control_client.hpp"
 #include "apps/control_socket.hpp"
+#include "apps/remote_gate.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -128,6 +129,34 @@ TEST_F(Answers, RefuseWrongTypesAndMissingKeys) {
 TEST_F(Answers, CarryWhatAHandlerRefusesOrThrows) {
   EXPECT_EQ(error(R"({"do": "echo", "text": "x", "times": 4})"), "too often | three times at most");
   EXPECT_NE(error(R"({"do": "throw"})").find("out of luck"), std::string::npos);
+}
+
+TEST(RemoteGate, LetsReadingAndStopsThroughAndTheRestWhenItIsAllowed) {
+  using runtime::RemoteCommand;
+  const auto off = remote_gate(RemoteCommand::kOff, {});
+  EXPECT_TRUE(off("status", ControlEffect::kReads));
+  EXPECT_TRUE(off("estop", ControlEffect::kStops));
+  const Status refused = off("clock.pause", ControlEffect::kChanges);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().hint.find("[remote] command"), std::string::npos);
+  for (const RemoteCommand command : {RemoteCommand::kLocal, RemoteCommand::kNetwork}) {
+    EXPECT_TRUE(remote_gate(command, {})("clock.pause", ControlEffect::kChanges));
+  }
+}
+
+TEST(RemoteGate, RefusesChangesOfControllersAndJointsWhileSomebodyOwnsTheRobot) {
+  std::string owner;
+  const auto gate = remote_gate(runtime::RemoteCommand::kLocal, [&owner] { return owner; });
+  EXPECT_TRUE(gate("controller.stop", ControlEffect::kChanges));
+  owner = "squat on robot-pc";
+  for (const char* name : {"controller.stop", "joint.set"}) {
+    const Status refused = gate(name, ControlEffect::kChanges);
+    ASSERT_FALSE(refused) << name;
+    EXPECT_EQ(refused.error().message, name + ": 'squat on robot-pc' commands the robot"s);
+  }
+  EXPECT_TRUE(gate("controller.list", ControlEffect::kReads));
+  EXPECT_TRUE(gate("fault.reset", ControlEffect::kChanges));
+  EXPECT_TRUE(gate("estop", ControlEffect::kStops));
 }
 
 /// A folder of its own for the default paths, and a client that speaks bytes.
