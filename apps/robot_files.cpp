@@ -1,9 +1,19 @@
 #include "apps/robot_files.hpp"
 
+#include <fstream>
+#include <sstream>
+
 #include "hal/sim/setup.hpp"
 #include "runtime/experiment.hpp"
 
 namespace tandem::apps {
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
 
 std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
   auto description = runtime::complete_robot(config);

@@ -25,6 +25,9 @@ struct RobotFiles {
 /// Whether the file is a robot's: a robot has a [model], an experiment names a robot.
 [[nodiscard]] bool is_robot(const std::string& file);
 
+/// A file's bytes; empty when it cannot be read.
+[[nodiscard]] std::string text_of(const std::string& file);
+
 /// Reads a robot.toml and its description.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);
 

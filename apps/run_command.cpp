@@ -122,6 +122,13 @@ Exit run(Composition& c, const RunOptions& options) {
   std::FILE* out = human_output(options.json);
   runtime::Experiment& e = c.experiment;
   const runtime::CycleConfig config = cycle_config(c, options);
+  const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
+  const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
+  const auto dds = DdsRun::open(c, "tandem_run", truth);
+  if (!dds) {
+    print_errors({dds.error()});
+    return Exit::kUsage;
+  }
   std::unique_ptr<log::Recorder> recorder;
   if (!options.no_log) {
     auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
@@ -131,15 +138,9 @@ Exit run(Composition& c, const RunOptions& options) {
     }
     recorder = std::move(*opened);
   }
-  const auto dds = DdsRun::open(c, "tandem_run");
-  if (!dds) {
-    print_errors({dds.error()});
-    return Exit::kUsage;
-  }
   rt::WallClock clock;
-  const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
-  const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
-  runtime::RobotCycle cycle({e.robot, *c.backend, *c.controllers, clock, recorder.get(), truth},
+  runtime::RobotCycle cycle({e.robot, *c.backend, *c.controllers, clock, recorder.get(), truth,
+                             *dds == nullptr ? nullptr : &(*dds)->tap()},
                             config);
   if (!options.quiet) {
     fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
@@ -164,12 +165,14 @@ Exit run(Composition& c, const RunOptions& options) {
   rt::install_emergency_signal();
   std::optional<rt::NoCpuSleep> awake;
   if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
+  if (*dds != nullptr) (*dds)->start(cycle);
   LoopThread loop(cycle, e.thread);
   watch(cycle, loop, c, out, options.quiet);
   loop.join();
   if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 
-  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}};
+  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}, {}};
+  if (*dds != nullptr) summary.dds = (*dds)->finish();
   if (recorder != nullptr) summary.log = recorder->close();
   if (c.frames != nullptr) summary.frames = c.frames->close();
   summary.faults = fault_texts(cycle, summary.log);

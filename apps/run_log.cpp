@@ -7,20 +7,11 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 namespace tandem::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string text_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 log::RunInfo info_of(const Composition& c) {
   const runtime::Experiment& e = c.experiment;

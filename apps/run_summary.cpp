@@ -35,6 +35,14 @@ Json frames_json(const std::optional<hal::can::FrameRecord::Result>& frames) {
   return {{"path", frames->path}, {"frames", frames->frames}, {"lost", frames->lost}};
 }
 
+Json dds_json(const std::optional<DdsResult>& dds) {
+  if (!dds) return nullptr;
+  return {{"domain", dds->domain},
+          {"samples", dds->counts.sent},
+          {"refused", dds->counts.refused},
+          {"dropped", dds->counts.dropped}};
+}
+
 Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
   if (!ground) return nullptr;
   return {{"weight_N", ground->weight_N},
@@ -102,6 +110,7 @@ Json RunSummary::json() const {
   json["cycle_ns"] = percentiles_json(loop.work.percentiles());
   json["log"] = log_json(log);
   json["frames"] = frames_json(frames);
+  json["dds"] = dds_json(dds);
   json["buses"] = buses_json(composition.can_buses());
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
@@ -162,6 +171,11 @@ void RunSummary::print(std::FILE* out) const {
     facts.add("log",
               fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
                           log->dropped, static_cast<double>(log->bytes) * 1e-6));
+  }
+  if (dds) {
+    facts.add("DDS", fmt::format("domain {}: {} samples, {} refused; {} cycles dropped",
+                                 dds->domain, dds->counts.sent, dds->counts.refused,
+                                 dds->counts.dropped));
   }
   add_bus_facts(composition.can_buses(), facts);
   if (frames) {

@@ -9,6 +9,7 @@
 
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/dds_run.hpp"
 #include "log/recorder.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -21,6 +22,7 @@ struct RunSummary {
   std::optional<log::RecordingResult> log;  ///< empty: nothing was logged
   std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
   std::vector<std::string> faults;          ///< the log's trouble included
+  std::optional<DdsResult> dds;             ///< empty: it was off
 
   [[nodiscard]] double sim_s() const;
   /// docs/json.md

@@ -19,7 +19,7 @@ struct Qos {
   bool reliable = true;
   bool transient_local = false;  ///< late readers get the last `depth` samples
   std::int32_t depth = 10;       ///< samples that are kept for readers, or until they are taken
-  std::string user_data;         ///< "key=value;…": what it says of itself before its type's hash
+  std::string user_data{};       ///< "key=value;…": what it says of itself before its type's hash
 };
 
 struct RawEndpoint {

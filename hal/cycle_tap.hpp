@@ -15,6 +15,7 @@ namespace tandem::hal {
 
 /// How long a cycle took, on the loop's clock.
 struct CycleTimes {
+  std::int64_t begin_ns = 0;    ///< clock time of the cycle's begin
   std::int64_t wakeup_ns = -1;  ///< from the grid point to the cycle's begin; -1: not paced
   std::int64_t bus_ns = -1;     ///< then to the bus' answers; -1: waits for none
   std::int64_t work_ns = 0;     ///< the rest, of the cycle before this one

@@ -12,6 +12,7 @@ bool RobotCycle::step() noexcept {
   if (phase_ == RunPhase::kDone) return false;
   const rt::Tick tick = wait();
   time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+  begin_ns_ = tick.begin_ns;
   wakeup_ns_ = tick.wakeup_ns;
   trace_wait(tick);
   exchange();
@@ -207,7 +208,8 @@ void RobotCycle::show() noexcept TANDEM_RT {
               .state = state_,
               .command = command_,
               .truth = truth_,
-              .times = {.wakeup_ns = wakeup_ns_,
+              .times = {.begin_ns = begin_ns_,
+                        .wakeup_ns = wakeup_ns_,
                         .bus_ns = loop_.last_bus_ns(),
                         .work_ns = loop_.last_work_ns(),
                         .overruns = loop_.statistics().overruns,

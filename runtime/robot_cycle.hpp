@@ -170,6 +170,7 @@ class RobotCycle {
   RunStatistics statistics_;
 
   hal::CycleTime time_;
+  std::int64_t begin_ns_ = 0;  // clock time
   std::int64_t wakeup_ns_ = -1;
   RunPhase phase_ = RunPhase::kBringUp;
   bool started_ = false;                                   // the first cycle was

@@ -1,0 +1,204 @@
+#include "dds/diagnostic_topics.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+
+namespace tandem::dds {
+namespace {
+
+constexpr std::uint32_t kStaleCycles = 10;  // as the loop takes a joint for lost
+constexpr double kHotShare = 0.9;           // of the winding's limit
+
+using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
+using StatusMessage = diagnostic_msgs_msg_dds__DiagnosticStatus_;
+
+std::vector<double> temperature_limits(const hal::RobotConfig& robot) {
+  std::vector<double> limits;
+  for (const hal::JointConfig& joint : robot.joints) {
+    const auto actuator =
+        std::ranges::find(robot.actuators, joint.actuator, &hal::ActuatorConfig::name);
+    limits.push_back(actuator == robot.actuators.end() ? std::numeric_limits<double>::infinity()
+                                                       : actuator->temperature_limit_C);
+  }
+  return limits;
+}
+
+/// Of the newest fault of `name` that is latched; empty: there is none.
+std::string latched_text(const std::vector<FaultEntry>& faults, const std::string& name) {
+  for (auto fault = faults.rbegin(); fault != faults.rend(); ++fault) {
+    if (fault->latched && fault->joint == name) return fault->text;
+  }
+  return {};
+}
+
+std::string percentiles(const rt::Histogram& histogram) {
+  const rt::Percentiles p = histogram.percentiles();
+  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
+  return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f}", us(p.p50), us(p.p99), us(p.p999),
+                     us(p.max));
+}
+
+}  // namespace
+
+DiagnosticTopics::DiagnosticTopics(OutputMaker& maker, const RunDescription& run)
+    : robot_(run.robot),
+      hal_(run.hal),
+      temperature_limit_C_(temperature_limits(run.robot)),
+      output_(
+          maker.periodic<diagnostic_msgs::DiagnosticArray>(Topic::kDiagnostics, "diagnostics")) {}
+
+HealthStatus DiagnosticTopics::run(const CycleSample& sample) const {
+  HealthStatus status{.level = Level::kOk,
+                      .name = "tandem: run",
+                      .message = hal::to_string(sample.phase),
+                      .hardware_id = robot_.name,
+                      .values = {{"hal", hal_},
+                                 {"phase", hal::to_string(sample.phase)},
+                                 {"cycle", std::to_string(sample.time.cycle)},
+                                 {"answer of the robot", to_string(sample.read_code)}}};
+  std::size_t latched = 0;
+  for (const FaultEntry& fault : sample.faults) {
+    if (!fault.latched) continue;
+    if (++latched == 1) {
+      status.message = fault.joint + (fault.joint.empty() ? "" : ": ") + fault.text;
+    }
+    const bool borne = fault.category == hal::StopCategory::kWarn;
+    status.level = std::max(status.level, borne ? Level::kWarn : Level::kError);
+  }
+  status.values.emplace_back("latched faults", std::to_string(latched));
+  if (sample.phase == hal::RunPhase::kFaulted) status.level = Level::kError;
+  return status;
+}
+
+HealthStatus DiagnosticTopics::loop(const CycleSample& sample) {
+  const LoopRecord& loop = sample.loop;
+  HealthStatus status{.level = Level::kOk,
+                      .name = "tandem: loop",
+                      .message = "on time",
+                      .hardware_id = robot_.name,
+                      .values = {{"cycles", std::to_string(loop.cycles)},
+                                 {"overruns", std::to_string(loop.overruns)},
+                                 {"skipped", std::to_string(loop.skipped)},
+                                 {"cycles not published", std::to_string(loop.dropped)},
+                                 {"work p50/p99/p99.9/max [us]", percentiles(loop.work)},
+                                 {"wake-up p50/p99/p99.9/max [us]", percentiles(loop.wakeup)}}};
+  if (loop.bus.count() > 0) {
+    status.values.emplace_back("bus p50/p99/p99.9/max [us]", percentiles(loop.bus));
+  }
+  if (loop.dropped > told_dropped_) {
+    status.level = Level::kWarn;
+    status.message =
+        fmt::format("{} cycles were not published: DDS is too slow", loop.dropped - told_dropped_);
+  }
+  if (loop.overruns > told_overruns_) {
+    status.level = Level::kWarn;
+    status.message = fmt::format("{} overruns", loop.overruns - told_overruns_);
+  }
+  told_dropped_ = loop.dropped;
+  told_overruns_ = loop.overruns;
+  return status;
+}
+
+HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t index) const {
+  const hal::StateImage& state = sample.state;
+  const hal::JointConfig& config = robot_.joints[index];
+  const auto drive = static_cast<hal::DriveState>(state.drive_state()[index]);
+  const std::uint32_t age = state.age_cycles()[index];
+  const double temperature_C = state.temperature_C()[index];
+  HealthStatus status{
+      .level = Level::kOk,
+      .name = "tandem: joint " + config.name,
+      .message = hal::to_string(drive),
+      .hardware_id = config.board,
+      .values = {{"drive", hal::to_string(drive)},
+                 {"mode", hal::to_string(static_cast<hal::ControlMode>(state.mode()[index]))},
+                 {"fault", fmt::format("0x{:04X}", state.fault()[index])},
+                 {"temperature [C]", fmt::format("{:.1f}", temperature_C)},
+                 {"current [A]", fmt::format("{:.2f}", state.current_A()[index])},
+                 {"age [cycles]", std::to_string(age)}}};
+  const std::string fault = latched_text(sample.faults, config.name);
+  if (state.fault()[index] != 0 || !fault.empty()) {
+    status.level = Level::kError;
+    status.message = fault.empty() ? fmt::format("fault 0x{:04X}", state.fault()[index]) : fault;
+  } else if (drive == hal::DriveState::kUnknown || age > kStaleCycles) {
+    status.level = Level::kStale;
+    status.message = fmt::format("no feedback for {} cycles", age);
+  } else if (temperature_C >= kHotShare * temperature_limit_C_[index]) {
+    status.level = Level::kWarn;
+    status.message = fmt::format("the winding is hot: {:.0f} of at most {:.0f} C", temperature_C,
+                                 temperature_limit_C_[index]);
+  } else if (drive == hal::DriveState::kQuickStopActive) {
+    status.level = Level::kWarn;
+  }
+  return status;
+}
+
+HealthStatus DiagnosticTopics::sensor(const CycleSample& sample, std::size_t index) const {
+  const hal::SensorConfig& config = robot_.sensors[index];
+  const std::uint32_t age = sample.state.sensor_age_cycles()[index];
+  HealthStatus status{.level = Level::kOk,
+                      .name = "tandem: sensor " + config.name,
+                      .message = "fresh",
+                      .hardware_id = fmt::format("{} node {}", config.bus, config.node_id),
+                      .values = {{"age [cycles]", std::to_string(age)}}};
+  const std::string fault = latched_text(sample.faults, config.name);
+  if (!fault.empty()) {
+    status.level = Level::kError;
+    status.message = fault;
+  } else if (age > kStaleCycles) {
+    status.level = Level::kStale;
+    status.message = fmt::format("no feedback for {} cycles", age);
+  }
+  return status;
+}
+
+std::vector<HealthStatus> DiagnosticTopics::statuses(const CycleSample& sample) {
+  std::vector<HealthStatus> joints, boards;
+  for (std::size_t j = 0; j < robot_.joints.size(); ++j) joints.push_back(joint(sample, j));
+  for (const hal::BoardConfig& board : robot_.boards) {
+    HealthStatus status{.level = Level::kOk,
+                        .name = "tandem: board " + board.name,
+                        .message = "every axis is well",
+                        .hardware_id = fmt::format("{} node {}", board.bus, board.node_id),
+                        .values = {}};
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (robot_.joints[j].board != board.name) continue;
+      const std::string& name = robot_.joints[j].name;
+      status.values.emplace_back(name, joints[j].message);
+      if (joints[j].level <= status.level) continue;
+      status.level = joints[j].level;
+      status.message = name + ": " + joints[j].message;
+    }
+    boards.push_back(std::move(status));
+  }
+  std::vector<HealthStatus> all{run(sample), loop(sample)};
+  std::ranges::move(boards, std::back_inserter(all));
+  std::ranges::move(joints, std::back_inserter(all));
+  for (std::size_t s = 0; s < robot_.sensors.size(); ++s) all.push_back(sensor(sample, s));
+  return all;
+}
+
+void DiagnosticTopics::publish(const CycleSample& sample) {
+  if (!sample.is_due(Topic::kDiagnostics) || !output_.wanted()) return;
+  const std::vector<HealthStatus> all = statuses(sample);
+  std::vector<std::vector<KeyValue>> values(all.size());
+  std::vector<StatusMessage> messages(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const HealthStatus& status = all[i];
+    for (const auto& [key, value] : status.values) values[i].push_back({refer(key), refer(value)});
+    messages[i].level = static_cast<std::uint8_t>(status.level);
+    messages[i].name = refer(status.name);
+    messages[i].message = refer(status.message);
+    messages[i].hardware_id = refer(status.hardware_id);
+    refer(messages[i].values, std::span<const KeyValue>(values[i]));
+  }
+  diagnostic_msgs::DiagnosticArray message{};
+  message.header = {ros_time(sample.stamp_ns), refer(no_frame_)};
+  refer(message.status, std::span<const StatusMessage>(messages));
+  output_.write(message);
+}
+
+}  // namespace tandem::dds

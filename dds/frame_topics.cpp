@@ -1,0 +1,119 @@
+#include "dds/frame_topics.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::dds {
+namespace {
+
+model::Placement inverse(const model::Placement& a_b) {
+  return {a_b.R.transpose(), -(a_b.R.transpose() * a_b.p)};
+}
+
+geometry_msgs_msg_dds__Transform_ transform(const model::Placement& at) {
+  const Eigen::Quaterniond q(at.R);
+  return {{at.p.x(), at.p.y(), at.p.z()}, {q.x(), q.y(), q.z(), q.w()}};
+}
+
+bool finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot) {
+  FrameTree frames;
+  for (const model::Link& link : tree.links) {
+    if (link.parent < 0) continue;
+    const model::Link& parent = tree.links[static_cast<std::size_t>(link.parent)];
+    const model::Placement from_parent = inverse(parent.in_body);
+    if (link.moving < 0) {
+      frames.fixed.push_back({parent.name, link.name, from_parent * link.in_body});
+      continue;
+    }
+    const model::Joint& joint = tree.joints[static_cast<std::size_t>(link.moving)];
+    const auto configured = std::ranges::find(robot.joints, joint.name, &hal::JointConfig::name);
+    frames.moving.push_back({parent.name, link.name, from_parent * joint.in_parent, joint.type,
+                             joint.axis,
+                             static_cast<std::size_t>(configured - robot.joints.begin())});
+  }
+  return frames;
+}
+
+model::Placement placement(const FrameEdge& edge, double position) {
+  if (edge.type == model::JointType::kPrismatic) {
+    return edge.at_zero * model::Placement{Eigen::Matrix3d::Identity(), edge.axis * position};
+  }
+  const Eigen::Matrix3d turned = Eigen::AngleAxisd(position, edge.axis).toRotationMatrix();
+  return edge.at_zero * model::Placement{turned, Eigen::Vector3d::Zero()};
+}
+
+FrameTopics::FrameTopics(OutputMaker& maker, const RunDescription& run)
+    : frames_(frame_tree(run.tree, run.robot)),
+      urdf_(run.urdf),
+      odom_("odom"),
+      base_(run.tree.links.front().name),
+      base_known_(run.tree.floating_base && run.truth != nullptr),
+      tf_(maker.periodic<tf2_msgs::TFMessage>(Topic::kTf, "tf")),
+      tf_static_(maker.latched<tf2_msgs::TFMessage>("tf_static")),
+      description_(maker.latched<std_msgs::String>("robot_description")) {
+  if (base_known_) odometry_ = maker.periodic<nav_msgs::Odometry>(Topic::kOdom, "odom");
+  transforms_.reserve(std::max(frames_.moving.size() + 1, frames_.fixed.size()));
+}
+
+void FrameTopics::begin(std::int64_t stamp_ns) {
+  description_.write({refer(urdf_)});
+  transforms_.clear();
+  for (const FrameEdge& edge : frames_.fixed) {
+    transforms_.push_back(
+        {{ros_time(stamp_ns), refer(edge.parent)}, refer(edge.child), transform(edge.at_zero)});
+  }
+  tf2_msgs::TFMessage message{};
+  refer(message.transforms, std::span<const Stamped>(transforms_));
+  tf_static_.write(message);
+}
+
+void FrameTopics::publish(const CycleSample& sample) {
+  if (sample.is_due(Topic::kTf) && tf_.wanted()) publish_moving(sample);
+  if (sample.is_due(Topic::kOdom) && odometry_.wanted()) publish_odometry(sample);
+}
+
+void FrameTopics::publish_moving(const CycleSample& sample) {
+  const Time stamp = ros_time(sample.stamp_ns);
+  transforms_.clear();
+  if (base_known_ && sample.truth != nullptr) {
+    const auto p = sample.truth->base_position_m();
+    const auto q = sample.truth->base_quaternion();
+    if (finite(p) && finite(q)) {
+      transforms_.push_back(
+          {{stamp, refer(odom_)}, refer(base_), {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}}});
+    }
+  }
+  const auto positions = sample.state.position_rad();
+  for (const FrameEdge& edge : frames_.moving) {
+    const double position = positions[edge.joint];
+    if (!std::isfinite(position)) continue;
+    transforms_.push_back(
+        {{stamp, refer(edge.parent)}, refer(edge.child), transform(placement(edge, position))});
+  }
+  tf2_msgs::TFMessage message{};
+  refer(message.transforms, std::span<const Stamped>(transforms_));
+  tf_.write(message);
+}
+
+void FrameTopics::publish_odometry(const CycleSample& sample) {
+  if (sample.truth == nullptr) return;
+  const auto p = sample.truth->base_position_m();
+  const auto q = sample.truth->base_quaternion();
+  const auto v = sample.truth->base_velocity();
+  if (!finite(p) || !finite(q) || !finite(v)) return;
+  nav_msgs::Odometry message{};
+  message.header = {ros_time(sample.stamp_ns), refer(odom_)};
+  message.child_frame_id = refer(base_);
+  message.pose.pose = {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
+  message.twist.twist = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+  odometry_.write(message);
+}
+
+}  // namespace tandem::dds

@@ -1,0 +1,156 @@
+#include "dds/image_topics.hpp"
+
+namespace tandem::dds {
+namespace {
+
+std::vector<std::string> names(const auto& items) {
+  std::vector<std::string> found;
+  for (const auto& item : items) found.push_back(item.name);
+  return found;
+}
+
+using Bin = tandem_msgs_msg_dds__HistogramBin_;
+
+tandem_msgs_msg_dds__Histogram_ message_of(const rt::Histogram& histogram, std::vector<Bin>& bins) {
+  for (const rt::HistogramBin& bin : histogram.bins()) bins.push_back({bin.upper_ns, bin.count});
+  const rt::Percentiles p = histogram.percentiles();
+  tandem_msgs_msg_dds__Histogram_ message{};
+  message.count = histogram.count();
+  message.p50_ns = p.p50;
+  message.p99_ns = p.p99;
+  message.p999_ns = p.p999;
+  message.max_ns = p.max;
+  refer(message.bins, std::span<const Bin>(bins));
+  return message;
+}
+
+}  // namespace
+
+ImageTopics::ImageTopics(OutputMaker& maker, const RunDescription& run)
+    : run_(run.run),
+      robot_(run.robot.name),
+      version_(run.version),
+      hal_(run.hal),
+      hash_(run.description_hash),
+      period_ns_(run.period_ns),
+      joints_(names(run.robot.joints)),
+      sensors_(names(run.robot.sensors)),
+      state_(maker.periodic<tandem_msgs::State>(Topic::kState, "tandem/state")),
+      command_(maker.periodic<tandem_msgs::Command>(Topic::kCommand, "tandem/command")),
+      statistics_(
+          maker.periodic<tandem_msgs::LoopStatistics>(Topic::kStatistics, "tandem/statistics")),
+      description_(maker.latched<tandem_msgs::Robot>("tandem/robot")),
+      faults_(maker.latched<tandem_msgs::Faults>("tandem/faults")) {
+  for (const hal::SensorConfig& sensor : run.robot.sensors) {
+    channels_.push_back(static_cast<std::uint32_t>(sensor.channels()));
+  }
+}
+
+void ImageTopics::begin(std::int64_t /*stamp_ns*/) {
+  tandem_msgs::Robot message{};
+  message.run = run_;
+  message.name = refer(robot_);
+  message.version = refer(version_);
+  message.hal = refer(hal_);
+  message.description_hash = refer(hash_);
+  message.period_ns = period_ns_;
+  refer(message.joints, joints_.get());
+  refer(message.sensors, sensors_.get());
+  refer(message.sensor_channels, std::span<const std::uint32_t>(channels_));
+  description_.write(message);
+  publish_faults({}, 0);
+}
+
+void ImageTopics::publish(const CycleSample& sample) {
+  if (sample.is_due(Topic::kState) && state_.wanted()) publish_state(sample);
+  if (sample.is_due(Topic::kCommand) && command_.wanted()) publish_command(sample);
+  if (sample.is_due(Topic::kStatistics) && statistics_.wanted()) publish_statistics(sample);
+}
+
+void ImageTopics::publish_state(const CycleSample& sample) {
+  const hal::StateImage& state = sample.state;
+  tandem_msgs::State message{};
+  message.run = run_;
+  message.cycle = sample.time.cycle;
+  message.time_ns = sample.time.time_ns;
+  message.phase = static_cast<std::uint8_t>(sample.phase);
+  message.code = static_cast<std::uint8_t>(sample.read_code);
+  refer(message.position_rad, state.position_rad());
+  refer(message.velocity_rad_s, state.velocity_rad_s());
+  refer(message.acceleration_rad_s2, state.acceleration_rad_s2());
+  refer(message.torque_nm, state.torque_Nm());
+  refer(message.motor_position_rad, state.motor_position_rad());
+  refer(message.motor_velocity_rad_s, state.motor_velocity_rad_s());
+  refer(message.current_a, state.current_A());
+  refer(message.voltage_v, state.voltage_V());
+  refer(message.temperature_c, state.temperature_C());
+  refer(message.sensor, state.sensor());
+  refer(message.fault, state.fault());
+  refer(message.age_cycles, state.age_cycles());
+  refer(message.sensor_age_cycles, state.sensor_age_cycles());
+  refer(message.statusword, state.statusword());
+  refer(message.mode, state.mode());
+  refer(message.interaction, state.interaction());
+  refer(message.drive_state, state.drive_state());
+  state_.write(message);
+}
+
+void ImageTopics::publish_command(const CycleSample& sample) {
+  const hal::CommandImage& command = sample.command;
+  tandem_msgs::Command message{};
+  message.run = run_;
+  message.cycle = sample.time.cycle;
+  message.time_ns = sample.time.time_ns;
+  refer(message.position_rad, command.position_rad());
+  refer(message.velocity_rad_s, command.velocity_rad_s());
+  refer(message.torque_nm, command.torque_Nm());
+  refer(message.voltage_v, command.voltage_V());
+  refer(message.current_a, command.current_A());
+  refer(message.stiffness_nm_rad, command.stiffness_Nm_rad());
+  refer(message.damping_nms_rad, command.damping_Nms_rad());
+  refer(message.mode, command.mode());
+  refer(message.interaction, command.interaction());
+  refer(message.fault_reset, command.fault_reset());
+  command_.write(message);
+}
+
+void ImageTopics::publish_statistics(const CycleSample& sample) {
+  const LoopRecord& loop = sample.loop;
+  std::vector<Bin> wakeup, bus, work;
+  tandem_msgs::LoopStatistics message{};
+  message.run = run_;
+  message.cycle = sample.time.cycle;
+  message.time_ns = sample.time.time_ns;
+  message.cycles = loop.cycles;
+  message.overruns = loop.overruns;
+  message.skipped = loop.skipped;
+  message.dropped = loop.dropped;
+  message.wakeup = message_of(loop.wakeup, wakeup);
+  message.bus = message_of(loop.bus, bus);
+  message.work = message_of(loop.work, work);
+  statistics_.write(message);
+}
+
+void ImageTopics::publish_faults(const std::vector<FaultEntry>& faults, std::uint64_t lost) {
+  std::vector<std::string> categories;
+  for (const FaultEntry& fault : faults) categories.emplace_back(hal::to_string(fault.category));
+  std::vector<tandem_msgs_msg_dds__Fault_> list;
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    const FaultEntry& fault = faults[i];
+    list.push_back({.cycle = fault.cycle,
+                    .time_s = fault.time_s,
+                    .joint = refer(fault.joint),
+                    .board = refer(fault.board),
+                    .text = refer(fault.text),
+                    .category = refer(categories[i]),
+                    .latched = fault.latched,
+                    .cleared_s = fault.cleared_s});
+  }
+  tandem_msgs::Faults message{};
+  message.run = run_;
+  refer(message.faults, std::span<const tandem_msgs_msg_dds__Fault_>(list));
+  message.lost = lost;
+  faults_.write(message);
+}
+
+}  // namespace tandem::dds

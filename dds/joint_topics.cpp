@@ -1,0 +1,82 @@
+#include "dds/joint_topics.hpp"
+
+#include <array>
+
+namespace tandem::dds {
+namespace {
+
+/// An interface of dynamic_joint_states, named as ros2_control names it where it does.
+struct Interface {
+  const char* name;
+  std::span<const double> (hal::StateImage::*values)() const noexcept;
+};
+constexpr std::array<Interface, 9> kInterfaces{{
+    {"position", &hal::StateImage::position_rad},
+    {"velocity", &hal::StateImage::velocity_rad_s},
+    {"acceleration", &hal::StateImage::acceleration_rad_s2},
+    {"effort", &hal::StateImage::torque_Nm},
+    {"motor_position", &hal::StateImage::motor_position_rad},
+    {"motor_velocity", &hal::StateImage::motor_velocity_rad_s},
+    {"current", &hal::StateImage::current_A},
+    {"voltage", &hal::StateImage::voltage_V},
+    {"temperature", &hal::StateImage::temperature_C},
+}};
+
+std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
+  std::vector<std::string> names;
+  for (const hal::JointConfig& joint : robot.joints) names.push_back(joint.name);
+  return names;
+}
+
+std::vector<std::string> interface_names() {
+  std::vector<std::string> names;
+  for (const Interface& one : kInterfaces) names.emplace_back(one.name);
+  return names;
+}
+
+}  // namespace
+
+JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
+    : joints_(joint_names(run.robot)),
+      interfaces_(interface_names()),
+      values_(run.robot.joints.size() * kInterfaces.size()),
+      joint_values_(run.robot.joints.size()),
+      joint_states_(maker.periodic<sensor_msgs::JointState>(Topic::kJointStates, "joint_states")),
+      dynamic_joint_states_(maker.periodic<control_msgs::DynamicJointState>(
+          Topic::kDynamicJointStates, "dynamic_joint_states")) {
+  for (std::size_t j = 0; j < joint_values_.size(); ++j) {
+    refer(joint_values_[j].interface_names, interfaces_.get());
+    refer(joint_values_[j].values,
+          std::span<const double>(values_).subspan(j * kInterfaces.size(), kInterfaces.size()));
+  }
+  dynamic_.header.frame_id = refer(no_frame_);
+  refer(dynamic_.joint_names, joints_.get());
+  refer(dynamic_.interface_values,
+        std::span<const control_msgs_msg_dds__InterfaceValue_>(joint_values_));
+}
+
+void JointTopics::publish(const CycleSample& sample) {
+  if (sample.is_due(Topic::kJointStates) && joint_states_.wanted()) {
+    sensor_msgs::JointState message{};
+    message.header = {ros_time(sample.stamp_ns), refer(no_frame_)};
+    refer(message.name, joints_.get());
+    refer(message.position, sample.state.position_rad());
+    refer(message.velocity, sample.state.velocity_rad_s());
+    refer(message.effort, sample.state.torque_Nm());
+    joint_states_.write(message);
+  }
+  if (sample.is_due(Topic::kDynamicJointStates) && dynamic_joint_states_.wanted()) {
+    dynamic_joint_states_.write(dynamic(sample));
+  }
+}
+
+const control_msgs::DynamicJointState& JointTopics::dynamic(const CycleSample& sample) {
+  dynamic_.header.stamp = ros_time(sample.stamp_ns);
+  for (std::size_t i = 0; i < kInterfaces.size(); ++i) {
+    const auto values = (sample.state.*kInterfaces[i].values)();
+    for (std::size_t j = 0; j < values.size(); ++j) values_[j * kInterfaces.size() + i] = values[j];
+  }
+  return dynamic_;
+}
+
+}  // namespace tandem::dds

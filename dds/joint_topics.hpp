@@ -1,0 +1,31 @@
+// joint_states and dynamic_joint_states.
+// Layer: dds.  Thread: the publisher's.
+#pragma once
+
+#include <vector>
+
+#include "dds/message_parts.hpp"
+#include "dds/topic_group.hpp"
+
+namespace tandem::dds {
+
+/// Every joint in the process image's order, link side. A joint that has not been heard of has 0.
+class JointTopics final : public TopicGroup {
+ public:
+  JointTopics(OutputMaker& maker, const RunDescription& run);
+  void publish(const CycleSample& sample) override;
+
+ private:
+  [[nodiscard]] const control_msgs::DynamicJointState& dynamic(const CycleSample& sample);
+
+  TextList joints_;
+  TextList interfaces_;
+  std::vector<double> values_;  // a joint's interfaces one after another
+  std::vector<control_msgs_msg_dds__InterfaceValue_> joint_values_;
+  std::string no_frame_;
+  Output<sensor_msgs::JointState> joint_states_;
+  Output<control_msgs::DynamicJointState> dynamic_joint_states_;
+  control_msgs::DynamicJointState dynamic_{};
+};
+
+}  // namespace tandem::dds

@@ -1,0 +1,243 @@
+#include "dds/publisher.hpp"
+
+#include <time.h>
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include "dds/diagnostic_topics.hpp"
+#include "dds/frame_topics.hpp"
+#include "dds/image_topics.hpp"
+#include "dds/joint_topics.hpp"
+#include "dds/message_parts.hpp"
+#include "dds/sensor_topics.hpp"
+
+namespace tandem::dds {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::size_t kTimesSlots = 16'384;
+constexpr std::size_t kImageSlots = 512;
+constexpr auto kPoll = std::chrono::milliseconds(1);
+constexpr auto kClockAtLeast = std::chrono::milliseconds(100);  // while the simulation stands still
+constexpr auto kOffsetGood = std::chrono::seconds(1);
+
+constexpr std::uint32_t bit(Topic topic) { return 1U << static_cast<unsigned>(topic); }
+constexpr std::uint32_t kNeedsState = bit(Topic::kJointStates) | bit(Topic::kDynamicJointStates) |
+                                      bit(Topic::kImu) | bit(Topic::kWrench) | bit(Topic::kTf) |
+                                      bit(Topic::kDiagnostics) | bit(Topic::kState);
+constexpr std::uint32_t kNeedsCommand = bit(Topic::kCommand);
+constexpr std::uint32_t kNeedsTruth = bit(Topic::kTf) | bit(Topic::kOdom);
+
+constexpr std::size_t aligned(std::size_t bytes) { return (bytes + 15) / 16 * 16; }
+
+std::int64_t read_clock(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
+
+/// CLOCK_REALTIME less CLOCK_MONOTONIC, the reading that was disturbed least.
+std::int64_t wall_less_monotonic() {
+  std::int64_t offset = 0, best = std::numeric_limits<std::int64_t>::max();
+  for (int i = 0; i < 5; ++i) {
+    const std::int64_t before = read_clock(CLOCK_MONOTONIC);
+    const std::int64_t wall = read_clock(CLOCK_REALTIME);
+    const std::int64_t took = read_clock(CLOCK_MONOTONIC) - before;
+    if (took >= best) continue;
+    best = took;
+    offset = wall - before - took / 2;
+  }
+  return offset;
+}
+
+Status check_names(const hal::RobotConfig& robot) {
+  std::set<std::string> names;
+  for (const hal::SensorConfig& sensor : robot.sensors) {
+    if (names.insert(ros_token(sensor.name)).second) continue;
+    return fail("two sensors are called '" + ros_token(sensor.name) + "' in ROS 2",
+                "rename '" + sensor.name + "': only letters, digits and _ make a difference");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Publisher>> Publisher::create(Participant& participant,
+                                                     const RunDescription& run) {
+  if (const Status names = check_names(run.robot); !names) return std::unexpected(names.error());
+  std::unique_ptr<Publisher> made(new Publisher(participant, run));
+  if (made->error_) return std::unexpected(*made->error_);
+  return made;
+}
+
+Publisher::Publisher(Participant& participant, const RunDescription& run)
+    : simulated_time_(run.simulated_time),
+      state_(run.robot.shape()),
+      command_(run.robot.shape()),
+      truth_(run.truth == nullptr ? std::nullopt : std::optional(*run.truth)),
+      state_at_(aligned(sizeof(Head))),
+      command_at_(state_at_ + aligned(state_.bytes().size())),
+      truth_at_(command_at_ + aligned(command_.bytes().size())),
+      times_ring_(aligned(sizeof(Times)), kTimesSlots),
+      image_ring_(slot_bytes(), kImageSlots) {
+  OutputMaker maker(participant, run.period_ns, counts_);
+  for (std::size_t t = 0; t < kTopics; ++t) every_[t] = maker.every(static_cast<Topic>(t));
+  if (!run.simulated_time) every_[static_cast<std::size_t>(Topic::kClock)] = 0;
+  if (run.truth == nullptr) every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
+  if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
+  groups_.push_back(std::make_unique<JointTopics>(maker, run));
+  groups_.push_back(std::make_unique<SensorTopics>(maker, run));
+  groups_.push_back(std::make_unique<FrameTopics>(maker, run));
+  groups_.push_back(std::make_unique<ImageTopics>(maker, run));
+  groups_.push_back(std::make_unique<DiagnosticTopics>(maker, run));
+  error_ = maker.error();
+}
+
+Publisher::~Publisher() { stop(); }
+
+std::size_t Publisher::slot_bytes() const {
+  return truth_at_ + (truth_ ? aligned(truth_->bytes().size()) : 0);
+}
+
+void Publisher::take(const hal::CycleView& view) noexcept TANDEM_RT {
+  const std::uint64_t number = taken_++;
+  if (const auto slot = times_ring_.begin_push(); !slot.empty()) {
+    const Times times{number, view.times};
+    std::memcpy(slot.data(), &times, sizeof(times));
+    times_ring_.end_push();
+  }
+  std::uint32_t due = 0;
+  for (std::size_t t = 0; t < kTopics; ++t) {
+    if (every_[t] != 0 && view.time.cycle % every_[t] == 0) due |= 1U << t;
+  }
+  if (due == 0) return;
+  const auto slot = image_ring_.begin_push();
+  if (slot.empty()) return;
+  const std::int64_t wakeup_ns = std::max<std::int64_t>(0, view.times.wakeup_ns);
+  const bool truth = truth_ && view.truth != nullptr && (due & kNeedsTruth) != 0;
+  const Head head{number,         view.time, view.times.begin_ns - wakeup_ns, due, view.phase,
+                  view.read_code, truth};
+  std::memcpy(slot.data(), &head, sizeof(head));
+  const auto copy = [&](std::size_t at, std::span<const std::byte> bytes) {
+    std::memcpy(slot.data() + at, bytes.data(), bytes.size());
+  };
+  if ((due & kNeedsState) != 0) copy(state_at_, view.state.bytes());
+  if ((due & kNeedsCommand) != 0) copy(command_at_, view.command.bytes());
+  if (truth) copy(truth_at_, view.truth->bytes());
+  image_ring_.end_push();
+}
+
+void Publisher::start(FaultSource faults) {
+  fault_source_ = std::move(faults);
+  wall_offset_ns_ = wall_less_monotonic();
+  offset_due_ = SteadyClock::now() + kOffsetGood;
+  for (const auto& group : groups_) group->begin(simulated_time_ ? 0 : read_clock(CLOCK_REALTIME));
+  if (simulated_time_) publish_clock();
+  thread_ = std::thread([this] { run(); });
+}
+
+PublishCounts Publisher::stop() {
+  stop_.store(true, std::memory_order_release);
+  if (thread_.joinable()) thread_.join();
+  counts_.dropped = image_ring_.dropped();
+  return counts_;
+}
+
+void Publisher::run() {
+  for (;;) {
+    const bool last = stop_.load(std::memory_order_acquire);  // before the ring is emptied
+    const bool some = drain();
+    look_at_faults();
+    if (simulated_time_ && SteadyClock::now() >= clock_due_) publish_clock();
+    if (last) return;
+    if (!some) std::this_thread::sleep_for(kPoll);
+  }
+}
+
+/// @return whether there was something to publish
+bool Publisher::drain() {
+  bool some = false;
+  // Not more than the ring holds, so that a fast simulation does not keep the rest from its turn.
+  for (std::size_t i = 0; i < kImageSlots; ++i) {
+    const auto slot = image_ring_.front();
+    if (slot.empty()) break;
+    some = true;
+    publish(slot);
+    image_ring_.pop();
+  }
+  if (!some) count_times(std::numeric_limits<std::uint64_t>::max());
+  return some;
+}
+
+/// Takes the times of every cycle up to take()'s call `up_to`.
+void Publisher::count_times(std::uint64_t up_to) {
+  for (auto slot = times_ring_.front(); !slot.empty(); slot = times_ring_.front()) {
+    Times entry{};
+    std::memcpy(&entry, slot.data(), sizeof(entry));
+    if (entry.number > up_to) return;
+    const hal::CycleTimes& times = entry.times;
+    ++loop_.cycles;
+    loop_.overruns = times.overruns;
+    loop_.skipped = times.skipped;
+    if (times.wakeup_ns >= 0) loop_.wakeup.record(times.wakeup_ns);
+    if (times.bus_ns >= 0) loop_.bus.record(times.bus_ns);
+    if (entry.number > 0) loop_.work.record(times.work_ns);  // of the cycle before
+    times_ring_.pop();
+  }
+}
+
+void Publisher::publish(std::span<const std::byte> slot) {
+  Head head{};
+  std::memcpy(&head, slot.data(), sizeof(head));
+  const auto copy = [&](std::span<std::byte> bytes, std::size_t at) {
+    std::memcpy(bytes.data(), slot.data() + at, bytes.size());
+  };
+  if ((head.due & kNeedsState) != 0) copy(state_.bytes(), state_at_);
+  if ((head.due & kNeedsCommand) != 0) copy(command_.bytes(), command_at_);
+  if (head.truth) copy(truth_->bytes(), truth_at_);
+  count_times(head.number);
+  loop_.dropped = image_ring_.dropped();
+  clock_ns_ = head.time.time_ns;
+  const CycleSample sample{.time = head.time,
+                           .stamp_ns = stamp_ns(head),
+                           .phase = head.phase,
+                           .read_code = head.read_code,
+                           .due = head.due,
+                           .state = state_,
+                           .command = command_,
+                           .truth = head.truth ? &*truth_ : nullptr,
+                           .loop = loop_,
+                           .faults = faults_};
+  if (sample.is_due(Topic::kClock)) publish_clock();  // before what is stamped with it
+  for (const auto& group : groups_) group->publish(sample);
+}
+
+void Publisher::publish_clock() {
+  clock_due_ = SteadyClock::now() + kClockAtLeast;
+  if (clock_.wanted()) clock_.write({ros_time(clock_ns_)});
+}
+
+void Publisher::look_at_faults() {
+  const std::uint64_t version = fault_source_.version();
+  if (version == fault_version_) return;
+  fault_version_ = version;
+  faults_ = fault_source_.faults();
+  for (const auto& group : groups_) group->publish_faults(faults_, fault_source_.lost());
+}
+
+/// The wall clock may be set or slewed while the loop's clock goes on: it is looked at now and
+/// then, on this thread.
+std::int64_t Publisher::stamp_ns(const Head& head) {
+  if (simulated_time_) return head.time.time_ns;
+  const SteadyClock::time_point now = SteadyClock::now();
+  if (now >= offset_due_) {
+    wall_offset_ns_ = wall_less_monotonic();
+    offset_due_ = now + kOffsetGood;
+  }
+  return head.nominal_ns + wall_offset_ns_;
+}
+
+}  // namespace tandem::dds

@@ -1,0 +1,101 @@
+// Shows a run to others: every cycle goes through a wait-free ring to a thread of this class' own,
+// which makes DDS samples of it. docs/ros2.md says which, when and how.
+// Layer: dds.  Thread: take() the loop's; the rest main.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "base/spsc_ring.hpp"
+#include "dds/topic_group.hpp"
+#include "hal/cycle_tap.hpp"
+
+namespace tandem::dds {
+
+/// Who tells the run's faults; asked on the publisher's thread.
+struct FaultSource {
+  std::function<std::uint64_t()>
+      version;  ///< 0: there are none; another one: some have come or gone
+  std::function<std::vector<FaultEntry>()> faults;
+  std::function<std::uint64_t()> lost;  ///< that the list had no room for
+};
+
+class Publisher final : public hal::CycleTap {
+ public:
+  /// Makes every topic; nothing is published yet. Robot, tree and participant outlive it.
+  /// Errors: Endpoint::create()'s; two sensors whose names are the same in ROS 2.
+  [[nodiscard]] static Result<std::unique_ptr<Publisher>> create(Participant& participant,
+                                                                 const RunDescription& run);
+  ~Publisher() override;
+  Publisher(const Publisher&) = delete;
+  Publisher& operator=(const Publisher&) = delete;
+
+  /// Publishes what does not change, and starts the thread.
+  void start(FaultSource faults);
+  /// Publishes what is in the ring, and ends the thread. Once, when no cycle comes any more.
+  PublishCounts stop();
+
+  /// @rt copies the images that a topic is due for, at most: no lock, no heap, no system call.
+  void take(const hal::CycleView& view) noexcept TANDEM_RT override;
+
+ private:
+  static constexpr std::size_t kTopics = kTopicRates.size();
+  /// Of every cycle.
+  struct Times {
+    std::uint64_t number;  // of take()'s calls
+    hal::CycleTimes times;
+  };
+  /// Of a cycle that some topic is due in; then the images follow.
+  struct Head {
+    std::uint64_t number;
+    hal::CycleTime time;
+    std::int64_t nominal_ns;  // on the loop's clock
+    std::uint32_t due;
+    hal::RunPhase phase;
+    Code read_code;
+    bool truth;
+  };
+
+  Publisher(Participant& participant, const RunDescription& run);
+  [[nodiscard]] std::size_t slot_bytes() const;
+  void run();
+  bool drain();
+  void count_times(std::uint64_t up_to);
+  void publish(std::span<const std::byte> slot);
+  void publish_clock();
+  void look_at_faults();
+  [[nodiscard]] std::int64_t stamp_ns(const Head& head);
+
+  bool simulated_time_;
+  std::array<std::uint64_t, kTopics> every_{};
+  PublishCounts counts_;
+  LoopRecord loop_;
+  std::vector<std::unique_ptr<TopicGroup>> groups_;
+  Output<rosgraph_msgs::Clock> clock_;
+  std::optional<Error> error_;
+
+  // Copies of what a slot holds, for the groups.
+  hal::StateImage state_;
+  hal::CommandImage command_;
+  std::optional<hal::TruthImage> truth_;
+  std::size_t state_at_, command_at_, truth_at_;  // in a slot
+  SpscRing times_ring_, image_ring_;
+  std::uint64_t taken_ = 0;  // the loop's
+
+  FaultSource fault_source_;
+  std::uint64_t fault_version_ = 0;
+  std::vector<FaultEntry> faults_;
+  std::int64_t clock_ns_ = 0;  // that `clock` told last
+  std::chrono::steady_clock::time_point clock_due_, offset_due_;
+  std::int64_t wall_offset_ns_ = 0;  // the wall clock less the loop's
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace tandem::dds

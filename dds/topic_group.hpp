@@ -1,0 +1,159 @@
+// What the publisher's topics have in common: where their samples come from and go to.
+// Layer: dds.  Thread: the publisher's.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "dds/config.hpp"
+#include "dds/endpoint.hpp"
+#include "hal/cycle_tap.hpp"
+#include "hal/robot_config.hpp"
+#include "hal/stop_category.hpp"
+#include "model/tree.hpp"
+#include "rt/histogram.hpp"
+
+namespace tandem::dds {
+
+/// A fault of the run as the topics tell it.
+struct FaultEntry {
+  std::uint64_t cycle = 0;
+  double time_s = 0.0;
+  std::string joint;  ///< or sensor, or controller; empty: of the whole robot
+  std::string board;  ///< the joint's; may be empty
+  std::string text;
+  hal::StopCategory category = hal::StopCategory::kWarn;
+  bool latched = true;
+  double cleared_s = 0.0;  ///< when it is not latched
+};
+
+/// What is the same in every cycle of a run.
+struct RunDescription {
+  const hal::RobotConfig& robot;
+  const model::Tree& tree;  ///< of the robot's description, for frames
+  std::string urdf;         ///< the description's text
+  std::string hal;          ///< "sim", "can"
+  std::string version;      ///< of Tandem
+  std::string description_hash;
+  std::int64_t period_ns = 1'000'000;
+  bool simulated_time = false;  ///< stamps are time_ns and `clock` tells them; else wall clock
+  const hal::TruthImage* truth = nullptr;  ///< the cycles'; null: they bring none
+  std::uint64_t run = 0;                   ///< drawn at its start
+};
+
+/// The loop's times, of every cycle so far.
+struct LoopRecord {
+  std::uint64_t cycles = 0;  ///< counted here
+  std::uint64_t overruns = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t dropped = 0;  ///< that did not fit into a ring
+  rt::Histogram wakeup, bus, work;
+};
+
+/// One cycle that some topic is due in.
+struct CycleSample {
+  hal::CycleTime time;
+  std::int64_t stamp_ns;  ///< of `time`, on the clock that the stamps have
+  hal::RunPhase phase;
+  Code read_code;
+  std::uint32_t due;             ///< bit i: Topic i
+  const hal::StateImage& state;  ///< good when a topic is due that needs it, as are
+  const hal::CommandImage& command;
+  const hal::TruthImage* truth;  ///< null: none
+  const LoopRecord& loop;
+  const std::vector<FaultEntry>& faults;
+
+  [[nodiscard]] bool is_due(Topic topic) const {
+    return (due >> static_cast<unsigned>(topic) & 1U) != 0;
+  }
+};
+
+struct PublishCounts {
+  std::uint64_t sent = 0;
+  std::uint64_t refused = 0;  ///< by DDS: a reader was too far behind, or memory short
+  std::uint64_t dropped = 0;  ///< cycles that did not fit into the ring
+};
+
+/// A topic of this process; one that was not made or is off takes no samples.
+template <class T>
+class Output {
+ public:
+  Output() = default;
+  Output(Writer<T> writer, PublishCounts& counts) : writer_(std::move(writer)), counts_(&counts) {}
+
+  /// Whether somebody would get a sample.
+  [[nodiscard]] bool wanted() const { return writer_ && writer_->endpoint().matched() > 0; }
+  void write(const T& sample) {
+    if (!writer_) return;
+    ++(writer_->write(sample) ? counts_->sent : counts_->refused);
+  }
+
+ private:
+  std::optional<Writer<T>> writer_;
+  PublishCounts* counts_ = nullptr;
+};
+
+/// Makes topics in the participant's namespace, and keeps the first thing that went wrong.
+class OutputMaker {
+ public:
+  OutputMaker(Participant& participant, std::int64_t period_ns, PublishCounts& counts)
+      : participant_(participant), period_ns_(period_ns), counts_(counts) {}
+
+  /// Cycles between two samples; 0: the topic is off.
+  [[nodiscard]] std::uint64_t every(Topic topic) const {
+    return participant_.config().cycles_between(topic, period_ns_);
+  }
+  /// One of samples that come again and again; nothing when [dds.every] has turned it off.
+  template <class T>
+  [[nodiscard]] Output<T> periodic(Topic topic, const std::string& ros_name) {
+    if (every(topic) == 0) return {};
+    return make<T>(ros_name, {.reliable = true, .transient_local = false, .depth = 16});
+  }
+  /// One whose last sample is given to readers that come late.
+  template <class T>
+  [[nodiscard]] Output<T> latched(const std::string& ros_name) {
+    return make<T>(ros_name, {.reliable = true, .transient_local = true, .depth = 1});
+  }
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+ private:
+  template <class T>
+  Output<T> make(const std::string& ros_name, const Qos& qos) {
+    auto writer = Writer<T>::create(participant_, participant_.topic_name(ros_name), qos);
+    if (writer) return Output<T>(std::move(*writer), counts_);
+    if (!error_) error_ = writer.error();
+    return {};
+  }
+
+  Participant& participant_;
+  std::int64_t period_ns_;
+  PublishCounts& counts_;
+  std::optional<Error> error_;
+};
+
+/// Some topics that belong together.
+class TopicGroup {
+ public:
+  virtual ~TopicGroup() = default;
+  /// Before the first cycle: what does not change.
+  virtual void begin(std::int64_t /*stamp_ns*/) {}
+  /// A cycle in which at least one topic of some group is due.
+  virtual void publish(const CycleSample& sample) = 0;
+  /// Faults have come or gone.
+  virtual void publish_faults(const std::vector<FaultEntry>& /*faults*/, std::uint64_t /*lost*/) {}
+};
+
+/// A name as ROS 2 allows it in a topic: what is no letter, digit or _ becomes _.
+[[nodiscard]] inline std::string ros_token(std::string name) {
+  for (char& c : name) {
+    const bool good = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (!good) c = '_';
+  }
+  const bool digit = !name.empty() && name.front() >= '0' && name.front() <= '9';
+  return digit ? "_" + name : name;
+}
+
+}  // namespace tandem::dds
