@@ -35,5 +35,6 @@ void add_flags(CLI::App& app, EdsOptions& o);
 void add_flags(CLI::App& app, ReportOptions& o);
 void add_flags(CLI::App& app, LatencyOptions& o);
 void add_flags(CLI::App& app, DoctorOptions& o);
+void add_flags(CLI::App& app, TopicOptions& o);
 
 }  // namespace tandem::apps

@@ -122,6 +122,7 @@ Command parse_command_line(int argc, const char* const* argv) {
       "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
   commands.add<JointOptions>("joint", "Joints of a running run: list, set, gains");
   commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
+  commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
   commands.add<InjectOptions>("inject",
                               "Inject a fault into a running emulated or simulated robot");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");

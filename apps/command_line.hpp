@@ -190,11 +190,41 @@ struct DoctorOptions {
   std::string json;
 };
 
+/// tandem topic list|echo|hz
+struct TopicOptions {
+  enum class Action : std::uint8_t { kList, kEcho, kHz } action = Action::kList;
+  std::string topic;  ///< echo, hz: "/joint_states"
+  int domain = 0;
+  std::vector<std::string> interfaces{"lo"};
+  std::optional<double> wait_s;        ///< for discovery; empty: 1 (list), 5 (echo, hz)
+  std::optional<std::uint64_t> count;  ///< echo, hz: samples, then it ends
+  std::string field;                   ///< echo: "position[2]"; empty: all
+  bool all = false;                    ///< list: not only ROS 2's topics
+  std::size_t window = 10'000;         ///< hz: intervals that the rate is of
+  std::string json;
+};
+
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
-using Command = std::variant<Exit, RunOptions, AskOptions, FaultOptions, EstopOptions, ClockOptions,
-                             ControllerOptions, JointOptions, InjectOptions, CheckOptions,
-                             ModelOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
-                             DoctorOptions, EmulateOptions>;
+// clang-format off: one a line, so that additions meet without conflict
+using Command = std::variant<Exit,
+                             RunOptions,
+                             AskOptions,
+                             FaultOptions,
+                             EstopOptions,
+                             ClockOptions,
+                             ControllerOptions,
+                             JointOptions,
+                             InjectOptions,
+                             CheckOptions,
+                             ModelOptions,
+                             LogOptions,
+                             EdsOptions,
+                             ReportOptions,
+                             LatencyOptions,
+                             DoctorOptions,
+                             EmulateOptions,
+                             TopicOptions>;
+// clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest
 /// flag or subcommand for one that does not exist.

@@ -35,6 +35,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit report_command(const ReportOptions& options);
 /// Says what of the machine stands in the way of real time; exit status 0 whatever it finds.
 [[nodiscard]] Exit doctor_command(const DoctorOptions& options);
+/// Topics of a DDS domain: a list, samples as text, rates.
+[[nodiscard]] Exit topic_command(const TopicOptions& options);
 /// Measures; judges nothing.
 [[nodiscard]] Exit latency_command(const LatencyOptions& options);
 

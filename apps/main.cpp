@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
                      [](const EdsOptions& options) { return eds_command(options); },
                      [](const ReportOptions& options) { return report_command(options); },
                      [](const DoctorOptions& options) { return doctor_command(options); },
+                     [](const TopicOptions& options) { return topic_command(options); },
                      [](const LatencyOptions& options) { return latency_command(options); },
                  },
                  command);

@@ -1,0 +1,137 @@
+// A publisher with a robot of config/, whose cycles the test makes up, and readers of its topics.
+// Layer: tests.  Thread: main.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "dds/publisher.hpp"
+#include "runtime/experiment.hpp"
+#include "tests/support/dds_domain.hpp"
+#include "tests/support/eventually.hpp"
+
+namespace tandem::dds::test {
+
+using tandem::test::eventually;
+
+inline runtime::CompleteRobot robot_of(const std::string& name) {
+  auto robot = runtime::read_robot(TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml");
+  EXPECT_TRUE(robot) << robot.error().front().to_string();
+  return std::move(*robot);
+}
+
+struct PublisherRig {
+  struct Options {
+    std::string robot = "double_pendulum";
+    bool simulated_time = true;
+    Config config = own_config();
+  };
+
+  explicit PublisherRig(const Options& options = {})
+      : robot(robot_of(options.robot)),
+        state(robot.config.shape()),
+        command(robot.config.shape()),
+        truth(robot.config.joints.size(), robot.config.contact.feet.size()) {
+    for (std::size_t i = 0; i < state.joints(); ++i) {
+      const auto x = static_cast<double>(i + 1);
+      state.position_rad()[i] = 0.1 * x;
+      state.velocity_rad_s()[i] = -0.2 * x;
+      state.torque_Nm()[i] = 3.0 * x;
+      state.temperature_C()[i] = 30.0 + x;
+      state.drive_state()[i] = static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
+      command.position_rad()[i] = 0.5 * x;
+    }
+    for (std::size_t i = 0; i < state.sensor().size(); ++i) {
+      state.sensor()[i] = 0.25 * static_cast<double>(i + 1);
+    }
+    auto entered = Domain::open(options.config);
+    EXPECT_TRUE(entered) << entered.error().to_string();
+    auto talker = Participant::open(*entered, "tandem_run");
+    auto other = Participant::open(*entered, "listener");
+    EXPECT_TRUE(talker && other);
+    participant = std::move(*talker);
+    listener = std::move(*other);
+    auto made = Publisher::create(*participant, {.robot = robot.config,
+                                                 .tree = robot.description.tree,
+                                                 .urdf = "<robot/>",
+                                                 .hal = "sim",
+                                                 .version = "1.2.3",
+                                                 .description_hash = "abc",
+                                                 .period_ns = kPeriod_ns,
+                                                 .simulated_time = options.simulated_time,
+                                                 .truth = &truth,
+                                                 .run = 77});
+    EXPECT_TRUE(made) << made.error().to_string();
+    publisher = std::move(*made);
+  }
+
+  void start() {
+    publisher->start({.version = [this] { return fault_version.load(); },
+                      .faults = [this] { return faults; },
+                      .lost = [] { return std::uint64_t{3}; }});
+  }
+  /// Shows one cycle.
+  void show(std::uint64_t cycle) {
+    const auto time_ns = static_cast<std::int64_t>(cycle) * kPeriod_ns;
+    const hal::CycleTime time{cycle, time_ns, kPeriod_ns};
+    publisher->take({time,
+                     phase,
+                     Code::kOk,
+                     state,
+                     command,
+                     &truth,
+                     {begin_ns + time_ns, 500, -1, 2000, 0, 0}});
+  }
+  /// Shows cycles as fast as they are published.
+  void show_all(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t cycle = from; cycle < to; ++cycle) {
+      show(cycle);
+      if (cycle % 100 == 99) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+  /// A reader that a sample published from now on reaches.
+  template <class T>
+  Reader<T> reader(const std::string& ros_name, bool transient_local = false) {
+    auto made = Reader<T>::create(
+        *listener, listener->topic_name(ros_name),
+        {.reliable = true, .transient_local = transient_local, .depth = 5000, .user_data = {}});
+    EXPECT_TRUE(made) << made.error().to_string();
+    EXPECT_TRUE(eventually([&] { return made->endpoint().matched() == 1; })) << ros_name;
+    return std::move(*made);
+  }
+
+  static constexpr std::int64_t kPeriod_ns = 1'000'000;
+  runtime::CompleteRobot robot;
+  hal::StateImage state;
+  hal::CommandImage command;
+  hal::TruthImage truth;
+  hal::RunPhase phase = hal::RunPhase::kRunning;
+  std::int64_t begin_ns = 0;
+  std::atomic<std::uint64_t> fault_version{0};
+  std::vector<FaultEntry> faults;
+  std::unique_ptr<Participant> participant, listener;
+  std::unique_ptr<Publisher> publisher;
+};
+
+template <class Sequence>
+auto list(const Sequence& sequence) {
+  return std::vector(sequence._buffer, sequence._buffer + sequence._length);
+}
+template <class Sequence>
+std::vector<std::string> texts(const Sequence& sequence) {
+  return {sequence._buffer, sequence._buffer + sequence._length};
+}
+template <class Span>
+auto list_of(Span span) {
+  return std::vector(span.begin(), span.end());
+}
+
+inline std::int64_t ns(const builtin_interfaces_msg_dds__Time_& stamp) {
+  return std::int64_t{stamp.sec} * 1'000'000'000 + stamp.nanosec;
+}
+
+}  // namespace tandem::dds::test
