@@ -34,10 +34,10 @@ struct FaultEntry {
 struct RunDescription {
   const hal::RobotConfig& robot;
   const model::Tree& tree;  ///< of the robot's description, for frames
-  std::string urdf;         ///< the description's text
-  std::string hal;          ///< "sim", "can"
-  std::string version;      ///< of Tandem
-  std::string description_hash;
+  std::string urdf{};       ///< the description's text
+  std::string hal{};        ///< "sim", "can"
+  std::string version{};    ///< of Tandem
+  std::string description_hash{};
   std::int64_t period_ns = 1'000'000;
   bool simulated_time = false;  ///< stamps are time_ns and `clock` tells them; else wall clock
   const hal::TruthImage* truth = nullptr;  ///< the cycles'; null: they bring none

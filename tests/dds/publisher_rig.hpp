@@ -24,14 +24,14 @@ inline runtime::CompleteRobot robot_of(const std::string& name) {
   return std::move(*robot);
 }
 
-struct PublisherRig {
-  struct Options {
-    std::string robot = "double_pendulum";
-    bool simulated_time = true;
-    Config config = own_config();
-  };
+struct RigOptions {
+  std::string robot = "double_pendulum";
+  bool simulated_time = true;
+  Config config = own_config();
+};
 
-  explicit PublisherRig(const Options& options = {})
+struct PublisherRig {
+  explicit PublisherRig(const RigOptions& options = {})
       : robot(robot_of(options.robot)),
         state(robot.config.shape()),
         command(robot.config.shape()),

@@ -104,7 +104,6 @@ std::int64_t now_ns(clockid_t clock) {
 
 TEST(Publisher, StampsTheWallClocksTimeWhereTimeIsNotSimulated) {
   PublisherRig rig({.simulated_time = false});
-  EXPECT_EQ(dds_lookup_participant(static_cast<dds_domainid_t>(own_domain()), nullptr, 0), 2);
   auto joints = rig.reader<sensor_msgs::JointState>("joint_states");
   rig.begin_ns = now_ns(CLOCK_MONOTONIC);
   const std::int64_t wall_ns = now_ns(CLOCK_REALTIME);

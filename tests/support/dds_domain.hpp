@@ -16,7 +16,8 @@ namespace tandem::dds::test {
 inline int own_domain() {
   static const int domain = [] {
     for (int number = 100; number < 200; ++number) {
-      const std::string file = "/tmp/tandem-test-dds-" + std::to_string(number) + ".lock";
+      std::string file = "/tmp/tandem-test-dds-";
+      file.append(std::to_string(number)).append(".lock");
       const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
       if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) == 0) return number;  // open until the end
       if (fd >= 0) ::close(fd);
