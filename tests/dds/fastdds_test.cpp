@@ -7,9 +7,8 @@
 
 #include "dds/cdr.hpp"
 #include "dds/service_server.hpp"
-#include "tests/dds/peer_process.hpp"
+#include "tests/dds/fastdds.hpp"
 #include "tests/dds/raw_topic.hpp"
-#include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
 
 namespace tandem::dds {
@@ -17,12 +16,6 @@ namespace {
 
 using tandem::test::eventually;
 using test::Bytes;
-
-#ifdef TANDEM_FASTDDS_PEER
-constexpr const char* kPeer = TANDEM_FASTDDS_PEER;
-#else
-constexpr const char* kPeer = nullptr;
-#endif
 
 /// Every type of a topic that is ROS 2's own.
 std::vector<const Type*> standard_types() {
@@ -51,9 +44,7 @@ Bytes payload(const Bytes& bytes, std::size_t size) {
 class FastDds : public testing::Test {
  protected:
   void SetUp() override {
-    if (kPeer == nullptr) {
-      GTEST_SKIP() << "Fast DDS is not installed (libfastrtps-dev, libfastcdr-dev, fastddsgen)";
-    }
+    if (test::kFastDdsPeer == nullptr) GTEST_SKIP() << test::kNoFastDds;
     auto domain = Domain::open(test::own_config());
     ASSERT_TRUE(domain) << domain.error().to_string();
     participant_ = std::move(*Participant::open(std::move(*domain), "cyclone"));
@@ -64,20 +55,16 @@ class FastDds : public testing::Test {
     return std::move(*RawEndpoint::create(kind, participant_->get(), type, topic, qos));
   }
 
-  [[nodiscard]] std::vector<std::string> peer_arguments() const {
-    return {kPeer, std::to_string(test::own_domain())};
-  }
-
   std::unique_ptr<Participant> participant_;
 };
 
 TEST_F(FastDds, HearsEveryStandardTypeAsItWasSent) {
-  std::vector<std::string> arguments = peer_arguments();
+  std::vector<std::string> arguments;
   for (const Type* type : standard_types()) {
     arguments.insert(arguments.end(),
                      {"hear", "reliable", type->ros_name, topic_of("rt/to_fast/", *type)});
   }
-  test::PeerProcess peer(arguments);
+  test::FastDdsPeer peer(arguments);
   std::vector<RawEndpoint> writers;
   std::vector<test::TypedSample> samples;
   for (const Type* type : standard_types()) {
@@ -106,14 +93,14 @@ TEST_F(FastDds, HearsEveryStandardTypeAsItWasSent) {
 }
 
 TEST_F(FastDds, IsHeardInEveryStandardTypeAsItSends) {
-  std::vector<std::string> arguments = peer_arguments();
+  std::vector<std::string> arguments;
   std::vector<RawEndpoint> readers;
   for (const Type* type : standard_types()) {
     const std::string topic = topic_of("rt/from_fast/", *type);
     arguments.insert(arguments.end(), {"say", "reliable", type->ros_name, topic});
     readers.push_back(make(EndpointKind::kReader, *type, topic));
   }
-  const test::PeerProcess peer(arguments);
+  const test::FastDdsPeer peer(arguments);
   for (std::size_t i = 0; i < readers.size(); ++i) {
     const Type& type = *standard_types()[i];
     std::vector<Bytes> taken;
@@ -140,13 +127,13 @@ TEST_F(FastDds, SubscribesWithRosQualitiesOfService) {
   const auto sample = codec.sample(test::CdrWriter(test::pattern()).sample(*type.tree));
   ASSERT_TRUE(sample);
   dds_write(latched.entity.get(), sample->get());  // once, before anybody is there
-  std::vector<std::string> arguments = peer_arguments();
+  std::vector<std::string> arguments;
   for (const char* word : {"hear", "best_effort", "std_msgs/msg/String", "rt/sensor", "hear",
                            "reliable", "std_msgs/msg/String", "rt/plain", "hear", "latched",
                            "std_msgs/msg/String", "rt/robot_description"}) {
     arguments.emplace_back(word);
   }
-  test::PeerProcess peer(arguments);
+  test::FastDdsPeer peer(arguments);
   std::set<std::string> heard;
   EXPECT_TRUE(eventually([&] {
     dds_write(sensor.entity.get(), sample->get());
@@ -171,12 +158,8 @@ TEST_F(FastDds, CallsAService) {
                                      }};
       });
   ASSERT_TRUE(added && server->start());
-  std::vector<std::string> arguments = peer_arguments();
-  for (const char* word : {"say", "reliable", "std_srvs/srv/Trigger_Request", "rq/resetRequest",
-                           "hear", "reliable", "std_srvs/srv/Trigger_Response", "rr/resetReply"}) {
-    arguments.emplace_back(word);
-  }
-  test::PeerProcess peer(arguments);
+  test::FastDdsPeer peer({"say", "reliable", "std_srvs/srv/Trigger_Request", "rq/resetRequest",
+                          "hear", "reliable", "std_srvs/srv/Trigger_Response", "rr/resetReply"});
   std::vector<std::string> heard;
   ASSERT_TRUE(eventually([&] { return !(heard = peer.lines()).empty(); }));
   EXPECT_EQ(heard.front(), "rr/resetReply pattern 4");

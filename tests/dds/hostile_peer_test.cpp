@@ -12,9 +12,8 @@
 
 #include "dds/cdr.hpp"
 #include "dds/endpoint.hpp"
-#include "tests/dds/peer_process.hpp"
+#include "tests/dds/fastdds.hpp"
 #include "tests/dds/raw_topic.hpp"
-#include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
 
 namespace tandem::dds {
@@ -22,12 +21,6 @@ namespace {
 
 using tandem::test::eventually;
 using test::Bytes;
-
-#ifdef TANDEM_FASTDDS_PEER
-constexpr const char* kPeer = TANDEM_FASTDDS_PEER;
-#else
-constexpr const char* kPeer = nullptr;
-#endif
 
 void append(Bytes& out, std::initializer_list<int> bytes) {
   for (const int byte : bytes) out.push_back(static_cast<std::byte>(byte));
@@ -76,9 +69,7 @@ class Sender {
 class HostilePeer : public testing::Test {
  protected:
   void SetUp() override {
-    if (kPeer == nullptr) {
-      GTEST_SKIP() << "Fast DDS is not installed (libfastrtps-dev, libfastcdr-dev, fastddsgen)";
-    }
+    if (test::kFastDdsPeer == nullptr) GTEST_SKIP() << test::kNoFastDds;
     auto domain = Domain::open(test::own_config());
     ASSERT_TRUE(domain) << domain.error().to_string();
     participant_ = std::move(*Participant::open(std::move(*domain), "victim"));
@@ -100,8 +91,6 @@ class HostilePeer : public testing::Test {
     return guid;
   }
 
-  static std::string domain() { return std::to_string(test::own_domain()); }
-
   std::unique_ptr<Participant> participant_;
 };
 
@@ -109,7 +98,7 @@ TEST_F(HostilePeer, WithMalformedSamplesIsNotHeardAndDoesNoHarm) {
   const Type& type = dds::type<sensor_msgs::JointState>();
   const RawEndpoint target = reader(type, "rt/joint_states", false);
   const RawEndpoint alive = reader(dds::type<std_msgs::String>(), "rt/alive", true);
-  const test::PeerProcess peer({kPeer, domain(), "say", "best_effort", "sensor_msgs/msg/JointState",
+  const test::FastDdsPeer peer({"say", "best_effort", "sensor_msgs/msg/JointState",
                                 "rt/joint_states", "say", "reliable", "std_msgs/msg/String",
                                 "rt/alive"});
   const dds_guid_t guid = writer_of(target.entity.get());
@@ -161,8 +150,7 @@ TEST_F(HostilePeer, WithMalformedSamplesIsNotHeardAndDoesNoHarm) {
 TEST_F(HostilePeer, WithGarbageForMessagesDoesNoHarm) {
   const Type& type = dds::type<std_msgs::String>();
   const RawEndpoint alive = reader(type, "rt/alive", true);
-  const test::PeerProcess peer(
-      {kPeer, domain(), "say", "reliable", "std_msgs/msg/String", "rt/alive"});
+  const test::FastDdsPeer peer({"say", "reliable", "std_msgs/msg/String", "rt/alive"});
   const dds_guid_t guid = writer_of(alive.entity.get());
   const Sender sender;
   std::mt19937_64 generator(4);
@@ -182,8 +170,7 @@ TEST_F(HostilePeer, WithGarbageForMessagesDoesNoHarm) {
   test::take_bytes(alive.entity.get());
   // A new topic: discovery works, too.
   const RawEndpoint later = reader(type, "rt/later", true);
-  const test::PeerProcess other(
-      {kPeer, domain(), "say", "reliable", "std_msgs/msg/String", "rt/later"});
+  const test::FastDdsPeer other({"say", "reliable", "std_msgs/msg/String", "rt/later"});
   EXPECT_TRUE(eventually([&] { return !test::take_bytes(later.entity.get()).empty(); }));
 }
 
@@ -196,8 +183,7 @@ std::size_t resident_bytes() {
 TEST_F(HostilePeer, ThatFloodsTakesNoMoreMemoryThanTheDepthOfTheHistory) {
   const Type& type = dds::type<std_msgs::String>();
   const RawEndpoint target = reader(type, "rt/flood", true);  // its depth is 10: 0.6 MB
-  const test::PeerProcess peer(
-      {kPeer, domain(), "flood", "reliable", "std_msgs/msg/String", "rt/flood"});
+  const test::FastDdsPeer peer({"flood", "reliable", "std_msgs/msg/String", "rt/flood"});
   // Nobody takes the samples; the number at the beginning of the last one tells how many came.
   const auto flooded = [&] {
     void* samples[16]{};
@@ -223,8 +209,8 @@ TEST_F(HostilePeer, WithAHugeSampleIsNotHeard) {
   const RawEndpoint target = reader(type, "rt/huge", true);
   const RawEndpoint alive = reader(type, "rt/alive", true);
   const std::size_t before = resident_bytes();
-  const test::PeerProcess peer({kPeer, domain(), "huge", "reliable", "std_msgs/msg/String",
-                                "rt/huge", "say", "reliable", "std_msgs/msg/String", "rt/alive"});
+  const test::FastDdsPeer peer({"huge", "reliable", "std_msgs/msg/String", "rt/huge", "say",
+                                "reliable", "std_msgs/msg/String", "rt/alive"});
   writer_of(target.entity.get());
   std::size_t heard = 0;
   EXPECT_TRUE(eventually([&] {

@@ -8,8 +8,6 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
 #include <algorithm>
 #include <cstdio>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -35,23 +33,11 @@ namespace {
 namespace fdds = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
+/// As the profile says that FASTRTPS_DEFAULT_PROFILES_FILE names.
 fdds::DomainParticipant* join(unsigned domain) {
-  fdds::DomainParticipantQos qos;
-  qos.name("fastdds_peer");
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList.push_back("127.0.0.1");
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  // On the loopback interface without multicast: others are looked for one by one.
-  constexpr unsigned kMostPeers = 20;
-  for (unsigned i = 0; i < kMostPeers; ++i) {
-    rtps::Locator_t peer;
-    peer.kind = LOCATOR_KIND_UDPv4;
-    rtps::IPLocator::setIPv4(peer, "127.0.0.1");
-    peer.port = 7410 + 250 * domain + 2 * i;
-    qos.wire_protocol().builtin.initialPeersList.push_back(peer);
-  }
-  return fdds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
+  auto* factory = fdds::DomainParticipantFactory::get_instance();
+  factory->load_profiles();
+  return factory->create_participant(domain, fdds::PARTICIPANT_QOS_DEFAULT);
 }
 
 template <class Qos>
