@@ -24,6 +24,8 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kResetDone: return "reset done";
     case EventKind::kResetFailed: return "reset failed";
     case EventKind::kControllersSwitched: return "controllers switched";
+    case EventKind::kJointSet: return "mode or impedance set";
+    case EventKind::kGainsSet: return "gains set";
   }
   return "?";
 }

@@ -28,6 +28,8 @@ enum class EventKind : std::uint8_t {
   kResetDone,        ///< every joint is enabled again
   kResetFailed,      ///< a cause is still there
   kControllersSwitched,  ///< on request: some were stopped, some started
+  kJointSet,             ///< on request: a joint's mode, interaction or impedance
+  kGainsSet,             ///< on request: gains of a joint's drive
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 

@@ -126,6 +126,7 @@ class RobotCycle {
   // robot_cycle_services.cpp
   void take_services() noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer carry_out(const LoopRequest& request) noexcept TANDEM_RT;
+  void note_service(const LoopRequest& request) noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
 
   // robot_cycle_faults.cpp

@@ -10,6 +10,7 @@ void RobotCycle::take_services() noexcept TANDEM_RT {
     if (!request) return;
     const bool ending = phase_ == RunPhase::kShutDown || phase_ == RunPhase::kDone;
     LoopAnswer answer = ending ? LoopAnswer{.refusal = Refusal::kEnding} : carry_out(*request);
+    if (answer.refusal == Refusal::kNone) note_service(*request);
     answer.number = request->number;
     answer.cycle = time_.cycle;
     mailbox_.answer(answer);
@@ -21,20 +22,24 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: return controllers_->remove(request.slot);
-    case Kind::kSwitch: {
-      const LoopAnswer answer = controllers_->switch_over(request.stop, request.start, controlling_,
-                                                          time_, state_, command_);
-      if (answer.refusal == Refusal::kNone) {
-        event(log::EventKind::kControllersSwitched);
-      }
-      return answer;
-    }
+    case Kind::kSwitch:
+      return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
+                                       command_);
     case Kind::kJoint:
       return controllers_->set_joint(request.joint, request.wish, controlling_, state_, command_);
     case Kind::kGains: break;
   }
   parameters_.set_gains(request.joint, request.loop, request.gains);
   return {};
+}
+
+/// In the log; what comes and goes without moving anything is not.
+void RobotCycle::note_service(const LoopRequest& request) noexcept TANDEM_RT {
+  using Kind = LoopRequest::Kind;
+  const auto joint = static_cast<std::int32_t>(request.joint);
+  if (request.kind == Kind::kSwitch) event(log::EventKind::kControllersSwitched);
+  if (request.kind == Kind::kJoint) event(log::EventKind::kJointSet, joint);
+  if (request.kind == Kind::kGains) event(log::EventKind::kGainsSet, joint);
 }
 
 void RobotCycle::show_joints() noexcept TANDEM_RT {

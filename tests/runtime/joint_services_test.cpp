@@ -2,9 +2,11 @@
 #include <cmath>
 #include <limits>
 
+#include "log/log_file.hpp"
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/hal/fake_backend.hpp"
+#include "tests/log/scratch_folder.hpp"
 #include "tests/runtime/first_order_robot.hpp"
 #include "tests/runtime/test_controllers.hpp"
 
@@ -195,6 +197,35 @@ TEST_F(JointServices, HoldJointsAgainAfterAReset) {
   ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
   EXPECT_TRUE(mode("elbow", ControlMode::kTorque));
+}
+
+TEST(JointServicesOf, ALoggedRunAreInItsLog) {
+  const log::ScratchFolder folder;
+  auto recorder =
+      log::Recorder::open(folder / "run.mcap", {.joints = {"shoulder", "elbow", "wrist"}}, {});
+  ASSERT_TRUE(recorder);
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{0}),
+                       test::parameters(), false));
+  rt::WallClock clock;
+  RobotCycle cycle({robot, backend, host, clock, recorder->get()}, {.running_cycles = 100});
+  for (int i = 0; i < 50; ++i) cycle.step();
+  ASSERT_TRUE(cycle.services().switch_controllers({}, {"sine"}, kNow));
+  ASSERT_TRUE(cycle.services().set_joint("elbow", {.mode = 3}, kNow));
+  ASSERT_TRUE(cycle.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0}, kNow));
+  cycle.run();
+  (void)(*recorder)->close();
+  std::vector<std::string> texts;
+  const auto events = log::LogFile::open(folder / "run.mcap")->events();
+  ASSERT_TRUE(events);
+  for (const auto& event : *events) {
+    if (event.event.cycle == 50) texts.push_back(event.text);
+  }
+  EXPECT_EQ(texts,
+            (std::vector<std::string>{"controllers switched", "mode or impedance set of elbow",
+                                      "gains set of wrist"}));
 }
 
 }  // namespace
