@@ -1,0 +1,227 @@
+// Whether subscribers change the loop: COMAN holding at 1 kHz with everything published, blocks
+// without a subscriber and blocks with 20 of them, another process', that join and leave, in turns.
+//   subscribers_bench [EXPERIMENT] [KERNELS.so] [--blocks N] [--seconds S] [--cpu N] [--domain N]
+// What is compared is the work of each cycle: from the return of the wait to the hand-over's end.
+#include <fmt/core.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <random>
+#include <thread>
+
+#include "bench/rig.hpp"
+#include "dds/publisher.hpp"
+#include "hal/sim/sim_robot.hpp"
+#include "rt/clock.hpp"
+#include "rt/histogram.hpp"
+#include "rt/thread_setup.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::bench {
+namespace {
+
+struct Options {
+  std::string experiment = TANDEM_CONFIG_FOLDER "/coman/hold.toml";
+  std::string library = TANDEM_MODEL_FOLDER "/coman_kernels.so";
+  int blocks = 6;  ///< of each kind
+  double seconds = 5.0;
+  int cpu = -1;
+  int domain = 77;
+  bool subscribers = false;  ///< be the other process
+};
+
+constexpr int kSubscribers = 20;
+
+dds::Config config_of(int domain) {
+  dds::Config config;
+  config.enabled = true;
+  config.domain = domain;
+  return config;
+}
+
+/// A participant of its own that reads two topics.
+class Subscriber {
+ public:
+  explicit Subscriber(const std::shared_ptr<dds::Domain>& domain)
+      : node_(dds::Participant::open(domain, "subscriber")) {
+    if (!node_) return;
+    joints_ = dds::Reader<dds::sensor_msgs::JointState>::create(
+        **node_, (*node_)->topic_name("joint_states"), {});
+    state_ = dds::Reader<dds::tandem_msgs::State>::create(**node_,
+                                                          (*node_)->topic_name("tandem/state"), {});
+  }
+  std::size_t take() {
+    std::size_t count = 0;
+    if (joints_) count += joints_->take([](const auto&, const auto&) {});
+    if (state_) count += state_->take([](const auto&, const auto&) {});
+    return count;
+  }
+
+ private:
+  Result<std::unique_ptr<dds::Participant>> node_;
+  Result<dds::Reader<dds::sensor_msgs::JointState>> joints_ = fail("none");
+  Result<dds::Reader<dds::tandem_msgs::State>> state_ = fail("none");
+};
+
+/// The other process: 'b' on standard input lets subscribers come and go, 'a' sends all away.
+int be_subscribers(int domain_number) {
+  const auto domain = dds::Domain::open(config_of(domain_number));
+  if (!domain) return fail_with(domain.error());
+  std::vector<std::unique_ptr<Subscriber>> subscribers(kSubscribers);
+  std::mt19937 random(1);
+  std::uniform_int_distribution<std::size_t> any(0, kSubscribers - 1);
+  bool busy = false;
+  std::size_t received = 0, changes = 0;
+  for (;;) {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    if (::poll(&input, 1, 20) > 0) {
+      char word = 0;
+      if (::read(STDIN_FILENO, &word, 1) != 1) break;
+      busy = word == 'b';
+      for (auto& one : subscribers) one = busy ? std::make_unique<Subscriber>(*domain) : nullptr;
+    }
+    if (!busy) continue;
+    auto& one = subscribers[any(random)];
+    one = one == nullptr ? std::make_unique<Subscriber>(*domain) : nullptr;
+    ++changes;
+    for (auto& reader : subscribers) {
+      if (reader != nullptr) received += reader->take();
+    }
+  }
+  fmt::print("subscribers joined or left {} times and received {} samples\n", changes, received);
+  std::fflush(stdout);
+  return 0;
+}
+
+/// The publisher, with the time of each cycle's work kept in the block's histogram.
+class TimedTap final : public hal::CycleTap {
+ public:
+  explicit TimedTap(hal::CycleTap& tap) : tap_(tap) {}
+  void take(const hal::CycleView& view) noexcept TANDEM_RT override {
+    const std::size_t block = view.time.cycle / cycles_per_block;
+    const bool settled = view.time.cycle % cycles_per_block > 100;  // the other process has changed
+    if (settled && block < blocks.size()) blocks[block].record(view.times.work_ns);
+    tap_.take(view);
+  }
+
+  std::uint64_t cycles_per_block = 1;
+  std::vector<rt::Histogram> blocks;
+
+ private:
+  hal::CycleTap& tap_;
+};
+
+/// Blocks 0, 2, … are without subscribers, 1, 3, … with them.
+void print(const TimedTap& tap) {
+  fmt::print("\n{:28} {:>8} {:>8} {:>8} {:>8} {:>9}\n", "work of a cycle [us]", "p50", "p99",
+             "p99.9", "max", "cycles");
+  std::array<double, 2> p999{};
+  for (const std::size_t kind : {0U, 1U}) {
+    std::vector<double> p50, p99, p99_9;
+    rt::Histogram all;
+    for (std::size_t block = kind; block < tap.blocks.size(); block += 2) {
+      const rt::Percentiles p = tap.blocks[block].percentiles();
+      p50.push_back(us(p.p50));
+      p99.push_back(us(p.p99));
+      p99_9.push_back(us(p.p999));
+      all.add(tap.blocks[block]);
+    }
+    p999[kind] = median(p99_9);
+    fmt::print("{:28} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}\n",
+               kind == 0 ? "nobody subscribes" : "20 join and leave", median(p50), median(p99),
+               p999[kind], us(all.max_ns()), all.count());
+  }
+  fmt::print("p99.9 with over without: {:.2f} (medians of {} blocks each)\n", p999[1] / p999[0],
+             tap.blocks.size() / 2);
+}
+
+int run(const Options& options, const char* program) {
+  auto rig = make_rig(options.experiment, options.library);
+  if (!rig) return fail_with(rig.error());
+  runtime::Experiment& e = (*rig)->experiment;
+  const auto description = runtime::read_robot(e.robot_file);
+  if (!description) return fail_with(description.error().front());
+  auto robot = sim::SimRobot::create(e.robot, (*rig)->kernels.get(), e.sim_robot_config());
+  if (!robot) return fail_with(robot.error());
+  const auto domain = dds::Domain::open(config_of(options.domain));
+  if (!domain) return fail_with(domain.error());
+  const auto node = dds::Participant::open(*domain, "subscribers_bench");
+  if (!node) return fail_with(node.error());
+  auto publisher =
+      dds::Publisher::create(**node, {.robot = e.robot,
+                                      .tree = description->description.tree,
+                                      .urdf = {},
+                                      .hal = "sim",
+                                      .version = "bench",
+                                      .description_hash = (*rig)->kernels->description_hash,
+                                      .period_ns = e.loop.period_ns,
+                                      .simulated_time = true,
+                                      .truth = &(*robot)->truth(),
+                                      .run = 1});
+  if (!publisher) return fail_with(publisher.error());
+
+  TimedTap tap(**publisher);
+  tap.blocks.resize(static_cast<std::size_t>(2 * options.blocks));
+  tap.cycles_per_block =
+      static_cast<std::uint64_t>(options.seconds * 1e9 / static_cast<double>(e.loop.period_ns));
+  rt::WallClock clock;
+  runtime::CycleConfig config;
+  config.loop = e.loop;
+  config.loop.pacing = rt::Pacing::kSimulated;
+  config.loop.rate = 1.0;
+  config.settle_cycles = e.settle_cycles();
+  runtime::RobotCycle cycle({.robot = e.robot,
+                             .backend = **robot,
+                             .controllers = *(*rig)->host,
+                             .clock = clock,
+                             .truth = &(*robot)->truth(),
+                             .tap = &tap},
+                            config);
+  const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
+  std::FILE* words = ::popen(others.c_str(), "w");
+  if (words == nullptr) return fail_with(fail("cannot start the subscribers").error());
+  fmt::print("{}{} blocks of {:g} s each way, {} at 1 kHz\n", machine_text(), options.blocks,
+             options.seconds, e.robot.name);
+  (*publisher)
+      ->start({.version = [] { return std::uint64_t{0}; },
+               .faults = [] { return std::vector<dds::FaultEntry>(); },
+               .lost = [] { return std::uint64_t{0}; }});
+  std::thread loop([&] {
+    rt::ThreadConfig thread;
+    thread.cpu = options.cpu;
+    const rt::ThreadReport report = rt::set_up_thread(thread);
+    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
+    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
+    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
+      if (k % tap.cycles_per_block != 0) continue;
+      std::fputc(k / tap.cycles_per_block % 2 == 0 ? 'a' : 'b', words);
+      std::fflush(words);
+    }
+  });
+  loop.join();
+  ::pclose(words);
+  const dds::PublishCounts counts = (*publisher)->stop();
+  print(tap);
+  fmt::print("published {}, refused {}, dropped cycles {}\n", counts.sent, counts.refused,
+             counts.dropped);
+  return 0;
+}
+
+}  // namespace
+}  // namespace tandem::bench
+
+int main(int argc, char** argv) {
+  using namespace tandem::bench;
+  Options options;
+  CLI::App app{"What subscribers that join and leave do to the loop"};
+  app.add_option("experiment", options.experiment, "default: COMAN holding");
+  app.add_option("kernels", options.library, "library of the robot's kernels");
+  app.add_option("--blocks", options.blocks, "of each kind")->check(CLI::Range(1, 1000));
+  app.add_option("--seconds", options.seconds, "of a block")->check(CLI::Range(0.5, 600.0));
+  app.add_option("--cpu", options.cpu, "the loop's; the rest of the process may be anywhere");
+  app.add_option("--domain", options.domain, "DDS domain")->check(CLI::Range(0, 232));
+  app.add_flag("--subscribers", options.subscribers, "be the other process");
+  CLI11_PARSE(app, argc, argv);
+  return options.subscribers ? be_subscribers(options.domain) : run(options, argv[0]);
+}
