@@ -14,8 +14,8 @@ using SteadyClock = std::chrono::steady_clock;
 using AskClient = dds::ServiceClient<dds::tandem_msgs::Ask_Request, dds::tandem_msgs::Ask_Response>;
 
 constexpr char kService[] = "tandem/ask";
-/// To find the first process, and then others that are there, too.
-constexpr std::chrono::milliseconds kFirst{3000}, kOthers{250}, kLookAgain{10};
+/// To find the first process, and then others that are there, too, which a busy machine delays.
+constexpr std::chrono::milliseconds kFirst{3000}, kOthers{500}, kLookAgain{10};
 
 class DdsClient : public ControlClient {
  public:
