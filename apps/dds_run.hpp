@@ -9,14 +9,16 @@
 #include "base/result.hpp"
 #include "dds/participant.hpp"
 #include "dds/publisher.hpp"
+#include "dds/service_server.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
-/// What a run has published.
+/// What a run has published, and what it was asked.
 struct DdsResult {
   int domain = 0;
   dds::PublishCounts counts;
+  dds::ServiceServer::Counts services{};
 };
 
 class DdsRun {

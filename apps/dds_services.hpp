@@ -20,6 +20,8 @@ class DdsServices {
                                                                  const ControlRegistry& registry,
                                                                  ControlRegistry::Gate gate);
 
+  [[nodiscard]] dds::ServiceServer::Counts counts() const { return server_->counts(); }
+
  private:
   DdsServices(const ControlRegistry& registry, ControlRegistry::Gate gate)
       : registry_(&registry), gate_(std::move(gate)) {}

@@ -173,6 +173,7 @@ Exit run(Composition& c, const RunOptions& options) {
 
   RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}, {}};
   if (*dds != nullptr) summary.dds = (*dds)->finish();
+  if (*services != nullptr) summary.dds->services = (*services)->counts();
   if (recorder != nullptr) summary.log = recorder->close();
   if (c.frames != nullptr) summary.frames = c.frames->close();
   summary.faults = fault_texts(cycle, summary.log);

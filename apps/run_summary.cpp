@@ -40,7 +40,11 @@ Json dds_json(const std::optional<DdsResult>& dds) {
   return {{"domain", dds->domain},
           {"samples", dds->counts.sent},
           {"refused", dds->counts.refused},
-          {"dropped", dds->counts.dropped}};
+          {"dropped", dds->counts.dropped},
+          {"requests", dds->services.requests},
+          {"requests_dropped", dds->services.dropped},
+          {"replies", dds->services.replies},
+          {"replies_unclaimed", dds->services.unclaimed}};
 }
 
 Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
@@ -173,9 +177,13 @@ void RunSummary::print(std::FILE* out) const {
                           log->dropped, static_cast<double>(log->bytes) * 1e-6));
   }
   if (dds) {
-    facts.add("DDS", fmt::format("domain {}: {} samples, {} refused; {} cycles dropped",
-                                 dds->domain, dds->counts.sent, dds->counts.refused,
-                                 dds->counts.dropped));
+    facts.add("DDS",
+              fmt::format("domain {}: {} samples, {} refused; {} cycles dropped", dds->domain,
+                          dds->counts.sent, dds->counts.refused, dds->counts.dropped));
+    if (dds->services.requests > 0) {
+      facts.add("requests over DDS",
+                fmt::format("{}, {} dropped", dds->services.requests, dds->services.dropped));
+    }
   }
   add_bus_facts(composition.can_buses(), facts);
   if (frames) {

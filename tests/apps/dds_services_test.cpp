@@ -98,6 +98,10 @@ TEST_F(RunOverDds, AnswerAsTheControlSocketDoes) {
   EXPECT_EQ(ask("\xff\xfe")["ok"], false);
   EXPECT_NE(ask(std::string(300'000, ' '))["error"].dump().find("of more than"), std::string::npos);
   EXPECT_EQ(end(), 0);
+  const auto counts = json("run.json")["dds"];
+  EXPECT_EQ(counts["requests"], 6);
+  EXPECT_EQ(counts["replies"], 6);
+  EXPECT_EQ(counts["requests_dropped"], 0);
 }
 
 TEST_F(RunOverDds, ChangeNothingUnlessTheExperimentAllowsIt) {
