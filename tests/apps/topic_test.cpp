@@ -1,4 +1,7 @@
 // `tandem run --dds` as `tandem topic` sees it, and what publishing does not change.
+#include <map>
+#include <set>
+
 #include "tests/apps/running.hpp"
 #include "tests/support/dds_domain.hpp"
 
@@ -140,6 +143,49 @@ TEST_F(Topic, OfTwoRobotsInOneDomainAreKeptApartByTheirNamespaces) {
   EXPECT_EQ(topic("echo /right/joint_states --once --field name[0]").out, "joint1\n---\n");
   EXPECT_EQ(std::system(("kill $(cat '" + (folder_ / "other.pid").string() + "')").c_str()), 0);
   other.join();
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Topic, ClockGoesOnWhileTheRunIsPausedAndSaysTheSameTime) {
+  start("--start-paused --duration 2000 --dds" + domain_);
+  until(R"("paused": true)");
+  const auto times = [&] {
+    std::set<std::int64_t> found;
+    for (const auto& one : topic_json("echo /clock --count 3 --wait 30")) {
+      found.insert(one["clock"]["sec"].get<std::int64_t>() * 1'000'000'000 +
+                   one["clock"]["nanosec"].get<std::int64_t>());
+    }
+    return found;
+  };
+  EXPECT_EQ(times(), std::set<std::int64_t>{0});
+  EXPECT_EQ(to_run("clock step 51").status, 0);
+  EXPECT_EQ(times(), std::set<std::int64_t>{50'000'000});
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Topic, FaultsAndDiagnosticsTellAnEmergencyStopAndItsReset) {
+  begin("--on-fault wait --dds" + domain_);
+  EXPECT_EQ(topic_json("echo /tandem/faults --once --wait 30")["faults"].size(), 0U);
+  EXPECT_EQ(to_run("estop").status, 0);
+  until(R"("phase": "faulted")");
+  nlohmann::json faults;
+  const auto told = [&](bool latched) {
+    for (int i = 0; i < 100; ++i) {
+      faults = topic_json("echo /tandem/faults --once")["faults"];
+      if (faults.size() == 1 && faults[0]["latched"] == latched) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(told(true)) << faults;
+  EXPECT_EQ(faults[0]["category"], "category1");
+  EXPECT_EQ(faults[0]["joint"], "");
+  const auto run = topic_json("echo /diagnostics --once --field status[0]");
+  EXPECT_EQ(run["name"], "tandem: run");
+  EXPECT_EQ(run["level"], 2);
+  EXPECT_EQ(run["message"], faults[0]["text"]);
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  EXPECT_TRUE(told(false)) << faults;
+  EXPECT_GT(faults[0]["cleared_s"].get<double>(), faults[0]["time_s"].get<double>());
   EXPECT_EQ(end(), 0);
 }
 
