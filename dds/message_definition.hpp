@@ -76,7 +76,7 @@ struct MessageDefinition {
 /// By ROS 2's name; null when it is unknown.
 [[nodiscard]] const MessageDefinition* find_definition(std::string_view ros_name);
 
-/// "RIHS01_…": the SHA-256 of the type's description as JSON, as REP-2011 has it.
+/// "RIHS01_…": the SHA-256 of the type's description as JSON, as REP-2016 has it.
 /// @pre it is resolved
 [[nodiscard]] std::string type_hash(const MessageDefinition& definition);
 
