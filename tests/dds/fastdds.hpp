@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -11,11 +12,9 @@
 
 namespace tandem::dds::test {
 
-#ifdef TANDEM_FASTDDS_PEER
-constexpr const char* kFastDdsPeer = TANDEM_FASTDDS_PEER;
-#else
-constexpr const char* kFastDdsPeer = nullptr;
-#endif
+constexpr const char* kFastDdsPeer = TANDEM_BINARY_DIR "/bin/fastdds_peer";
+/// It is built where Fast DDS and its generator are installed.
+inline bool have_fastdds() { return std::filesystem::exists(kFastDdsPeer); }
 constexpr const char* kNoFastDds =
     "Fast DDS is not installed (libfastrtps-dev, libfastcdr-dev, fastddsgen)";
 

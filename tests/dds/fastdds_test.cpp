@@ -44,7 +44,7 @@ Bytes payload(const Bytes& bytes, std::size_t size) {
 class FastDds : public testing::Test {
  protected:
   void SetUp() override {
-    if (test::kFastDdsPeer == nullptr) GTEST_SKIP() << test::kNoFastDds;
+    if (!test::have_fastdds()) GTEST_SKIP() << test::kNoFastDds;
     auto domain = Domain::open(test::own_config());
     ASSERT_TRUE(domain) << domain.error().to_string();
     participant_ = std::move(*Participant::open(std::move(*domain), "cyclone"));
