@@ -96,6 +96,17 @@ class Backend {
   /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
 
+  /// What the joints are told in a cycle that calls shut_down(), before that call. For a robot that
+  /// another loop drives: it carries it out.
+  virtual void last_command(const CommandImage& /*command*/) noexcept TANDEM_RT {}
+  /// The command that the robot follows before it follows this loop's: that of the loop that owns
+  /// it, to go on from. False: there is no such loop.
+  [[nodiscard]] virtual bool command_in_force(CommandImage& /*command*/) const noexcept TANDEM_RT {
+    return false;
+  }
+  /// Cycles of the robot's time that have gone by unseen just before this exchange().
+  [[nodiscard]] virtual std::uint64_t missed() const noexcept TANDEM_RT { return 0; }
+
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process tells nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }

@@ -51,6 +51,20 @@ Code CommandLimits::apply(const StateImage& state, CommandImage& command) noexce
   return worst;
 }
 
+void CommandLimits::follow(const CommandImage& command) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < last_.size(); ++j) {
+    last_[j] = {.position_rad = command.position_rad()[j],
+                .velocity_rad_s = command.velocity_rad_s()[j],
+                .torque_Nm = command.torque_Nm()[j],
+                .voltage_V = command.voltage_V()[j],
+                .current_A = command.current_A()[j],
+                .stiffness_Nm_rad = command.stiffness_Nm_rad()[j],
+                .damping_Nms_rad = command.damping_Nms_rad()[j],
+                .mode = command.mode()[j],
+                .interaction = command.interaction()[j]};
+  }
+}
+
 void CommandLimits::modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT {
   Last& last = last_[joint];
   std::int8_t& mode = command.mode()[joint];

@@ -44,6 +44,9 @@ class CommandLimits {
   /// @rt    no allocation, lock or throw; O(joints).
   [[nodiscard]] Code apply(const StateImage& state, CommandImage& command) noexcept TANDEM_RT;
 
+  /// `command` is what the joints follow now, by whoever: the next one is limited from there.
+  void follow(const CommandImage& command) noexcept TANDEM_RT;
+
   /// What apply() answered for each joint in the last cycle.
   [[nodiscard]] std::span<const Code> codes() const noexcept { return codes_; }
   [[nodiscard]] std::span<const LimitCounters> counters() const noexcept { return counters_; }

@@ -202,6 +202,8 @@ struct PidGains {
   double kp = 0.0;
   double ki = 0.0;
   double kd = 0.0;
+
+  bool operator==(const PidGains&) const = default;
 };
 
 /// The loops whose gains can be set at run time.

@@ -143,6 +143,15 @@ std::int64_t CyclicLoop::finish() noexcept TANDEM_RT {
   return now_ns;
 }
 
+void CyclicLoop::skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT {
+  ++statistics_.overruns;
+  statistics_.skipped += cycles;
+  next_cycle_ += cycles;
+  tick.skipped += cycles;
+  tick.cycle += cycles;
+  tick.time_ns = static_cast<std::int64_t>(tick.cycle) * config_.period_ns;
+}
+
 void CyclicLoop::archive(Archive& ar) {
   ar(next_cycle_);
   if (ar.reading()) {

@@ -90,6 +90,10 @@ class CyclicLoop {
   /// Of the newest cycle that finished.
   [[nodiscard]] std::int64_t last_work_ns() const noexcept { return last_work_ns_; }
 
+  /// External pacing: so many cycles went by unseen before the one that wait() has announced, which
+  /// gets its number and time by that. Counted as an overrun's are.
+  void skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT;
+
   /// The overruns so far count no more towards OverrunPolicy::kStop.
   void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next

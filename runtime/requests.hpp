@@ -35,6 +35,10 @@ class Requests {
     ask(category == hal::StopCategory::kCategory0 ? kStop0 : kStop1);
   }
 
+  /// Whether take() has something to tell.
+  [[nodiscard]] bool pending() const noexcept {
+    return asked_.load(std::memory_order_relaxed) != 0;
+  }
   [[nodiscard]] Asked take() noexcept TANDEM_RT {
     if (asked_.load(std::memory_order_relaxed) == 0) return {};
     const std::uint32_t asked = asked_.exchange(0, std::memory_order_relaxed);

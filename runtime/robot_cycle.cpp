@@ -10,21 +10,29 @@ using log::EventKind;
 
 bool RobotCycle::step() noexcept {
   if (phase_ == RunPhase::kDone) return false;
-  const rt::Tick tick = wait();
+  rt::Tick tick = wait();
   time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
   begin_ns_ = tick.begin_ns;
   wakeup_ns_ = tick.wakeup_ns;
   trace_wait(tick);
-  exchange();
-  cycle(tick);
+  exchange(tick);
+  sense(tick);
+  await_owner();
+  act(tick);
   return phase_ != RunPhase::kDone;
 }
 
-void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
+void RobotCycle::sense(const rt::Tick& tick) noexcept TANDEM_RT {
   const rt::ScopedRealtime in_cycle;
   read();
   mark(Stage::kRead);
   check(tick);
+}
+
+void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
+  const rt::ScopedRealtime in_cycle;
+  follow_owner();
+  take_requests();
   mark(Stage::kCheck);
   update(tick);
   mark(Stage::kUpdate);
@@ -41,7 +49,7 @@ void RobotCycle::cycle(const rt::Tick& tick) noexcept TANDEM_RT {
 /// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
-  const std::size_t most = 3 + 12 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() +
+  const std::size_t most = 3 + 16 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() +
                            sensor_lost_.size();
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
   if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
@@ -49,8 +57,12 @@ rt::Tick RobotCycle::wait() noexcept {
 }
 
 /// May block until the robot has answered, which does not count as the cycle's work.
-void RobotCycle::exchange() noexcept {
+void RobotCycle::exchange(rt::Tick& tick) noexcept {
   backend_->exchange(time_);
+  if (const std::uint64_t missed = backend_->missed(); missed > 0) {
+    loop_.skip(tick, missed);
+    time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+  }
   if (backend_->waits_for_bus()) mark(Stage::kExchange, loop_.exchanged());
 }
 
@@ -79,7 +91,6 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   }
   check_backend(read_code_);
   advance_phase();
-  take_requests();
 }
 
 /// The run's course when nobody asks for anything.
@@ -110,13 +121,16 @@ bool RobotCycle::time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT {
 }
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
-  command_.cycle()[0] = time_.cycle;
-  command_.time_ns()[0] = time_.time_ns;
+  for (hal::CommandImage* image : {&command_, &wanted_}) {
+    image->cycle()[0] = time_.cycle;
+    image->time_ns()[0] = time_.time_ns;
+  }
   switch (phase_) {
     case RunPhase::kBringUp:
     case RunPhase::kResetting:
       controllers_->release(command_);  // every reference follows its joint until it is enabled
       controllers_->hold(state_, command_);
+      (void)backend_->command_in_force(command_);
       break;
     case RunPhase::kSettling: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
@@ -135,10 +149,11 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
 }
 
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
-  if (!controlling_) controllers_->start(time_, state_, command_);
+  if (!controlling_) start_controllers();
   controlling_ = true;
   ++ran_;
-  const Code code = controllers_->update(time_, state_, command_);
+  const Code code = controllers_->update(time_, state_, controlled());
+  if (delay_.on()) delay_.pass(wanted_, command_);
   if (code == Code::kOk) return;
   if (code == Code::kStopped) {
     event(EventKind::kControllersDone);
@@ -149,6 +164,16 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
          .code = static_cast<std::uint32_t>(code),
          .source = FaultSource::kController,
          .category = hal::StopCategory::kCategory1});
+}
+
+void RobotCycle::start_controllers() noexcept TANDEM_RT {
+  if (backend_->command_in_force(command_)) limits_.follow(command_);
+  if (delay_.on()) {
+    controllers_->hold(state_, command_);
+    delay_.fill(command_);
+    wanted_.assign(command_);
+  }
+  controllers_->start(time_, state_, controlled());
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
@@ -175,6 +200,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
     check_backend(backend_->write(command_, parameters_));
     return;
   }
+  backend_->last_command(command_);
   const bool disabled = backend_->shut_down();
   const bool too_long = time_.cycle - phase_began_ >= config_.shut_down_cycles;
   if (!disabled && !too_long && read_code_ != Code::kDiverged) return;

@@ -16,9 +16,11 @@
 #include "rt/clock_control.hpp"
 #include "rt/cyclic_loop.hpp"
 #include "runtime/after_stop.hpp"
+#include "runtime/command_delay.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_trace.hpp"
 #include "runtime/fault.hpp"
+#include "runtime/owner_controller.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/run_services.hpp"
@@ -34,6 +36,7 @@ struct CycleConfig {
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   AfterStop after_stop = AfterStop::kEnd;
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
+  std::uint32_t delay_cycles = 0;        ///< between the controllers and the limits
   std::size_t trace_cycles = 0;          ///< the last that trace() keeps: 6 clock reads each
 };
 
@@ -46,6 +49,7 @@ struct CycleParts {
   log::Recorder* recorder = nullptr;       ///< null: nothing is logged. Not started yet.
   const hal::TruthImage* truth = nullptr;  ///< the simulation's, filled by backend.read()
   hal::CycleTap* tap = nullptr;            ///< null: nobody watches
+  OwnerSeat owner = {};                    ///< for one in another process
 };
 
 /// A run from bring-up to shut-down, cycle by cycle:
@@ -64,6 +68,9 @@ class RobotCycle {
  public:
   /// Adds the recorder's channels and starts it. Allocates all that the cycle needs.
   RobotCycle(const CycleParts& parts, const CycleConfig& config);
+  ~RobotCycle();
+  RobotCycle(const RobotCycle&) = delete;
+  RobotCycle& operator=(const RobotCycle&) = delete;
 
   /// One cycle. False once the run is done.
   bool step() noexcept;
@@ -107,7 +114,7 @@ class RobotCycle {
 
  private:
   [[nodiscard]] rt::Tick wait() noexcept;
-  void exchange() noexcept;
+  void exchange(rt::Tick& tick) noexcept;
   void read() noexcept TANDEM_RT;
   void check(const rt::Tick& tick) noexcept TANDEM_RT;
   void update(const rt::Tick& tick) noexcept TANDEM_RT;
@@ -115,13 +122,22 @@ class RobotCycle {
   void write() noexcept TANDEM_RT;
   void hand_over() noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
-  void cycle(const rt::Tick& tick) noexcept TANDEM_RT;
+  void sense(const rt::Tick& tick) noexcept TANDEM_RT;
+  void act(const rt::Tick& tick) noexcept TANDEM_RT;
 
   void advance_phase() noexcept TANDEM_RT;
   void check_backend(Code code) noexcept TANDEM_RT;
   void check_joints() noexcept TANDEM_RT;
   void check_sensors() noexcept TANDEM_RT;
   [[nodiscard]] bool time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT;
+
+  // robot_cycle_owner.cpp
+  void await_owner() noexcept;
+  void follow_owner() noexcept TANDEM_RT;
+  void seat_owner(bool owned) noexcept TANDEM_RT;
+  void take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT;
+  [[nodiscard]] bool has_owner() const noexcept TANDEM_RT;
+  [[nodiscard]] hal::PortView port_view() noexcept TANDEM_RT;
 
   // robot_cycle_services.cpp
   void take_services() noexcept TANDEM_RT;
@@ -143,6 +159,11 @@ class RobotCycle {
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
   void run_controllers() noexcept TANDEM_RT;
+  void start_controllers() noexcept TANDEM_RT;
+  /// The image that controllers write.
+  [[nodiscard]] hal::CommandImage& controlled() noexcept TANDEM_RT {
+    return delay_.on() ? wanted_ : command_;
+  }
   void go(RunPhase next) noexcept TANDEM_RT;
   void event(log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0) noexcept TANDEM_RT;
@@ -159,6 +180,7 @@ class RobotCycle {
   log::Recorder* recorder_;
   const hal::TruthImage* truth_;
   hal::CycleTap* tap_;
+  OwnerSeat seat_;
   CycleConfig config_;
 
   rt::Doorbell bell_;  // rings when a loop that blocks has something to look at
@@ -166,6 +188,8 @@ class RobotCycle {
   rt::CyclicLoop loop_;
   hal::StateImage state_;
   hal::CommandImage command_;
+  hal::CommandImage wanted_;  // by the controllers, when what they want is delayed
+  CommandDelay delay_;
   hal::ParameterImage parameters_;
   hal::CommandLimits limits_;
   RunStatistics statistics_;
@@ -183,6 +207,7 @@ class RobotCycle {
   std::uint64_t spent_ = 0;                                                // of running_cycles
   std::uint64_t ran_ = 0;                                                  // cycles of kRunning
   std::vector<std::uint8_t> joint_faulted_, sensor_lost_, joint_limited_;  // noted once each
+  std::vector<std::uint8_t> causes_;                                       // for the owner
   FaultLog faults_;
 
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;

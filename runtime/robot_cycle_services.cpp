@@ -24,9 +24,10 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     case Kind::kRemove: return controllers_->remove(request.slot);
     case Kind::kSwitch:
       return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
-                                       command_);
+                                       controlled());
     case Kind::kJoint:
-      return controllers_->set_joint(request.joint, request.wish, controlling_, state_, command_);
+      return controllers_->set_joint(request.joint, request.wish, controlling_, state_,
+                                     controlled());
     case Kind::kGains: break;
   }
   parameters_.set_gains(request.joint, request.loop, request.gains);

@@ -11,21 +11,26 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       recorder_(parts.recorder),
       truth_(parts.truth),
       tap_(parts.tap),
+      seat_(parts.owner),
       config_(config),
       clock_control_(config.loop, bell_),
       loop_(config.loop, parts.clock, &clock_control_),
       state_(parts.robot.shape()),
       command_(parts.robot.shape()),
+      wanted_(parts.robot.shape()),
+      delay_(parts.robot.shape(), config.delay_cycles),
       parameters_(hal::initial_parameters(parts.robot)),
       limits_(parts.robot, config.loop.period_ns),
       statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet()),
       joint_faulted_(parts.robot.joints.size()),
       sensor_lost_(parts.robot.sensors.size()),
       joint_limited_(parts.robot.joints.size()),
+      causes_(parts.robot.joints.size()),
       services_(parts.robot, parts.controllers, mailbox_, progress_, clock_control_, parameters_),
       looks_(parts.robot.joints.size()),
       trace_(config.trace_cycles) {
   progress_.total_cycles = config.running_cycles;
+  if (seat_.port != nullptr) seat_.port->on_news([this] { bell_.ring(); });
   if (recorder_ == nullptr) return;
   state_channel_ = recorder_->add_channel("/tandem/state", "tandem/msg/State", state_.layout());
   command_channel_ =
@@ -42,6 +47,8 @@ void RobotCycle::archive(Archive& ar) {
   loop_.archive(ar);
   state_.archive(ar);
   command_.archive(ar);
+  wanted_.archive(ar);
+  delay_.archive(ar);
   parameters_.archive(ar);
   limits_.archive(ar);
   statistics_.archive(ar);
@@ -116,6 +123,20 @@ Fault RobotCycle::tell(std::size_t number) const {
       fault.text = static_cast<EmergencyInput>(record.code) == EmergencyInput::kSignal
                        ? "emergency stop by a signal"
                        : "emergency stop on request";
+      break;
+    case FaultSource::kOwner:
+      switch (static_cast<hal::OwnerLoss>(record.code)) {
+        case hal::OwnerLoss::kNone: fault.text = "the remote owner asked for a stop"; break;
+        case hal::OwnerLoss::kSilent:
+          fault.text = "the remote owner is gone: its lease has run out";
+          break;
+        case hal::OwnerLoss::kStale:
+          fault.text = "the remote owner's commands stopped, or came too late";
+          break;
+        case hal::OwnerLoss::kLate:
+          fault.text = "the remote owner gave no command for this cycle in time";
+          break;
+      }
       break;
   }
   if (record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||

@@ -1,0 +1,91 @@
+// The loop's part of an owner in another process: shown each cycle, followed, and left.
+#include <algorithm>
+
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+
+using log::EventKind;
+
+RobotCycle::~RobotCycle() {
+  if (seat_.port != nullptr) seat_.port->on_news({});
+}
+
+hal::PortView RobotCycle::port_view() noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < causes_.size(); ++j) {
+    const bool told = state_.fault()[j] != 0;
+    causes_[j] = told ? static_cast<std::uint8_t>(backend_->fault_cause(j)) : 0;
+  }
+  return {.time = time_,
+          .phase = phase_,
+          .read_code = read_code_,
+          .reaction = reaction_,
+          .state = state_,
+          .command = command_,
+          .causes = causes_};
+}
+
+/// In lockstep: blocks until the owner's command for this cycle is there, or there is something
+/// else to do.
+void RobotCycle::await_owner() noexcept {
+  if (seat_.port == nullptr || !seat_.port->lockstep()) return;
+  const hal::PortView view = port_view();
+  seat_.port->send(view);
+  for (;;) {
+    const std::uint32_t seen = bell_.count();
+    if (bell_.ended() || requests_.pending()) break;
+    const std::int64_t until_ns = seat_.port->wait_until_ns(view);
+    if (until_ns == 0) break;
+    bell_.wait(seen, until_ns);
+  }
+  loop_.exchanged();  // waiting is no work of the cycle's own
+}
+
+void RobotCycle::follow_owner() noexcept TANDEM_RT {
+  if (seat_.port == nullptr) return;
+  const hal::OwnerWish wish = seat_.port->exchange(port_view());
+  seat_.controller->follow(wish);
+  if (wish.gains != nullptr) take_gains(*wish.gains);
+  if (wish.stop != hal::StopCategory::kWarn) {
+    fault({.source = FaultSource::kOwner, .category = wish.stop});
+  }
+  if (wish.loss != hal::OwnerLoss::kNone) {
+    fault({.code = static_cast<std::uint32_t>(wish.loss),
+           .source = FaultSource::kOwner,
+           .category = wish.on_loss});
+  }
+  if (wish.reset) begin_reset();
+  seat_owner(wish.live);
+  const bool serves = phase_ == RunPhase::kRunning && has_owner();  // its controller ends the run
+  if (wish.done && wish.ends_run && !serves && phase_ != RunPhase::kShutDown) {
+    event(EventKind::kStopRequested);
+    go(RunPhase::kShutDown);
+  }
+}
+
+bool RobotCycle::has_owner() const noexcept TANDEM_RT {
+  return (controllers_->shown().active & only(seat_.slot)) != 0;
+}
+
+/// Gives the robot to the owner, or takes it back: a switch of controllers.
+void RobotCycle::seat_owner(bool owned) noexcept TANDEM_RT {
+  if (owned == has_owner()) return;
+  const ControllerSet owner = only(seat_.slot);
+  const LoopAnswer answer =
+      owned ? controllers_->switch_over(controllers_->shown().active, owner, controlling_, time_,
+                                        state_, controlled())
+            : controllers_->switch_over(owner, 0, controlling_, time_, state_, controlled());
+  if (answer.refusal == Refusal::kNone && controlling_) event(EventKind::kControllersSwitched);
+}
+
+void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < parameters_.joints(); ++j) {
+    for (std::size_t i = 0; i < hal::kPidLoops; ++i) {
+      const auto loop = static_cast<hal::PidLoop>(i);
+      if (wanted.gains(j, loop) == parameters_.gains(j, loop)) continue;
+      parameters_.set_gains(j, loop, wanted.gains(j, loop));
+    }
+  }
+}
+
+}  // namespace tandem::runtime
