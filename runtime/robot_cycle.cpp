@@ -121,16 +121,14 @@ bool RobotCycle::time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT {
 }
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
-  for (hal::CommandImage* image : {&command_, &wanted_}) {
-    image->cycle()[0] = time_.cycle;
-    image->time_ns()[0] = time_.time_ns;
-  }
+  stamp(command_);
+  stamp(wanted_);
   switch (phase_) {
     case RunPhase::kBringUp:
     case RunPhase::kResetting:
       controllers_->release(command_);  // every reference follows its joint until it is enabled
       controllers_->hold(state_, command_);
-      (void)backend_->command_in_force(command_);
+      (void)go_on_from_robot();
       break;
     case RunPhase::kSettling: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
@@ -166,8 +164,20 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
          .category = hal::StopCategory::kCategory1});
 }
 
+void RobotCycle::stamp(hal::CommandImage& command) const noexcept TANDEM_RT {
+  command.cycle()[0] = time_.cycle;
+  command.time_ns()[0] = time_.time_ns;
+}
+
+/// From what the robot follows, when that is another loop's. False: it is not.
+bool RobotCycle::go_on_from_robot() noexcept TANDEM_RT {
+  const bool is_others = backend_->command_in_force(command_);
+  stamp(command_);
+  return is_others;
+}
+
 void RobotCycle::start_controllers() noexcept TANDEM_RT {
-  if (backend_->command_in_force(command_)) limits_.follow(command_);
+  if (go_on_from_robot()) limits_.follow(command_);
   if (delay_.on()) {
     controllers_->hold(state_, command_);
     delay_.fill(command_);

@@ -160,6 +160,8 @@ class RobotCycle {
 
   void run_controllers() noexcept TANDEM_RT;
   void start_controllers() noexcept TANDEM_RT;
+  [[nodiscard]] bool go_on_from_robot() noexcept TANDEM_RT;
+  void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;
   /// The image that controllers write.
   [[nodiscard]] hal::CommandImage& controlled() noexcept TANDEM_RT {
     return delay_.on() ? wanted_ : command_;

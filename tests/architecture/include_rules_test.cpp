@@ -27,7 +27,7 @@ const Rules& rules() {
       {"hal", {"base"}},
       {"hal/ethercat-can", {"base", "canopen", "hal", "rt/histogram.hpp"}},
       {"hal/sim", {"base", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can"}},
-      {"hal/remote", {"base", "hal", "dds"}},
+      {"hal/remote", {"base", "hal", "dds", "rt/histogram.hpp"}},
       {"dds", {"base", "hal", "model", "rt/histogram.hpp"}},
       {"controllers", {"base", "hal", "model/kernels.h"}},
       {"log", {"base", "hal"}},

@@ -1,0 +1,67 @@
+// What both ends of the network proxy share: whose robot it is, its topics, its clock.
+// Layer: hal/remote.  Thread: any.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/realtime.hpp"
+#include "dds/endpoint.hpp"
+#include "hal/image.hpp"
+#include "hal/robot_config.hpp"
+
+namespace tandem::remote {
+
+namespace tandem_msgs = dds::tandem_msgs;
+
+/// What two processes must agree on before one drives the other's robot.
+struct Identity {
+  std::string robot;
+  std::string description_hash;  ///< of everything its kernels are made from
+  std::int64_t period_ns = 0;
+  std::vector<std::string> joints;
+  std::vector<std::string> sensors;
+  std::uint32_t state_bytes = 0;    ///< of its images
+  std::uint32_t command_bytes = 0;
+
+  bool operator==(const Identity&) const = default;
+};
+[[nodiscard]] Identity identity_of(const hal::RobotConfig& robot, std::string description_hash,
+                                   std::int64_t period_ns);
+/// What `there` has otherwise than `here`, in words; empty: nothing.
+[[nodiscard]] std::string difference(const Identity& here, const Identity& there);
+
+inline constexpr const char* kServerTopic = "tandem/link/server";
+inline constexpr const char* kRequestTopic = "tandem/link/request";
+inline constexpr const char* kStateTopic = "tandem/link/state";
+inline constexpr const char* kCommandTopic = "tandem/link/command";
+/// Late joiners get the last sample; nobody is waited for.
+[[nodiscard]] dds::Qos link_qos();
+
+enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
+
+/// CLOCK_MONOTONIC [ns].
+[[nodiscard]] std::int64_t now_ns() noexcept TANDEM_RT;
+/// A number that no other process draws; not 0.
+[[nodiscard]] std::uint64_t draw_number();
+
+/// Every value of a command is finite, every mode one that there is.
+[[nodiscard]] bool is_sound(const hal::CommandImage& command) noexcept;
+
+/// Calls a function on a thread of Cyclone DDS whenever a reader has samples, until this goes.
+class OnData {
+ public:
+  OnData(dds_entity_t reader, std::function<void()> call);
+  ~OnData();
+  OnData(const OnData&) = delete;
+  OnData& operator=(const OnData&) = delete;
+
+ private:
+  dds_entity_t reader_;
+  std::function<void()> call_;
+};
+
+}  // namespace tandem::remote

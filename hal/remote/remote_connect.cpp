@@ -1,0 +1,229 @@
+// How a client finds a server, gets the robot, keeps it, and gives it back.
+#include <chrono>
+#include <cstring>
+
+#include "hal/remote/remote_backend.hpp"
+
+namespace tandem::remote {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr auto kAgain = std::chrono::milliseconds(100);
+
+SteadyClock::time_point in_seconds(double seconds) {
+  return SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(
+                                  std::chrono::duration<double>(seconds));
+}
+
+std::string text(const char* of_sample) { return of_sample == nullptr ? "" : of_sample; }
+
+template <class Sequence>
+std::vector<std::string> texts(const Sequence& sequence) {
+  std::vector<std::string> all;
+  for (std::uint32_t i = 0; i < sequence._length; ++i) all.push_back(text(sequence._buffer[i]));
+  return all;
+}
+
+std::string seconds(double value) {
+  std::string text = std::to_string(value);
+  return text.substr(0, text.find('.') + 2) + " s";
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& participant,
+                                                              const hal::RobotConfig& robot,
+                                                              const Identity& identity,
+                                                              const ClientConfig& config) {
+  const auto name = [&](const char* topic) { return participant.topic_name(topic); };
+  auto server =
+      dds::Reader<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
+  if (!server) return std::unexpected(server.error());
+  auto state =
+      dds::Reader<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
+  if (!state) return std::unexpected(state.error());
+  auto requests =
+      dds::Writer<tandem_msgs::LinkRequest>::create(participant, name(kRequestTopic), link_qos());
+  if (!requests) return std::unexpected(requests.error());
+  auto commands =
+      dds::Writer<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
+  if (!commands) return std::unexpected(commands.error());
+  std::unique_ptr<RemoteBackend> made(
+      new RemoteBackend({std::move(*server), std::move(*state), std::move(*requests),
+                         std::move(*commands)},
+                        robot, config));
+  if (Status found = made->find_server(identity); !found) return std::unexpected(found.error());
+  if (Status leased = made->take_lease(); !leased) return std::unexpected(leased.error());
+  return made;
+}
+
+RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::RobotConfig& robot,
+                             ClientConfig config)
+    : endpoints_(std::move(endpoints)),
+      config_(std::move(config)),
+      joints_(robot.joints.size()),
+      newest_(Seen{hal::StateImage(robot.shape()), hal::CommandImage(robot.shape()),
+                   std::vector<std::uint8_t>(robot.joints.size())}),
+      command_(robot.shape()),
+      gains_(robot.joints.size() * 3 * hal::kPidLoops),
+      revisions_(robot.joints.size()) {
+  on_told_.emplace(endpoints_.server.endpoint().get(), [this] { take_told(); });
+}
+
+RemoteBackend::~RemoteBackend() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  closes_.notify_all();
+  if (renewing_.joinable()) renewing_.join();
+  on_told_.reset();
+  on_states_.reset();
+  if (!leased_ || gone_) return;
+  ask(Action::kRelease);
+  dds_wait_for_acks(endpoints_.requests.endpoint().get(), DDS_MSECS(500));
+}
+
+Status RemoteBackend::find_server(const Identity& identity) {
+  const auto deadline = in_seconds(config_.connect_timeout_s);
+  std::unique_lock lock(mutex_);
+  const auto found = [this] { return told_ && !told_->ending; };
+  while (!found() && SteadyClock::now() < deadline) {
+    if (config_.interrupted && config_.interrupted()) break;
+    news_.wait_for(lock, kAgain);
+  }
+  if (!found()) {
+    return fail("no server was found within " + seconds(config_.connect_timeout_s),
+                "start `tandem serve` with the same [dds] domain and namespace");
+  }
+  if (const std::string other = difference(identity, told_->identity); !other.empty()) {
+    return fail("the server's robot is not this one: " + other,
+                "run both with the same robot.toml, description and period");
+  }
+  if (told_->lockstep != config_.lockstep) {
+    return told_->lockstep ? fail("the server runs in lockstep", "add --lockstep here")
+                           : fail("the server does not run in lockstep",
+                                  "leave --lockstep out here, or start `tandem serve --lockstep`");
+  }
+  run_ = told_->run;
+  return {};
+}
+
+Status RemoteBackend::take_lease() {
+  on_states_.emplace(endpoints_.state.endpoint().get(), [this] { take_states(); });
+  const auto deadline = in_seconds(config_.connect_timeout_s);
+  std::unique_lock lock(mutex_);
+  while (told_->owner != client_) {
+    if (told_->owner != 0) {
+      return fail("the robot is owned by " + told_->owner_name,
+                  "wait until it gives it back, or end it");
+    }
+    if (SteadyClock::now() > deadline) {
+      return fail("the server gave no lease within " + seconds(config_.connect_timeout_s),
+                  "is it still running?");
+    }
+    const std::uint64_t before = told_count_;
+    lock.unlock();
+    ask(Action::kAcquire);
+    lock.lock();
+    news_.wait_for(lock, kAgain, [&] { return told_count_ != before; });
+  }
+  leased_ = true;
+  renewing_ = std::thread([this] { renew(); });
+  return {};
+}
+
+void RemoteBackend::ask(Action action) {
+  tandem_msgs::LinkRequest sample{};
+  sample.run = run_;
+  sample.client = client_;
+  sample.action = static_cast<std::uint8_t>(action);
+  sample.name = config_.name.data();
+  (void)endpoints_.requests.write(sample);
+}
+
+void RemoteBackend::renew() {
+  std::unique_lock lock(mutex_);
+  while (!closing_) {
+    const std::chrono::duration<double> pause(told_->lease_timeout_s / 4.0);
+    lock.unlock();
+    if (!lost_) ask(Action::kRenew);
+    lock.lock();
+    closes_.wait_for(lock, pause, [this] { return closing_; });
+  }
+}
+
+void RemoteBackend::take_told() {
+  {
+    const std::lock_guard lock(mutex_);
+    endpoints_.server.take([this](const tandem_msgs::LinkServer& sample, const auto&) {
+      if (run_ != 0 && sample.run != run_) return;  // another server
+      told_ = Told{.identity = {.robot = text(sample.robot),
+                                .description_hash = text(sample.description_hash),
+                                .period_ns = sample.period_ns,
+                                .joints = texts(sample.joints),
+                                .sensors = texts(sample.sensors),
+                                .state_bytes = sample.state_bytes,
+                                .command_bytes = sample.command_bytes},
+                   .run = sample.run,
+                   .owner = sample.owner,
+                   .owner_name = text(sample.owner_name),
+                   .status = text(sample.status),
+                   .lease_timeout_s = sample.lease_timeout_s,
+                   .lockstep = sample.lockstep,
+                   .ending = sample.ending};
+      ++told_count_;
+      heard_ns_ = now_ns();
+      if (run_ == 0) return;
+      if (sample.ending) ending_ = true;
+      if (leased_ && sample.owner != client_) lost_ = true;
+    });
+  }
+  news_.notify_all();
+}
+
+void RemoteBackend::take_states() {
+  {
+    const std::lock_guard lock(mutex_);
+    endpoints_.state.take([this](const tandem_msgs::LinkState& sample, const auto&) {
+      if (sample.run == run_ && unpack(sample)) newest_.publish();
+    });
+  }
+  news_.notify_all();
+}
+
+/// False: not this robot's, which no server of it sends.
+bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
+  Seen& to = newest_.back();
+  if (sample.state._length != to.state.bytes().size() ||
+      sample.command._length != to.command.bytes().size() || sample.causes._length != joints_) {
+    return false;
+  }
+  std::memcpy(to.state.bytes().data(), sample.state._buffer, sample.state._length);
+  std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
+  to.causes.assign(sample.causes._buffer, sample.causes._buffer + joints_);
+  to.cycle = sample.cycle;
+  to.owner = sample.owner;
+  to.answered_cycle = sample.answered_cycle;
+  to.answered_ns = sample.answered_ns;
+  to.sent_ns = sample.sent_ns;
+  to.phase = sample.phase;
+  to.code = sample.code;
+  to.reaction = static_cast<hal::StopCategory>(sample.reaction);
+  to.is_one = true;
+  heard_ns_ = now_ns();
+  return true;
+}
+
+std::string RemoteBackend::status_text() const {
+  const std::lock_guard lock(mutex_);
+  if (gone_) {
+    return "the server has not been heard for " + seconds(config_.server_timeout_s);
+  }
+  if (ending_) return "the server's run is over";
+  if (lost_) return "the server took the robot away: no command in time, or a stop there";
+  if (told_ && !told_->status.empty()) return "at the server: " + told_->status;
+  return "the server brings the robot up";
+}
+
+}  // namespace tandem::remote

@@ -1,0 +1,250 @@
+// The loop's side of the link, and the checks of what arrives. What goes out: server_send.cpp.
+#include "hal/remote/server.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "hal/capabilities.hpp"
+
+namespace tandem::remote {
+
+using hal::OwnerLoss;
+using hal::RunPhase;
+using hal::StopCategory;
+
+namespace {
+
+constexpr std::int64_t kLook_ns = 50'000'000;  // a waiting cycle looks around so often
+constexpr std::size_t kGains = 3 * hal::kPidLoops;
+constexpr std::size_t kRingCycles = 64;
+
+std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
+
+}  // namespace
+
+Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant,
+                                             const hal::RobotConfig& robot, Identity identity,
+                                             const ServerConfig& config) {
+  const auto name = [&](const char* topic) { return participant.topic_name(topic); };
+  auto server =
+      dds::Writer<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
+  if (!server) return std::unexpected(server.error());
+  auto state =
+      dds::Writer<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
+  if (!state) return std::unexpected(state.error());
+  auto requests =
+      dds::Reader<tandem_msgs::LinkRequest>::create(participant, name(kRequestTopic), link_qos());
+  if (!requests) return std::unexpected(requests.error());
+  auto commands =
+      dds::Reader<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
+  if (!commands) return std::unexpected(commands.error());
+  return std::unique_ptr<Server>(new Server({std::move(*server), std::move(*state),
+                                             std::move(*requests), std::move(*commands)},
+                                            robot, std::move(identity), config));
+}
+
+Server::Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity identity,
+               const ServerConfig& config)
+    : endpoints_(std::move(endpoints)),
+      identity_(std::move(identity)),
+      config_(config),
+      gains_(hal::initial_parameters(robot)),
+      newest_(Taken{hal::CommandImage(robot.shape()), gains_}),
+      stop_(static_cast<std::uint8_t>(StopCategory::kWarn)),
+      ring_(sizeof(Shown) + identity_.state_bytes + identity_.command_bytes + robot.joints.size(),
+            kRingCycles),
+      joints_(robot.joints.size()),
+      thread_([this] { run(); }) {
+  on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
+  on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });
+}
+
+void Server::on_news(std::function<void()> ring) {
+  const std::lock_guard lock(ring_mutex_);
+  on_news_ = std::move(ring);
+}
+
+void Server::ring() {
+  const std::lock_guard lock(ring_mutex_);
+  if (on_news_) on_news_();
+}
+
+void Server::take_requests() {
+  endpoints_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto&) {
+    if (sample.run != run_ || sample.client == 0) return;
+    switch (static_cast<Action>(sample.action)) {
+      case Action::kAcquire:
+        (void)lease_.acquire(sample.client, sample.name == nullptr ? "" : sample.name, now_ns());
+        break;
+      case Action::kRenew:
+        if (lease_.owner() == sample.client) lease_.heard(now_ns());
+        return;
+      case Action::kRelease: (void)lease_.release(sample.client); break;
+      default: return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      news_ = true;
+    }
+    wake_.notify_one();
+  });
+  ring();
+}
+
+void Server::take_commands() {
+  {
+    const std::lock_guard lock(in_mutex_);
+    endpoints_.commands.take([this](const tandem_msgs::LinkCommand& sample, const auto&) {
+      const Verdict verdict = judge(sample);
+      counts_[static_cast<std::size_t>(verdict)].fetch_add(1, std::memory_order_relaxed);
+    });
+  }
+  ring();
+}
+
+/// Whether a sample may reach the loop; hands it over then.
+Verdict Server::judge(const tandem_msgs::LinkCommand& sample) {
+  if (sample.run != run_ || sample.client == 0 || sample.client != lease_.owner()) {
+    return Verdict::kNoLease;
+  }
+  if (sample.client != gate_client_) {
+    gate_client_ = sample.client;
+    gate_sequence_ = 0;
+    gate_stops_ = gate_resets_ = 0;
+  }
+  if (sample.sequence_number <= gate_sequence_) return Verdict::kOutOfOrder;
+  gate_sequence_ = sample.sequence_number;
+  note_stops(sample);  // whatever else is wrong with it
+  const std::uint64_t cycle = cycle_.load(std::memory_order_acquire);
+  if (sample.cycle > cycle || cycle - sample.cycle > config_.max_age_cycles) {
+    return Verdict::kStale;
+  }
+  if (!unpack(sample)) return Verdict::kMalformed;
+  lease_.heard(now_ns());
+  newest_.publish();
+  return Verdict::kTaken;
+}
+
+void Server::note_stops(const tandem_msgs::LinkCommand& sample) {
+  if (sample.resets != gate_resets_) reset_.store(true, std::memory_order_relaxed);
+  gate_resets_ = sample.resets;
+  if (sample.stops == gate_stops_) return;
+  gate_stops_ = sample.stops;
+  const auto hardest = static_cast<std::uint8_t>(StopCategory::kCategory1);
+  // What nobody knows stops as category 1.
+  const std::uint8_t asked =
+      sample.stop < static_cast<std::uint8_t>(StopCategory::kWarn) ? sample.stop : hardest;
+  std::uint8_t before = stop_.load(std::memory_order_relaxed);
+  while (asked < before && !stop_.compare_exchange_weak(before, asked)) {
+  }
+}
+
+bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
+  Taken& to = newest_.back();
+  if (sample.command._length != to.command.bytes().size()) return false;
+  const std::uint32_t gains = sample.gains._length;
+  if (gains != 0 && gains != joints_ * kGains) return false;
+  std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
+  if (!is_sound(to.command)) return false;
+  const double* value = sample.gains._buffer;
+  if (!std::all_of(value, value + gains, [](double v) { return std::isfinite(v) && v >= 0.0; })) {
+    return false;
+  }
+  for (std::size_t i = 0; i < gains; i += 3) {
+    gains_.set_gains(i / kGains, static_cast<hal::PidLoop>(i % kGains / 3),
+                     {.kp = value[i], .ki = value[i + 1], .kd = value[i + 2]});
+  }
+  if (gains != 0) ++gains_number_;
+  if (to.gains_number != gains_number_) to.gains = gains_;
+  to.gains_number = gains_number_;
+  to.client = sample.client;
+  to.sequence = sample.sequence_number;
+  to.cycle = sample.cycle;
+  to.state_ns = sample.state_ns;
+  to.sent_ns = sample.sent_ns;
+  to.live = sample.live;
+  to.done = sample.done;
+  return true;
+}
+
+OwnerLoss Server::loss_of(const hal::PortView& view,
+                          std::uint64_t owner) const noexcept TANDEM_RT {
+  const std::int64_t now = now_ns();
+  if (now - lease_.heard_ns() > ns(config_.lease_timeout_s)) return OwnerLoss::kSilent;
+  const Taken& taken = newest_.front();
+  if (config_.lockstep) {
+    const bool there = taken.client == owner && taken.cycle == view.time.cycle;
+    const bool late = waits_since_ns_ != 0 && now - waits_since_ns_ > ns(config_.lockstep_timeout_s);
+    return late && !there ? OwnerLoss::kLate : OwnerLoss::kNone;
+  }
+  const bool old = led_by_ == owner && view.time.cycle - taken.cycle > config_.max_age_cycles;
+  return old ? OwnerLoss::kStale : OwnerLoss::kNone;
+}
+
+std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
+  if (view.phase == RunPhase::kShutDown || view.phase == RunPhase::kDone) return 0;
+  const std::int64_t now = now_ns();
+  const std::uint64_t owner = lease_.owner();
+  if (owner == 0) {
+    waits_since_ns_ = 0;
+    const bool stands = view.phase == RunPhase::kBringUp || view.phase == RunPhase::kSettling ||
+                        view.phase == RunPhase::kRunning;
+    return stands && led_by_ == 0 ? now + kLook_ns : 0;
+  }
+  if (waits_since_ns_ == 0) waits_since_ns_ = now;
+  newest_.refresh();
+  const Taken& taken = newest_.front();
+  if (taken.client == owner && taken.cycle == view.time.cycle) return 0;
+  if (loss_of(view, owner) != OwnerLoss::kNone) return 0;
+  return now + kLook_ns;
+}
+
+hal::OwnerWish Server::exchange(const hal::PortView& view) noexcept TANDEM_RT {
+  if (!config_.lockstep) push(view);
+  hal::OwnerWish wish;
+  wish.on_loss = config_.on_lost;
+  constexpr auto kNone = static_cast<std::uint8_t>(StopCategory::kWarn);
+  if (stop_.load(std::memory_order_relaxed) != kNone) {
+    wish.stop = static_cast<StopCategory>(stop_.exchange(kNone, std::memory_order_relaxed));
+  }
+  if (reset_.load(std::memory_order_relaxed)) {
+    wish.reset = reset_.exchange(false, std::memory_order_relaxed);
+  }
+  newest_.refresh();
+  const Taken& taken = newest_.front();
+  const std::uint64_t owner = lease_.owner();
+  if (owner != 0 && taken.client == owner && done_client_ != owner) {
+    measure(view, taken);
+    wish.live = taken.live;
+    wish.command = &taken.command;
+    if (taken.gains_number != gains_taken_) wish.gains = &taken.gains;
+    gains_taken_ = taken.gains_number;
+    wish.done = taken.done;
+    if (taken.done) done_client_ = owner;
+    wish.ends_run = config_.ends_with_owner;
+    if (taken.done && !config_.ends_with_owner) wish.live = false;
+  }
+  if (owner != 0 && !wish.done) wish.loss = loss_of(view, owner);
+  if (wish.loss != OwnerLoss::kNone) wish.live = false;
+  if (owner != 0 && (wish.done || wish.loss != OwnerLoss::kNone)) {
+    (void)lease_.release(owner);
+    if (wish.loss != OwnerLoss::kNone) losses_.fetch_add(1, std::memory_order_relaxed);
+    // One that has commanded nothing yet leaves nothing behind.
+    if (led_by_ != owner) wish.loss = OwnerLoss::kNone;
+  }
+  led_by_ = wish.live ? owner : 0;
+  waits_since_ns_ = 0;
+  return wish;
+}
+
+void Server::measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT {
+  if (taken.sequence == answered_sequence_ && taken.sent_ns == answered_ns_) return;
+  answered_sequence_ = taken.sequence;
+  answered_cycle_ = taken.cycle;
+  answered_ns_ = taken.sent_ns;
+  age_.record(now_ns() - taken.state_ns);
+  age_cycles_.record(static_cast<std::int64_t>(view.time.cycle - taken.cycle));
+}
+
+}  // namespace tandem::remote

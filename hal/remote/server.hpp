@@ -1,0 +1,152 @@
+// The owner's end of the robot: shows each cycle on DDS, and takes one client's commands.
+// Layer: hal/remote.  Thread: made and closed by one; its CommandPort is the loop's.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "base/result.hpp"
+#include "base/spsc_ring.hpp"
+#include "hal/command_port.hpp"
+#include "hal/remote/lease.hpp"
+#include "hal/remote/link.hpp"
+#include "hal/remote/newest.hpp"
+#include "rt/histogram.hpp"
+
+namespace tandem::remote {
+
+struct ServerConfig {
+  bool lockstep = false;
+  bool ends_with_owner = false;       ///< the run, when an owner is done; else the next may come
+  double lease_timeout_s = 1.0;       ///< an owner that is not heard for so long has lost it
+  std::uint64_t max_age_cycles = 100; ///< of the state that a command answers
+  double lockstep_timeout_s = 60.0;   ///< that a cycle waits for a living owner's command
+  hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
+};
+
+class Server final : public hal::CommandPort {
+ public:
+  /// Begins to tell of the robot. The participant outlives it.
+  /// Errors: what DDS refuses.
+  [[nodiscard]] static Result<std::unique_ptr<Server>> open(dds::Participant& participant,
+                                                            const hal::RobotConfig& robot,
+                                                            Identity identity,
+                                                            const ServerConfig& config);
+  ~Server() override;
+
+  /// What is told to a client whose robot is in fault; called on another thread until close().
+  void set_status(std::function<std::string()> status);
+  /// Tells that the run is over, and takes nothing any more. The loop has stopped.
+  void close();
+
+  [[nodiscard]] bool lockstep() const noexcept override { return config_.lockstep; }
+  void send(const hal::PortView& view) noexcept override;
+  [[nodiscard]] std::int64_t wait_until_ns(const hal::PortView& view) noexcept override;
+  [[nodiscard]] hal::OwnerWish exchange(const hal::PortView& view) noexcept TANDEM_RT override;
+  void on_news(std::function<void()> ring) override;
+
+  /// For any thread.
+  [[nodiscard]] const Lease& lease() const noexcept { return lease_; }
+  [[nodiscard]] std::uint64_t count(Verdict verdict) const noexcept {
+    return counts_[static_cast<std::size_t>(verdict)].load(std::memory_order_relaxed);
+  }
+  /// Cycles that were not shown, because the thread that sends was behind.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return ring_.dropped(); }
+  [[nodiscard]] std::uint64_t losses() const noexcept {
+    return losses_.load(std::memory_order_relaxed);
+  }
+  // For when the loop has stopped: of the state that each new command answers.
+  [[nodiscard]] const rt::Histogram& age() const noexcept { return age_; }
+  /// In cycles instead of nanoseconds.
+  [[nodiscard]] const rt::Histogram& age_cycles() const noexcept { return age_cycles_; }
+
+ private:
+  /// A command that has passed every check.
+  struct Taken {
+    hal::CommandImage command;
+    hal::ParameterImage gains;
+    std::uint64_t client = 0, sequence = 0, cycle = 0;
+    std::int64_t state_ns = 0, sent_ns = 0;
+    std::uint64_t gains_number = 0;  // another one: other gains
+    bool live = false, done = false;
+  };
+  /// A cycle on its way to the thread that sends; the images follow it.
+  struct Shown {
+    std::uint64_t cycle, answered_cycle, owner;
+    std::int64_t time_ns, sent_ns, answered_ns;
+    std::uint8_t phase, code, reaction, padding[5];
+  };
+  struct Endpoints {
+    dds::Writer<tandem_msgs::LinkServer> server;
+    dds::Writer<tandem_msgs::LinkState> state;
+    dds::Reader<tandem_msgs::LinkRequest> requests;
+    dds::Reader<tandem_msgs::LinkCommand> commands;
+  };
+
+  Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity identity,
+         const ServerConfig& config);
+
+  void run();
+  void tell();
+  void send_shown();
+  void write_state(const Shown& shown, std::span<const std::byte> state,
+                   std::span<const std::byte> command, std::span<const std::uint8_t> causes);
+  [[nodiscard]] Shown shown_of(const hal::PortView& view) noexcept TANDEM_RT;
+  void push(const hal::PortView& view) noexcept TANDEM_RT;
+  void ring();
+  void take_requests();
+  void take_commands();
+  [[nodiscard]] Verdict judge(const tandem_msgs::LinkCommand& sample);
+  [[nodiscard]] bool unpack(const tandem_msgs::LinkCommand& sample);
+  void note_stops(const tandem_msgs::LinkCommand& sample);
+  [[nodiscard]] hal::OwnerLoss loss_of(const hal::PortView& view,
+                                       std::uint64_t owner) const noexcept TANDEM_RT;
+  void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
+
+  Endpoints endpoints_;
+  Identity identity_;
+  ServerConfig config_;
+  std::uint64_t run_ = draw_number();
+  Lease lease_;
+  std::array<std::atomic<std::uint64_t>, kVerdicts> counts_{};
+  std::atomic<std::uint64_t> losses_{0};
+
+  // From DDS' threads to the loop.
+  std::mutex in_mutex_;  // of what follows
+  std::uint64_t gate_client_ = 0, gate_sequence_ = 0;
+  std::uint32_t gate_stops_ = 0, gate_resets_ = 0;
+  hal::ParameterImage gains_;  // the newest
+  std::uint64_t gains_number_ = 0;
+  Newest<Taken> newest_;
+  std::atomic<std::uint8_t> stop_;  // a hal::StopCategory, to be carried out
+  std::atomic<bool> reset_{false};
+  std::mutex ring_mutex_;
+  std::function<void()> on_news_;
+
+  // The loop's.
+  std::atomic<std::uint64_t> cycle_{0};  // shown last; read by DDS' threads
+  std::uint64_t led_by_ = 0;             // client whose commands are followed; 0: nobody's
+  std::uint64_t answered_sequence_ = 0, answered_cycle_ = 0, done_client_ = 0;
+  std::uint64_t gains_taken_ = 0;
+  std::int64_t answered_ns_ = 0, waits_since_ns_ = 0;
+  rt::Histogram age_, age_cycles_;
+
+  // The sending thread's.
+  SpscRing ring_;
+  std::size_t joints_;
+  std::mutex mutex_;  // of what follows
+  std::condition_variable wake_;
+  std::function<std::string()> status_;
+  bool news_ = true, ending_ = false, stopping_ = false;
+  std::thread thread_;
+  std::optional<OnData> on_requests_, on_commands_;  // last: they call the others
+};
+
+}  // namespace tandem::remote

@@ -1,0 +1,168 @@
+// Both ends of the network proxy in one process: a served robot with its loop's thread, and an
+// owner with its own loop.
+// Layer: tests.  Thread: main; the served loop has its own.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "hal/remote/remote_backend.hpp"
+#include "hal/remote/server.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/support/dds_domain.hpp"
+
+namespace tandem::remote::test {
+
+using runtime::RobotCycle;
+using runtime::RunPhase;
+
+inline constexpr std::int64_t kPeriod_ns = 1'000'000;
+
+inline bool eventually(const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (std::chrono::steady_clock::now() < end) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return condition();
+}
+
+/// A participant of this program's domain.
+inline std::unique_ptr<dds::Participant> participant(const std::string& node) {
+  static const auto domain = dds::Domain::open(dds::test::own_config());
+  EXPECT_TRUE(domain) << domain.error().to_string();
+  auto made = dds::Participant::open(*domain, node);
+  EXPECT_TRUE(made) << made.error().to_string();
+  return std::move(*made);
+}
+
+/// What a run was, cycle by cycle; the room for it is there before.
+class Record final : public hal::CycleTap {
+ public:
+  struct Cycle {
+    RunPhase phase;
+    hal::StateImage state;
+    hal::CommandImage command;
+    hal::TruthImage truth;
+  };
+  explicit Record(const hal::RobotConfig& robot, std::size_t most = 2000)
+      : cycles_(most, Cycle{RunPhase::kDone, hal::StateImage(robot.shape()),
+                            hal::CommandImage(robot.shape()),
+                            hal::TruthImage(robot.joints.size(), 0)}) {}
+  void take(const hal::CycleView& view) noexcept override {
+    if (count_ == cycles_.size()) return;
+    Cycle& one = cycles_[count_++];
+    one.phase = view.phase;
+    one.state.assign(view.state);
+    one.command.assign(view.command);
+    if (view.truth != nullptr) one.truth.assign(*view.truth);
+  }
+  [[nodiscard]] std::span<const Cycle> cycles() const { return {cycles_.data(), count_}; }
+
+ private:
+  std::vector<Cycle> cycles_;
+  std::size_t count_ = 0;
+};
+
+/// A robot in this process with its loop on a thread, for owners in others.
+class Served {
+ public:
+  explicit Served(const ServerConfig& config, runtime::CycleConfig cycle_config = {},
+                  hal::CycleTap* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot())
+      : robot(std::move(of)),
+        backend(robot),
+        host(robot, nullptr, kPeriod_ns),
+        participant_(participant("served")) {
+    auto made =
+        Server::open(*participant_, robot, identity_of(robot, "hash", kPeriod_ns), config);
+    EXPECT_TRUE(made) << made.error().to_string();
+    server = std::move(*made);
+    owner = std::make_shared<runtime::OwnerController>();
+    EXPECT_TRUE(host.add("remote", owner, runtime::test::parameters(), false));
+    cycle_config.after_stop = runtime::AfterStop::kWait;
+    cycle = std::make_unique<RobotCycle>(
+        runtime::CycleParts{.robot = robot,
+                            .backend = backend,
+                            .controllers = host,
+                            .clock = clock,
+                            .truth = &backend.truth,
+                            .tap = tap,
+                            .owner = {server.get(), owner.get(), 0}},
+        cycle_config);
+  }
+  ~Served() { end(); }
+  void begin() {
+    thread_ = std::thread([this] { cycle->run(); });
+  }
+  /// Lets it come to its end, without asking for it.
+  void join() {
+    if (thread_.joinable()) thread_.join();
+    server->close();
+  }
+  void end() {
+    cycle->requests().end_run();
+    join();
+  }
+  [[nodiscard]] RunPhase phase() const { return cycle->progress().phase.load(); }
+
+  hal::RobotConfig robot;
+  runtime::test::FirstOrderRobot backend;
+  runtime::ControllerHost host;
+  rt::WallClock clock;
+  std::unique_ptr<dds::Participant> participant_;
+  std::unique_ptr<Server> server;
+  std::shared_ptr<runtime::OwnerController> owner;
+  std::unique_ptr<RobotCycle> cycle;
+
+ private:
+  std::thread thread_;
+};
+
+/// An owner: a loop with a sine on joint 0, over the link.
+class Owner {
+ public:
+  static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
+                                                        ClientConfig config,
+                                                        const hal::RobotConfig& robot) {
+    if (config.name.empty()) config.name = "the test's owner";
+    return RemoteBackend::connect(participant, robot, identity_of(robot, "hash", kPeriod_ns),
+                                  config);
+  }
+
+  explicit Owner(const ClientConfig& config, runtime::CycleConfig cycle_config = {})
+      : robot(hal::test::fake_robot()),
+        participant_(participant("owner")),
+        host(robot, nullptr, kPeriod_ns) {
+    auto made = connect(*participant_, config, robot);
+    EXPECT_TRUE(made) << made.error().to_string();
+    if (!made) return;
+    backend = std::move(*made);
+    auto sine = std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0});
+    controller = sine.get();
+    EXPECT_TRUE(host.add("sine", sine, runtime::test::parameters()));
+    cycle_config.bring_up_cycles = ~std::uint64_t{0};
+    cycle_config.loop.pacing =
+        config.lockstep ? rt::Pacing::kSimulated : rt::Pacing::kExternal;
+    cycle = std::make_unique<RobotCycle>(
+        runtime::CycleParts{robot, *backend, host, clock}, cycle_config);
+  }
+
+  hal::RobotConfig robot;
+  std::unique_ptr<dds::Participant> participant_;
+  std::unique_ptr<RemoteBackend> backend;
+  runtime::ControllerHost host;
+  runtime::test::Sine* controller = nullptr;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+}  // namespace tandem::remote::test

@@ -1,0 +1,92 @@
+// In lockstep a run over the link is the run in one process, bit for bit.
+#include <algorithm>
+#include <cstring>
+
+#include "tests/remote/link_rig.hpp"
+
+namespace tandem::remote {
+namespace {
+
+using namespace test;
+
+constexpr std::uint64_t kRunning = 300, kSettling = 40;
+
+void in_process(Record& record, std::uint32_t delay) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  runtime::test::FirstOrderRobot backend(robot);
+  runtime::ControllerHost host(robot, nullptr, kPeriod_ns);
+  EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
+                       runtime::test::parameters()));
+  rt::WallClock clock;
+  RobotCycle cycle({.robot = robot,
+                    .backend = backend,
+                    .controllers = host,
+                    .clock = clock,
+                    .truth = &backend.truth,
+                    .tap = &record},
+                   {.running_cycles = kRunning, .settle_cycles = kSettling, .delay_cycles = delay});
+  cycle.run();
+  EXPECT_TRUE(cycle.faults().empty());
+}
+
+void over_the_link(Record& record, std::uint32_t delay) {
+  Served served({.lockstep = true, .ends_with_owner = true}, {.settle_cycles = kSettling},
+                &record);
+  served.begin();
+  ClientConfig config;
+  config.lockstep = true;
+  Owner owner(config, {.running_cycles = kRunning, .delay_cycles = delay});
+  owner.cycle->run();
+  served.join();
+  EXPECT_TRUE(owner.cycle->faults().empty());
+  EXPECT_TRUE(served.cycle->faults().empty());
+  EXPECT_EQ(owner.cycle->running_cycles(), kRunning);
+}
+
+bool same(const hal::Image& a, const hal::Image& b) {
+  return std::ranges::equal(a.bytes(), b.bytes());
+}
+
+/// The first field that differs.
+std::string difference_of(const hal::Image& a, const hal::Image& b) {
+  for (const hal::Field& field : a.layout().fields()) {
+    const std::size_t size = field.count * hal::size_of(field.type);
+    if (std::memcmp(a.bytes().data() + field.offset, b.bytes().data() + field.offset, size) != 0) {
+      return field.name;
+    }
+  }
+  return {};
+}
+
+void expect_same(const Record& a, const Record& b) {
+  ASSERT_EQ(a.cycles().size(), b.cycles().size());
+  ASSERT_GT(a.cycles().size(), kRunning + kSettling);
+  for (std::size_t i = 0; i < a.cycles().size(); ++i) {
+    const Record::Cycle& one = a.cycles()[i];
+    const Record::Cycle& other = b.cycles()[i];
+    ASSERT_EQ(one.phase, other.phase) << "cycle " << i;
+    ASSERT_EQ(difference_of(one.state, other.state), "") << "cycle " << i;
+    ASSERT_EQ(difference_of(one.command, other.command), "") << "cycle " << i;
+    ASSERT_EQ(difference_of(one.truth, other.truth), "") << "cycle " << i;
+  }
+}
+
+TEST(LockstepLink, IsTheRunInOneProcessBitForBit) {
+  Record here(hal::test::fake_robot()), there(hal::test::fake_robot());
+  in_process(here, 0);
+  over_the_link(there, 0);
+  expect_same(here, there);
+}
+
+TEST(LockstepLink, WithADelayIsTheDelayedRunInOneProcess) {
+  Record here(hal::test::fake_robot()), there(hal::test::fake_robot());
+  Record undelayed(hal::test::fake_robot());
+  in_process(here, 3);
+  over_the_link(there, 3);
+  expect_same(here, there);
+  in_process(undelayed, 0);
+  EXPECT_FALSE(same(here.cycles().back().state, undelayed.cycles().back().state));
+}
+
+}  // namespace
+}  // namespace tandem::remote
