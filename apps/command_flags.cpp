@@ -5,6 +5,14 @@
 namespace tandem::apps {
 namespace {
 
+const char kServeExamples[] = R"(Examples:
+  tandem serve config/coman/squat.toml                          in one terminal, and in another
+  tandem run config/coman/squat.toml --hal dds                  in real time: serve --realtime
+  tandem serve config/coman/squat.toml --lockstep --once        the same bits as in one process:
+  tandem run config/coman/squat.toml --hal dds --lockstep
+  tandem serve config/coman/robot.toml --hal can                the robot itself
+[remote] of the experiment says who may command and what follows when an owner vanishes.)";
+
 const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --report        and draw the plots
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
@@ -119,6 +127,38 @@ CLI::Validator is_rate() {
   return {check, "0, 0.01 to 1000"};
 }
 
+/// What `run` and `serve` share.
+void add_loop_flags(CLI::App& app, RunOptions& o) {
+  CLI::Option* rate = app.add_option("--rate", o.rate,
+                                     "Simulated seconds per wall second; 0: free running (default)")
+                          ->check(is_rate());
+  app.add_flag_callback(
+         "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
+      ->excludes(rate);
+  app.add_flag("--start-paused", o.start_paused, "Stand before the first cycle: tandem clock step");
+  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--record-frames", o.record_frames,
+                 "CAN: write every frame to this file, as candump -L does");
+  app.add_option("--scenario", o.scenario, kScenarioHelp);
+  CLI::Option* log =
+      app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
+  app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
+  app.add_option("--kernel-variant", o.kernel_variant,
+                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  CLI::Option* trace =
+      app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
+  app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
+      ->needs(trace)
+      ->check(CLI::Range(1, 1'000'000));
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
+  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
+  app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
+      ->check(CLI::Range(0, 232));
+}
+
 }  // namespace
 
 void add_target(CLI::App& app, ControlTarget& target) {
@@ -140,52 +180,38 @@ void add_target(CLI::App& app, ControlTarget& target) {
 
 void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
-  CLI::Option* rate = app.add_option("--rate", o.rate,
-                                     "Simulated seconds per wall second; 0: free running (default)")
-                          ->check(is_rate());
-  app.add_flag_callback(
-         "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
-      ->excludes(rate);
-  app.add_flag("--start-paused", o.start_paused, "Stand before the first cycle: tandem clock step");
-  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
+  add_loop_flags(app, o);
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
       ->check(CLI::PositiveNumber);
   app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
-      ->check(CLI::IsMember({"sim", "can"}));
-  app.add_flag("--lockstep", o.lockstep, "CAN: wait for `tandem emulate --lockstep`, at any speed");
-  app.add_option("--interface", o.interfaces, kInterfaceHelp);
-  app.add_option("--record-frames", o.record_frames,
-                 "CAN: write every frame to this file, as candump -L does");
-  app.add_option("--scenario", o.scenario, kScenarioHelp);
-  CLI::Option* log =
-      app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
-  app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
-  app.add_option("--kernel-variant", o.kernel_variant,
-                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+      ->check(CLI::IsMember({"sim", "can", "dds"}));
+  app.add_flag("--lockstep", o.lockstep,
+               "CAN, DDS: wait for `tandem emulate --lockstep` or `serve --lockstep`, at any speed");
+  app.add_option("--delay-cycles", o.delay_cycles,
+                 "Whole cycles between controllers and limits (default: the experiment's, or 0)")
+      ->check(CLI::Range(0, 1000));
   app.add_flag("--report", o.report, "Draw the report after the run");
-  CLI::Option* trace =
-      app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
-  app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
-      ->needs(trace)
-      ->check(CLI::Range(1, 1'000'000));
-  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
-  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
-  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
   app.add_option("--on-fault", o.on_fault,
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
                  "the wall clock, end else)")
       ->check(CLI::IsMember({"end", "wait"}));
   CLI::Option* dds = app.add_flag_callback(
       "--dds", [&o] { o.dds = true; }, "Show the robot to ROS 2 and `tandem topic`");
-  CLI::Option* no_dds =
-      app.add_flag_callback(
-             "--no-dds", [&o] { o.dds = false; }, "Do not, whatever the experiment says")
-          ->excludes(dds);
-  app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
-      ->excludes(no_dds)
-      ->check(CLI::Range(0, 232));
+  app.add_flag_callback(
+         "--no-dds", [&o] { o.dds = false; }, "Do not, whatever the experiment says")
+      ->excludes(dds)
+      ->excludes("--domain");
   app.footer(kRunExamples);
+}
+
+void add_flags(CLI::App& app, ServeOptions& o) {
+  app.add_option("file", o.run.experiment, "Experiment or robot TOML")->required();
+  add_loop_flags(app, o.run);
+  app.add_option("--hal", o.run.hal, "What stands for the robot (default: the experiment's, or sim)")
+      ->check(CLI::IsMember({"sim", "can"}));
+  app.add_flag("--lockstep", o.run.lockstep, "Each cycle waits for its owner's command");
+  app.add_flag("--once", o.run.once, "End when an owner gives the robot back");
+  app.footer(kServeExamples);
 }
 
 void add_flags(CLI::App& app, FaultOptions& o) {

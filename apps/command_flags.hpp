@@ -20,6 +20,7 @@ void add_target(CLI::App& app, ControlTarget& target);
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.
 void add_flags(CLI::App& app, RunOptions& o);
+void add_flags(CLI::App& app, ServeOptions& o);
 void add_flags(CLI::App& app, FaultOptions& o);
 void add_flags(CLI::App& app, EstopOptions& o);
 void add_flags(CLI::App& app, ClockOptions& o);

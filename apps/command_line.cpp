@@ -15,6 +15,7 @@ const char kExamples[] = R"(Examples:
   tandem run config/coman/squat.toml                 simulate, as fast as the machine goes
   tandem run config/coman/squat.toml --realtime      at the speed of a clock
   tandem emulate config/coman/squat.toml --lockstep  the robot on the other end of CAN
+  tandem serve config/coman/squat.toml               a robot for `tandem run X --hal dds`
   tandem check config/coman/squat.toml               read every file, move nothing
   tandem report runs/coman-squat-001.mcap            draw the plots of a run
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
@@ -109,6 +110,7 @@ Command parse_command_line(int argc, const char* const* argv) {
 
   Subcommands commands(app);
   commands.add<RunOptions>("run", "Run an experiment");
+  commands.add<ServeOptions>("serve", "Run a robot for controllers in other processes");
   commands.add<EmulateOptions>("emulate",
                                "The robot on the other end of CAN: boards' firmware and plant");
   commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");

@@ -30,8 +30,11 @@ struct RunOptions {
   std::string scenario;               ///< TOML of faults to inject; empty: none
   bool no_log = false;
   std::string kernel_variant;           ///< empty: the best that this CPU runs
-  std::string hal;                      ///< "sim", "can"; empty: the experiment's
-  bool lockstep = false;                ///< CAN: wait for an emulated robot
+  std::string hal;                      ///< "sim", "can", "dds"; empty: the experiment's
+  bool lockstep = false;                ///< CAN, DDS: wait for the other end; serve: for an owner
+  std::optional<std::uint32_t> delay_cycles;  ///< instead of the experiment's
+  bool serves = false;                  ///< `tandem serve`: no controllers but an owner's
+  bool once = false;                    ///< ends when an owner gives the robot back
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string record_frames;            ///< file of the bus' frames; empty: none
   bool report = false;                  ///< draw the report after the run
@@ -44,6 +47,11 @@ struct RunOptions {
   std::string on_fault;       ///< "end", "wait"; empty: the experiment's
   std::optional<bool> dds;    ///< instead of the experiment's
   std::optional<int> domain;  ///< of DDS, instead of the experiment's
+};
+
+/// tandem serve EXPERIMENT|ROBOT
+struct ServeOptions {
+  RunOptions run;  ///< with what fits to it
 };
 
 /// tandem fault show|reset
@@ -208,6 +216,7 @@ struct TopicOptions {
 // clang-format off: one a line, so that additions meet without conflict
 using Command = std::variant<Exit,
                              RunOptions,
+                             ServeOptions,
                              AskOptions,
                              FaultOptions,
                              EstopOptions,

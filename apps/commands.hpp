@@ -11,6 +11,8 @@ namespace tandem::apps {
 
 /// Reads every file first, and runs only when all is right.
 [[nodiscard]] Exit run_command(const RunOptions& options);
+/// Runs a robot without controllers of its own, for owners in other processes.
+[[nodiscard]] Exit serve_command(const ServeOptions& options);
 /// What a run has latched, and the request to clear it. Exit::kFault: a cause is still there.
 [[nodiscard]] Exit fault_command(const FaultOptions& options);
 [[nodiscard]] Exit estop_command(const EstopOptions& options);

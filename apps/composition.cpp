@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <unistd.h>
+
 #include <filesystem>
 
 #include "apps/kernel_store.hpp"
@@ -9,6 +11,7 @@
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/sim/scenario.hpp"
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -63,16 +66,56 @@ void add_controllers(Composition& c, Collector& errors) {
   errors.add(c.experiment.document.diagnostics());
 }
 
+/// What to serve: an experiment, or a robot in the first of its postures.
+std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
+  if (!is_robot(file)) return runtime::read_experiment(file);
+  auto robot = read_robot(file);
+  if (!robot) return std::unexpected(robot.error());
+  std::string text = "robot = \"\"\nduration_s = 1.0\n";
+  if (!robot->config.postures.empty()) {
+    text += "posture = \"" + robot->config.postures.front().name + "\"\n";
+  }
+  text += "[[controller]]\nplugin = \"hold\"\n";
+  auto experiment = runtime::parse_experiment(text, file, robot->config);
+  if (experiment) experiment->robot_file = file;
+  return experiment;
+}
+
+/// Without controllers and without an end; DDS is what it is for.
+void serve_only(runtime::Experiment& e, bool lockstep) {
+  e.controllers.clear();
+  e.duration_s = 0.0;
+  e.hal.delay_cycles = 0;  // the owner's is in its commands
+  e.dds.enabled = true;
+  e.remote.command = e.remote.command.value_or(runtime::RemoteCommand::kLocal);
+  e.remote.lockstep = e.remote.lockstep || lockstep;
+}
+
+/// The controller that an owner in another process is.
+void add_owner(Composition& c, Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  const auto command = e.remote.command.value_or(runtime::RemoteCommand::kOff);
+  const bool may = command != runtime::RemoteCommand::kOff && e.dds.enabled;
+  if (!may || c.controllers == nullptr || e.hal.backend == runtime::BackendKind::kDds) return;
+  auto owner = std::make_shared<runtime::OwnerController>();
+  c.owner_slot = c.controllers->size();
+  const auto nothing = TomlDocument::parse("", e.file);
+  const Status added = c.controllers->add("remote", owner, nothing->root(), false);
+  if (!added) return errors.add(added.error(), e.file, 0);
+  c.owner = std::move(owner);
+}
+
 }  // namespace
 
 std::string hal_name(const runtime::HalOptions& hal) {
   if (hal.backend == runtime::BackendKind::kSim) return "sim";
-  return hal.lockstep ? "can lockstep" : "can";
+  const std::string name = hal.backend == runtime::BackendKind::kCan ? "can" : "dds";
+  return hal.lockstep ? name + " lockstep" : name;
 }
 
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
                                                                  const Overrides& overrides) {
-  auto experiment = runtime::read_experiment(file);
+  auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
   if (!experiment) return std::unexpected(experiment.error());
   auto c = std::make_unique<Composition>();
   runtime::Experiment& e = c->experiment;
@@ -84,6 +127,13 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
+  e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
+  if (overrides.serves) serve_only(e, overrides.lockstep);
+  const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
+  if (is_remote) {
+    e.dds.enabled = false;  // the robot is the server's to show
+    e.hal.settle_s = 0.0;   // bring-up and settling are the server's
+  }
 
   Collector errors;
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
@@ -100,12 +150,14 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
     errors.add(kernels.error(), e.robot.file, 0);
   }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
-  add_controllers(*c, errors);
+  if (!overrides.serves) add_controllers(*c, errors);
+  add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
-  if (e.hal.backend == runtime::BackendKind::kCan) {
+  if (e.hal.backend != runtime::BackendKind::kSim) {
     if (overrides.scenario.empty()) return c;
     errors.add({.message = "faults are injected on the other end of the wire",
-                .hint = "give --scenario to `tandem emulate`",
+                .hint = is_remote ? "give --scenario to `tandem serve`"
+                                  : "give --scenario to `tandem emulate`",
                 .file = overrides.scenario,
                 .key = {}},
                overrides.scenario, 0);
@@ -129,8 +181,37 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   return c;
 }
 
+namespace {
+
+/// The robot of a server in the experiment's domain.
+Diagnostics connect_remote(Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  auto domain = dds::Domain::open(e.dds);
+  if (!domain) return {domain.error()};
+  auto participant = dds::Participant::open(std::move(*domain), "tandem_owner");
+  if (!participant) return {participant.error()};
+  c.participant = std::move(*participant);
+  auto backend = remote::RemoteBackend::connect(
+      *c.participant, e.robot,
+      remote::identity_of(e.robot, c.kernels->description_hash, e.loop.period_ns),
+      {.name = fmt::format("tandem run {}, process {}",
+                           std::filesystem::path(e.file).filename().string(), ::getpid()),
+       .lockstep = e.hal.lockstep,
+       .interrupted = [] { return rt::stop_requested(); },
+       .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});
+  if (!backend) return {backend.error()};
+  c.remote = backend->get();
+  c.backend = std::move(*backend);
+  return {};
+}
+
+}  // namespace
+
 Diagnostics connect(Composition& c, const std::string& record_frames) {
   const runtime::Experiment& e = c.experiment;
+  if (e.hal.backend == runtime::BackendKind::kDds && record_frames.empty()) {
+    return connect_remote(c);
+  }
   if (e.hal.backend != runtime::BackendKind::kCan) {
     if (record_frames.empty()) return {};
     return {fail("--record-frames: a robot in this process has no bus to record",

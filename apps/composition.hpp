@@ -13,11 +13,15 @@
 #include "apps/can_sockets.hpp"
 #include "apps/robot_files.hpp"
 #include "base/result.hpp"
+#include "dds/domain.hpp"
+#include "dds/participant.hpp"
 #include "hal/ethercat-can/frame_record.hpp"
+#include "hal/remote/remote_backend.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/kernel_library.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/experiment.hpp"
+#include "runtime/owner_controller.hpp"
 
 namespace tandem::apps {
 
@@ -30,6 +34,8 @@ struct Overrides {
   bool lockstep = false;                ///< true: whatever the experiment says
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
   std::string scenario = {};            ///< faults to inject into the simulation
+  std::optional<std::uint32_t> delay_cycles = std::nullopt;
+  bool serves = false;  ///< no controllers of its own, and no end
   std::optional<bool> dds = std::nullopt;
   std::optional<int> domain = std::nullopt;  ///< of DDS
 };
@@ -47,10 +53,14 @@ struct Composition {
   model::KernelLibrary kernels;
   std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
-  std::unique_ptr<hal::Backend> backend;          ///< the CAN backend only after connect()
+  std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
+  std::unique_ptr<hal::Backend> backend;          ///< CAN's and DDS' only after connect()
   sim::SimRobot* sim = nullptr;                   ///< the backend, when it is the simulation
   const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
+  remote::RemoteBackend* remote = nullptr;        ///< the backend, when another process has it
   std::unique_ptr<runtime::ControllerHost> controllers;
+  std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
+  std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
 
   /// Empty without a CAN backend.
@@ -60,7 +70,7 @@ struct Composition {
   }
 };
 
-/// "sim", "can", "can lockstep", for logs and summaries.
+/// "sim", "can", "can lockstep", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const runtime::HalOptions& hal);
 
 /// Reads an experiment with all its files and composes it. Every error that can be found without
@@ -69,9 +79,11 @@ struct Composition {
 [[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
     const std::string& experiment, const Overrides& overrides);
 
-/// Opens the CAN interfaces and makes the CAN backend; the simulation has nothing to connect.
+/// Opens the CAN interfaces and makes the CAN backend, or finds the server of the DDS backend and
+/// gets its robot; the simulation has nothing to connect.
 /// @param record_frames  file that every frame is written to; empty: none
-/// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus.
+/// Errors: CanSockets::open()'s; a record that cannot be made, or without a bus; Domain::open()'s,
+/// RemoteBackend::connect()'s.
 [[nodiscard]] Diagnostics connect(Composition& composition, const std::string& record_frames);
 
 }  // namespace tandem::apps

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
       std::visit(Overloaded{
                      [](Exit done) { return done; },
                      [](const RunOptions& options) { return run_command(options); },
+                     [](const ServeOptions& options) { return serve_command(options); },
                      [](const EmulateOptions& options) { return emulate_command(options); },
                      [](const AskOptions& options) { return ask_command(options); },
                      [](const FaultOptions& options) { return fault_command(options); },

@@ -11,6 +11,7 @@
 #include "apps/inject.hpp"
 #include "apps/loop_thread.hpp"
 #include "apps/remote_gate.hpp"
+#include "apps/remote_link.hpp"
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
@@ -40,14 +41,19 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
 runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   runtime::Experiment& e = c.experiment;
   const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
-  e.loop.pacing = simulated ? rt::Pacing::kSimulated : rt::Pacing::kWallClock;
+  e.loop.pacing = rt::Pacing::kSimulated;
+  if (c.backend->pace() == hal::Pace::kWallClock) e.loop.pacing = rt::Pacing::kWallClock;
+  if (c.backend->pace() == hal::Pace::kBus) e.loop.pacing = rt::Pacing::kExternal;
   e.loop.rate = options.rate.value_or(simulated ? e.loop.rate : 0.0);
   e.loop.start_paused = simulated && (options.start_paused || e.loop.start_paused);
   runtime::CycleConfig config;
   config.loop = e.loop;
   config.running_cycles = e.cycles();
   config.settle_cycles = e.settle_cycles();
-  config.after_stop = simulated ? runtime::AfterStop::kEnd : runtime::AfterStop::kWait;
+  config.delay_cycles = e.hal.delay_cycles;
+  const bool waits = options.serves || e.loop.pacing == rt::Pacing::kWallClock;
+  config.after_stop = waits ? runtime::AfterStop::kWait : runtime::AfterStop::kEnd;
+  if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
   if (e.after_stop) config.after_stop = *e.after_stop;
   if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
@@ -57,7 +63,9 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
 
 std::string pace_text(const Composition& c) {
   const runtime::HalOptions& hal = c.experiment.hal;
-  const std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
+  std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
+  if (hal.backend == runtime::BackendKind::kDds) where = "over DDS, ";
+  if (c.backend->pace() == hal::Pace::kBus) return where + "at the server's pace";
   if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
   const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
   const rt::LoopConfig& loop = c.experiment.loop;
@@ -112,10 +120,15 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
 
 /// Null without DDS.
 Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
-                                                   const runtime::RemoteOptions& remote) {
+                                                   const runtime::RemoteOptions& remote,
+                                                   const remote::Server* server) {
   if (run == nullptr) return nullptr;
   const auto command = remote.command.value_or(runtime::RemoteCommand::kOff);
-  return DdsServices::open(run->participant(), commands, remote_gate(command, {}));
+  const auto owner = [server] {
+    const bool owned = server != nullptr && server->lease().owner() != 0;
+    return owned ? server->lease().name() : std::string();
+  };
+  return DdsServices::open(run->participant(), commands, remote_gate(command, owner));
 }
 
 Exit run(Composition& c, const RunOptions& options) {
@@ -124,7 +137,7 @@ Exit run(Composition& c, const RunOptions& options) {
   const runtime::CycleConfig config = cycle_config(c, options);
   const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
   const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
-  const auto dds = DdsRun::open(c, "tandem_run", truth);
+  const auto dds = DdsRun::open(c, options.serves ? "tandem_serve" : "tandem_run", truth);
   if (!dds) {
     print_errors({dds.error()});
     return Exit::kUsage;
@@ -138,10 +151,22 @@ Exit run(Composition& c, const RunOptions& options) {
     }
     recorder = std::move(*opened);
   }
+  const auto server = open_server(c, dds->get(), options.once);
+  if (!server) {
+    print_errors({server.error()});
+    return Exit::kUsage;
+  }
   rt::WallClock clock;
-  runtime::RobotCycle cycle({e.robot, *c.backend, *c.controllers, clock, recorder.get(), truth,
-                             *dds == nullptr ? nullptr : &(*dds)->tap()},
+  runtime::RobotCycle cycle({.robot = e.robot,
+                             .backend = *c.backend,
+                             .controllers = *c.controllers,
+                             .clock = clock,
+                             .recorder = recorder.get(),
+                             .truth = truth,
+                             .tap = *dds == nullptr ? nullptr : &(*dds)->tap(),
+                             .owner = {server->get(), c.owner.get(), c.owner_slot}},
                             config);
+  if (*server != nullptr) tell_faults(**server, cycle);
   if (!options.quiet) {
     fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
                e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
@@ -156,7 +181,7 @@ Exit run(Composition& c, const RunOptions& options) {
     });
   }
   const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
-  const auto services = open_services(dds->get(), commands, e.remote);
+  const auto services = open_services(dds->get(), commands, e.remote, server->get());
   if (!services) {
     print_errors({services.error()});
     return Exit::kUsage;
@@ -169,9 +194,11 @@ Exit run(Composition& c, const RunOptions& options) {
   LoopThread loop(cycle, e.thread);
   watch(cycle, loop, c, out, options.quiet);
   loop.join();
+  if (*server != nullptr) (*server)->close();
   if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 
   RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}, {}};
+  summary.server = server->get();
   if (*dds != nullptr) summary.dds = (*dds)->finish();
   if (*services != nullptr) summary.dds->services = (*services)->counts();
   if (recorder != nullptr) summary.log = recorder->close();
@@ -181,8 +208,10 @@ Exit run(Composition& c, const RunOptions& options) {
     fmt::print(out, "\n");
     summary.print(out);
   }
-  for (const std::string& warning : c.master->warnings()) {
-    fmt::print(stderr, "warning: {}\n", warning);
+  if (c.master != nullptr) {
+    for (const std::string& warning : c.master->warnings()) {
+      fmt::print(stderr, "warning: {}\n", warning);
+    }
   }
   for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
   add_report(options, summary, out);
@@ -212,10 +241,14 @@ Exit run_command(const RunOptions& options) {
                       .lockstep = options.lockstep,
                       .interfaces = options.interfaces,
                       .scenario = options.scenario,
+                      .delay_cycles = options.delay_cycles,
+                      .serves = options.serves,
                       .dds = options.dds,
                       .domain = options.domain};
   if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
+  if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
+  rt::install_stop_signals();
   const auto composition = compose(options.experiment, overrides);
   if (!composition) {
     print_errors(composition.error());
@@ -230,6 +263,12 @@ Exit run_command(const RunOptions& options) {
     return Exit::kUsage;
   }
   return run(**composition, options);
+}
+
+Exit serve_command(const ServeOptions& options) {
+  RunOptions run = options.run;
+  run.serves = true;
+  return run_command(run);
 }
 
 }  // namespace tandem::apps

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "apps/bus_watch.hpp"
+#include "apps/remote_link.hpp"
 #include "apps/round_trips.hpp"
 
 namespace tandem::apps {
@@ -124,9 +125,12 @@ Json RunSummary::json() const {
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["base"] = base_json(cycle.statistics().base());
-  json["round_trips"] = round_trips_json(composition.master->round_trips());
+  const hal::can::DriveMaster* master = composition.master;
+  json["round_trips"] =
+      master == nullptr ? Json::array() : round_trips_json(master->round_trips());
+  json["remote"] = remote_json(server, composition.remote);
   json["faults"] = faults;
-  json["warnings"] = composition.master->warnings();
+  json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
   json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
   return json;
@@ -136,7 +140,7 @@ void RunSummary::print(std::FILE* out) const {
   print_worst_joints(*this, out);
   print_faults(faults_json(cycle.faults()), out);
   fmt::print(out, "\n");
-  if (composition.backend->waits_for_bus()) {
+  if (composition.master != nullptr && composition.backend->waits_for_bus()) {
     print_slowest_nodes(composition.master->round_trips(), out);
     fmt::print(out, "\n");
   }
@@ -170,6 +174,7 @@ void RunSummary::print(std::FILE* out) const {
     facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
     facts.add("overruns", std::to_string(loop.overruns));
   }
+  add_remote_facts(server, composition.remote, facts);
   facts.add("kernels", composition.kernels->variant);
   if (log) {
     facts.add("log",

@@ -10,6 +10,7 @@
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
 #include "apps/dds_run.hpp"
+#include "hal/remote/server.hpp"
 #include "log/recorder.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -23,6 +24,7 @@ struct RunSummary {
   std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
   std::vector<std::string> faults;          ///< the log's trouble included
   std::optional<DdsResult> dds;             ///< empty: it was off
+  const remote::Server* server = nullptr;   ///< null: nobody could own the robot from afar
 
   [[nodiscard]] double sim_s() const;
   /// docs/json.md

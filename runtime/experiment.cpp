@@ -33,12 +33,10 @@ void check_reference(TomlTable& table, const char* key, const std::string& name,
 HalOptions read_hal(TomlTable table, const SimOptions& sim) {
   HalOptions hal;
   const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "dds"});
-  if (backend == "dds") {
-    table.error("backend", "the backend 'dds' is not part of this version",
-                "set backend = \"sim\" or \"can\"");
-  }
+  if (backend == "dds") hal.backend = BackendKind::kDds;
   if (backend == "can") hal.backend = BackendKind::kCan;
   hal.lockstep = table.boolean_or("lockstep", hal.lockstep);
+  hal.delay_cycles = static_cast<std::uint32_t>(table.integer_or("delay_cycles", 0, 0, 1000));
   hal.answer_window = table.number_or("answer_window", hal.answer_window, {0.05, 0.95});
   hal.settle_s = table.number_or("settle_s", sim.hoist ? sim.hoist_release_s : 0.0, {0.0, 600.0});
   table.finish();
@@ -113,6 +111,17 @@ RemoteOptions read_remote(TomlTable table) {
     remote.command =
         read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
   }
+  remote.lockstep = table.boolean_or("lockstep", remote.lockstep);
+  remote.lease_timeout_s =
+      table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
+  remote.lockstep_timeout_s =
+      table.number_or("lockstep_timeout_s", remote.lockstep_timeout_s, {0.05, 3600.0});
+  remote.max_age_cycles = static_cast<std::uint64_t>(table.integer_or(
+      "max_age_cycles", static_cast<std::int64_t>(remote.max_age_cycles), 1, 100'000));
+  const std::string on_lost =
+      table.choice_or("on_lost", "hold", {"hold", "category1", "category0"});
+  if (on_lost == "category1") remote.on_lost = hal::StopCategory::kCategory1;
+  if (on_lost == "category0") remote.on_lost = hal::StopCategory::kCategory0;
   table.finish();
   return remote;
 }

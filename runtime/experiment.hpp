@@ -22,14 +22,15 @@
 
 namespace tandem::runtime {
 
-/// [hal] backend. "dds" is a known name that this version refuses.
-enum class BackendKind : std::uint8_t { kSim, kCan };
+/// [hal] backend
+enum class BackendKind : std::uint8_t { kSim, kCan, kDds };
 
 /// [hal]: what stands for the robot, and how the loop and it go together.
 struct HalOptions {
   BackendKind backend = BackendKind::kSim;
   bool lockstep = false;        ///< "can": wait for an emulated robot's answers, at any speed
   double answer_window = 0.5;   ///< "can" in real time: share of the period to wait for answers
+  std::uint32_t delay_cycles = 0;  ///< between the controllers and the limits
   double settle_s = 0.0;        ///< every joint is held, from enabled until controllers start
 };
 
@@ -54,6 +55,12 @@ enum class RemoteCommand : std::uint8_t {
 };
 struct RemoteOptions {
   std::optional<RemoteCommand> command;  ///< empty: off in `run`, local in `serve`
+  // Of an owner (docs/remote.md).
+  bool lockstep = false;               ///< each cycle waits for its command
+  double lease_timeout_s = 1.0;        ///< one that is silent for so long has lost the robot
+  double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a command
+  std::uint64_t max_age_cycles = 100;  ///< of the state that a command answers
+  hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
 };
 
 /// [log]
