@@ -222,10 +222,21 @@ TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
             "'board', 1000000 ns (choose a common divisor of both)\n");
 }
 
-TEST(Experiment, RefusesABackendOfALaterVersion) {
-  EXPECT_EQ(errors_of(with("[hal]\nbackend = 'dds'")),
-            "arm/x.toml:5: hal.backend: the backend 'dds' is not part of this version "
-            "(set backend = \"sim\" or \"can\")\n");
+TEST(Experiment, ReadsTheNetworkProxysKeys) {
+  const auto e = parse_experiment(with("[hal]\nbackend = 'dds'\ndelay_cycles = 2\n"
+                                       "[remote]\ncommand = 'local'\nlockstep = true\n"
+                                       "lease_timeout_s = 0.5\nmax_age_cycles = 20\n"
+                                       "lockstep_timeout_s = 3.0\non_lost = 'category1'"),
+                                  "arm/x.toml", robot());
+  ASSERT_TRUE(e) << e.error().front().to_string();
+  EXPECT_EQ(e->hal.backend, BackendKind::kDds);
+  EXPECT_EQ(e->hal.delay_cycles, 2U);
+  EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
+  EXPECT_TRUE(e->remote.lockstep);
+  EXPECT_EQ(e->remote.lease_timeout_s, 0.5);
+  EXPECT_EQ(e->remote.max_age_cycles, 20U);
+  EXPECT_EQ(e->remote.lockstep_timeout_s, 3.0);
+  EXPECT_EQ(e->remote.on_lost, hal::StopCategory::kCategory1);
 }
 
 TEST(Experiment, SuggestsTheNearestPosture) {

@@ -1,0 +1,282 @@
+// Who has the robot, and what the server does with commands that it should not follow.
+#include <limits>
+
+#include "tests/remote/link_rig.hpp"
+
+namespace tandem::remote {
+namespace {
+
+using namespace test;
+
+TEST(Lease, HasOneOwnerAtATime) {
+  Lease lease;
+  EXPECT_TRUE(lease.acquire(7, "seven", 100));
+  EXPECT_TRUE(lease.acquire(7, "seven", 150));
+  EXPECT_EQ(lease.heard_ns(), 150);
+  EXPECT_FALSE(lease.acquire(8, "eight", 200));
+  EXPECT_EQ(lease.name(), "seven");
+  EXPECT_FALSE(lease.release(8));
+  EXPECT_EQ(lease.owner(), 7U);
+  EXPECT_TRUE(lease.release(7));
+  EXPECT_EQ(lease.owner(), 0U);
+  EXPECT_TRUE(lease.acquire(8, "eight", 300));
+  EXPECT_EQ(lease.given(), 2U);
+}
+
+TEST(Newest, GivesWhatWasPublishedLast) {
+  Newest<int> box(0);
+  EXPECT_FALSE(box.refresh());
+  for (const int value : {1, 2, 3}) {
+    box.back() = value;
+    box.publish();
+  }
+  EXPECT_TRUE(box.refresh());
+  EXPECT_EQ(box.front(), 3);
+  EXPECT_FALSE(box.refresh());
+  EXPECT_EQ(box.front(), 3);
+}
+
+/// A served robot in real time, and a client that says to it what it likes.
+class LinkChecks : public testing::Test {
+ protected:
+  static runtime::CycleConfig real_time() {
+    runtime::CycleConfig config;
+    config.loop.rate = 1.0;
+    return config;
+  }
+  static ServerConfig config() {
+    ServerConfig config;
+    config.lease_timeout_s = 30.0;  // but where a test wants it otherwise
+    config.max_age_cycles = 50'000;
+    return config;
+  }
+
+  explicit LinkChecks(const ServerConfig& of = config()) : served(of, real_time()) {}
+
+  void SetUp() override {
+    participant_ = participant("talker");
+    const auto name = [&](const char* topic) { return participant_->topic_name(topic); };
+    using dds::Reader, dds::Writer;
+    told_.emplace(*Reader<tandem_msgs::LinkServer>::create(*participant_, name(kServerTopic),
+                                                           link_qos()));
+    requests_.emplace(*Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic),
+                                                                link_qos()));
+    commands_.emplace(*Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic),
+                                                                link_qos()));
+    served.begin();
+    ASSERT_TRUE(eventually([this] { return look() != 0; }));
+    ASSERT_TRUE(eventually([this] {
+      return served.phase() == RunPhase::kRunning && commands_->endpoint().matched() == 1 &&
+             requests_->endpoint().matched() == 1;
+    }));
+    image_.assign(served.cycle->command());
+    for (std::int8_t& mode : image_.mode()) mode = 1;
+    acquire(kClient);
+    ASSERT_TRUE(eventually([this] { return served.server->lease().owner() == kClient; }));
+  }
+
+  /// The server's run; 0: not heard yet.
+  std::uint64_t look() {
+    told_->take([this](const tandem_msgs::LinkServer& sample, const auto&) { run_ = sample.run; });
+    return run_;
+  }
+  void acquire(std::uint64_t client) {
+    std::string name = "talker";
+    tandem_msgs::LinkRequest sample{};
+    sample.run = run_;
+    sample.client = client;
+    sample.name = name.data();
+    requests_->write(sample);
+  }
+  /// A command that is right.
+  tandem_msgs::LinkCommand sample() {
+    tandem_msgs::LinkCommand out{};
+    out.run = run_;
+    out.client = kClient;
+    out.sequence_number = ++sequence_;
+    out.cycle = served.cycle->progress().cycles.load() - 1;
+    out.state_ns = out.sent_ns = now_ns();
+    out.live = true;
+    out.stop = 3;
+    out.command._buffer = reinterpret_cast<std::uint8_t*>(image_.bytes().data());
+    out.command._length = out.command._maximum =
+        static_cast<std::uint32_t>(image_.bytes().size());
+    return out;
+  }
+  /// Writes it, and expects what becomes of it.
+  void expect(Verdict verdict, const tandem_msgs::LinkCommand& command) {
+    const std::uint64_t before = served.server->count(verdict);
+    ASSERT_TRUE(commands_->write(command));
+    EXPECT_TRUE(eventually([&] { return served.server->count(verdict) == before + 1; }))
+        << to_string(verdict);
+  }
+
+  static constexpr std::uint64_t kClient = 4711;
+  Served served;
+  std::unique_ptr<dds::Participant> participant_;
+  std::optional<dds::Reader<tandem_msgs::LinkServer>> told_;
+  std::optional<dds::Writer<tandem_msgs::LinkRequest>> requests_;
+  std::optional<dds::Writer<tandem_msgs::LinkCommand>> commands_;
+  hal::CommandImage image_{served.robot.shape()};
+  std::uint64_t run_ = 0, sequence_ = 0;
+};
+
+TEST_F(LinkChecks, ACommandOfItsOwnerIsTakenAndNobodyElses) {
+  expect(Verdict::kTaken, sample());
+  auto other = sample();
+  other.client = 4712;
+  expect(Verdict::kNoLease, other);
+  auto earlier = sample();
+  ++earlier.run;
+  expect(Verdict::kNoLease, earlier);
+}
+
+TEST_F(LinkChecks, ADuplicateAndOneThatWasOvertakenAreNotTaken) {
+  const auto first = sample();
+  const auto second = sample();
+  expect(Verdict::kTaken, second);
+  expect(Verdict::kOutOfOrder, second);
+  expect(Verdict::kOutOfOrder, first);
+}
+
+TEST_F(LinkChecks, ACommandForACycleThatHasNotBeenIsNotTaken) {
+  auto future = sample();
+  future.cycle += 1'000'000'000;
+  expect(Verdict::kStale, future);
+}
+
+TEST_F(LinkChecks, WhatIsNotFiniteOrOfAnotherSizeIsNotTaken) {
+  image_.torque_Nm()[0] = std::numeric_limits<double>::quiet_NaN();
+  expect(Verdict::kMalformed, sample());
+  image_.torque_Nm()[0] = std::numeric_limits<double>::infinity();
+  expect(Verdict::kMalformed, sample());
+  image_.torque_Nm()[0] = 0.0;
+  image_.mode()[0] = 17;
+  expect(Verdict::kMalformed, sample());
+  image_.mode()[0] = 1;
+  auto small = sample();
+  small.command._length -= 8;
+  expect(Verdict::kMalformed, small);
+  double gain = 1.0;
+  auto gains = sample();
+  gains.gains._buffer = &gain;
+  gains.gains._length = gains.gains._maximum = 1;
+  expect(Verdict::kMalformed, gains);
+  expect(Verdict::kTaken, sample());
+  EXPECT_TRUE(served.cycle->faults().empty());
+}
+
+TEST_F(LinkChecks, AFloodIsCountedAndLeavesTheLoopAlone) {
+  auto flood = sample();
+  flood.client = 1;
+  for (int i = 0; i < 20'000; ++i) commands_->write(flood);
+  EXPECT_TRUE(eventually([&] { return served.server->count(Verdict::kNoLease) > 100; }));
+  expect(Verdict::kTaken, sample());
+  EXPECT_EQ(served.phase(), RunPhase::kRunning);
+  EXPECT_TRUE(served.cycle->faults().empty());
+}
+
+TEST_F(LinkChecks, AStopIsCarriedOutEvenWithACommandThatIsNotTaken) {
+  auto stop = sample();
+  stop.stops = 1;
+  stop.stop = static_cast<std::uint8_t>(hal::StopCategory::kCategory1);
+  stop.command._length = 0;
+  expect(Verdict::kMalformed, stop);
+  EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kFaulted; }));
+  ASSERT_EQ(served.cycle->faults().size(), 1U);
+  EXPECT_EQ(served.cycle->faults()[0].text, "the remote owner asked for a stop");
+  auto reset = sample();
+  reset.stops = 1;
+  reset.resets = 1;
+  expect(Verdict::kTaken, reset);
+  EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kRunning; }));
+}
+
+/// Its commands may be 20 cycles old, its lease lasts a second.
+class LinkLoss : public LinkChecks {
+ protected:
+  static ServerConfig impatient(hal::StopCategory on_lost) {
+    ServerConfig config;
+    config.max_age_cycles = 20;
+    config.lease_timeout_s = 30.0;
+    config.on_lost = on_lost;
+    return config;
+  }
+  explicit LinkLoss(hal::StopCategory on_lost = hal::StopCategory::kCategory1)
+      : LinkChecks(impatient(on_lost)) {}
+
+  /// Commands until they are followed, and then no more.
+  void lead() {
+    ASSERT_TRUE(eventually([this] {
+      if (served.host.shown().active != 0 || served.server->losses() > 0) return true;
+      commands_->write(sample());
+      return false;
+    }));
+  }
+};
+
+TEST_F(LinkLoss, CommandsThatStopLeadToTheDeclaredStop) {
+  lead();
+  EXPECT_TRUE(eventually([this] { return served.phase() == RunPhase::kFaulted; }));
+  ASSERT_FALSE(served.cycle->faults().empty());
+  EXPECT_EQ(served.cycle->faults()[0].text,
+            "the remote owner's commands stopped, or came too late");
+  EXPECT_EQ(served.server->lease().owner(), 0U);
+}
+
+class LinkLossHeld : public LinkLoss {
+ protected:
+  LinkLossHeld() : LinkLoss(hal::StopCategory::kWarn) {}
+};
+
+TEST_F(LinkLossHeld, HoldsEveryJointAndTakesTheNextOwner) {
+  lead();
+  ASSERT_TRUE(eventually([this] { return !served.cycle->faults().empty(); }));
+  EXPECT_EQ(served.phase(), RunPhase::kRunning);
+  EXPECT_TRUE(eventually([this] { return served.host.shown().active == 0; }));
+  acquire(5000);
+  EXPECT_TRUE(eventually([this] { return served.server->lease().owner() == 5000U; }));
+}
+
+TEST(Connect, TellsWhoHasTheRobotAndWhatDiffers) {
+  Served served({}, {.loop = {.rate = 1.0}});
+  served.begin();
+  const auto first = participant("first");
+  const auto second = participant("second");
+  ClientConfig config;
+  config.name = "the first one";
+  auto owner = Owner::connect(*first, config, served.robot);
+  ASSERT_TRUE(owner) << owner.error().to_string();
+  config.name = "the second one";
+  const auto late = Owner::connect(*second, config, served.robot);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().message, "the robot is owned by the first one");
+  hal::RobotConfig other = served.robot;
+  other.joints[1].name = "wrist";
+  const auto wrong = Owner::connect(*second, config, other);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().message.find("joint 1 is '" + served.robot.joints[1].name +
+                                       "' there and 'wrist' here"),
+            std::string::npos)
+      << wrong.error().message;
+  config.lockstep = true;
+  const auto locked = Owner::connect(*second, config, served.robot);
+  ASSERT_FALSE(locked);
+  EXPECT_EQ(locked.error().message, "the server does not run in lockstep");
+  owner->reset();  // gives it back
+  config.lockstep = false;
+  const auto next = Owner::connect(*second, config, served.robot);
+  EXPECT_TRUE(next) << next.error().to_string();
+}
+
+TEST(Connect, WithoutAServerSaysSoInTime) {
+  const auto alone = participant("alone");
+  ClientConfig config;
+  config.connect_timeout_s = 0.3;
+  const auto none = Owner::connect(*alone, config, hal::test::fake_robot());
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().message, "no server was found within 0.3 s");
+}
+
+}  // namespace
+}  // namespace tandem::remote
