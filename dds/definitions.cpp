@@ -14,7 +14,7 @@ struct Source {
 };
 
 constexpr Source kSources[] = {
-#include "definitions.inc"
+#include <definitions.inc>
 };
 
 std::vector<MessageDefinition> parsed() {
