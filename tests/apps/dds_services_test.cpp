@@ -156,7 +156,10 @@ TEST_F(RunOverDds, LoadSwitchListAndUnloadControllers) {
   call<UnloadController_Response>(
       "unload_controller", UnloadController_Request{0, 0, name.data()},
       [](const UnloadController_Response& reply) { EXPECT_TRUE(reply.success) << reply.message; });
-  EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"].size(), 1U);
+  const auto left = ask_local(R"({"do": "controller.list"})")["controllers"];
+  ASSERT_EQ(left.size(), 2U);
+  EXPECT_EQ(left[0]["name"], "hold");
+  EXPECT_EQ(left[1]["name"], "remote") << "an owner's, which [remote] command brings";
   EXPECT_EQ(end(), 0);
 }
 
@@ -266,7 +269,7 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   begin_with("local");
   expect_same("ask '{\"do\": \"help\"}'", "controller.load");
   expect_same("ask '{\"do\": \"hlep\"}'", "did you mean 'help'?");
-  expect_same("controller list", "hold        active  joint1, joint2");
+  expect_same("controller list", "hold        active    joint1, joint2");
   expect_same("controller start rest", "rest");
   expect_same("joint set jiont2 --mode idle", "did you mean 'joint2'?");
   expect_same("joint list --gains", "joint2");
