@@ -158,7 +158,7 @@ void RunSummary::print(std::FILE* out) const {
                           base->max_height_m, base->final_tilt_rad * kDegrees));
   }
   const rt::LoopStatistics& loop = cycle.loop();
-  const bool wall_clock = composition.experiment.loop.pacing == rt::Pacing::kWallClock;
+  const bool wall_clock = composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
     facts.add("ran", fmt::format("{:.3f} s, {} cycles, {} skipped", wall_s, cycle.running_cycles(),
                                  loop.skipped));

@@ -101,6 +101,10 @@ Code RemoteBackend::write(const hal::CommandImage& command,
                           const hal::ParameterImage& parameters) noexcept TANDEM_RT {
   live_ = phase() == hal::Phase::kOperational;
   keep(command);
+  // A server in fault follows no command: it is asked for a reset, of every joint.
+  const bool clears = std::ranges::any_of(command.fault_reset(), [](auto one) { return one != 0; });
+  if (clears && !clears_ && !live_) ++resets_;
+  clears_ = clears;
   for (std::size_t j = 0; j < joints_; ++j) {
     if (revisions_[j] == parameters.revision(j)) continue;
     revisions_[j] = parameters.revision(j);

@@ -23,6 +23,7 @@ namespace tandem::remote {
 struct ClientConfig {
   std::string name;               ///< for people: "tandem run squat.toml, process 312"
   bool lockstep = false;          ///< must be the server's
+  std::uint64_t server = 0;       ///< Server::number(); 0: the first that is heard
   double connect_timeout_s = 10;  ///< for a server to be found, and to give the lease
   double server_timeout_s = 3;    ///< a server that is not heard for so long is gone
   std::function<bool()> interrupted = {};  ///< true: exchange() waits no longer
@@ -134,6 +135,7 @@ class RemoteBackend final : public hal::Backend {
   bool resetting_ = false;
   hal::StopCategory latched_ = hal::StopCategory::kWarn, asked_ = hal::StopCategory::kWarn;
   std::uint32_t stops_ = 0, resets_ = 0;
+  bool clears_ = false;  // the last command asked for a joint's fault to be cleared
   hal::CommandImage command_;
   std::vector<double> gains_;
   std::vector<std::uint32_t> revisions_;  // that were sent

@@ -67,6 +67,7 @@ RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::RobotConfig& robot,
       command_(robot.shape()),
       gains_(robot.joints.size() * 3 * hal::kPidLoops),
       revisions_(robot.joints.size()) {
+  run_ = config_.server;
   on_told_.emplace(endpoints_.server.endpoint().get(), [this] { take_told(); });
 }
 
@@ -174,9 +175,9 @@ void RemoteBackend::take_told() {
                    .ending = sample.ending};
       ++told_count_;
       heard_ns_ = now_ns();
-      if (run_ == 0) return;
+      if (!leased_) return;
       if (sample.ending) ending_ = true;
-      if (leased_ && sample.owner != client_) lost_ = true;
+      if (sample.owner != client_) lost_ = true;
     });
   }
   news_.notify_all();

@@ -52,6 +52,8 @@ class Server final : public hal::CommandPort {
   [[nodiscard]] hal::OwnerWish exchange(const hal::PortView& view) noexcept TANDEM_RT override;
   void on_news(std::function<void()> ring) override;
 
+  /// Its number among the servers of a domain, drawn at the start.
+  [[nodiscard]] std::uint64_t number() const noexcept { return run_; }
   /// For any thread.
   [[nodiscard]] const Lease& lease() const noexcept { return lease_; }
   [[nodiscard]] std::uint64_t count(Verdict verdict) const noexcept {

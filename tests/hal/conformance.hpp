@@ -52,6 +52,7 @@ class Rig {
   /// One cycle. Codes are the caller's to look at: `read`, `limited`, `written`.
   void step() {
     time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
+    it.backend->exchange(time);
     read = it.backend->read(time, state);
     devices.advance();
     limited = limits.apply(state, command);

@@ -1,0 +1,118 @@
+// `tandem serve` and `tandem run --hal dds` as two processes: the same bits as one, and what
+// follows when one of them is killed.
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/apps/program.hpp"
+#include "tests/support/dds_domain.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Serve : public Program {
+ protected:
+  [[nodiscard]] static std::string domain() {
+    return " --domain " + std::to_string(dds::test::own_domain());
+  }
+  [[nodiscard]] static std::string coman() { return TANDEM_SOURCE_DIR "/config/coman/squat.toml"; }
+
+  /// Starts `tandem ARGUMENTS` in the background; its process id.
+  [[nodiscard]] pid_t begin(const std::string& arguments, const std::string& name) const {
+    const std::string command = "cd '" + folder_.string() + "' && { '" TANDEM_BINARY_DIR
+                                "/bin/tandem' " + arguments + " >" + name + ".txt 2>" + name +
+                                ".err </dev/null & echo $! >" + name + ".pid; }";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return std::stoi(read_text(folder_ / (name + ".pid")));
+  }
+  static bool eventually(const std::function<bool()>& condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < end) {
+      if (condition()) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return condition();
+  }
+  /// Until the process has ended: a zombie is nobody's here, init takes it.
+  static bool ended(pid_t process) {
+    return eventually([process] { return ::kill(process, 0) != 0; });
+  }
+  [[nodiscard]] nlohmann::json ask(const std::string& socket, const std::string& what) const {
+    const Outcome outcome = tandem("ask '{\"do\": \"" + what + "\"}' --socket " + socket);
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+
+  /// The log's hash of an experiment in one process, and over DDS in lockstep.
+  void compare(const std::string& experiment, const std::string& arguments) const {
+    const Outcome alone = tandem("run " + experiment + arguments + " --quiet --json alone.json");
+    ASSERT_EQ(alone.status, 0) << alone.err;
+    const pid_t server = begin("serve " + experiment + domain() +
+                                   " --lockstep --once --no-socket --quiet --json served.json",
+                               "serve");
+    const Outcome owner = tandem("run " + experiment + domain() + arguments +
+                                 " --hal dds --lockstep --no-log --no-socket --quiet");
+    EXPECT_EQ(owner.status, 0) << owner.err;
+    ASSERT_TRUE(ended(server));
+    const auto here = json("alone.json"), there = json("served.json");
+    EXPECT_EQ(here["log"]["data_sha256"], there["log"]["data_sha256"]);
+    EXPECT_EQ(here["log"]["messages"], there["log"]["messages"]);
+    EXPECT_GT(there["remote"]["commands"]["taken"].get<int>(), 1000);
+    EXPECT_EQ(there["log"]["dropped"], 0);
+  }
+};
+
+TEST_F(Serve, InLockstepGivesTheBitsOfOneProcess) { compare("trajectory.toml", " --duration 2"); }
+
+TEST_F(Serve, InLockstepWithADelayGivesTheBitsOfOneDelayedProcess) {
+  compare("trajectory.toml", " --duration 2 --delay-cycles 2");
+}
+
+TEST_F(Serve, OfASquatInLockstepGivesTheBitsOfOneProcess) { compare(coman(), " --duration 0.5"); }
+
+TEST_F(Serve, AnOwnerThatIsKilledLeavesTheDeclaredReaction) {
+  std::ofstream(folder_ / "trajectory.toml", std::ios::app)
+      << "\n[remote]\ncommand = \"local\"\non_lost = \"category1\"\nmax_age_cycles = 200\n";
+  const std::string socket = (folder_ / "s.sock").string();
+  const pid_t server =
+      begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet --socket " + socket,
+            "serve");
+  const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
+                                "--duration 600 --socket " + (folder_ / "o.sock").string(),
+                            "owner");
+  ASSERT_TRUE(eventually([&] {
+    const auto status = ask((folder_ / "o.sock").string(), "status");
+    return status.is_object() && status.value("phase", "") == "running";
+  })) << read_text(folder_ / "owner.err");
+  ASSERT_EQ(::kill(owner, SIGKILL), 0);
+  nlohmann::json faults;
+  EXPECT_TRUE(eventually([&] {
+    faults = ask(socket, "fault.show");
+    return faults.is_object() && faults.value("phase", "") == "faulted";
+  }));
+  EXPECT_NE(faults.dump().find("the remote owner's commands stopped"), std::string::npos)
+      << faults.dump();
+  ASSERT_EQ(::kill(server, SIGTERM), 0);
+  EXPECT_TRUE(ended(server));
+}
+
+TEST_F(Serve, AServerThatIsKilledEndsItsOwnerInAFault) {
+  const pid_t server =
+      begin("serve trajectory.toml" + domain() + " --realtime --no-log --no-socket --quiet",
+            "serve");
+  const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
+                                "--duration 600 --socket " + (folder_ / "o.sock").string(),
+                            "owner");
+  ASSERT_TRUE(eventually([&] {
+    const auto status = ask((folder_ / "o.sock").string(), "status");
+    return status.is_object() && status.value("phase", "") == "running";
+  })) << read_text(folder_ / "owner.err");
+  ASSERT_EQ(::kill(server, SIGKILL), 0);
+  EXPECT_TRUE(ended(owner));
+  EXPECT_NE(read_text(folder_ / "owner.err").find("the server has not been heard for"),
+            std::string::npos)
+      << read_text(folder_ / "owner.err");
+}
+
+}  // namespace
+}  // namespace tandem::apps
