@@ -30,8 +30,8 @@ void in_process(Record& record, std::uint32_t delay) {
 }
 
 void over_the_link(Record& record, std::uint32_t delay) {
-  Served served({.lockstep = true, .ends_with_owner = true}, {.settle_cycles = kSettling},
-                &record);
+  Served served({.lockstep = true, .ends_with_owner = true, .lease_timeout_s = 30.0},
+                {.settle_cycles = kSettling}, &record);
   served.begin();
   ClientConfig config;
   config.lockstep = true;

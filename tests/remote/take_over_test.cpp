@@ -68,7 +68,8 @@ TEST(Server, ThatEndsItsRunEndsItsOwnersInAFault) {
 TEST(LockstepLink, AnOwnerThatAnswersNothingLosesTheRobotInTime) {
   ServerConfig config;
   config.lockstep = true;
-  config.lockstep_timeout_s = 0.2;
+  config.lease_timeout_s = 30.0;
+  config.lockstep_timeout_s = 1.0;
   config.on_lost = hal::StopCategory::kCategory1;
   Served served(config);
   served.begin();
@@ -86,6 +87,7 @@ TEST(LockstepLink, AnOwnerThatAnswersNothingLosesTheRobotInTime) {
 TEST(LockstepLink, AServerThatWaitsForAnOwnerCanBeEnded) {
   ServerConfig config;
   config.lockstep = true;
+  config.lease_timeout_s = 30.0;
   Served served(config);
   served.begin();
   std::this_thread::sleep_for(std::chrono::milliseconds(20));  // it waits by then, or not yet
@@ -97,6 +99,7 @@ TEST(LockstepLink, AServerThatWaitsForAnOwnerCanBeEnded) {
 TEST(LockstepLink, AServerThatWaitsForACommandCanBeStopped) {
   ServerConfig config;
   config.lockstep = true;
+  config.lease_timeout_s = 30.0;
   Served served(config);
   served.begin();
   ClientConfig client;
