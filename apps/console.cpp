@@ -98,9 +98,7 @@ void Facts::print(std::FILE* out) const {
 }
 
 StatusLine::StatusLine(std::FILE* out)
-    : out_(out),
-      terminal_(isatty(fileno(out)) != 0),
-      next_(std::chrono::steady_clock::now()) {}
+    : out_(out), terminal_(isatty(fileno(out)) != 0), next_(std::chrono::steady_clock::now()) {}
 
 StatusLine::~StatusLine() {
   if (drawn_) fmt::print(out_, "\n");
@@ -127,7 +125,8 @@ Progress::Progress(std::FILE* out, double total_s)
       next_(started_) {}
 
 void Progress::update(double done_s, const std::string& note) {
-  const double share = total_s_ > 0.0 ? std::clamp(done_s / total_s_, 0.0, 1.0) : 1.0;
+  if (total_s_ <= 0.0) return update_endless(done_s, note);
+  const double share = std::clamp(done_s / total_s_, 0.0, 1.0);
   if (!terminal_) {
     const int tenth = static_cast<int>(share * 10.0 + 1e-9);
     if (tenth <= tenth_) return;
@@ -146,6 +145,23 @@ void Progress::update(double done_s, const std::string& note) {
   const double wall_s = std::chrono::duration<double>(now - started_).count();
   fmt::print(out_, "\r  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}\033[K", bar, done_s, total_s_,
              wall_s, note);
+  std::fflush(out_);
+  drawn_ = true;
+}
+
+void Progress::update_endless(double done_s, const std::string& note) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool news = !noted_ || *noted_ != note;
+  noted_ = note;
+  if (!terminal_) {
+    if (news) fmt::print(out_, "  {:8.2f} s  {}\n", done_s, note.empty() ? "running" : note);
+    std::fflush(out_);
+    return;
+  }
+  if (now < next_ && !news) return;
+  next_ = now + std::chrono::milliseconds(50);
+  const double wall_s = std::chrono::duration<double>(now - started_).count();
+  fmt::print(out_, "\r  {:8.2f} s  {:5.1f} s elapsed  {}\033[K", done_s, wall_s, note);
   std::fflush(out_);
   drawn_ = true;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,7 @@ class StatusLine {
 /// The progress of a run: a bar that is redrawn on a terminal, a line per tenth elsewhere.
 class Progress {
  public:
+  /// @param total_s  of the whole; 0: it has no end, and no bar
   Progress(std::FILE* out, double total_s);
   /// @param done_s  simulated seconds so far.  @param note  behind the bar; may be empty.
   void update(double done_s, const std::string& note);
@@ -86,11 +88,14 @@ class Progress {
   void finish();
 
  private:
+  void update_endless(double done_s, const std::string& note);
+
   std::FILE* out_;
   double total_s_;
   bool terminal_;
   bool drawn_ = false;
   int tenth_ = -1;
+  std::optional<std::string> noted_;  // of an endless one
   std::chrono::steady_clock::time_point started_;
   std::chrono::steady_clock::time_point next_;
 };

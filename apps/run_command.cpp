@@ -73,6 +73,16 @@ std::string pace_text(const Composition& c) {
          (loop.start_paused ? ", paused: tandem clock resume" : "");
 }
 
+std::string length_text(const runtime::Experiment& e) {
+  if (e.cycles() == 0) return "until it is stopped";
+  return fmt::format("{:.3f} s", static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9);
+}
+
+std::string served_text(const runtime::Experiment& e) {
+  return fmt::format("served in DDS domain {}, {}", e.dds.domain,
+                     e.remote.lockstep ? "in lockstep, " : "");
+}
+
 /// Boards have clocks of their own.
 Status check_pace(const Composition& c, const RunOptions& options) {
   if (c.backend->pace() == hal::Pace::kSimulatedClock) return {};
@@ -168,9 +178,9 @@ Exit run(Composition& c, const RunOptions& options) {
                             config);
   if (*server != nullptr) tell_faults(**server, cycle);
   if (!options.quiet) {
-    fmt::print(out, "{}: {} joints, {:.3f} s at {:.3g} kHz, {}\n", e.robot.name,
-               e.robot.joints.size(), static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9,
-               1e6 / static_cast<double>(e.loop.period_ns), pace_text(c));
+    fmt::print(out, "{}: {} joints, {} at {:.3g} kHz, {}{}\n", e.robot.name, e.robot.joints.size(),
+               length_text(e), 1e6 / static_cast<double>(e.loop.period_ns),
+               options.serves ? served_text(e) : "", pace_text(c));
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle, e.robot);

@@ -44,7 +44,7 @@ void RemoteBackend::exchange(const hal::CycleTime&) noexcept {
   if (!fresh_) return;
   const std::uint64_t cycle = newest_.front().cycle;
   missed_now_ = first_ || config_.lockstep ? 0 : cycle - last_cycle_ - 1;
-  missed_ += first_ ? 0 : cycle - last_cycle_ - 1;
+  missed_ += first_ || done_ ? 0 : cycle - last_cycle_ - 1;
   last_cycle_ = cycle;
   first_ = false;
 }

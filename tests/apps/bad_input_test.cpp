@@ -21,7 +21,9 @@ class Mount {
     mounted_ = run("mount -t tmpfs -o " + options + " tmpfs");
   }
   ~Mount() {
-    if (mounted_) EXPECT_TRUE(run("umount"));
+    if (mounted_) {
+      EXPECT_TRUE(run("umount"));
+    }
   }
   Mount(const Mount&) = delete;
   Mount& operator=(const Mount&) = delete;
