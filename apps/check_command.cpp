@@ -9,6 +9,15 @@
 namespace tandem::apps {
 namespace {
 
+const char* backend_text(runtime::BackendKind backend) {
+  switch (backend) {
+    case runtime::BackendKind::kSim: break;
+    case runtime::BackendKind::kCan: return "can: drive master here, boards on SocketCAN interfaces";
+    case runtime::BackendKind::kDds: return "dds: the robot of another process (tandem serve)";
+  }
+  return "sim: drive master, frames, boards' firmware and plant in this process";
+}
+
 Json errors_json(const Diagnostics& errors) {
   Json list = Json::array();
   for (const Error& error : errors) {
@@ -42,10 +51,7 @@ void print_plan(const Composition& c, std::FILE* out) {
   Facts facts;
   add_robot_facts(e.robot, facts);
   facts.add("kernels", fmt::format("{} ({})", c.kernels.path(), c.kernels->variant));
-  facts.add("backend", e.hal.backend == runtime::BackendKind::kCan
-                           ? "can: drive master here, boards on SocketCAN interfaces"
-                           : "sim: drive master, frames, boards' firmware and plant in this "
-                             "process");
+  facts.add("backend", backend_text(e.hal.backend));
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
     facts.add("controller " + note.name, note.doc + (note.active ? "" : " Inactive at first."));

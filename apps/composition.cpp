@@ -71,7 +71,7 @@ std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& f
   if (!is_robot(file)) return runtime::read_experiment(file);
   auto robot = read_robot(file);
   if (!robot) return std::unexpected(robot.error());
-  std::string text = "robot = \"\"\nduration_s = 1.0\n";
+  std::string text = "robot = \"robot.toml\"\nduration_s = 1.0\n";  // is not followed
   if (!robot->config.postures.empty()) {
     text += "posture = \"" + robot->config.postures.front().name + "\"\n";
   }
@@ -129,13 +129,21 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
   if (overrides.serves) serve_only(e, overrides.lockstep);
+  Collector errors;
+  if (overrides.serves && e.hal.backend == runtime::BackendKind::kDds) {
+    errors.add({.message = "a robot of another process cannot be served once more",
+                .hint = "add --hal sim or --hal can",
+                .file = {},
+                .key = "hal.backend"},
+               e.file, 0);
+    return errors.give();
+  }
   const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
   if (is_remote) {
     e.dds.enabled = false;  // the robot is the server's to show
     e.hal.settle_s = 0.0;   // bring-up and settling are the server's
   }
 
-  Collector errors;
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
