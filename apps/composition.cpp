@@ -56,7 +56,8 @@ void add_controllers(Composition& c, Collector& errors) {
     }
     const std::string doc = loaded->plugin().doc;
     if (c.controllers == nullptr) continue;  // without kernels: only that it can be loaded
-    const Status added = c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
+    const Status added =
+        c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
     if (!added) {
       errors.add(added.error(), c.experiment.file, line);
       continue;

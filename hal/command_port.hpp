@@ -18,11 +18,11 @@ namespace tandem::hal {
 struct PortView {
   CycleTime time;
   RunPhase phase;
-  Code read_code;          ///< of the backend's read()
-  StopCategory reaction;   ///< the hardest stop that is latched; kWarn: none
+  Code read_code;         ///< of the backend's read()
+  StopCategory reaction;  ///< the hardest stop that is latched; kWarn: none
   const StateImage& state;
-  const CommandImage& command;            ///< of the last cycle: what the joints follow
-  std::span<const std::uint8_t> causes;   ///< (n) FaultCause of every joint in fault
+  const CommandImage& command;           ///< of the last cycle: what the joints follow
+  std::span<const std::uint8_t> causes;  ///< (n) FaultCause of every joint in fault
 };
 
 /// Why an owner lost the robot.
@@ -35,15 +35,15 @@ enum class OwnerLoss : std::uint8_t {
 
 /// What the owner wants in a cycle. Pointers are good until the next exchange().
 struct OwnerWish {
-  bool live = false;      ///< `command` is to be followed
-  bool done = false;      ///< it gives the robot back, with `command` as its last
-  bool ends_run = false;  ///< with `done`: nobody else is waited for
-  OwnerLoss loss = OwnerLoss::kNone;          ///< told once
-  StopCategory on_loss = StopCategory::kWarn; ///< with `loss`: kWarn holds every joint
-  StopCategory stop = StopCategory::kWarn;    ///< asked for since the last exchange()
-  bool reset = false;                         ///< asked for since the last exchange()
+  bool live = false;                  ///< `command` is to be followed
+  bool done = false;                  ///< it gives the robot back, with `command` as its last
+  bool ends_run = false;              ///< with `done`: nobody else is waited for
+  OwnerLoss loss = OwnerLoss::kNone;  ///< told once
+  StopCategory on_loss = StopCategory::kWarn;  ///< with `loss`: kWarn holds every joint
+  StopCategory stop = StopCategory::kWarn;     ///< asked for since the last exchange()
+  bool reset = false;                          ///< asked for since the last exchange()
   const CommandImage* command = nullptr;
-  const ParameterImage* gains = nullptr;      ///< null: as they were
+  const ParameterImage* gains = nullptr;  ///< null: as they were
 };
 
 class CommandPort {

@@ -28,10 +28,10 @@ enum class BackendKind : std::uint8_t { kSim, kCan, kDds };
 /// [hal]: what stands for the robot, and how the loop and it go together.
 struct HalOptions {
   BackendKind backend = BackendKind::kSim;
-  bool lockstep = false;        ///< "can": wait for an emulated robot's answers, at any speed
-  double answer_window = 0.5;   ///< "can" in real time: share of the period to wait for answers
+  bool lockstep = false;           ///< "can": wait for an emulated robot's answers, at any speed
+  double answer_window = 0.5;      ///< "can" in real time: share of the period to wait for answers
   std::uint32_t delay_cycles = 0;  ///< between the controllers and the limits
-  double settle_s = 0.0;        ///< every joint is held, from enabled until controllers start
+  double settle_s = 0.0;           ///< every joint is held, from enabled until controllers start
 };
 
 /// [sim]. Its `order` and `noise` are already applied to Experiment::robot.

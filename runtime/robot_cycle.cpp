@@ -49,8 +49,8 @@ void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
 /// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
-  const std::size_t most = 3 + 16 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() +
-                           sensor_lost_.size();
+  const std::size_t most =
+      3 + 16 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() + sensor_lost_.size();
   const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
   if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
   return loop_.wait();

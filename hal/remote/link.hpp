@@ -24,7 +24,7 @@ struct Identity {
   std::int64_t period_ns = 0;
   std::vector<std::string> joints;
   std::vector<std::string> sensors;
-  std::uint32_t state_bytes = 0;    ///< of its images
+  std::uint32_t state_bytes = 0;  ///< of its images
   std::uint32_t command_bytes = 0;
 
   bool operator==(const Identity&) const = default;

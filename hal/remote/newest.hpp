@@ -27,8 +27,8 @@ class Newest {
   /// The reader's: takes the newest. False: front() is the newest already.
   bool refresh() noexcept TANDEM_RT {
     if ((middle_.load(std::memory_order_acquire) & kFresh) == 0) return false;
-    front_ = static_cast<std::uint8_t>(middle_.exchange(front_, std::memory_order_acq_rel) &
-                                       kIndex);
+    front_ =
+        static_cast<std::uint8_t>(middle_.exchange(front_, std::memory_order_acq_rel) & kIndex);
     return true;
   }
   [[nodiscard]] const T& front() const noexcept TANDEM_RT { return slots_[front_]; }

@@ -21,11 +21,11 @@
 namespace tandem::remote {
 
 struct ClientConfig {
-  std::string name;               ///< for people: "tandem run squat.toml, process 312"
-  bool lockstep = false;          ///< must be the server's
-  std::uint64_t server = 0;       ///< Server::number(); 0: the first that is heard
-  double connect_timeout_s = 10;  ///< for a server to be found, and to give the lease
-  double server_timeout_s = 3;    ///< a server that is not heard for so long is gone
+  std::string name;                        ///< for people: "tandem run squat.toml, process 312"
+  bool lockstep = false;                   ///< must be the server's
+  std::uint64_t server = 0;                ///< Server::number(); 0: the first that is heard
+  double connect_timeout_s = 10;           ///< for a server to be found, and to give the lease
+  double server_timeout_s = 3;             ///< a server that is not heard for so long is gone
   std::function<bool()> interrupted = {};  ///< true: exchange() waits no longer
   /// A drive's error code in words; empty: as Backend::fault_text() has it.
   std::function<std::string(std::uint32_t)> error_text = {};
@@ -38,9 +38,10 @@ class RemoteBackend final : public hal::Backend {
   /// Finds the server, compares robots, takes the lease.
   /// Errors: what DDS refuses; no server in time; another robot (what differs is named); in
   /// lockstep and the server not, or the other way round; owned by somebody else, who is named.
-  [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(
-      dds::Participant& participant, const hal::RobotConfig& robot, const Identity& identity,
-      const ClientConfig& config);
+  [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
+                                                                      const hal::RobotConfig& robot,
+                                                                      const Identity& identity,
+                                                                      const ClientConfig& config);
   /// Gives the robot back.
   ~RemoteBackend() override;
 

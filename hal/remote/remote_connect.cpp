@@ -11,8 +11,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr auto kAgain = std::chrono::milliseconds(100);
 
 SteadyClock::time_point in_seconds(double seconds) {
-  return SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(
-                                  std::chrono::duration<double>(seconds));
+  return SteadyClock::now() +
+         std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
 }
 
 std::string text(const char* of_sample) { return of_sample == nullptr ? "" : of_sample; }
@@ -48,10 +48,9 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
   auto commands =
       dds::Writer<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
   if (!commands) return std::unexpected(commands.error());
-  std::unique_ptr<RemoteBackend> made(
-      new RemoteBackend({std::move(*server), std::move(*state), std::move(*requests),
-                         std::move(*commands)},
-                        robot, config));
+  std::unique_ptr<RemoteBackend> made(new RemoteBackend(
+      {std::move(*server), std::move(*state), std::move(*requests), std::move(*commands)}, robot,
+      config));
   if (Status found = made->find_server(identity); !found) return std::unexpected(found.error());
   if (Status leased = made->take_lease(); !leased) return std::unexpected(leased.error());
   return made;

@@ -39,9 +39,9 @@ Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant,
   auto commands =
       dds::Reader<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
   if (!commands) return std::unexpected(commands.error());
-  return std::unique_ptr<Server>(new Server({std::move(*server), std::move(*state),
-                                             std::move(*requests), std::move(*commands)},
-                                            robot, std::move(identity), config));
+  return std::unique_ptr<Server>(new Server(
+      {std::move(*server), std::move(*state), std::move(*requests), std::move(*commands)}, robot,
+      std::move(identity), config));
 }
 
 Server::Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity identity,
@@ -168,14 +168,14 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   return true;
 }
 
-OwnerLoss Server::loss_of(const hal::PortView& view,
-                          std::uint64_t owner) const noexcept TANDEM_RT {
+OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) const noexcept TANDEM_RT {
   const std::int64_t now = now_ns();
   if (now - lease_.heard_ns() > ns(config_.lease_timeout_s)) return OwnerLoss::kSilent;
   const Taken& taken = newest_.front();
   if (config_.lockstep) {
     const bool there = taken.client == owner && taken.cycle == view.time.cycle;
-    const bool late = waits_since_ns_ != 0 && now - waits_since_ns_ > ns(config_.lockstep_timeout_s);
+    const bool late =
+        waits_since_ns_ != 0 && now - waits_since_ns_ > ns(config_.lockstep_timeout_s);
     return late && !there ? OwnerLoss::kLate : OwnerLoss::kNone;
   }
   const bool old = led_by_ == owner && view.time.cycle - taken.cycle > config_.max_age_cycles;

@@ -24,10 +24,10 @@ namespace tandem::remote {
 
 struct ServerConfig {
   bool lockstep = false;
-  bool ends_with_owner = false;       ///< the run, when an owner is done; else the next may come
-  double lease_timeout_s = 1.0;       ///< an owner that is not heard for so long has lost it
-  std::uint64_t max_age_cycles = 100; ///< of the state that a command answers
-  double lockstep_timeout_s = 60.0;   ///< that a cycle waits for a living owner's command
+  bool ends_with_owner = false;        ///< the run, when an owner is done; else the next may come
+  double lease_timeout_s = 1.0;        ///< an owner that is not heard for so long has lost it
+  std::uint64_t max_age_cycles = 100;  ///< of the state that a command answers
+  double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a living owner's command
   hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
 };
 

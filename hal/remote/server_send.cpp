@@ -145,8 +145,7 @@ void Server::send_shown() {
 }
 
 void Server::write_state(const Shown& shown, std::span<const std::byte> state,
-                         std::span<const std::byte> command,
-                         std::span<const std::uint8_t> causes) {
+                         std::span<const std::byte> command, std::span<const std::uint8_t> causes) {
   tandem_msgs::LinkState sample{};
   sample.run = run_;
   sample.cycle = shown.cycle;

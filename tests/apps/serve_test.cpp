@@ -20,9 +20,9 @@ class Serve : public Program {
 
   /// Starts `tandem ARGUMENTS` in the background; its process id.
   [[nodiscard]] pid_t begin(const std::string& arguments, const std::string& name) const {
-    const std::string command = "cd '" + folder_.string() + "' && { '" TANDEM_BINARY_DIR
-                                "/bin/tandem' " + arguments + " >" + name + ".txt 2>" + name +
-                                ".err </dev/null & echo $! >" + name + ".pid; }";
+    const std::string command =
+        "cd '" + folder_.string() + "' && { '" TANDEM_BINARY_DIR "/bin/tandem' " + arguments +
+        " >" + name + ".txt 2>" + name + ".err </dev/null & echo $! >" + name + ".pid; }";
     EXPECT_EQ(std::system(command.c_str()), 0);
     return std::stoi(read_text(folder_ / (name + ".pid")));
   }
@@ -97,9 +97,8 @@ TEST_F(Serve, AnOwnerThatIsKilledLeavesTheDeclaredReaction) {
 }
 
 TEST_F(Serve, AServerThatIsKilledEndsItsOwnerInAFault) {
-  const pid_t server =
-      begin("serve trajectory.toml" + domain() + " --realtime --no-log --no-socket --quiet",
-            "serve");
+  const pid_t server = begin(
+      "serve trajectory.toml" + domain() + " --realtime --no-log --no-socket --quiet", "serve");
   const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
                                 "--duration 600 --socket " + (folder_ / "o.sock").string(),
                             "owner");

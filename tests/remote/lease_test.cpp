@@ -57,12 +57,12 @@ class LinkChecks : public testing::Test {
     participant_ = participant("talker");
     const auto name = [&](const char* topic) { return participant_->topic_name(topic); };
     using dds::Reader, dds::Writer;
-    told_.emplace(*Reader<tandem_msgs::LinkServer>::create(*participant_, name(kServerTopic),
-                                                           link_qos()));
-    requests_.emplace(*Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic),
-                                                                link_qos()));
-    commands_.emplace(*Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic),
-                                                                link_qos()));
+    told_.emplace(
+        *Reader<tandem_msgs::LinkServer>::create(*participant_, name(kServerTopic), link_qos()));
+    requests_.emplace(
+        *Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic), link_qos()));
+    commands_.emplace(
+        *Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic), link_qos()));
     served.begin();
     ASSERT_TRUE(eventually([this] { return look() != 0; }));
     ASSERT_TRUE(eventually([this] {
@@ -99,8 +99,7 @@ class LinkChecks : public testing::Test {
     out.live = true;
     out.stop = 3;
     out.command._buffer = reinterpret_cast<std::uint8_t*>(image_.bytes().data());
-    out.command._length = out.command._maximum =
-        static_cast<std::uint32_t>(image_.bytes().size());
+    out.command._length = out.command._maximum = static_cast<std::uint32_t>(image_.bytes().size());
     return out;
   }
   /// Writes it, and expects what becomes of it.

@@ -55,9 +55,9 @@ class Record final : public hal::CycleTap {
     hal::TruthImage truth;
   };
   explicit Record(const hal::RobotConfig& robot, std::size_t most = 2000)
-      : cycles_(most, Cycle{RunPhase::kDone, hal::StateImage(robot.shape()),
-                            hal::CommandImage(robot.shape()),
-                            hal::TruthImage(robot.joints.size(), 0)}) {}
+      : cycles_(most,
+                Cycle{RunPhase::kDone, hal::StateImage(robot.shape()),
+                      hal::CommandImage(robot.shape()), hal::TruthImage(robot.joints.size(), 0)}) {}
   void take(const hal::CycleView& view) noexcept override {
     if (count_ == cycles_.size()) return;
     Cycle& one = cycles_[count_++];
@@ -82,22 +82,21 @@ class Served {
         backend(robot),
         host(robot, nullptr, kPeriod_ns),
         participant_(participant("served")) {
-    auto made =
-        Server::open(*participant_, robot, identity_of(robot, "hash", kPeriod_ns), config);
+    auto made = Server::open(*participant_, robot, identity_of(robot, "hash", kPeriod_ns), config);
     EXPECT_TRUE(made) << made.error().to_string();
     server = std::move(*made);
     owner = std::make_shared<runtime::OwnerController>();
     EXPECT_TRUE(host.add("remote", owner, runtime::test::parameters(), false));
     cycle_config.after_stop = runtime::AfterStop::kWait;
-    cycle = std::make_unique<RobotCycle>(
-        runtime::CycleParts{.robot = robot,
-                            .backend = backend,
-                            .controllers = host,
-                            .clock = clock,
-                            .truth = &backend.truth,
-                            .tap = tap,
-                            .owner = {server.get(), owner.get(), 0}},
-        cycle_config);
+    cycle =
+        std::make_unique<RobotCycle>(runtime::CycleParts{.robot = robot,
+                                                         .backend = backend,
+                                                         .controllers = host,
+                                                         .clock = clock,
+                                                         .truth = &backend.truth,
+                                                         .tap = tap,
+                                                         .owner = {server.get(), owner.get(), 0}},
+                                     cycle_config);
   }
   ~Served() { end(); }
   void begin() {
@@ -150,10 +149,9 @@ class Owner {
     controller = sine.get();
     EXPECT_TRUE(host.add("sine", sine, runtime::test::parameters()));
     cycle_config.bring_up_cycles = ~std::uint64_t{0};
-    cycle_config.loop.pacing =
-        config.lockstep ? rt::Pacing::kSimulated : rt::Pacing::kExternal;
-    cycle = std::make_unique<RobotCycle>(
-        runtime::CycleParts{robot, *backend, host, clock}, cycle_config);
+    cycle_config.loop.pacing = config.lockstep ? rt::Pacing::kSimulated : rt::Pacing::kExternal;
+    cycle = std::make_unique<RobotCycle>(runtime::CycleParts{robot, *backend, host, clock},
+                                         cycle_config);
   }
 
   hal::RobotConfig robot;

@@ -89,8 +89,8 @@ ConformanceRobot make_remote_ur5e() {
   client.name = "the conformance suite";
   client.lockstep = true;
   client.server = served->server->number();
-  made.backend = take(remote::RemoteBackend::connect(participant(false), made.robot,
-                                                     served->identity(), client));
+  made.backend = take(
+      remote::RemoteBackend::connect(participant(false), made.robot, served->identity(), client));
   made.keep = served;
   return made;
 }

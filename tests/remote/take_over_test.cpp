@@ -19,7 +19,8 @@ runtime::CycleConfig paced() {
 double largest_step(std::span<const Record::Cycle> cycles) {
   double most = 0.0;
   for (std::size_t i = 1; i < cycles.size(); ++i) {
-    if (cycles[i - 1].phase != RunPhase::kRunning || cycles[i].phase != RunPhase::kRunning) continue;
+    if (cycles[i - 1].phase != RunPhase::kRunning || cycles[i].phase != RunPhase::kRunning)
+      continue;
     most = std::max(most, std::abs(cycles[i].command.position_rad()[0] -
                                    cycles[i - 1].command.position_rad()[0]));
   }
@@ -57,8 +58,8 @@ TEST(Server, ThatEndsItsRunEndsItsOwnersInAFault) {
   served->begin();
   Owner owner({}, {});
   std::thread loop([&owner] { owner.cycle->run(); });
-  EXPECT_TRUE(eventually(
-      [&] { return owner.cycle->progress().phase.load() == RunPhase::kRunning; }));
+  EXPECT_TRUE(
+      eventually([&] { return owner.cycle->progress().phase.load() == RunPhase::kRunning; }));
   served->end();
   loop.join();
   ASSERT_FALSE(owner.cycle->faults().empty());
