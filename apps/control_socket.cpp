@@ -22,6 +22,15 @@ namespace {
 constexpr mode_t kFolderMode = 0700;
 constexpr mode_t kSocketMode = 0600;
 
+void wake(int eventfd) {
+  const std::uint64_t one = 1;
+  (void)!::write(eventfd, &one, sizeof one);
+}
+
+std::string refused(const std::string& error, const std::string& hint) {
+  return Json{{"ok", false}, {"error", error}, {"hint", hint}}.dump();
+}
+
 std::string reason() { return std::strerror(errno); }
 
 /// The folder of the default paths: made when it is missing, refused when it is not ours alone.
@@ -56,15 +65,17 @@ Status clear_way(const std::string& path) {
 }  // namespace
 
 struct ControlSocket::Client {
-  explicit Client(int descriptor) : fd(descriptor) {}
+  Client(int descriptor, std::uint64_t its_number) : fd(descriptor), number(its_number) {}
   ~Client() { ::close(fd); }
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
   int fd;
+  std::uint64_t number;
   std::string in, out;
   std::uint64_t last_turn = 0;
-  bool ending = false;  // nothing more is read: closed when its answers are out
+  bool waiting = false;  // the second thread has a question of this one
+  bool ending = false;   // nothing more is read: closed when its answers are out
   bool gone = false;
 };
 
@@ -91,6 +102,7 @@ Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& pa
     return std::unexpected(listening.error());
   }
   socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
+  socket->worker_ = std::thread([raw = socket.get()] { raw->work(); });
   return socket;
 }
 
@@ -102,10 +114,11 @@ Status ControlSocket::listen() {
   if (Status clear = clear_way(path_); !clear) return clear;
   listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   struct stat made {};
   // Nobody can connect before listen(), so the mode is right for the first who can.
   const bool listens =
-      listener_ >= 0 && wake_ >= 0 &&
+      listener_ >= 0 && wake_ >= 0 && done_ >= 0 &&
       ::bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
       ::chmod(path_.c_str(), kSocketMode) == 0 && ::stat(path_.c_str(), &made) == 0 &&
       ::listen(listener_, static_cast<int>(kMaxControlClients)) == 0;
@@ -119,26 +132,32 @@ Status ControlSocket::listen() {
 }
 
 ControlSocket::~ControlSocket() {
-  if (thread_.joinable()) {
-    const std::uint64_t one = 1;
-    (void)!::write(wake_, &one, sizeof one);
-    thread_.join();
+  {
+    const std::scoped_lock lock(mutex_);
+    ending_ = true;
   }
+  more_.notify_all();
+  wake(wake_);
+  if (thread_.joinable()) thread_.join();
+  if (worker_.joinable()) worker_.join();
   struct stat found {};
   const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
                     found.st_ino == inode_;
   if (ours) ::unlink(path_.c_str());
   if (listener_ >= 0) ::close(listener_);
   if (wake_ >= 0) ::close(wake_);
+  if (done_ >= 0) ::close(done_);
 }
 
 void ControlSocket::serve() {
   std::vector<pollfd> watched;
   for (;;) {
-    watched.assign({{wake_, POLLIN, 0}, {listener_, POLLIN, 0}});
+    watched.assign({{wake_, POLLIN, 0}, {done_, POLLIN, 0}, {listener_, POLLIN, 0}});
+    const std::size_t first = watched.size();
     for (const auto& client : clients_) {
       // A client with answers to come is not asked for more: it takes them first.
-      const short events = client->out.empty() ? POLLIN : POLLOUT;
+      const short asking = client->waiting ? 0 : POLLIN;
+      const short events = client->out.empty() ? asking : POLLOUT;
       watched.push_back({client->fd, events, 0});
     }
     if (::poll(watched.data(), watched.size(), -1) < 0) {
@@ -146,8 +165,8 @@ void ControlSocket::serve() {
       return;
     }
     if (watched[0].revents != 0) return;
-    for (std::size_t i = 0; i + 2 < watched.size(); ++i) {
-      const short happened = watched[i + 2].revents;
+    for (std::size_t i = 0; first + i < watched.size(); ++i) {
+      const short happened = watched[first + i].revents;
       if (happened == 0) continue;
       Client& client = *clients_[i];
       client.last_turn = ++turn_;
@@ -161,7 +180,8 @@ void ControlSocket::serve() {
       }
     }
     std::erase_if(clients_, [](const auto& one) { return one->gone; });
-    if (watched[1].revents != 0) accept();
+    if (watched[1].revents != 0) deliver();
+    if (watched[2].revents != 0) accept();
   }
 }
 
@@ -172,7 +192,7 @@ void ControlSocket::accept() {
     clients_.erase(std::ranges::min_element(clients_, {},
                                             [](const auto& client) { return client->last_turn; }));
   }
-  clients_.push_back(std::make_unique<Client>(fd));
+  clients_.push_back(std::make_unique<Client>(fd, ++newest_));
   clients_.back()->last_turn = ++turn_;
 }
 
@@ -187,27 +207,84 @@ void ControlSocket::take(Client& client) {
   }
 }
 
-/// Answers what is there, line by line, as long as the client takes the answers.
+/// Answers what is there, line by line, as long as the client takes the answers. What may take long
+/// goes to the second thread, and the rest waits for it.
 void ControlSocket::answer_lines(Client& client) {
-  while (!client.gone && !client.ending && client.out.empty()) {
+  while (!client.gone && !client.ending && !client.waiting && client.out.empty()) {
     const std::size_t end = client.in.find('\n');
     const std::size_t length = end == std::string::npos ? client.in.size() : end + 1;
     if (length > kMaxControlLine) {
-      client.out = Json{{"ok", false},
-                        {"error", fmt::format("a line of more than {} bytes", kMaxControlLine)},
-                        {"hint", "send shorter ones"}}
-                       .dump();
+      client.out = refused(fmt::format("a line of more than {} bytes", kMaxControlLine),
+                           "send shorter ones");
       client.ending = true;
     } else if (end == std::string::npos) {
       return;
     } else {
-      const Json answer = registry_->answer(std::string_view(client.in).substr(0, end));
-      client.out = answer.dump(-1, ' ', false, Json::error_handler_t::replace);
+      std::string question = client.in.substr(0, end);
       client.in.erase(0, length);
+      if (registry_->stops(question)) {
+        client.out = answer_to(question);
+      } else if (hand_over(client, std::move(question))) {
+        return;
+      } else {
+        client.out = refused("too many questions at once", "ask again");
+      }
     }
     client.out += '\n';
     flush(client);
   }
+}
+
+/// @return false when there is no room: clients that left theirs and went can fill it
+bool ControlSocket::hand_over(Client& client, std::string question) {
+  const std::scoped_lock lock(mutex_);
+  if (questions_.size() == kMaxControlWaiting) return false;
+  questions_.push_back({client.number, std::move(question)});
+  client.waiting = true;
+  more_.notify_one();
+  return true;
+}
+
+std::string ControlSocket::answer_to(std::string_view question) const {
+  return registry_->answer(question).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// The second thread: one question after the other, so that the first is free for a stop.
+void ControlSocket::work() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    more_.wait(lock, [this] { return ending_ || !questions_.empty(); });
+    if (ending_) return;
+    Errand errand = std::move(questions_.front());
+    questions_.pop_front();
+    lock.unlock();
+    errand.text = answer_to(errand.text);
+    lock.lock();
+    answers_.push_back(std::move(errand));
+    wake(done_);
+  }
+}
+
+/// Hands the second thread's answers to the clients that are still there.
+void ControlSocket::deliver() {
+  std::uint64_t count = 0;
+  (void)!::read(done_, &count, sizeof count);
+  std::vector<Errand> answers;
+  {
+    const std::scoped_lock lock(mutex_);
+    answers.swap(answers_);
+  }
+  for (Errand& answer : answers) {
+    const auto found = std::ranges::find(clients_, answer.client, &Client::number);
+    if (found == clients_.end()) continue;
+    Client& client = **found;
+    client.waiting = false;
+    client.last_turn = ++turn_;
+    client.out = std::move(answer.text) + '\n';
+    flush(client);
+    answer_lines(client);
+  }
+  std::erase_if(clients_, [](const auto& one) { return one->gone; });
 }
 
 void ControlSocket::flush(Client& client) {

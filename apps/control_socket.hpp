@@ -1,12 +1,17 @@
 // The Unix-domain socket of a running process: a line of JSON in, a line of JSON out.
-// Layer: apps.  Thread: open/close main; serves on a thread of its own, never the loop's.
+// Layer: apps.  Thread: open/close main; two of its own, one of which talks and stops; never the loop.
 #pragma once
 
 #include <sys/types.h>
 
+#include <condition_variable>
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -20,6 +25,9 @@ inline constexpr std::size_t kMaxControlLine = kMaxQuestion + 1;
 /// Clients at once. A further one takes the place of the one that has been quiet the longest, so
 /// that an emergency stop always finds its way in.
 inline constexpr std::size_t kMaxControlClients = 16;
+/// Questions that wait for one that is at work, those of clients that have gone included. One more
+/// is refused.
+inline constexpr std::size_t kMaxControlWaiting = 64;
 
 /// The folder of every socket of this user: $XDG_RUNTIME_DIR/tandem, or /tmp/tandem-<uid> where
 /// there is no such folder.
@@ -30,7 +38,8 @@ inline constexpr std::size_t kMaxControlClients = 16;
 
 /// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
 /// or leaves undone reaches the process: a client that sends a line that is too long, that does
-/// not read its answers, or that is gone, is closed.
+/// not read its answers, or that is gone, is closed. A client's questions are answered in order; a
+/// command that stops the robot waits for no other client's.
 class ControlSocket {
  public:
   /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
@@ -48,6 +57,11 @@ class ControlSocket {
 
  private:
   struct Client;
+  /// A question for the second thread, or its answer.
+  struct Errand {
+    std::uint64_t client;
+    std::string text;
+  };
   ControlSocket(std::string path, const ControlRegistry& registry);
   Status listen();
   void serve();
@@ -55,6 +69,10 @@ class ControlSocket {
   void take(Client& client);
   void answer_lines(Client& client);
   static void flush(Client& client);
+  bool hand_over(Client& client, std::string question);
+  [[nodiscard]] std::string answer_to(std::string_view question) const;
+  void work();
+  void deliver();
 
   std::string path_;
   const ControlRegistry* registry_;
@@ -63,8 +81,18 @@ class ControlSocket {
   dev_t device_ = 0;
   ino_t inode_ = 0;
   std::uint64_t turn_ = 0;  // counts what clients do, to know who has been quiet
+  std::uint64_t newest_ = 0;  // client's number
   std::vector<std::unique_ptr<Client>> clients_;
+
+  int done_ = -1;  // eventfd: the second thread's word to the first, "answers_ has some"
+  std::mutex mutex_;
+  std::condition_variable more_;
+  std::deque<Errand> questions_;
+  std::vector<Errand> answers_;
+  bool ending_ = false;
+
   std::thread thread_;
+  std::thread worker_;
 };
 
 }  // namespace tandem::apps

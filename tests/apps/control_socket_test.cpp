@@ -296,6 +296,37 @@ TEST_F(Socket, GivesTheQuietestClientsPlaceToANewOne) {
   for (const int fd : clients) ::close(fd);
 }
 
+TEST_F(Socket, StopsWhileAnotherCommandIsAtWorkAndManyWait) {
+  std::atomic<bool> at_work{false}, stopped{false};
+  registry.add("slow", ControlEffect::kChanges, "ends after a stop", {},
+               [&](const Json&) -> Result<Json> {
+                 at_work = true;
+                 while (!stopped) std::this_thread::yield();
+                 return Json{{"text", "slow"}};
+               });
+  registry.add("stop", ControlEffect::kStops, "stops", {},
+               [&](const Json&) -> Result<Json> { return Json{{"text", "stop"}}; });
+  const auto socket = open(path);
+  const int slow = connect();
+  send(slow, "{\"do\": \"slow\"}\n{\"do\": \"stop\"}\n");
+  while (!at_work) std::this_thread::yield();
+  for (std::size_t i = 0; i < kMaxControlWaiting; ++i) {
+    const int gone = connect();
+    send(gone, "{\"do\": \"help\"}\n");
+    ::close(gone);
+  }
+  const int late = connect();
+  send(late, "{\"do\": \"help\"}\n");
+  EXPECT_NE(line(late).find("too many questions"), std::string::npos);
+  send(late, "{\"do\": \"stop\"}\n");
+  EXPECT_EQ(line(late), "{\"ok\":true,\"text\":\"stop\"}\n");
+  stopped = true;
+  EXPECT_EQ(line(slow), "{\"ok\":true,\"text\":\"slow\"}\n");
+  EXPECT_EQ(line(slow), "{\"ok\":true,\"text\":\"stop\"}\n");  // in order
+  ::close(late);
+  ::close(slow);
+}
+
 TEST_F(Socket, ReplacesTheFileOfADeadProcessAndNothingElse) {
   const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
   const auto address = control_address(path);
