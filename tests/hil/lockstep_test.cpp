@@ -1,4 +1,4 @@
-// Whole squats over the kernel's CAN, in lockstep: the bits of the run in process.
+// Whole runs over the kernel's CAN, in lockstep: the bits of the run in process.
 #include <nlohmann/json.hpp>
 
 #include "tests/hil/process.hpp"
@@ -9,11 +9,6 @@ namespace {
 using test::Process;
 using test::tandem;
 
-class HilLockstep : public test::OwnFolder, public testing::WithParamInterface<const char*> {
- protected:
-  [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
-};
-
 /// Logs are large and written in the guest's memory; of a failure the differences are enough.
 struct MemoryFolder {
   MemoryFolder() { std::filesystem::create_directories(path); }
@@ -21,47 +16,98 @@ struct MemoryFolder {
   const std::filesystem::path path = std::filesystem::temp_directory_path() / "lockstep";
 };
 
-TEST_P(HilLockstep, ASquatOverCanIsTheInProcessRunBitForBit) {
-  const MemoryFolder memory;
-  const std::string experiment =
-      std::string(TANDEM_SOURCE_DIR "/config/") + GetParam() + "/squat.toml";
-  const std::string in_process = memory.path / "in_process";
-  const std::string over_can = memory.path / "over_can";
-  Process alone(tandem({"run", experiment, "--quiet", "--no-socket", "--log", in_process}),
-                file("in_process.txt"));
-  ASSERT_EQ(alone.wait(), 0) << alone.output();
+class Lockstep : public test::OwnFolder {
+ protected:
+  [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] nlohmann::json json(const std::string& name) const {
+    return nlohmann::json::parse(test::text_of(file(name)));
+  }
+  [[nodiscard]] static std::string experiment(const std::string& name) {
+    return TANDEM_SOURCE_DIR "/config/" + name;
+  }
+  [[nodiscard]] std::vector<std::string> emulate_words(const std::string& experiment) const {
+    return tandem(
+        {"emulate", experiment, "--lockstep", "--no-socket", "--json", file("robot.json")});
+  }
+  void run_in_process(const std::string& experiment, const std::vector<std::string>& more = {}) {
+    auto words = tandem({"run", experiment, "--quiet", "--no-socket", "--log", in_process_});
+    words.insert(words.end(), more.begin(), more.end());
+    Process alone(words, file("in_process.txt"));
+    ASSERT_EQ(alone.wait(), 0) << alone.output();
+  }
+  /// That all but the plant's truth is the same in both logs, and no frame was lost.
+  void expect_same_bits(const std::string& log, std::uint64_t cycles_at_least) {
+    Process diff(
+        tandem({"log", "diff", in_process_ + log, over_can_ + log, "--json", file("diff.json")}),
+        file("diff.txt"));
+    EXPECT_EQ(diff.wait(), 0) << diff.output();
+    const auto topics = json("diff.json")["topics"];
+    for (const char* name : {"/tandem/state", "/tandem/command", "/tandem/event"}) {
+      ASSERT_TRUE(topics.contains(name)) << diff.output();
+      EXPECT_GT(topics[name]["messages"][0], 0) << name;
+    }
+    const std::uint64_t cycles = topics["/tandem/state"]["messages"][0];
+    EXPECT_GT(cycles, cycles_at_least) << "from power-on to the end";
+    const auto emulated = json("robot.json");
+    EXPECT_EQ(emulated["steps"], cycles);
+    EXPECT_EQ(emulated["frames_lost"], 0);
+    std::printf("%s: %llu cycles, %llu frames to the boards, %llu back\n", log.c_str(),
+                static_cast<unsigned long long>(cycles),
+                emulated["frames_in"].get<unsigned long long>(),
+                emulated["frames_out"].get<unsigned long long>());
+  }
 
-  Process robot(tandem({"emulate", experiment, "--lockstep", "--no-socket", "--json",
-                        file("robot.json")}),
-                file("robot.txt"));
+  const MemoryFolder memory_;
+  const std::string in_process_ = memory_.path / "in_process";
+  const std::string over_can_ = memory_.path / "over_can";
+};
+
+class HilLockstep : public Lockstep, public testing::WithParamInterface<const char*> {};
+
+TEST_P(HilLockstep, ASquatOverCanIsTheInProcessRunBitForBit) {
+  const std::string squat = experiment(GetParam()) + "/squat.toml";
+  ASSERT_NO_FATAL_FAILURE(run_in_process(squat));
+
+  Process robot(emulate_words(squat), file("robot.txt"));
   ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
-  Process master(tandem({"run", experiment, "--hal", "can", "--lockstep", "--no-socket", "--log",
-                         over_can, "--json", file("run.json")}),
+  Process master(tandem({"run", squat, "--hal", "can", "--lockstep", "--no-socket", "--log",
+                         over_can_, "--json", file("run.json")}),
                  file("run.txt"));
   ASSERT_EQ(master.wait(), 0) << master.output();
   ASSERT_EQ(robot.interrupt(), 0) << robot.output();
-
-  const std::string log = std::string("/") + GetParam() + "-squat-001.mcap";
-  Process diff(tandem({"log", "diff", in_process + log, over_can + log, "--json",
-                       file("diff.json")}),
-               file("diff.txt"));
-  EXPECT_EQ(diff.wait(), 0) << diff.output();
-  const auto same = nlohmann::json::parse(test::text_of(file("diff.json")));
-  const auto run = nlohmann::json::parse(test::text_of(file("run.json")));
-  const std::uint64_t cycles = same["topics"]["/tandem/state"]["messages"][0];
-  EXPECT_GT(cycles, 30'000U) << "from power-on to the end";
-  EXPECT_EQ(run["hal"], "can lockstep");
-  const auto emulated = nlohmann::json::parse(test::text_of(file("robot.json")));
-  EXPECT_EQ(emulated["steps"], cycles);
-  EXPECT_EQ(emulated["frames_lost"], 0);
-  std::printf("%s: %llu cycles, %llu frames to the boards, %llu back\n", GetParam(),
-              static_cast<unsigned long long>(cycles),
-              emulated["frames_in"].get<unsigned long long>(),
-              emulated["frames_out"].get<unsigned long long>());
+  EXPECT_EQ(json("run.json")["hal"], "can lockstep");
+  expect_same_bits(std::string("/") + GetParam() + "-squat-001.mcap", 30'000);
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, HilLockstep, testing::Values("coman", "walkman"),
                          [](const auto& robot) { return std::string(robot.param); });
+
+using HilServe = Lockstep;
+
+/// Three processes: boards and plant, the loop on CAN, and over DDS the controllers.
+TEST_F(HilServe, ARobotOnCanDrivenOverDdsIsTheInProcessRunBitForBit) {
+  const std::string trajectory = experiment("double_pendulum_classic/trajectory.toml");
+  const std::string domain = "77";  // of this test: the network is no other's
+  ASSERT_NO_FATAL_FAILURE(run_in_process(trajectory, {"--duration", "0.5"}));
+
+  Process robot(emulate_words(trajectory), file("robot.txt"));
+  ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
+  Process server(tandem({"serve", trajectory, "--hal", "can", "--lockstep", "--once", "--no-socket",
+                         "--domain", domain, "--log", over_can_, "--json", file("serve.json")}),
+                 file("serve.txt"));
+  ASSERT_TRUE(server.says("served in DDS domain " + domain)) << server.output();
+  Process owner(tandem({"run", trajectory, "--hal", "dds", "--lockstep", "--no-log", "--no-socket",
+                        "--domain", domain, "--duration", "0.5"}),
+                file("owner.txt"));
+  ASSERT_EQ(owner.wait(), 0) << owner.output() << server.output();
+  ASSERT_EQ(server.wait(), 0) << server.output();
+  ASSERT_EQ(robot.interrupt(), 0) << robot.output();
+  const auto served = json("serve.json");
+  EXPECT_EQ(served["hal"], "can lockstep");
+  EXPECT_EQ(served["remote"]["losses"], 0);
+  EXPECT_GT(served["remote"]["commands"]["taken"], 500) << "bring-up and half a second at 500 Hz";
+  expect_same_bits("/double_pendulum-trajectory-001.mcap", 1000);
+}
 
 }  // namespace
 }  // namespace tandem
