@@ -17,6 +17,8 @@ const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --report        and draw the plots
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
   tandem run config/coman/squat.toml --start-paused  then `tandem clock step 10`, `clock resume`
+  tandem run config/coman/squat.toml --dds --realtime      shown to ROS 2 and `tandem topic`
+  tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
   tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
@@ -40,7 +42,7 @@ const char kClockExamples[] = R"(Examples:
   tandem clock rate 0.1                              ten times slower than real time
   tandem clock rate 0                                as fast as the machine goes
   tandem clock resume
-The results are the same bits. A run in real time refuses: a robot's time cannot be paused.
+The results are the same bits. Only simulated time: a robot's cannot be paused, and is refused.
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kAskExamples[] = R"(Examples:
@@ -216,12 +218,12 @@ void add_flags(CLI::App& app, ServeOptions& o) {
 
 void add_flags(CLI::App& app, FaultOptions& o) {
   app.require_subcommand(1);
+  app.footer(kFaultExamples);  // its subcommands', too
   CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
   CLI::App* reset = app.add_subcommand("reset", "Clear what is latched and go on where it stands");
   for (CLI::App* one : {show, reset}) {
     add_target(*one, o.target);
     one->add_option("--json", o.json, kJsonHelp);
-    one->footer(kFaultExamples);
   }
   show->callback([&o] { o.action = FaultOptions::Action::kShow; });
   reset->callback([&o] { o.action = FaultOptions::Action::kReset; });

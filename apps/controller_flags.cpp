@@ -1,4 +1,6 @@
 // Flags of the commands that change a running run: tandem controller, tandem joint.
+#include <cmath>
+
 #include "apps/command_flags.hpp"
 
 namespace tandem::apps {
@@ -19,6 +21,15 @@ const char kJointExamples[] = R"(Examples:
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
 Without --socket or --dds it is the only `tandem run` of this user.)";
+
+CLI::Validator is_finite() {
+  const auto check = [](const std::string& text) -> std::string {
+    double number = 0.0;
+    if (CLI::detail::lexical_cast(text, number) && std::isfinite(number)) return "";
+    return "'" + text + "' is no finite number";
+  };
+  return {check, ""};
+}
 
 /// What every subcommand has.
 template <class Options>
@@ -84,15 +95,17 @@ void add_flags(CLI::App& app, JointOptions& o) {
   set->add_option("joint", o.joint, "Its name")->required();
   set->add_option("--mode", o.mode, "idle, position, velocity, torque, open_loop, current");
   set->add_option("--interaction", o.interaction, "stiff, compliant");
-  set->add_option("--stiffness", o.stiffness_Nm_rad, "Of the virtual spring [Nm/rad]");
-  set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]");
+  set->add_option("--stiffness", o.stiffness_Nm_rad, "Of the virtual spring [Nm/rad]")
+      ->check(is_finite());
+  set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
+      ->check(is_finite());
   CLI::App* gains =
       add("gains", "Gains of a loop in its drive; what is left out stays", Action::kGains);
   gains->add_option("joint", o.joint, "Its name")->required();
   gains->add_option("loop", o.loop, "position, velocity, torque, current")->required();
-  gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md");
-  gains->add_option("--ki", o.ki);
-  gains->add_option("--kd", o.kd);
+  gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());
+  gains->add_option("--ki", o.ki)->check(is_finite());
+  gains->add_option("--kd", o.kd)->check(is_finite());
 }
 
 }  // namespace tandem::apps

@@ -109,7 +109,7 @@ Result<dds::TopicInfo> find_topic(const TopicOptions& options, const Part& part)
       if (info.writers == 0) continue;
       const std::string ros = info.ros_name();
       if (ros == name || info.topic == options.topic) return std::move(info);
-      known.push_back(ros.empty() ? info.topic : ros);
+      if (!ros.empty()) known.push_back(ros);  // services' and the graph's are not looked for
     }
     std::this_thread::sleep_for(kPoll);
   } while (SteadyClock::now() < end && !rt::stop_requested());

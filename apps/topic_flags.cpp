@@ -18,6 +18,12 @@ const char kHzExamples[] = R"(Examples:
   tandem topic hz /joint_states                      until Ctrl-C
   tandem topic hz /tandem/state --count 5000         and what was lost, by the cycles' numbers)";
 
+const char kTopicExamples[] = R"(Examples:
+  tandem topic list                                  with somebody who publishes:
+  tandem topic echo /joint_states --once             `tandem run X --dds --realtime`, or ROS 2
+  tandem topic hz /tandem/state
+Each subcommand's --help tells more.)";
+
 void add_domain(CLI::App& app, TopicOptions& o) {
   app.add_option("--domain", o.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
       ->check(CLI::Range(0, 232));
@@ -32,6 +38,7 @@ void add_domain(CLI::App& app, TopicOptions& o) {
 
 void add_flags(CLI::App& app, TopicOptions& o) {
   app.require_subcommand(1);
+  app.footer(kTopicExamples);
   CLI::App* list = app.add_subcommand("list", "Topics, their types, who writes and reads them");
   list->add_flag("--all", o.all, "Not only ROS 2's topics: services' and the graph's, too");
   list->footer(kListExamples);
