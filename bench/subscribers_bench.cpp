@@ -1,13 +1,19 @@
-// Whether subscribers change the loop: COMAN holding at 1 kHz with everything published, blocks
-// without a subscriber and blocks with 20 of them, another process', that join and leave, in turns.
+// Whether others change the loop: COMAN holding at 1 kHz with everything published, in turns
+//   - nobody subscribes,
+//   - 20 subscribers of another process join and leave,
+//   - five that never read what they asked for, and a flood of packets that are no RTPS.
 //   subscribers_bench [EXPERIMENT] [KERNELS.so] [--blocks N] [--seconds S] [--cpu N] [--domain N]
 // What is compared is the work of each cycle: from the return of the wait to the hand-over's end.
 #include <fmt/core.h>
+#include <netinet/in.h>
 #include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <random>
+#include <string_view>
 #include <thread>
 
 #include "bench/rig.hpp"
@@ -32,6 +38,11 @@ struct Options {
 };
 
 constexpr int kSubscribers = 20;
+constexpr int kIdle = 5;  ///< subscribers that never read
+/// The blocks' kinds in their order, as standard input of the other process has them.
+constexpr std::string_view kKinds = "abc";
+constexpr std::array<const char*, kKinds.size()> kNames{"nobody subscribes", "20 join and leave",
+                                                        "5 never read, a flood"};
 
 dds::Config config_of(int domain) {
   dds::Config config;
@@ -64,24 +75,52 @@ class Subscriber {
   Result<dds::Reader<dds::tandem_msgs::State>> state_ = fail("none");
 };
 
-/// The other process: 'b' on standard input lets subscribers come and go, 'a' sends all away.
+/// A thousand packets of noise to the port at which the first participant of a domain listens.
+class Flood {
+ public:
+  explicit Flood(int domain) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    address_.sin_family = AF_INET;
+    address_.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain + 11));  // RTPS 9.6.1
+    address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    noise_.fill('R');
+  }
+  ~Flood() { ::close(socket_); }
+  void send() {
+    const auto* to = reinterpret_cast<const sockaddr*>(&address_);
+    for (int i = 0; i < 1000; ++i) {
+      sent_ += ::sendto(socket_, noise_.data(), noise_.size(), 0, to, sizeof address_) > 0 ? 1 : 0;
+    }
+  }
+  [[nodiscard]] std::size_t sent() const { return sent_; }
+
+ private:
+  int socket_;
+  sockaddr_in address_{};
+  std::array<char, 512> noise_{};
+  std::size_t sent_ = 0;
+};
+
+/// The other process: each character on standard input begins a block of that kind.
 int be_subscribers(int domain_number) {
   const auto domain = dds::Domain::open(config_of(domain_number));
   if (!domain) return fail_with(domain.error());
   std::vector<std::unique_ptr<Subscriber>> subscribers(kSubscribers);
   std::mt19937 random(1);
   std::uniform_int_distribution<std::size_t> any(0, kSubscribers - 1);
-  bool busy = false;
+  Flood flood(domain_number);
+  char kind = 'a';
   std::size_t received = 0, changes = 0;
   for (;;) {
     pollfd input{STDIN_FILENO, POLLIN, 0};
     if (::poll(&input, 1, 20) > 0) {
-      char word = 0;
-      if (::read(STDIN_FILENO, &word, 1) != 1) break;
-      busy = word == 'b';
-      for (auto& one : subscribers) one = busy ? std::make_unique<Subscriber>(*domain) : nullptr;
+      if (::read(STDIN_FILENO, &kind, 1) != 1) break;
+      const std::size_t there = kind == 'a' ? 0 : kind == 'b' ? kSubscribers : kIdle;
+      for (std::size_t i = 0; i < kSubscribers; ++i) {
+        subscribers[i] = i < there ? std::make_unique<Subscriber>(*domain) : nullptr;
+      }
     }
-    if (!busy) continue;
+    if (kind == 'c') flood.send();
+    if (kind != 'b') continue;
     auto& one = subscribers[any(random)];
     one = one == nullptr ? std::make_unique<Subscriber>(*domain) : nullptr;
     ++changes;
@@ -89,7 +128,8 @@ int be_subscribers(int domain_number) {
       if (reader != nullptr) received += reader->take();
     }
   }
-  fmt::print("subscribers joined or left {} times and received {} samples\n", changes, received);
+  fmt::print("subscribers joined or left {} times and received {} samples; {} packets of noise\n",
+             changes, received, flood.sent());
   std::fflush(stdout);
   return 0;
 }
@@ -112,15 +152,14 @@ class TimedTap final : public hal::CycleTap {
   hal::CycleTap& tap_;
 };
 
-/// Blocks 0, 2, … are without subscribers, 1, 3, … with them.
 void print(const TimedTap& tap) {
   fmt::print("\n{:28} {:>8} {:>8} {:>8} {:>8} {:>9}\n", "work of a cycle [us]", "p50", "p99",
              "p99.9", "max", "cycles");
-  std::array<double, 2> p999{};
-  for (const std::size_t kind : {0U, 1U}) {
+  std::array<double, kKinds.size()> p999{};
+  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
     std::vector<double> p50, p99, p99_9;
     rt::Histogram all;
-    for (std::size_t block = kind; block < tap.blocks.size(); block += 2) {
+    for (std::size_t block = kind; block < tap.blocks.size(); block += kKinds.size()) {
       const rt::Percentiles p = tap.blocks[block].percentiles();
       p50.push_back(us(p.p50));
       p99.push_back(us(p.p99));
@@ -128,12 +167,12 @@ void print(const TimedTap& tap) {
       all.add(tap.blocks[block]);
     }
     p999[kind] = median(p99_9);
-    fmt::print("{:28} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}\n",
-               kind == 0 ? "nobody subscribes" : "20 join and leave", median(p50), median(p99),
-               p999[kind], us(all.max_ns()), all.count());
+    fmt::print("{:28} {:8.1f} {:8.1f} {:8.1f} {:8.1f} {:9}\n", kNames[kind], median(p50),
+               median(p99), p999[kind], us(all.max_ns()), all.count());
   }
-  fmt::print("p99.9 with over without: {:.2f} (medians of {} blocks each)\n", p999[1] / p999[0],
-             tap.blocks.size() / 2);
+  fmt::print(
+      "p99.9 over that of nobody: {:.2f} with 20, {:.2f} hostile; medians of {} blocks each\n",
+      p999[1] / p999[0], p999[2] / p999[0], tap.blocks.size() / kKinds.size());
 }
 
 int run(const Options& options, const char* program) {
@@ -162,7 +201,7 @@ int run(const Options& options, const char* program) {
   if (!publisher) return fail_with(publisher.error());
 
   TimedTap tap(**publisher);
-  tap.blocks.resize(static_cast<std::size_t>(2 * options.blocks));
+  tap.blocks.resize(kKinds.size() * static_cast<std::size_t>(options.blocks));
   tap.cycles_per_block =
       static_cast<std::uint64_t>(options.seconds * 1e9 / static_cast<double>(e.loop.period_ns));
   rt::WallClock clock;
@@ -181,7 +220,7 @@ int run(const Options& options, const char* program) {
   const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
   std::FILE* words = ::popen(others.c_str(), "w");
   if (words == nullptr) return fail_with(fail("cannot start the subscribers").error());
-  fmt::print("{}{} blocks of {:g} s each way, {} at 1 kHz\n", machine_text(), options.blocks,
+  fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(), options.blocks,
              options.seconds, e.robot.name);
   (*publisher)
       ->start({.version = [] { return std::uint64_t{0}; },
@@ -195,7 +234,7 @@ int run(const Options& options, const char* program) {
     const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
     for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
       if (k % tap.cycles_per_block != 0) continue;
-      std::fputc(k / tap.cycles_per_block % 2 == 0 ? 'a' : 'b', words);
+      std::fputc(kKinds[k / tap.cycles_per_block % kKinds.size()], words);
       std::fflush(words);
     }
   });
