@@ -78,12 +78,15 @@ Json remote_json(const remote::Server* server, const remote::RemoteBackend* clie
 void add_remote_facts(const remote::Server* server, const remote::RemoteBackend* client,
                       Facts& facts) {
   if (client != nullptr) {
-    facts.add("turn-around p50/p99/p99.9/max", microseconds(client->turn_around()));
+    if (client->turn_around().count() > 0) {
+      facts.add("turn-around p50/p99/p99.9/max", microseconds(client->turn_around()));
+    }
     facts.add("missed", fmt::format("{} cycles of the server", client->missed_cycles()));
   }
   if (server == nullptr) return;
   facts.add("owners", fmt::format("{}, {} lost", server->lease().given(), server->losses()));
   facts.add("commands", counts(*server));
+  if (server->age().count() == 0) return;
   facts.add("age of their state p50/p99/p99.9/max", microseconds(server->age()));
   const rt::Percentiles p = server->age_cycles().percentiles();
   facts.add("in cycles", fmt::format("{} / {} / {} / {}", p.p50, p.p99, p.p999, p.max));

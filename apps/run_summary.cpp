@@ -170,10 +170,9 @@ void RunSummary::print(std::FILE* out) const {
   if (composition.backend->waits_for_bus()) {
     facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
   }
-  if (wall_clock || loop.wakeup.count() > 0) {
-    facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
-    facts.add("overruns", std::to_string(loop.overruns));
-  }
+  const bool woken = loop.wakeup.count() > 0;  // not by a server's cycles
+  if (woken) facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
+  if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
   add_remote_facts(server, composition.remote, facts);
   facts.add("kernels", composition.kernels->variant);
   if (log) {

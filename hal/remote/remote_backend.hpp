@@ -23,7 +23,7 @@ namespace tandem::remote {
 struct ClientConfig {
   std::string name;                        ///< for people: "tandem run squat.toml, process 312"
   bool lockstep = false;                   ///< must be the server's
-  std::uint64_t server = 0;                ///< Server::number(); 0: the first that is heard
+  std::uint64_t server = 0;                ///< Server::number(); 0: the only one there is
   double connect_timeout_s = 10;           ///< for a server to be found, and to give the lease
   double server_timeout_s = 3;             ///< a server that is not heard for so long is gone
   std::function<bool()> interrupted = {};  ///< true: exchange() waits no longer
@@ -36,7 +36,7 @@ struct ClientConfig {
 class RemoteBackend final : public hal::Backend {
  public:
   /// Finds the server, compares robots, takes the lease.
-  /// Errors: what DDS refuses; no server in time; another robot (what differs is named); in
+  /// Errors: what DDS refuses; no server in time, or several while none is named; another robot (what differs is named); in
   /// lockstep and the server not, or the other way round; owned by somebody else, who is named.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                                       const hal::RobotConfig& robot,
@@ -120,10 +120,12 @@ class RemoteBackend final : public hal::Backend {
   std::condition_variable news_, closes_;
   std::optional<Told> told_;
   std::uint64_t told_count_ = 0;
+  bool several_ = false;  // servers were heard before one was chosen
   bool closing_ = false;
   // Written by DDS' threads, read by any.
   std::atomic<std::uint64_t> run_{0};
   std::atomic<std::int64_t> heard_ns_{0};
+  std::atomic<std::uint8_t> phase_{0};  // the server's run's
   std::atomic<bool> leased_{false}, lost_{false}, ending_{false}, gone_{false};
   Newest<Seen> newest_;
 

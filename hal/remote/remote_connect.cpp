@@ -3,12 +3,15 @@
 #include <cstring>
 
 #include "hal/remote/remote_backend.hpp"
+#include "hal/run_phase.hpp"
 
 namespace tandem::remote {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr auto kAgain = std::chrono::milliseconds(100);
+/// For a second server, of which each is heard ten times a second.
+constexpr auto kLookAround = std::chrono::milliseconds(300);
 
 SteadyClock::time_point in_seconds(double seconds) {
   return SteadyClock::now() +
@@ -27,6 +30,10 @@ std::vector<std::string> texts(const Sequence& sequence) {
 std::string seconds(double value) {
   std::string text = std::to_string(value);
   return text.substr(0, text.find('.') + 2) + " s";
+}
+
+std::unexpected<Error> interrupted() {
+  return fail("interrupted before it had the robot", "nothing was moved");
 }
 
 }  // namespace
@@ -93,8 +100,14 @@ Status RemoteBackend::find_server(const Identity& identity) {
     news_.wait_for(lock, kAgain);
   }
   if (!found()) {
+    if (config_.interrupted && config_.interrupted()) return interrupted();
     return fail("no server was found within " + seconds(config_.connect_timeout_s),
                 "start `tandem serve` with the same [dds] domain and namespace");
+  }
+  if (config_.server == 0) news_.wait_for(lock, kLookAround, [this] { return several_; });
+  if (several_) {
+    return fail("several servers were found",
+                "give each a [dds] namespace or domain of its own, or end all but one");
   }
   if (const std::string other = difference(identity, told_->identity); !other.empty()) {
     return fail("the server's robot is not this one: " + other,
@@ -118,6 +131,7 @@ Status RemoteBackend::take_lease() {
       return fail("the robot is owned by " + told_->owner_name,
                   "wait until it gives it back, or end it");
     }
+    if (config_.interrupted && config_.interrupted()) return interrupted();
     if (SteadyClock::now() > deadline) {
       return fail("the server gave no lease within " + seconds(config_.connect_timeout_s),
                   "is it still running?");
@@ -158,6 +172,7 @@ void RemoteBackend::take_told() {
     const std::lock_guard lock(mutex_);
     endpoints_.server.take([this](const tandem_msgs::LinkServer& sample, const auto&) {
       if (run_ != 0 && sample.run != run_) return;  // another server
+      if (told_ && !told_->ending && !sample.ending && sample.run != told_->run) several_ = true;
       told_ = Told{.identity = {.robot = text(sample.robot),
                                 .description_hash = text(sample.description_hash),
                                 .period_ns = sample.period_ns,
@@ -211,6 +226,7 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   to.code = sample.code;
   to.reaction = static_cast<hal::StopCategory>(sample.reaction);
   to.is_one = true;
+  phase_ = sample.phase;
   heard_ns_ = now_ns();
   return true;
 }
@@ -220,7 +236,9 @@ std::string RemoteBackend::status_text() const {
   if (gone_) {
     return "the server has not been heard for " + seconds(config_.server_timeout_s);
   }
-  if (ending_) return "the server's run is over";
+  if (ending_ || phase_ >= static_cast<std::uint8_t>(hal::RunPhase::kShutDown)) {
+    return "the server's run is over";
+  }
   if (lost_) return "the server took the robot away: no command in time, or a stop there";
   if (told_ && !told_->status.empty()) return "at the server: " + told_->status;
   return "the server brings the robot up";

@@ -268,6 +268,23 @@ TEST(Connect, TellsWhoHasTheRobotAndWhatDiffers) {
   EXPECT_TRUE(next) << next.error().to_string();
 }
 
+TEST(Connect, RefusesToChooseBetweenServersUnlessOneIsNamed) {
+  Served served({}, {.loop = {.rate = 1.0}});
+  Served other({}, {.loop = {.rate = 1.0}});
+  served.begin();
+  other.begin();
+  const auto owner = participant("owner");
+  ClientConfig config;
+  const auto none = Owner::connect(*owner, config, served.robot);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().message, "several servers were found");
+  EXPECT_EQ(served.server->lease().given() + other.server->lease().given(), 0U);
+  config.server = other.server->number();
+  const auto named = Owner::connect(*owner, config, served.robot);
+  ASSERT_TRUE(named) << named.error().to_string();
+  EXPECT_EQ(other.server->lease().given(), 1U);
+}
+
 TEST(Connect, WithoutAServerSaysSoInTime) {
   const auto alone = participant("alone");
   ClientConfig config;
@@ -275,6 +292,11 @@ TEST(Connect, WithoutAServerSaysSoInTime) {
   const auto none = Owner::connect(*alone, config, hal::test::fake_robot());
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().message, "no server was found within 0.3 s");
+  config.connect_timeout_s = 60;
+  config.interrupted = [] { return true; };
+  const auto stopped = Owner::connect(*alone, config, hal::test::fake_robot());
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().message, "interrupted before it had the robot");
 }
 
 }  // namespace
