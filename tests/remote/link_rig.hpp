@@ -38,7 +38,11 @@ inline bool eventually(const std::function<bool()>& condition) {
 
 /// A participant of this program's domain.
 inline std::unique_ptr<dds::Participant> participant(const std::string& node) {
-  static const auto domain = dds::Domain::open(dds::test::own_config());
+  static const auto domain = [] {
+    dds::Config config = dds::test::own_config();
+    config.every[static_cast<std::size_t>(dds::Topic::kClock)] = 1;  // each cycle's time is told
+    return dds::Domain::open(config);
+  }();
   EXPECT_TRUE(domain) << domain.error().to_string();
   auto made = dds::Participant::open(*domain, node);
   EXPECT_TRUE(made) << made.error().to_string();
@@ -76,13 +80,16 @@ class Record final : public hal::CycleTap {
 /// A robot in this process with its loop on a thread, for owners in others.
 class Served {
  public:
+  /// @param kept  participant to use; null: one of its own
   explicit Served(const ServerConfig& config, runtime::CycleConfig cycle_config = {},
-                  hal::CycleTap* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot())
+                  hal::CycleTap* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot(),
+                  dds::Participant* kept = nullptr)
       : robot(std::move(of)),
         backend(robot),
         host(robot, nullptr, kPeriod_ns),
-        participant_(participant("served")) {
-    auto made = Server::open(*participant_, robot, identity_of(robot, "hash", kPeriod_ns), config);
+        participant_(kept == nullptr ? participant("served") : nullptr) {
+    auto made = Server::open(kept == nullptr ? *participant_ : *kept, robot,
+                             identity_of(robot, "hash", kPeriod_ns), config);
     EXPECT_TRUE(made) << made.error().to_string();
     server = std::move(*made);
     owner = std::make_shared<runtime::OwnerController>();
