@@ -17,7 +17,7 @@ namespace {
 
 using namespace test;
 
-constexpr std::size_t kLanes = 6;       // sequences at a time: they mostly wait
+constexpr std::size_t kLanes = 6;  // sequences at a time: they mostly wait
 
 std::int64_t in_ms(std::int64_t ms) { return now_ns() + ms * 1'000'000; }
 
