@@ -1,5 +1,5 @@
 // The Unix-domain socket of a running process: a line of JSON in, a line of JSON out.
-// Layer: apps.  Thread: open/close main; two of its own, one of which talks and stops; never the loop.
+// Layer: apps.  Thread: open/close main; one of its own talks and stops, another does the rest.
 #pragma once
 
 #include <sys/types.h>

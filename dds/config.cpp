@@ -46,8 +46,8 @@ SecurityConfig read_security(TomlTable table, const std::string& folder) {
 void read_every(TomlTable table, Config& config) {
   for (std::size_t i = 0; i < kTopicRates.size(); ++i) {
     const std::string_view key = kTopicRates[i].key;
-    if (!table.has(key)) continue;
-    config.every[i] = static_cast<std::uint64_t>(table.integer(key, 0, 1'000'000));
+    const std::int64_t cycles = table.integer_or(key, -1, 0, 1'000'000);  // -1: it is not there
+    if (cycles >= 0) config.every[i] = static_cast<std::uint64_t>(cycles);
   }
   table.finish();
 }

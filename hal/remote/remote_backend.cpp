@@ -61,7 +61,7 @@ Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noe
   ahead_ns_ = seen.state.time_ns()[0] - time.time_ns;
   if (seen.answered_ns != answered_ns_) {
     answered_ns_ = seen.answered_ns;
-    turn_around_.record(now_ns() - answered_ns_);
+    if (answered_ns_ != 0) turn_around_.record(now_ns() - answered_ns_);
   }
   if (resetting_ && seen.answered_cycle >= reset_after_) resetting_ = false;
   return static_cast<Code>(seen.code) == Code::kTimeout ? Code::kTimeout : Code::kOk;

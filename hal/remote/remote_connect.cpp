@@ -241,6 +241,9 @@ std::string RemoteBackend::status_text() const {
   }
   if (lost_) return "the server took the robot away: no command in time, or a stop there";
   if (told_ && !told_->status.empty()) return "at the server: " + told_->status;
+  if (phase_ == static_cast<std::uint8_t>(hal::RunPhase::kFaulted)) {
+    return "the server has stopped the robot";
+  }
   return "the server brings the robot up";
 }
 

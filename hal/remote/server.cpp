@@ -214,6 +214,7 @@ hal::OwnerWish Server::exchange(const hal::PortView& view) noexcept TANDEM_RT {
   newest_.refresh();
   const Taken& taken = newest_.front();
   const std::uint64_t owner = lease_.owner();
+  if (taken.client != owner) answered_ns_ = 0;  // not of this owner
   if (owner != 0 && taken.client == owner && done_client_ != owner) {
     measure(view, taken);
     wish.live = taken.live;

@@ -39,6 +39,7 @@ TEST(DdsConfig, RefusesAnUnknownTopicAndANegativeRate) {
   ASSERT_EQ(errors.size(), 2U);
   EXPECT_EQ(errors[0].key, "dds.every.tf");
   EXPECT_EQ(errors[1].key, "dds.every.joint_state");
+  EXPECT_EQ(errors[1].hint, "did you mean 'joint_states'?");
 }
 
 TEST(DdsConfig, OfEveryTopicIsDocumented) {
