@@ -109,6 +109,12 @@ void Publisher::take(const hal::CycleView& view) noexcept TANDEM_RT {
     std::memcpy(slot.data(), &times, sizeof(times));
     times_ring_.end_push();
   }
+  copy_due(view, number);
+  newest_ns_.store(view.time.time_ns, std::memory_order_release);
+}
+
+/// The images that a topic is due for in this cycle.
+void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexcept TANDEM_RT {
   std::uint32_t due = 0;
   for (std::size_t t = 0; t < kTopics; ++t) {
     if (every_[t] != 0 && view.time.cycle % every_[t] == 0) due |= 1U << t;
@@ -149,8 +155,10 @@ PublishCounts Publisher::stop() {
 void Publisher::run() {
   for (;;) {
     const bool last = stop_.load(std::memory_order_acquire);  // before the ring is emptied
+    const std::int64_t newest_ns = newest_ns_.load(std::memory_order_acquire);  // and this, too
     const bool some = drain();
     look_at_faults();
+    if (!some) clock_ns_ = newest_ns;  // whether or not the cycle had a place in the ring
     if (simulated_time_ && SteadyClock::now() >= clock_due_) publish_clock();
     if (last) return;
     if (!some) std::this_thread::sleep_for(kPoll);

@@ -64,6 +64,7 @@ class Publisher final : public hal::CycleTap {
 
   Publisher(Participant& participant, const RunDescription& run);
   [[nodiscard]] std::size_t slot_bytes() const;
+  void copy_due(const hal::CycleView& view, std::uint64_t number) noexcept TANDEM_RT;
   void run();
   bool drain();
   void count_times(std::uint64_t up_to);
@@ -91,7 +92,8 @@ class Publisher final : public hal::CycleTap {
   FaultSource fault_source_;
   std::uint64_t fault_version_ = 0;
   std::vector<FaultEntry> faults_;
-  std::int64_t clock_ns_ = 0;  // that `clock` told last
+  std::int64_t clock_ns_ = 0;               // that `clock` tells next
+  std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
   std::chrono::steady_clock::time_point clock_due_, offset_due_;
   std::int64_t wall_offset_ns_ = 0;  // the wall clock less the loop's
   std::atomic<bool> stop_{false};

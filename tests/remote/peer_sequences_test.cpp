@@ -127,7 +127,7 @@ void operators_come_and_go(Played& run) {
 void step_exactly(Played& run) {
   run.pause();
   std::optional<std::uint64_t> at = run.stand();
-  if (at) run.stands_still(*at, false);
+  if (at) run.stands_still(*at);
   if (at && !run.sequence.resumes() && !run.sequence.in_fault) {
     run.require(*at == run.asked_for - run.dropped, "other cycles than those of steps");
   }
@@ -137,7 +137,7 @@ void step_exactly(Played& run) {
     const auto then = run.stand();
     if (!then) return;
     run.require(*then == *at + steps, fmt::format("step {} from {} to {}", steps, *at, *then));
-    run.stands_still(*then, true);
+    run.stands_still(*then);
     at = then;
   }
 }

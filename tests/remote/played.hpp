@@ -54,7 +54,7 @@ class Played {
   void step(std::uint64_t cycles) {
     if (control().step(cycles)) asked_for += cycles;
   }
-  void stands_still(std::uint64_t at, bool stepped);
+  void stands_still(std::uint64_t at);
   void clock_tells(std::uint64_t cycles);
   void end();
 
@@ -115,11 +115,10 @@ inline std::optional<std::uint64_t> Played::stand() {
 }
 
 /// Whatever peers do meanwhile.
-inline void Played::stands_still(std::uint64_t at, bool stepped) {
+inline void Played::stands_still(std::uint64_t at) {
   require(watch.count == at, fmt::format("{} cycles ended, {} began", watch.count, at));
   std::this_thread::sleep_for(milliseconds(1));
-  // A run that nobody slows down may outrun its publisher, which counts what it drops.
-  if (clock_ && stepped) clock_tells(at);
+  if (clock_) clock_tells(at);
   require(control().state().standing, "it does not stand any more");
   require(watch.count == at, fmt::format("{} cycles, paused at {}", watch.count, at));
 }
