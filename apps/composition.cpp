@@ -101,7 +101,7 @@ void add_owner(Composition& c, Collector& errors) {
   auto owner = std::make_shared<runtime::OwnerController>();
   c.owner_slot = c.controllers->size();
   const auto nothing = TomlDocument::parse("", e.file);
-  const Status added = c.controllers->add("remote", owner, nothing->root(), false);
+  const Status added = c.controllers->add(runtime::kOwnerController, owner, nothing->root(), false);
   if (!added) return errors.add(added.error(), e.file, 0);
   c.owner = std::move(owner);
 }

@@ -1,9 +1,11 @@
 #include "apps/controller_control.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/toml_text.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "runtime/owner_controller.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -45,6 +47,18 @@ Result<Json> tell(RunServices& services, const Result<runtime::Asked>& asked) {
     if (one.active) answer["active"].push_back(one.name);
   }
   return answer;
+}
+
+/// A switch that an operator asks for. The owner in another process comes and goes with its lease.
+Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start) {
+  for (const runtime::ControllerLook& one : services.controllers()) {
+    if (one.name != runtime::kOwnerController || !one.plugin.empty()) continue;
+    const auto named = std::ranges::count(stop, one.name) + std::ranges::count(start, one.name);
+    if (named == 0) continue;
+    return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
+                "end the owner's run; `tandem estop` stops the robot whoever has it");
+  }
+  return tell(services, services.switch_controllers(stop, start));
 }
 
 Result<TomlDocument> parameters_of(const Json& request) {
@@ -103,20 +117,20 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
   registry.add("controller.start", ControlEffect::kChanges, "starts a controller", {kName},
                [&services](const Json& request) {
                  const Names names{request["name"].get<std::string>()};
-                 return tell(services, services.switch_controllers({}, names));
+                 return switch_by_hand(services, {}, names);
                });
   registry.add("controller.stop", ControlEffect::kChanges,
                "stops a controller; its joints are held", {kName},
                [&services](const Json& request) {
                  const Names names{request["name"].get<std::string>()};
-                 return tell(services, services.switch_controllers(names, {}));
+                 return switch_by_hand(services, names, {});
                });
   registry.add("controller.switch", ControlEffect::kChanges,
                "stops some and starts others in one cycle, all or none",
                {names_key("stop", "controllers to stop"), names_key("start", "and to start")},
                [&services](const Json& request) {
-                 return tell(services, services.switch_controllers(names_of(request, "stop"),
-                                                                   names_of(request, "start")));
+                 return switch_by_hand(services, names_of(request, "stop"),
+                                       names_of(request, "start"));
                });
 }
 

@@ -54,7 +54,8 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   if (!quiet) {
-    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s, "");
+    bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
+               progress_note(cycle));
     bar.finish();
   }
 }

@@ -8,6 +8,9 @@
 
 namespace tandem::runtime {
 
+/// Its name among the loop's controllers.
+inline constexpr const char* kOwnerController = "remote";
+
 /// Claims every joint, and writes whatever the owner wrote: its own modes and references, which
 /// pass the loop's limits as any controller's do.
 class OwnerController final : public Controller {
