@@ -12,7 +12,8 @@ namespace {
 const char* backend_text(runtime::BackendKind backend) {
   switch (backend) {
     case runtime::BackendKind::kSim: break;
-    case runtime::BackendKind::kCan: return "can: drive master here, boards on SocketCAN interfaces";
+    case runtime::BackendKind::kCan:
+      return "can: drive master here, boards on SocketCAN interfaces";
     case runtime::BackendKind::kDds: return "dds: the robot of another process (tandem serve)";
   }
   return "sim: drive master, frames, boards' firmware and plant in this process";

@@ -62,7 +62,9 @@ Result<Json> step(runtime::RobotCycle& cycle, const Json& request) {
 
 }  // namespace
 
-bool time_stands(const runtime::RobotCycle& cycle) { return cycle.clock_control().state().standing; }
+bool time_stands(const runtime::RobotCycle& cycle) {
+  return cycle.clock_control().state().standing;
+}
 
 void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
   registry.add("clock.show", ControlEffect::kReads, "where the clock stands, and how fast it is",

@@ -187,8 +187,9 @@ void add_flags(CLI::App& app, RunOptions& o) {
       ->check(CLI::PositiveNumber);
   app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can", "dds"}));
-  app.add_flag("--lockstep", o.lockstep,
-               "CAN, DDS: wait for `tandem emulate --lockstep` or `serve --lockstep`, at any speed");
+  app.add_flag(
+      "--lockstep", o.lockstep,
+      "CAN, DDS: wait for `tandem emulate --lockstep` or `serve --lockstep`, at any speed");
   app.add_option("--delay-cycles", o.delay_cycles,
                  "Whole cycles between controllers and limits (default: the experiment's, or 0)")
       ->check(CLI::Range(0, 1000));
@@ -209,7 +210,8 @@ void add_flags(CLI::App& app, RunOptions& o) {
 void add_flags(CLI::App& app, ServeOptions& o) {
   app.add_option("file", o.run.experiment, "Experiment or robot TOML")->required();
   add_loop_flags(app, o.run);
-  app.add_option("--hal", o.run.hal, "What stands for the robot (default: the experiment's, or sim)")
+  app.add_option("--hal", o.run.hal,
+                 "What stands for the robot (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can"}));
   app.add_flag("--lockstep", o.run.lockstep, "Each cycle waits for its owner's command");
   app.add_flag("--once", o.run.once, "End when an owner gives the robot back");

@@ -80,7 +80,7 @@ class ControlSocket {
   int wake_ = -1;  // eventfd: the destructor's word to the thread
   dev_t device_ = 0;
   ino_t inode_ = 0;
-  std::uint64_t turn_ = 0;  // counts what clients do, to know who has been quiet
+  std::uint64_t turn_ = 0;    // counts what clients do, to know who has been quiet
   std::uint64_t newest_ = 0;  // client's number
   std::vector<std::unique_ptr<Client>> clients_;
 

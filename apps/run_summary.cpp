@@ -126,8 +126,7 @@ Json RunSummary::json() const {
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["base"] = base_json(cycle.statistics().base());
   const hal::can::DriveMaster* master = composition.master;
-  json["round_trips"] =
-      master == nullptr ? Json::array() : round_trips_json(master->round_trips());
+  json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
   json["remote"] = remote_json(server, composition.remote);
   json["faults"] = faults;
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();

@@ -19,12 +19,12 @@ namespace tandem::apps {
 struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;
-  double wall_s = 0.0;                      ///< while controllers ran
-  std::optional<log::RecordingResult> log;  ///< empty: nothing was logged
+  double wall_s = 0.0;                                  ///< while controllers ran
+  std::optional<log::RecordingResult> log;              ///< empty: nothing was logged
   std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
-  std::vector<std::string> faults;          ///< the log's trouble included
-  std::optional<DdsResult> dds;             ///< empty: it was off
-  const remote::Server* server = nullptr;   ///< null: nobody could own the robot from afar
+  std::vector<std::string> faults;                      ///< the log's trouble included
+  std::optional<DdsResult> dds;                         ///< empty: it was off
+  const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
 
   [[nodiscard]] double sim_s() const;
   /// docs/json.md

@@ -71,8 +71,9 @@ struct GainsWish {
 };
 
 /// Each request is judged before it reaches the loop, then done by the loop at a cycle's boundary,
-/// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop whose
-/// time stands, or which is very slow, comes to it with its next cycle, and the answer says so.
+/// whole or not at all. A call waits up to `patience` for that; zero: it does not wait. A loop
+/// whose time stands, or which is very slow, comes to it with its next cycle, and the answer says
+/// so.
 ///
 /// Errors of all: the run shuts down or is done; kCapacity requests wait already.
 class RunServices {

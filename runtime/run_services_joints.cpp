@@ -75,8 +75,8 @@ std::vector<JointInfo> RunServices::joints() {
 Status RunServices::check_mode(std::size_t joint, const JointWish& wish,
                                const JointLook& now) const {
   const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
-  const auto interaction = static_cast<hal::InteractionMode>(
-      wish.interaction >= 0 ? wish.interaction : now.interaction);
+  const auto interaction =
+      static_cast<hal::InteractionMode>(wish.interaction >= 0 ? wish.interaction : now.interaction);
   if (Status able = hal::check_capability(*robot_, joint, mode, interaction); !able) return able;
   LoopAnswer refused{.joint = static_cast<std::int32_t>(joint)};
   const ControllerSet active = planned();

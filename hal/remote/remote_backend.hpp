@@ -37,7 +37,8 @@ class RemoteBackend final : public hal::Backend {
  public:
   /// Finds the server, compares robots, takes the lease.
   /// Errors: what DDS refuses; no server in time, or several while none is named; another robot
-  /// (what differs is named); in lockstep and the server not, or the other way round; owned by somebody else, who is named.
+  /// (what differs is named); in lockstep and the server not, or the other way round; owned by
+  /// somebody else, who is named.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                                       const hal::RobotConfig& robot,
                                                                       const Identity& identity,

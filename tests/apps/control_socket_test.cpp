@@ -304,8 +304,9 @@ TEST_F(Socket, StopsWhileAnotherCommandIsAtWorkAndManyWait) {
                  while (!stopped) std::this_thread::yield();
                  return Json{{"text", "slow"}};
                });
-  registry.add("stop", ControlEffect::kStops, "stops", {},
-               [&](const Json&) -> Result<Json> { return Json{{"text", "stop"}}; });
+  registry.add("stop", ControlEffect::kStops, "stops", {}, [&](const Json&) -> Result<Json> {
+    return Json{{"text", "stop"}};
+  });
   const auto socket = open(path);
   const int slow = connect();
   send(slow, "{\"do\": \"slow\"}\n{\"do\": \"stop\"}\n");

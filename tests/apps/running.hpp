@@ -23,11 +23,11 @@ class Running : public Program {
   /// The same with no flags but these, and without waiting.
   void start(const std::string& flags) {
     run_ = std::thread([this, flags] {
-      const std::string command =
-          "cd '" + folder_.string() + "' && echo $$ >pid && exec '" + TANDEM_BINARY_DIR +
-          "/bin/tandem' run hold.toml --no-log -q --json run.json "
-          "--socket " +
-          socket_ + " " + flags + " 2>run.txt";
+      const std::string command = "cd '" + folder_.string() + "' && echo $$ >pid && exec '" +
+                                  TANDEM_BINARY_DIR +
+                                  "/bin/tandem' run hold.toml --no-log -q --json run.json "
+                                  "--socket " +
+                                  socket_ + " " + flags + " 2>run.txt";
       const int raw = std::system(command.c_str());
       status_ = WIFEXITED(raw) ? WEXITSTATUS(raw) : -1;
     });
