@@ -49,7 +49,7 @@ void RobotCycle::follow_owner() noexcept TANDEM_RT {
   if (wish.stop != hal::StopCategory::kWarn) {
     fault({.source = FaultSource::kOwner, .category = wish.stop});
   }
-  if (wish.loss != hal::OwnerLoss::kNone) {
+  if (wish.loss != hal::OwnerLoss::kNone && phase_ != RunPhase::kShutDown) {  // else it may leave
     fault({.code = static_cast<std::uint32_t>(wish.loss),
            .source = FaultSource::kOwner,
            .category = wish.on_loss});
