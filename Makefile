@@ -2,11 +2,12 @@
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 
-.PHONY: demo test unit hil rtsan fuzz clean help
+.PHONY: demo test test-all unit hil rtsan fuzz clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 5 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
+	@echo "make test-all  that, and the proofs that take long"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
@@ -20,6 +21,10 @@ demo:
 # tests on a real CAN stack and a minute of each fuzz target.
 test: unit rtsan
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
+
+# What takes too long for every change.
+test-all: test
+	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 
 unit:
 	@scripts/install-dependencies test

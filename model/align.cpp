@@ -16,6 +16,7 @@ using Eigen::Vector3d;
 
 constexpr double kExact = 1e-14;    // below this a constant is rounding noise
 constexpr double kParallel = 1e-9;  // candidates only: nothing depends on it but their quality
+constexpr double kFarthest = 2.0;   // shift of a frame along its axis, in reaches of its body
 
 // Operations of one constant turn, of one component of a constant shift and of an offset.
 constexpr double kTurnCost = 64.0;
@@ -47,11 +48,24 @@ double foot(const Line& a, const Line& b) {
   return d.cross(b.direction).dot(n) / n.squaredNorm();
 }
 
+// How far a body reaches from its own joint: to its centre of mass and to the joints that it
+// carries, and as far as its joint is from the parent's.
+double reach(const Tree& tree, std::size_t joint) {
+  const Body& body = tree.bodies[joint + 1];
+  double reach = tree.joints[joint].in_parent.p.norm();
+  if (body.inertia.mass_kg > 0.0) reach = std::max(reach, body.inertia.com_m.norm());
+  for (std::size_t child = joint + 1; child < tree.joints.size(); ++child)
+    if (tree.joints[child].parent == static_cast<int>(joint) + 1)
+      reach = std::max(reach, tree.joints[child].in_parent.p.norm());
+  return reach;
+}
+
 Vector3d perpendicular(const Vector3d& v, const Vector3d& axis) { return v - v.dot(axis) * axis; }
 
 void add_direction(std::vector<Vector3d>& list, const Vector3d& v, const Vector3d& axis) {
   const Vector3d x = perpendicular(v, axis);
-  if (x.norm() > kParallel) list.push_back(x.normalized());
+  // Twice: of a short difference rounding leaves a part along the axis.
+  if (x.norm() > kParallel) list.push_back(perpendicular(x.normalized(), axis).normalized());
 }
 
 Matrix3d frame_about(const Vector3d& z, const Vector3d& x) {
@@ -73,7 +87,7 @@ std::vector<Placement> candidates(const Tree& tree, std::size_t joint) {
   const Joint& j = tree.joints[joint];
   const Vector3d& z = axis.direction;
   const Placement& in_parent = j.in_parent;
-  std::vector<double> shifts{0.0};
+  std::vector<double> shifts{0.0};  // the first candidate is the description's own frame
   std::vector<Vector3d> directions;
   for (int k = 0; k < 3; ++k) add_direction(directions, Vector3d::Unit(k), z);
   if (j.parent > 0) {
@@ -92,6 +106,10 @@ std::vector<Placement> candidates(const Tree& tree, std::size_t joint) {
     add_direction(directions, z.cross(other.direction), z);
     add_direction(directions, other.point, z);
   }
+  // Axes that are almost parallel meet far away. A frame out there would cost all digits of the
+  // inertia, so origins stay where the body is.
+  const double farthest = kFarthest * reach(tree, joint);
+  std::erase_if(shifts, [&](double shift) { return !(std::abs(shift) <= farthest); });
   std::vector<Placement> result;
   for (const double shift : shifts)
     for (const Vector3d& x : directions) {
@@ -120,6 +138,13 @@ struct Choice {
 };
 
 }  // namespace
+
+std::vector<Placement> described_frames(const Tree& tree) {
+  std::vector<Placement> result{Placement{}};
+  for (std::size_t j = 0; j < tree.joints.size(); ++j)
+    result.push_back(candidates(tree, j).front());
+  return result;
+}
 
 std::vector<Placement> align_frames(const Tree& tree) {
   const std::size_t count = tree.joints.size();

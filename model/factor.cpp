@@ -105,7 +105,8 @@ MechanismJoint make_joint(const Joint& joint, const Placement& parent, const Pla
   const Matrix3d R = parent.R.transpose() * in_parent.R;
   const Vector3d p = parent.R.transpose() * (in_parent.p - parent.p);
   MechanismJoint result;
-  for (int k = 0; k < 3; ++k) result.in_parent.p[k] = std::abs(p[k]) < kExact ? 0.0 : p[k];
+  const double size = joint.in_parent.p.norm() + own.p.norm() + parent.p.norm();
+  for (int k = 0; k < 3; ++k) result.in_parent.p[k] = std::abs(p[k]) < kExact * size ? 0.0 : p[k];
   result.prismatic = joint.type == JointType::kPrismatic;
   if (result.prismatic) {
     result.in_parent.R = factor_rotation(R);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
 
@@ -94,6 +96,20 @@ void add_part_files(const std::vector<EmittedKernel>& kernels, GeneratedKernels&
   close();
 }
 
+// A constant that is not finite cannot be written as C++. It stands for a division by nothing.
+Status check_finite(const Graph& graph, const TracedKernel& kernel) {
+  const std::vector<bool> live = live_nodes(graph, kernel.outputs);
+  bool finite = true;
+  for (std::size_t i = 0; i < live.size(); ++i)
+    if (live[i] && graph.nodes()[i].op == Op::kConstant)
+      finite = finite && std::isfinite(graph.nodes()[i].value);
+  for (const Expr& output : kernel.outputs)
+    if (output.is_constant()) finite = finite && std::isfinite(output.value());
+  if (finite) return {};
+  return fail("the kernel " + kernel.shape.name + " holds a constant that is not finite",
+              "look for a joint that moves no mass or inertia, or for numbers out of all scale");
+}
+
 constexpr std::string_view kLibrarySource = R"(#include "kernels.h"
 
 namespace baseline { extern const tandem_kernels table; }
@@ -136,6 +152,8 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   for (int k = 0; k < kKernels; ++k) {
     Graph graph;
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
+    if (Status status = check_finite(graph, kernel); !status)
+      return std::unexpected(status.error());
     kernels.push_back(emit_kernel(graph, kernel, kPartOperations));
     result.counts.push_back({kernels.back().name, kernels.back().count});
   }

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "model/hash.hpp"
+#include "model/kernel_check.hpp"
 #include "model/kernel_sources.hpp"
 #include "model/process.hpp"
 
@@ -19,6 +20,8 @@ namespace tandem::model {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kFreshLibrary = "library.so";  // linked, but not yet checked
 
 struct Variant {
   std::string name;   // "x86-64-v3"
@@ -184,15 +187,18 @@ Result<int> compile_stale(const GeneratedKernels& generated, const std::vector<J
 }
 
 Status link(const std::vector<Job>& jobs, const std::vector<std::string>& compiler,
-            const fs::path& directory, const fs::path& library, const std::string& stamp) {
-  const fs::path fresh = directory / "library.so";  // renamed: a running program keeps the old one
+            const fs::path& directory) {
   std::vector<std::string> command = compiler;
-  for (const char* word : {"-shared", "-o", "library.so"}) command.emplace_back(word);
+  for (const char* word : {"-shared", "-o", kFreshLibrary}) command.emplace_back(word);
   for (const Job& job : jobs) command.push_back(job.object);
-  if (!run_program(command, directory, directory / "link.log"))
-    return std::unexpected(compile_error(directory, "link"));
+  if (run_program(command, directory, directory / "link.log")) return {};
+  return std::unexpected(compile_error(directory, "link"));
+}
+
+// Renamed, not written: a program that runs keeps the old one.
+Status put_in_place(const fs::path& directory, const fs::path& library, const std::string& stamp) {
   std::error_code code;
-  fs::rename(fresh, library, code);
+  fs::rename(directory / kFreshLibrary, library, code);
   if (code) return fail("cannot write " + library.string() + ": " + code.message());
   return write_if_changed(directory / "library.stamp", stamp);
 }
@@ -230,7 +236,11 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   }
   const Result<int> compiled = compile_stale(*generated, jobs, directory, options);
   if (!compiled) return std::unexpected(compiled.error());
-  if (Status status = link(jobs, compiler, directory, library, stamp); !status)
+  if (Status status = link(jobs, compiler, directory); !status)
+    return std::unexpected(status.error());
+  if (Status status = check_kernels((directory / kFreshLibrary).string(), tree, spec); !status)
+    return std::unexpected(status.error());
+  if (Status status = put_in_place(directory, library, stamp); !status)
     return std::unexpected(status.error());
   report.compiled = *compiled;
   if (options.progress) options.progress(*compiled + 1, *compiled + 1, library.filename().string());

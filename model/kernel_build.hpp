@@ -34,8 +34,11 @@ struct BuildReport {
 /// only if its text, the headers or the command changed. Compiler flags do not depend on how
 /// this program was built, so that a run's bits do not either.
 ///
+/// What was linked is checked by check_kernels() before it takes its place.
+///
 /// Errors: those of generate_kernels(); no compiler; a file that does not compile (its log's
-/// path and first lines); a folder that cannot be written.
+/// path and first lines); a kernel that does not compute what the description says; a folder that
+/// cannot be written.
 [[nodiscard]] Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
                                                 const BuildOptions& options);
 

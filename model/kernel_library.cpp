@@ -42,7 +42,7 @@ Result<KernelLibrary> load_kernels(const std::string& path, const std::string& h
   library.kernels_ = variant.empty() ? best : get(variant.c_str());
   if (library.kernels_ != nullptr) return library;
   std::string known;
-  for (const char* name : {"baseline", "x86-64-v3", "x86-64-v4"})
+  for (const char* name : kVariantNames)
     if (get(name) != nullptr) known += (known.empty() ? "" : ", ") + std::string(name);
   return refuse(path, "has no variant '" + variant + "' that this CPU runs", "it has: " + known);
 }

@@ -2,6 +2,7 @@
 // Layer: model.  Thread: non-RT to load; the kernels run on any thread.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 
@@ -9,6 +10,9 @@
 #include "model/kernels.h"
 
 namespace tandem::model {
+
+/// What a library may hold: code for any x86-64, for 2013's and for 2017's.
+inline constexpr std::array<const char*, 3> kVariantNames{"baseline", "x86-64-v3", "x86-64-v4"};
 
 /// Keeps the library loaded as long as a copy lives.
 class KernelLibrary {

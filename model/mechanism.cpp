@@ -4,8 +4,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/nearest.hpp"
+#include "model/rounded.hpp"
 
 namespace tandem::model {
 namespace {
@@ -13,47 +15,65 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kExact = 1e-14;  // relative: below this a constant is rounding noise
+// What a length that is the difference of longer ones, or a sum over links, may be off by.
+constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
 Placement inverse(const Placement& a) { return {a.R.transpose(), -(a.R.transpose() * a.p)}; }
 
-FixedPlacement fixed_placement(const Placement& a) {
+// The components of a shift; `size` is that of the lengths that it is the difference of.
+FixedPlacement fixed_placement(const Placement& a, double size) {
   FixedPlacement result;
   result.R = factor_rotation(a.R);
-  for (int k = 0; k < 3; ++k) result.p[k] = std::abs(a.p[k]) < kExact ? 0.0 : a.p[k];
+  for (int k = 0; k < 3; ++k) result.p[k] = Rounded(a.p[k], kRounding * size).without_noise();
   return result;
 }
 
-Moments<double> moments_of(const Inertia& inertia) {
-  const Vector3d& c = inertia.com_m;
+using RoundedMoments = Moments<Rounded>;
+
+// The moments of `inertia`, seen from where `frame` says that its own frame stands. `size`: of the
+// lengths that its centre of mass was summed of.
+RoundedMoments moments_of(const Inertia& inertia, const Placement& frame, double size) {
+  const double about_com = inertia.about_com_kg_m2.lpNorm<Eigen::Infinity>();
+  const double noise_h = kRounding * inertia.mass_kg * size;
+  const double noise_J = kRounding * (about_com + inertia.mass_kg * size * size);
+  Vec3<Rounded> c;  // of the mass, in the new frame
+  Mat3<Rounded> R;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) R[i][j] = Rounded(frame.R(i, j));
+  for (int i = 0; i < 3; ++i) c[i] = Rounded(inertia.com_m[i], kRounding * size);
+  c = multiply(R, c) + Vec3<Rounded>{frame.p[0], frame.p[1], frame.p[2]};
   const Matrix3d J = 0.5 * inertia.about_com_kg_m2.trace() * Matrix3d::Identity() -
-                     inertia.about_com_kg_m2 + inertia.mass_kg * c * c.transpose();
-  Moments<double> result;
-  result.m = inertia.mass_kg;
+                     0.5 * (inertia.about_com_kg_m2 + inertia.about_com_kg_m2.transpose());
+  RoundedMoments result;
+  result.m = Rounded(inertia.mass_kg, 0.0);
   for (int i = 0; i < 3; ++i) {
-    result.h[i] = inertia.mass_kg * c[i];
-    for (int j = 0; j <= i; ++j) result.J(i, j) = 0.5 * (J(i, j) + J(j, i));
+    result.h[i] = result.m * c[i];
+    result.h[i].noise += noise_h;
+    for (int j = 0; j <= i; ++j) {
+      Rounded sum = result.h[i] * c[j];
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l) sum += R[i][k] * R[j][l] * Rounded(J(k, l), 0.0);
+      result.J(i, j) = {sum.value, sum.noise + noise_J};
+    }
   }
   return result;
 }
 
-void drop_noise(Moments<double>& x, double total_mass) {
-  double h = 0.0;
-  double J = 0.0;
-  for (const double v : x.h) h = std::max(h, std::abs(v));
-  for (const double v : x.J.entry) J = std::max(J, std::abs(v));
-  if (std::abs(x.m) < kExact * total_mass) x.m = 0.0;
-  for (double& v : x.h) v = std::abs(v) < kExact * h ? 0.0 : v;
-  for (double& v : x.J.entry) v = std::abs(v) < kExact * J ? 0.0 : v;
+Moments<double> without_noise(const RoundedMoments& x) {
+  Moments<double> result;
+  result.m = x.m.value;  // masses are only ever added
+  for (int i = 0; i < 3; ++i) result.h[i] = x.h[i].without_noise();
+  for (std::size_t i = 0; i < 6; ++i) result.J.entry[i] = x.J.entry[i].without_noise();
+  return result;
 }
 
 // Gives to the parent what a joint's motion leaves as it is: masses on a revolute joint's axis
 // (m, h_z, J_zz), and for a prismatic joint the second moments about its origin.
-void regroup(Mechanism& mechanism) {
+void regroup(Mechanism& mechanism, std::vector<RoundedMoments> moments) {
   for (int j = mechanism.joint_count() - 1; j >= 0; --j) {
     const MechanismJoint& joint = mechanism.joints[j];
-    Moments<double>& own = mechanism.moments[j + 1];
-    Moments<double> moved;
+    RoundedMoments& own = moments[j + 1];
+    RoundedMoments moved;
     if (joint.prismatic) {
       std::swap(moved.J, own.J);
     } else {
@@ -62,10 +82,10 @@ void regroup(Mechanism& mechanism) {
       std::swap(moved.J(2, 2), own.J(2, 2));
     }
     moved = turned(joint.in_parent.R, moved);
-    for (int axis = 0; axis < 3; ++axis) shift(moved, axis, joint.in_parent.p[axis]);
-    add_to(mechanism.moments[joint.parent], moved);
+    for (int axis = 0; axis < 3; ++axis) shift(moved, axis, Rounded(joint.in_parent.p[axis]));
+    add_to(moments[joint.parent], moved);
   }
-  for (Moments<double>& x : mechanism.moments) drop_noise(x, mechanism.mass_kg);
+  for (const RoundedMoments& x : moments) mechanism.moments.push_back(without_noise(x));
 }
 
 std::vector<std::string> link_names(const Tree& tree) {
@@ -95,13 +115,21 @@ Matrix3d from_rpy(const std::array<double, 3>& rpy) {
 struct Maker {
   const Tree& tree;
   const ModelSpec& spec;
-  std::vector<Placement> frames;  // chosen frame of each body, in the description's
-  std::vector<int> site_link;     // per site
+  std::vector<Placement> frames;        // chosen frame of each body, in the description's
+  std::vector<int> site_link;           // per site
+  std::vector<RoundedMoments> moments;  // per body, as described
   Mechanism result;
 
-  Placement in_frame(int body, const Placement& in_described) const {
-    return inverse(frames[body]) * in_described;
+  // A placement that is given in a body's described frame, in its chosen one.
+  FixedPlacement in_frame(int body, const Placement& in_described) const {
+    return fixed_placement(inverse(frames[body]) * in_described,
+                           in_described.p.norm() + frames[body].p.norm());
   }
+  // The moments of a link or body, in a body's chosen frame.
+  RoundedMoments moments_in(int body, const Inertia& in_described, double size) const {
+    return moments_of(in_described, inverse(frames[body]), size + frames[body].p.norm());
+  }
+  double size_of(int body) const;
   void bodies();
   Status armature();
   Status sites();
@@ -124,11 +152,19 @@ void Maker::bodies() {
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     const bool moves = b > 0 || tree.floating_base;
     const Inertia inertia = moves ? tree.bodies[b].inertia : Inertia{};
-    result.true_moments.push_back(moments_of(inverse(frames[b]) * inertia));
+    moments.push_back(moments_in(static_cast<int>(b), inertia, size_of(static_cast<int>(b))));
+    result.true_moments.push_back(without_noise(moments.back()));
     result.mass_kg += inertia.mass_kg;
   }
-  for (Moments<double>& x : result.true_moments) drop_noise(x, result.mass_kg);
-  result.moments = result.true_moments;
+}
+
+// How far a body's links reach from its described frame.
+double Maker::size_of(int body) const {
+  double size = 0.0;
+  for (const Link& link : tree.links)
+    if (link.body == body && link.inertia.mass_kg > 0.0)
+      size = std::max(size, link.in_body.p.norm() + link.inertia.com_m.norm());
+  return size;
 }
 
 Status Maker::armature() {
@@ -152,8 +188,7 @@ Status Maker::sites() {
       return fail(user + " is defined twice", "give each site a name of its own");
     const Placement in_link{from_rpy(site.rpy_rad), Vector3d(site.xyz_m.data())};
     const int body = tree.links[link].body;
-    result.sites.push_back(
-        {body, fixed_placement(in_frame(body, tree.links[link].in_body * in_link)), -1});
+    result.sites.push_back({body, in_frame(body, tree.links[link].in_body * in_link), -1});
     result.site_names.push_back(site.name);
     site_link.push_back(link);
     if (!site.wrench) continue;
@@ -166,17 +201,18 @@ Status Maker::sites() {
 // What hangs on the link `first`: on its own body masses and sites, and the joints that leave it.
 void Maker::gather_beyond(int first, MechanismSensor& sensor) const {
   std::vector<bool> beyond(tree.links.size(), false);
+  RoundedMoments masses;
   for (std::size_t i = static_cast<std::size_t>(first); i < tree.links.size(); ++i) {
     const Link& link = tree.links[i];
     beyond[i] = static_cast<int>(i) == first || (link.parent >= 0 && beyond[link.parent]);
     if (!beyond[i]) continue;
     if (link.body == sensor.body)
-      add_to(sensor.beyond, moments_of(in_frame(sensor.body, link.in_body) * link.inertia));
+      add_to(masses, moments_in(sensor.body, link.in_body * link.inertia, size_of(link.body)));
     const bool starts_here = link.moving >= 0 && static_cast<int>(i) != first;
     if (starts_here && tree.joints[link.moving].parent == sensor.body)
       sensor.joints.push_back(link.moving);
   }
-  drop_noise(sensor.beyond, result.mass_kg);
+  sensor.beyond = without_noise(masses);
   for (std::size_t s = 0; s < result.sites.size(); ++s) {
     const MechanismSite& site = result.sites[s];
     if (site.wrench >= 0 && site.body == sensor.body && beyond[site_link[s]])
@@ -206,7 +242,7 @@ Status Maker::sensor(const SensorSpec& spec_of) {
                 "name a link that the joint carries, or one that carries the joint");
   }
   gather_beyond(first, sensor);
-  sensor.in_body = fixed_placement(in_frame(tree.links[frame].body, tree.links[frame].in_body));
+  sensor.in_body = in_frame(tree.links[frame].body, tree.links[frame].in_body);
   result.sensors.push_back(std::move(sensor));
   result.sensor_names.push_back(spec_of.name);
   return {};
@@ -220,13 +256,18 @@ Status Maker::sensors() {
 
 }  // namespace
 
-Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec) {
-  Maker maker{tree, spec, align_frames(tree), {}, {}};
+Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec, Frames frames) {
+  const bool chosen = frames == Frames::kFewestOperations;
+  Maker maker{tree, spec, chosen ? align_frames(tree) : described_frames(tree), {}, {}, {}};
   maker.bodies();
   if (Status status = maker.armature(); !status) return std::unexpected(status.error());
   if (Status status = maker.sites(); !status) return std::unexpected(status.error());
   if (Status status = maker.sensors(); !status) return std::unexpected(status.error());
-  regroup(maker.result);
+  if (chosen) {
+    regroup(maker.result, std::move(maker.moments));
+  } else {
+    maker.result.moments = maker.result.true_moments;
+  }
   return std::move(maker.result);
 }
 

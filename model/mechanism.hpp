@@ -69,12 +69,19 @@ struct Mechanism {
   [[nodiscard]] int nv() const { return v_index(joint_count()); }
 };
 
+/// How a mechanism is prepared.
+enum class Frames : std::uint8_t {
+  kFewestOperations,  ///< frames chosen and inertias regrouped, for generated code
+  kAsDescribed,       ///< each body's own joint's frame, inertias as they are: to check the other
+};
+
 /// Prepares `tree` for the algorithms.
 ///
 /// Errors: a site's link, a sensor's joint or link, or an armature's joint that the tree lacks
 /// (the nearest name is suggested); a sensor whose link is on neither side of its joint; a name
 /// used twice; an armature that is negative or not finite.
-[[nodiscard]] Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec);
+[[nodiscard]] Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec,
+                                               Frames frames = Frames::kFewestOperations);
 
 /// R as turns and a permutation; entries within 1e-14 of a multiple of 90 degrees are exact.
 [[nodiscard]] FixedRotation factor_rotation(const Eigen::Matrix3d& R);
@@ -88,5 +95,8 @@ struct Mechanism {
 /// Where each body's frame stands in the description's frame of that body, chosen so that the
 /// constant transforms between them take the fewest operations.
 [[nodiscard]] std::vector<Placement> align_frames(const Tree& tree);
+
+/// The same, left where the description has them: turned only so that z is the joint's axis.
+[[nodiscard]] std::vector<Placement> described_frames(const Tree& tree);
 
 }  // namespace tandem::model

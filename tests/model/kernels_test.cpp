@@ -6,6 +6,7 @@
 
 #include "model/emit.hpp"
 #include "model/kernel_build.hpp"
+#include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
 #include "tests/model/reference.hpp"
 
@@ -16,29 +17,8 @@ std::string built_library(const std::string& robot) {
   return library_path(TANDEM_TEST_KERNELS, robot);
 }
 
-// Calls the compiled kernel with arrays.
 Runner runner(const tandem_kernels& k, const Mechanism& m) {
-  return [&k, &m](Kernel kernel, const Arrays& in) {
-    Arrays out;
-    for (const KernelArray& array : kernel_shape(kernel, m).outputs)
-      out.emplace_back(static_cast<std::size_t>(array.size),
-                       std::numeric_limits<double>::quiet_NaN());
-    const auto i = [&](std::size_t n) { return in[n].data(); };
-    const auto o = [&](std::size_t n) { return out[n].data(); };
-    switch (kernel) {
-      case Kernel::kForwardDynamics: k.forward_dynamics(i(0), i(1), i(2), i(3), o(0)); break;
-      case Kernel::kInverseDynamics: k.inverse_dynamics(i(0), i(1), i(2), i(3), o(0)); break;
-      case Kernel::kMassMatrix: k.mass_matrix(i(0), o(0)); break;
-      case Kernel::kBias: k.bias(i(0), i(1), o(0)); break;
-      case Kernel::kCenterOfMass: k.center_of_mass(i(0), i(1), o(0), o(1), o(2)); break;
-      case Kernel::kCentroidalMomentum: k.centroidal_momentum(i(0), i(1), o(0)); break;
-      case Kernel::kEnergy: k.energy(i(0), i(1), o(0)); break;
-      case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
-      case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
-      case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
-    }
-    return out;
-  };
+  return [&k, &m](Kernel kernel, const Arrays& in) { return call_kernel(k, kernel, m, in); };
 }
 
 struct Compiled {
@@ -283,6 +263,25 @@ TEST(KernelBuild, NamesTheCompilerThatIsNotThereAndTheLogOfOneThatFails) {
   report = build_kernels(reference_tree(robot), reference_spec(robot), options);
   ASSERT_FALSE(report);
   EXPECT_NE(report.error().message.find("/proc/nowhere"), std::string::npos);
+}
+
+// A compiler that takes 9.81 for 9.82: whatever breaks the code, the library is not written.
+TEST(KernelBuild, WritesNoLibraryThatDisagreesWithTheDescription) {
+  const BuildFolder folder;
+  const ReferenceRobot& robot = reference_robot("double_pendulum");
+  BuildOptions options = folder.options();
+  ASSERT_TRUE(build_kernels(reference_tree(robot), reference_spec(robot), options));
+  options.compiler = (folder.path / "compiler").string();
+  std::ofstream(options.compiler) << "#!/bin/sh\nsed -i 's/9[.]81/9.82/g' part_*.cpp\nexec c++ \"$@\"\n";
+  std::filesystem::permissions(options.compiler, std::filesystem::perms::owner_all);
+  ModelSpec spec = reference_spec(robot);
+  spec.armature.emplace_back(reference_tree(robot).joints[0].name, 0.25);
+  const auto report = build_kernels(reference_tree(robot), spec, options);
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().message.find("is off by"), std::string::npos)
+      << report.error().to_string();
+  const auto old = load_kernels(options.library, description_hash(reference_tree(robot), reference_spec(robot)));
+  EXPECT_TRUE(old) << "the library from before is no longer there";
 }
 
 }  // namespace
