@@ -60,8 +60,9 @@ const char kCheckExamples[] = R"(Examples:
 const char kModelBuildExamples[] = R"(Examples:
   tandem model build config/coman/robot.toml
   tandem model build my_robot/robot.toml -o /tmp/my_robot.so
-Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models), where
-`tandem run` finds it. A library that is up to date is left alone.)";
+Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models, or
+~/.cache/tandem/models), where `tandem run` finds it by the robot's name and the hash of its
+files. A library that is up to date is left alone.)";
 
 const char kModelInfoExamples[] = R"(Examples:
   tandem model info config/walkman/robot.toml

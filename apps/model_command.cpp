@@ -21,9 +21,12 @@ void print_progress(int done, int total, const std::string& file) {
 
 Status build(const RobotFiles& robot, const ModelOptions& options) {
   model::BuildOptions build;
-  build.library = options.output.empty()
-                      ? model::library_path(user_model_folder(), robot.config.name)
-                      : options.output;
+  build.library = options.output;
+  if (options.output.empty()) {
+    auto path = user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
+    if (!path) return std::unexpected(path.error());
+    build.library = std::move(*path);
+  }
   build.progress = print_progress;
   if (options.force) {
     std::error_code ignored;  // what cannot be removed is found out by writing it

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "base/file_name.hpp"
 #include "hal/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -206,12 +207,23 @@ void check_boards(TomlTable& root, const RobotConfig& robot) {
   }
 }
 
+/// The robot's name becomes part of its kernels' and logs' file names.
+std::string read_name(TomlTable& root) {
+  std::string name = root.text("name");
+  if (name.empty()) return name;  // has been said
+  if (const std::string problem = file_name_problem(name); !problem.empty()) {
+    root.error("name", "'" + name + "' " + problem + ", but it becomes part of file names",
+               "use letters, digits, _, - and ., at most " + std::to_string(kLongestFileName));
+  }
+  return name;
+}
+
 /// Reads in the order of the references: what is named before what names it.
 RobotConfig read(const TomlDocument& document) {
   RobotConfig robot;
   robot.file = document.file();
   TomlTable root = document.root();
-  robot.name = root.text("name");
+  robot.name = read_name(root);
   robot.model = read_model(root, document.folder());
   read_drive_tables(root, robot);
   for (TomlTable& bus : root.tables("bus")) read_bus(bus, robot);

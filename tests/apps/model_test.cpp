@@ -25,6 +25,44 @@ TEST_F(Model, AUsersOwnRobotRunsFromTheCacheFolder) {
   EXPECT_EQ(run.status, 0) << run.err;
 }
 
+/// Kernel libraries in the cache folder of a test.
+std::ptrdiff_t libraries_in(const std::filesystem::path& folder) {
+  std::ptrdiff_t count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    count += entry.path().extension() == ".so" ? 1 : 0;
+  }
+  return count;
+}
+
+TEST_F(Model, TwoRobotsOfOneNameHaveTheirKernelsSideBySide) {
+  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
+  const std::string other = read_text(folder_ / "robot.toml");
+  ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
+  edit("robot.toml", "inertia_kg_m2 = 0.003", "inertia_kg_m2 = 0.004");
+  ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
+  EXPECT_EQ(libraries_in(folder_ / "cache/tandem/models"), 2);
+  EXPECT_EQ(tandem("model info robot.toml", cache).status, 0);
+  write_text(folder_ / "robot.toml", other);
+  const Outcome again = tandem("model build robot.toml", cache);
+  EXPECT_NE(again.out.find("up to date"), std::string::npos) << again.out;
+  const Outcome run = tandem("run hold.toml --duration 0.05 --no-log", cache);
+  EXPECT_EQ(run.status, 0) << run.err;
+}
+
+TEST_F(Model, WithoutAHomeThereIsNoFolderForKernelsToLoad) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
+  for (const std::string environment : {"env -u HOME -u XDG_CACHE_HOME", "env HOME=tmp"}) {
+    const Outcome outcome = tandem("model build robot.toml", environment);
+    EXPECT_EQ(outcome.status, 2);
+    for (const std::string text : {"HOME", "XDG_CACHE_HOME", "-o"}) {
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    }
+  }
+  const Outcome named = tandem("model build robot.toml -o kernels.so", "env -u HOME");
+  EXPECT_EQ(named.status, 0) << named.err;
+}
+
 TEST_F(Model, InfoCountsOperationsAndMachineCode) {
   const Outcome outcome = tandem("model info robot.toml --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;

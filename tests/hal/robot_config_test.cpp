@@ -172,6 +172,15 @@ TEST(RobotConfig, ReadsTheIdentityOfABoardAndProtections) {
   EXPECT_EQ(robot->buses[0].max_load, 0.8);
 }
 
+TEST(RobotConfig, RefusesANameThatIsNoFileName) {
+  expect_error(with("name = \"leg\"", "name = \"../../leg\""),
+               "robots/leg.toml:1: name: '../../leg' has other characters than letters, digits, "
+               "_, - and ., but it becomes part of file names "
+               "(use letters, digits, _, - and ., at most 64)");
+  EXPECT_NE(errors_of(with("name = \"leg\"", "name = \".leg\"")).find("begins with ."),
+            std::string::npos);
+}
+
 TEST(RobotConfig, OfABareModelNeedsNoJoints) {
   EXPECT_EQ(errors_of("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n"), "");
 }

@@ -1,0 +1,18 @@
+// Which names may become part of a file's name.
+// Layer: base.  Thread: non-RT only.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace tandem {
+
+/// The most characters of such a name: with what is added to it, it stays a file name anywhere.
+inline constexpr std::size_t kLongestFileName = 64;
+
+/// Why `name` cannot be part of a file's name, or empty when it can: letters, digits, `_`, `-`
+/// and `.` of ASCII, no `.` or `-` at the front, 1 to kLongestFileName characters. So it leads
+/// to no other folder, hides no file and is no program's option.
+[[nodiscard]] std::string file_name_problem(std::string_view name);
+
+}  // namespace tandem
