@@ -1,10 +1,11 @@
 #include "base/toml_reader.hpp"
 
+#include <toml++/toml.h>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "base/nearest.hpp"
 
@@ -37,41 +38,63 @@ std::string number_text(double value) {
 
 TomlTable::TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path,
                      int line)
-    : shared_(std::move(shared)), table_(table), path_(std::move(path)), line_(line) {}
+    : shared_(std::move(shared)),
+      table_(table),
+      path_(std::move(path)),
+      line_(line),
+      defaults_(&kEmpty) {}
+
+void TomlTable::inherit(const TomlTable& defaults) {
+  defaults_ = defaults.table_;
+  defaults_path_ = defaults.path_;
+}
 
 std::string TomlTable::dotted(std::string_view key) const {
   if (key.empty()) return path_;
-  return path_.empty() ? std::string(key) : path_ + "." + std::string(key);
+  const bool inherited = !table_->contains(key) && defaults_->contains(key);
+  const std::string& path = inherited ? defaults_path_ : path_;
+  return path.empty() ? std::string(key) : path + "." + std::string(key);
+}
+
+const toml::node* TomlTable::get(std::string_view key) const {
+  const toml::node* own = table_->get(key);
+  return own != nullptr ? own : defaults_->get(key);
 }
 
 const toml::node* TomlTable::find(std::string_view key) {
   asked_.emplace(key);
-  return table_->get(key);
+  return get(key);
 }
 
 const toml::node* TomlTable::require(std::string_view key) {
   const toml::node* node = find(key);
-  if (node == nullptr && table_ != &kBroken) {
-    error(key, "this key is missing", "add it to the table");
+  if (node == nullptr && !partial_ && table_ != &kBroken && defaults_ != &kBroken) {
+    error(key, "this key is missing",
+          "add it to the table" +
+              (defaults_path_.empty() ? "" : ", or to [" + defaults_path_ + "] for all"));
   }
   return node;
 }
 
-bool TomlTable::has(std::string_view key) const { return table_->contains(key); }
+bool TomlTable::has(std::string_view key) const { return get(key) != nullptr; }
 
 int TomlTable::line() const { return line_; }
 
 int TomlTable::line(std::string_view key) const {
-  const toml::node* node = key.empty() ? nullptr : table_->get(key);
+  const toml::node* node = key.empty() ? nullptr : get(key);
   return node == nullptr ? line() : static_cast<int>(node->source().begin.line);
 }
 
 void TomlTable::error(std::string_view key, std::string message, std::string hint) {
-  shared_->diagnostics.push_back({.message = std::move(message),
-                                  .hint = std::move(hint),
-                                  .file = shared_->file,
-                                  .line = line(key),
-                                  .key = dotted(key)});
+  Error error{.message = std::move(message),
+              .hint = std::move(hint),
+              .file = shared_->file,
+              .line = line(key),
+              .key = dotted(key)};
+  const bool known = std::ranges::any_of(shared_->diagnostics, [&](const Error& other) {
+    return other.line == error.line && other.key == error.key && other.message == error.message;
+  });
+  if (!known) shared_->diagnostics.push_back(std::move(error));
 }
 
 void TomlTable::finish() {
@@ -209,8 +232,7 @@ std::vector<double> TomlTable::numbers_or(std::string_view key, std::vector<doub
   return found;
 }
 
-std::vector<std::string> TomlTable::texts_or(std::string_view key,
-                                             std::vector<std::string> value) {
+std::vector<std::string> TomlTable::texts_or(std::string_view key, std::vector<std::string> value) {
   const toml::node* node = find(key);
   if (node == nullptr) return value;
   const toml::array* array = node->as_array();
@@ -326,7 +348,8 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
     document.shared_->root = toml::parse(text, file);
   } catch (const toml::parse_error& e) {
     return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
-                                 "correct the syntax at this line", file,
+                                 "correct the syntax at this line",
+                                 file,
                                  static_cast<int>(e.source().begin.line),
                                  {}});
   }

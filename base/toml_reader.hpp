@@ -71,10 +71,17 @@ class TomlTable {
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key);
   /// The keys of this table that hold tables, sorted: for [actuator.NAME].
   [[nodiscard]] std::vector<std::string> table_names() const;
-  /// Every key of this table, sorted; marks none as read. For free-form maps (posture.home).
+  /// Every key of this table itself, sorted; marks none as read. For free-form maps (posture.home).
   [[nodiscard]] std::vector<std::string> keys() const;
 
-  /// Reports an error of the caller's own at `key` (or at the table when empty).
+  /// From now on the keys that this table lacks are those of `defaults`: a sub-table or list as a
+  /// whole. What is wrong with one of them is reported there, and once.
+  void inherit(const TomlTable& defaults);
+  /// From now on a key that is missing is no error: a table of defaults need not be whole.
+  void make_partial() { partial_ = true; }
+
+  /// Reports an error of the caller's own at `key` (or at the table when empty). The same error
+  /// twice is one.
   void error(std::string_view key, std::string message, std::string hint = {});
   /// Reports every key that no getter asked for.
   void finish();
@@ -87,6 +94,7 @@ class TomlTable {
   friend class TomlDocument;
   struct Shared;  // the parsed document and its diagnostics
   TomlTable(std::shared_ptr<Shared> shared, const toml::table* table, std::string path, int line);
+  const toml::node* get(std::string_view key) const;
   const toml::node* find(std::string_view key);
   const toml::node* require(std::string_view key);
   bool check_number(std::string_view key, const toml::node& node, Range range, double& out);
@@ -95,7 +103,10 @@ class TomlTable {
   std::shared_ptr<Shared> shared_;
   const toml::table* table_;
   std::string path_;
-  int line_;  // of the table, or of the one it is missing from
+  int line_;                     // of the table, or of the one it is missing from
+  const toml::table* defaults_;  // empty without inherit()
+  std::string defaults_path_;
+  bool partial_ = false;
   std::set<std::string, std::less<>> asked_;
 };
 

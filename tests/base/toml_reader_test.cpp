@@ -49,6 +49,39 @@ TEST(TomlReader, RefusesNumbersThatAreNotFiniteOrOutOfRange) {
   EXPECT_EQ(document.diagnostics()[5].message, "this key is missing");
 }
 
+TEST(TomlReader, TakesWhatATableLacksFromItsDefaults) {
+  const TomlDocument document = parse("[defaults]\na = 1\nb = -2\n[t]\na = 3\n[u]\nb = 4\nc = 5\n");
+  TomlTable root = document.root();
+  TomlTable defaults = root.table("defaults");
+  defaults.make_partial();
+  EXPECT_EQ(defaults.number("c"), 0.0);
+  for (const char* name : {"t", "u"}) {
+    TomlTable table = root.table(name);
+    table.inherit(defaults);
+    EXPECT_EQ(table.number("a"), name[0] == 't' ? 3.0 : 1.0);
+    (void)table.number("b", kPositive);
+    EXPECT_EQ(table.has("c"), name[0] == 'u');
+    (void)table.number("c");
+    table.finish();
+  }
+  ASSERT_EQ(document.diagnostics().size(), 2U);
+  EXPECT_EQ(document.diagnostics()[0].key, "defaults.b");
+  EXPECT_EQ(document.diagnostics()[0].line, 3);
+  EXPECT_EQ(document.diagnostics()[1].key, "t.c");
+  EXPECT_EQ(document.diagnostics()[1].hint, "add it to the table, or to [defaults] for all");
+}
+
+TEST(TomlReader, ReportsAFaultOfTheDefaultsOnce) {
+  const TomlDocument document = parse("[defaults]\nb = -2\n[t]\n[u]\n");
+  TomlTable root = document.root();
+  for (const char* name : {"t", "u"}) {
+    TomlTable table = root.table(name);
+    table.inherit(root.table("defaults"));
+    (void)table.number("b", kPositive);
+  }
+  EXPECT_EQ(document.diagnostics().size(), 1U);
+}
+
 TEST(TomlReader, GivesTheLineOfASyntaxError) {
   const auto document = TomlDocument::parse("a = 1\nb = = 2\n", "x.toml");
   ASSERT_FALSE(document.has_value());
