@@ -41,50 +41,6 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   return model;
 }
 
-void read_bus(TomlTable table, RobotConfig& robot) {
-  BusConfig bus;
-  bus.line = table.line();
-  bus.name = table.text("name");
-  check_unique(table, robot.buses, bus.name, "bus");
-  bus.interface = table.text_or("interface", bus.name);
-  bus.fd = table.boolean_or("fd", true);
-  bus.bitrate = table.integer_or("bitrate", bus.bitrate, 10'000, 1'000'000);
-  bus.data_bitrate = table.integer_or("data_bitrate", bus.data_bitrate, 10'000, 12'000'000);
-  if (bus.fd && bus.data_bitrate < bus.bitrate) {
-    table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
-                "raise it, or set fd = false");
-  }
-  bus.max_load = table.number_or("max_load", bus.max_load, {0.01, 1.0});
-  table.finish();
-  robot.buses.push_back(bus);
-}
-
-std::optional<std::uint32_t> read_identity(TomlTable& table, const char* key) {
-  if (!table.has(key)) return {};
-  return static_cast<std::uint32_t>(table.integer(key, 0, 0xFFFFFFFF));
-}
-
-void read_board(TomlTable table, NodeIds& ids, RobotConfig& robot) {
-  BoardConfig board;
-  board.name = table.text("name");
-  check_unique(table, robot.boards, board.name, "board");
-  board.bus = table.text("bus");
-  check_reference(table, "bus", board.bus, robot.buses, "bus");
-  board.node_id = ids.read(table, board.bus);
-  board.control_period_ns =
-      table.integer_or("control_period_ns", board.control_period_ns, 10'000, 100'000'000);
-  board.heartbeat_ms = static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
-  board.command_timeout_cycles =
-      static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
-  board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
-  board.vendor_id = read_identity(table, "vendor_id");
-  board.product_code = read_identity(table, "product_code");
-  board.revision = read_identity(table, "revision");
-  board.serial = read_identity(table, "serial");
-  table.finish();
-  robot.boards.push_back(board);
-}
-
 std::vector<double> read_channels(TomlTable& table, const char* key, std::size_t channels,
                                   Range range) {
   std::vector<double> values = table.numbers_or(key, {}, range);
@@ -188,25 +144,6 @@ void read_safety(TomlTable table, RobotConfig& robot) {
   table.finish();
 }
 
-/// A board's axes are numbered from 0 without a gap, and there is at least one.
-void check_boards(TomlTable& root, const RobotConfig& robot) {
-  std::vector<TomlTable> tables = root.tables("board");
-  for (std::size_t i = 0; i < tables.size(); ++i) {
-    const std::string& name = robot.boards[i].name;
-    std::set<int> axes;
-    for (const JointConfig& joint : robot.joints) {
-      if (joint.board == name) axes.insert(joint.axis);
-    }
-    if (axes.empty()) {
-      tables[i].error("name", "no joint is on board '" + name + "'",
-                      "remove the board or name it in a [[joint]]");
-    } else if (*axes.rbegin() + 1 != static_cast<int>(axes.size())) {
-      tables[i].error("name", "the axes of board '" + name + "' have a gap",
-                      "number them from 0 without a gap");
-    }
-  }
-}
-
 /// The robot's name becomes part of its kernels' and logs' file names.
 std::string read_name(TomlTable& root) {
   std::string name = root.text("name");
@@ -226,11 +163,10 @@ RobotConfig read(const TomlDocument& document) {
   robot.name = read_name(root);
   robot.model = read_model(root, document.folder());
   read_drive_tables(root, robot);
-  for (TomlTable& bus : root.tables("bus")) read_bus(bus, robot);
   NodeIds ids;
-  for (TomlTable& board : root.tables("board")) read_board(board, ids, robot);
-  read_joints(root, robot);
-  check_boards(root, robot);
+  std::vector<BoardTable> boards = read_buses(root, ids, robot);
+  read_joints(root, seats_of(boards), robot);
+  check_boards(boards, robot);
   for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, ids, robot);
   read_contact(root, robot);
   TomlTable postures = root.table_or_empty("posture");

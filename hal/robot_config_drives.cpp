@@ -1,16 +1,10 @@
-#include <cmath>
-#include <limits>
-
 #include "hal/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {
 
-constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
-
-void read_actuator(TomlTable table, const std::string& name, RobotConfig& robot) {
+ActuatorConfig read_actuator(TomlTable& table) {
   ActuatorConfig a;
-  a.name = name;
   a.order = static_cast<int>(table.integer_or("order", 2, 0, 3));
   a.resistance_ohm = table.number("resistance_ohm", kPositive);
   a.inductance_H = table.number_or("inductance_H", 0.0, kNotNegative);
@@ -28,13 +22,7 @@ void read_actuator(TomlTable table, const std::string& name, RobotConfig& robot)
   a.thermal_time_s = table.number_or("thermal_time_s", a.thermal_time_s, kPositive);
   a.temperature_limit_C =
       table.number_or("temperature_limit_C", a.temperature_limit_C, {-50.0, 3000.0});
-  const std::string problem = actuator_problem(a);
-  if (!problem.empty()) {
-    table.error("", "of order " + std::to_string(a.order) + ": " + problem,
-                "give it, or another order");
-  }
-  table.finish();
-  robot.actuators.push_back(a);
+  return a;
 }
 
 double read_gain(TomlTable& table, const char* key) {
@@ -54,9 +42,8 @@ PidConfig read_pid(TomlTable table) {
   return pid;
 }
 
-void read_gains(TomlTable table, const std::string& name, RobotConfig& robot) {
+GainsConfig read_gains(TomlTable& table) {
   GainsConfig g;
-  g.name = name;
   g.position = read_pid(table.table_or_empty("position"));
   g.velocity = read_pid(table.table_or_empty("velocity"));
   g.torque = read_pid(table.table_or_empty("torque"));
@@ -68,98 +55,14 @@ void read_gains(TomlTable table, const std::string& name, RobotConfig& robot) {
   g.emf_compensation = table.number_or("emf_compensation", 0.0, {0.0, 1.0});
   g.stiffness_Nm_rad = read_gain(table, "stiffness_Nm_rad");
   g.damping_Nms_rad = read_gain(table, "damping_Nms_rad");
-  table.finish();
-  robot.gains.push_back(g);
+  return g;
 }
 
-StopCategory read_stop_category(TomlTable& table, StopCategory value) {
-  static const std::vector<std::string> kNames{"category0", "category1", "hold", "warn"};
-  const auto found =
-      std::ranges::find(kNames, table.choice_or("on_fault", to_string(value), kNames));
-  return static_cast<StopCategory>(found - kNames.begin());
-}
-
-void read_following(TomlTable& table, JointConfig& joint) {
-  joint.following_error_rad =
-      table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
-  joint.following_timeout_s =
-      table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
-}
-
-/// [joint_defaults]: what every [[joint]] has that does not say otherwise.
-JointConfig read_joint_defaults(TomlTable table) {
-  JointConfig joint;
-  joint.encoder_counts_per_rev = table.number_or("encoder_counts_per_rev", kUnset, kPositive);
-  joint.motor_encoder_counts_per_rev =
-      table.number_or("motor_encoder_counts_per_rev", kUnset, kPositive);
-  joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
-  read_following(table, joint);
-  joint.on_fault = read_stop_category(table, StopCategory::kCategory1);
-  table.finish();
-  return joint;
-}
-
-double number_or_default(TomlTable& table, std::string_view key, double value) {
-  return std::isnan(value) ? table.number(key, kPositive) : table.number_or(key, value, kPositive);
-}
-
-void read_joint_limits(TomlTable& table, JointConfig& joint) {
-  joint.min_position_rad = table.number_or("min_position_rad", kUnset);
-  joint.max_position_rad = table.number_or("max_position_rad", kUnset);
-  if (joint.min_position_rad >= joint.max_position_rad) {  // false where one is NaN
-    table.error("min_position_rad", "the position limits are reversed or equal",
-                "min_position_rad must be less than max_position_rad");
-  }
-  joint.max_velocity_rad_s = table.number_or("max_velocity_rad_s", kUnset, kPositive);
-  joint.max_torque_Nm = table.number_or("max_torque_Nm", kUnset, kPositive);
-  joint.rated_torque_Nm = table.number_or("rated_torque_Nm", kUnset, kPositive);
-}
-
-void check_seat(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
-  for (const JointConfig& other : robot.joints) {
-    if (!joint.name.empty() && other.name == joint.name) {
-      table.error("name",
-                  other.board == joint.board
-                      ? "the joint '" + joint.name + "' is described twice"
-                      : "the joint '" + joint.name + "' is on two boards, '" + other.board +
-                            "' and '" + joint.board + "'",
-                  "remove one of the two");
-    } else if (!joint.board.empty() && other.board == joint.board && other.axis == joint.axis) {
-      table.error("axis",
-                  "axis " + std::to_string(joint.axis) + " of board '" + joint.board +
-                      "' already drives joint '" + other.name + "'",
-                  "give each joint of a board an axis of its own");
-    }
-  }
-  for (const auto& [locked, position] : robot.model.lock) {
-    if (locked != joint.name) continue;
-    table.error("name", "the joint '" + joint.name + "' is locked in [model.lock]",
-                "remove the lock or the [[joint]]");
-  }
-}
-
-void read_joint(TomlTable table, const JointConfig& defaults, RobotConfig& robot) {
-  JointConfig joint = defaults;
-  joint.line = table.line();
-  joint.name = table.text("name");
-  joint.board = table.text("board");
-  check_reference(table, "board", joint.board, robot.boards, "board");
-  joint.axis = static_cast<int>(table.integer_or("axis", 0, 0, 7));
-  joint.actuator = table.text("actuator");
-  check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
-  joint.gains = table.text("gains");
-  check_reference(table, "gains", joint.gains, robot.gains, "gains table");
-  read_joint_limits(table, joint);
-  joint.encoder_counts_per_rev =
-      number_or_default(table, "encoder_counts_per_rev", joint.encoder_counts_per_rev);
-  joint.motor_encoder_counts_per_rev =
-      number_or_default(table, "motor_encoder_counts_per_rev", joint.motor_encoder_counts_per_rev);
-  joint.torque_noise_Nm = table.number_or("torque_noise_Nm", joint.torque_noise_Nm, kNotNegative);
-  read_following(table, joint);
-  joint.on_fault = read_stop_category(table, joint.on_fault);
-  check_seat(table, joint, robot);
-  table.finish();
-  robot.joints.push_back(joint);
+void check_actuator(TomlTable& table, const ActuatorConfig& actuator) {
+  const std::string problem = actuator_problem(actuator);
+  if (problem.empty()) return;
+  table.error("", "of order " + std::to_string(actuator.order) + ": " + problem,
+              "give it, or another order");
 }
 
 }  // namespace
@@ -179,19 +82,27 @@ std::string actuator_problem(const ActuatorConfig& a) {
 }
 
 void read_drive_tables(TomlTable& root, RobotConfig& robot) {
+  const TomlTable actuator_defaults = read_defaults(root, "actuator_defaults", read_actuator);
   TomlTable actuators = root.table_or_empty("actuator");
   for (const std::string& name : actuators.table_names()) {
-    read_actuator(actuators.table(name), name, robot);
+    TomlTable table = actuators.table(name);
+    table.inherit(actuator_defaults);
+    robot.actuators.push_back(read_actuator(table));
+    robot.actuators.back().name = name;
+    check_actuator(table, robot.actuators.back());
+    table.finish();
   }
   actuators.finish();
+  const TomlTable gains_defaults = read_defaults(root, "gains_defaults", read_gains);
   TomlTable gains = root.table_or_empty("gains");
-  for (const std::string& name : gains.table_names()) read_gains(gains.table(name), name, robot);
+  for (const std::string& name : gains.table_names()) {
+    TomlTable table = gains.table(name);
+    table.inherit(gains_defaults);
+    robot.gains.push_back(read_gains(table));
+    robot.gains.back().name = name;
+    table.finish();
+  }
   gains.finish();
-}
-
-void read_joints(TomlTable& root, RobotConfig& robot) {
-  const JointConfig defaults = read_joint_defaults(root.table_or_empty("joint_defaults"));
-  for (TomlTable& joint : root.tables("joint")) read_joint(joint, defaults, robot);
 }
 
 }  // namespace tandem::hal

@@ -1,10 +1,12 @@
-// What the parts of the robot.toml reader share: references, duplicates, node ids.
+// What the parts of the robot.toml reader share: references, duplicates, defaults, node ids.
 // Layer: hal, private to robot_config*.cpp.  Thread: non-RT only.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -53,23 +55,65 @@ inline std::array<double, 3> vector3(TomlTable& table, std::string_view key,
   return {found[0], found[1], found[2]};
 }
 
-/// Node ids are unique on a bus, boards and sensors together.
-struct NodeIds {
-  std::set<std::pair<std::string, int>> used;
+/// Reads [KIND_defaults] once by itself, so that each of its keys is checked whoever uses it.
+/// @param read  what reads the keys that may stand there
+template <class Read>
+TomlTable read_defaults(TomlTable& root, std::string_view key, const Read& read) {
+  TomlTable defaults = root.table_or_empty(key);
+  defaults.make_partial();
+  (void)read(defaults);
+  defaults.finish();
+  return defaults;
+}
 
+/// Node ids are unique on a bus, boards and sensors together. Without a `node_id` it is one more
+/// than that of the node before it on its bus.
+class NodeIds {
+ public:
   int read(TomlTable& table, const std::string& bus) {
-    const int id = static_cast<int>(table.integer("node_id", 1, 127));
-    if (id != 0 && !bus.empty() && !used.emplace(bus, id).second) {
+    int& last = last_[bus];
+    const int id = static_cast<int>(table.integer_or("node_id", last + 1, 1, 127));
+    if (id > 127) {
+      table.error("node_id", "no node id is left after 127 on bus '" + bus + "'",
+                  "set node_id, here or of the node before");
+    } else if (!bus.empty() && !used_.emplace(bus, id).second) {
       table.error("node_id", "node id " + std::to_string(id) + " is taken on bus '" + bus + "'",
                   "every board and sensor of a bus needs an id of its own");
     }
+    last = id;
     return id;
   }
+
+ private:
+  std::map<std::string, int, std::less<>> last_;
+  std::set<std::pair<std::string, int>> used_;
 };
 
-/// [actuator.NAME] and [gains.NAME].
+/// A board's table and the joints that it lists, axis by axis.
+struct BoardTable {
+  TomlTable table;
+  std::string board;
+  std::vector<std::string> joints;
+};
+
+/// Where the motor of a joint is that a board lists.
+struct Seat {
+  std::string joint;
+  std::string board;
+  int axis = 0;
+};
+
+/// [actuator.NAME], [gains.NAME] and their defaults.
 void read_drive_tables(TomlTable& root, RobotConfig& robot);
-/// [joint_defaults] and [[joint]]; after everything that a joint refers to.
-void read_joints(TomlTable& root, RobotConfig& robot);
+/// [[bus]] with its boards, then [[board]]; and their defaults.
+[[nodiscard]] std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot);
+/// The joints that boards list, in that order.
+[[nodiscard]] std::vector<Seat> seats_of(std::span<const BoardTable> boards);
+/// [joint_defaults] and [[joint]]; after everything that a joint refers to. Those with a seat come
+/// first, in that order.
+void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot);
+/// A board's axes are numbered from 0 without a gap, there is at least one, and every joint that
+/// it lists is there.
+void check_boards(std::span<BoardTable> boards, const RobotConfig& robot);
 
 }  // namespace tandem::hal

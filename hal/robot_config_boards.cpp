@@ -1,0 +1,145 @@
+#include "hal/robot_config_read.hpp"
+
+namespace tandem::hal {
+namespace {
+
+constexpr std::size_t kMostAxes = 8;
+
+BusConfig read_bus(TomlTable& table) {
+  BusConfig bus;
+  bus.fd = table.boolean_or("fd", true);
+  bus.bitrate = table.integer_or("bitrate", bus.bitrate, 10'000, 1'000'000);
+  bus.data_bitrate = table.integer_or("data_bitrate", bus.data_bitrate, 10'000, 12'000'000);
+  bus.max_load = table.number_or("max_load", bus.max_load, {0.01, 1.0});
+  return bus;
+}
+
+void add_bus(TomlTable& table, RobotConfig& robot) {
+  BusConfig bus = read_bus(table);
+  bus.line = table.line();
+  bus.name = table.text("name");
+  check_unique(table, robot.buses, bus.name, "bus");
+  bus.interface = table.text_or("interface", bus.name);
+  if (bus.fd && bus.data_bitrate < bus.bitrate) {
+    table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
+                "raise it, or set fd = false");
+  }
+  robot.buses.push_back(bus);
+}
+
+std::optional<std::uint32_t> read_identity(TomlTable& table, const char* key) {
+  if (!table.has(key)) return {};
+  return static_cast<std::uint32_t>(table.integer(key, 0, 0xFFFFFFFF));
+}
+
+BoardConfig read_board(TomlTable& table) {
+  BoardConfig board;
+  board.control_period_ns =
+      table.integer_or("control_period_ns", board.control_period_ns, 10'000, 100'000'000);
+  board.heartbeat_ms = static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
+  board.command_timeout_cycles =
+      static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
+  board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
+  board.vendor_id = read_identity(table, "vendor_id");
+  board.product_code = read_identity(table, "product_code");
+  board.revision = read_identity(table, "revision");
+  return board;
+}
+
+/// The joints that the board lists: each once, and on this board alone.
+std::vector<std::string> read_list(TomlTable& table, const std::string& board,
+                                   const std::vector<BoardTable>& others) {
+  std::vector<std::string> joints = table.texts_or("joints", {});
+  if (joints.size() > kMostAxes) {
+    table.error("joints", "lists " + std::to_string(joints.size()) + " joints",
+                "a board has at most " + std::to_string(kMostAxes) + " axes");
+  }
+  for (auto joint = joints.begin(); joint != joints.end(); ++joint) {
+    if (std::find(joints.begin(), joint, *joint) != joint) {
+      table.error("joints", "the joint '" + *joint + "' is listed twice", "remove one of the two");
+    }
+    for (const BoardTable& other : others) {
+      if (std::ranges::find(other.joints, *joint) == other.joints.end()) continue;
+      table.error(
+          "joints",
+          "the joint '" + *joint + "' is on two boards, '" + other.board + "' and '" + board + "'",
+          "remove one of the two");
+    }
+  }
+  return joints;
+}
+
+/// @param bus  whose table holds this one; empty for a [[board]]
+void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
+               std::vector<BoardTable>& boards, RobotConfig& robot) {
+  BoardConfig board = read_board(table);
+  board.name = table.text("name");
+  check_unique(table, robot.boards, board.name, "board");
+  board.bus = bus.empty() ? table.text("bus") : bus;
+  check_reference(table, "bus", board.bus, robot.buses, "bus");
+  board.node_id = ids.read(table, board.bus);
+  board.serial = read_identity(table, "serial");
+  std::vector<std::string> joints = read_list(table, board.name, boards);
+  table.finish();
+  boards.push_back({std::move(table), board.name, std::move(joints)});
+  robot.boards.push_back(std::move(board));
+}
+
+}  // namespace
+
+std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot) {
+  const TomlTable bus_defaults = read_defaults(root, "bus_defaults", read_bus);
+  const TomlTable board_defaults = read_defaults(root, "board_defaults", read_board);
+  std::vector<BoardTable> boards;
+  for (TomlTable& bus : root.tables("bus")) {
+    bus.inherit(bus_defaults);
+    add_bus(bus, robot);
+    const std::string name = robot.buses.back().name;
+    for (TomlTable& board : bus.tables("boards")) {
+      board.inherit(board_defaults);
+      add_board(board, name, ids, boards, robot);
+    }
+    bus.finish();
+  }
+  for (TomlTable& board : root.tables("board")) {
+    board.inherit(board_defaults);
+    add_board(board, {}, ids, boards, robot);
+  }
+  return boards;
+}
+
+std::vector<Seat> seats_of(std::span<const BoardTable> boards) {
+  std::vector<Seat> seats;
+  for (const BoardTable& board : boards) {
+    for (std::size_t axis = 0; axis < board.joints.size(); ++axis) {
+      seats.push_back({board.joints[axis], board.board, static_cast<int>(axis)});
+    }
+  }
+  return seats;
+}
+
+void check_boards(std::span<BoardTable> boards, const RobotConfig& robot) {
+  const std::vector<std::string> known = names_of(robot.joints);
+  for (BoardTable& board : boards) {
+    for (const std::string& joint : board.joints) {
+      if (robot.joint_index(joint) >= 0) continue;
+      board.table.error("joints", "there is no [[joint]] '" + joint + "'", suggest(joint, known));
+    }
+    std::set<int> axes;
+    for (std::size_t axis = 0; axis < board.joints.size(); ++axis) {
+      axes.insert(static_cast<int>(axis));
+    }
+    for (const JointConfig& joint : robot.joints) {
+      if (joint.board == board.board) axes.insert(joint.axis);
+    }
+    if (axes.empty()) {
+      board.table.error("name", "no joint is on board '" + board.board + "'",
+                        "list its joints, or remove the board");
+    } else if (*axes.rbegin() + 1 != static_cast<int>(axes.size())) {
+      board.table.error("name", "the axes of board '" + board.board + "' have a gap",
+                        "number them from 0 without a gap");
+    }
+  }
+}
+
+}  // namespace tandem::hal

@@ -1,0 +1,147 @@
+#include <limits>
+
+#include "hal/robot_config_read.hpp"
+
+namespace tandem::hal {
+namespace {
+
+constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
+
+StopCategory read_stop_category(TomlTable& table) {
+  static const std::vector<std::string> kNames{"category0", "category1", "hold", "warn"};
+  const auto found = std::ranges::find(kNames, table.choice_or("on_fault", "category1", kNames));
+  return static_cast<StopCategory>(found - kNames.begin());
+}
+
+void read_limits(TomlTable& table, JointConfig& joint) {
+  joint.min_position_rad = table.number_or("min_position_rad", kUnset);
+  joint.max_position_rad = table.number_or("max_position_rad", kUnset);
+  joint.max_velocity_rad_s = table.number_or("max_velocity_rad_s", kUnset, kPositive);
+  joint.max_torque_Nm = table.number_or("max_torque_Nm", kUnset, kPositive);
+  joint.rated_torque_Nm = table.number_or("rated_torque_Nm", kUnset, kPositive);
+}
+
+/// What joints may have in common.
+JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
+  JointConfig joint;
+  joint.actuator = table.text("actuator");
+  check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
+  joint.gains = table.text_or("gains", joint.actuator);
+  read_limits(table, joint);
+  joint.encoder_counts_per_rev = table.number("encoder_counts_per_rev", kPositive);
+  joint.motor_encoder_counts_per_rev = table.number("motor_encoder_counts_per_rev", kPositive);
+  joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
+  joint.following_error_rad =
+      table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
+  joint.following_timeout_s =
+      table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
+  joint.on_fault = read_stop_category(table);
+  return joint;
+}
+
+void check_gains(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
+  if (table.has("gains")) {
+    check_reference(table, "gains", joint.gains, robot.gains, "gains table");
+  } else if (!joint.gains.empty() &&
+             std::ranges::find(robot.gains, joint.gains, &GainsConfig::name) == robot.gains.end()) {
+    table.error("gains", "there is no [gains." + joint.gains + "] for the actuator of that name",
+                "add that table, or set gains");
+  }
+}
+
+/// The joints that a table is for: `name`, or `names`.
+std::vector<std::string> read_names(TomlTable& table) {
+  if (!table.has("names")) return {table.text("name")};
+  if (!table.text_or("name", {}).empty()) {
+    table.error("names", "a joint's table has a name or names, not both", "remove one of the two");
+  }
+  std::vector<std::string> names = table.texts_or("names", {});
+  if (names.empty()) table.error("names", "names no joint", "give at least one");
+  if (std::ranges::count(names, std::string()) != 0) table.error("names", "must not be empty");
+  return names;
+}
+
+/// Its board and axis: where a board lists it, or as its table says.
+void read_seat(TomlTable& table, std::span<const Seat> seats, const RobotConfig& robot,
+               JointConfig& joint) {
+  const std::string board = table.text_or("board", {});
+  const int axis = static_cast<int>(table.integer_or("axis", 0, 0, 7));
+  const auto seat = std::ranges::find(seats, joint.name, &Seat::joint);
+  if (seat != seats.end()) {
+    joint.board = seat->board;
+    joint.axis = seat->axis;
+    for (const char* key : {"board", "axis"}) {
+      if (!table.has(key)) continue;
+      table.error(key, "board '" + seat->board + "' lists joint '" + joint.name + "' already",
+                  "remove this key");
+    }
+  } else if (table.has("names")) {
+    table.error("names", "no board lists joint '" + joint.name + "'",
+                "add it to the joints of its board");
+  } else {
+    if (!table.has("board")) {
+      table.error("board", "this key is missing",
+                  "add it to the table, or the joint to the joints of its board");
+    }
+    joint.board = board;
+    joint.axis = axis;
+    check_reference(table, "board", board, robot.boards, "board");
+  }
+}
+
+void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
+  for (const JointConfig& other : robot.joints) {
+    if (!joint.name.empty() && other.name == joint.name) {
+      table.error("name",
+                  other.board == joint.board
+                      ? "the joint '" + joint.name + "' is described twice"
+                      : "the joint '" + joint.name + "' is on two boards, '" + other.board +
+                            "' and '" + joint.board + "'",
+                  "remove one of the two");
+    } else if (!joint.board.empty() && other.board == joint.board && other.axis == joint.axis) {
+      table.error("axis",
+                  "axis " + std::to_string(joint.axis) + " of board '" + joint.board +
+                      "' already drives joint '" + other.name + "'",
+                  "give each joint of a board an axis of its own");
+    }
+  }
+  for (const auto& [locked, position] : robot.model.lock) {
+    if (locked != joint.name) continue;
+    table.error("name", "the joint '" + joint.name + "' is locked in [model.lock]",
+                "remove the lock or the [[joint]]");
+  }
+}
+
+void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robot) {
+  JointConfig common = read_joint(table, robot);
+  common.line = table.line();
+  check_gains(table, common, robot);
+  if (common.min_position_rad >= common.max_position_rad) {  // false where one is NaN
+    table.error("min_position_rad", "the position limits are reversed or equal",
+                "min_position_rad must be less than max_position_rad");
+  }
+  for (const std::string& name : read_names(table)) {
+    JointConfig joint = common;
+    joint.name = name;
+    read_seat(table, seats, robot, joint);
+    check_joint(table, joint, robot);
+    robot.joints.push_back(joint);
+  }
+  table.finish();
+}
+
+}  // namespace
+
+void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot) {
+  const TomlTable defaults = read_defaults(
+      root, "joint_defaults", [&](TomlTable& table) { return read_joint(table, robot); });
+  for (TomlTable& joint : root.tables("joint")) {
+    joint.inherit(defaults);
+    add_joints(joint, seats, robot);
+  }
+  std::ranges::stable_sort(robot.joints, {}, [&](const JointConfig& joint) {
+    return std::ranges::find(seats, joint.name, &Seat::joint) - seats.begin();
+  });
+}
+
+}  // namespace tandem::hal
