@@ -97,7 +97,8 @@ TEST_F(BadInput, ANanInTheUrdfIsRefused) {
 }
 
 TEST_F(BadInput, AJointThatTheUrdfLacksIsRefusedWithTheNearest) {
-  edit("robot.toml", "name = \"joint2\"", "name = \"jiont2\"");
+  edit("robot.toml", "joints = [\"joint1\", \"joint2\"]", "joints = [\"joint1\", \"jiont2\"]");
+  edit("robot.toml", "names = [\"joint1\", \"joint2\"]", "names = [\"joint1\", \"jiont2\"]");
   edit("robot.toml", "joint2 = -0.5", "jiont2 = -0.5");
   const Outcome outcome = tandem("run hold.toml");
   EXPECT_EQ(outcome.status, 2);
@@ -107,11 +108,8 @@ TEST_F(BadInput, AJointThatTheUrdfLacksIsRefusedWithTheNearest) {
 }
 
 TEST_F(BadInput, AJointOnTwoBoardsIsRefused) {
-  edit("robot.toml", "[[joint]]\nname = \"joint1\"",
-       "[[board]]\nname = \"board_2\"\nbus = \"arm\"\nnode_id = 2\n\n"
-       "[[joint]]\nname = \"joint1\"\nboard = \"board_2\"\naxis = 0\nactuator = \"motor\"\n"
-       "gains = \"motor\"\nencoder_counts_per_rev = 65536\nmotor_encoder_counts_per_rev = 65536\n"
-       "\n[[joint]]\nname = \"joint1\"");
+  edit("robot.toml", "[[joint]]",
+       "[[board]]\nname = \"board_2\"\nbus = \"arm\"\njoints = [\"joint1\"]\n\n[[joint]]");
   expect_refused({"robot.toml:", "joint1", "two boards", "board_1", "board_2"});
 }
 

@@ -26,9 +26,9 @@ class Witness : public OwnFolder, public testing::WithParamInterface<bool> {
     if (fd()) return;
     replace("robot.toml", "fd = true\n", "fd = false\n");
     replace("robot.toml", "data_bitrate = 8_000_000\n", "");
-    replace("robot.toml", "board = \"board_1\"\naxis = 1", "board = \"board_2\"\naxis = 0");
+    replace("robot.toml", "joints = [\"joint1\", \"joint2\"]", "joints = [\"joint1\"]");
     replace("robot.toml", "[[joint]]",
-            "[[board]]\nname = \"board_2\"\nbus = \"arm\"\nnode_id = 2\n\n[[joint]]");
+            "[[board]]\nname = \"board_2\"\nbus = \"arm\"\njoints = [\"joint2\"]\n\n[[joint]]");
     replace("trajectory.toml", "seed = 1", "seed = 1\nperiod_ns = 4_000_000");
   }
 
