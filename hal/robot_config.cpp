@@ -21,6 +21,23 @@ void read_site(TomlTable table, ModelConfig& model) {
   model.sites.push_back(site);
 }
 
+LinkConfig read_link(TomlTable table, const std::string& name) {
+  LinkConfig link;
+  link.name = name;
+  link.line = table.line();
+  if (table.has("mass_kg")) link.mass_kg = table.number("mass_kg", kNotNegative);
+  if (table.has("com_m")) link.com_m = vector3(table, "com_m", {});
+  if (table.has("inertia_kg_m2")) {
+    link.inertia_kg_m2.emplace();
+    std::ranges::copy(table.numbers("inertia_kg_m2", 6), link.inertia_kg_m2->begin());
+  }
+  if (!link.mass_kg && !link.com_m && !link.inertia_kg_m2) {
+    table.error("", "gives nothing", "give mass_kg, com_m or inertia_kg_m2, or remove it");
+  }
+  table.finish();
+  return link;
+}
+
 ModelConfig read_model(TomlTable& root, const std::string& folder) {
   ModelConfig model;
   TomlTable table = root.table("model");
@@ -32,10 +49,16 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   model.floating_base = table.choice("base", {"floating", "fixed"}) == "floating";
   model.mimic_independent =
       table.choice_or("mimic", "refuse", {"refuse", "independent"}) == "independent";
+  model.repair_inertia = table.choice_or("inertia", "strict", {"strict", "repair"}) == "repair";
   model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
   TomlTable lock = table.table_or_empty("lock");
   for (const std::string& joint : lock.keys()) model.lock.emplace_back(joint, lock.number(joint));
   lock.finish();
+  TomlTable links = table.table_or_empty("link");
+  for (const std::string& name : links.table_names()) {
+    model.links.push_back(read_link(links.table(name), name));
+  }
+  links.finish();
   table.finish();
   for (TomlTable& site : root.tables("site")) read_site(site, model);
   return model;

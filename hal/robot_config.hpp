@@ -27,12 +27,24 @@ struct SiteConfig {
   int line = 0;                         ///< in the TOML, for messages
 };
 
+/// [model.link.NAME]: mass and inertia instead of the URDF's; what is not given stays the URDF's.
+struct LinkConfig {
+  std::string name;                     ///< of the URDF
+  std::optional<double> mass_kg;        ///< 0: no inertia either, unless the next but one gives it
+  std::optional<std::array<double, 3>> com_m;          ///< in the link's frame
+  std::optional<std::array<double, 6>> inertia_kg_m2;  ///< ixx ixy ixz iyy iyz izz about the com,
+                                                       ///< along the link's axes
+  int line = 0;                         ///< in the TOML, for messages
+};
+
 /// [model]
 struct ModelConfig {
   std::string urdf;                     ///< path, resolved against the TOML's folder
   bool floating_base = false;
   bool mimic_independent = false;       ///< mimic = "independent"; the default "refuse" is an error
+  bool repair_inertia = false;          ///< inertia = "repair"; the default "strict" is an error
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
+  std::vector<LinkConfig> links;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
   std::vector<SiteConfig> sites;
 };
@@ -230,13 +242,15 @@ struct RobotConfig {
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
                                                                          const std::string& file);
 
-/// A moving joint as the URDF describes it. Infinite where it sets no limit.
+/// A moving joint as the URDF describes it. Infinite where none is needed, NaN where the URDF
+/// lacks a limit or gives one that makes no sense.
 struct JointDescription {
   std::string name;
   double min_position_rad;
   double max_position_rad;
   double max_velocity_rad_s;
   double max_torque_Nm;
+  std::string limits_note = {};  ///< what is wrong with the URDF's limits, and where; or empty
 };
 
 /// The names in a URDF that a robot.toml may refer to.

@@ -140,26 +140,37 @@ class Completion : private Check {
     return 0.9 * 2147483647.0 / counts * 2.0 * std::numbers::pi;
   }
 
-  void fill(double& value, double described, const JointConfig& joint, const std::string& key) {
+  void no_limit(const JointConfig& joint, const JointDescription& found, const std::string& key) {
+    const std::string note = found.limits_note.empty() ? "" : " (" + found.limits_note + ")";
+    error(joint.line, "joint." + joint.name + "." + key,
+          "neither this file nor the description gives a limit" + note, "set " + key);
+  }
+
+  void fill(double& value, double described, const JointConfig& joint,
+            const JointDescription& found, const std::string& key) {
     if (!std::isnan(value)) return;
     value = described;
-    if (std::isfinite(described) && described > 0.0) return;
-    error(joint.line, "joint." + joint.name + "." + key,
-          "neither this file nor the description gives a limit", "set " + key);
+    if (!std::isfinite(described) || described <= 0.0) no_limit(joint, found, key);
+  }
+
+  /// @param countable  the most that a joint may turn, whatever is described
+  void fill_position(double& value, double described, double countable, const JointConfig& joint,
+                     const JointDescription& found, const std::string& key) {
+    if (!std::isnan(value)) return;
+    if (std::isnan(described)) return no_limit(joint, found, key);
+    value = std::clamp(described, -countable, countable);
   }
 
   void complete(JointConfig& joint, const JointDescription& found) {
     const std::string key = "joint." + joint.name;
     const double countable = countable_rad(joint);
-    if (std::isnan(joint.min_position_rad)) {
-      joint.min_position_rad = std::max(found.min_position_rad, -countable);
-    }
-    if (std::isnan(joint.max_position_rad)) {
-      joint.max_position_rad = std::min(found.max_position_rad, countable);
-    }
+    fill_position(joint.min_position_rad, found.min_position_rad, countable, joint, found,
+                  "min_position_rad");
+    fill_position(joint.max_position_rad, found.max_position_rad, countable, joint, found,
+                  "max_position_rad");
     check_limits(joint, key, countable);
-    fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, joint, "max_velocity_rad_s");
-    fill(joint.max_torque_Nm, found.max_torque_Nm, joint, "max_torque_Nm");
+    fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, joint, found, "max_velocity_rad_s");
+    fill(joint.max_torque_Nm, found.max_torque_Nm, joint, found, "max_torque_Nm");
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",

@@ -10,7 +10,7 @@ ActuatorConfig read_actuator(TomlTable& table) {
   a.inductance_H = table.number_or("inductance_H", 0.0, kNotNegative);
   a.torque_constant_Nm_A = table.number("torque_constant_Nm_A", kPositive);
   a.gear_ratio = table.number("gear_ratio", kPositive);
-  a.inertia_kg_m2 = table.number("inertia_kg_m2", kNotNegative);
+  a.inertia_kg_m2 = table.number("inertia_kg_m2", kPositive);
   a.damping_Nms_rad = table.number("damping_Nms_rad", kNotNegative);
   a.spring_Nm_rad = table.number_or("spring_Nm_rad", 0.0, kNotNegative);
   a.spring_damping_Nms_rad = table.number_or("spring_damping_Nms_rad", 0.0, kNotNegative);

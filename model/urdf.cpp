@@ -15,6 +15,8 @@
 #include "base/nearest.hpp"
 #include "model/urdf_inertia.hpp"
 #include "model/urdf_outline.hpp"
+#include "model/urdf_override.hpp"
+#include "model/urdf_repair.hpp"
 
 namespace tandem::model {
 namespace {
@@ -106,11 +108,15 @@ class Builder {
   }
 
   std::expected<UrdfModel, Diagnostics> run(const urdf::ModelInterface& model) {
+    const auto root = model.getRoot();
+    const bool floats = !outline_.floating_joint.empty();
+    if (floats) check_floating(*root->child_joints.front());
     check_locks(model);
     check_mimics();
+    check_overrides(options_, outline_, errors_);
     if (!errors_.empty()) return std::unexpected(errors_);
-    add_all(*model.getRoot());
-    check_inertias(out_.tree, outline_, errors_, out_.warnings);
+    add_all(floats ? *root->child_links.front() : *root);
+    check_inertias(out_.tree, outline_, options_, errors_, out_.warnings);
     if (!errors_.empty()) return std::unexpected(errors_);
     return std::move(out_);
   }
@@ -120,17 +126,36 @@ class Builder {
     errors_.push_back({std::move(message), std::move(hint), out_.tree.file, line, std::move(key)});
   }
 
+  const OutlineJoint& outlined(const std::string& joint) const {
+    return *std::ranges::find(outline_.joints, joint, &OutlineJoint::name);
+  }
+
   const double* lock_of(const std::string& joint) const {
     const auto found =
         std::ranges::find(options_.lock, joint, &std::pair<std::string, double>::first);
     return found == options_.lock.end() ? nullptr : &found->second;
   }
 
+  /// The joint that makes the base a free one agrees with robot.toml.
+  void check_floating(const urdf::Joint& joint) {
+    const std::string key = "joint " + joint.name;
+    if (!options_.floating_base) {
+      error(outline_.floating_line, key,
+            "the joint of type 'floating' lets the base move, but robot.toml says base = \"fixed\"",
+            "set base = \"floating\" in [model], or make the joint fixed");
+    }
+    const Placement origin = placement(joint.parent_to_joint_origin_transform);
+    if (origin.R.isIdentity(0.0) && origin.p.isZero(0.0)) return;
+    out_.warnings.push_back({"the <origin> of the floating joint is not used",
+                             "a posture says where the base starts", out_.tree.file,
+                             outline_.floating_line, key});
+  }
+
   void check_locks(const urdf::ModelInterface& model) {
     for (const auto& [name, position] : options_.lock) {
       const std::string key = "joint " + name;
       const auto joint = model.getJoint(name);
-      if (joint == nullptr) {
+      if (joint == nullptr || !outline_.joint_lines.contains(name)) {
         std::vector<std::string> known;
         for (const auto& [one, line] : outline_.joint_lines) known.push_back(one);
         error(0, key, "there is no joint '" + name + "' to lock", suggest(name, known));
@@ -141,12 +166,11 @@ class Builder {
         error(line, key, "a fixed joint is locked", "remove it from [model.lock]");
       if (!std::isfinite(position))
         error(line, key, "is locked at a position that is not finite", "");
-      const bool bounded = moves(*joint) && joint->type != urdf::Joint::CONTINUOUS;
-      if (bounded && (position < joint->limits->lower || position > joint->limits->upper)) {
+      const OutlineJoint& limits = outlined(name);
+      if (moves(*joint) && (position < limits.lower || position > limits.upper)) {
         error(line, key,
               "is locked at " + std::to_string(position) + ", beyond its limits " +
-                  std::to_string(joint->limits->lower) + " to " +
-                  std::to_string(joint->limits->upper),
+                  std::to_string(limits.lower) + " to " + std::to_string(limits.upper),
               "lock it within them");
       }
     }
@@ -190,6 +214,9 @@ class Builder {
     Link link;
     link.name = source.name;
     link.inertia = inertia_of(source);
+    if (const LinkOverride* given = find_override(options_, source.name)) {
+      link.inertia = overridden(link.inertia, *given);
+    }
     link.parent = parent;
     if (parent < 0) {
       tree.bodies.push_back({source.name, {}});
@@ -211,12 +238,22 @@ class Builder {
         tree.bodies.push_back({source.name, {}});
       }
     }
+    const bool fixed_to_world = link.body == 0 && !tree.floating_base;
+    if (options_.repair_inertia && !fixed_to_world) repair(link);
     Body& body = tree.bodies[static_cast<std::size_t>(link.body)];
     body.inertia = body.inertia + link.in_body * link.inertia;
     tree.links.push_back(link);
   }
 
-  Joint moving_joint(const urdf::Joint& source, int parent, const Placement& seat) const {
+  void repair(Link& link) {
+    auto found = repaired(link.inertia);
+    if (!found) return;
+    link.inertia = found->inertia;
+    out_.warnings.push_back({found->text, kRepaired, out_.tree.file,
+                             outline_.link_lines.at(link.name), "link " + link.name});
+  }
+
+  Joint moving_joint(const urdf::Joint& source, int parent, const Placement& seat) {
     Joint joint;
     joint.name = source.name;
     joint.parent = parent;
@@ -226,13 +263,12 @@ class Builder {
     joint.type = source.type == urdf::Joint::PRISMATIC    ? JointType::kPrismatic
                  : source.type == urdf::Joint::CONTINUOUS ? JointType::kContinuous
                                                           : JointType::kRevolute;
-    if (source.limits == nullptr) return joint;
-    if (joint.type != JointType::kContinuous) {
-      joint.lower = source.limits->lower;
-      joint.upper = source.limits->upper;
-    }
-    joint.velocity = source.limits->velocity;
-    joint.effort = source.limits->effort;
+    const OutlineJoint& limits = outlined(source.name);
+    joint.lower = limits.lower;
+    joint.upper = limits.upper;
+    joint.velocity = limits.velocity;
+    joint.effort = limits.effort;
+    if (!limits.limits_note.empty()) out_.limits_notes[source.name] = limits.limits_note;
     return joint;
   }
 

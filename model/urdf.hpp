@@ -3,7 +3,10 @@
 // Layer: model.  Thread: non-RT only; readers in several threads wait for each other.
 #pragma once
 
+#include <array>
 #include <expected>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,34 +17,58 @@
 
 namespace tandem::model {
 
+/// Mass and inertia of a link instead of the description's. What is empty stays as described.
+struct LinkOverride {
+  std::string link;
+  std::optional<double> mass_kg{};               ///< 0 without inertia_kg_m2: no inertia either
+  std::optional<std::array<double, 3>> com_m{};  ///< in the link's frame
+  /// ixx ixy ixz iyy iyz izz about the center of mass, along the axes of the link.
+  std::optional<std::array<double, 6>> inertia_kg_m2{};
+  int line = 0;  ///< in UrdfOptions::overrides_file, for messages
+};
+
 struct UrdfOptions {
   bool floating_base = false;
   bool mimic_independent = false;  ///< treat mimic joints as independent; else they are refused
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> fixed position [rad or m]
+  bool repair_inertia = false;  ///< take the nearest possible inertia for an impossible one
+  std::vector<LinkOverride> links{};
+  std::string overrides_file{};  ///< the file that `links` stand in, for messages
 };
 
 struct UrdfModel {
   Tree tree;
-  Diagnostics warnings;  ///< what was tolerated
+  Diagnostics warnings;  ///< what was tolerated, left out or repaired
+  /// Joint -> why its limits in `tree` are NaN where they are. A joint without limits has none.
+  std::map<std::string, std::string> limits_notes{};
 };
 
 /// A link below this share of the mass of the body that it is part of may have an impossible
 /// inertia: it is used as it stands, with a warning, because public descriptions carry cameras
-/// and lids so. The body as a whole must be possible.
+/// and lids so. The body as a whole must be possible. Repaired are such links, too.
 inline constexpr double kNegligibleMassShare = 0.01;
 
-/// Understands revolute, continuous, prismatic and fixed joints. A link without mass, or fixed to
-/// another, becomes part of that link's body. Visuals and collisions are not looked at.
+/// The hint of the warning that each repaired inertia has.
+inline constexpr const char* kRepaired = "by inertia = \"repair\" in [model]";
+
+/// Understands revolute, continuous, prismatic and fixed joints, and a floating one from a root
+/// without mass, which is left out: its child is then the floating base. A link without mass, or
+/// fixed to another, becomes part of that link's body. Visuals and collisions are not looked at,
+/// nor is the inertia of what is fixed to the world. A moving joint's limits are NaN where the
+/// description gives none or reversed, negative or zero ones.
 ///
 /// Errors, all of them at once as far as the text can be understood:
 ///   - the file is missing, unreadable, cut off, no XML, no <robot>;
 ///   - a name, attribute or element is missing; a number is unreadable, NaN or infinite;
 ///   - two links or joints of one name; a joint to a link that is not there (nearest suggested);
 ///   - a link with two parents, a loop, two roots, no link at all;
-///   - planar, floating or unknown joint types; mimic joints, unless independent or locked;
-///   - a zero axis; reversed limits; a lock on a joint that is missing, fixed or beyond limits;
+///   - planar or unknown joint types; a floating one elsewhere, or with a fixed base; mimic joints,
+///     unless independent or locked; xacro that was not expanded;
+///   - a zero axis; a lock on a joint that is missing, fixed or beyond limits; an override of a
+///     link that is not there;
 ///   - negative mass; an inertia that is not positive definite or breaks the triangle inequality
-///     (by more than 1e-6 of its largest moment), unless the link's mass is negligible;
+///     (by more than 1e-6 of its largest moment), unless the link's mass is negligible or
+///     inertias are repaired;
 ///   - a moving joint that carries no mass at all, or a floating base without mass.
 [[nodiscard]] std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
                                                               const UrdfOptions& options);

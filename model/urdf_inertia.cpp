@@ -3,7 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "model/urdf.hpp"
+#include "model/urdf_override.hpp"
 
 namespace tandem::model {
 namespace {
@@ -11,34 +11,16 @@ namespace {
 constexpr double kDefiniteTolerance = 1e-12;  // of the largest principal moment
 constexpr double kTriangleTolerance = 1e-6;   // rounding of the description's own digits
 
-std::string moments_text(const Eigen::Vector3d& moments) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%.4g, %.4g, %.4g kg m^2", moments[0], moments[1], moments[2]);
-  return text;
-}
-
-/// What is impossible about an inertia, or empty.
-std::string problem(const Inertia& inertia) {
-  const Eigen::Matrix3d& I = inertia.about_com_kg_m2;
-  if (!I.allFinite() || !inertia.com_m.allFinite() || !std::isfinite(inertia.mass_kg)) {
-    return "the mass or inertia is too large to be computed with";
-  }
-  if (inertia.mass_kg == 0.0) return I.isZero(0.0) ? "" : "there is an inertia without mass";
+Eigen::Vector3d principal_moments(const Eigen::Matrix3d& I) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(I, Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d moments = solver.eigenvalues();  // ascending
-  if (!(moments[0] > kDefiniteTolerance * std::abs(moments[2]))) {
-    return "the inertia is not positive definite: principal moments " + moments_text(moments);
-  }
-  if (moments[0] + moments[1] < moments[2] * (1.0 - kTriangleTolerance)) {
-    return "the inertia breaks the triangle inequality: principal moments " + moments_text(moments);
-  }
-  return {};
+  return solver.eigenvalues();  // ascending
 }
 
 class Checker {
  public:
-  Checker(const Tree& tree, const Outline& outline, Diagnostics& errors, Diagnostics& warnings)
-      : tree_(tree), outline_(outline), errors_(errors), warnings_(warnings) {}
+  Checker(const Tree& tree, const Outline& outline, const UrdfOptions& options, Diagnostics& errors,
+          Diagnostics& warnings)
+      : tree_(tree), outline_(outline), options_(options), errors_(errors), warnings_(warnings) {}
 
   void run() {
     const std::size_t before = errors_.size();
@@ -49,16 +31,28 @@ class Checker {
   }
 
  private:
+  [[nodiscard]] bool fixed_to_world(int body) const { return body == 0 && !tree_.floating_base; }
+
   void check_link(const Link& link) {
-    const std::string found = problem(link.inertia);
-    if (found.empty()) return;
+    const std::string found = inertia_problem(link.inertia);
+    if (found.empty() || fixed_to_world(link.body)) return;
     const double whole = tree_.bodies[static_cast<std::size_t>(link.body)].inertia.mass_kg;
     Error report{found, {}, tree_.file, line_of(link.name), "link " + link.name};
-    if (std::isfinite(whole) && link.inertia.mass_kg < kNegligibleMassShare * whole) {
+    if (const LinkOverride* given = find_override(options_, link.name)) {
+      report.file = options_.overrides_file;
+      report.line = given->line;
+      report.key = "model.link." + link.name;
+    }
+    if (link.inertia.mass_kg < 0.0) {
+      report.hint = "masses are zero or positive";
+      errors_.push_back(report);
+    } else if (std::isfinite(whole) && link.inertia.mass_kg < kNegligibleMassShare * whole) {
       report.hint = "used as it is, for it has less than 1 % of its body's mass";
       warnings_.push_back(report);
     } else {
-      report.hint = "check the six moments, their signs and their reference point";
+      report.hint =
+          "check the six moments, their signs and their reference point; inertia = \"repair\" in "
+          "[model] takes the nearest possible one, and `tandem check --repair` shows it";
       errors_.push_back(report);
     }
   }
@@ -66,9 +60,8 @@ class Checker {
   /// A body's links one by one are possible or negligible; their sum must be possible too.
   void check_body(std::size_t index) {
     const Body& body = tree_.bodies[index];
-    const bool fixed_to_world = index == 0 && !tree_.floating_base;
-    const std::string found = problem(body.inertia);
-    if (fixed_to_world || found.empty()) return;
+    const std::string found = inertia_problem(body.inertia);
+    if (fixed_to_world(static_cast<int>(index)) || found.empty()) return;
     errors_.push_back({"with all that is fixed to it, " + found,
                        "correct the inertias of its links", tree_.file, line_of(body.name),
                        "link " + body.name});
@@ -103,15 +96,40 @@ class Checker {
 
   const Tree& tree_;
   const Outline& outline_;
+  const UrdfOptions& options_;
   Diagnostics& errors_;
   Diagnostics& warnings_;
 };
 
 }  // namespace
 
-void check_inertias(const Tree& tree, const Outline& outline, Diagnostics& errors,
-                    Diagnostics& warnings) {
-  Checker(tree, outline, errors, warnings).run();
+std::string inertia_problem(const Inertia& inertia) {
+  const Eigen::Matrix3d& I = inertia.about_com_kg_m2;
+  if (!I.allFinite() || !inertia.com_m.allFinite() || !std::isfinite(inertia.mass_kg)) {
+    return "the mass or inertia is too large to be computed with";
+  }
+  if (inertia.mass_kg < 0.0) return "the mass is negative";
+  if (inertia.mass_kg == 0.0) return I.isZero(0.0) ? "" : "there is an inertia without mass";
+  const Eigen::Vector3d moments = principal_moments(I);
+  if (!(moments[0] > kDefiniteTolerance * std::abs(moments[2]))) {
+    return "the inertia is not positive definite: principal moments " + moments_text(inertia);
+  }
+  if (moments[0] + moments[1] < moments[2] * (1.0 - kTriangleTolerance)) {
+    return "the inertia breaks the triangle inequality: principal moments " + moments_text(inertia);
+  }
+  return {};
+}
+
+std::string moments_text(const Inertia& inertia) {
+  const Eigen::Vector3d moments = principal_moments(inertia.about_com_kg_m2);
+  char text[96];
+  std::snprintf(text, sizeof text, "%.4g, %.4g, %.4g kg m^2", moments[0], moments[1], moments[2]);
+  return text;
+}
+
+void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions& options,
+                    Diagnostics& errors, Diagnostics& warnings) {
+  Checker(tree, outline, options, errors, warnings).run();
 }
 
 }  // namespace tandem::model

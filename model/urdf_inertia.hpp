@@ -2,15 +2,25 @@
 // Layer: model, private to urdf*.cpp.  Thread: non-RT only.
 #pragma once
 
+#include <string>
+
 #include "base/result.hpp"
 #include "model/tree.hpp"
+#include "model/urdf.hpp"
 #include "model/urdf_outline.hpp"
 
 namespace tandem::model {
 
+/// What is impossible about an inertia, or empty.
+[[nodiscard]] std::string inertia_problem(const Inertia& inertia);
+
+/// "0.01, 0.02, 0.02 kg m^2": the principal moments, ascending.
+[[nodiscard]] std::string moments_text(const Inertia& inertia);
+
 /// Checks every link (those of negligible mass give warnings), every body and that each moving
-/// joint carries mass. Errors and warnings name the link or joint with its line.
-void check_inertias(const Tree& tree, const Outline& outline, Diagnostics& errors,
-                    Diagnostics& warnings);
+/// joint carries mass; nothing of what is fixed to the world. Errors and warnings name the link or
+/// joint with its line, or what overrides it.
+void check_inertias(const Tree& tree, const Outline& outline, const UrdfOptions& options,
+                    Diagnostics& errors, Diagnostics& warnings);
 
 }  // namespace tandem::model

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/nearest.hpp"
+#include "model/urdf_xacro.hpp"
 
 namespace tandem::model {
 namespace {
@@ -37,6 +38,10 @@ class Reader {
       const std::string found = robot == nullptr ? "" : robot->Name();
       error(robot == nullptr ? 0 : robot->GetLineNum(), found, "the root element is not <robot>",
             "name a URDF; expand xacro and convert SDF first");
+      return std::move(out_);
+    }
+    if (auto left = find_xacro(*robot, file_)) {
+      out_.errors.push_back(std::move(*left));
       return std::move(out_);
     }
     read_robot(*robot);
@@ -82,6 +87,7 @@ class Reader {
     if (out_.links.size() > kMostLinks) {
       error(robot.GetLineNum(), "", "the robot has more than 10000 links");
     }
+    warn_of_dynamics();
     tinyxml2::XMLPrinter printer(nullptr, true);
     reduced_.Print(&printer);
     out_.text = printer.CStr();
@@ -93,9 +99,6 @@ class Reader {
                                                   "mujoco",   "camera",       "plugin"};
     const std::string name = e.Name();
     if (std::ranges::find(kOthers, name) != kOthers.end()) return;
-    if (name.starts_with("xacro:")) {
-      return error(e.GetLineNum(), name, "this file is xacro, not URDF", "expand it with xacro");
-    }
     const std::vector<std::string> ours{"link", "joint"};
     if (const std::string meant = nearest(name, ours); !meant.empty() && name.size() <= 6) {
       return error(e.GetLineNum(), name, "unknown element <" + name + ">",
@@ -216,9 +219,7 @@ class Reader {
     check_origin(*inertial, key);
     const XMLElement* mass = child(*inertial, "mass", key, Needed::kYes);
     const std::vector<double> kg = numbers(mass, "value", 1, key, Needed::kYes);
-    if (!kg.empty() && kg[0] < 0.0) {
-      error(mass->GetLineNum(), key, "the mass is negative", "masses are zero or positive");
-    }
+    if (!kg.empty()) out_.links.back().mass_kg = kg[0];
     const XMLElement* inertia = child(*inertial, "inertia", key, Needed::kYes);
     for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
       (void)numbers(inertia, moment, 1, key, Needed::kYes);
@@ -239,7 +240,7 @@ class Reader {
     const XMLElement* child_link = child(e, "child", key, Needed::kYes);
     if (child_link != nullptr) joint.child = name_of(*child_link, "link", key);
     check_origin(e, key);
-    if (joint.type != "fixed") check_motion(e, joint, key);
+    if (joint.type != "fixed" && joint.type != "floating") read_motion(e, joint, key);
     if (const XMLElement* mimic = child(e, "mimic", key, Needed::kNo)) {
       joint.mimic = name_of(*mimic, "joint", key);
     }
@@ -248,51 +249,96 @@ class Reader {
     copy->SetAttribute("name", joint.name.c_str());
     copy->SetAttribute("type", joint.type.c_str());
     reduced.InsertEndChild(copy);
-    for (const char* part : {"parent", "child", "origin", "axis", "limit"}) {
+    for (const char* part : {"parent", "child", "origin", "axis"}) {
       const XMLElement* found = e.FirstChildElement(part);
       if (found != nullptr) copy->InsertEndChild(found->DeepClone(&reduced_));
     }
+    XMLElement* limit = reduced_.NewElement("limit");  // ours are in `joint`; urdfdom needs one
+    for (const char* name : {"velocity", "effort"}) limit->SetAttribute(name, "0");
+    copy->InsertEndChild(limit);
   }
 
   void check_type(const OutlineJoint& joint, const std::string& key) {
-    static const std::vector<std::string> kTypes{"revolute", "continuous", "prismatic", "fixed"};
+    static const std::vector<std::string> kTypes{"revolute", "continuous", "prismatic", "fixed",
+                                                 "floating"};
     if (joint.type.empty() || std::ranges::find(kTypes, joint.type) != kTypes.end()) return;
-    if (joint.type == "floating" || joint.type == "planar") {
-      return error(joint.line, key, "joints of type '" + joint.type + "' are not supported",
-                   joint.type == "floating"
-                       ? "remove the joint and set base = \"floating\" in robot.toml"
-                       : "build it of two prismatic and one revolute joint");
+    if (joint.type == "planar") {
+      return error(joint.line, key, "joints of type 'planar' are not supported",
+                   "build it of two prismatic and one revolute joint");
     }
     error(joint.line, key, "unknown joint type '" + joint.type + "'", suggest(joint.type, kTypes));
   }
 
-  void check_motion(const XMLElement& e, const OutlineJoint& joint, const std::string& key) {
+  void read_motion(const XMLElement& e, OutlineJoint& joint, const std::string& key) {
     const std::vector<double> axis =
         numbers(child(e, "axis", key, Needed::kNo), "xyz", 3, key, Needed::kYes);
     if (!axis.empty() && std::hypot(axis[0], axis[1], axis[2]) < 1e-6) {
       error(joint.line, key, "the axis has no length", "give a direction, for example 0 0 1");
     }
-    const bool bounded = joint.type != "continuous";
-    const XMLElement* limit = child(e, "limit", key, bounded ? Needed::kYes : Needed::kNo);
-    const std::vector<double> lower = numbers(limit, "lower", 1, key, Needed::kNo);
-    const std::vector<double> upper = numbers(limit, "upper", 1, key, Needed::kNo);
-    const double from = lower.empty() ? 0.0 : lower[0];
-    const double to = upper.empty() ? 0.0 : upper[0];
-    if (bounded && from > to) {
-      error(limit->GetLineNum(), key, "the limits are reversed", "lower must not be above upper");
+    if (const XMLElement* limit = child(e, "limit", key, Needed::kNo)) {
+      read_limits(*limit, joint, key);
+    } else if (joint.type == "continuous") {
+      joint.velocity = joint.effort = std::numeric_limits<double>::infinity();
+    } else {
+      joint.limits_note = "the joint at " + place(joint.line) + " has no <limit>";
     }
-    for (const char* name : {"velocity", "effort"}) {
-      const std::vector<double> most = numbers(limit, name, 1, key, Needed::kYes);
-      if (most.empty() || most[0] >= 0.0) continue;
-      error(limit->GetLineNum(), key, std::string("the limit of ") + name + " is negative",
-            "give its absolute value");
+    if (joint.type == "continuous") {
+      joint.lower = -std::numeric_limits<double>::infinity();
+      joint.upper = std::numeric_limits<double>::infinity();
     }
+    read_dynamics(e.FirstChildElement("dynamics"));
+  }
+
+  /// Limits that make no sense are left to robot.toml.
+  void read_limits(const XMLElement& limit, OutlineJoint& joint, const std::string& key) {
+    const auto one = [&](const char* name, double none) {
+      const std::vector<double> found = numbers(&limit, name, 1, key, Needed::kNo);
+      return found.empty() ? none : found[0];
+    };
+    const auto note = [&](const std::string& what) {
+      joint.limits_note += joint.limits_note.empty() ? place(limit.GetLineNum()) + ": " : ", ";
+      joint.limits_note += what;
+    };
+    joint.lower = one("lower", 0.0);
+    joint.upper = one("upper", 0.0);
+    if (joint.type != "continuous" && joint.lower >= joint.upper) {
+      note(joint.lower > joint.upper ? "lower is above upper" : "lower and upper are equal");
+      joint.lower = joint.upper = kNoLimit;
+    }
+    joint.velocity = one("velocity", kNoLimit);
+    joint.effort = one("effort", kNoLimit);
+    for (double* most : {&joint.velocity, &joint.effort}) {
+      if (*most > 0.0) continue;
+      const std::string name = most == &joint.velocity ? "velocity" : "effort";
+      note(std::isnan(*most) ? name + " is missing" : name + " is not above 0");
+      *most = kNoLimit;
+    }
+  }
+
+  [[nodiscard]] std::string place(int line) const { return file_ + ":" + std::to_string(line); }
+
+  void read_dynamics(const XMLElement* dynamics) {
+    if (dynamics == nullptr) return;
+    const bool used =
+        dynamics->DoubleAttribute("damping") != 0.0 || dynamics->DoubleAttribute("friction") != 0.0;
+    if (used && damped_++ == 0) damped_line_ = dynamics->GetLineNum();
+  }
+
+  void warn_of_dynamics() {
+    if (damped_ == 0) return;
+    out_.warnings.push_back({"the damping and friction of " + std::to_string(damped_) +
+                                 (damped_ == 1 ? " joint" : " joints") +
+                                 " (<dynamics>) is not used: a joint's damping is its actuator's",
+                             "damping_Nms_rad of [actuator.NAME] in robot.toml", file_,
+                             damped_line_, "dynamics"});
   }
 
   const std::string& file_;
   tinyxml2::XMLDocument document_;
   tinyxml2::XMLDocument reduced_;
   Outline out_;
+  int damped_ = 0;  // joints with damping or friction
+  int damped_line_ = 0;
 };
 
 }  // namespace

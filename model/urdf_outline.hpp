@@ -2,6 +2,7 @@
 // Layer: model, private to urdf*.cpp.  Thread: non-RT only.
 #pragma once
 
+#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -14,7 +15,10 @@ namespace tandem::model {
 struct OutlineLink {
   std::string name;
   int line = 0;
+  double mass_kg = 0.0;  ///< 0 without <inertial>
 };
+
+inline constexpr double kNoLimit = std::numeric_limits<double>::quiet_NaN();
 
 struct OutlineJoint {
   std::string name;
@@ -23,6 +27,12 @@ struct OutlineJoint {
   std::string child;   ///< link
   std::string mimic;   ///< joint; empty: independent
   int line = 0;
+  // kNoLimit where the text gives none, or one that makes no sense; then the note says why.
+  double lower = kNoLimit;
+  double upper = kNoLimit;
+  double velocity = kNoLimit;
+  double effort = kNoLimit;
+  std::string limits_note;
 };
 
 /// A URDF whose every element that matters is present, unique and numeric where it must be.
@@ -37,11 +47,17 @@ struct Outline {
 
   std::map<std::string, int> link_lines;  ///< of the first link of each name
   std::map<std::string, int> joint_lines;
+
+  /// The joint of type floating from the root to the base, of which check_topology() leaves
+  /// nothing but this, nor of the root. Empty: none.
+  std::string floating_joint;
+  int floating_line = 0;
 };
 
 [[nodiscard]] Outline outline_urdf(std::string_view text, const std::string& file);
 
-/// Appends an error for each way in which the joints do not make one tree of all links.
+/// Appends an error for each way in which the joints do not make one tree of all links, and takes
+/// a massless root out that nothing but a floating joint leaves.
 void check_topology(Outline& outline, const std::string& file);
 
 }  // namespace tandem::model

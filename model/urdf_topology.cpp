@@ -18,6 +18,10 @@ class Topology {
     if (!outline_.errors.empty()) return;
     check_roots();
     check_loops();
+    if (!outline_.errors.empty()) return;
+    for (const OutlineJoint& joint : outline_.joints) {
+      if (joint.type == "floating" && free_base(joint)) return take_out(joint);
+    }
   }
 
  private:
@@ -94,6 +98,41 @@ class Topology {
     const OutlineJoint& joint = *leads_to_.at(start);
     error(joint.line, "joint " + joint.name, "the links make a loop: " + ring,
           "every link must hang on one root");
+  }
+
+  /// Whether the joint leads from a root that is nothing else to the base; if not, an error.
+  bool free_base(const OutlineJoint& joint) {
+    const std::string key = "joint " + joint.name;
+    const auto root = std::ranges::find(outline_.links, joint.parent, &OutlineLink::name);
+    const std::string what =
+        "a joint of type 'floating' is understood only from a root without "
+        "mass to the robot's base, ";
+    if (leads_to_.contains(joint.parent)) {
+      error(joint.line, key, what + "and '" + joint.parent + "' is not the root",
+            "make it fixed, or describe what it carries as a robot of its own");
+      return false;
+    }
+    if (std::ranges::count(outline_.joints, joint.parent, &OutlineJoint::parent) > 1) {
+      error(joint.line, key, what + "and other joints leave '" + joint.parent + "', too",
+            "let them start at '" + joint.child + "', or remove them");
+      return false;
+    }
+    if (root->mass_kg != 0.0) {
+      error(joint.line, key, what + "and '" + joint.parent + "' has mass",
+            "remove its <inertial>, or remove the link and the joint");
+      return false;
+    }
+    return true;
+  }
+
+  void take_out(const OutlineJoint& joint) {
+    const std::string root = joint.parent;
+    outline_.floating_joint = joint.name;
+    outline_.floating_line = joint.line;
+    outline_.link_lines.erase(root);
+    outline_.joint_lines.erase(outline_.floating_joint);
+    std::erase_if(outline_.links, [&](const OutlineLink& link) { return link.name == root; });
+    std::erase_if(outline_.joints, [&](const OutlineJoint& one) { return one.parent == root; });
   }
 
   Outline& outline_;

@@ -51,8 +51,15 @@ Status read_description(RunData& run) {
     return log_error(run, "this log does not carry the description " + m.urdf,
                      "report needs a log that `tandem run` has written");
   }
-  auto description =
-      model::parse_urdf(text, m.urdf, {m.floating_base, m.mimic_independent, m.lock});
+  model::UrdfOptions options{.floating_base = m.floating_base,
+                             .mimic_independent = m.mimic_independent,
+                             .lock = m.lock,
+                             .repair_inertia = m.repair_inertia,
+                             .overrides_file = run.robot.file};
+  for (const hal::LinkConfig& link : m.links) {
+    options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});
+  }
+  auto description = model::parse_urdf(text, m.urdf, options);
   if (!description) return std::unexpected(description.error().front());
   run.tree = std::move(description->tree);
   return {};

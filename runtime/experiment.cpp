@@ -112,8 +112,7 @@ RemoteOptions read_remote(TomlTable table) {
         read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
   }
   remote.lockstep = table.boolean_or("lockstep", remote.lockstep);
-  remote.lease_timeout_s =
-      table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
+  remote.lease_timeout_s = table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
   remote.lockstep_timeout_s =
       table.number_or("lockstep_timeout_s", remote.lockstep_timeout_s, {0.05, 3600.0});
   remote.max_age_cycles = static_cast<std::uint64_t>(table.integer_or(
@@ -282,35 +281,48 @@ std::uint64_t Experiment::settle_cycles() const {
 }
 
 sim::SimRobotConfig Experiment::sim_robot_config() const {
-  return {.period_ns = loop.period_ns,
-          .integrator = sim.integrator,
-          .substep_ns = sim.substep_ns,
-          .posture = posture,
-          .hold = sim.hoist,
-          .release_ns = std::llround(sim.hoist_release_s * 1e9),
-          .seed = seed,
-          .truth = sim.ground_truth,
-          .bus_timing = sim.bus_timing,
-          .bus_latency_ns = sim.bus_latency_ns,
-          .answer_window_ns =
-              std::llround(hal.answer_window * static_cast<double>(loop.period_ns))};
+  return {
+      .period_ns = loop.period_ns,
+      .integrator = sim.integrator,
+      .substep_ns = sim.substep_ns,
+      .posture = posture,
+      .hold = sim.hoist,
+      .release_ns = std::llround(sim.hoist_release_s * 1e9),
+      .seed = seed,
+      .truth = sim.ground_truth,
+      .bus_timing = sim.bus_timing,
+      .bus_latency_ns = sim.bus_latency_ns,
+      .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns))};
 }
 
 namespace {
 
-std::expected<model::UrdfModel, Diagnostics> read_description(const hal::ModelConfig& model) {
-  return model::read_urdf(model.urdf, {.floating_base = model.floating_base,
-                                       .mimic_independent = model.mimic_independent,
-                                       .lock = model.lock});
+/// @param file  the robot.toml
+model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string& file) {
+  model::UrdfOptions options{.floating_base = model.floating_base,
+                             .mimic_independent = model.mimic_independent,
+                             .lock = model.lock,
+                             .repair_inertia = model.repair_inertia,
+                             .overrides_file = file};
+  for (const hal::LinkConfig& link : model.links) {
+    options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});
+  }
+  return options;
 }
 
-hal::RobotDescription plain(const model::Tree& tree) {
+std::expected<model::UrdfModel, Diagnostics> read_description(const hal::RobotConfig& robot) {
+  return model::read_urdf(robot.model.urdf, urdf_options(robot.model, robot.file));
+}
+
+hal::RobotDescription plain(const model::UrdfModel& model) {
   hal::RobotDescription description;
-  for (const model::Joint& joint : tree.joints) {
-    description.moving_joints.push_back(
-        {joint.name, joint.lower, joint.upper, joint.velocity, joint.effort});
+  for (const model::Joint& joint : model.tree.joints) {
+    const auto note = model.limits_notes.find(joint.name);
+    description.moving_joints.push_back({joint.name, joint.lower, joint.upper, joint.velocity,
+                                         joint.effort,
+                                         note == model.limits_notes.end() ? "" : note->second});
   }
-  for (const model::Link& link : tree.links) {
+  for (const model::Link& link : model.tree.links) {
     description.links.push_back(link.name);
     if (link.moving < 0 && !link.joint.empty()) description.other_joints.push_back(link.joint);
   }
@@ -320,9 +332,9 @@ hal::RobotDescription plain(const model::Tree& tree) {
 }  // namespace
 
 std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
-  auto found = read_description(robot.model);
+  auto found = read_description(robot);
   if (!found) return found;
-  Diagnostics errors = hal::complete_from_description(robot, plain(found->tree));
+  Diagnostics errors = hal::complete_from_description(robot, plain(*found));
   if (!errors.empty()) return std::unexpected(in_order(std::move(errors)));
   return found;
 }
@@ -337,9 +349,9 @@ std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file) {
   }
   // The file is wrong by itself; what can be said of its names beside that is said too.
   const auto description =
-      config.model.urdf.empty() ? std::unexpected(Diagnostics{}) : read_description(config.model);
+      config.model.urdf.empty() ? std::unexpected(Diagnostics{}) : read_description(config);
   if (description) {
-    const Diagnostics names = hal::check_names(config, plain(description->tree));
+    const Diagnostics names = hal::check_names(config, plain(*description));
     errors.insert(errors.end(), names.begin(), names.end());
   }
   errors = in_order(std::move(errors));

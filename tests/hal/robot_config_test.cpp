@@ -181,6 +181,51 @@ TEST(RobotConfig, RefusesANameThatIsNoFileName) {
             std::string::npos);
 }
 
+TEST(RobotConfig, ReadsWhatALinkWeighsInsteadOfTheDescription) {
+  const auto robot = parse_robot_config(
+      with("[model.lock]",
+           "inertia = 'repair'\n[model.link.foot]\nmass_kg = 2\ncom_m = [0, 0.1, 0.2]\n"
+           "inertia_kg_m2 = [1, 2, 3, 4, 5, 6]\n[model.link.thigh]\nmass_kg = 0\n[model.lock]"),
+      "leg.toml");
+  ASSERT_TRUE(robot.has_value());
+  EXPECT_TRUE(robot->model.repair_inertia);
+  ASSERT_EQ(robot->model.links.size(), 2u);
+  const LinkConfig& foot = robot->model.links[0];
+  EXPECT_EQ(foot.name, "foot");
+  EXPECT_EQ(foot.line, 6);
+  EXPECT_EQ(foot.mass_kg, 2.0);
+  EXPECT_EQ((*foot.com_m)[1], 0.1);
+  EXPECT_EQ((*foot.inertia_kg_m2)[5], 6.0);
+  EXPECT_EQ(robot->model.links[1].mass_kg, 0.0);
+  EXPECT_FALSE(robot->model.links[1].inertia_kg_m2.has_value());
+}
+
+TEST(RobotConfig, RefusesALinkThatWeighsWrong) {
+  const auto link = [](const std::string& keys) {
+    return with("[model.lock]", "[model.link.foot]\n" + keys + "\n[model.lock]");
+  };
+  expect_error(link("mass_kg = -1"),
+               "robots/leg.toml:6: model.link.foot.mass_kg: -1 is out of range "
+               "(must be at least 0)");
+  expect_error(link("mas_kg = 1\nmass_kg = 1"),
+               "robots/leg.toml:6: model.link.foot.mas_kg: unknown key (did you mean 'mass_kg'?)");
+  expect_error(link("inertia_kg_m2 = [1, 1, 1]"),
+               "robots/leg.toml:6: model.link.foot.inertia_kg_m2: has 3 numbers (give exactly 6)");
+  expect_error(link(""),
+               "robots/leg.toml:5: model.link.foot: gives nothing "
+               "(give mass_kg, com_m or inertia_kg_m2, or remove it)");
+}
+
+TEST(RobotConfig, RefusesAnActuatorWithoutInertia) {
+  for (const std::string order : {"0", "1", "2"}) {
+    EXPECT_NE(errors_of(with("inertia_kg_m2 = 0.1387", "inertia_kg_m2 = 0\norder = " + order))
+                  .find("robots/leg.toml:16: actuator.big.inertia_kg_m2: 0 is out of range "
+                        "(must be greater than 0)"),
+              std::string::npos)
+        << order;
+  }
+}
+
 TEST(RobotConfig, OfABareModelNeedsNoJoints) {
   EXPECT_EQ(errors_of("name = 'm'\n[model]\nurdf = 'm.urdf'\nbase = 'fixed'\n"), "");
 }
@@ -610,6 +655,29 @@ TEST_F(Completed, AsksForALimitThatNobodyGives) {
   EXPECT_EQ(errors,
             "leg.toml:37: joint.hip.max_velocity_rad_s: neither this file nor the description "
             "gives a limit (set max_velocity_rad_s)\n");
+}
+
+TEST_F(Completed, SaysWhyTheDescriptionGivesNoLimits) {
+  const double none = std::nan("");
+  description_.moving_joints[1] = {"knee", none, none, none, 200.0, "leg.urdf:12 has no <limit>"};
+  read(kRobot);
+  const std::string why =
+      "neither this file nor the description gives a limit (leg.urdf:12 has no <limit>) ";
+  const std::string key = "leg.toml:44: joint.knee.";
+  EXPECT_EQ(errors, key + "min_position_rad: " + why + "(set min_position_rad)\n" + key +
+                        "max_position_rad: " + why + "(set max_position_rad)\n" + key +
+                        "max_velocity_rad_s: " + why + "(set max_velocity_rad_s)\n");
+}
+
+TEST_F(Completed, TakesEveryLimitFromTheRobotsFileWhenTheDescriptionHasNone) {
+  const double none = std::nan("");
+  description_.moving_joints[1] = {"knee", none, none, none, none, "has no <limit>"};
+  read(with("max_torque_Nm = 80",
+            "max_torque_Nm = 80\nmin_position_rad = -1\nmax_position_rad = 2\n"
+            "max_velocity_rad_s = 3"));
+  EXPECT_EQ(errors, "");
+  EXPECT_EQ(robot.joints[1].min_position_rad, -1.0);
+  EXPECT_EQ(robot.joints[1].max_velocity_rad_s, 3.0);
 }
 
 TEST_F(Completed, RefusesLimitsThatTheEncoderCannotCount) {

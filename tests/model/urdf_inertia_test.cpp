@@ -3,23 +3,27 @@
 namespace tandem::model {
 namespace {
 
+const char* const kHint =
+    "(check the six moments, their signs and their reference point; inertia = \"repair\" in "
+    "[model] takes the nearest possible one, and `tandem check --repair` shows it)";
+
 TEST(UrdfInertia, RefusesANegativeMass) {
   expect_error(with("<mass value=\"3\"/>", "<mass value=\"-3\"/>"),
-               "arm.urdf:18: link weight: the mass is negative (masses are zero or positive)");
+               "arm.urdf:16: link weight: the mass is negative (masses are zero or positive)");
 }
 
 TEST(UrdfInertia, RefusesAnInertiaThatIsNotPositiveDefinite) {
   EXPECT_EQ(errors_of(with("ixx=\"0.03\" ixy=\"0\"", "ixx=\"0.03\" ixy=\"0.05\"")),
-            "arm.urdf:16: link weight: the inertia is not positive definite: principal moments "
-            "-0.02, 0.03, 0.08 kg m^2 (check the six moments, their signs and their reference "
-            "point)\n");
+            std::string("arm.urdf:16: link weight: the inertia is not positive definite: "
+                        "principal moments -0.02, 0.03, 0.08 kg m^2 ") +
+                kHint + "\n");
 }
 
 TEST(UrdfInertia, RefusesAnInertiaThatBreaksTheTriangleInequality) {
   EXPECT_EQ(errors_of(with("ixx=\"0.03\"", "ixx=\"0.07\"")),
-            "arm.urdf:16: link weight: the inertia breaks the triangle inequality: principal "
-            "moments 0.03, 0.03, 0.07 kg m^2 (check the six moments, their signs and their "
-            "reference point)\n");
+            std::string("arm.urdf:16: link weight: the inertia breaks the triangle inequality: "
+                        "principal moments 0.03, 0.03, 0.07 kg m^2 ") +
+                kHint + "\n");
 }
 
 TEST(UrdfInertia, AcceptsAThinPlateWhoseInertiaIsRounded) {

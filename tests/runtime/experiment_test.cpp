@@ -377,6 +377,55 @@ TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
   EXPECT_EQ(e.error()[0].file, (folder_ / "no.toml").string());
 }
 
+TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
+  write("arm.urdf", replaced(kUrdf, "<limit lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"/>",
+                             ""));
+  const auto none = read_robot(write("robot.toml", kRobot));
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error()[0].to_string(),
+            (folder_ / "robot.toml").string() +
+                ":22: joint.elbow.min_position_rad: neither this file nor the description gives a "
+                "limit (the joint at " +
+                (folder_ / "arm.urdf").string() + ":4 has no <limit>) (set min_position_rad)");
+  EXPECT_EQ(none.error().size(), 4u) << "each of the four limits";
+  const auto given =
+      read_robot(write("robot.toml", replaced(kRobot, "board = \"board\"",
+                                              "board = \"board\"\nmin_position_rad = -2\n"
+                                              "max_position_rad = 2\nmax_velocity_rad_s = 3\n"
+                                              "max_torque_Nm = 4")));
+  ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
+  EXPECT_EQ(given->config.joints[0].min_position_rad, -2.0);
+}
+
+TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
+  write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
+  EXPECT_FALSE(read_robot(write("robot.toml", kRobot)).has_value());
+  const auto given = read_robot(write(
+      "robot.toml", replaced(kRobot, "[actuator.motor]",
+                             "[model.link.upper]\nmass_kg = 2\n"
+                             "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
+  ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
+  EXPECT_EQ(given->description.tree.bodies[1].inertia.mass_kg, 2.0);
+  EXPECT_EQ(given->description.tree.bodies[1].inertia.about_com_kg_m2(2, 2), 1.5);
+  const auto unknown = read_robot(write(
+      "robot.toml",
+      replaced(kRobot, "[actuator.motor]", "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
+  ASSERT_FALSE(unknown.has_value());
+  EXPECT_EQ(unknown.error()[0].to_string(), (folder_ / "robot.toml").string() +
+                                                ":5: model.link.uper: the description has no link "
+                                                "'uper' (did you mean 'upper'?)");
+}
+
+TEST_F(ExperimentFiles, RepairInertiasWhenTheRobotSaysSo) {
+  write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
+  const auto repaired = read_robot(
+      write("robot.toml",
+            replaced(kRobot, "base = \"fixed\"", "base = \"fixed\"\ninertia = \"repair\"")));
+  ASSERT_TRUE(repaired.has_value()) << repaired.error()[0].to_string();
+  ASSERT_EQ(repaired->description.warnings.size(), 1u);
+  EXPECT_EQ(repaired->description.warnings[0].key, "link upper");
+}
+
 class BundledRobot : public testing::TestWithParam<const char*> {};
 
 TEST_P(BundledRobot, IsCompleteWithItsDescription) {
@@ -385,7 +434,7 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   ASSERT_TRUE(bundled.has_value()) << bundled.error()[0].to_string();
   const auto description = complete_robot(*bundled);
   ASSERT_TRUE(description.has_value()) << description.error()[0].to_string();
-  EXPECT_TRUE(description->warnings.empty());
+  for (const Error& warning : description->warnings) EXPECT_EQ(warning.key, "dynamics");
   EXPECT_EQ(description->tree.joints.size(), bundled->joints.size());
   for (const hal::JointConfig& joint : bundled->joints) {
     EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
