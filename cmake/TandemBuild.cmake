@@ -63,6 +63,28 @@ function(tandem_controller name)
     CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
 endfunction()
 
+# tandem_kernels(ROBOT TOML): the target kernels_ROBOT makes lib/models/ROBOT_kernels.so by `tandem
+# model build`. The builder skips what is up to date, so the target always runs and mostly does
+# nothing. One at a time: each uses every core for its compilers.
+# A sanitizer's build takes those of another build folder, when they are there: they are the same.
+set(TANDEM_MODELS_FROM "" CACHE PATH "Build folder whose kernel libraries are used")
+set_property(GLOBAL APPEND PROPERTY JOB_POOLS kernels=1)
+function(tandem_kernels robot toml)
+  set(library lib/models/${robot}_kernels.so)
+  if(TANDEM_MODELS_FROM AND EXISTS ${TANDEM_MODELS_FROM}/${library})
+    add_custom_target(kernels_${robot}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/lib/models
+      COMMAND ${CMAKE_COMMAND} -E create_symlink ${TANDEM_MODELS_FROM}/${library}
+        ${PROJECT_BINARY_DIR}/${library}
+      VERBATIM)
+    return()
+  endif()
+  add_custom_target(kernels_${robot}
+    COMMAND tandem model build ${toml} -o ${PROJECT_BINARY_DIR}/${library}
+    JOB_POOL kernels VERBATIM
+    COMMENT "Kernels of ${robot}")
+endfunction()
+
 # tandem_test_program(NAME SOURCES … LINKS …): one GoogleTest executable. The target `tests`
 # builds them all.
 function(tandem_test_program name)

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "controllers/controller.hpp"
+#include "controllers/feet.hpp"
 #include "controllers/min_jerk.hpp"
 #include "controllers/model_map.hpp"
 #include "controllers/parameters.hpp"
@@ -24,9 +25,9 @@ std::string imu_site(const hal::RobotConfig& robot, const hal::SensorConfig& sen
 
 /// Parameters: mode ("compliant": a virtual spring and damper about the start posture, "torque":
 /// none), joints (all), stiffness_Nm_rad and damping_Nms_rad (the robot's), ramp_s (1),
-/// left_sole and right_sole ("l_sole", "r_sole"; floating base only).
+/// feet (all; floating base only).
 ///
-/// tau = h(q, 0) for a fixed base. A floating base is taken to stand on both feet, turned as its
+/// tau = h(q, 0) for a fixed base. A floating base is taken to stand on its feet, turned as its
 /// IMU says, or upright when it has none.
 class GravityCompensation : public Controller {
  public:
@@ -38,7 +39,7 @@ class GravityCompensation : public Controller {
     ramp_s_ = setup.parameters.number_or("ramp_s", 1.0, kPositive);
     compliant_ =
         setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
-    if (const Status feet = find_feet(setup); !feet) return feet;
+    if (const Status standing = stand(setup); !standing) return standing;
     if (const Status joints = claim_joints(setup); !joints) return joints;
     q_.assign(kernels_->nq, 0.0);
     rest_.assign(kernels_->nv, 0.0);
@@ -89,15 +90,13 @@ class GravityCompensation : public Controller {
     double torque_Nm = 0.0;     // at the start
   };
 
-  Status find_feet(ControllerSetup& setup) {
+  Status stand(ControllerSetup& setup) {
     if (kernels_->floating_base == 0) return {};
-    const Result<std::size_t> left =
-        site_index(*kernels_, setup.parameters.text_or("left_sole", "l_sole"));
-    if (!left) return std::unexpected(left.error());
-    const Result<std::size_t> right =
-        site_index(*kernels_, setup.parameters.text_or("right_sole", "r_sole"));
-    if (!right) return std::unexpected(right.error());
-    feet_ = {*left, *right};
+    const std::vector<std::string> names =
+        setup.parameters.texts_or("feet", foot_names(setup.robot));
+    const Result<std::vector<Foot>> feet = find_feet(setup.robot, *kernels_, names);
+    if (!feet) return std::unexpected(feet.error());
+    support_.emplace(*feet);
     for (std::size_t i = 0; i < setup.robot.sensors.size(); ++i) {
       const hal::SensorConfig& sensor = setup.robot.sensors[i];
       if (sensor.type != hal::SensorType::kImu) continue;
@@ -148,7 +147,7 @@ class GravityCompensation : public Controller {
     kernels_->bias(q_.data(), rest_.data(), tau_.data());
     locate();
     kernels_->site_jacobians(q_.data(), J_.data());
-    carry_on_both_feet(*kernels_, feet_, q_, pose_, J_, tau_);
+    support_->carry(*kernels_, q_, pose_, J_, tau_);
   }
 
   void locate() noexcept TANDEM_RT {
@@ -176,7 +175,7 @@ class GravityCompensation : public Controller {
   };
   const tandem_kernels* kernels_ = nullptr;
   ModelMap map_;
-  Feet feet_;
+  std::optional<Support> support_;  // of a floating base
   std::optional<Imu> imu_;
   bool compliant_ = true;
   double ramp_s_ = 1.0;

@@ -1,10 +1,11 @@
-// squat: both feet stay, the centre of mass stays over them, the base goes down and up again.
+// squat: the feet stay, the centre of mass stays over them, the base goes down and up again.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 
 #include "controllers/controller.hpp"
+#include "controllers/feet.hpp"
 #include "controllers/min_jerk.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/stance.hpp"
@@ -15,6 +16,7 @@ namespace {
 constexpr int kWalkSteps = 200;  // of the way down, checked at configuration
 constexpr int kFirstSolve = 50;  // Newton steps to the first configuration
 constexpr int kCycleSolve = 4;   // and at most in a cycle; one is enough as a rule
+constexpr double kMostSlip_m = 1e-3;
 
 std::string metres(double value) {
   char text[32];
@@ -56,9 +58,9 @@ class Squat : public Controller {
   Status configure(ControllerSetup& setup) override {
     read(setup.parameters);
     const hal::PostureConfig* posture = posture_parameter(setup);
-    const std::string left = setup.parameters.text_or("left_sole", "l_sole");
-    const std::string right = setup.parameters.text_or("right_sole", "r_sole");
-    Result<Stance> stance = Stance::make(setup.robot, setup.kernels, left, right);
+    const std::vector<std::string> feet =
+        setup.parameters.texts_or("feet", foot_names(setup.robot));
+    Result<Stance> stance = Stance::make(setup.robot, setup.kernels, feet);
     if (!stance) return std::unexpected(stance.error());
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       const Status claimed = claim(setup, j, hal::ControlMode::kPosition);
@@ -147,16 +149,15 @@ class Squat : public Controller {
     for (int i = 0; i <= kWalkSteps; ++i) {
       const double down = plan_.depth_m * i / kWalkSteps;
       const Stance::Solution solution = stance_->solve(top - down, kFirstSolve);
-      const std::string problem =
-          solution.converged ? beyond_limits(setup.robot)
-                             : "the feet cannot stay where they are with the mass over them";
+      std::string problem = "the feet cannot stay where they are with the mass over them";
+      if (solution.converged) problem = beyond_limits(setup.robot);
       if (problem.empty()) {
         reached = down;
         continue;
       }
       if (i == 0) {
         setup.parameters.error("posture", "the robot cannot stand like this: " + problem,
-                               "choose a posture with both soles on the ground, knees bent");
+                               "choose a posture with every foot on the ground and bent knees");
       } else {
         setup.parameters.error("depth_m",
                                "only " + metres(reached) + " can be reached; beyond, " + problem,
@@ -168,6 +169,9 @@ class Squat : public Controller {
 
   /// What the configuration at hand would break, moving at the squat's largest speed.
   [[nodiscard]] std::string beyond_limits(const hal::RobotConfig& robot) {
+    if (stance_->slip_m() > kMostSlip_m) {
+      return "the legs have too few joints to keep every foot in its place";
+    }
     stance_->move(-plan_.peak_rate_m_s());
     std::ranges::fill(vdot_, 0.0);
     stance_->carry(vdot_);
@@ -192,7 +196,7 @@ class Squat : public Controller {
   std::optional<Stance> stance_;
   double period_s_ = 0.0;
   std::int64_t start_ns_ = 0;
-  double height_m_ = 0.0;              // of the base above the soles at the start
+  double height_m_ = 0.0;              // of the base above the feet at the start
   std::int64_t standing_ = 0;          // whether the start posture was found
   double link_damping_Nms_rad_ = 0.0;  // of the legs' joints
   std::vector<double> damping_, measured_, last_v_, vdot_;
@@ -201,4 +205,4 @@ class Squat : public Controller {
 }  // namespace
 }  // namespace tandem
 
-TANDEM_CONTROLLER(tandem::Squat, "squat", "Squats on both feet with the centre of mass over them.")
+TANDEM_CONTROLLER(tandem::Squat, "squat", "Squats on its feet with the centre of mass over them.")

@@ -5,10 +5,13 @@
 #include <cmath>
 
 #include "base/archive.hpp"
+#include "controllers/ground_frame.hpp"
+#include "controllers/independent.hpp"
 
 namespace tandem {
 namespace {
 
+using Eigen::Map;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -17,30 +20,20 @@ constexpr double kConverged = 1e-5;   // a step below it leaves an error of its 
 constexpr double kLongestStep = 0.2;  // [rad or m] in one Newton step
 
 Matrix3d rotation(const std::vector<double>& pose, std::size_t site) noexcept {
-  return Eigen::Map<const RowMajor3>(&pose[12 * site]);
+  return Map<const RowMajor3>(&pose[12 * site]);
 }
 Vector3d origin(const std::vector<double>& pose, std::size_t site) noexcept {
-  return Eigen::Map<const Vector3d>(&pose[12 * site + 9]);
-}
-
-/// The middle of the contact points of a site, or its origin when it has none.
-std::array<double, 3> middle_of(const hal::RobotConfig& robot, const std::string& site) {
-  std::array<double, 3> middle{};
-  for (const hal::FootConfig& foot : robot.contact.feet) {
-    if (foot.site != site || foot.points_m.empty()) continue;
-    for (const auto& point : foot.points_m) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        middle[k] += point[k] / static_cast<double>(foot.points_m.size());
-      }
-    }
-  }
-  return middle;
+  return Map<const Vector3d>(&pose[12 * site + 9]);
 }
 
 }  // namespace
 
-Stance::Stance(const tandem_kernels& kernels)
+Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet)
     : kernels_(&kernels),
+      map_(std::move(map)),
+      feet_(std::move(feet)),
+      support_(feet_),
+      placed_(feet_.size()),
       q_(kernels.nq, 0.0),
       v_(kernels.nv, 0.0),
       tau_(kernels.nv, 0.0),
@@ -53,53 +46,90 @@ Stance::Stance(const tandem_kernels& kernels)
       wrench_(6 * kernels.wrenches, 0.0) {}
 
 Result<Stance> Stance::make(const hal::RobotConfig& robot, const tandem_kernels* kernels,
-                            const std::string& left, const std::string& right) {
+                            std::span<const std::string> feet) {
   Result<ModelMap> map = ModelMap::make(robot, kernels);
   if (!map) return std::unexpected(map.error());
   if (kernels->floating_base == 0) {
     return fail("only a robot with a floating base stands on feet", "choose another controller");
   }
-  Stance stance(*kernels);
-  stance.map_ = std::move(*map);
-  for (std::size_t i = 0; i < 2; ++i) {
-    const std::string& name = i == 0 ? left : right;
-    const Result<std::size_t> site = site_index(*kernels, name);
-    if (!site) return std::unexpected(site.error());
-    stance.feet_[i].site = *site;
-    stance.feet_[i].middle_m = middle_of(robot, name);
-  }
+  Result<std::vector<Foot>> found = find_feet(robot, *kernels, feet);
+  if (!found) return std::unexpected(found.error());
+  Stance stance(*kernels, std::move(*map), std::move(*found));
   if (const Status legs = stance.find_legs(robot); !legs) return std::unexpected(legs.error());
   return stance;
 }
 
 Status Stance::find_legs(const hal::RobotConfig& robot) {
-  // At a configuration without symmetry, a joint moves a sole exactly when it lies on its way.
-  for (std::size_t i = 0; i < kernels_->joints; ++i) {
-    q_[7 + i] = 0.1 + 0.01 * static_cast<double>(i);
-  }
-  q_[6] = 1.0;
+  // Near where it will stand, but without symmetry: what depends on what here, does so always.
+  std::vector<double> near(robot.joints.size(), 0.0);
+  if (!robot.postures.empty()) near = robot.postures[0].position_rad;
+  for (std::size_t j = 0; j < near.size(); ++j) near[j] += 0.1 + 0.01 * static_cast<double>(j);
+  place(near);
   evaluate();
-  columns_[0] = 0;
-  columns_[1] = 1;
-  for (std::size_t foot = 0; foot < 2; ++foot) {
-    std::size_t found = 0;
-    for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-      const std::size_t column = map_.v_index(j);
-      double moves = 0.0;
-      for (int k = 0; k < 6; ++k) {
-        moves = std::max(moves, std::abs(jacobian(static_cast<int>(6 * foot) + k, column)));
+  std::vector<bool> moves(kernels_->nv, false);
+  for (const Foot& foot : feet_) {
+    bool any = false;
+    for (std::size_t i = 6; i < kernels_->nv; ++i) {
+      double most = 0.0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        most = std::max(most, std::abs(site_J_[(6 * foot.site + k) * kernels_->nv + i]));
       }
-      if (moves < 1e-9) continue;
-      if (found < 6) columns_[2 + 6 * foot + found] = column;
-      ++found;
+      if (most < 1e-9) continue;
+      moves[i] = any = true;
     }
-    if (found != 6) {
-      return fail("the site '" + std::string(kernels_->site_names[feet_[foot].site]) +
-                      "' is moved by " + std::to_string(found) + " joints",
-                  "standing needs exactly six from the base to each sole");
+    if (any) continue;
+    return fail("the foot '" + foot.name + "' is moved by no joint",
+                "leave it out of `feet`, or correct its site's link in " + robot.file);
+  }
+  std::vector<std::size_t> columns{0, 1};
+  for (std::size_t j = 0; j < map_.joints(); ++j) {
+    if (!moves[map_.v_index(j)]) continue;
+    columns.push_back(map_.v_index(j));
+    legs_.push_back(map_.v_index(j));
+  }
+  choose(columns);
+  return {};
+}
+
+std::vector<Stance::Row> Stance::all_rows() const {
+  std::vector<Row> rows;
+  for (std::size_t foot = 0; foot < feet_.size(); ++foot) {
+    for (const Eigen::Index k : {0, 1, 2}) rows.push_back({What::kPlace, foot, k, 0});
+    if (feet_[foot].shape == FootShape::kPoint) continue;
+    rows.push_back({What::kTurn, foot, 0, 1});
+    if (feet_[foot].shape == FootShape::kSurface) rows.push_back({What::kTurn, foot, 1, 1});
+    rows.push_back({What::kTurn, foot, 2, 3});  // about the vertical
+  }
+  for (const Eigen::Index k : {0, 1}) rows.push_back({What::kMass, 0, k, 2});
+  return rows;
+}
+
+/// Keeps independent equations, and as many of the unknowns `columns`.
+void Stance::choose(const std::vector<std::size_t>& columns) {
+  const std::vector<Row> all = all_rows();
+  Eigen::MatrixXd J(all.size(), columns.size());
+  std::vector<int> priorities;
+  for (Eigen::Index row = 0; row < J.rows(); ++row) {
+    const Row& one = all[static_cast<std::size_t>(row)];
+    priorities.push_back(one.priority);
+    for (Eigen::Index i = 0; i < J.cols(); ++i) {
+      J(row, i) = jacobian(one, columns[static_cast<std::size_t>(i)]);
     }
   }
-  return {};
+  const std::vector<Eigen::Index> rows = independent_rows(J, priorities);
+  Eigen::MatrixXd kept(static_cast<Eigen::Index>(rows.size()), J.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    kept.row(static_cast<Eigen::Index>(i)) = J.row(rows[i]);
+    rows_.push_back(all[static_cast<std::size_t>(rows[i])]);
+  }
+  for (const Eigen::Index i : independent_rows(kept.transpose(), {})) {
+    columns_.push_back(columns[static_cast<std::size_t>(i)]);
+  }
+  const auto n = static_cast<Eigen::Index>(rows_.size());
+  A_.setIdentity(n, n);
+  error_.setZero(n);
+  step_.setZero(n);
+  lu_.compute(A_);
 }
 
 double Stance::place(std::span<const double> position_rad) noexcept TANDEM_RT {
@@ -108,31 +138,35 @@ double Stance::place(std::span<const double> position_rad) noexcept TANDEM_RT {
   q_[6] = 1.0;
   map_.positions_to_q(position_rad, q_);
   evaluate();
-  const Matrix3d R[2] = {rotation(pose_, feet_[0].site), rotation(pose_, feet_[1].site)};
-  const Vector3d p[2] = {origin(pose_, feet_[0].site), origin(pose_, feet_[1].site)};
-  const Vector3d between = 0.5 * (p[0] + p[1]);
-  // G's axes in the base: z along both soles' normals, x along their mean direction.
-  const Vector3d z = (R[0].col(2) + R[1].col(2)).normalized();
-  const Vector3d ahead = R[0].col(0) + R[1].col(0);
-  const Vector3d x = (ahead - ahead.dot(z) * z).normalized();
-  Matrix3d base_G;
-  base_G << x, z.cross(x), z;
-  Vector3d middle = Vector3d::Zero();
-  for (std::size_t i = 0; i < 2; ++i) {
-    const Vector3d at = base_G.transpose() * (p[i] - between);
-    const Vector3d toes = base_G.transpose() * R[i].col(0);
-    feet_[i].position_m = {at.x(), at.y(), 0.0};
-    feet_[i].yaw_rad = std::atan2(toes.y(), toes.x());
-    const Vector3d offset(feet_[i].middle_m[0], feet_[i].middle_m[1], 0.0);
-    middle += 0.5 * (Vector3d(at.x(), at.y(), 0.0) +
-                     Eigen::AngleAxisd(feet_[i].yaw_rad, Vector3d::UnitZ()) * offset);
+  const GroundFrame ground = ground_under(feet_, pose_);
+  for (std::size_t i = 0; i < feet_.size(); ++i) {
+    const Vector3d at = ground.R.transpose() * (middle(i) - ground.origin_m);
+    placed_[i].position_m = {at.x(), at.y(), 0.0};
+    level(i, ground.R);
   }
-  com_m_ = {middle.x(), middle.y()};
-  const Vector3d base = -(base_G.transpose() * between);
+  const Vector3d base = -(ground.R.transpose() * ground.origin_m);
   q_[0] = base.x();
   q_[1] = base.y();
   q_[2] = base.z();
   return base.z();
+}
+
+/// Where foot `i` is turned to on the ground: as it is, but level.
+void Stance::level(std::size_t i, const Matrix3d& base_G) noexcept TANDEM_RT {
+  const Foot& foot = feet_[i];
+  Matrix3d turn = base_G.transpose() * rotation(pose_, foot.site);
+  Vector3d across = Vector3d::UnitX();
+  if (foot.shape != FootShape::kPoint) {
+    const Vector3d axis = turn * Map<const Vector3d>(foot.axis.data());
+    Vector3d wanted(0.0, 0.0, axis.z() < 0.0 ? -1.0 : 1.0);
+    if (foot.shape == FootShape::kLine) {
+      wanted = Vector3d(axis.x(), axis.y(), 0.0).normalized();
+      across = Vector3d::UnitZ().cross(wanted);
+    }
+    turn = Eigen::Quaterniond::FromTwoVectors(axis, wanted).toRotationMatrix() * turn;
+  }
+  Map<Matrix3d>(placed_[i].turn.data()) = turn;
+  Map<Vector3d>(placed_[i].across.data()) = across;
 }
 
 void Stance::evaluate() noexcept TANDEM_RT {
@@ -143,28 +177,61 @@ void Stance::evaluate() noexcept TANDEM_RT {
                            com_J_.data());
 }
 
-Stance::Vector Stance::error() const noexcept TANDEM_RT {
-  Vector e;
-  for (int i = 0; i < 2; ++i) {
-    const Foot& foot = feet_[static_cast<std::size_t>(i)];
-    const Matrix3d R = rotation(pose_, foot.site);
-    const Matrix3d wanted = Eigen::AngleAxisd(foot.yaw_rad, Vector3d::UnitZ()).toRotationMatrix();
-    const Matrix3d turn = wanted * R.transpose();
-    e.segment<3>(6 * i) =
-        Eigen::Map<const Vector3d>(foot.position_m.data()) - origin(pose_, foot.site);
-    e.segment<3>(6 * i + 3) =
-        0.5 * Vector3d(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1));
-  }
-  e[12] = com_m_[0] - com_[0];
-  e[13] = com_m_[1] - com_[1];
-  return e;
+Vector3d Stance::middle(std::size_t foot) const noexcept TANDEM_RT {
+  const std::size_t site = feet_[foot].site;
+  return origin(pose_, site) +
+         rotation(pose_, site) * Map<const Vector3d>(feet_[foot].middle_m.data());
 }
 
-double Stance::jacobian(int row, std::size_t v_column) const noexcept TANDEM_RT {
+Vector3d Stance::axis(const Row& row) const noexcept TANDEM_RT {
+  const bool across =
+      row.what == What::kTurn && row.axis == 0 && feet_[row.foot].shape == FootShape::kLine;
+  return across ? Vector3d(Map<const Vector3d>(placed_[row.foot].across.data()))
+                : Vector3d(Vector3d::Unit(row.axis));
+}
+
+double Stance::error(const Row& row) const noexcept TANDEM_RT {
+  // G's origin is the middle of the feet.
+  if (row.what == What::kMass) return -com_[static_cast<std::size_t>(row.axis)];
+  const Placed& placed = placed_[row.foot];
+  if (row.what == What::kPlace) {
+    return (Map<const Vector3d>(placed.position_m.data()) - middle(row.foot))[row.axis];
+  }
+  const Matrix3d turn =
+      Map<const Matrix3d>(placed.turn.data()) * rotation(pose_, feet_[row.foot].site).transpose();
+  return 0.5 * axis(row).dot(Vector3d(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0),
+                                      turn(1, 0) - turn(0, 1)));
+}
+
+double Stance::jacobian(const Row& row, std::size_t v_column) const noexcept TANDEM_RT {
   const std::size_t nv = kernels_->nv;
-  if (row >= 12) return com_J_[static_cast<std::size_t>(row - 12) * nv + v_column];
-  const std::size_t site = feet_[static_cast<std::size_t>(row / 6)].site;
-  return site_J_[(6 * site + static_cast<std::size_t>(row % 6)) * nv + v_column];
+  if (row.what == What::kMass) {
+    return com_J_[static_cast<std::size_t>(row.axis) * nv + v_column];
+  }
+  const std::size_t site = feet_[row.foot].site;
+  const auto part = [&](std::size_t k) { return site_J_[(6 * site + k) * nv + v_column]; };
+  const Vector3d angular(part(3), part(4), part(5));
+  if (row.what == What::kTurn) return axis(row).dot(angular);
+  return part(static_cast<std::size_t>(row.axis)) +
+         angular.cross(middle(row.foot) - origin(pose_, site))[row.axis];
+}
+
+void Stance::gather() noexcept TANDEM_RT {
+  for (std::size_t row = 0; row < rows_.size(); ++row) {
+    const auto r = static_cast<Eigen::Index>(row);
+    error_[r] = error(rows_[row]);
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      A_(r, static_cast<Eigen::Index>(i)) = jacobian(rows_[row], columns_[i]);
+    }
+  }
+}
+
+/// Moves the unknowns. The base is level, so that its own axes are G's.
+void Stance::advance(const Eigen::VectorXd& step, double factor) noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const std::size_t column = columns_[i];
+    q_[column < 6 ? column : column + 1] += factor * step[static_cast<Eigen::Index>(i)];
+  }
 }
 
 Stance::Solution Stance::solve(double height_m, int max_steps) noexcept TANDEM_RT {
@@ -172,60 +239,60 @@ Stance::Solution Stance::solve(double height_m, int max_steps) noexcept TANDEM_R
   Solution solution;
   while (solution.steps < max_steps && !solution.converged) {
     evaluate();
-    Matrix A;
-    for (int row = 0; row < kUnknowns; ++row) {
-      for (int column = 0; column < kUnknowns; ++column) {
-        A(row, column) = jacobian(row, columns_[static_cast<std::size_t>(column)]);
-      }
-    }
-    lu_.compute(A);
-    const Vector e = error();
-    Vector step = lu_.solve(e);
-    const double length = step.cwiseAbs().maxCoeff();
+    gather();
+    lu_.compute(A_);
+    step_ = lu_.solve(error_);
+    const double length = step_.cwiseAbs().maxCoeff();
     ++solution.steps;
-    solution.residual = e.cwiseAbs().maxCoeff();
+    solution.residual = error_.cwiseAbs().maxCoeff();
     if (!std::isfinite(length)) return solution;
-    if (length > kLongestStep) step *= kLongestStep / length;
-    // The base is level, so that its own axes are G's and x and y are the first two of v.
-    q_[0] += step[0];
-    q_[1] += step[1];
-    for (int i = 2; i < kUnknowns; ++i) q_[columns_[static_cast<std::size_t>(i)] + 1] += step[i];
+    advance(step_, length > kLongestStep ? kLongestStep / length : 1.0);
     solution.converged = length < kConverged;
   }
   return solution;
 }
 
 void Stance::predict(double dt_s) noexcept TANDEM_RT {
-  q_[0] += v_[0] * dt_s;
-  q_[1] += v_[1] * dt_s;
-  for (int i = 2; i < kUnknowns; ++i) {
-    const std::size_t column = columns_[static_cast<std::size_t>(i)];
-    q_[column + 1] += v_[column] * dt_s;
+  for (const std::size_t column : columns_) {
+    q_[column < 6 ? column : column + 1] += v_[column] * dt_s;
   }
 }
 
 void Stance::move(double rate_m_s) noexcept TANDEM_RT {
-  Vector drift;
-  for (int row = 0; row < kUnknowns; ++row) drift[row] = -jacobian(row, 2) * rate_m_s;
-  const Vector rate = lu_.solve(drift);
+  for (std::size_t row = 0; row < rows_.size(); ++row) {
+    error_[static_cast<Eigen::Index>(row)] = -jacobian(rows_[row], 2) * rate_m_s;
+  }
+  step_ = lu_.solve(error_);
   v_[2] = rate_m_s;
-  for (int i = 0; i < kUnknowns; ++i) v_[columns_[static_cast<std::size_t>(i)]] = rate[i];
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    v_[columns_[i]] = step_[static_cast<Eigen::Index>(i)];
+  }
 }
 
 void Stance::carry(std::span<const double> vdot) noexcept TANDEM_RT {
   kernels_->inverse_dynamics(q_.data(), v_.data(), vdot.data(), wrench_.data(), tau_.data());
-  carry_on_both_feet(*kernels_, {feet_[0].site, feet_[1].site}, q_, pose_, site_J_, tau_);
+  support_.carry(*kernels_, q_, pose_, site_J_, tau_);
 }
 
 bool Stance::in_leg(std::size_t j) const noexcept {
-  return std::find(columns_.begin() + 2, columns_.end(), map_.v_index(j)) != columns_.end();
+  return std::ranges::find(legs_, map_.v_index(j)) != legs_.end();
 }
 
 double Stance::residual() noexcept TANDEM_RT {
   evaluate();
-  return error().cwiseAbs().maxCoeff();
+  gather();
+  return error_.cwiseAbs().maxCoeff();
 }
 
-void Stance::archive(Archive& ar) { ar(feet_, com_m_, q_, v_); }
+double Stance::slip_m() noexcept TANDEM_RT {
+  evaluate();
+  double most = 0.0;
+  for (std::size_t i = 0; i < feet_.size(); ++i) {
+    most = std::max(most, (middle(i) - Map<const Vector3d>(placed_[i].position_m.data())).norm());
+  }
+  return most;
+}
+
+void Stance::archive(Archive& ar) { ar(placed_, q_, v_); }
 
 }  // namespace tandem

@@ -78,7 +78,7 @@ TEST(GravityCompensation, RefusesAStiffnessThatIsTooMuch) {
 TEST(GravityCompensation, CarriesARobotThatStandsOnBothFeet) {
   test::Harness run(test::biped_robot(), "gravity_compensation", "", test::biped_kernels());
   ASSERT_EQ(run.problem(), "");
-  Stance stance = Stance::make(run.robot, test::biped_kernels(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(run.robot, test::biped_kernels(), foot_names(run.robot)).value();
   const double height = stance.place(run.robot.postures[0].position_rad);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   ASSERT_TRUE(stance.solve(height, 50).converged);
@@ -116,7 +116,8 @@ TEST(GravityCompensation, TurnsWithTheImu) {
   std::vector<double> pose(24), twist(12), J(12 * test::kBipedNv);
   test::biped_site_motion(q.data(), nullptr, nullptr, pose.data(), twist.data(), rest.data());
   test::biped_site_jacobians(q.data(), J.data());
-  carry_on_both_feet(*test::biped_kernels(), {0, 1}, q, pose, J, tau);
+  Support support(find_feet(robot, *test::biped_kernels(), foot_names(robot)).value());
+  support.carry(*test::biped_kernels(), q, pose, J, tau);
   const int ankle = robot.joint_index("LAnkSag");
   EXPECT_NEAR(run.command.torque_Nm()[static_cast<std::size_t>(ankle)], tau[6 + 5], 1e-9);
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controllers/feet.hpp"
 #include "controllers/stance.hpp"
 #include "tests/controllers/harness.hpp"
 #include "tests/support/test_robot.hpp"
@@ -21,7 +22,8 @@ class SquatRobots : public testing::TestWithParam<Case> {
 };
 
 TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
-  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  Stance stance =
+      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   for (int i = 0; i <= 100; ++i) {
@@ -32,7 +34,8 @@ TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
 }
 
 TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
-  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  Stance stance =
+      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   const double rate = GetParam().depth_m / 2.0;
@@ -47,8 +50,9 @@ TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
 }
 
 TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
-  // The same torques and the ground's two wrenches, through inverse dynamics once more.
-  Stance stance = Stance::make(loaded.robot, loaded.kernels.get(), "l_sole", "r_sole").value();
+  // The same torques and the ground's wrenches, through inverse dynamics once more.
+  Stance stance =
+      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
   const double height = stance.place(posture);
   const tandem_kernels& kernels = *loaded.kernels;
   ASSERT_TRUE(stance.solve(height - GetParam().depth_m, 50).converged);
@@ -56,14 +60,18 @@ TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
   const std::vector<double> rest(kernels.nv);
   stance.carry(rest);
   std::vector<double> M(kernels.nv * kernels.nv), wrench(6 * kernels.wrenches);
-  const double half = 0.5 * kernels.mass_kg * 9.81;
+  const double share = kernels.mass_kg * 9.81 / kernels.wrenches;
   double middle = 0.0;  // of the contact points, ahead of the sole's origin
   for (const auto& point : loaded.robot.contact.feet[0].points_m) {
     middle += point[0] / static_cast<double>(loaded.robot.contact.feet[0].points_m.size());
   }
-  for (std::uint32_t w = 0; w < kernels.wrenches; ++w) {
-    wrench[6 * w + 2] = half;
-    wrench[6 * w + 4] = -middle * half;
+  std::vector<double> pose(12 * kernels.sites), twist(6 * kernels.sites), acceleration(twist);
+  kernels.site_motion(stance.q().data(), rest.data(), rest.data(), pose.data(), twist.data(),
+                      acceleration.data());
+  const auto feet = find_feet(loaded.robot, kernels, foot_names(loaded.robot)).value();
+  for (std::size_t w = 0; w < feet.size(); ++w) {
+    for (std::size_t i = 0; i < 3; ++i) wrench[6 * w + i] = share * pose[12 * feet[w].site + 6 + i];
+    wrench[6 * w + 4] = -middle * share;  // of a sole, whose site is upright
   }
   std::vector<double> tau(kernels.nv);
   kernels.inverse_dynamics(stance.q().data(), rest.data(), rest.data(), wrench.data(), tau.data());
@@ -93,7 +101,8 @@ TEST_P(SquatRobots, TheWholeSquatRunsWithinEveryLimit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Config, SquatRobots,
-                         testing::Values(Case{"coman", 0.10}, Case{"walkman", 0.30}),
+                         testing::Values(Case{"coman", 0.10}, Case{"walkman", 0.30},
+                                         Case{"anymal_c", 0.15}),
                          [](const auto& made) { return std::string(made.param.robot); });
 
 }  // namespace

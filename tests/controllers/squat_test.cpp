@@ -26,11 +26,11 @@ TEST(MinJerk, IsTheClosedFormAndItsDerivatives) {
 class StanceTest : public testing::Test {
  protected:
   hal::RobotConfig robot = test::biped_robot();
-  Stance stance = Stance::make(robot, test::biped_kernels(), "l_sole", "r_sole").value();
+  Stance stance = Stance::make(robot, test::biped_kernels(), foot_names(robot)).value();
   double height = stance.place(robot.postures[0].position_rad);
 };
 
-TEST_F(StanceTest, SolvesEighteenEquationsToRounding) {
+TEST_F(StanceTest, SolvesFourteenEquationsToRounding) {
   for (const double down : {0.0, 0.1, 0.2, 0.3}) {
     ASSERT_TRUE(stance.solve(height - down, 50).converged) << down;
     EXPECT_LT(stance.residual(), 1e-9) << down;
@@ -188,9 +188,9 @@ TEST(Squat, RefusesARobotThatCannotSquat) {
                 .find("needs the robot's generated model"),
             std::string::npos);
   EXPECT_NE(test::Harness(test::biped_robot(), "squat",
-                          std::string(kSquat) + "left_sole = 'l_sloe'\n", test::biped_kernels())
+                          std::string(kSquat) + "feet = ['l_sloe']\n", test::biped_kernels())
                 .problem()
-                .find("has no site 'l_sloe' (did you mean 'l_sole'?)"),
+                .find("has no foot 'l_sloe' (did you mean 'l_sole'?)"),
             std::string::npos);
   hal::RobotConfig robot = test::biped_robot();
   robot.joints.pop_back();

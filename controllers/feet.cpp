@@ -1,0 +1,70 @@
+#include "controllers/feet.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "base/nearest.hpp"
+#include "controllers/model_map.hpp"
+
+namespace tandem {
+namespace {
+
+/// Middle, shape and axis from the points: their spread along its principal axes.
+void describe(Foot& foot) {
+  using Vector3 = Eigen::Vector3d;
+  const auto count = static_cast<double>(foot.points_m.size());
+  Vector3 middle = Vector3::Zero();
+  for (const auto& point : foot.points_m) middle += Eigen::Map<const Vector3>(point.data()) / count;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const auto& point : foot.points_m) {
+    const Vector3 from = Eigen::Map<const Vector3>(point.data()) - middle;
+    spread += from * from.transpose() / count;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);  // the widest is the last
+  const double extent = kFootExtent_m * kFootExtent_m;
+  Vector3 axis = Vector3::Zero();
+  if (axes.eigenvalues()[1] > extent) {
+    foot.shape = FootShape::kSurface;
+    axis = axes.eigenvectors().col(0);
+  } else if (axes.eigenvalues()[2] > extent) {
+    foot.shape = FootShape::kLine;
+    axis = axes.eigenvectors().col(2);
+  }
+  Eigen::Map<Vector3>(foot.middle_m.data()) = middle;
+  Eigen::Map<Vector3>(foot.axis.data()) = axis;
+}
+
+}  // namespace
+
+std::vector<std::string> foot_names(const hal::RobotConfig& robot) {
+  std::vector<std::string> names;
+  for (const hal::FootConfig& foot : robot.contact.feet) names.push_back(foot.site);
+  return names;
+}
+
+Result<std::vector<Foot>> find_feet(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+                                    std::span<const std::string> names) {
+  if (names.empty()) {
+    return fail("the robot has no foot to stand on",
+                "give each a [[contact.foot]] in " + robot.file + ": its site and its points");
+  }
+  std::vector<Foot> feet;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(robot.contact.feet, name, &hal::FootConfig::site);
+    if (found == robot.contact.feet.end()) {
+      return fail("the robot has no foot '" + name + "'", suggest(name, foot_names(robot)));
+    }
+    if (std::ranges::find(feet, name, &Foot::name) != feet.end()) {
+      return fail("the foot '" + name + "' stands twice", "name it once");
+    }
+    const Result<std::size_t> site = site_index(kernels, name);
+    if (!site) return std::unexpected(site.error());
+    Foot& foot = feet.emplace_back(Foot{.name = name, .site = *site, .points_m = found->points_m});
+    if (foot.points_m.empty()) foot.points_m.emplace_back();
+    describe(foot);
+  }
+  return feet;
+}
+
+}  // namespace tandem
