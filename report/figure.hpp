@@ -15,6 +15,9 @@ enum class CurveStyle : std::uint8_t {
   kComputed,     ///< dashed, orange: what a model says
   kSecond,       ///< solid, purple: the other side, or the other log
   kThird,        ///< solid, grey
+  kFourth,       ///< solid, green
+  kFifth,        ///< solid, brown
+  kSixth,        ///< solid, light blue
   kStick,        ///< solid with round joints, blue
   kStickSecond,  ///< the same, dark grey
   kStickThird,   ///< the same, light grey

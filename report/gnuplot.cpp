@@ -33,10 +33,13 @@ set style line 2 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
 set style line 3 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
 set style line 4 lw 2.0 lc rgb '#8e4aa8' dt solid
 set style line 5 lw 1.6 lc rgb '#8a939e' dt solid
-set style line 6 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
-set style line 7 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
-set style line 8 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
-set style line 9 lw 1.8 lc rgb "#3a424c" dt (3,4)
+set style line 6 lw 2.0 lc rgb '#3d8b57' dt solid
+set style line 7 lw 2.0 lc rgb '#a0612b' dt solid
+set style line 8 lw 2.0 lc rgb '#5cb3d6' dt solid
+set style line 9 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
+set style line 10 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
+set style line 11 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
+set style line 12 lw 1.8 lc rgb "#3a424c" dt (3,4)
 set key at graph 0, graph 1.085 left top horizontal reverse Left samplen 1.8 font ',12'
 )";
 
@@ -137,7 +140,7 @@ std::string plot_command(const Figure& figure, std::size_t index) {
                        line_style(curve.style), title);
   }
   for (const Level& level : figure.levels) {
-    out += fmt::format("{}{:.9g} with lines ls 9 notitle", out.empty() ? "plot " : ", ", level.y);
+    out += fmt::format("{}{:.9g} with lines ls 12 notitle", out.empty() ? "plot " : ", ", level.y);
   }
   return out + "\n";
 }

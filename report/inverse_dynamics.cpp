@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <string_view>
 
 namespace tandem::report {
 namespace {
@@ -37,6 +38,36 @@ Matrix6 response(const tandem_kernels& k, const double* q, Pair pair) {
   return out;
 }
 
+/// The motion's wrenches at a row, turned into their sites' frames.
+class Acting {
+ public:
+  explicit Acting(const tandem_kernels& k)
+      : k_(k), pose_(12UL * k.sites), twist_(6UL * k.sites), acceleration_(6UL * k.sites) {
+    for (std::uint32_t w = 0; w < k.wrenches; ++w) {
+      for (std::uint32_t site = 0; site < k.sites; ++site) {
+        if (std::string_view(k.site_names[site]) == k.wrench_names[w]) sites_.push_back(site);
+      }
+    }
+  }
+  void turn(const double* q, const std::vector<double>& in_W, std::vector<double>& wrench) {
+    const std::vector<double> rest(k_.nv, 0.0);
+    k_.site_motion(q, rest.data(), rest.data(), pose_.data(), twist_.data(), acceleration_.data());
+    for (std::size_t w = 0; w < sites_.size(); ++w) {
+      using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+      const Eigen::Map<const RowMajor3> R(&pose_[12 * sites_[w]]);
+      for (const std::size_t part : {6 * w, 6 * w + 3}) {
+        Eigen::Map<Eigen::Vector3d>(wrench.data() + part) =
+            R.transpose() * Eigen::Map<const Eigen::Vector3d>(&in_W[part]);
+      }
+    }
+  }
+
+ private:
+  const tandem_kernels& k_;
+  std::vector<std::size_t> sites_;
+  std::vector<double> pose_, twist_, acceleration_;
+};
+
 /// Pairs of a sensor and the one site whose wrench it measures.
 std::vector<Pair> find_pairs(const tandem_kernels& k, const double* q) {
   std::vector<Pair> pairs;
@@ -52,6 +83,13 @@ std::vector<Pair> find_pairs(const tandem_kernels& k, const double* q) {
 }
 
 }  // namespace
+
+bool wrenches_known(const tandem_kernels& k, const Motion& motion) {
+  if (k.wrenches == 0 || !motion.wrenches.empty()) return true;
+  std::vector<bool> seen(k.wrenches, false);
+  for (const Pair pair : find_pairs(k, motion.q.front().data())) seen[pair.site] = true;
+  return std::ranges::all_of(seen, [](bool one) { return one; });
+}
 
 std::vector<double> derivative(std::span<const double> values, double step_s, std::size_t half) {
   std::vector<double> out(values.size(), 0.0);
@@ -85,13 +123,15 @@ std::vector<std::vector<double>> inverse_dynamics(const tandem_kernels& k, const
     for (std::size_t row = 0; row < rows; ++row) vdot[row][i] = rate[row];
   }
   const std::vector<Pair> pairs = find_pairs(k, motion.q.front().data());
-  std::vector<double> wrench(6UL * k.wrenches, 0.0);
+  Acting acting(k);
+  const std::vector<double> none(6UL * k.wrenches, 0.0);
+  std::vector<double> wrench = none;
   std::vector<double> unloaded(6UL * k.sensors);
   for (std::size_t row = 0; row < rows; ++row) {
     const double* q = motion.q[row].data();
     const double* v = motion.v[row].data();
-    std::ranges::fill(wrench, 0.0);
-    k.sensor_wrenches(q, v, vdot[row].data(), wrench.data(), unloaded.data());
+    if (!motion.wrenches.empty()) acting.turn(q, motion.wrenches[row], wrench);
+    k.sensor_wrenches(q, v, vdot[row].data(), none.data(), unloaded.data());
     for (const Pair pair : pairs) {
       const Eigen::Map<const Vector6> measured(motion.sensors[row].data() + 6 * pair.sensor);
       const Eigen::Map<const Vector6> own(unloaded.data() + 6 * pair.sensor);

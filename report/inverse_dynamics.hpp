@@ -16,11 +16,18 @@ struct Motion {
   std::vector<std::vector<double>> q;        ///< rows of nq, model order
   std::vector<std::vector<double>> v;        ///< rows of nv
   std::vector<std::vector<double>> sensors;  ///< rows of 6 per kernel sensor: what was measured
+  /// Rows of 6 per kernel wrench: what acted there, force and moment about the site's origin in W
+  /// axes. Empty: nobody knows.
+  std::vector<std::vector<double>> wrenches;
 };
 
-/// tau (nv) of each row: inverse dynamics with the acceleration differenced from v, and with
-/// those wrenches at the wrench sites that explain what the six-axis sensors measured. A site
-/// that no sensor sees, or that shares its sensor with another, carries no wrench.
+/// Whether the wrench at every wrench site can be known: a six-axis sensor sees it and no other,
+/// or the motion has it. If not, inverse_dynamics() would be wrong by what acts there.
+[[nodiscard]] bool wrenches_known(const tandem_kernels& kernels, const Motion& motion);
+
+/// tau (nv) of each row: inverse dynamics with the acceleration differenced from v. The wrench at
+/// a wrench site is the one that explains what its six-axis sensor measured; at a site without a
+/// sensor of its own it is the motion's, or none.
 [[nodiscard]] std::vector<std::vector<double>> inverse_dynamics(const tandem_kernels& kernels,
                                                                 const Motion& motion);
 

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
+#include <numbers>
 
 namespace tandem::report {
 namespace {
@@ -65,35 +66,15 @@ void add_point(Curve& curve, const Eigen::Vector3d& point, double shift_m) {
   curve.y.push_back(point.z());
 }
 
-struct Spread {
-  double low_m = 0.0, high_m = 0.0;  ///< heights of the first figure
-  double pitch_m = 0.0;              ///< from one figure to the next, so that none touch
+/// A foot's contact points in W, and the last body before them.
+struct FootPoints {
+  std::size_t body = 0;
+  std::vector<Eigen::Vector3d> points_m;
 };
 
-Spread spread(const model::Tree& tree, const hal::RobotConfig& robot,
-              std::span<const PostureSample> samples) {
-  Spread out;
-  if (!robot.contact.feet.empty()) out.low_m = out.high_m = robot.contact.height_m;
-  double widest = 0.0;
-  for (const PostureSample& sample : samples) {
-    double left = 1e300;
-    double right = -1e300;
-    for (const model::Placement& body : body_placements(tree, robot, sample)) {
-      left = std::min(left, body.p.x());
-      right = std::max(right, body.p.x());
-      if (&sample != &samples.front()) continue;
-      out.low_m = std::min(out.low_m, body.p.z());
-      out.high_m = std::max(out.high_m, body.p.z());
-    }
-    widest = std::max(widest, right - left);
-  }
-  out.pitch_m = std::max(0.6 * (out.high_m - out.low_m), 1.2 * widest);
-  return out;
-}
-
-/// The soles as lines from heel to toe.
-void add_soles(Curve& curve, const model::Tree& tree, const hal::RobotConfig& robot,
-               std::span<const model::Placement> bodies, double shift_m) {
+std::vector<FootPoints> feet_of(const model::Tree& tree, const hal::RobotConfig& robot,
+                                std::span<const model::Placement> bodies) {
+  std::vector<FootPoints> feet;
   for (const hal::FootConfig& foot : robot.contact.feet) {
     for (const hal::SiteConfig& site : robot.model.sites) {
       const int index = site.name == foot.site ? tree.link_index(site.link) : -1;
@@ -105,18 +86,83 @@ void add_soles(Curve& curve, const model::Tree& tree, const hal::RobotConfig& ro
       };
       const model::Placement in_link{(rotation(2) * rotation(1) * rotation(0)).matrix(),
                                      Eigen::Map<const Eigen::Vector3d>(site.xyz_m.data())};
-      const model::Placement sole =
-          bodies[static_cast<std::size_t>(link.body)] * link.in_body * in_link;
-      const auto [heel, toe] = std::ranges::minmax_element(
-          foot.points_m, {}, [](const std::array<double, 3>& p) { return p[0]; });
-      for (const auto& point : {*heel, *toe}) {
-        const Eigen::Vector3d in_site(point[0], 0.0, point[2]);
-        add_point(curve, sole.R * in_site + sole.p, shift_m);
+      FootPoints& one = feet.emplace_back();
+      one.body = static_cast<std::size_t>(link.body);
+      const model::Placement sole = bodies[one.body] * link.in_body * in_link;
+      for (const auto& point : foot.points_m) {
+        one.points_m.push_back(sole.R * Eigen::Map<const Eigen::Vector3d>(point.data()) + sole.p);
       }
-      curve.x.push_back(kGap);
-      curve.y.push_back(kGap);
+      if (one.points_m.empty()) one.points_m.push_back(sole.p);
     }
   }
+  return feet;
+}
+
+struct Spread {
+  double low_m = 0.0, high_m = 0.0;  ///< heights of the first figure
+  double pitch_m = 0.0;              ///< from one figure to the next, so that none touch
+  double line_m = 0.0;               ///< between lines of text below
+};
+
+Spread spread(const model::Tree& tree, const hal::RobotConfig& robot,
+              std::span<const PostureSample> samples) {
+  constexpr double kAspect = 1.9;  // of the drawing: width over height
+  Spread out;
+  if (!robot.contact.feet.empty()) out.low_m = out.high_m = robot.contact.height_m;
+  double widest = 0.0;
+  for (const PostureSample& sample : samples) {
+    double left = 1e300;
+    double right = -1e300;
+    const auto bodies = body_placements(tree, robot, sample);
+    for (const model::Placement& body : bodies) {
+      left = std::min(left, body.p.x());
+      right = std::max(right, body.p.x());
+      if (&sample != &samples.front()) continue;
+      out.low_m = std::min(out.low_m, body.p.z());
+      out.high_m = std::max(out.high_m, body.p.z());
+    }
+    for (const FootPoints& foot : feet_of(tree, robot, bodies)) {
+      for (const Eigen::Vector3d& point : foot.points_m) {
+        left = std::min(left, point.x());
+        right = std::max(right, point.x());
+      }
+    }
+    widest = std::max(widest, right - left);
+  }
+  out.pitch_m = std::max(0.6 * (out.high_m - out.low_m), 1.2 * widest);
+  const double across_m = out.pitch_m * static_cast<double>(samples.size());
+  out.line_m = 0.095 * std::max(out.high_m - out.low_m, across_m / kAspect);
+  return out;
+}
+
+/// The feet as lines from the last joint to the hindmost and on to the foremost contact point.
+void add_feet(Curve& curve, std::span<const FootPoints> feet,
+              std::span<const model::Placement> bodies, double shift_m) {
+  for (const FootPoints& foot : feet) {
+    const auto [heel, toe] = std::ranges::minmax_element(
+        foot.points_m, {}, [](const Eigen::Vector3d& p) { return p.x(); });
+    add_point(curve, bodies[foot.body].p, shift_m);
+    add_point(curve, *heel, shift_m);
+    add_point(curve, *toe, shift_m);
+    curve.x.push_back(kGap);
+    curve.y.push_back(kGap);
+  }
+}
+
+/// Whether the bodies' centres of mass move more to the sides than ahead, from moment to moment.
+bool moves_sideways(const model::Tree& tree, const hal::RobotConfig& robot,
+                    std::span<const PostureSample> samples) {
+  const auto first = body_placements(tree, robot, samples.front());
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  for (const PostureSample& sample : samples) {
+    const auto bodies = body_placements(tree, robot, sample);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Eigen::Vector3d com = tree.bodies[i].inertia.com_m;
+      const Eigen::Vector3d moved = bodies[i].R * com + bodies[i].p - first[i].R * com - first[i].p;
+      way = way.cwiseMax(moved.cwiseAbs());
+    }
+  }
+  return way.y() > way.x();
 }
 
 }  // namespace
@@ -140,19 +186,27 @@ std::vector<model::Placement> body_placements(const model::Tree& tree,
 }
 
 Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
-                      std::span<const PostureSample> samples) {
+                      std::span<const PostureSample> moments) {
+  const bool legged = !robot.contact.feet.empty();
+  const bool from_front = !legged && moves_sideways(tree, robot, moments);
+  std::vector<PostureSample> samples(moments.begin(), moments.end());
+  if (from_front) {  // W's y is drawn to the right
+    const Eigen::AngleAxisd view(-0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ());
+    const model::Placement turned{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
+    for (PostureSample& sample : samples) sample.base = turned * sample.base;
+  }
   Figure figure;
   figure.name = "posture";
-  figure.title = "Posture, seen from the robot's right";
+  figure.title =
+      from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
   figure.y_label = "z [m]";
   figure.equal_axes = true;
   Curve others{"arms and head", CurveStyle::kStickThird, {}, {}};
-  const bool legged = !robot.contact.feet.empty();
   Curve trunk{legged ? "trunk" : robot.name, CurveStyle::kStickSecond, {}, {}};
   Curve legs{"legs", CurveStyle::kStick, {}, {}};
   const std::vector<Limb> limbs = limbs_of(tree, robot);
 
-  const auto [low, high, pitch_m] = spread(tree, robot, samples);
+  const auto [low, high, pitch_m, line_m] = spread(tree, robot, samples);
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
     const auto bodies = body_placements(tree, robot, samples[s]);
@@ -168,11 +222,10 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
       curve.x.push_back(kGap);
       curve.y.push_back(kGap);
     }
-    add_soles(legs, tree, robot, bodies, shift_m);
+    add_feet(legs, feet_of(tree, robot, bodies), bodies, shift_m);
     const double x = shift_m + samples[s].base.p.x();
-    figure.notes.push_back({samples[s].label, x, low - 0.08 * (high - low)});
-    figure.notes.push_back(
-        {fmt::format("{:.2f} s", samples[s].time_s), x, low - 0.17 * (high - low)});
+    figure.notes.push_back({samples[s].label, x, low - line_m});
+    figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x, low - 2.0 * line_m});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m, false});
   for (Curve* curve : {&others, &trunk, &legs}) {

@@ -21,10 +21,11 @@ struct PostureSample {
 };
 
 /// The side view, x to the right and z up, of several moments beside each other: legs (what
-/// carries a contact's site) blue, the trunk dark, everything else light.
+/// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet
+/// that moves more to its sides than ahead is seen from the front, y to the right.
 /// @pre every joint of the tree is one of the robot's.
 [[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
-                                    std::span<const PostureSample> samples);
+                                    std::span<const PostureSample> moments);
 
 /// Placement in W of every body's frame, in the tree's order.
 [[nodiscard]] std::vector<model::Placement> body_placements(const model::Tree& tree,

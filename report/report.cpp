@@ -45,6 +45,27 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
   return table;
 }
 
+/// Of every foot, by the simulation's truth; without rows when the log has none.
+PageTable feet_table(const RunData& run, const std::string& side) {
+  PageTable table{"Feet" + side,
+                  "Vertical force of the ground in the simulation, and the farthest that a foot "
+                  "was from where it last touched down.",
+                  {"foot", "mean [N]", "max [N]", "slip [mm]"},
+                  {}};
+  for (const FootFigures& foot : run.feet()) {
+    table.rows.push_back({foot.name, fmt::format("{:.2f}", foot.mean_force_N),
+                          fmt::format("{:.2f}", foot.max_force_N),
+                          fmt::format("{:.3f}", foot.slip_m * 1e3)});
+  }
+  return table;
+}
+
+void add_tables(const RunData& run, const std::string& side, Page& page) {
+  page.tables.push_back(tracking_table(run, side));
+  PageTable feet = feet_table(run, side);
+  if (!feet.rows.empty()) page.tables.push_back(std::move(feet));
+}
+
 Status create(const std::string& folder) {
   std::error_code problem;
   std::filesystem::create_directories(folder, problem);
@@ -63,11 +84,11 @@ Page page_of(const RunData& run, const RunData* other) {
                                 : fmt::format("{}: two runs", run.info.robot);
   page.lead = "Time 0 is the first cycle of the controllers, after the drives' bring-up.";
   add_facts(run, other == nullptr ? "" : " A", page.facts);
-  page.tables.push_back(tracking_table(run, other == nullptr ? "" : " A"));
+  add_tables(run, other == nullptr ? "" : " A", page);
   if (other == nullptr) return page;
   page.lead += " A is " + run.path + ", B is " + other->path + ".";
   add_facts(*other, " B", page.facts);
-  page.tables.push_back(tracking_table(*other, " B"));
+  add_tables(*other, " B", page);
   return page;
 }
 
@@ -93,9 +114,9 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
   const tandem_kernels* kernels = find_kernels(*run);
   if (kernels == nullptr) {
     files.remarks.push_back("no inverse dynamics: there is no kernel library that fits this log");
-  } else if (kernels->floating_base != 0 && run->base.empty()) {
-    files.remarks.push_back("no inverse dynamics: the log lacks the base's motion (no truth)");
-    kernels = nullptr;
+  } else if (kernels->floating_base != 0 && !run->truth()) {
+    files.remarks.push_back(
+        "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
   }
   const std::vector<Figure> figures = figures_of(*run, over, kernels);
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());

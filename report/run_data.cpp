@@ -162,8 +162,15 @@ Status read_command(const log::LogFile& file, RunData& run) {
 
 Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
-  auto table = file.read(
-      kTruth, columns_of(file, kTruth, {"base_position_m", "base_quaternion", "base_velocity"}));
+  std::vector<log::Column> columns =
+      columns_of(file, kTruth, {"base_position_m", "base_quaternion", "base_velocity"});
+  const std::size_t feet = 3 * run.robot.contact.feet.size();
+  if (feet > 0) {  // a robot without feet has no such fields
+    const auto of_feet =
+        columns_of(file, kTruth, {"foot_position_m", "foot_force_N", "foot_moment_Nm"});
+    columns.insert(columns.end(), of_feet.begin(), of_feet.end());
+  }
+  auto table = file.read(kTruth, columns);
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
   // The log of a killed run may end between a state and its truth.
@@ -172,10 +179,14 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
       !std::equal(run.time_s.begin(), run.time_s.begin() + rows, table->time_s.begin())) {
     return {};
   }
-  run.base = std::move(table->columns);
+  run.base = take(*table, 0, 13);
+  run.foot_position_m = take(*table, 13, feet);
+  run.foot_force_N = take(*table, 13 + feet, feet);
+  run.foot_moment_Nm = take(*table, 13 + 2 * feet, feet);
   run.time_s.resize(rows);
   for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm,
-                           &run.reference_rad, &run.sensor, &run.base}) {
+                           &run.reference_rad, &run.sensor, &run.base, &run.foot_position_m,
+                           &run.foot_force_N, &run.foot_moment_Nm}) {
     for (std::vector<double>& column : *columns) column.resize(rows);
   }
   return {};
@@ -190,7 +201,7 @@ std::size_t RunData::first_channel(std::size_t index) const {
 }
 
 model::Placement RunData::base_placement(std::size_t row) const {
-  if (base.size() != 13 || !robot.model.floating_base) return {};
+  if (!truth() || !robot.model.floating_base) return {};
   const Eigen::Quaterniond rotation(base[6][row], base[3][row], base[4][row], base[5][row]);
   return {rotation.normalized().toRotationMatrix(),
           Eigen::Vector3d(base[0][row], base[1][row], base[2][row])};
@@ -220,6 +231,26 @@ std::vector<Tracking> RunData::tracking() const {
     all.push_back(one);
   }
   std::ranges::stable_sort(all, std::ranges::greater{}, &Tracking::rms_rad);
+  return all;
+}
+
+std::vector<FootFigures> RunData::feet() const {
+  std::vector<FootFigures> all;
+  for (std::size_t i = 0; truth() && i < robot.contact.feet.size(); ++i) {
+    FootFigures one{.name = robot.contact.feet[i].site};
+    const std::vector<double>& up_N = foot_force_N[3 * i + 2];
+    const std::vector<double>& x = foot_position_m[3 * i];
+    const std::vector<double>& y = foot_position_m[3 * i + 1];
+    std::size_t touched = 0;
+    for (std::size_t row = 0; row < rows(); ++row) {
+      one.mean_force_N += up_N[row] / static_cast<double>(rows());
+      one.max_force_N = std::max(one.max_force_N, up_N[row]);
+      if (!(up_N[row] > 0.0)) continue;
+      if (row > 0 && !(up_N[row - 1] > 0.0)) touched = row;
+      one.slip_m = std::max(one.slip_m, std::hypot(x[row] - x[touched], y[row] - y[touched]));
+    }
+    all.push_back(one);
+  }
   return all;
 }
 

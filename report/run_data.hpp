@@ -23,6 +23,14 @@ struct Tracking {
   double max_torque_Nm = 0.0;  ///< the largest magnitude measured
 };
 
+/// What the ground did to a foot, by the simulation's truth.
+struct FootFigures {
+  std::string name;           ///< of its site
+  double mean_force_N = 0.0;  ///< vertical
+  double max_force_N = 0.0;
+  double slip_m = 0.0;  ///< farthest, level, from where it last touched down
+};
+
 struct RunData {
   std::string path;
   log::RunInfo info;
@@ -37,10 +45,13 @@ struct RunData {
   double step_s = 0.0;                              ///< between rows
   std::vector<double> time_s;                       ///< of each row, 0 when the controllers started
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
-  Columns reference_rad;  ///< [joint][row]; NaN when not under position control
-  Columns sensor;         ///< [channel][row], all sensors one after another
-  Columns base;           ///< [13][row]: position, quaternion xyzw, velocity of the base
-                          ///< in its frame; empty when the log has no truth
+  Columns reference_rad;    ///< [joint][row]; NaN when not under position control
+  Columns sensor;           ///< [channel][row], all sensors one after another
+  Columns base;             ///< [13][row]: position, quaternion xyzw, velocity of the base
+                            ///< in its frame; empty when the log has no truth
+  Columns foot_position_m;  ///< [3 feet][row]: origin of each foot's site in W; empty as base
+  Columns foot_force_N;     ///< [3 feet][row]: of the ground on each foot, W axes; empty as base
+  Columns foot_moment_Nm;   ///< [3 feet][row]: about the site's origin, W axes; empty as base
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
   /// First channel of sensor `index` in `sensor`.
@@ -49,8 +60,12 @@ struct RunData {
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
   /// Every joint's position at a row, in the image's order.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
+  /// Whether the log tells where the base was and what the ground did.
+  [[nodiscard]] bool truth() const { return !base.empty(); }
   /// Joints that were under position control, the worst first.
   [[nodiscard]] std::vector<Tracking> tracking() const;
+  /// One per foot; none when the log has no truth.
+  [[nodiscard]] std::vector<FootFigures> feet() const;
 };
 
 /// Errors: as log::LogFile::open; a log without state and command; one without its robot's files.

@@ -70,21 +70,22 @@ Curve curve_of(const RunData& run, std::string label, CurveStyle style,
   return curve;
 }
 
-Figure hip_figure(const RunData& run, const RunData* other, int joint) {
-  const std::string& name = run.robot.joints[at(joint)].name;
+Figure hip_figure(const RunData& run, const RunData* other, const Subjects& subjects) {
+  const std::size_t joint = at(subjects.hip);
+  const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "hip_position";
-  figure.title = std::string(legged(run) ? "Hip" : "Joint") + " position against its reference";
+  figure.title = (subjects.leg ? "Hip" : "Joint") + std::string(" position against its reference");
   figure.x_label = "time [s]";
   figure.y_label = name + " [deg]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
-                                   CurveStyle::kMeasured, run.position_rad[at(joint)], kDegrees));
+                                   CurveStyle::kMeasured, run.position_rad[joint], kDegrees));
   if (other != nullptr) {
     figure.curves.push_back(curve_of(*other, "measured, B", CurveStyle::kSecond,
-                                     other->position_rad[at(joint)], kDegrees));
+                                     other->position_rad[joint], kDegrees));
   }
   figure.curves.push_back(curve_of(run, other == nullptr ? "reference" : "reference, A",
-                                   CurveStyle::kReference, run.reference_rad[at(joint)], kDegrees));
+                                   CurveStyle::kReference, run.reference_rad[joint], kDegrees));
   return figure;
 }
 
@@ -100,63 +101,124 @@ double weight_N(const RunData& run) {
   return mass_kg * gravity_m_s2(run);
 }
 
-/// Weight of the links beyond a sensor's joint [N]: what a foot's sensor does not carry.
-double weight_beyond_N(const RunData& run, int sensor) {
-  const int first = run.tree.child_link_index(run.robot.sensors[at(sensor)].joint);
-  if (first < 0) return 0.0;
+/// Which links lie beyond a joint, away from the root.
+std::vector<bool> links_beyond(const RunData& run, const std::string& joint) {
   std::vector<bool> beyond(run.tree.links.size(), false);
-  double mass_kg = 0.0;
-  for (std::size_t i = at(first); i < run.tree.links.size(); ++i) {
+  const int first = run.tree.child_link_index(joint);
+  for (std::size_t i = at(std::max(first, 0)); first >= 0 && i < beyond.size(); ++i) {
     const int parent = run.tree.links[i].parent;
     beyond[i] = i == at(first) || (parent >= 0 && beyond[at(parent)]);
+  }
+  return beyond;
+}
+
+/// Weight of the links beyond a sensor's joint [N]: what a foot's sensor does not carry.
+double weight_beyond_N(const RunData& run, int sensor) {
+  const std::vector<bool> beyond = links_beyond(run, run.robot.sensors[at(sensor)].joint);
+  double mass_kg = 0.0;
+  for (std::size_t i = 0; i < beyond.size(); ++i) {
     if (beyond[i]) mass_kg += run.tree.links[i].inertia.mass_kg;
   }
   return mass_kg * gravity_m_s2(run);
 }
 
+/// Whether a sensor measures what a foot carries; on a robot without feet, whether it is six-axis.
+bool on_a_leg(const RunData& run, const hal::SensorConfig& sensor) {
+  if (sensor.type != hal::SensorType::kForceTorque) return false;
+  if (!legged(run)) return true;
+  const std::vector<bool> beyond = links_beyond(run, sensor.joint);
+  return std::ranges::any_of(run.robot.contact.feet, [&](const hal::FootConfig& foot) {
+    return std::ranges::any_of(run.robot.model.sites, [&](const hal::SiteConfig& site) {
+      const int link = run.tree.link_index(site.link);
+      return site.name == foot.site && link >= 0 && beyond[at(link)];
+    });
+  });
+}
+
+/// The share of the weight that every foot carries when all carry alike.
+std::string share_text(std::size_t feet) {
+  if (feet == 1) return "the weight";
+  return feet == 2 ? "half the weight" : fmt::format("1/{} of the weight", feet);
+}
+
+/// One vertical force per sensor or, without sensors, per foot by the log's truth.
+struct Force {
+  std::string name;
+  std::vector<double> up_N;
+};
+std::vector<Force> foot_forces(const RunData& run, const std::vector<int>& sensors) {
+  std::vector<Force> forces;
+  for (const int sensor : sensors) {
+    forces.push_back({run.robot.sensors[at(sensor)].name, vertical_force(run, sensor)});
+  }
+  if (!forces.empty() || !run.truth()) return forces;
+  for (std::size_t foot = 0; foot < run.robot.contact.feet.size(); ++foot) {
+    forces.push_back({run.robot.contact.feet[foot].site, run.foot_force_N[3 * foot + 2]});
+  }
+  return forces;
+}
+
 Figure force_figure(const RunData& run, const RunData* other, const std::vector<int>& sensors) {
+  constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond, CurveStyle::kThird,
+                                    CurveStyle::kFourth,   CurveStyle::kFifth,  CurveStyle::kSixth};
+  const std::vector<Force> forces = foot_forces(run, sensors);
+  const std::size_t feet = run.robot.contact.feet.size();
   Figure figure;
   figure.name = "foot_force";
-  figure.title = "Vertical force in the feet's six-axis sensors";
+  figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
+                                 : fmt::format("Vertical force in the {}six-axis sensors",
+                                               legged(run) ? "feet's " : "");
   figure.x_label = "time [s]";
   figure.y_label = "force [N]";
-  constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond};
-  const std::size_t shown = other == nullptr ? std::min<std::size_t>(2, sensors.size()) : 1;
+  const std::size_t shown =
+      other == nullptr ? std::min(std::size(kStyles), forces.size()) : std::size_t{1};
+  if (shown < forces.size()) figure.title += fmt::format(", {} of {}", shown, forces.size());
   for (std::size_t i = 0; i < shown; ++i) {
-    const std::string& name = run.robot.sensors[at(sensors[i])].name;
-    figure.curves.push_back(curve_of(run, other == nullptr ? name : name + ", A", kStyles[i],
-                                     vertical_force(run, sensors[i]), 1.0));
+    figure.curves.push_back(curve_of(run, forces[i].name + (other == nullptr ? "" : ", A"),
+                                     kStyles[i], forces[i].up_N, 1.0));
   }
   if (other != nullptr) {
-    const std::string& name = run.robot.sensors[at(sensors.front())].name;
-    figure.curves.push_back(curve_of(*other, name + ", B", CurveStyle::kSecond,
-                                     vertical_force(*other, sensors.front()), 1.0));
+    const std::vector<Force> more = foot_forces(*other, sensors);
+    if (!more.empty()) {
+      figure.curves.push_back(curve_of(*other, more.front().name + ", B", CurveStyle::kSecond,
+                                       more.front().up_N, 1.0));
+    }
   }
-  if (run.robot.model.floating_base && run.robot.contact.feet.size() == 2) {
-    const double half = 0.5 * weight_N(run);
+  if (!run.robot.model.floating_base || feet == 0 || forces.size() != feet) return figure;
+  const double share = weight_N(run) / static_cast<double>(feet);
+  if (sensors.empty()) {
+    figure.levels.push_back({share_text(feet), share, true});
+  } else {
     figure.levels.push_back(
-        {"half the weight; lower line: less the foot beyond the sensor", half, true});
-    figure.levels.push_back({"", half - weight_beyond_N(run, sensors.front()), true});
+        {share_text(feet) + "; lower line: less the foot beyond the sensor", share, true});
+    figure.levels.push_back({"", share - weight_beyond_N(run, sensors.front()), true});
   }
   return figure;
 }
 
-Figure torque_figure(const RunData& run, const RunData* other, int joint,
+Figure torque_figure(const RunData& run, const RunData* other, const Subjects& subjects,
                      const tandem_kernels* kernels) {
-  const std::string& name = run.robot.joints[at(joint)].name;
+  const std::size_t joint = at(subjects.knee);
+  const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "knee_torque";
-  figure.title =
-      std::string(legged(run) ? "Knee" : "Joint") + " torque: measured, and by inverse dynamics";
+  figure.title = (subjects.leg ? "Knee" : "Joint") + std::string(" torque: measured");
   figure.x_label = "time [s]";
   figure.y_label = name + " [Nm]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
-                                   CurveStyle::kMeasured, run.torque_Nm[at(joint)], 1.0));
+                                   CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
   if (other != nullptr) {
     figure.curves.push_back(
-        curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[at(joint)], 1.0));
+        curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[joint], 1.0));
   }
-  if (kernels != nullptr) figure.curves.push_back(inverse_dynamics_curve(run, joint, *kernels));
+  if (kernels == nullptr) return figure;
+  Curve computed = inverse_dynamics_curve(run, subjects.knee, *kernels);
+  if (computed.x.empty()) {
+    figure.title += " (no inverse dynamics: the log lacks the ground's forces)";
+  } else {
+    figure.title += ", and by inverse dynamics";
+    figure.curves.push_back(std::move(computed));
+  }
   return figure;
 }
 
@@ -173,7 +235,7 @@ std::size_t nearest_row(const std::vector<double>& values, double wanted, std::s
 /// Moments of the first half cycle and the end: by the base's height, or by `joint`'s position.
 /// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
-  const bool base = run.base.size() == 13 && run.robot.model.floating_base;
+  const bool base = run.truth() && run.robot.model.floating_base;
   const std::vector<double>& depth = base ? run.base[2] : run.position_rad[at(joint)];
   const double start = depth.front();
   const auto far = std::ranges::max_element(
@@ -202,15 +264,16 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
 Subjects subjects_of(const RunData& run) {
   Subjects subjects;
   std::vector<int> joints = pitch_joints(run);
-  if (joints.size() < 2) joints = widest_joints(run);
+  subjects.leg = joints.size() >= 2;
+  if (!subjects.leg) joints = widest_joints(run);
   subjects.hip = run.robot.joint_index(run.hip);
   subjects.knee = run.robot.joint_index(run.knee);
   if (subjects.hip < 0) subjects.hip = joints.front();
   if (subjects.knee < 0) subjects.knee = joints[std::min<std::size_t>(1, joints.size() - 1)];
   for (std::size_t i = 0; i < run.robot.sensors.size(); ++i) {
     const hal::SensorConfig& sensor = run.robot.sensors[i];
-    if (sensor.type != hal::SensorType::kForceTorque) continue;
     const bool first = sensor.name == run.foot;
+    if (!first && !on_a_leg(run, sensor)) continue;
     subjects.foot_sensors.insert(
         first ? subjects.foot_sensors.begin() : subjects.foot_sensors.end(), static_cast<int>(i));
   }
@@ -233,6 +296,34 @@ std::vector<double> vertical_force(const RunData& run, int sensor) {
   return force;
 }
 
+namespace {
+
+/// The foot at each wrench site of the kernels; -1: no foot, nothing acts there.
+std::vector<int> feet_of_wrenches(const RunData& run, const tandem_kernels& kernels) {
+  std::vector<int> feet;
+  const auto& all = run.robot.contact.feet;
+  for (std::uint32_t w = 0; w < kernels.wrenches; ++w) {
+    const auto foot = std::ranges::find(all, kernels.wrench_names[w], &hal::FootConfig::site);
+    feet.push_back(foot == all.end() ? -1 : static_cast<int>(foot - all.begin()));
+  }
+  return feet;
+}
+
+/// What the ground did at each wrench site: force and moment in W's axes.
+std::vector<double> ground_wrenches(const RunData& run, const std::vector<int>& feet,
+                                    std::size_t row) {
+  std::vector<double> wrenches(6 * feet.size(), 0.0);
+  for (std::size_t w = 0; w < feet.size(); ++w) {
+    for (std::size_t k = 0; feet[w] >= 0 && k < 3; ++k) {
+      wrenches[6 * w + k] = run.foot_force_N[3 * at(feet[w]) + k][row];
+      wrenches[6 * w + 3 + k] = run.foot_moment_Nm[3 * at(feet[w]) + k][row];
+    }
+  }
+  return wrenches;
+}
+
+}  // namespace
+
 Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels& kernels) {
   const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
   const std::size_t base_q = kernels.floating_base != 0 ? 7 : 0;
@@ -248,7 +339,8 @@ Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels
     model_order[i] = at(index);
     if (index == joint) wanted = base_v + i;
   }
-  if (base_q > 0 && run.base.size() != 13) return curve;
+  if (base_q > 0 && !run.truth()) return curve;
+  const std::vector<int> feet = feet_of_wrenches(run, kernels);
   for (std::size_t row = 0; row < run.rows(); row += stride) {
     std::vector<double> q(base_q);
     std::vector<double> v(base_v);
@@ -267,8 +359,10 @@ Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels
     motion.q.push_back(std::move(q));
     motion.v.push_back(std::move(v));
     motion.sensors.push_back(std::move(sensors));
+    if (run.truth()) motion.wrenches.push_back(ground_wrenches(run, feet, row));
     curve.x.push_back(run.time_s[row]);
   }
+  if (!wrenches_known(kernels, motion)) return {};
   for (const std::vector<double>& tau : inverse_dynamics(kernels, motion)) {
     curve.y.push_back(tau[wanted]);
   }
@@ -279,11 +373,11 @@ std::vector<Figure> figures_of(const RunData& run, const RunData* other,
                                const tandem_kernels* kernels) {
   const Subjects subjects = subjects_of(run);
   std::vector<Figure> figures;
-  figures.push_back(hip_figure(run, other, subjects.hip));
-  if (!subjects.foot_sensors.empty()) {
+  figures.push_back(hip_figure(run, other, subjects));
+  if (!subjects.foot_sensors.empty() || (run.truth() && legged(run))) {
     figures.push_back(force_figure(run, other, subjects.foot_sensors));
   }
-  figures.push_back(torque_figure(run, other, subjects.knee, kernels));
+  figures.push_back(torque_figure(run, other, subjects, kernels));
   std::vector<PostureSample> samples = moments(run, subjects.hip, other == nullptr ? "" : " A");
   if (other != nullptr) {
     const auto more = moments(*other, subjects.hip, " B");

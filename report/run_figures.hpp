@@ -1,5 +1,5 @@
-// The figures of a run: hip position, foot force, knee torque, posture; of two runs, laid over
-// each other.
+// The figures of a run: position of one joint, force in the feet, torque of another joint, posture;
+// of two runs, laid over each other.
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
@@ -15,12 +15,13 @@ namespace tandem::report {
 struct Subjects {
   int hip = -1;  ///< joint in the image
   int knee = -1;
+  bool leg = false;  ///< they turn one leg in its plane: then they are called hip and knee
   std::vector<int> foot_sensors;  ///< force/torque sensors in the image, the chosen one first
 };
 
 /// What the experiment's [report] says. Where it is silent: the first two pitch joints of the
-/// first foot's leg, and the force/torque sensors of the legs; on a robot without feet the two
-/// joints that move most.
+/// first foot's leg, and the force/torque sensors of the legs; on a robot without such legs the
+/// two joints that move most.
 [[nodiscard]] Subjects subjects_of(const RunData& run);
 
 /// @param kernels  of the run's robot, for the torque that inverse dynamics gives; null: without.
@@ -29,6 +30,8 @@ struct Subjects {
                                              const tandem_kernels* kernels);
 
 /// The torque [Nm] of one joint by inverse dynamics of the logged motion, as a curve over time.
+/// The ground's forces are those that the feet's sensors measured; feet without one take them from
+/// the log's truth. Empty when neither knows them, or the base's motion.
 [[nodiscard]] Curve inverse_dynamics_curve(const RunData& run, int joint,
                                            const tandem_kernels& kernels);
 

@@ -1,6 +1,7 @@
 // The numbers behind the figures: slopes, inverse dynamics of a logged motion, postures.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/urdf.hpp"
@@ -54,12 +55,33 @@ TEST(InverseDynamics, ExplainsTheSensorsByWrenchesAtTheSites) {
   }
 }
 
+/// The cart's foot is turned upside down: its z is W's -z.
+void upside_down(const double*, const double*, const double*, double* pose, double*, double*) {
+  const double turned[12] = {1, 0, 0, 0, -1, 0, 0, 0, -1, 0, 0, 0};
+  std::copy_n(turned, 12, pose);
+}
+
+TEST(InverseDynamics, TakesTheMotionsWrenchesWhereNoSensorMeasures) {
+  static const char* const foot[] = {"foot"};
+  tandem_kernels cart{};
+  cart.nq = cart.nv = cart.joints = cart.sites = cart.wrenches = 1;
+  cart.site_names = cart.wrench_names = foot;
+  cart.inverse_dynamics = cart_inverse_dynamics;
+  cart.site_motion = upside_down;
+  cart.sensor_wrenches = [](const double*, const double*, const double*, const double*, double*) {};
+  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.0}, {0.0}}, {{}, {}, {}}, {}};
+  EXPECT_FALSE(wrenches_known(cart, motion));
+  motion.wrenches.assign(3, {0, 0, 20.0, 0, 0, 0});
+  EXPECT_TRUE(wrenches_known(cart, motion));
+  EXPECT_NEAR(inverse_dynamics(cart, motion)[1][0], 20.0, 1e-9);
+}
+
 TEST(InverseDynamics, WithoutSensorsTakesNoWrench) {
   tandem_kernels cart{};
   cart.nq = cart.nv = cart.joints = cart.wrenches = 1;
   cart.inverse_dynamics = cart_inverse_dynamics;
   cart.sensor_wrenches = [](const double*, const double*, const double*, const double*, double*) {};
-  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.03}, {0.06}}, {{}, {}, {}}};
+  Motion motion{0.01, {{0.0}, {0.0}, {0.0}}, {{0.0}, {0.03}, {0.06}}, {{}, {}, {}}, {}};
   EXPECT_NEAR(inverse_dynamics(cart, motion)[1][0], 2.0 * 3.0, 1e-9);
 }
 
