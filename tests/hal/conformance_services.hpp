@@ -56,9 +56,9 @@ TEST_P(BackendConformance, MoreDampingSlowsACompliantJoint) {
     EXPECT_EQ(devices.impedance.set_impedance_offset(j, offset), Code::kOk);
     return rig.peak([&] { return devices.encoders.velocity_rad_s(j); }, 1.0);
   };
-  const double limit = devices.impedance.impedance_limits(j).damping_Nms_rad;
-  const double light = peak_with(damping / 2.0);
-  EXPECT_LT(peak_with(std::min(2.0 * damping, limit)), 0.95 * light);
+  // A robot's own damping is about the most that a free link bears on its spring.
+  const double light = peak_with(damping / 4.0);
+  EXPECT_LT(peak_with(damping), 0.95 * light);
 }
 
 TEST_P(BackendConformance, VelocityControlYieldsToo) {
@@ -168,7 +168,7 @@ TEST_P(BackendConformance, AFaultLatchesIsNamedAndIsReset) {
       },
       3.0));
   rig.run(0.5);
-  EXPECT_TRUE(rig.operational());
+  EXPECT_TRUE(rig.operational()) << rig.it.backend->status_text();
 }
 
 TEST_P(BackendConformance, ACommandThatIsNotFiniteNeverMovesTheRobot) {
