@@ -28,7 +28,8 @@ class JointTrajectory : public Controller {
     }
     std::vector<TomlTable> tables = parameters.tables("waypoint");
     if (tables.empty()) {
-      parameters.error("", "there is no way-point", "add [[controller.parameters.waypoint]]");
+      parameters.error("", "there is no way-point",
+                       "add [[controller.parameters.waypoint]] with time_s and position_rad");
     }
     times_s_.assign(1, 0.0);
     points_.assign(joints_.size(), Motion{});  // the measured positions, at the start
@@ -64,9 +65,26 @@ class JointTrajectory : public Controller {
   void archive(Archive& ar) override { ar(start_ns_, segment_, points_); }
 
  private:
+  /// One number a joint; says which joints these are when there are more or fewer.
+  std::vector<double> read_positions(const ControllerSetup& setup, TomlTable& table) {
+    std::vector<double> positions = table.numbers("position_rad", 0);
+    if (table.has("position_rad") && positions.size() != joints_.size()) {
+      std::string order;
+      for (const std::size_t joint : joints_) {
+        order += (order.empty() ? "" : ", ") + setup.robot.joints[joint].name;
+      }
+      table.error("position_rad",
+                  "has " + std::to_string(positions.size()) + " numbers for " +
+                      std::to_string(joints_.size()) + " joints",
+                  "give one each for " + order + "; or name those that move in `joints`");
+    }
+    positions.resize(joints_.size(), 0.0);
+    return positions;
+  }
+
   void read_waypoint(ControllerSetup& setup, TomlTable& table) {
     const double time_s = table.number("time_s", kPositive);
-    const std::vector<double> positions = table.numbers("position_rad", joints_.size());
+    const std::vector<double> positions = read_positions(setup, table);
     table.finish();
     if (time_s <= times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");

@@ -37,7 +37,8 @@ const hal::PostureConfig* posture_parameter(ControllerSetup& setup) {
     std::vector<std::string> known;
     for (const hal::PostureConfig& one : setup.robot.postures) known.push_back(one.name);
     setup.parameters.error("posture", "the robot has no posture '" + name + "'",
-                           suggest(name, known));
+                           known.empty() ? "add [posture." + name + "] to " + setup.robot.file
+                                         : suggest(name, known));
   }
   return posture;
 }

@@ -78,6 +78,15 @@ TEST(Hold, RefusesAPostureBeyondAJointsLimits) {
             "posture, or leave the joint out of `joints`)");
 }
 
+TEST(Hold, SaysWhereARobotWithoutPosturesGetsOne) {
+  hal::RobotConfig config = robot();
+  config.postures.clear();
+  config.file = "arm/robot.toml";
+  EXPECT_EQ(test::Harness(config, "hold", "posture = 'ready'\n").problem(),
+            "experiment.toml:1: posture: the robot has no posture 'ready' (add [posture.ready] to "
+            "arm/robot.toml)");
+}
+
 TEST(Hold, RefusesAJointWithoutPositionControl) {
   hal::RobotConfig config = robot();
   config.gains[0].position = {};

@@ -91,12 +91,14 @@ std::string problem_of(const std::string& text) {
 
 TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
   EXPECT_EQ(problem_of("joints = ['wrist']\n"),
-            "experiment.toml:1: there is no way-point (add [[controller.parameters.waypoint]])");
+            "experiment.toml:1: there is no way-point (add [[controller.parameters.waypoint]] with "
+            "time_s and position_rad)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1.7]\n"),
             "experiment.toml:4: waypoint[0].position_rad: joint 'wrist' leaves its limits (stay "
             "within -1.500000 and 1.500000)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1, 2]\n"),
-            "experiment.toml:4: waypoint[0].position_rad: has 2 numbers (give exactly 1)");
+            "experiment.toml:4: waypoint[0].position_rad: has 2 numbers for 1 joints "
+            "(give one each for wrist; or name those that move in `joints`)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
                        "[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"),
             "experiment.toml:6: waypoint[1].time_s: is not later than the way-point before (sort "
