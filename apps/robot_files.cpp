@@ -20,7 +20,7 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
   if (!description) return std::unexpected(description.error());
   model::ModelSpec spec = sim::model_spec(config);
   return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
-                    std::move(description->warnings)};
+                    description->right_angles, std::move(description->warnings)};
 }
 
 std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file) {

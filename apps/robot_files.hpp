@@ -8,6 +8,7 @@
 #include "base/result.hpp"
 #include "hal/robot_config.hpp"
 #include "model/model_spec.hpp"
+#include "model/right_angles.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::apps {
@@ -16,6 +17,7 @@ struct RobotFiles {
   hal::RobotConfig config;  ///< completed from the description
   model::Tree tree;
   model::ModelSpec spec;
+  model::RightAngles right_angles;  ///< what the description has of few digits
   Diagnostics warnings;  ///< what the description's reader tolerated
 };
 

@@ -50,6 +50,8 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   model.mimic_independent =
       table.choice_or("mimic", "refuse", {"refuse", "independent"}) == "independent";
   model.repair_inertia = table.choice_or("inertia", "strict", {"strict", "repair"}) == "repair";
+  model.exact_right_angles =
+      table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
   model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
   TomlTable lock = table.table_or_empty("lock");
   for (const std::string& joint : lock.keys()) model.lock.emplace_back(joint, lock.number(joint));

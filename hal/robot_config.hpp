@@ -43,6 +43,7 @@ struct ModelConfig {
   bool floating_base = false;
   bool mimic_independent = false;       ///< mimic = "independent"; the default "refuse" is an error
   bool repair_inertia = false;          ///< inertia = "repair"; the default "strict" is an error
+  bool exact_right_angles = false;      ///< right_angles = "exact"; the default is "as_written"
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
   std::vector<LinkConfig> links;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};

@@ -166,4 +166,11 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   return result;
 }
 
+Result<OperationCount> count_kernel(Kernel kernel, const Tree& tree, const ModelSpec& spec) {
+  const Result<Mechanism> mechanism = make_mechanism(tree, spec);
+  if (!mechanism) return std::unexpected(mechanism.error());
+  Graph graph;
+  return count_operations(graph, trace_kernel(kernel, *mechanism, graph).outputs);
+}
+
 }  // namespace tandem::model

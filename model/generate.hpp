@@ -40,4 +40,8 @@ struct GeneratedKernels {
 /// Errors: those of make_mechanism().
 [[nodiscard]] Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spec);
 
+/// Operations of one kernel, without writing it. Errors: those of make_mechanism().
+[[nodiscard]] Result<OperationCount> count_kernel(Kernel kernel, const Tree& tree,
+                                                  const ModelSpec& spec);
+
 }  // namespace tandem::model

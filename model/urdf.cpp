@@ -105,6 +105,7 @@ class Builder {
     out_.tree.file = file;
     out_.tree.floating_base = options.floating_base;
     out_.warnings = outline.warnings;
+    out_.right_angles = outline.right_angles;
   }
 
   std::expected<UrdfModel, Diagnostics> run(const urdf::ModelInterface& model) {
@@ -286,7 +287,7 @@ Diagnostics one_error(std::string message, std::string hint, const std::string& 
 
 std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const std::string& file,
                                                  const UrdfOptions& options) {
-  Outline outline = outline_urdf(text, file);
+  Outline outline = outline_urdf(text, file, options.exact_right_angles);
   if (outline.errors.empty()) check_topology(outline, file);
   if (!outline.errors.empty()) {
     sort_by_line(outline.errors);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "model/right_angles.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::model {
@@ -32,6 +33,7 @@ struct UrdfOptions {
   bool mimic_independent = false;  ///< treat mimic joints as independent; else they are refused
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> fixed position [rad or m]
   bool repair_inertia = false;  ///< take the nearest possible inertia for an impossible one
+  bool exact_right_angles = false;  ///< take angles within 1e-5 rad of a right one for it
   std::vector<LinkOverride> links{};
   std::string overrides_file{};  ///< the file that `links` stand in, for messages
 };
@@ -39,6 +41,7 @@ struct UrdfOptions {
 struct UrdfModel {
   Tree tree;
   Diagnostics warnings;  ///< what was tolerated, left out or repaired
+  RightAngles right_angles{};  ///< those that the text writes with few digits
   /// Joint -> why its limits in `tree` are NaN where they are. A joint without limits has none.
   std::map<std::string, std::string> limits_notes{};
 };

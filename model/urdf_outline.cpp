@@ -22,7 +22,8 @@ enum class Needed : bool { kNo, kYes };
 /// Walks the XML once, collects what matters and reports what is wrong with it.
 class Reader {
  public:
-  Reader(const std::string& file) : file_(file) {}
+  Reader(const std::string& file, bool exact_right_angles)
+      : file_(file), exact_right_angles_(exact_right_angles) {}
 
   Outline run(std::string_view text) {
     if (text.find('\0') != std::string_view::npos) {
@@ -224,7 +225,8 @@ class Reader {
     for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
       (void)numbers(inertia, moment, 1, key, Needed::kYes);
     }
-    copy->InsertEndChild(inertial->DeepClone(&reduced_));
+    tinyxml2::XMLNode* cloned = copy->InsertEndChild(inertial->DeepClone(&reduced_));
+    look_at_rpy(cloned->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
   }
 
   void read_joint(const XMLElement& e, XMLElement& reduced) {
@@ -253,6 +255,9 @@ class Reader {
       const XMLElement* found = e.FirstChildElement(part);
       if (found != nullptr) copy->InsertEndChild(found->DeepClone(&reduced_));
     }
+    look_at_rpy(copy->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
+    if (joint.type != "fixed")
+      look_at_axis(copy->FirstChildElement("axis"), exact_right_angles_, out_.right_angles);
     XMLElement* limit = reduced_.NewElement("limit");  // ours are in `joint`; urdfdom needs one
     for (const char* name : {"velocity", "effort"}) limit->SetAttribute(name, "0");
     copy->InsertEndChild(limit);
@@ -334,6 +339,7 @@ class Reader {
   }
 
   const std::string& file_;
+  const bool exact_right_angles_;
   tinyxml2::XMLDocument document_;
   tinyxml2::XMLDocument reduced_;
   Outline out_;
@@ -343,8 +349,8 @@ class Reader {
 
 }  // namespace
 
-Outline outline_urdf(std::string_view text, const std::string& file) {
-  return Reader(file).run(text);
+Outline outline_urdf(std::string_view text, const std::string& file, bool exact_right_angles) {
+  return Reader(file, exact_right_angles).run(text);
 }
 
 }  // namespace tandem::model

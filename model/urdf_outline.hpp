@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "model/right_angles.hpp"
 
 namespace tandem::model {
 
@@ -44,6 +45,7 @@ struct Outline {
   std::string text;  ///< the same description with nothing but links' inertials and joints
   Diagnostics errors;
   Diagnostics warnings;
+  RightAngles right_angles;  ///< of joints and inertials
 
   std::map<std::string, int> link_lines;  ///< of the first link of each name
   std::map<std::string, int> joint_lines;
@@ -54,7 +56,9 @@ struct Outline {
   int floating_line = 0;
 };
 
-[[nodiscard]] Outline outline_urdf(std::string_view text, const std::string& file);
+/// @param exact_right_angles  right angles of few digits are written exactly in the answer's text.
+[[nodiscard]] Outline outline_urdf(std::string_view text, const std::string& file,
+                                   bool exact_right_angles);
 
 /// Appends an error for each way in which the joints do not make one tree of all links, and takes
 /// a massless root out that nothing but a floating joint leaves.

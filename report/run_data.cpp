@@ -55,6 +55,7 @@ Status read_description(RunData& run) {
                              .mimic_independent = m.mimic_independent,
                              .lock = m.lock,
                              .repair_inertia = m.repair_inertia,
+                             .exact_right_angles = m.exact_right_angles,
                              .overrides_file = run.robot.file};
   for (const hal::LinkConfig& link : m.links) {
     options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});

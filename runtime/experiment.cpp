@@ -303,6 +303,7 @@ model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string
                              .mimic_independent = model.mimic_independent,
                              .lock = model.lock,
                              .repair_inertia = model.repair_inertia,
+                             .exact_right_angles = model.exact_right_angles,
                              .overrides_file = file};
   for (const hal::LinkConfig& link : model.links) {
     options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});

@@ -81,6 +81,23 @@ TEST_F(Model, InfoCountsOperationsAndMachineCode) {
   }
 }
 
+TEST_F(Model, InfoTellsWhatRightAnglesOfFewDigitsCost) {
+  edit("double_pendulum.urdf", "<origin xyz=\"0.023 0 0.1\" rpy=\"0 0 0\"",
+       "<origin xyz=\"0.023 0 0.1\" rpy=\"1.5708 0 0\"");
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nright_angles = \"exact\"");
+  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
+  const Outcome outcome = tandem("model info robot.toml --json -", cache);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto angles = nlohmann::json::parse(outcome.out)["right_angles"];
+  EXPECT_EQ(angles["count"], 1);
+  EXPECT_EQ(angles["exact"], true);
+  EXPECT_NEAR(angles["worst_rad"].get<double>(), 3.673e-6, 1e-9);
+  EXPECT_LT(angles["operations_exact"], angles["operations_as_written"]);
+  EXPECT_GT(angles["displacement_m"], 1e-8);
+  EXPECT_LT(angles["displacement_m"], 1e-5);
+}
+
 TEST_F(Model, InfoTellsOfAVariantByName) {
   const Outcome outcome = tandem("model info robot.toml --kernel-variant baseline --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -67,6 +67,26 @@ TEST(Urdf, LocksAJointAtItsPosition) {
   EXPECT_EQ(turned->tree.links[1].in_body.R, about_y);
 }
 
+TEST(Urdf, TakesRightAnglesAsTheyAreWrittenAndExactlyOnRequest) {
+  std::string few = with("rpy=\"1.5707963267948966 0 0", "rpy=\"1.5708 0 0");
+  few = replaced(few, "<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 2 1e-5\"/>");
+  const auto written = parse_urdf(few, "arm.urdf", {});
+  const auto exact = parse_urdf(few, "arm.urdf", {.exact_right_angles = true});
+  ASSERT_TRUE(written && exact);
+  EXPECT_EQ(written->right_angles.count, 2);
+  EXPECT_NEAR(written->right_angles.worst_rad, 5e-6, 1e-10);
+  EXPECT_EQ(exact->right_angles.count, 2);
+  EXPECT_NEAR(written->tree.joints[1].in_parent.R(1, 1), 1.5707963267948966 - 1.5708, 1e-13);
+  EXPECT_EQ(exact->tree.joints[1].in_parent.R(1, 1), 0.0);
+  EXPECT_EQ(exact->tree.joints[0].axis, Eigen::Vector3d::UnitY());
+  // The tip hangs 0.3 m beyond the slide's turn, 1 m below the shoulder's axis.
+  const Displacement moved = largest_displacement(written->tree, exact->tree);
+  EXPECT_EQ(moved.link, "tip");
+  EXPECT_GT(moved.distance_m, 0.3 * 3.673e-6);
+  EXPECT_LT(moved.distance_m, 2.0 * 1.3 * (3.674e-6 + 5e-6));
+  EXPECT_EQ(parse_urdf(kRobot, "arm.urdf", {})->right_angles.count, 0);
+}
+
 TEST(Urdf, GivesAContinuousJointNoLimits) {
   const auto model =
       parse_urdf(replaced(with("shoulder\" type=\"revolute", "shoulder\" type=\"continuous"),
