@@ -22,7 +22,8 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("seed" + side, std::to_string(run.info.seed));
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
-  facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", run.time_s.back()));
+  facts.emplace_back("controllers ran" + side,
+                     fmt::format("{:.3f} s", run.controllers_ran ? run.time_s.back() : 0.0));
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {
@@ -82,7 +83,9 @@ Page page_of(const RunData& run, const RunData* other) {
   page.title = other == nullptr ? fmt::format("{}: {}", run.info.robot,
                                               std::filesystem::path(run.path).stem().string())
                                 : fmt::format("{}: two runs", run.info.robot);
-  page.lead = "Time 0 is the first cycle of the controllers, after the drives' bring-up.";
+  page.lead = run.controllers_ran
+                  ? "Time 0 is the first cycle of the controllers, after the drives' bring-up."
+                  : "The run ended before its controllers started: time 0 is the drives' bring-up.";
   add_facts(run, other == nullptr ? "" : " A", page.facts);
   add_tables(run, other == nullptr ? "" : " A", page);
   if (other == nullptr) return page;

@@ -19,6 +19,16 @@ std::unexpected<Error> log_error(const RunData& run, std::string message, std::s
   return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
 }
 
+/// How long every joint was held before the controllers started, as the experiment says or by
+/// default (docs/configuration.md, [hal] settle_s).
+double settle_of(TomlTable& experiment) {
+  TomlTable sim = experiment.table_or_empty("sim");
+  TomlTable hoist = sim.table_or_empty("hoist");
+  const double by_hoist_s =
+      hoist.boolean_or("enabled", true) ? hoist.number_or("release_s", 1.0) : 0.0;
+  return experiment.table_or_empty("hal").number_or("settle_s", by_hoist_s);
+}
+
 /// The robot's and the experiment's files, from the texts that the log carries.
 Status read_configuration(RunData& run) {
   bool found = false;
@@ -32,11 +42,12 @@ Status read_configuration(RunData& run) {
       if (!robot) return std::unexpected(robot.error().front());
       run.robot = std::move(*robot);
       found = true;
-    } else {
+    } else if (root.has("robot")) {  // the experiment; a scenario has none
       TomlTable report = root.table_or_empty("report");
       run.hip = report.text_or("hip", {});
       run.knee = report.text_or("knee", {});
       run.foot = report.text_or("foot", {});
+      run.settle_s = settle_of(root);
     }
   }
   if (found) return {};
@@ -98,19 +109,23 @@ void crop(log::Table& table, double begin_s, double end_s) {
 }
 
 struct Window {
+  double bring_up_s = -1e300;  ///< its end
   double begin_s = -1e300;
   double end_s = 1e300;
 };
 
-/// When controllers ran, as the events tell.
-Result<Window> window_of(const log::LogFile& file) {
+/// When controllers ran, as the events tell: after bring-up and `settle_s`.
+Result<Window> window_of(const log::LogFile& file, double settle_s) {
   const auto events = file.events();
   if (!events) return std::unexpected(events.error());
   Window window;
   constexpr double kHalfNanosecond = 0.5e-9;
   for (const log::EventText& one : *events) {
     const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
-    if (one.event.kind == log::EventKind::kBringUpDone) window.begin_s = time_s - kHalfNanosecond;
+    if (one.event.kind == log::EventKind::kBringUpDone) {
+      window.bring_up_s = time_s - kHalfNanosecond;
+      window.begin_s = window.bring_up_s + settle_s;
+    }
     const bool end = one.event.kind == log::EventKind::kControllersDone ||
                      one.event.kind == log::EventKind::kStopRequested ||
                      one.event.kind == log::EventKind::kFault;
@@ -119,7 +134,8 @@ Result<Window> window_of(const log::LogFile& file) {
   return window;
 }
 
-Status read_state(const log::LogFile& file, const Window& window, RunData& run) {
+/// Begins with the bring-up's end when the run ended before its controllers started.
+Status read_state(const log::LogFile& file, Window& window, RunData& run) {
   std::vector<log::Column> columns =
       columns_of(file, kState, {"position_rad", "velocity_rad_s", "torque_Nm"});
   if (!run.robot.sensors.empty()) {
@@ -128,10 +144,14 @@ Status read_state(const log::LogFile& file, const Window& window, RunData& run) 
   }
   auto table = file.read(kState, columns);
   if (!table) return std::unexpected(table.error());
+  const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
+  run.controllers_ran = end_s > window.begin_s;
+  if (!run.controllers_ran) window.begin_s = window.bring_up_s;
+  window.end_s = std::max(window.end_s, window.begin_s);
   crop(*table, window.begin_s, window.end_s);
   const std::size_t n = run.robot.joints.size();
   if (table->columns.size() < 3 * n || table->time_s.size() < 2) {
-    return log_error(run, "this log has no cycle in which controllers ran", {});
+    return log_error(run, "this log has no cycle after the drives' bring-up", {});
   }
   run.time_s = table->time_s;
   run.position_rad = take(*table, 0, n);
@@ -163,15 +183,15 @@ Status read_command(const log::LogFile& file, RunData& run) {
 
 Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
-  std::vector<log::Column> columns =
+  std::vector<log::Column> wanted =
       columns_of(file, kTruth, {"base_position_m", "base_quaternion", "base_velocity"});
   const std::size_t feet = 3 * run.robot.contact.feet.size();
   if (feet > 0) {  // a robot without feet has no such fields
     const auto of_feet =
         columns_of(file, kTruth, {"foot_position_m", "foot_force_N", "foot_moment_Nm"});
-    columns.insert(columns.end(), of_feet.begin(), of_feet.end());
+    wanted.insert(wanted.end(), of_feet.begin(), of_feet.end());
   }
-  auto table = file.read(kTruth, columns);
+  auto table = file.read(kTruth, wanted);
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
   // The log of a killed run may end between a state and its truth.
@@ -185,9 +205,9 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
   run.foot_force_N = take(*table, 13 + feet, feet);
   run.foot_moment_Nm = take(*table, 13 + 2 * feet, feet);
   run.time_s.resize(rows);
-  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm,
-                           &run.reference_rad, &run.sensor, &run.base, &run.foot_position_m,
-                           &run.foot_force_N, &run.foot_moment_Nm}) {
+  for (Columns* columns :
+       {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
+        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm}) {
     for (std::vector<double>& column : *columns) column.resize(rows);
   }
   return {};
@@ -266,7 +286,7 @@ Result<RunData> read_run(const std::string& path) {
   run.data_sha256 = file->data_sha256();
   if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());
   if (const Status s = read_description(run); !s) return std::unexpected(s.error());
-  const Result<Window> window = window_of(*file);
+  Result<Window> window = window_of(*file, run.settle_s);
   if (!window) return std::unexpected(window.error());
   if (const Status s = read_state(*file, *window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());

@@ -42,8 +42,10 @@ struct RunData {
   model::Tree tree;
   std::string hip, knee, foot;  ///< the experiment's [report]; may be empty
 
-  double step_s = 0.0;                              ///< between rows
-  std::vector<double> time_s;                       ///< of each row, 0 when the controllers started
+  double settle_s = 0.0;        ///< from bring-up to the controllers' start
+  bool controllers_ran = true;  ///< false: the rows are those in which they were waited for
+  double step_s = 0.0;          ///< between rows
+  std::vector<double> time_s;   ///< of each row, 0 when the controllers started
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another

@@ -52,6 +52,7 @@ TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
   const std::string page = read_text(folder_ / files["report"].get<std::string>());
   EXPECT_NE(page.find("<svg"), std::string::npos);
   EXPECT_NE(page.find("inverse dynamics"), std::string::npos);
+  EXPECT_NE(page.find("0.500 s"), std::string::npos) << "without the time before the controllers";
   EXPECT_GE(files["images"].size(), 4U);
   for (const auto& image : files["images"]) {
     EXPECT_TRUE(read_text(folder_ / image.get<std::string>()).starts_with("\x89PNG"));
