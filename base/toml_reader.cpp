@@ -78,6 +78,11 @@ const toml::node* TomlTable::require(std::string_view key) {
 
 bool TomlTable::has(std::string_view key) const { return get(key) != nullptr; }
 
+bool TomlTable::is_text(std::string_view key) const {
+  const toml::node* node = get(key);
+  return node != nullptr && node->is_string();
+}
+
 int TomlTable::line() const { return line_; }
 
 int TomlTable::line(std::string_view key) const {

@@ -62,6 +62,8 @@ class TomlTable {
   [[nodiscard]] std::vector<std::vector<double>> rows(std::string_view key, std::size_t columns);
 
   [[nodiscard]] bool has(std::string_view key) const;
+  /// Whether the key is there and holds a text: for a number that may also be a word.
+  [[nodiscard]] bool is_text(std::string_view key) const;
   /// The sub-table `key`; an empty one, after an error, when it is missing or no table.
   [[nodiscard]] TomlTable table(std::string_view key);
   /// The sub-table `key`; an empty one without error when it is missing. A key that is then

@@ -1,6 +1,7 @@
 #include "hal/robot_config.hpp"
 
 #include <filesystem>
+#include <limits>
 
 #include "base/file_name.hpp"
 #include "hal/robot_config_read.hpp"
@@ -139,6 +140,16 @@ void read_contact(TomlTable& root, RobotConfig& robot) {
   table.finish();
 }
 
+double read_base_height(TomlTable& table, const RobotConfig& robot) {
+  if (!table.is_text("base_height_m")) return table.number_or("base_height_m", 0.0);
+  (void)table.choice("base_height_m", {"auto"});
+  if (robot.contact.feet.empty()) {
+    table.error("base_height_m", "there is no [contact] with a foot to stand on",
+                "add one, or give a number");
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
 void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) {
   PostureConfig posture;
   posture.name = name;
@@ -147,7 +158,7 @@ void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) 
   std::vector<std::string> known = names_of(robot.joints);
   if (robot.model.floating_base) {
     known.emplace_back("base_height_m");
-    posture.base_height_m = table.number_or("base_height_m", 0.0);
+    posture.base_height_m = read_base_height(table, robot);
   }
   for (const std::string& key : table.keys()) {
     if (robot.model.floating_base && key == "base_height_m") continue;

@@ -195,7 +195,8 @@ struct ContactConfig {
 /// [posture.NAME]: positions by joint, in the image's order; joints not named are 0.
 struct PostureConfig {
   std::string name;
-  double base_height_m = 0.0;           ///< of the base's origin above W's; floating base only
+  double base_height_m = 0.0;           ///< of the base's origin above W's; floating base only. NaN:
+                                        ///< "auto", until it is computed from the description
   std::vector<double> position_rad;
   int line = 0;                         ///< in the TOML, for messages
 };

@@ -7,6 +7,7 @@
 
 #include "base/nearest.hpp"
 #include "rt/clock_control.hpp"
+#include "runtime/standing_height.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -337,6 +338,10 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   if (!found) return found;
   Diagnostics errors = hal::complete_from_description(robot, plain(*found));
   if (!errors.empty()) return std::unexpected(in_order(std::move(errors)));
+  for (hal::PostureConfig& posture : robot.postures) {
+    if (!std::isnan(posture.base_height_m)) continue;
+    posture.base_height_m = standing_height_m(robot, posture, found->tree);
+  }
   return found;
 }
 

@@ -136,8 +136,9 @@ struct CompleteRobot {
 /// complete_robot()'s.
 [[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file);
 
-/// Reads the robot's URDF and fills from it what robot.toml left out. Errors: read_urdf()'s and
-/// complete_from_description()'s. The answer holds the tree and what was tolerated in it.
+/// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
+/// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
+/// holds the tree and what was tolerated in it.
 [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);
 
 }  // namespace tandem::runtime

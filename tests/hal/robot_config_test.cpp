@@ -350,6 +350,24 @@ TEST(RobotConfig, RefusesAPostureOfAnUnknownJoint) {
                "(did you mean 'knee'?)");
 }
 
+TEST(RobotConfig, LeavesTheHeightOfABaseToTheDescription) {
+  const auto robot = parse_robot_config(with("= 0.5\nknee", "= \"auto\"\nknee"), "leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_TRUE(std::isnan(robot->postures[0].base_height_m));
+  expect_error(with("= 0.5\nknee", "= \"atuo\"\nknee"),
+               "robots/leg.toml:71: posture.home.base_height_m: 'atuo' is not one of the choices "
+               "(did you mean 'auto'?)");
+}
+
+TEST(RobotConfig, ComputesNoHeightWithoutAFoot) {
+  std::string text = with("= 0.5\nknee", "= \"auto\"\nknee");
+  const std::size_t at = text.find("[contact]");
+  text.erase(at, text.find("[posture.home]") - at);
+  expect_error(text,
+               "robots/leg.toml:61: posture.home.base_height_m: there is no [contact] with a foot "
+               "to stand on (add one, or give a number)");
+}
+
 TEST(RobotConfig, RefusesAFootWhoseSiteTakesNoWrench) {
   EXPECT_NE(errors_of(with("wrench = true", "wrench = false")).find("takes no wrench"),
             std::string::npos);

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 namespace tandem::runtime {
 namespace {
@@ -440,6 +442,32 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
     EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
     EXPECT_GT(joint.max_torque_Nm, 0.0) << joint.name;
   }
+}
+
+/// A bundled humanoid whose posture leaves the base's height to the description: that height, less
+/// how far flat soles sink into the ground under its weight.
+double sunk_height_m(const std::string& name, const std::string& given) {
+  const std::string file = TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml";
+  std::ifstream in(file);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  auto robot = hal::parse_robot_config(
+      replaced(text, "base_height_m = " + given, "base_height_m = \"auto\""), file);
+  EXPECT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_TRUE(std::isnan(robot->posture("stand")->base_height_m));
+  const auto description = complete_robot(*robot);
+  EXPECT_TRUE(description.has_value()) << description.error()[0].to_string();
+  double weight_N = 0.0;
+  for (const model::Body& body : description->tree.bodies) weight_N += 9.81 * body.inertia.mass_kg;
+  std::size_t points = 0;
+  for (const hal::FootConfig& foot : robot->contact.feet) points += foot.points_m.size();
+  const double stiffness_N_m = robot->contact.stiffness_N_m * static_cast<double>(points);
+  return robot->posture("stand")->base_height_m - weight_N / stiffness_N_m;
+}
+
+TEST(StandingHeight, IsWhereTheLowestPointOfTheSolesTouchesTheGround) {
+  // The given figures are those of a robot that the ground carries, rounded to a millimetre.
+  EXPECT_NEAR(sunk_height_m("coman", "0.502"), 0.502, 0.5e-3);
+  EXPECT_NEAR(sunk_height_m("walkman", "1.079"), 1.079, 0.5e-3);
 }
 
 TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {
