@@ -11,6 +11,7 @@
 #include <mutex>
 #include <thread>
 
+#include "model/file_lock.hpp"
 #include "model/hash.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_sources.hpp"
@@ -22,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFreshLibrary = "library.so";  // linked, but not yet checked
+constexpr const char* kLock = "lock";
 
 struct Variant {
   std::string name;   // "x86-64-v3"
@@ -203,6 +205,14 @@ Status put_in_place(const fs::path& directory, const fs::path& library, const st
   return write_if_changed(directory / "library.stamp", stamp);
 }
 
+// What was compiled before; the lock stays.
+void forget_objects(const fs::path& directory) {
+  std::error_code ignored;  // what cannot be removed is found out by writing it
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory, ignored)) {
+    if (entry.path().filename() != kLock) fs::remove(entry.path(), ignored);
+  }
+}
+
 }  // namespace
 
 std::string library_path(const std::string& directory, const std::string& robot) {
@@ -224,6 +234,9 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   const std::vector<std::string> compiler = compiler_command(options);
   if (!program_exists(compiler.back()))
     return fail("no C++ compiler '" + compiler.back() + "'", "install one: apt install g++");
+  const Result<FileLock> lock = FileLock::take((directory / kLock).string(), options.waiting);
+  if (!lock) return std::unexpected(lock.error());
+  if (options.force) forget_objects(directory);
 
   BuildReport report{options.library, generated->hash, false, 0, 0.0, generated->counts};
   const std::vector<Job> jobs = make_jobs(*generated, compiler);

@@ -14,8 +14,11 @@ struct BuildOptions {
   std::string library;   ///< path of the shared library to make
   std::string compiler;  ///< empty: the one that built this program, else c++
   int jobs = 0;          ///< compilers at a time; 0: one per core
+  bool force = false;    ///< compile every file again
   /// Called from the caller's thread as files are done: how many of how many, and which.
   std::function<void(int done, int total, const std::string& file)> progress;
+  /// Called once when another process builds this library: its end is awaited.
+  std::function<void()> waiting;
 };
 
 struct BuildReport {
@@ -31,14 +34,15 @@ struct BuildReport {
 [[nodiscard]] std::string library_path(const std::string& directory, const std::string& robot);
 
 /// Makes the library. Sources and objects are kept in LIBRARY.build/; a file is compiled again
-/// only if its text, the headers or the command changed. Compiler flags do not depend on how
+/// only if its text, the headers or the command changed. Of several processes that make one
+/// library, one compiles and the others wait for it. Compiler flags do not depend on how
 /// this program was built, so that a run's bits do not either.
 ///
 /// What was linked is checked by check_kernels() before it takes its place.
 ///
 /// Errors: those of generate_kernels(); no compiler; a file that does not compile (its log's
 /// path and first lines); a kernel that does not compute what the description says; a folder that
-/// cannot be written.
+/// cannot be written or locked.
 [[nodiscard]] Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
                                                 const BuildOptions& options);
 

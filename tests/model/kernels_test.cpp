@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "model/emit.hpp"
+#include "model/file_lock.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
@@ -244,6 +246,36 @@ TEST(KernelBuild, DoesNothingWhenUpToDateAndOnlyWhatChangedElse) {
   EXPECT_LT(second->compiled, first->compiled);  // library.cpp is the same
   EXPECT_TRUE(load_kernels(options.library, second->hash));
   EXPECT_FALSE(load_kernels(options.library, first->hash));
+}
+
+TEST(KernelBuild, WaitsForAnotherBuilderOfTheSameLibrary) {
+  const BuildFolder folder;
+  const ReferenceRobot& robot = reference_robot("double_pendulum");
+  BuildOptions options = folder.options();
+  const Tree tree = reference_tree(robot);
+  ASSERT_TRUE(build_kernels(tree, reference_spec(robot), options));
+  std::optional<FileLock> other(std::move(*FileLock::take(options.library + ".build/lock", {})));
+  int waited = 0;
+  options.waiting = [&] {
+    ++waited;
+    other.reset();
+  };
+  const auto report = build_kernels(tree, reference_spec(robot), options);
+  ASSERT_TRUE(report) << report.error().to_string();
+  EXPECT_TRUE(report->was_up_to_date);
+  EXPECT_EQ(waited, 1);
+}
+
+TEST(KernelBuild, CompilesEveryFileAgainWhenForced) {
+  const BuildFolder folder;
+  const ReferenceRobot& robot = reference_robot("double_pendulum");
+  BuildOptions options = folder.options();
+  const auto first = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  ASSERT_TRUE(first);
+  options.force = true;
+  const auto second = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->compiled, first->compiled);
 }
 
 TEST(KernelBuild, NamesTheCompilerThatIsNotThereAndTheLogOfOneThatFails) {
