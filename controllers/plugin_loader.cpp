@@ -29,6 +29,33 @@ std::string joined(const std::vector<std::string>& parts) {
   return text.empty() ? "no folder" : text;
 }
 
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream in(list);
+  for (std::string part; std::getline(in, part, ':');) {
+    if (!part.empty()) parts.push_back(part);
+  }
+  return parts;
+}
+
+/// The folder that holds the program's bin and lib.
+fs::path program_prefix() {
+  std::error_code ignored;
+  return fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
+}
+
+/// How to get a bundled controller that has not been built; else what resembles the name.
+std::string missing_hint(const std::string& name, const std::vector<std::string>& folders) {
+  const std::vector<std::string> bundled = split(TANDEM_BUNDLED_CONTROLLERS);
+  const fs::path build = program_prefix();
+  std::error_code ignored;
+  if (std::ranges::find(bundled, name) != bundled.end() &&
+      fs::exists(build / "CMakeCache.txt", ignored)) {
+    return "build it: cmake --build " + build.string() + " --target controller_" + name;
+  }
+  return suggest(name, available_controllers(folders));
+}
+
 bool is_file(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
@@ -37,14 +64,15 @@ bool is_file(const fs::path& path) {
 Result<std::string> find(const std::string& name, const std::vector<std::string>& folders) {
   if (name.find('/') != std::string::npos) {
     if (is_file(name)) return name;
-    return refuse(name, name, "there is no such controller library", "check the path");
+    return refuse(name, name, "there is no such controller library",
+                  "build it, or correct the path");
   }
   for (const std::string& folder : folders) {
     const fs::path path = fs::path(folder) / (name + ".so");
     if (is_file(path)) return path.string();
   }
   return refuse(name, {}, "there is no controller '" + name + "' in " + joined(folders),
-                suggest(name, available_controllers(folders)));
+                missing_hint(name, folders));
 }
 
 /// A library of another ABI is only asked for its entry's first two members, which never move.
@@ -70,17 +98,9 @@ void LoadedController::Close::operator()(void* library) const noexcept { dlclose
 
 std::vector<std::string> controller_folders() {
   std::vector<std::string> folders;
-  if (const char* set = std::getenv("TANDEM_CONTROLLERS")) {
-    std::istringstream list(set);
-    for (std::string folder; std::getline(list, folder, ':');) {
-      if (!folder.empty()) folders.push_back(folder);
-    }
-  }
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  const fs::path prefix = program.parent_path().parent_path();
-  folders.push_back((prefix / "lib/controllers").string());
-  folders.push_back((prefix / "lib/tandem/controllers").string());
+  if (const char* set = std::getenv("TANDEM_CONTROLLERS")) folders = split(set);
+  folders.push_back((program_prefix() / "lib/controllers").string());
+  folders.push_back((program_prefix() / "lib/tandem/controllers").string());
   return folders;
 }
 

@@ -29,6 +29,13 @@ TEST(PluginLoader, NamesTheFoldersSearchedAndTheNearestController) {
   EXPECT_EQ(loaded.error().hint, "did you mean 'hold'?");
 }
 
+TEST(PluginLoader, SaysHowABundledControllerIsBuilt) {
+  const auto loaded = load_controller("squat", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().hint,
+            "build it: cmake --build " TANDEM_BINARY_DIR " --target controller_squat");
+}
+
 TEST(PluginLoader, NamesAPathThatDoesNotExist) {
   const auto loaded = load_controller("no/such.so", {});
   ASSERT_FALSE(loaded.has_value());
