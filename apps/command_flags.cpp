@@ -102,6 +102,7 @@ const char kDoctorExamples[] = R"(Examples:
   tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
 Each finding comes with the command that mends it. The exit status does not depend on them.)";
 
+const char kNoBuildHelp[] = "Refuse when the robot's kernels are missing, instead of building them";
 const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
 
 const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
@@ -149,6 +150,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  app.add_flag("--no-build", o.no_build, kNoBuildHelp);
   CLI::Option* trace =
       app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
   app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
@@ -286,6 +288,7 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  app.add_flag("--no-build", o.no_build, kNoBuildHelp);
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");

@@ -30,6 +30,7 @@ struct RunOptions {
   std::string scenario;               ///< TOML of faults to inject; empty: none
   bool no_log = false;
   std::string kernel_variant;           ///< empty: the best that this CPU runs
+  bool no_build = false;                ///< missing kernels are an error
   std::string hal;                      ///< "sim", "can", "dds"; empty: the experiment's
   bool lockstep = false;                ///< CAN, DDS: wait for the other end; serve: for an owner
   std::optional<std::uint32_t> delay_cycles;  ///< instead of the experiment's
@@ -133,6 +134,7 @@ struct EmulateOptions {
   std::string scenario;                   ///< TOML of faults to inject; empty: none
   std::vector<std::string> interfaces;    ///< "can0=vcan0"
   std::string kernel_variant;             ///< empty: the best that this CPU runs
+  bool no_build = false;                  ///< missing kernels are an error
   std::string socket;                     ///< of the control socket; empty: the default path
   bool no_socket = false;
   bool quiet = false;  ///< neither progress nor table

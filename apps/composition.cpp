@@ -6,7 +6,6 @@
 
 #include <filesystem>
 
-#include "apps/kernel_store.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
@@ -39,9 +38,9 @@ class Collector {
 /// A plugin's path is relative to the experiment's file; its bare name is looked for.
 std::string plugin_path(const runtime::Experiment& e, const std::string& plugin) {
   if (!plugin.contains('/')) return plugin;
-  const std::filesystem::path path = plugin;
-  if (path.is_absolute()) return plugin;
-  return (std::filesystem::path(e.document.folder()) / path).lexically_normal().string();
+  // Absolute, so that "./x.so" beside a file of the working directory does not become a name.
+  const std::filesystem::path folder = std::filesystem::absolute(e.document.folder());
+  return (folder / plugin).lexically_normal().string();
 }
 
 void add_controllers(Composition& c, Collector& errors) {
@@ -55,16 +54,44 @@ void add_controllers(Composition& c, Collector& errors) {
       continue;
     }
     const std::string doc = loaded->plugin().doc;
-    if (c.controllers == nullptr) continue;  // without kernels: only that it can be loaded
-    const Status added =
-        c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
-    if (!added) {
-      errors.add(added.error(), c.experiment.file, line);
-      continue;
+    if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
+      const Status added =
+          c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
+      if (!added) {
+        errors.add(added.error(), c.experiment.file, line);
+        continue;
+      }
     }
     c.notes.push_back({spec.name, doc, spec.active});
   }
   errors.add(c.experiment.document.diagnostics());
+}
+
+/// The robot's kernels, and the host of controllers. They are built after all that can be checked
+/// without them, for it takes a while.
+/// @return false: there are errors, and no more to find
+bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overrides,
+                 Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  const bool builds = overrides.missing_kernels != MissingKernels::kRefuse;
+  auto kernels = supply_kernels(robot, e.kernel_variant,
+                                builds ? MissingKernels::kTolerate : MissingKernels::kRefuse);
+  if (kernels && kernels->get() == nullptr &&
+      overrides.missing_kernels != MissingKernels::kTolerate) {
+    if (!overrides.serves) add_controllers(c, errors);
+    if (!errors.empty()) return false;
+    c.notes.clear();
+    kernels = supply_kernels(robot, e.kernel_variant, overrides.missing_kernels);
+  }
+  if (!kernels) {
+    errors.add(kernels.error(), e.robot.file, 0);
+    return true;
+  }
+  c.kernels = std::move(*kernels);
+  if (c.kernels.get() == nullptr) return true;
+  c.controllers =
+      std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
+  return true;
 }
 
 /// What to serve: an experiment, or a robot in the first of its postures.
@@ -151,17 +178,12 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   c->tree = robot->tree;
-  if (auto kernels = find_kernels(*robot, e.kernel_variant)) {
-    c->kernels = std::move(*kernels);
-    c->controllers =
-        std::make_unique<runtime::ControllerHost>(e.robot, c->kernels.get(), e.loop.period_ns);
-  } else {
-    errors.add(kernels.error(), e.robot.file, 0);
-  }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
+  if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
+  if (c->kernels.get() == nullptr) return c;
   if (e.hal.backend != runtime::BackendKind::kSim) {
     if (overrides.scenario.empty()) return c;
     errors.add({.message = "faults are injected on the other end of the wire",

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/can_sockets.hpp"
+#include "apps/kernel_supply.hpp"
 #include "apps/robot_files.hpp"
 #include "base/result.hpp"
 #include "dds/domain.hpp"
@@ -27,13 +28,14 @@ namespace tandem::apps {
 
 /// What the command line says instead of the experiment.
 struct Overrides {
-  std::optional<std::uint64_t> seed;
-  std::optional<double> duration_s;
-  std::string kernel_variant;
+  std::optional<std::uint64_t> seed = std::nullopt;
+  std::optional<double> duration_s = std::nullopt;
+  std::string kernel_variant = {};
+  MissingKernels missing_kernels = MissingKernels::kRefuse;
   std::optional<runtime::BackendKind> backend = std::nullopt;
-  bool lockstep = false;                ///< true: whatever the experiment says
-  std::vector<std::string> interfaces;  ///< "can0=vcan0"
-  std::string scenario = {};            ///< faults to inject into the simulation
+  bool lockstep = false;                     ///< true: whatever the experiment says
+  std::vector<std::string> interfaces = {};  ///< "can0=vcan0"
+  std::string scenario = {};                 ///< faults to inject into the simulation
   std::optional<std::uint32_t> delay_cycles = std::nullopt;
   bool serves = false;  ///< no controllers of its own, and no end
   std::optional<bool> dds = std::nullopt;
@@ -48,10 +50,10 @@ struct ControllerNote {
 };
 
 struct Composition {
-  runtime::Experiment experiment;  ///< overrides applied; its robot is completed
-  model::Tree tree;                ///< the robot's description
-  model::KernelLibrary kernels;
-  std::unique_ptr<CanSockets> sockets;            ///< of the CAN backend
+  runtime::Experiment experiment;       ///< overrides applied; its robot is completed
+  model::Tree tree;                     ///< the robot's description
+  model::KernelLibrary kernels;         ///< empty with kTolerate: then there is no more than notes
+  std::unique_ptr<CanSockets> sockets;  ///< of the CAN backend
   std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
   std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
   std::unique_ptr<hal::Backend> backend;          ///< CAN's and DDS' only after connect()
@@ -75,7 +77,7 @@ struct Composition {
 
 /// Reads an experiment with all its files and composes it. Every error that can be found without
 /// running is found here: experiment, robot, description, kernels, backend, plugins, parameters,
-/// claims.
+/// claims. Without kernels, which MissingKernels::kTolerate admits, the last two are not checked.
 [[nodiscard]] std::expected<std::unique_ptr<Composition>, Diagnostics> compose(
     const std::string& experiment, const Overrides& overrides);
 

@@ -6,7 +6,7 @@
 #include "apps/console.hpp"
 #include "apps/errands.hpp"
 #include "apps/inject.hpp"
-#include "apps/kernel_store.hpp"
+#include "apps/kernel_supply.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -84,7 +84,8 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   }
   const auto description = with_description(robot);
   if (!description) return std::unexpected(description.error());
-  auto kernels = find_kernels(*description, options.kernel_variant);
+  auto kernels = supply_kernels(*description, options.kernel_variant,
+                                missing_kernels(options.no_build, options.quiet));
   if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
   e->kernels = std::move(*kernels);
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);

@@ -1,23 +1,15 @@
 #include <fmt/core.h>
-#include <unistd.h>
-
-#include <filesystem>
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
 #include "apps/kernel_sizes.hpp"
 #include "apps/kernel_store.hpp"
+#include "apps/kernel_supply.hpp"
 #include "apps/robot_files.hpp"
-#include "model/kernel_build.hpp"
+#include "model/generate.hpp"
 
 namespace tandem::apps {
 namespace {
-
-/// One line on a terminal, redrawn; nothing elsewhere.
-void print_progress(int done, int total, const std::string& file) {
-  if (isatty(STDERR_FILENO) == 0) return;
-  fmt::print(stderr, "\r  [{}/{}] {}\033[K{}", done, total, file, done < total ? "" : "\n");
-}
 
 Status build(const RobotFiles& robot, const ModelOptions& options) {
   model::BuildOptions build;
@@ -27,12 +19,8 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
     if (!path) return std::unexpected(path.error());
     build.library = std::move(*path);
   }
-  build.progress = print_progress;
-  if (options.force) {
-    std::error_code ignored;  // what cannot be removed is found out by writing it
-    std::filesystem::remove_all(build.library + ".build", ignored);
-  }
-  const Result<model::BuildReport> report = model::build_kernels(robot.tree, robot.spec, build);
+  build.force = options.force;
+  const Result<model::BuildReport> report = build_shown(robot, build);
   if (!report) return std::unexpected(report.error());
   if (report->was_up_to_date) {
     fmt::print("{}: kernels are up to date ({})\n", robot.config.name, report->library);

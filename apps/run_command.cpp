@@ -248,6 +248,7 @@ Exit run_command(const RunOptions& options) {
   Overrides overrides{.seed = options.seed,
                       .duration_s = options.duration_s,
                       .kernel_variant = options.kernel_variant,
+                      .missing_kernels = missing_kernels(options.no_build, options.quiet),
                       .lockstep = options.lockstep,
                       .interfaces = options.interfaces,
                       .scenario = options.scenario,
@@ -258,12 +259,12 @@ Exit run_command(const RunOptions& options) {
   if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
   if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
-  rt::install_stop_signals();
   const auto composition = compose(options.experiment, overrides);
   if (!composition) {
     print_errors(composition.error());
     return Exit::kUsage;
   }
+  rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {
     print_errors(errors);
     return Exit::kUsage;

@@ -116,7 +116,10 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
   ReportFiles files;
   const tandem_kernels* kernels = find_kernels(*run);
   if (kernels == nullptr) {
-    files.remarks.push_back("no inverse dynamics: there is no kernel library that fits this log");
+    files.remarks.push_back(
+        "no inverse dynamics: there is no kernel library that fits this log; run: "
+        "tandem model build " +
+        run->robot.file);
   } else if (kernels->floating_base != 0 && !run->truth()) {
     files.remarks.push_back(
         "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");

@@ -149,6 +149,12 @@ TEST_F(BadInput, APluginThatDoesNotExistIsRefusedWithTheNearest) {
   expect_refused({"hold.toml:", "hodl", "hold"});
 }
 
+TEST_F(BadInput, APluginThatDoesNotExistIsRefusedBeforeKernelsAreBuilt) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
+  edit("hold.toml", "\"hold\"", "\"./hold.so\"");
+  expect_refused({folder_.string() + "/hold.so", "no such controller library"});
+}
+
 TEST_F(BadInput, APluginWithoutItsEntryPointIsRefused) {
   edit("hold.toml", "\"hold\"", "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/no_entry.so\"");
   expect_refused({"no_entry.so", "tandem_controller_plugin"});
@@ -194,7 +200,8 @@ TEST_F(BadInput, APeriodOfZeroIsRefused) {
 
 TEST_F(BadInput, KernelsOfAnotherDescriptionAreRefusedWithTheCommandThatMendsIt) {
   edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
-  expect_refused({"another description", "run: tandem model build robot.toml"});
+  expect_refused({"another description", "run: tandem model build robot.toml"},
+                 "run hold.toml --no-build --duration 0.05");
 }
 
 TEST_F(BadInput, AKernelVariantThatIsNotThereIsRefused) {

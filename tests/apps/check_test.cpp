@@ -56,8 +56,7 @@ TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
     const Outcome outcome = tandem(command);
     EXPECT_EQ(outcome.status, 2) << command;
     EXPECT_NE(outcome.err.find("cannot carry its mean load"), std::string::npos) << outcome.err;
-    EXPECT_NE(outcome.err.find("any of these fits: period_ns ="), std::string::npos)
-        << outcome.err;
+    EXPECT_NE(outcome.err.find("any of these fits: period_ns ="), std::string::npos) << outcome.err;
   }
   EXPECT_FALSE(has_log());
 }
@@ -65,9 +64,41 @@ TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
 TEST_F(Check, SaysOkAsJson) {
   const Outcome outcome = tandem("check hold.toml --json -");
   EXPECT_EQ(outcome.status, 0);
-  EXPECT_EQ(nlohmann::json::parse(outcome.out),
-            nlohmann::json::parse(R"({"ok": true, "errors": []})"));
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["ok"], true);
+  EXPECT_EQ(json["errors"], nlohmann::json::array());
+  EXPECT_NE(json["kernels"], "");
   EXPECT_NE(outcome.err.find("double_pendulum"), std::string::npos) << "text for people";
+}
+
+TEST_F(Check, FindsAPluginBesideTheExperimentFromAnyFolder) {
+  std::filesystem::copy_file(TANDEM_BINARY_DIR "/lib/controllers/hold.so", folder_ / "mine.so");
+  edit("hold.toml", "\"hold\"", "\"./mine.so\"");
+  EXPECT_EQ(tandem("check hold.toml").status, 0) << read_text(folder_ / "err.txt");
+  std::filesystem::create_directory(folder_ / "my_robot");
+  for (const char* file : {"double_pendulum.urdf", "robot.toml", "hold.toml", "mine.so"}) {
+    std::filesystem::rename(folder_ / file, folder_ / "my_robot" / file);
+  }
+  EXPECT_EQ(tandem("check my_robot/hold.toml").status, 0) << read_text(folder_ / "err.txt");
+}
+
+TEST_F(Check, HoldsOfWhatTheDemoNamesNext) {
+  std::istringstream makefile(read_text(TANDEM_SOURCE_DIR "/Makefile"));
+  const std::string start = "\t@echo \"  build/release/bin/tandem ";
+  int named = 0;
+  for (std::string line; std::getline(makefile, line);) {
+    if (!line.starts_with(start)) continue;
+    std::istringstream words(line.substr(start.size()));
+    std::string command;
+    std::string file;
+    words >> command >> file;
+    ++named;
+    file = TANDEM_SOURCE_DIR "/" + file;
+    EXPECT_TRUE(std::filesystem::exists(file)) << file;
+    if (command != "run") continue;
+    EXPECT_EQ(tandem("check " + file).status, 0) << read_text(folder_ / "err.txt");
+  }
+  EXPECT_EQ(named, 3);
 }
 
 }  // namespace

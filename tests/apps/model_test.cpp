@@ -63,6 +63,53 @@ TEST_F(Model, WithoutAHomeThereIsNoFolderForKernelsToLoad) {
   EXPECT_EQ(named.status, 0) << named.err;
 }
 
+/// A robot of one's own: no library in the build folder fits it.
+class MissingKernels : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.0025");
+    cache_ = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  }
+  std::string cache_;
+};
+
+TEST_F(MissingKernels, AreBuiltByARunOnce) {
+  const std::string run = "run hold.toml --duration 0.05 --no-log --json -";
+  const Outcome first = tandem(run, cache_);
+  ASSERT_EQ(first.status, 0) << first.err;
+  EXPECT_TRUE(nlohmann::json::accept(first.out)) << first.out;
+  EXPECT_NE(first.err.find("no kernels fit these files yet"), std::string::npos) << first.err;
+  EXPECT_NE(first.err.find(" 50 %"), std::string::npos) << first.err;
+  EXPECT_EQ(first.err.find('\r'), std::string::npos) << "no terminal, no line to redraw";
+  EXPECT_NE(first.err.find("files compiled in"), std::string::npos) << first.err;
+  const Outcome second = tandem(run, cache_);
+  EXPECT_EQ(second.status, 0) << second.err;
+  EXPECT_EQ(second.err.find("compiled"), std::string::npos) << second.err;
+}
+
+TEST_F(MissingKernels, AreNoErrorForCheckWhichTellsOfThem) {
+  for (const std::string file : {"hold.toml", "robot.toml"}) {
+    const Outcome outcome = tandem("check " + file + " --json check.json", cache_);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("none yet: `tandem run` builds them"), std::string::npos)
+        << outcome.out;
+    EXPECT_NE(outcome.out.find("tandem model build"), std::string::npos) << outcome.out;
+    EXPECT_EQ(json("check.json")["kernels"], "");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "cache"));
+}
+
+TEST_F(MissingKernels, AreBuiltOnceByRunsSideBySide) {
+  const std::string run = "run hold.toml --duration 0.05 --log ";
+  const std::string other =
+      "cd '" + folder_.string() + "' && " + cache_ + " '" TANDEM_BINARY_DIR "/bin/tandem' " + run;
+  const Outcome both = tandem(run + "a --json a.json & " + other + "b --json b.json; wait", cache_);
+  EXPECT_EQ(both.status, 0) << both.err;
+  EXPECT_EQ(json("a.json")["log"]["data_sha256"], json("b.json")["log"]["data_sha256"]);
+  EXPECT_EQ(libraries_in(folder_ / "cache/tandem/models"), 1);
+}
+
 TEST_F(Model, InfoCountsOperationsAndMachineCode) {
   const Outcome outcome = tandem("model info robot.toml --json -");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
