@@ -16,6 +16,12 @@ demo:
 	@cmake --preset demo --log-level=WARNING
 	@cmake --build --preset demo --parallel $(JOBS)
 	@build/release/bin/tandem run config/coman/squat.toml --report
+	@echo
+	@echo "Next, from this folder (a robot's first run builds its kernels, which takes a minute or two):"
+	@echo "  build/release/bin/tandem run config/panda/trajectory.toml  # another robot"
+	@echo "  build/release/bin/tandem run config/coman/hold.toml        # another controller"
+	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
+	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
 # What CI runs: all tests, the real-time proof, and side by side, for each takes one core, the
 # tests on a real CAN stack and a minute of each fuzz target.

@@ -1,4 +1,5 @@
 // 03: a whole controller. It moves one joint to and fro about where it stands.
+//   cmake --build build/release --target tandem controller_sway    (`make demo` has done so)
 //   export TANDEM_CONTROLLERS=build/release/lib/examples
 //   build/release/bin/tandem run examples/03_controller/sway.toml
 #include <cmath>
