@@ -129,8 +129,8 @@ TEST_F(Model, InfoCountsOperationsAndMachineCode) {
 }
 
 TEST_F(Model, InfoTellsWhatRightAnglesOfFewDigitsCost) {
-  edit("double_pendulum.urdf", "<origin xyz=\"0.023 0 0.1\" rpy=\"0 0 0\"",
-       "<origin xyz=\"0.023 0 0.1\" rpy=\"1.5708 0 0\"");
+  edit("double_pendulum.urdf", "<origin xyz=\"0.0060872 0 0.035\" rpy=\"0 0 0\"",
+       "<origin xyz=\"0.0060872 0 0.035\" rpy=\"0 1.5708 0\"");
   edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nright_angles = \"exact\"");
   const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
   ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);

@@ -216,7 +216,7 @@ struct BuildFolder {
   }
   ~BuildFolder() { std::filesystem::remove_all(path); }
   [[nodiscard]] BuildOptions options() const {
-    return {.library = (path / "k.so").string(), .compiler = {}, .jobs = 1, .progress = {}};
+    return {.library = (path / "k.so").string(), .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}};
   }
 };
 
