@@ -57,6 +57,13 @@ const char kCheckExamples[] = R"(Examples:
   tandem check --bus config/coman/squat.toml         the load of every bus, worst case
   tandem check my_robot.toml --json -                errors with file, line, key and hint)";
 
+const char kNewExamples[] = R"(Examples:
+  tandem new my_robot.urdf                           writes my_robot/, then
+  tandem run my_robot/hold.toml                      the robot holds a posture, or stands
+  tandem new my_robot.urdf --like coman -o soft      springs and ground in proportion to COMAN's
+  tandem new my_robot.urdf --base fixed --force
+Every figure that is guessed is marked so in robot.toml. Rules: docs/robots.md.)";
+
 const char kModelBuildExamples[] = R"(Examples:
   tandem model build config/coman/robot.toml
   tandem model build my_robot/robot.toml -o /tmp/my_robot.so
@@ -317,6 +324,18 @@ void add_flags(CLI::App& app, ModelOptions& o) {
   info->add_option("--json", o.json, kJsonHelp);
   info->footer(kModelInfoExamples);
   info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
+}
+
+void add_flags(CLI::App& app, NewOptions& o) {
+  app.add_option("urdf", o.urdf, "Robot description (URDF; expand xacro first)")->required();
+  app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
+  app.add_option("--like", o.like,
+                 "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  app.add_option("--base", o.base, "Instead of what its feet suggest")
+      ->check(CLI::IsMember({"floating", "fixed"}));
+  app.add_flag("--force", o.force, "Write over the files of a folder that exists");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kNewExamples);
 }
 
 void add_flags(CLI::App& app, LogOptions& o) {

@@ -117,6 +117,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<ReportOptions>("report", "Draw the plots of a log, or of two");
   commands.add<LogOptions>("log", "Logs: info, csv, diff");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
+  commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
   commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
   commands.add<EstopOptions>("estop", "Emergency stop of a running run");

@@ -151,6 +151,16 @@ struct ModelOptions {
   std::string json;
 };
 
+/// tandem new URDF
+struct NewOptions {
+  std::string urdf;
+  std::string output;  ///< folder; empty: the description's name, here
+  std::string like;    ///< a bundled robot or a robot.toml; empty: rigid drives
+  std::string base;    ///< "floating", "fixed"; empty: found out
+  bool force = false;  ///< write into a folder that exists
+  std::string json;
+};
+
 /// tandem log info|csv|diff LOG [LOG_B]
 struct LogOptions {
   enum class Action : std::uint8_t { kInfo, kCsv, kDiff } action = Action::kInfo;
@@ -228,6 +238,7 @@ using Command = std::variant<Exit,
                              InjectOptions,
                              CheckOptions,
                              ModelOptions,
+                             NewOptions,
                              LogOptions,
                              EdsOptions,
                              ReportOptions,

@@ -31,6 +31,8 @@ namespace tandem::apps {
 /// Asks a running `tandem emulate` or `run` to inject a fault.
 [[nodiscard]] Exit inject_command(const InjectOptions& options);
 [[nodiscard]] Exit model_command(const ModelOptions& options);
+/// Writes a robot's folder from its description: robot.toml, hold.toml, move.toml.
+[[nodiscard]] Exit new_command(const NewOptions& options);
 [[nodiscard]] Exit log_command(const LogOptions& options);
 /// Writes a data sheet per type of board and sensor.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);

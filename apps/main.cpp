@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
                      [](const InjectOptions& options) { return inject_command(options); },
                      [](const CheckOptions& options) { return check_command(options); },
                      [](const ModelOptions& options) { return model_command(options); },
+                     [](const NewOptions& options) { return new_command(options); },
                      [](const LogOptions& options) { return log_command(options); },
                      [](const EdsOptions& options) { return eds_command(options); },
                      [](const ReportOptions& options) { return report_command(options); },

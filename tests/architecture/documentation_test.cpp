@@ -61,7 +61,7 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   const std::string page = text_of(kRoot / "docs/json.md");
   for (const char* file :
        {"apps/run_summary.cpp", "apps/bus_table.cpp", "apps/check_command.cpp",
-        "apps/model_command.cpp", "apps/log_command.cpp", "apps/latency_report.cpp",
+        "apps/model_command.cpp", "apps/new_command.cpp", "apps/log_command.cpp", "apps/latency_report.cpp",
         "apps/doctor_command.cpp", "apps/round_trips.cpp", "apps/controller_control.cpp",
         "apps/joint_control.cpp", "apps/topic_command.cpp", "apps/topic_rate.cpp"}) {
     const std::string source = text_of(kRoot / file);

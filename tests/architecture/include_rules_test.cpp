@@ -35,9 +35,11 @@ const Rules& rules() {
       {"runtime",
        {"base", "rt", "model", "hal", "hal/ethercat-can", "hal/sim", "hal/remote", "dds",
         "controllers", "log"}},
+      {"scaffold", {"base", "model", "hal", "hal/ethercat-can"}},
       {"apps",
        {"base", "rt", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can", "hal/sim",
-        "hal/remote", "dds", "controllers", "log", "report", "runtime"}},
+        "hal/remote", "dds", "controllers", "log", "report", "runtime",
+        "scaffold"}},
   };
   return table;
 }

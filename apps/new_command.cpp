@@ -1,0 +1,212 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+
+#include "apps/commands.hpp"
+#include "apps/console.hpp"
+#include "apps/robot_files.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
+#include "scaffold/new_robot.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kPeriod_ns = 1'000'000;
+
+Diagnostics one(std::string message, std::string hint, std::string file) {
+  return {Error{std::move(message), std::move(hint), std::move(file), 0, {}}};
+}
+
+/// A name for files and TOML: letters, digits, '_' and '-'.
+std::string plain_name(std::string name) {
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; }, '_');
+  return name.empty() ? "robot" : name;
+}
+
+/// Where bundled robots stand: beside the working directory, the build, or an installation.
+std::vector<fs::path> robot_folders() {
+  std::error_code problem;
+  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
+  const fs::path root = program.parent_path().parent_path();
+  return {"config", root.parent_path().parent_path() / "config", root / "share/tandem/config"};
+}
+
+/// The robot that --like names: a file, or the folder of a bundled one.
+std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
+  std::error_code ignored;
+  std::string file = name;
+  for (const fs::path& folder : robot_folders()) {
+    if (fs::is_regular_file(file, ignored)) break;
+    file = (folder / name / "robot.toml").string();
+  }
+  if (!fs::is_regular_file(file, ignored)) {
+    return std::unexpected(one("there is no bundled robot '" + name + "' to take after",
+                               "give the path of its robot.toml", name));
+  }
+  auto robot = read_robot(file);
+  if (!robot) return std::unexpected(robot.error());
+  return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
+}
+
+Status write_file(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) return {};
+  return std::unexpected(
+      Error{"the file cannot be written", "choose another folder with -o", file.string(), 0, {}});
+}
+
+/// Writes everything into a folder beside the one that is asked for, reads it back as `tandem
+/// run` would, and puts it in place: what is wrong leaves nothing behind.
+class Folder {
+ public:
+  explicit Folder(fs::path final) : final_(std::move(final)) {
+    draft_ = final_.string() + ".new-" + std::to_string(getpid());
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(draft_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  Diagnostics write(const scaffold::NewRobot& robot, const std::string& urdf) {
+    std::error_code problem;
+    fs::create_directories(draft_, problem);
+    const std::string copy = fs::path(urdf).filename().string();
+    for (const auto& [name, text] :
+         {std::pair{copy, text_of(urdf)},
+          {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
+          {std::string("hold.toml"), scaffold::hold_text(robot)},
+          {std::string("move.toml"), scaffold::move_text(robot)}}) {
+      if (Status written = write_file(draft_ / name, text); !written) return {written.error()};
+    }
+    return {};
+  }
+
+  Diagnostics check() const {
+    const auto robot = read_robot((draft_ / "robot.toml").string());
+    if (!robot) return robot.error();
+    return hal::can::check_bus_load(robot->config, kPeriod_ns);
+  }
+
+  Status place() {
+    std::error_code problem;
+    fs::create_directories(final_, problem);
+    for (const auto& entry : fs::directory_iterator(draft_)) {
+      fs::rename(entry.path(), final_ / entry.path().filename(), problem);
+      if (problem) return fail(problem.message(), "choose another folder with -o");
+    }
+    return {};
+  }
+
+ private:
+  fs::path final_, draft_;
+};
+
+Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
+  Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
+  for (const scaffold::Foot& foot : robot.feet) feet.push_back(foot.name);
+  for (const scaffold::FoundSensor& sensor : robot.sensors) sensors.push_back(sensor.config.name);
+  for (const scaffold::DriveSize& drive : robot.drives) drives.push_back(drive.actuator.name);
+  return {{"folder", folder},
+          {"robot", robot.config.name},
+          {"joints", robot.config.joints.size()},
+          {"mass_kg", robot.mass_kg},
+          {"base", robot.config.model.floating_base ? "floating" : "fixed"},
+          {"base_height_m", robot.stands_m},
+          {"feet", feet},
+          {"sensors", sensors},
+          {"drives", drives},
+          {"boards", robot.config.boards.size()}};
+}
+
+void print_table(const scaffold::NewRobot& robot, const std::string& folder, std::FILE* out) {
+  Facts facts;
+  facts.add("robot", fmt::format("{}: {} joints, {:.2f} kg", robot.config.name,
+                                 robot.config.joints.size(), robot.mass_kg));
+  for (const std::string& remark : robot.remarks) facts.add("", remark);
+  for (std::size_t f = 0; f < robot.feet.size(); ++f) {
+    const scaffold::Foot& foot = robot.feet[f];
+    facts.add("foot " + foot.name,
+              fmt::format("{}, {} contact point{}{}", robot.tree.links[foot.link].name,
+                          foot.points.size(), foot.points.size() == 1 ? "" : "s",
+                          foot.guess.empty() ? "" : " (guess)"));
+  }
+  if (robot.stands_m > 0.0) facts.add("stands", fmt::format("root at {:.3f} m", robot.stands_m));
+  for (const scaffold::FoundSensor& sensor : robot.sensors) {
+    const bool wrench = sensor.config.type == hal::SensorType::kForceTorque;
+    facts.add("sensor " + sensor.config.name,
+              (wrench ? "force/torque at " + sensor.config.joint : "IMU at " + sensor.config.link) +
+                  (sensor.guess.empty() ? "" : " (guess)"));
+  }
+  for (const scaffold::DriveSize& drive : robot.drives) {
+    facts.add("drive " + drive.actuator.name,
+              fmt::format("{} joints, {}", drive.joints.size(), drive.remark));
+  }
+  if (const auto loads = hal::can::bus_loads(robot.config, kPeriod_ns)) {
+    for (const hal::can::BusLoad& load : *loads) {
+      const auto boards = std::ranges::count(robot.config.boards, load.bus, &hal::BoardConfig::bus);
+      facts.add("bus " + load.bus,
+                fmt::format("{} boards, load {:.0f} %", boards, 100.0 * load.load));
+    }
+  }
+  facts.print(out);
+  fmt::print(out,
+             "\nNext:\n  tandem run {0}/hold.toml --report\n  tandem run {0}/move.toml --report\n"
+             "Look for `guess` in {0}/robot.toml: each stands where a figure of yours belongs.\n",
+             folder);
+}
+
+Diagnostics run(const NewOptions& options) {
+  std::error_code ignored;
+  const std::string name = plain_name(fs::path(options.urdf).stem().string());
+  const std::string folder = options.output.empty() ? name : options.output;
+  if (fs::exists(folder, ignored) && !options.force) {
+    return one("this exists already", "give another folder with -o, or --force", folder);
+  }
+  std::optional<scaffold::Like> like;
+  if (!options.like.empty()) {
+    auto read = read_like(options.like);
+    if (!read) return read.error();
+    like = std::move(*read);
+  }
+  scaffold::Request request;
+  request.urdf = options.urdf;
+  request.name = plain_name(fs::path(folder).lexically_normal().filename().string());
+  request.base = options.base == "floating" ? scaffold::Base::kFloating
+                 : options.base == "fixed"  ? scaffold::Base::kFixed
+                                            : scaffold::Base::kAuto;
+  request.like = like ? &*like : nullptr;
+  const auto robot = scaffold::make_robot(request);
+  if (!robot) return robot.error();
+  Folder files{fs::path(folder)};
+  if (Diagnostics errors = files.write(*robot, options.urdf); !errors.empty()) return errors;
+  if (Diagnostics errors = files.check(); !errors.empty()) return errors;
+  if (Status placed = files.place(); !placed) return {placed.error()};
+  for (const Error& warning : robot->warnings)
+    fmt::print(stderr, "warning: {}\n", warning.to_string());
+  print_table(*robot, folder, human_output(options.json));
+  if (Status written = write_json(options.json, to_json(*robot, folder)); !written) {
+    return {written.error()};
+  }
+  return {};
+}
+
+}  // namespace
+
+Exit new_command(const NewOptions& options) {
+  const Diagnostics errors = run(options);
+  print_errors(errors);
+  return errors.empty() ? Exit::kDone : Exit::kUsage;
+}
+
+}  // namespace tandem::apps

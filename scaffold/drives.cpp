@@ -1,0 +1,193 @@
+#include "scaffold/drives.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tandem::scaffold {
+namespace {
+
+// Sizes.
+constexpr double kSameSize = 0.6;        // least share of a size's effort that it serves
+constexpr double kEmfShare = 0.6;        // of the voltage, at the largest speed
+constexpr double kDropShare = 0.3;       // of the voltage, in the winding at the largest effort
+constexpr double kCurrentMargin = 1.25;  // of the current limit
+constexpr double kMostCurrent_A = 60.0;  // before a higher voltage is taken
+constexpr double kAcceleration = 300.0;  // [rad/s^2]: of the rotor alone at the largest effort
+constexpr double kFriction = 0.02;       // of the back-EMF's damping
+constexpr double kGear = 100.0;
+constexpr double kGearPerMetre = 1000.0;  // [rad/m] of a slide
+constexpr double kInductanceTime_s = 0.5e-3;
+constexpr double kHeating_K = 80.0;  // in the end, at kContinuous of the largest effort
+constexpr double kContinuous = 0.6;
+
+// Gains.
+constexpr double kEmfCompensation = 0.9;
+constexpr double kEstimator_Hz = 150.0;  // cut-off of the firmware's velocity estimate
+constexpr double kLagMargin = 0.4;       // [rad]: phase that the lag may take at the crossover
+constexpr double kDamping = 0.7;         // of the heaviest load
+constexpr double kCascade = 4.0;         // velocity loop over position loop
+constexpr double kFallMargin = 3.0;      // stiffness over what an inverted pendulum needs
+constexpr double kIntegralMargin = 4.0;  // in Routh's criterion
+constexpr double kIntegralRate_1_s = 2.0;
+constexpr double kSameGains = 2.5;
+
+struct Range {
+  double least = 0.0, most = 0.0, fall = 0.0;
+};
+
+Range range_of(const std::vector<int>& joints, const std::vector<JointLoad>& loads, double rotor) {
+  Range range{1e300, 0.0, 0.0};
+  for (const int j : joints) {
+    range.least = std::min(range.least, rotor + loads[j].least_inertia);
+    range.most = std::max(range.most, rotor + loads[j].most_inertia);
+    range.fall = std::max(range.fall, loads[j].fall_Nm_rad);
+  }
+  return range;
+}
+
+double estimator_lag_s(double period_s) {
+  const double a = std::exp(-2.0 * std::numbers::pi * kEstimator_Hz * period_s);
+  return 0.5 * period_s + a * period_s / (1.0 - a);
+}
+
+struct PositionGains {
+  double kp = 0.0, ki = 0.0, kd = 0.0, damping = 0.0;
+};
+
+PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& inertia,
+                             double period_s) {
+  const double crossover = kLagMargin / (0.5 * period_s + estimator_lag_s(period_s));
+  const double motor_constant = drive.gear_ratio * drive.torque_constant_Nm_A;
+  const double emf = motor_constant * motor_constant / drive.resistance_ohm;
+  PositionGains g;
+  g.kd = kEmfCompensation * emf + crossover * inertia.least;
+  g.damping = g.kd + drive.damping_Nms_rad - kEmfCompensation * emf;
+  const double fastest = g.damping * crossover / kCascade;
+  const double damped = g.damping * g.damping / (4.0 * kDamping * kDamping * inertia.most);
+  g.kp = std::min(fastest, std::max(damped, kFallMargin * inertia.fall));
+  const double routh = g.damping * (g.kp - inertia.fall) / (kIntegralMargin * inertia.most);
+  g.ki = std::max(0.0, std::min(kIntegralRate_1_s * g.kp, routh));
+  return g;
+}
+
+hal::ActuatorConfig motor(double effort, double velocity, bool slides) {
+  hal::ActuatorConfig m;
+  m.order = 0;
+  double current = 0.0, motor_constant = 0.0;
+  for (const double volts : {24.0, 48.0, 96.0, 192.0}) {
+    m.voltage_limit_V = volts;
+    motor_constant = kEmfShare * volts / velocity;
+    current = effort / motor_constant;
+    if (kCurrentMargin * current <= kMostCurrent_A) break;
+  }
+  m.gear_ratio = slides ? kGearPerMetre : kGear;
+  m.torque_constant_Nm_A = rounded(motor_constant / m.gear_ratio);
+  motor_constant = m.torque_constant_Nm_A * m.gear_ratio;
+  current = effort / motor_constant;
+  m.resistance_ohm = rounded(kDropShare * m.voltage_limit_V / current);
+  m.inductance_H = rounded(kInductanceTime_s * m.resistance_ohm);
+  m.inertia_kg_m2 = rounded(effort / kAcceleration);
+  m.damping_Nms_rad =
+      rounded((1.0 + kFriction) * motor_constant * motor_constant / m.resistance_ohm);
+  m.current_limit_A = rounded(kCurrentMargin * current);
+  const double heat_W = m.resistance_ohm * std::pow(kContinuous * current, 2.0);
+  m.thermal_resistance_K_W = rounded(kHeating_K / heat_W);
+  return m;
+}
+
+GainSet gain_set(const DriveSize& drive, std::vector<int> joints,
+                 const std::vector<JointLoad>& loads, double period_s) {
+  const hal::ActuatorConfig& m = drive.actuator;
+  const Range inertia = range_of(joints, loads, m.inertia_kg_m2);
+  const PositionGains p = position_gains(m, inertia, period_s);
+  GainSet set;
+  hal::GainsConfig& g = set.gains;
+  g.position.gains = {rounded(p.kp), rounded(p.ki), rounded(p.kd)};
+  g.velocity.gains = {rounded(p.damping), rounded(5.0 * p.damping), 0.0};
+  g.current.gains = {rounded(0.3 * m.resistance_ohm), rounded(200.0 * m.resistance_ohm), 0.0};
+  g.emf_compensation = kEmfCompensation;
+  g.stiffness_Nm_rad = rounded(0.2 * p.kp);
+  g.damping_Nms_rad =
+      rounded(std::min(p.kd, 2.0 * kDamping * std::sqrt(0.2 * p.kp * inertia.most)));
+  set.remark = fmt::format("inertia with its rotor {:.3g} to {:.3g}", inertia.least, inertia.most);
+  if (inertia.fall > 0.0) {
+    set.remark += fmt::format("; standing needs more than {:.3g} Nm/rad", inertia.fall);
+  }
+  set.joints = std::move(joints);
+  return set;
+}
+
+}  // namespace
+
+double rounded(double value, int digits) {
+  if (value == 0.0 || !std::isfinite(value)) return value;
+  const double scale = std::pow(10.0, digits - 1 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+std::vector<DriveSize> size_drives(const model::Tree& tree,
+                                   const std::vector<JointLimits>& limits) {
+  std::vector<DriveSize> sizes;
+  for (const bool slides : {false, true}) {
+    std::vector<int> joints;
+    for (std::size_t j = 0; j < limits.size(); ++j) {
+      if ((tree.joints[j].type == model::JointType::kPrismatic) == slides) {
+        joints.push_back(static_cast<int>(j));
+      }
+    }
+    std::ranges::stable_sort(joints, std::greater{}, [&](int j) { return limits[j].effort; });
+    for (std::size_t first = 0, end = 0; first < joints.size(); first = end) {
+      const double effort = limits[joints[first]].effort;
+      double velocity = 0.0;
+      DriveSize size;
+      for (end = first; end < joints.size() && limits[joints[end]].effort >= kSameSize * effort;
+           ++end) {
+        velocity = std::max(velocity, limits[joints[end]].velocity);
+        size.joints.push_back(joints[end]);
+      }
+      size.actuator = motor(effort, velocity, slides);
+      size.actuator.name = fmt::format("drive_{:.3g}{}", rounded(effort, 2), slides ? "N" : "Nm");
+      std::ranges::replace(size.actuator.name, '.', '_');
+      size.remark = fmt::format("{:.3g} {} at {:.3g} {}", effort, slides ? "N" : "Nm", velocity,
+                                slides ? "m/s" : "rad/s");
+      std::ranges::sort(size.joints);
+      sizes.push_back(std::move(size));
+    }
+  }
+  return sizes;
+}
+
+std::vector<GainSet> tune(const std::vector<DriveSize>& drives, const std::vector<JointLoad>& loads,
+                          double control_period_s) {
+  std::vector<GainSet> sets;
+  for (const DriveSize& drive : drives) {
+    const auto stiffness = [&](int j) {
+      const Range inertia = range_of({j}, loads, drive.actuator.inertia_kg_m2);
+      return position_gains(drive.actuator, inertia, control_period_s).kp;
+    };
+    std::vector<int> joints = drive.joints;
+    std::ranges::stable_sort(joints, std::greater{}, stiffness);
+    std::vector<GainSet> own;
+    for (std::size_t first = 0, end = 0; first < joints.size(); first = end) {
+      const double stiffest = stiffness(joints[first]);
+      for (end = first; end < joints.size() && kSameGains * stiffness(joints[end]) >= stiffest;) {
+        ++end;
+      }
+      std::vector<int> group(joints.begin() + static_cast<std::ptrdiff_t>(first),
+                             joints.begin() + static_cast<std::ptrdiff_t>(end));
+      std::ranges::sort(group);
+      own.push_back(gain_set(drive, std::move(group), loads, control_period_s));
+    }
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      own[i].gains.name =
+          drive.actuator.name + (own.size() == 1 ? "" : "_" + std::to_string(i + 1));
+      sets.push_back(std::move(own[i]));
+    }
+  }
+  return sets;
+}
+
+}  // namespace tandem::scaffold

@@ -1,0 +1,40 @@
+// Motors, gears and gains for joints of which only limits and loads are known. docs/robots.md
+// has the equations.
+// Layer: scaffold.  Thread: any, non-RT.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "hal/robot_config.hpp"
+#include "scaffold/loads.hpp"
+
+namespace tandem::scaffold {
+
+/// A table of robot.toml, what it serves, and the remark that stands over it.
+struct DriveSize {
+  hal::ActuatorConfig actuator;
+  std::vector<int> joints;
+  std::string remark;
+};
+struct GainSet {
+  hal::GainsConfig gains;
+  std::vector<int> joints;
+  std::string remark;
+};
+
+/// Groups joints by effort, from the strongest on: a size serves those that need at least 0.6 of
+/// it. Rigid drives that reach effort and speed at their limits of current and voltage.
+[[nodiscard]] std::vector<DriveSize> size_drives(const model::Tree& tree,
+                                                 const std::vector<JointLimits>& limits);
+
+/// Gains for each size, by the smallest and the largest inertia that its joints move; joints
+/// whose stiffness would differ by more than a factor of 2.5 get sets of their own.
+[[nodiscard]] std::vector<GainSet> tune(const std::vector<DriveSize>& drives,
+                                        const std::vector<JointLoad>& loads,
+                                        double control_period_s);
+
+/// Rounds to `digits` significant ones, so that files stay readable.
+[[nodiscard]] double rounded(double value, int digits = 3);
+
+}  // namespace tandem::scaffold

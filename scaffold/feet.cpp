@@ -1,0 +1,206 @@
+#include "scaffold/feet.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "scaffold/contact_points.hpp"
+#include "scaffold/posture.hpp"
+#include "scaffold/words.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+using Eigen::Vector3d;
+using model::Placement;
+using model::Tree;
+
+constexpr double kLowestShare = 0.1;  // of the height: ends so near to the lowest are feet, too
+constexpr double kAhead_m = 0.005;    // a sole so far ahead of its ankle shows where ahead is
+constexpr double kSoleLink_m = 0.03;  // a link called sole so near to the geometry sets the level
+constexpr double kLevel = 0.98;       // cosine: a frame within 11 degrees of level
+
+Placement inverse(const Placement& a) { return {a.R.transpose(), -(a.R.transpose() * a.p)}; }
+
+int foot_word(const std::string& name) {
+  for (const auto& [word, rank] : {std::pair{"sole", 4}, {"foot", 3}, {"toe", 2}, {"ankle", 1}}) {
+    if (mentions(name, word)) return rank;
+  }
+  return 0;
+}
+
+/// The best foot word among the links of a body.
+int rank_of(const Tree& tree, int body) {
+  int best = 0;
+  for (const model::Link& link : tree.links) {
+    if (link.body == body) best = std::max(best, foot_word(link.name));
+  }
+  return best;
+}
+
+std::vector<int> named_feet(const Tree& tree) {
+  std::vector<int> bodies;
+  for (int body : end_bodies(tree)) {
+    int rank = rank_of(tree, body);
+    const int parent = tree.joints[body - 1].parent;
+    if (rank == 2 && parent > 0 && rank_of(tree, parent) >= 3) body = parent;  // a toe that moves
+    if (rank > 0 && std::ranges::find(bodies, body) == bodies.end()) bodies.push_back(body);
+  }
+  return bodies;
+}
+
+std::vector<int> lowest_ends(const Tree& tree, const Posed& neutral) {
+  double low = 0.0, high = 0.0;
+  for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
+    const double z = neutral.body(static_cast<int>(b)).p.z();
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  std::vector<int> bodies = end_bodies(tree);
+  std::erase_if(bodies, [&](int body) {
+    return neutral.body(body).p.z() > low + kLowestShare * (high - low);
+  });
+  return bodies;
+}
+
+/// The length of the leg that ends in `body`, along its joints.
+double leg_length(const Tree& tree, const Posed& neutral, int body) {
+  double length = 0.0;
+  const std::vector<int> path = path_to(tree, body);
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    length += (neutral.origin(path[i]) - neutral.origin(path[i - 1])).norm();
+  }
+  return std::max(length, 0.1);
+}
+
+/// Shapes of the links called foot, sole, toe or ankle; without any, of the whole body.
+ContactPatch patch_of(const Tree& tree, const Outfit& outfit, const Posed& neutral, int body,
+                      int& link) {
+  for (const int least : {1, 0}) {
+    std::vector<Shape> shapes;
+    std::vector<Placement> placements;
+    for (std::size_t i = 0; i < tree.links.size(); ++i) {
+      const model::Link& one = tree.links[i];
+      if (one.body != body || foot_word(one.name) < least) continue;
+      const auto found = outfit.shapes.find(one.name);
+      if (found == outfit.shapes.end()) continue;
+      if (shapes.empty()) link = static_cast<int>(i);
+      for (const Shape& shape : found->second) {
+        shapes.push_back(shape);
+        placements.push_back(neutral.link(static_cast<int>(i)));
+      }
+    }
+    ContactPatch patch = lowest_points(shapes, placements);
+    if (!patch.points.empty()) return patch;
+  }
+  return {};
+}
+
+int best_link(const Tree& tree, int body) {
+  int best = -1;
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    const model::Link& link = tree.links[i];
+    if (link.body != body) continue;
+    if (best < 0 || (link.inertia.mass_kg > 0.0 && !(tree.links[best].inertia.mass_kg > 0.0))) {
+      best = static_cast<int>(i);
+    }
+  }
+  return best;
+}
+
+/// A level link called sole says where the ground is better than a box around the foot does.
+void use_sole_link(const Tree& tree, const Posed& neutral, Foot& foot, ContactPatch& patch) {
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    const model::Link& link = tree.links[i];
+    if (link.body != foot.body || !mentions(link.name, "sole")) continue;
+    const Placement at = neutral.link(static_cast<int>(i));
+    if (at.R(2, 2) < kLevel || patch.radius_m > 0.0) continue;
+    if (std::abs(at.p.z() - patch.points[0].z()) > kSoleLink_m) continue;
+    patch.up = at.R.col(2);
+    for (Vector3d& p : patch.points) p -= patch.up * patch.up.dot(p - at.p);
+    foot.link = static_cast<int>(i);
+    return;
+  }
+}
+
+Foot make_foot(const Tree& tree, const Outfit& outfit, const Posed& neutral, int body) {
+  Foot foot;
+  foot.body = body;
+  foot.link = best_link(tree, body);
+  ContactPatch patch = patch_of(tree, outfit, neutral, body, foot.link);
+  if (patch.points.empty()) {
+    patch = equivalent_sole(neutral.body(body) * tree.bodies[body].inertia,
+                            neutral.origin(body - 1), leg_length(tree, neutral, body));
+    foot.guess = fmt::format(
+        "no usable collision shape: a sole of the size that its inertia suggests, {:.3f} m under "
+        "the last joint; measure it",
+        neutral.origin(body - 1).z() - patch.points[0].z());
+  }
+  use_sole_link(tree, neutral, foot, patch);
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : patch.points) middle += p / static_cast<double>(patch.points.size());
+  const Vector3d up = patch.up;
+  Vector3d x = Vector3d::UnitX() - up * up.x();
+  Eigen::Matrix3d R;
+  R << x.normalized(), up.cross(x.normalized()), up;
+  const Placement sole{R, middle};
+  foot.sole_in_link = inverse(neutral.link(foot.link)) * sole;
+  foot.radius_m = patch.radius_m;
+  for (const Vector3d& p : patch.points) foot.points.push_back(R.transpose() * (p - middle));
+  return foot;
+}
+
+}  // namespace
+
+std::vector<Foot> find_feet(const Tree& tree, const Outfit& outfit, const Posed& neutral,
+                            FeetBy by) {
+  std::vector<Foot> feet;
+  for (const int body : by == FeetBy::kName ? named_feet(tree) : lowest_ends(tree, neutral)) {
+    feet.push_back(make_foot(tree, outfit, neutral, body));
+  }
+  return feet;
+}
+
+Vector3d direction_ahead(const Tree&, const std::vector<Foot>& feet, const Posed& neutral) {
+  Vector3d reach = Vector3d::Zero();
+  double count = 0.0;
+  for (const Foot& foot : feet) {
+    if (!foot.flat()) continue;
+    reach += (neutral.link(foot.link) * foot.sole_in_link).p - neutral.origin(foot.body - 1);
+    count += 1.0;
+  }
+  reach.z() = 0.0;
+  if (count == 0.0 || reach.norm() < kAhead_m * count) return Vector3d::UnitX();
+  Eigen::Index axis = 0;
+  reach.cwiseAbs().maxCoeff(&axis);
+  return Vector3d::Unit(axis) * (reach[axis] > 0.0 ? 1.0 : -1.0);
+}
+
+void face_ahead(const Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet) {
+  for (Foot& foot : feet) {
+    const Placement sole = neutral.link(foot.link) * foot.sole_in_link;
+    const Vector3d up = sole.R.col(2);
+    const Vector3d x = (ahead - up * up.dot(ahead)).normalized();
+    Eigen::Matrix3d R;
+    R << x, up.cross(x), up;
+    for (Vector3d& p : foot.points) p = R.transpose() * (sole.R * p);
+    foot.sole_in_link = inverse(neutral.link(foot.link)) * Placement{R, sole.p};
+  }
+}
+
+void settle_balls(const Vector3d& ahead, const Posed& standing, std::vector<Foot>& feet) {
+  for (Foot& foot : feet) {
+    if (foot.flat()) continue;
+    const Placement link = standing.link(foot.link);
+    Eigen::Matrix3d R;
+    R << ahead, Vector3d::UnitZ().cross(ahead), Vector3d::UnitZ();
+    const Placement old = link * foot.sole_in_link;
+    for (Vector3d& p : foot.points) p = R.transpose() * (old.R * p);
+    const Vector3d bottom = old.p - Vector3d(0.0, 0.0, foot.radius_m);
+    foot.sole_in_link = inverse(link) * Placement{R, bottom};
+  }
+}
+
+}  // namespace tandem::scaffold

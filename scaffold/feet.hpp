@@ -1,0 +1,47 @@
+// Which ends of a robot are its feet, and where they touch the ground.
+// Layer: scaffold.  Thread: any, non-RT.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "scaffold/outfit.hpp"
+#include "scaffold/posed.hpp"
+
+namespace tandem::scaffold {
+
+/// A foot. Its sole's frame has z up and x ahead when the robot stands.
+struct Foot {
+  std::string name;  ///< of its site; given by name_limbs()
+  int link = 0;      ///< in the tree: what the sole's frame is fixed to
+  int body = 0;
+  model::Placement sole_in_link;        ///< flat: the middle of the points; else a ball's centre
+  double radius_m = 0.0;                ///< of a point foot's ball; 0: flat, or a bare point
+  std::vector<Eigen::Vector3d> points;  ///< in the sole's frame
+  std::string guess;                    ///< what was assumed; empty: the description has it
+
+  [[nodiscard]] bool flat() const { return points.size() > 2; }
+};
+
+enum class FeetBy : std::uint8_t {
+  kName,       ///< a link of a limb's end is called foot, sole, ankle or toe
+  kStructure,  ///< the lowest ends of limbs
+};
+
+/// @param neutral  a posture in which soles are level, as far as anybody knows
+/// @return none when nothing looks like a foot
+[[nodiscard]] std::vector<Foot> find_feet(const model::Tree& tree, const Outfit& outfit,
+                                          const Posed& neutral, FeetBy by);
+
+/// Where the robot looks: along the feet if they reach ahead of their ankles, else the root's x.
+/// One of the root's axes, in W.
+[[nodiscard]] Eigen::Vector3d direction_ahead(const model::Tree& tree,
+                                              const std::vector<Foot>& feet, const Posed& neutral);
+
+/// Turns every sole's frame so that x is ahead, in the posture in which it is level.
+void face_ahead(const Eigen::Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet);
+
+/// Puts the contact point of each ball under its centre, in the posture in which it stands.
+void settle_balls(const Eigen::Vector3d& ahead, const Posed& standing, std::vector<Foot>& feet);
+
+}  // namespace tandem::scaffold

@@ -1,0 +1,64 @@
+#include "scaffold/ground.hpp"
+
+#include <cmath>
+
+#include "scaffold/posed.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+// COMAN's contact over its weight on each of eight points: docs/robots.md.
+constexpr double kStiffness_1_m = 648.0;
+constexpr double kDamping_s_m = 3.3;
+constexpr double kTangentialDamping_s_m = 2.33;
+
+double clean(double value, double step) {
+  const double result = std::round(value / step) * step;
+  return result == 0.0 ? 0.0 : result;
+}
+
+hal::SiteConfig site_of(const model::Tree& tree, const Foot& foot) {
+  hal::SiteConfig site;
+  site.name = foot.name;
+  site.link = tree.links[foot.link].name;
+  site.wrench = true;
+  const Eigen::Matrix3d& R = foot.sole_in_link.R;
+  // Roll, pitch, yaw about fixed axes.
+  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+  const bool upright = std::hypot(R(0, 0), R(1, 0)) < 1e-9;
+  const double roll = upright ? std::atan2(-R(1, 2), R(1, 1)) : std::atan2(R(2, 1), R(2, 2));
+  const double yaw = upright ? 0.0 : std::atan2(R(1, 0), R(0, 0));
+  site.rpy_rad = {clean(roll, 1e-8), clean(pitch, 1e-8), clean(yaw, 1e-8)};
+  for (int i = 0; i < 3; ++i) site.xyz_m[i] = clean(foot.sole_in_link.p[i], 1e-6);
+  return site;
+}
+
+}  // namespace
+
+void fill_ground(const hal::RobotConfig* like, NewRobot& robot) {
+  hal::ContactConfig& contact = robot.config.contact;
+  double points = 0.0;
+  for (const Foot& foot : robot.feet) {
+    robot.config.model.sites.push_back(site_of(robot.tree, foot));
+    hal::FootConfig config;
+    config.site = foot.name;
+    for (const Eigen::Vector3d& p : foot.points) {
+      config.points_m.push_back({clean(p.x(), 1e-5), clean(p.y(), 1e-5), clean(p.z(), 1e-5)});
+      points += 1.0;
+    }
+    contact.feet.push_back(std::move(config));
+  }
+  const double weight_N = robot.mass_kg * kGravity_m_s2 / points;
+  contact.stiffness_N_m = rounded(kStiffness_1_m * weight_N);
+  contact.damping_s_m = kDamping_s_m;
+  contact.tangential_stiffness_N_m = contact.stiffness_N_m;
+  contact.tangential_damping_Ns_m = rounded(kTangentialDamping_s_m * weight_N);
+  contact.static_friction = 0.9;
+  contact.sliding_friction = 0.8;
+  if (like == nullptr || like->contact.feet.empty()) return;
+  contact.damping_s_m = like->contact.damping_s_m;
+  contact.static_friction = like->contact.static_friction;
+  contact.sliding_friction = like->contact.sliding_friction;
+}
+
+}  // namespace tandem::scaffold

@@ -1,0 +1,116 @@
+#include "scaffold/loads.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scaffold/posture.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+using Eigen::Vector3d;
+using model::Tree;
+
+constexpr int kPostures = 200;
+constexpr double kLever = 0.3;             // of a leg's length: from a bent knee to the load's line
+constexpr double kLoadMargin = 2.0;        // of a drive over gravity at its worst
+constexpr double kAcceleration = 10.0;     // [rad/s^2 or m/s^2] on top of it
+constexpr double kLeastEffort = 0.5;       // [Nm or N]
+constexpr double kAbsurdEffort = 10.0;     // times the robot's weight at its reach
+constexpr double kAbsurdVelocity = 100.0;  // [rad/s or m/s]
+constexpr double kVelocity_rad_s = 5.0;    // without a limit
+constexpr double kVelocity_m_s = 0.5;
+
+/// The next of 0.5, 0.8, 1.2, 2, 3, 5, 8, 12, …: so that a left and a right joint, whose loads
+/// differ by chance, get the same.
+double next_size(double effort) {
+  for (double decade = kLeastEffort;; decade *= 10.0) {
+    for (const double step : {1.0, 1.6, 2.4, 4.0, 6.0}) {
+      if (effort <= step * decade * (1.0 + 1e-9)) return step * decade;
+    }
+  }
+}
+
+/// Largest distance between a joint's origin and the root.
+double reach_of(const Tree& tree) {
+  double most = 0.1;
+  std::vector<double> reach(tree.bodies.size(), 0.0);
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    reach[j + 1] = reach[tree.joints[j].parent] + tree.joints[j].in_parent.p.norm();
+    most = std::max(most, reach[j + 1] + tree.bodies[j + 1].inertia.com_m.norm());
+  }
+  return most;
+}
+
+/// A leg whose foot stands swings the robot above it: its share of the whole, as a point mass.
+void add_stance(const Tree& tree, const std::vector<Foot>& feet, const Posed& stance,
+                std::vector<JointLoad>& loads) {
+  const double share_kg = stance.whole().mass_kg / static_cast<double>(feet.size());
+  for (const Foot& foot : feet) {
+    const std::vector<int> path = path_to(tree, foot.body);
+    const Vector3d sole = (stance.link(foot.link) * foot.sole_in_link).p;
+    const double length = (stance.origin(path.front()) - sole).norm();
+    for (const int j : path) {
+      if (stance.slides(j)) continue;
+      const double lever = (stance.whole().com_m - stance.origin(j)).norm();
+      loads[j].most_inertia = std::max(loads[j].most_inertia, share_kg * lever * lever);
+      loads[j].fall_Nm_rad = share_kg * kGravity_m_s2 * lever;
+      loads[j].gravity_Nm =
+          std::max(loads[j].gravity_Nm, 2.0 * share_kg * kGravity_m_s2 * kLever * length);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<Foot>& feet,
+                                const Posed* stance) {
+  const Bounds bounds = bounds_of(tree);
+  std::vector<JointLoad> loads(tree.joints.size());
+  for (int sample = 0; sample < kPostures; ++sample) {
+    Eigen::VectorXd q(bounds.lower.size());
+    for (Eigen::Index j = 0; j < q.size(); ++j) {
+      q[j] = bounds.lower[j] +
+             (bounds.upper[j] - bounds.lower[j]) * halton(sample, static_cast<int>(j));
+    }
+    const Posed posed(tree, q);
+    for (std::size_t j = 0; j < loads.size(); ++j) {
+      const int joint = static_cast<int>(j);
+      const double inertia = posed.inertia(joint);
+      JointLoad& load = loads[j];
+      load.least_inertia = sample == 0 ? inertia : std::min(load.least_inertia, inertia);
+      load.most_inertia = std::max(load.most_inertia, inertia);
+      load.gravity_Nm = std::max(load.gravity_Nm, std::abs(posed.gravity_load(joint)));
+    }
+  }
+  if (stance != nullptr) add_stance(tree, feet, *stance, loads);
+  return loads;
+}
+
+std::vector<JointLimits> limits_of(const Tree& tree, const std::vector<JointLoad>& loads) {
+  double mass = 0.0;
+  for (const model::Body& body : tree.bodies) mass += body.inertia.mass_kg;
+  const double weight_at_reach = mass * kGravity_m_s2 * std::max(reach_of(tree), 1.0);
+  std::vector<JointLimits> limits;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const model::Joint& joint = tree.joints[j];
+    const bool slides = joint.type == model::JointType::kPrismatic;
+    JointLimits limit;
+    limit.effort = joint.effort;
+    limit.velocity = joint.velocity;
+    if (!(joint.effort > 0.0 && joint.effort < kAbsurdEffort * weight_at_reach)) {
+      limit.effort =
+          next_size(kLoadMargin * loads[j].gravity_Nm + kAcceleration * loads[j].least_inertia);
+      limit.effort_guessed = true;
+    }
+    if (!(joint.velocity > 0.0 && joint.velocity < kAbsurdVelocity)) {
+      limit.velocity = slides ? kVelocity_m_s : kVelocity_rad_s;
+      limit.velocity_guessed = true;
+    }
+    limit.range = position_range(joint);
+    limits.push_back(limit);
+  }
+  return limits;
+}
+
+}  // namespace tandem::scaffold

@@ -1,0 +1,262 @@
+#include "scaffold/new_robot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "model/urdf.hpp"
+#include "scaffold/ground.hpp"
+#include "scaffold/like.hpp"
+#include "scaffold/moves.hpp"
+#include "scaffold/standing.hpp"
+#include "scaffold/wiring.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+constexpr double kControlPeriod_s = 1e-3;
+constexpr double kEncoderCounts = 1048576.0;
+constexpr double kMotorCounts = 1638400.0;
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// Decides one thing after the other; each step may use what the steps before have found.
+class Maker {
+ public:
+  explicit Maker(const Request& request) : request_(request) {}
+
+  std::expected<NewRobot, Diagnostics> run() {
+    if (Diagnostics errors = read(); !errors.empty()) return std::unexpected(errors);
+    for (const auto step :
+         {&Maker::choose_base, &Maker::choose_posture, &Maker::choose_drives, &Maker::wire_up}) {
+      if (Status done = (this->*step)(); !done) {
+        Error error = done.error();
+        error.file = request_.urdf;
+        return std::unexpected(Diagnostics{error});
+      }
+    }
+    return std::move(robot_);
+  }
+
+ private:
+  using Tree = model::Tree;
+
+  Diagnostics read();
+  Diagnostics take(model::UrdfModel found);
+  [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> read_tree(bool floating) const;
+  Status choose_base();
+  Status choose_posture();
+  Status choose_drives();
+  Status wire_up();
+  void fill_model();
+  void fill_joints();
+  void fill_posture(const std::string& name, double base_height_m);
+  void fill_report();
+
+  const Request& request_;
+  NewRobot robot_;
+  Outfit outfit_;
+  std::optional<Standing> standing_;
+  Eigen::VectorXd q_;
+  bool must_float_ = false;  ///< the description has a floating joint at its root
+};
+
+std::expected<model::UrdfModel, Diagnostics> Maker::read_tree(bool floating) const {
+  return model::read_urdf(request_.urdf, {.floating_base = floating,
+                                          .mimic_independent = true,
+                                          .repair_inertia = robot_.config.model.repair_inertia});
+}
+
+/// As it stands if that is possible; else with what the reader offers to make it so.
+Diagnostics Maker::read() {
+  Diagnostics fewest;
+  for (const bool repair : {false, true}) {
+    robot_.config.model.repair_inertia = repair;
+    for (const bool floating : {false, true}) {
+      auto found = read_tree(floating);
+      if (!found) {
+        if (fewest.empty() || found.error().size() < fewest.size()) fewest = found.error();
+        continue;
+      }
+      must_float_ = floating;
+      return take(std::move(*found));
+    }
+  }
+  return fewest;
+}
+
+Diagnostics Maker::take(model::UrdfModel found) {
+  if (found.tree.joints.empty()) {
+    return {Error{
+        "the robot has no joint that moves", "name another description", request_.urdf, 0, {}}};
+  }
+  if (robot_.config.model.repair_inertia) {
+    robot_.remarks.push_back("Impossible inertias are replaced by the nearest possible ones.");
+  }
+  robot_.tree = std::move(found.tree);
+  robot_.warnings = std::move(found.warnings);
+  outfit_ = read_outfit(text_of(request_.urdf));
+  return {};
+}
+
+Status Maker::choose_base() {
+  const Posed posed(robot_.tree, neutral_posture(robot_.tree));
+  const bool heavy = robot_.tree.bodies[0].inertia.mass_kg > 0.0;
+  const bool asked = request_.base == Base::kFloating || must_float_;
+  if (must_float_ && request_.base == Base::kFixed) {
+    return fail("the description's root moves by a floating joint", "leave --base out");
+  }
+  if (request_.base != Base::kFixed && heavy) {
+    robot_.feet = find_feet(robot_.tree, outfit_, posed, FeetBy::kName);
+    if (robot_.feet.empty() && asked) {
+      robot_.feet = find_feet(robot_.tree, outfit_, posed, FeetBy::kStructure);
+      for (Foot& foot : robot_.feet) {
+        const std::string chosen = "no link is called a foot: this is one of the lowest ends";
+        foot.guess = foot.guess.empty() ? chosen : chosen + "; " + foot.guess;
+      }
+    }
+  }
+  const bool floating = !robot_.feet.empty();
+  if (!floating && asked) {
+    return fail("a floating base needs mass at its root, and feet",
+                "give --base fixed, or the root link an inertial");
+  }
+  const char* why = request_.base != Base::kAuto ? "as --base says"
+                    : must_float_                ? "the description has a floating joint"
+                    : floating                   ? "there are feet by name"
+                                                 : "no link is called a foot";
+  robot_.remarks.push_back(
+      fmt::format("The base is {}: {}.", floating ? "floating" : "fixed", why));
+  if (floating) {  // a base that moves changes what the reader has to refuse
+    auto found = read_tree(true);
+    if (!found) return std::unexpected(found.error().front());
+    robot_.tree = std::move(found->tree);
+    robot_.ahead = direction_ahead(robot_.tree, robot_.feet, posed);
+    face_ahead(robot_.ahead, posed, robot_.feet);
+  }
+  robot_.limbs = split_limbs(robot_.tree, robot_.feet, posed, robot_.ahead);
+  robot_.mass_kg = 0.0;
+  for (std::size_t b = floating ? 0 : 1; b < robot_.tree.bodies.size(); ++b) {
+    robot_.mass_kg += robot_.tree.bodies[b].inertia.mass_kg;
+  }
+  return {};
+}
+
+Status Maker::choose_posture() {
+  if (robot_.feet.empty()) {
+    q_ = waiting_posture(robot_.tree);
+    return {};
+  }
+  standing_.emplace(robot_.tree, robot_.feet, robot_.ahead, spared_posture(robot_.tree));
+  if (Status found = standing_->find(); !found) return found;
+  q_ = standing_->q();
+  return {};
+}
+
+Status Maker::choose_drives() {
+  const std::optional<Posed> stance =
+      standing_ ? std::optional<Posed>(std::in_place, robot_.tree, q_) : std::nullopt;
+  const std::vector<JointLoad> loads =
+      loads_of(robot_.tree, robot_.feet, stance ? &*stance : nullptr);
+  robot_.limits = limits_of(robot_.tree, loads);
+  if (request_.like != nullptr) {
+    robot_.like = request_.like->config.name;
+    robot_.scale = scale_of(robot_.tree, request_.like->tree);
+    take_drives(*request_.like, loads, robot_);
+  } else {
+    robot_.drives = size_drives(robot_.tree, robot_.limits);
+    robot_.gains = tune(robot_.drives, loads, kControlPeriod_s);
+  }
+  robot_.sensors = find_sensors(robot_.tree, outfit_);
+  fill_model();
+  fill_joints();
+  if (!standing_) {
+    fill_posture("ready", 0.0);
+    robot_.move = swing(robot_, q_);
+    return {};
+  }
+  robot_.move = squat_and_swing(robot_, *standing_);  // needs the balls' centres
+  settle_balls(robot_.ahead, *stance, robot_.feet);
+  fill_ground(request_.like == nullptr ? nullptr : &request_.like->config, robot_);
+  robot_.stands_m = standing_->height_m();
+  fill_posture("stand", robot_.stands_m);
+  return {};
+}
+
+Status Maker::wire_up() {
+  fill_report();
+  return wire(robot_);
+}
+
+void Maker::fill_model() {
+  hal::RobotConfig& config = robot_.config;
+  config.name = request_.name;
+  config.model.urdf = request_.urdf;
+  config.model.floating_base = robot_.tree.floating_base;
+  config.model.mimic_independent = !outfit_.mimics.empty();
+  if (!outfit_.mimics.empty()) {
+    robot_.remarks.push_back(
+        fmt::format("Joints that mimic another one have drives of their own: {}.",
+                    fmt::join(outfit_.mimics, ", ")));
+  }
+  for (const DriveSize& drive : robot_.drives) config.actuators.push_back(drive.actuator);
+  for (const GainSet& set : robot_.gains) config.gains.push_back(set.gains);
+}
+
+void Maker::fill_joints() {
+  hal::RobotConfig& config = robot_.config;
+  for (const Limb& limb : robot_.limbs) {
+    for (const int j : limb.joints) {
+      const JointLimits& limit = robot_.limits[j];
+      hal::JointConfig joint;
+      joint.name = robot_.tree.joints[j].name;
+      const auto serves = [&](const auto& group) {
+        return std::ranges::count(group.joints, j) > 0;
+      };
+      joint.actuator = std::ranges::find_if(robot_.drives, serves)->actuator.name;
+      joint.gains = std::ranges::find_if(robot_.gains, serves)->gains.name;
+      joint.min_position_rad = limit.range.lower;
+      joint.max_position_rad = limit.range.upper;
+      joint.max_torque_Nm = joint.rated_torque_Nm = limit.effort;
+      joint.max_velocity_rad_s = limit.velocity;
+      joint.encoder_counts_per_rev = kEncoderCounts;
+      joint.motor_encoder_counts_per_rev = kMotorCounts;
+      config.joints.push_back(std::move(joint));
+    }
+  }
+}
+
+void Maker::fill_posture(const std::string& name, double base_height_m) {
+  hal::PostureConfig posture;
+  posture.name = name;
+  posture.base_height_m = base_height_m;
+  for (const hal::JointConfig& joint : robot_.config.joints) {
+    posture.position_rad.push_back(q_[robot_.tree.joint_index(joint.name)]);
+  }
+  robot_.config.postures.push_back(std::move(posture));
+}
+
+/// A leg's hip and knee, or the first two joints of the first limb.
+void Maker::fill_report() {
+  std::vector<int> joints = standing_ ? standing_->hip_and_knee() : std::vector<int>{};
+  if (joints.empty()) joints = robot_.limbs.front().joints;
+  if (joints.size() > 2) joints.resize(2);
+  for (const int j : joints) robot_.report.push_back(robot_.tree.joints[j].name);
+}
+
+}  // namespace
+
+std::expected<NewRobot, Diagnostics> make_robot(const Request& request) {
+  return Maker(request).run();
+}
+
+}  // namespace tandem::scaffold

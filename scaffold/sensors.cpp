@@ -1,0 +1,123 @@
+#include "scaffold/sensors.hpp"
+
+#include <algorithm>
+
+#include "scaffold/words.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+using model::Tree;
+
+bool is_force_torque(const std::string& name) {
+  if (mentions(name, "imu") || mentions(name, "gyro") || has_word(name, "acc")) return false;
+  return has_word(name, "ft") || mentions(name, "force");
+}
+
+class Finder {
+ public:
+  explicit Finder(const Tree& tree) : tree_(tree), mass_kg_(tree.links.size(), 0.0) {
+    for (std::size_t i = tree.links.size(); i-- > 0;) {
+      mass_kg_[i] += tree.links[i].inertia.mass_kg;
+      if (tree.links[i].parent >= 0) mass_kg_[tree.links[i].parent] += mass_kg_[i];
+    }
+  }
+
+  std::vector<FoundSensor> run(const Outfit& outfit) {
+    for (const SensorElement& element : outfit.sensors) {
+      if (!mentions(element.type, "force")) continue;
+      add_wrench(tree_.child_link_index(element.parent), element.name);
+    }
+    for (std::size_t i = 0; i < tree_.links.size(); ++i) {
+      const model::Link& link = tree_.links[i];
+      if (is_force_torque(link.name)) add_wrench(static_cast<int>(i), link.name);
+    }
+    for (std::size_t i = 0; i < tree_.links.size(); ++i) {
+      const model::Link& link = tree_.links[i];
+      if (mass_kg_[i] > 0.0 && is_force_torque(link.joint)) {
+        add_wrench(static_cast<int>(i), link.joint);
+      }
+    }
+    for (std::size_t i = 0; i < tree_.links.size(); ++i) {
+      if (mentions(tree_.links[i].name, "imu")) add_imu(static_cast<int>(i), {});
+    }
+    const bool imu = std::ranges::any_of(
+        found_, [](const FoundSensor& s) { return s.config.type == hal::SensorType::kImu; });
+    if (tree_.floating_base && !imu) {
+      add_imu(0, "the description names no IMU; say where it is, or remove it");
+    }
+    return std::move(found_);
+  }
+
+ private:
+  /// The link beyond the joint that a sensor at `link` measures: a frame without mass measures
+  /// for the link that it is fixed to, a chain of such frames is one sensor.
+  [[nodiscard]] int measured(int link) const {
+    while (link > 0 && !(mass_kg_[link] > 0.0)) link = tree_.links[link].parent;
+    while (link > 0 && !(tree_.links[link].inertia.mass_kg > 0.0)) {
+      int child = -1;
+      for (std::size_t i = 0; i < tree_.links.size(); ++i) {
+        if (tree_.links[i].parent != link) continue;
+        if (child >= 0 || tree_.links[i].moving >= 0) return link;
+        child = static_cast<int>(i);
+      }
+      link = child;
+    }
+    return link;
+  }
+
+  void add_wrench(int named, std::string name) {
+    const int link = named < 0 ? -1 : measured(named);
+    if (link <= 0 || (!tree_.floating_base && tree_.links[link].body == 0)) return;
+    const std::string& joint = tree_.links[link].joint;
+    int frame = link;  // the frame that the description made for it, when there is one
+    for (std::size_t i = 0; i < tree_.links.size(); ++i) {
+      const bool here = tree_.links[i].body == tree_.links[link].body;
+      if (here && is_force_torque(tree_.links[i].name) && measured(static_cast<int>(i)) == link) {
+        frame = static_cast<int>(i);
+        name = tree_.links[i].name;
+        break;
+      }
+    }
+    if (taken(joint, name)) return;
+    FoundSensor sensor;
+    sensor.config.name = name;
+    sensor.config.type = hal::SensorType::kForceTorque;
+    sensor.config.joint = joint;
+    sensor.config.link = tree_.links[frame].name;
+    sensor.body = tree_.links[link].body;
+    found_.push_back(std::move(sensor));
+  }
+
+  void add_imu(int link, const std::string& guess) {
+    const int body = tree_.links[link].body;
+    for (const FoundSensor& other : found_) {
+      if (other.config.type == hal::SensorType::kImu && other.body == body) return;
+    }
+    FoundSensor sensor;
+    sensor.config.name = guess.empty() ? tree_.links[link].name : "base_imu";
+    sensor.config.type = hal::SensorType::kImu;
+    sensor.config.link = tree_.links[link].name;
+    sensor.body = body;
+    sensor.guess = guess;
+    found_.push_back(std::move(sensor));
+  }
+
+  [[nodiscard]] bool taken(const std::string& joint, const std::string& name) const {
+    return std::ranges::any_of(found_, [&](const FoundSensor& s) {
+      return s.config.joint == joint || s.config.name == name;
+    });
+  }
+
+  const Tree& tree_;
+  std::vector<double> mass_kg_;  ///< per link: of it and all beyond
+  std::vector<FoundSensor> found_;
+};
+
+}  // namespace
+
+std::vector<FoundSensor> find_sensors(const Tree& tree, const Outfit& outfit) {
+  return Finder(tree).run(outfit);
+}
+
+}  // namespace tandem::scaffold

@@ -1,0 +1,25 @@
+// Sensors that a description names.
+// Layer: scaffold.  Thread: any, non-RT.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "hal/robot_config.hpp"
+#include "scaffold/outfit.hpp"
+
+namespace tandem::scaffold {
+
+/// A sensor without its place on a bus.
+struct FoundSensor {
+  hal::SensorConfig config;  ///< name, type, joint, link
+  int body = 0;              ///< that it sits on
+  std::string guess;         ///< what was assumed; empty: the description names it
+};
+
+/// Force/torque sensors: <sensor> elements, and joints and links with "ft" or "force" in their
+/// names, one for each wrench. IMUs: links with "imu" in their names, one for each body; a
+/// floating base without any gets one at its root.
+[[nodiscard]] std::vector<FoundSensor> find_sensors(const model::Tree& tree, const Outfit& outfit);
+
+}  // namespace tandem::scaffold

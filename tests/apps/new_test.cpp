@@ -1,0 +1,76 @@
+// `tandem new`: a folder from a URDF alone, and what then runs.
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class New : public Program {
+ protected:
+  /// Makes the folder, and lets the robot hold its posture and move.
+  void holds_and_moves(const std::string& urdf, double most_rad) {
+    const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+    Outcome outcome = tandem("new '" TANDEM_SOURCE_DIR "/" + urdf + "' -o made", cache);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    outcome = tandem("model build made/robot.toml", cache);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    for (const std::string experiment : {"hold", "move"}) {
+      outcome = tandem("run made/" + experiment + ".toml --no-log --json run.json", cache);
+      ASSERT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+      const nlohmann::json run = json("run.json");
+      EXPECT_TRUE(run["fault_log"].empty()) << experiment;
+      EXPECT_FALSE(run["joints"].empty());
+      for (const auto& [name, joint] : run["joints"].items()) {
+        EXPECT_LT(joint["max_tracking_error_rad"], most_rad) << experiment << ": " << name;
+      }
+      if (!run["base"].is_null()) {
+        EXPECT_LT(run["base"]["final_tilt_rad"], 0.01) << experiment;
+      }
+    }
+  }
+};
+
+TEST_F(New, MakesAnArmHoldAndMove) {
+  holds_and_moves("config/double_pendulum/double_pendulum.urdf", 0.01);
+}
+
+TEST_F(New, MakesAQuadrupedStandAndMoveOnPointFeet) {
+  holds_and_moves("tests/data/robots/anymal_c.urdf", 0.01);
+}
+
+TEST_F(New, WritesOverNothingWithoutForce) {
+  EXPECT_EQ(tandem("new double_pendulum.urdf").status, 0);
+  write_text(folder_ / "double_pendulum/hold.toml", "mine");
+  const Outcome again = tandem("new double_pendulum.urdf");
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.err.find("this exists already"), std::string::npos) << again.err;
+  EXPECT_EQ(read_text(folder_ / "double_pendulum/hold.toml"), "mine");
+  EXPECT_EQ(tandem("new double_pendulum.urdf --force").status, 0);
+  EXPECT_NE(read_text(folder_ / "double_pendulum/hold.toml"), "mine");
+}
+
+TEST_F(New, LeavesNothingBehindOfWhatIsWrong) {
+  write_text(folder_ / "some.xacro", "<robot name='a' xmlns:xacro='x'><xacro:arm/></robot>");
+  write_text(folder_ / "broken.urdf", "<robot name='a'><link name='b'>");
+  for (const std::string file : {"missing.urdf", "some.xacro", "broken.urdf"}) {
+    const Outcome outcome = tandem("new " + file);
+    EXPECT_EQ(outcome.status, 2) << file;
+    EXPECT_EQ(outcome.err.rfind("error: ", 0), 0U) << outcome.err;
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    EXPECT_FALSE(entry.is_directory()) << entry.path();
+  }
+}
+
+TEST_F(New, SaysWhatItChoseAsJson) {
+  const Outcome outcome =
+      tandem("new '" TANDEM_SOURCE_DIR "/config/coman/coman.urdf' -o c --like coman --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["base"], "floating");
+  EXPECT_EQ(json["joints"], 29);
+  EXPECT_EQ(json["feet"].size(), 2U);
+  EXPECT_NE(read_text(folder_ / "c/robot.toml").find("spring_Nm_rad"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::apps

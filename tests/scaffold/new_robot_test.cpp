@@ -1,0 +1,169 @@
+// What `tandem new` finds out of a description, and that the files say it.
+#include "scaffold/new_robot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "hal/ethercat-can/bus_load.hpp"
+#include "runtime/experiment.hpp"
+#include "scaffold/words.hpp"
+#include "tests/scaffold/robots.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+std::vector<std::string> sensors_of(const NewRobot& robot) {
+  std::vector<std::string> names;
+  for (const FoundSensor& sensor : robot.sensors) names.push_back(sensor.config.name);
+  return names;
+}
+
+class EveryPublicRobot : public ::testing::TestWithParam<PublicRobot> {};
+
+TEST_P(EveryPublicRobot, GetsFilesThatAreReadBackAsTheyWereMeant) {
+  const NewRobot robot = made(GetParam());
+  auto read =
+      hal::parse_robot_config(robot_text(robot, path_of(GetParam()), "x.urdf"), "robot.toml");
+  ASSERT_TRUE(read) << read.error().front().to_string();
+  const auto description = runtime::complete_robot(*read);
+  ASSERT_TRUE(description) << description.error().front().to_string();
+  EXPECT_TRUE(hal::can::check_bus_load(*read, 1'000'000).empty());
+  ASSERT_EQ(read->joints.size(), robot.config.joints.size());
+  for (std::size_t j = 0; j < read->joints.size(); ++j) {
+    const hal::JointConfig& is = read->joints[j];
+    const hal::JointConfig& meant = robot.config.joints[j];
+    EXPECT_EQ(is.name, meant.name);
+    EXPECT_EQ(is.board, meant.board);
+    EXPECT_EQ(is.axis, meant.axis);
+    EXPECT_EQ(is.actuator, meant.actuator);
+    EXPECT_EQ(is.gains, meant.gains);
+    EXPECT_NEAR(is.max_torque_Nm, meant.max_torque_Nm, 1e-2 * meant.max_torque_Nm);
+    EXPECT_NEAR(read->postures[0].position_rad[j], robot.config.postures[0].position_rad[j], 1e-4);
+  }
+  for (std::size_t s = 0; s < read->sensors.size(); ++s) {
+    EXPECT_EQ(read->sensors[s].bus, robot.config.sensors[s].bus);
+    EXPECT_EQ(read->sensors[s].node_id, robot.config.sensors[s].node_id);
+  }
+  for (const std::string& text : {hold_text(robot), move_text(robot)}) {
+    const auto experiment = runtime::parse_experiment(text, "experiment.toml", *read);
+    EXPECT_TRUE(experiment) << experiment.error().front().to_string();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, EveryPublicRobot, ::testing::ValuesIn(kPublicRobots),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(NewRobot, FindsOneSensorForEachWrenchAndEachImu) {
+  EXPECT_EQ(sensors_of(made(kPublicRobots[1])), std::vector<std::string>{"ft_frame"});
+  EXPECT_EQ(sensors_of(made(kPublicRobots[3])), std::vector<std::string>{"imu_link"});
+  const NewRobot walkman = made(kPublicRobots[6]);  // six frames in a row in each foot: one sensor
+  ASSERT_EQ(walkman.sensors.size(), 3U);
+  EXPECT_EQ(walkman.sensors[0].config.joint, "FT_LFoot_X");
+  EXPECT_FALSE(walkman.sensors[2].guess.empty()) << "its description names no IMU";
+  const NewRobot icub = made(kPublicRobots[7]);
+  EXPECT_EQ(std::ranges::count(icub.sensors, hal::SensorType::kForceTorque,
+                               [](const FoundSensor& s) { return s.config.type; }),
+            6);
+}
+
+TEST(NewRobot, TakesWhereTheDescriptionHasNoLimitWhatTheModelNeeds) {
+  const NewRobot pendulum = made(kPublicRobots[0]);  // effort and velocity are 0
+  for (const JointLimits& limit : pendulum.limits) {
+    EXPECT_TRUE(limit.effort_guessed && limit.velocity_guessed);
+    EXPECT_GT(limit.effort, 0.0);
+  }
+  const NewRobot icub = made(kPublicRobots[7]);  // 20 joints of 50000 Nm at 50000 rad/s
+  EXPECT_EQ(std::ranges::count(icub.limits, true, &JointLimits::effort_guessed), 20);
+  const std::string text = robot_text(icub, "icub.urdf", "icub.urdf");
+  EXPECT_NE(text.find("# guess: twice gravity at its worst; the description's is 50000"),
+            std::string::npos);
+}
+
+TEST(NewRobot, NamesLimbsAsPeopleDo) {
+  std::vector<std::string> names;
+  for (const Limb& limb : made(kPublicRobots[5]).limbs) names.push_back(limb.name);
+  std::ranges::sort(names);
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"left_arm", "left_leg", "right_arm", "right_leg", "torso"}));
+  const NewRobot anymal = made(kPublicRobots[3]);
+  EXPECT_EQ(anymal.limbs[0].name, "left_front_leg");
+  EXPECT_EQ(anymal.feet[0].points.size(), 1U) << "a ball";
+}
+
+TEST(NewRobot, TakesTheBaseThatItIsTold) {
+  const std::string urdf = path_of(kPublicRobots[5]);
+  const auto fixed = make_robot({.urdf = urdf, .name = "coman", .base = Base::kFixed});
+  ASSERT_TRUE(fixed);
+  EXPECT_FALSE(fixed->config.model.floating_base);
+  EXPECT_TRUE(fixed->feet.empty());
+}
+
+TEST(NewRobot, TakesSpringsInProportionFromAnother) {
+  auto read = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  ASSERT_TRUE(read);
+  auto description = runtime::complete_robot(*read);
+  ASSERT_TRUE(description);
+  const Like coman{*read, description->tree};
+  const auto same =
+      make_robot({.urdf = path_of(kPublicRobots[5]), .name = "coman", .like = &coman});
+  ASSERT_TRUE(same) << same.error().front().to_string();
+  EXPECT_NEAR(same->scale, 1.0, 1e-9);
+  for (const hal::JointConfig& joint : same->config.joints) {  // like itself: the same drives
+    const hal::JointConfig& theirs = read->joints[read->joint_index(joint.name)];
+    EXPECT_EQ(joint.actuator, theirs.actuator) << joint.name;
+    EXPECT_NEAR(same->config.actuator_of(joint).spring_Nm_rad,
+                read->actuator_of(theirs).spring_Nm_rad, 0.5)
+        << joint.name;
+  }
+}
+
+/// A one-legged hopper whose root moves by a floating joint, and whose foot's inertia is
+/// impossible.
+constexpr char kHopper[] = R"(<robot name="hopper">
+  <link name="world"/>
+  <joint name="free" type="floating"><parent link="world"/><child link="body"/></joint>
+  <link name="body"><inertial><mass value="10"/><inertia ixx="0.2" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="hip" type="revolute"><parent link="body"/><child link="thigh"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="10"/></joint>
+  <link name="thigh"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="knee" type="revolute"><origin xyz="0 0 -0.4"/><parent link="thigh"/><child link="shank"/><axis xyz="0 1 0"/><limit lower="0" upper="2" effort="50" velocity="10"/></joint>
+  <link name="shank"><inertial><origin xyz="0 0 -0.2"/><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="ankle" type="revolute"><origin xyz="0 0 -0.4"/><parent link="shank"/><child link="stub"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="30" velocity="10"/></joint>
+  <link name="stub"><inertial><mass value="0.5"/><inertia ixx="0.001" iyy="0.001" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0.03 0 -0.05"/><geometry><box size="0.2 0.1 0.02"/></geometry></collision></link>
+</robot>)";
+
+TEST(NewRobot, UsesWhatTheReaderOffersForFloatingRootsAndImpossibleInertias) {
+  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_hopper.urdf";
+  std::ofstream(file) << kHopper;
+  const auto robot = make_robot({.urdf = file.string(), .name = "hopper"});
+  std::filesystem::remove(file);
+  ASSERT_TRUE(robot) << robot.error().front().to_string();
+  EXPECT_TRUE(robot->config.model.floating_base);
+  EXPECT_TRUE(robot->config.model.repair_inertia);
+  ASSERT_EQ(robot->feet.size(), 1U) << "the lowest end, though it is called stub";
+  EXPECT_EQ(robot->feet[0].points.size(), 4U);
+  EXPECT_NE(robot_text(*robot, "h.urdf", "h.urdf").find("inertia = \"repair\""), std::string::npos);
+}
+
+TEST(NewRobot, ToldOfNoMovingJointIsAnError) {
+  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_test.urdf";
+  std::ofstream(file) << "<robot name='stone'><link name='stone'/></robot>";
+  const auto robot = make_robot({.urdf = file.string(), .name = "stone"});
+  std::filesystem::remove(file);
+  ASSERT_FALSE(robot);
+  EXPECT_NE(robot.error().front().message.find("no joint that moves"), std::string::npos);
+}
+
+TEST(Words, StandByThemselves) {
+  EXPECT_TRUE(has_word("l_leg_ft", "ft"));
+  EXPECT_TRUE(has_word("FT_LFoot_X", "ft"));
+  EXPECT_TRUE(has_word("wristFtSensor", "ft"));
+  EXPECT_FALSE(has_word("RSoftHand", "ft"));
+  EXPECT_FALSE(has_word("left_arm", "ft"));
+}
+
+}  // namespace
+}  // namespace tandem::scaffold

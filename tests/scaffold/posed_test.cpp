@@ -1,0 +1,75 @@
+// Kinematics and loads of a posture against the algorithms that the kernels are made from.
+#include "scaffold/posed.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "model/dynamics.hpp"
+#include "scaffold/posture.hpp"
+#include "tests/scaffold/robots.hpp"
+
+namespace tandem::scaffold {
+namespace {
+
+class PosedOnPublicRobots : public ::testing::TestWithParam<PublicRobot> {};
+
+Eigen::VectorXd sample(const model::Tree& tree, int index) {
+  const Bounds bounds = bounds_of(tree);
+  Eigen::VectorXd q(bounds.lower.size());
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    q[j] =
+        bounds.lower[j] + (bounds.upper[j] - bounds.lower[j]) * halton(index, static_cast<int>(j));
+  }
+  return q;
+}
+
+TEST_P(PosedOnPublicRobots, InertiaAndGravityAreThoseOfTheMassMatrixAndInverseDynamics) {
+  const NewRobot robot = made(GetParam());
+  const model::Tree& tree = robot.tree;
+  const auto mechanism = model::make_mechanism(tree, {.floating_base = tree.floating_base});
+  ASSERT_TRUE(mechanism);
+  for (int index = 0; index < 5; ++index) {
+    const Eigen::VectorXd q = sample(tree, index);
+    std::vector<double> all(mechanism->nq(), 0.0);
+    if (tree.floating_base) all[6] = 1.0;
+    for (int j = 0; j < mechanism->joint_count(); ++j) all[mechanism->q_index(j)] = q[j];
+    const std::vector<double> still(mechanism->nv(), 0.0);
+    const auto M = model::evaluate_kernel(model::Kernel::kMassMatrix, *mechanism, {all})[0];
+    const auto bias = model::evaluate_kernel(model::Kernel::kBias, *mechanism, {all, still})[0];
+    const Posed posed(tree, q);
+    for (int j = 0; j < mechanism->joint_count(); ++j) {
+      const auto i = static_cast<std::size_t>(mechanism->v_index(j));
+      const double diagonal = M[i * static_cast<std::size_t>(mechanism->nv()) + i];
+      EXPECT_NEAR(posed.inertia(j), diagonal, 1e-9 * (1.0 + diagonal)) << tree.joints[j].name;
+      EXPECT_NEAR(posed.gravity_load(j), bias[i], 1e-9 * (1.0 + std::abs(bias[i])))
+          << tree.joints[j].name;
+    }
+  }
+}
+
+TEST_P(PosedOnPublicRobots, JacobiansAreTheDerivativesOfPositions) {
+  const NewRobot robot = made(GetParam());
+  const Eigen::VectorXd q = sample(robot.tree, 3);
+  const int body = static_cast<int>(robot.tree.bodies.size()) - 1;
+  const Posed here(robot.tree, q);
+  const Eigen::Vector3d local(0.1, -0.2, 0.3);
+  const auto at = [&](const Posed& posed) {
+    return Eigen::Vector3d(posed.body(body).R * local + posed.body(body).p);
+  };
+  const Eigen::MatrixXd J = here.point_jacobian(body, at(here)), Jc = here.com_jacobian();
+  constexpr double kStep = 1e-6;
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    Eigen::VectorXd moved = q;
+    moved[j] += kStep;
+    const Posed there(robot.tree, moved);
+    EXPECT_LT(((at(there) - at(here)) / kStep - J.col(j)).norm(), 1e-5);
+    EXPECT_LT(((there.whole().com_m - here.whole().com_m) / kStep - Jc.col(j)).norm(), 1e-5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, PosedOnPublicRobots, ::testing::ValuesIn(kPublicRobots),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace tandem::scaffold

@@ -1,0 +1,41 @@
+// The descriptions that the repository holds.
+#pragma once
+
+#include <array>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+
+#include "scaffold/new_robot.hpp"
+
+namespace tandem::scaffold {
+
+struct PublicRobot {
+  const char* name;
+  const char* urdf;  ///< from the repository's root
+  std::size_t feet;
+};
+inline void PrintTo(const PublicRobot& robot, std::ostream* out) { *out << robot.name; }
+
+inline constexpr std::array<PublicRobot, 8> kPublicRobots{{
+    {"double_pendulum", "config/double_pendulum/double_pendulum.urdf", 0},
+    {"ur5e", "config/ur5e/ur5e.urdf", 0},
+    {"panda", "config/panda/panda.urdf", 0},
+    {"anymal_c", "tests/data/robots/anymal_c.urdf", 4},
+    {"simple_humanoid", "tests/data/robots/simple_humanoid.urdf", 2},
+    {"coman", "config/coman/coman.urdf", 2},
+    {"walkman", "config/walkman/walkman.urdf", 2},
+    {"icub", "tests/data/robots/icub.urdf", 2},
+}};
+
+inline std::string path_of(const PublicRobot& robot) {
+  return std::string(TANDEM_SOURCE_DIR) + "/" + robot.urdf;
+}
+
+inline NewRobot made(const PublicRobot& robot) {
+  auto found = make_robot({.urdf = path_of(robot), .name = robot.name});
+  if (!found) throw std::runtime_error(found.error().front().to_string());
+  return std::move(*found);
+}
+
+}  // namespace tandem::scaffold
