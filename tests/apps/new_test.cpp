@@ -34,7 +34,7 @@ TEST_F(New, MakesAnArmHoldAndMove) {
 }
 
 TEST_F(New, MakesAQuadrupedStandAndMoveOnPointFeet) {
-  holds_and_moves("tests/data/robots/anymal_c.urdf", 0.01);
+  holds_and_moves("config/anymal_c/anymal_c.urdf", 0.01);
 }
 
 TEST_F(New, WritesOverNothingWithoutForce) {

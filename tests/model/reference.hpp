@@ -32,11 +32,11 @@ inline constexpr std::array<ReferenceRobot, 8> kReferenceRobots{{
     {"double_pendulum", "config/double_pendulum/double_pendulum.urdf", false},
     {"ur5e", "config/ur5e/ur5e.urdf", false},
     {"panda", "config/panda/panda.urdf", false},
-    {"anymal_c", "tests/data/robots/anymal_c.urdf", true},
+    {"anymal_c", "config/anymal_c/anymal_c.urdf", true},
     {"simple_humanoid", "tests/data/robots/simple_humanoid.urdf", true},
     {"coman", "config/coman/coman.urdf", true},
     {"walkman", "config/walkman/walkman.urdf", true},
-    {"icub", "tests/data/robots/icub.urdf", true},
+    {"icub", "config/icub/icub.urdf", true},
 }};
 inline const ReferenceRobot& reference_robot(const std::string& name) {
   for (const ReferenceRobot& robot : kReferenceRobots)

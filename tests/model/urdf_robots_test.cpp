@@ -70,7 +70,7 @@ TEST(PublicRobots, AreEight) { EXPECT_EQ(known_robots().size(), 8u); }
 
 TEST(PublicRobots, WarnOfAnymalsCamerasAndHatch) {
   const auto model =
-      read_urdf(TANDEM_SOURCE_DIR "/tests/data/robots/anymal_c.urdf", {.floating_base = true});
+      read_urdf(TANDEM_SOURCE_DIR "/config/anymal_c/anymal_c.urdf", {.floating_base = true});
   ASSERT_TRUE(model.has_value());
   EXPECT_EQ(model->warnings.size(), 5u) << to_text(model->warnings);
 }

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -21,10 +20,8 @@ inline constexpr std::uint64_t kRunning = 1500;  // cycles: into the first desce
 struct Squat {
   explicit Squat(const std::string& robot, std::uint64_t cycles = kRunning, double rate = 0.0,
                  log::Recorder* recorder = nullptr, bool bus_timing = false) {
-    const std::string source = TANDEM_SOURCE_DIR;
-    const std::string bundled = source + "/config/" + robot + "/squat.toml";
-    const bool there = std::filesystem::exists(bundled);
-    auto read = read_experiment(there ? bundled : source + "/tests/data/" + robot + "/squat.toml");
+    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot +
+                                "/squat.toml");
     if (!read) {
       ADD_FAILURE() << read.error().at(0).to_string();
       return;

@@ -21,11 +21,11 @@ inline constexpr std::array<PublicRobot, 8> kPublicRobots{{
     {"double_pendulum", "config/double_pendulum/double_pendulum.urdf", 0},
     {"ur5e", "config/ur5e/ur5e.urdf", 0},
     {"panda", "config/panda/panda.urdf", 0},
-    {"anymal_c", "tests/data/robots/anymal_c.urdf", 4},
+    {"anymal_c", "config/anymal_c/anymal_c.urdf", 4},
     {"simple_humanoid", "tests/data/robots/simple_humanoid.urdf", 2},
     {"coman", "config/coman/coman.urdf", 2},
     {"walkman", "config/walkman/walkman.urdf", 2},
-    {"icub", "tests/data/robots/icub.urdf", 2},
+    {"icub", "config/icub/icub.urdf", 2},
 }};
 
 inline std::string path_of(const PublicRobot& robot) {

@@ -1,6 +1,5 @@
 #include "tests/support/test_robot.hpp"
 
-#include <filesystem>
 #include <stdexcept>
 
 #include "hal/sim/setup.hpp"
@@ -26,11 +25,8 @@ T take(Result<T> made) {
 
 TestRobot load_test_robot(const std::string& name) {
   TestRobot out;
-  const std::string source = TANDEM_SOURCE_DIR;
-  const std::string bundled = source + "/config/" + name + "/robot.toml";
-  const bool there = std::filesystem::exists(bundled);
-  out.robot = take(
-      hal::read_robot_config(there ? bundled : source + "/tests/data/" + name + "/robot.toml"));
+  out.robot = take(hal::read_robot_config(std::string(TANDEM_SOURCE_DIR) + "/config/" + name +
+                                          "/robot.toml"));
   const model::UrdfModel urdf = take(runtime::complete_robot(out.robot));
   const std::string folder = std::string(TANDEM_BINARY_DIR) + "/lib/models";
   out.kernels =

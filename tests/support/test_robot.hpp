@@ -1,4 +1,4 @@
-// A robot of config/ or of tests/data/ with its kernels: a test that uses one depends on the target kernels_NAME.
+// A robot of config/ with its kernels: a test that uses one depends on the target kernels_NAME.
 // Layer: tests.  Thread: any.
 #pragma once
 
@@ -14,7 +14,7 @@ struct TestRobot {
   model::KernelLibrary kernels;
 };
 
-/// config/NAME/robot.toml, or tests/data/NAME/robot.toml. Throws std::runtime_error with the message of what went wrong.
+/// config/NAME/robot.toml. Throws std::runtime_error with the message of what went wrong.
 [[nodiscard]] TestRobot load_test_robot(const std::string& name);
 
 }  // namespace tandem::test
