@@ -280,6 +280,24 @@ TracedKernel trace_kernel(Kernel kernel, const Mechanism& m, Graph& graph) {
   return result;
 }
 
+TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
+  Mechanism floating = m;  // in empty space
+  floating.gravity = {0.0, 0.0, 0.0};
+  const KernelShape shape = kernel_shape(Kernel::kInverseDynamics, m);  // q, v, vdot, wrench -> tau
+  const KernelArray& vdot = shape.inputs[2];
+  TracedKernel result{{"mass_times", {shape.inputs[0], vdot}, shape.outputs}, {}};
+  std::vector<std::vector<Expr>> in;
+  for (const KernelArray& array : shape.inputs)
+    in.emplace_back(static_cast<std::size_t>(array.size), Expr(0.0));
+  for (std::uint32_t i = 0; i < in[0].size(); ++i) in[0][i] = graph.input(0, i);
+  for (std::uint32_t i = 0; i < in[2].size(); ++i) in[2][i] = graph.input(1, i);
+  std::vector<std::vector<Expr>> out;
+  out.emplace_back(static_cast<std::size_t>(shape.outputs[0].size), Expr(0.0));
+  run_kernel<Expr>(Kernel::kInverseDynamics, floating, in, out);
+  result.outputs = std::move(out[0]);
+  return result;
+}
+
 EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
                           std::uint32_t part_operations) {
   return Emitter(graph, kernel, part_operations).run();

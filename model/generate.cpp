@@ -15,6 +15,11 @@ namespace {
 constexpr std::uint32_t kPartOperations = 500;
 constexpr std::uint32_t kFileOperations = 3000;
 
+// The mass matrix of a chain has as many operations as the square of its joints. Beyond so many it
+// is written as a loop over its columns, each the forces of one unit acceleration: as accurate,
+// slower to run, and linear in code.
+constexpr std::uint32_t kMostMassMatrixOperations = 40'000;
+
 constexpr std::string_view kBanner =
     "// Made by `tandem model build`: change the robot's description instead.\n";
 
@@ -110,6 +115,33 @@ Status check_finite(const Graph& graph, const TracedKernel& kernel) {
               "look for a joint that moves no mass or inertia, or for numbers out of all scale");
 }
 
+OperationCount times(OperationCount count, std::uint32_t n) {
+  return {count.add * n, count.mul * n, count.div * n, count.sqrt * n, count.sincos * n};
+}
+
+// The mass matrix column by column.
+EmittedKernel mass_matrix_by_columns(const Mechanism& m) {
+  Graph graph;
+  EmittedKernel kernel = emit_kernel(graph, trace_mass_times(m, graph), kPartOperations);
+  const int nv = kernel_shape(Kernel::kBias, m).outputs[0].size;
+  kernel.name = kernel_shape(Kernel::kMassMatrix, m).name;
+  kernel.count = times(kernel.count, static_cast<std::uint32_t>(nv));
+  kernel.entry += fmt::format(R"(
+void {0}(const double* q, double* M) {{
+  double unit[{1}] = {{}};
+  double column[{1}];
+  for (int j = 0; j < {1}; ++j) {{
+    unit[j] = 1.0;
+    mass_times(q, unit, column);
+    unit[j] = 0.0;
+    for (int i = j; i < {1}; ++i) M[i * {1} + j] = M[j * {1} + i] = column[i];
+  }}
+}}
+)",
+                              kernel.name, nv);
+  return kernel;
+}
+
 constexpr std::string_view kLibrarySource = R"(#include "kernels.h"
 
 namespace baseline { extern const tandem_kernels table; }
@@ -155,6 +187,9 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
     if (Status status = check_finite(graph, kernel); !status)
       return std::unexpected(status.error());
     kernels.push_back(emit_kernel(graph, kernel, kPartOperations));
+    if (static_cast<Kernel>(k) == Kernel::kMassMatrix &&
+        kernels.back().count.add + kernels.back().count.mul > kMostMassMatrixOperations)
+      kernels.back() = mass_matrix_by_columns(*mechanism);
     result.counts.push_back({kernels.back().name, kernels.back().count});
   }
   result.headers.push_back({"kernels.h", std::string(kKernelsHeader), false});

@@ -10,6 +10,7 @@
 #include "model/kernel_build.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
+#include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
 
 namespace tandem::model {
@@ -216,7 +217,11 @@ struct BuildFolder {
   }
   ~BuildFolder() { std::filesystem::remove_all(path); }
   [[nodiscard]] BuildOptions options() const {
-    return {.library = (path / "k.so").string(), .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}};
+    return {.library = (path / "k.so").string(),
+            .compiler = {},
+            .jobs = 1,
+            .progress = {},
+            .waiting = {}};
   }
 };
 
@@ -297,6 +302,33 @@ TEST(KernelBuild, NamesTheCompilerThatIsNotThereAndTheLogOfOneThatFails) {
   EXPECT_NE(report.error().message.find("/proc/nowhere"), std::string::npos);
 }
 
+// A chain of 70 joints: its mass matrix is a loop over columns, which build_kernels() checks like
+// any other kernel.
+TEST(KernelBuild, WritesTheMassMatrixOfALongChainAsALoop) {
+  const BuildFolder folder;
+  const RandomRobot robot(3, {.joints = 70, .branching = 0.0});
+  const auto read = parse_urdf(robot.urdf(), "chain.urdf", {});
+  ASSERT_TRUE(read);
+  ModelSpec spec;
+  spec.robot = "chain";
+  const auto generated = generate_kernels(read->tree, spec);
+  ASSERT_TRUE(generated) << generated.error().to_string();
+  std::size_t bytes = 0;
+  for (const SourceFile& source : generated->sources) bytes += source.text.size();
+  EXPECT_LT(bytes, 3'000'000u);
+  const Mechanism m = *make_mechanism(read->tree, spec);
+  Graph graph;
+  const TracedKernel product = trace_mass_times(m, graph);
+  const SeededState state(m, 9);
+  const Array M = evaluate_kernel(Kernel::kMassMatrix, m, {state.q})[0];
+  Array expected(state.vdot.size(), 0.0);
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    for (std::size_t j = 0; j < expected.size(); ++j)
+      expected[i] += M[i * expected.size() + j] * state.vdot[j];
+  const std::vector<Array> inputs{state.q, state.vdot};
+  EXPECT_LE(relative_error(evaluate(graph, product.outputs, inputs), expected), 1e-12);
+}
+
 // A compiler that takes 9.81 for 9.82: whatever breaks the code, the library is not written.
 TEST(KernelBuild, WritesNoLibraryThatDisagreesWithTheDescription) {
   const BuildFolder folder;
@@ -304,7 +336,8 @@ TEST(KernelBuild, WritesNoLibraryThatDisagreesWithTheDescription) {
   BuildOptions options = folder.options();
   ASSERT_TRUE(build_kernels(reference_tree(robot), reference_spec(robot), options));
   options.compiler = (folder.path / "compiler").string();
-  std::ofstream(options.compiler) << "#!/bin/sh\nsed -i 's/9[.]81/9.82/g' part_*.cpp\nexec c++ \"$@\"\n";
+  std::ofstream(options.compiler)
+      << "#!/bin/sh\nsed -i 's/9[.]81/9.82/g' part_*.cpp\nexec c++ \"$@\"\n";
   std::filesystem::permissions(options.compiler, std::filesystem::perms::owner_all);
   ModelSpec spec = reference_spec(robot);
   spec.armature.emplace_back(reference_tree(robot).joints[0].name, 0.25);
@@ -312,7 +345,8 @@ TEST(KernelBuild, WritesNoLibraryThatDisagreesWithTheDescription) {
   ASSERT_FALSE(report);
   EXPECT_NE(report.error().message.find("is off by"), std::string::npos)
       << report.error().to_string();
-  const auto old = load_kernels(options.library, description_hash(reference_tree(robot), reference_spec(robot)));
+  const auto old =
+      load_kernels(options.library, description_hash(reference_tree(robot), reference_spec(robot)));
   EXPECT_TRUE(old) << "the library from before is no longer there";
 }
 
