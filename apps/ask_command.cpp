@@ -20,7 +20,7 @@ Exit ask_command(const AskOptions& options) {
     print_errors({answer.error()});
     return Exit::kUsage;
   }
-  fmt::print("{}\n", answer->dump(2));
+  fmt::print("{}\n", json_text(*answer, 2));
   return Exit::kDone;
 }
 

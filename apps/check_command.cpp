@@ -1,9 +1,12 @@
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "apps/bus_table.hpp"
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/start_height.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 
 namespace tandem::apps {
@@ -19,7 +22,7 @@ const char* backend_text(runtime::BackendKind backend) {
   return "sim: drive master, frames, boards' firmware and plant in this process";
 }
 
-Json errors_json(const Diagnostics& errors) {
+Json findings_json(const Diagnostics& errors) {
   Json list = Json::array();
   for (const Error& error : errors) {
     list.push_back({{"file", error.file},
@@ -86,6 +89,10 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels, s
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
+  if (robot.config.model.repair_inertia) {
+    const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
+    facts.add("inertias", fmt::format("{} repaired", repaired));
+  }
   fmt::print(out, "{} is right.\n", robot.config.file);
   facts.print(out);
 }
@@ -109,10 +116,21 @@ Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out
   return hal::can::check_bus_load(robot->config, kPeriodNs);
 }
 
-Diagnostics check_robot(const std::string& file, std::FILE* out, Json& json) {
-  const auto robot = read_robot(file);
+/// What may be meant, of a robot by itself: a posture need not be one to start from.
+Diagnostics warnings_of(const RobotFiles& robot) {
+  Diagnostics warnings = robot.warnings;
+  for (const hal::PostureConfig& posture : robot.config.postures) {
+    if (auto error = start_in_ground(robot, posture.name)) warnings.push_back(std::move(*error));
+  }
+  return warnings;
+}
+
+Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
+                        Json& json) {
+  const auto robot = read_robot(options.file, options.repair);
   if (!robot) return robot.error();
-  print_warnings(robot->warnings);
+  warnings = warnings_of(*robot);
+  print_warnings(warnings);
   const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
   print_robot(*robot, *kernels, out);
@@ -120,10 +138,18 @@ Diagnostics check_robot(const std::string& file, std::FILE* out, Json& json) {
   return {};
 }
 
-Diagnostics check_experiment(const std::string& file, std::FILE* out, Json& json) {
-  const auto composition = compose(file, {.missing_kernels = MissingKernels::kTolerate});
+Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
+                             Json& json) {
+  if (options.repair) {
+    return {Error{.message = "--repair is for a robot by itself",
+                  .hint = "name its robot.toml",
+                  .file = options.file,
+                  .key = {}}};
+  }
+  const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
-  print_warnings((*composition)->experiment.warnings);
+  warnings = (*composition)->experiment.warnings;
+  print_warnings(warnings);
   print_plan(**composition, out);
   json["kernels"] = (*composition)->kernels.path();
   return {};
@@ -135,15 +161,16 @@ Exit check_command(const CheckOptions& options) {
   std::FILE* out = human_output(options.json);
   const bool robot_only = is_robot(options.file);
   Json json{{"ok", true}, {"errors", Json::array()}};
-  Diagnostics errors;
+  Diagnostics errors, warnings;
   if (options.bus) errors = check_buses(options.file, robot_only, out, json["buses"]);
   if (errors.empty()) {
-    errors = robot_only ? check_robot(options.file, out, json)
-                        : check_experiment(options.file, out, json);
+    errors = robot_only ? check_robot(options, out, warnings, json)
+                        : check_experiment(options, out, warnings, json);
   }
   print_errors(errors);
   json["ok"] = errors.empty();
-  json["errors"] = errors_json(errors);
+  json["errors"] = findings_json(errors);
+  json["warnings"] = findings_json(warnings);
   if (const Status written = write_json(options.json, json); !written) {
     print_errors({written.error()});
     return Exit::kUsage;

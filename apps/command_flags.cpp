@@ -55,6 +55,7 @@ const char kCheckExamples[] = R"(Examples:
   tandem check config/coman/squat.toml               an experiment: robot, description, plugins
   tandem check config/coman/robot.toml               a robot by itself
   tandem check --bus config/coman/squat.toml         the load of every bus, worst case
+  tandem check my_robot.toml --repair                what inertia = "repair" would make of it
   tandem check my_robot.toml --json -                errors with file, line, key and hint)";
 
 const char kNewExamples[] = R"(Examples:
@@ -306,6 +307,7 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
 void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_option("file", o.file, "Experiment or robot TOML")->required();
   app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
+  app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kCheckExamples);
 }

@@ -119,8 +119,9 @@ struct InjectOptions {
 
 /// tandem check FILE
 struct CheckOptions {
-  std::string file;  ///< an experiment or a robot
-  bool bus = false;  ///< show the load of every bus
+  std::string file;     ///< an experiment or a robot
+  bool bus = false;     ///< show the load of every bus
+  bool repair = false;  ///< of a robot: as if it said inertia = "repair"
   std::string json;
 };
 

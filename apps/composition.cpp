@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "apps/start_height.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
@@ -178,6 +179,9 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   c->tree = robot->tree;
+  if (e.hal.backend == runtime::BackendKind::kSim) {
+    if (auto error = start_in_ground(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
+  }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);

@@ -43,9 +43,13 @@ Status check_writable(const std::string& file) {
   return out ? Status{} : std::unexpected(json_error(file));
 }
 
+std::string json_text(const Json& value, int indent) {
+  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
 Status write_json(const std::string& file, const Json& value) {
   if (file.empty()) return {};
-  const std::string text = value.dump(2) + "\n";
+  const std::string text = json_text(value, 2) + "\n";
   if (file == "-") {
     fmt::print("{}", text);
     std::fflush(stdout);

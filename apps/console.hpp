@@ -24,6 +24,10 @@ using Json = nlohmann::ordered_json;
 /// Whether `file` can be written, found out before a run: an error that names it when not.
 [[nodiscard]] Status check_writable(const std::string& file);
 
+/// `value` as JSON, whatever bytes its texts hold: what is no UTF-8 becomes U+FFFD.
+/// @param indent  blanks a level; -1: all in one line
+[[nodiscard]] std::string json_text(const Json& value, int indent = -1);
+
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 

@@ -150,7 +150,7 @@ Result<Json> ask(const std::string& path, const Json& question) {
                 "is the process running?");
   }
   const auto deadline = SteadyClock::now() + std::chrono::milliseconds(kControlAnswer_ms);
-  const Result<std::string> line = exchange(descriptor.get(), question.dump() + "\n", deadline);
+  const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", deadline);
   if (!line) return std::unexpected(line.error());
   return read_answer(*line, "what listens at " + path);
 }

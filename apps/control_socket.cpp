@@ -28,7 +28,7 @@ void wake(int eventfd) {
 }
 
 std::string refused(const std::string& error, const std::string& hint) {
-  return Json{{"ok", false}, {"error", error}, {"hint", hint}}.dump();
+  return json_text({{"ok", false}, {"error", error}, {"hint", hint}});
 }
 
 std::string reason() { return std::strerror(errno); }
@@ -246,7 +246,7 @@ bool ControlSocket::hand_over(Client& client, std::string question) {
 }
 
 std::string ControlSocket::answer_to(std::string_view question) const {
-  return registry_->answer(question).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_text(registry_->answer(question));
 }
 
 /// The second thread: one question after the other, so that the first is free for a stop.

@@ -23,7 +23,7 @@ class DdsClient : public ControlClient {
       : participant_(std::move(participant)), client_(std::move(client)) {}
 
   Result<Json> ask(const Json& question) override {
-    std::string text = question.dump();
+    std::string text = json_text(question);
     std::string answer;
     dds::tandem_msgs::Ask_Request request{};
     request.request = text.data();

@@ -3,14 +3,6 @@
 #include "apps/dds_service_types.hpp"
 
 namespace tandem::apps {
-namespace {
-
-std::string to_text(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-}  // namespace
-
 Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& participant,
                                                        const ControlRegistry& registry,
                                                        ControlRegistry::Gate gate) {
@@ -61,7 +53,7 @@ Status DdsServices::add_ask() {
     return dds::ServiceWork<Response>{
         .at_once = registry_->stops(question),
         .answer = [this, question](Response& reply, dds::ReplyMemory& memory) {
-          reply.answer = memory.text(to_text(ask(question)));
+          reply.answer = memory.text(json_text(ask(question)));
         }};
   });
 }
@@ -71,7 +63,7 @@ Status DdsServices::add(const char* name, const char* needs, Json (*question)(co
                         void (*fill)(const Json&, Response&, dds::ReplyMemory&)) {
   if (!registry_->effect(needs)) return {};
   return server_->add<Request, Response>(name, [this, question, fill](const Request& request) {
-    const std::string text = to_text(question(request));
+    const std::string text = json_text(question(request));
     return dds::ServiceWork<Response>{
         .at_once = registry_->stops(text),
         .answer = [this, text, fill](Response& reply, dds::ReplyMemory& memory) {

@@ -9,6 +9,7 @@
 #include "apps/kernel_supply.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
+#include "apps/start_height.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/scenario.hpp"
@@ -84,6 +85,9 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   }
   const auto description = with_description(robot);
   if (!description) return std::unexpected(description.error());
+  if (auto error = start_in_ground(*description, e->subject.sim.posture)) {
+    return std::unexpected(Diagnostics{std::move(*error)});
+  }
   auto kernels = supply_kernels(*description, options.kernel_variant,
                                 missing_kernels(options.no_build, options.quiet));
   if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "hal/sim/setup.hpp"
+#include "model/regular.hpp"
 #include "runtime/experiment.hpp"
 
 namespace tandem::apps {
@@ -15,15 +16,48 @@ std::string text_of(const std::string& file) {
   return text.str();
 }
 
+namespace {
+
+/// The postures as states of the tree.
+std::vector<model::NamedPosition> positions_of(const hal::RobotConfig& robot,
+                                               const model::Tree& tree) {
+  std::vector<model::NamedPosition> all;
+  for (const hal::PostureConfig& posture : robot.postures) {
+    model::NamedPosition one{"in the posture '" + posture.name + "'",
+                             std::vector<double>(tree.joints.size(), 0.0)};
+    for (std::size_t i = 0; i < robot.joints.size(); ++i) {
+      const int joint = tree.joint_index(robot.joints[i].name);
+      if (joint >= 0) one.position[static_cast<std::size_t>(joint)] = posture.position_rad[i];
+    }
+    all.push_back(std::move(one));
+  }
+  return all;
+}
+
+}  // namespace
+
 std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
   auto description = runtime::complete_robot(config);
   if (!description) return std::unexpected(description.error());
   model::ModelSpec spec = sim::model_spec(config);
+  const Status regular =
+      model::check_regular(description->tree, spec, positions_of(config, description->tree));
+  if (!regular) {
+    Error error = regular.error();
+    if (error.file.empty()) error.file = config.file;
+    return std::unexpected(Diagnostics{std::move(error)});
+  }
   return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
                     description->right_angles, std::move(description->warnings)};
 }
 
-std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file) {
+std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair) {
+  if (repair) {
+    auto config = hal::read_robot_config(file);
+    if (!config) return std::unexpected(config.error());
+    config->model.repair_inertia = true;
+    return with_description(std::move(*config));
+  }
   auto robot = runtime::read_robot(file);
   if (!robot) return std::unexpected(robot.error());
   return with_description(std::move(robot->config));

@@ -21,7 +21,8 @@ struct RobotFiles {
   Diagnostics warnings;  ///< what the description's reader tolerated
 };
 
-/// Reads the description that `config` names, and checks the two against each other.
+/// Reads the description that `config` names, checks the two against each other, and that the
+/// robot's dynamics can be solved: model::check_regular(), with every posture.
 [[nodiscard]] std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config);
 
 /// Whether the file is a robot's: a robot has a [model], an experiment names a robot.
@@ -31,6 +32,8 @@ struct RobotFiles {
 [[nodiscard]] std::string text_of(const std::string& file);
 
 /// Reads a robot.toml and its description.
-[[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file);
+/// @param repair  as if it said inertia = "repair"
+[[nodiscard]] std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file,
+                                                                bool repair = false);
 
 }  // namespace tandem::apps

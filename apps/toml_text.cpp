@@ -10,7 +10,7 @@ Status append(const Json& value, std::string& out) {
   if (value.is_object()) {
     out += "{";
     for (const auto& [key, part] : value.items()) {
-      out += between + Json(key).dump() + " = ";
+      out += between + json_text(key) + " = ";
       if (Status appended = append(part, out); !appended) return appended;
       between = ", ";
     }
@@ -24,7 +24,7 @@ Status append(const Json& value, std::string& out) {
     }
     out += "]";
   } else {
-    out += value.dump();
+    out += json_text(value);
   }
   return {};
 }
@@ -34,7 +34,7 @@ Status append(const Json& value, std::string& out) {
 Result<std::string> toml_of(const Json& object) {
   std::string text;
   for (const auto& [key, value] : object.items()) {
-    text += Json(key).dump() + " = ";
+    text += json_text(key) + " = ";
     if (Status appended = append(value, text); !appended) {
       return fail(key + ": " + appended.error().message, appended.error().hint);
     }

@@ -38,7 +38,7 @@ std::string quoted(const std::string& text) {
     for (const char c : text) out.append(c == '\'' ? 2 : 1, c);
     return out + "'";
   }
-  return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);  // YAML reads JSON's
+  return json_text(text);  // YAML reads JSON's
 }
 
 /// "3", "[]": what stands on one line; empty when it takes lines of its own.

@@ -28,7 +28,10 @@ double drawn(const Joint& joint, std::uint64_t& state) {
 
 std::vector<NamedPosition> all_positions(const Tree& tree, const std::vector<NamedPosition>& more) {
   std::vector<NamedPosition> all{{"when every joint is at 0", {}}};
-  all.front().position.assign(tree.joints.size(), 0.0);
+  for (const Joint& joint : tree.joints) {  // NaN, a limit that is not known, bounds nothing
+    const double above = joint.lower > 0.0 ? joint.lower : 0.0;
+    all.front().position.push_back(joint.upper < 0.0 ? joint.upper : above);
+  }
   all.insert(all.end(), more.begin(), more.end());
   std::uint64_t state = 1;
   for (int i = 0; i < kDrawn; ++i) {

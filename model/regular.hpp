@@ -17,8 +17,8 @@ struct NamedPosition {
   std::vector<double> position;  ///< by joint of the tree [rad or m]
 };
 
-/// Evaluates the mass matrix, rotors included, with every joint at 0, in `positions` and in four
-/// states drawn within the joints' limits, always the same ones.
+/// Evaluates the mass matrix, rotors included, with every joint at 0 or the limit next to it, in
+/// `positions` and in four states drawn within the joints' limits, always the same ones.
 ///
 /// Errors: the tree has no moving joint; make_mechanism()'s; a mass matrix that, scaled to ones on
 /// its diagonal, has an eigenvalue below 1e-10: it names the joints that share a mass or move

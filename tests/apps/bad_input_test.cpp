@@ -213,5 +213,81 @@ TEST_F(BadInput, AJsonFileThatCannotBeWrittenIsRefused) {
                  "run hold.toml --duration 0.05 --quiet --json nowhere/result.json");
 }
 
+TEST_F(BadInput, AFileThatIsNoUtf8IsRefusedInJsonToo) {
+  write_text(folder_ / "latin\xE9.toml", "name = \"caf\xE9\"\n");
+  write_text(folder_ / "names.toml", "robot = \"caf\xC3\xA9.toml\"\nduration_s = 1\n");
+  for (const std::string file : {"latin\xE9.toml", "names.toml"}) {
+    const Outcome outcome = tandem("check '" + file + "' --json -");
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    const auto json = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(json["ok"], false);
+    EXPECT_FALSE(json["errors"].empty());
+  }
+}
+
+TEST_F(BadInput, BytesOfAUrdfThatAreNoUtf8AreRefusedInJsonToo) {
+  edit("double_pendulum.urdf", "<link name=\"link1\">", "<link name=\"link1\xFF\">");
+  const Outcome outcome = tandem("check robot.toml --json -");
+  EXPECT_EQ(outcome.status, 2) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out)["ok"], false);
+}
+
+TEST_F(BadInput, ANameThatLeadsOutOfTheFolderIsRefused) {
+  edit("robot.toml", "name = \"double_pendulum\"", "name = \"../../x\"");
+  expect_refused({"robot.toml:", "name: '../../x' has other characters"}, "model build robot.toml");
+}
+
+TEST_F(BadInput, AnActuatorWithoutInertiaIsRefusedWithItsLine) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0");
+  for (const std::string command : {"check robot.toml", "check hold.toml", "run hold.toml"}) {
+    expect_refused({"robot.toml:18: actuator.motor.inertia_kg_m2", "greater than 0"}, command);
+  }
+}
+
+TEST_F(BadInput, AUrdfThatXacroHasNotExpandedIsRefused) {
+  edit("double_pendulum.urdf", "<mass value=\"0.26703\" />", "<mass value=\"${mass}\" />");
+  expect_refused({"double_pendulum.urdf:", "link link1: '${mass}' was left by xacro",
+                  "expand the xacro first"},
+                 "check robot.toml");
+}
+
+const char* const kBareRobot = "name = \"bare\"\n[model]\nurdf = \"bare.urdf\"\nbase = \"fixed\"\n";
+
+/// A bob that two parallel axes turn one after the other, with a link of this mass between them.
+std::string two_axes(const std::string& mass) {
+  const auto link = [](const std::string& name, const std::string& kg, const std::string& moment) {
+    return "<link name='" + name + "'><inertial><mass value='" + kg + "'/><inertia ixx='" + moment +
+           "' ixy='0' ixz='0' iyy='" + moment + "' iyz='0' izz='" + moment +
+           "'/></inertial></link>";
+  };
+  const auto joint = [](const std::string& name, const std::string& from, const std::string& to) {
+    return "<joint name='" + name + "' type='continuous'><parent link='" + from +
+           "'/><child link='" + to + "'/></joint>";
+  };
+  return "<robot name='bare'><link name='base'/>" + link("between", mass, mass) +
+         link("bob", "1", "0.1") + joint("a", "base", "between") + joint("b", "between", "bob") +
+         "</robot>";
+}
+
+TEST_F(BadInput, AMasslessLinkBetweenParallelAxesIsRefused) {
+  write_text(folder_ / "bare.toml", kBareRobot);
+  write_text(folder_ / "bare.urdf", two_axes("0"));
+  for (const std::string command : {"check bare.toml", "model build bare.toml -o bare.so"}) {
+    expect_refused({"bare.urdf:1: joint a: the mass matrix is singular when every joint is at 0: "
+                    "the joints 'a' and 'b' can move without moving any mass"},
+                   command);
+  }
+  write_text(folder_ / "bare.urdf", two_axes("0.1"));
+  EXPECT_EQ(tandem("check bare.toml").status, 0);
+}
+
+TEST_F(BadInput, ARobotInWhichNothingMovesIsRefused) {
+  write_text(folder_ / "bare.toml", kBareRobot);
+  write_text(folder_ / "bare.urdf", "<robot name='bare'><link name='base'/></robot>");
+  for (const std::string command : {"check bare.toml", "model build bare.toml -o bare.so"}) {
+    expect_refused({"bare.urdf: the description has no joint that moves"}, command);
+  }
+}
+
 }  // namespace
 }  // namespace tandem::apps

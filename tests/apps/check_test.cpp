@@ -68,6 +68,8 @@ TEST_F(Check, SaysOkAsJson) {
   EXPECT_EQ(json["ok"], true);
   EXPECT_EQ(json["errors"], nlohmann::json::array());
   EXPECT_NE(json["kernels"], "");
+  ASSERT_EQ(json["warnings"].size(), 1U) << outcome.out;
+  EXPECT_EQ(json["warnings"][0]["key"], "dynamics");
   EXPECT_NE(outcome.err.find("double_pendulum"), std::string::npos) << "text for people";
 }
 
@@ -99,6 +101,64 @@ TEST_F(Check, HoldsOfWhatTheDemoNamesNext) {
     EXPECT_EQ(tandem("check " + file).status, 0) << read_text(folder_ / "err.txt");
   }
   EXPECT_EQ(named, 3);
+}
+
+TEST_F(Check, RepairShowsWhatItWouldTakeForAnInertiaThatCannotBe) {
+  edit("double_pendulum.urdf", "ixx=\"0.00040827\"", "ixx=\"0.00090827\"");
+  const Outcome strict = tandem("check robot.toml");
+  EXPECT_EQ(strict.status, 2);
+  EXPECT_NE(strict.err.find("link link1: the inertia breaks the triangle inequality"),
+            std::string::npos)
+      << strict.err;
+  EXPECT_NE(strict.err.find("tandem check --repair"), std::string::npos) << strict.err;
+  const Outcome repaired = tandem("check robot.toml --repair --json -");
+  EXPECT_EQ(repaired.status, 0) << repaired.err;
+  EXPECT_NE(repaired.err.find("1 repaired"), std::string::npos) << repaired.err;
+  const auto warnings = nlohmann::json::parse(repaired.out)["warnings"];
+  ASSERT_EQ(warnings.size(), 2U) << repaired.out;  // the first is of <dynamics>
+  EXPECT_EQ(warnings[1]["key"], "link link1");
+  EXPECT_NE(warnings[1]["message"].get<std::string>().find("; taken: "), std::string::npos);
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\ninertia = \"repair\"");
+  EXPECT_EQ(tandem("check robot.toml").status, 0);
+  EXPECT_EQ(tandem("check hold.toml --repair").status, 2);
+}
+
+/// COMAN's files, with another height of the base in its posture.
+void copy_coman(const std::filesystem::path& to, const std::string& height) {
+  const std::filesystem::path from = TANDEM_SOURCE_DIR "/config/coman";
+  for (const char* file : {"coman.urdf", "hold.toml"}) {
+    std::filesystem::copy_file(from / file, to / file,
+                               std::filesystem::copy_options::overwrite_existing);
+  }
+  std::string robot = read_text(from / "robot.toml");
+  const std::string before = "base_height_m = 0.502";
+  robot.replace(robot.find(before), before.size(), "base_height_m = " + height);
+  write_text(to / "robot.toml", robot);
+}
+
+TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
+  copy_coman(folder_, "0.362");
+  for (const std::string command : {"check hold.toml", "run hold.toml"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2) << command;
+    EXPECT_NE(outcome.err.find("robot.toml:217: posture.stand.base_height_m: the posture 'stand' "
+                               "starts 0.1"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.err.find("m inside the ground, with the foot '"), std::string::npos);
+  }
+  EXPECT_FALSE(has_log());
+  const Outcome robot = tandem("check robot.toml");
+  EXPECT_EQ(robot.status, 0) << "a posture need not be one to start from";
+  const std::string hint = "(base_height_m = ";
+  const std::size_t at = robot.err.find(hint);
+  ASSERT_NE(at, std::string::npos) << robot.err;
+  const std::string height = robot.err.substr(at + hint.size(), 6);
+  EXPECT_NEAR(std::stod(height), 0.502, 0.005);
+  copy_coman(folder_, height);
+  EXPECT_EQ(tandem("check hold.toml").status, 0);
+  copy_coman(folder_, "0.8");  // the hoist lets it down
+  EXPECT_EQ(tandem("check hold.toml").status, 0);
 }
 
 }  // namespace

@@ -36,9 +36,18 @@ void check(const Tree& tree) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  for (const bool floating : {false, true}) {
-    const auto model = tandem::model::parse_urdf(
-        text, "fuzz.urdf", {.floating_base = floating, .mimic_independent = floating});
+  using tandem::model::UrdfOptions;
+  for (const UrdfOptions& options :
+       {UrdfOptions{}, UrdfOptions{.floating_base = true, .mimic_independent = true},
+        UrdfOptions{.repair_inertia = true},
+        UrdfOptions{.floating_base = true,
+        .mimic_independent = true,
+        .repair_inertia = true,
+        .links = {{.link = "upper",
+                 .mass_kg = 2.0,
+                 .com_m = {{0.1, 0.0, 0.0}},
+                 .inertia_kg_m2 = {{1.0, 0.0, 0.0, 1.0, 0.0, 9.0}}}}}}) {
+    const auto model = tandem::model::parse_urdf(text, "fuzz.urdf", options);
     if (model.has_value()) {
       check(model->tree);
     } else {
