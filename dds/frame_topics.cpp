@@ -33,15 +33,19 @@ FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot) {
       continue;
     }
     const model::Joint& joint = tree.joints[static_cast<std::size_t>(link.moving)];
-    const auto configured = std::ranges::find(robot.joints, joint.name, &hal::JointConfig::name);
+    const model::Joint& leader =
+        joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
+    const auto configured = std::ranges::find(robot.joints, leader.name, &hal::JointConfig::name);
     frames.moving.push_back({parent.name, link.name, from_parent * joint.in_parent, joint.type,
                              joint.axis,
-                             static_cast<std::size_t>(configured - robot.joints.begin())});
+                             static_cast<std::size_t>(configured - robot.joints.begin()),
+                             joint.multiplier, joint.offset});
   }
   return frames;
 }
 
 model::Placement placement(const FrameEdge& edge, double position) {
+  position = edge.multiplier * position + edge.offset;
   if (edge.type == model::JointType::kPrismatic) {
     return edge.at_zero * model::Placement{Eigen::Matrix3d::Identity(), edge.axis * position};
   }

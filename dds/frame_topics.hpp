@@ -18,6 +18,8 @@ struct FrameEdge {
   model::JointType type = model::JointType::kRevolute;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< in the child's frame
   std::size_t joint = 0;                            ///< in the image, of a moving one
+  double multiplier = 1.0;                          ///< of that joint's position, where the edge
+  double offset = 0.0;                              ///< follows it (URDF: mimic)
 };
 
 /// The URDF's frames: the joints that move, and those that are fixed or locked.
@@ -25,6 +27,7 @@ struct FrameTree {
   std::vector<FrameEdge> moving, fixed;
 };
 [[nodiscard]] FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot);
+/// @param position  of `edge.joint`
 [[nodiscard]] model::Placement placement(const FrameEdge& edge, double position);
 
 /// A floating base stands in the frame "odom", where the simulation's truth has it; nobody knows

@@ -49,7 +49,7 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   }
   model.floating_base = table.choice("base", {"floating", "fixed"}) == "floating";
   model.mimic_independent =
-      table.choice_or("mimic", "refuse", {"refuse", "independent"}) == "independent";
+      table.choice_or("mimic", "follow", {"follow", "independent"}) == "independent";
   model.repair_inertia = table.choice_or("inertia", "strict", {"strict", "repair"}) == "repair";
   model.exact_right_angles =
       table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";

@@ -41,7 +41,7 @@ struct LinkConfig {
 struct ModelConfig {
   std::string urdf;                     ///< path, resolved against the TOML's folder
   bool floating_base = false;
-  bool mimic_independent = false;       ///< mimic = "independent"; the default "refuse" is an error
+  bool mimic_independent = false;       ///< mimic = "independent"; the default is "follow"
   bool repair_inertia = false;          ///< inertia = "repair"; the default "strict" is an error
   bool exact_right_angles = false;      ///< right_angles = "exact"; the default is "as_written"
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
@@ -255,11 +255,20 @@ struct JointDescription {
   std::string limits_note = {};  ///< what is wrong with the URDF's limits, and where; or empty
 };
 
+/// A joint that mimics another, and where it lets that one go. Infinite where it sets no limit.
+struct FollowerDescription {
+  std::string name;
+  std::string leader;
+  double min_leader_rad;
+  double max_leader_rad;
+};
+
 /// The names in a URDF that a robot.toml may refer to.
 struct RobotDescription {
   std::vector<JointDescription> moving_joints;  ///< without the locked ones
   std::vector<std::string> other_joints;        ///< fixed and locked
   std::vector<std::string> links;
+  std::vector<FollowerDescription> followers{};
 };
 
 /// The names of joints and links that the URDF lacks, each with the nearest; empty names are passed
@@ -269,9 +278,10 @@ struct RobotDescription {
 
 /// Checks the configuration against its URDF and fills the limits that the TOML left to it.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
-/// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested), a
-/// moving joint without [[joint]] or lock, a site or sensor on an unknown link or joint, a limit
-/// that neither gives, a limit beyond the wire's range, a posture beyond the limits.
+/// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested) or
+/// follows another, a moving joint without [[joint]] or lock, a site or sensor on an unknown link
+/// or joint, a limit that neither gives, a limit beyond the wire's range or beyond what a follower
+/// allows, a posture beyond the limits.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
                                                     const RobotDescription& description);
 

@@ -74,8 +74,13 @@ class NameCheck : private Check {
   Diagnostics run() {
     const std::vector<std::string> moving = names_of(description_.moving_joints);
     for (const JointConfig& joint : robot_.joints) {
-      if (std::ranges::find(description_.other_joints, joint.name) ==
-          description_.other_joints.end()) {
+      if (const auto* follower = find(description_.followers, joint.name)) {
+        error(joint.line, "joint." + joint.name,
+              "the joint '" + joint.name + "' mimics '" + follower->leader +
+                  "' in the description and has no motor of its own",
+              "remove the [[joint]], or set mimic = \"independent\" in [model]");
+      } else if (std::ranges::find(description_.other_joints, joint.name) ==
+                 description_.other_joints.end()) {
         check_name(joint.line, "joint." + joint.name, "joint", joint.name, moving);
       } else {
         error(joint.line, "joint." + joint.name,
@@ -88,6 +93,7 @@ class NameCheck : private Check {
     }
     std::vector<std::string> joints = moving;
     joints.insert(joints.end(), description_.other_joints.begin(), description_.other_joints.end());
+    for (const FollowerDescription& one : description_.followers) joints.push_back(one.name);
     for (const SensorConfig& sensor : robot_.sensors) {
       const std::string key = "sensor." + sensor.name;
       check_name(sensor.line, key + ".link", "link", sensor.link, description_.links);
@@ -169,6 +175,7 @@ class Completion : private Check {
     fill_position(joint.max_position_rad, found.max_position_rad, countable, joint, found,
                   "max_position_rad");
     check_limits(joint, key, countable);
+    check_followers(joint, key);
     fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, joint, found, "max_velocity_rad_s");
     fill(joint.max_torque_Nm, found.max_torque_Nm, joint, found, "max_torque_Nm");
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
@@ -189,6 +196,18 @@ class Completion : private Check {
       error(joint.line, key + ".max_position_rad",
             "the position limits are more than the encoder's 32 bits can count",
             "narrow them or lower the counts per revolution");
+    }
+  }
+
+  void check_followers(const JointConfig& joint, const std::string& key) {
+    for (const FollowerDescription& follower : description_.followers) {
+      if (follower.leader != joint.name) continue;
+      const bool low = joint.min_position_rad < follower.min_leader_rad;
+      if (!low && !(joint.max_position_rad > follower.max_leader_rad)) continue;
+      error(joint.line, key + (low ? ".min_position_rad" : ".max_position_rad"),
+            "would take '" + follower.name + "', which mimics this joint, beyond its own limits",
+            "stay within " + std::to_string(follower.min_leader_rad) + " to " +
+                std::to_string(follower.max_leader_rad));
     }
   }
 

@@ -29,6 +29,11 @@ std::string text_of(const Tree& tree) {
     text += fmt::format("joint '{}' {} {}{}{}\n", j.name, j.parent,
                         j.type == JointType::kPrismatic ? "prismatic" : "revolute", text_of(j.axis),
                         text_of(j.in_parent));
+  for (const Joint& j : tree.joints)
+    if (j.follows())
+      text +=
+          fmt::format("'{}' follows '{}' {:a} {:a}\n", j.name,
+                      tree.joints[static_cast<std::size_t>(j.leader)].name, j.multiplier, j.offset);
   for (const Link& l : tree.links)
     text += fmt::format("link '{}' {} {} '{}' {}{}{}\n", l.name, l.body, l.parent, l.joint,
                         l.moving, text_of(l.in_body), text_of(l.inertia));

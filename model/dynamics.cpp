@@ -4,25 +4,26 @@ namespace tandem::model {
 
 KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
   const int sites = static_cast<int>(m.sites.size());
-  const KernelArray q{"q", m.nq()};
-  const KernelArray v{"v", m.nv()};
-  const KernelArray vdot{"vdot", m.nv()};
-  const KernelArray tau{"tau", m.nv()};
+  const int nv = m.kernel_nv();
+  const KernelArray q{"q", m.kernel_nq()};
+  const KernelArray v{"v", nv};
+  const KernelArray vdot{"vdot", nv};
+  const KernelArray tau{"tau", nv};
   const KernelArray wrench{"wrench", 6 * m.wrenches};
   switch (kernel) {
     case Kernel::kForwardDynamics: return {"forward_dynamics", {q, v, tau, wrench}, {vdot}};
     case Kernel::kInverseDynamics: return {"inverse_dynamics", {q, v, vdot, wrench}, {tau}};
-    case Kernel::kMassMatrix: return {"mass_matrix", {q}, {{"M", m.nv() * m.nv()}}};
-    case Kernel::kBias: return {"bias", {q, v}, {{"h", m.nv()}}};
+    case Kernel::kMassMatrix: return {"mass_matrix", {q}, {{"M", nv * nv}}};
+    case Kernel::kBias: return {"bias", {q, v}, {{"h", nv}}};
     case Kernel::kCenterOfMass:
-      return {"center_of_mass", {q, v}, {{"c", 3}, {"cdot", 3}, {"J", 3 * m.nv()}}};
+      return {"center_of_mass", {q, v}, {{"c", 3}, {"cdot", 3}, {"J", 3 * nv}}};
     case Kernel::kCentroidalMomentum: return {"centroidal_momentum", {q, v}, {{"h", 6}}};
     case Kernel::kEnergy: return {"energy", {q, v}, {{"kinetic_potential", 2}}};
     case Kernel::kSiteMotion:
       return {"site_motion",
               {q, v, vdot},
               {{"pose", 12 * sites}, {"twist", 6 * sites}, {"acceleration", 6 * sites}}};
-    case Kernel::kSiteJacobians: return {"site_jacobians", {q}, {{"J", 6 * sites * m.nv()}}};
+    case Kernel::kSiteJacobians: return {"site_jacobians", {q}, {{"J", 6 * sites * nv}}};
     case Kernel::kSensorWrenches:
       return {"sensor_wrenches",
               {q, v, vdot, wrench},

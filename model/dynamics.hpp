@@ -3,6 +3,7 @@
 // Layer: model.  Thread: any.
 #pragma once
 
+#include "model/coordinates.hpp"
 #include "model/forward_dynamics.hpp"
 #include "model/inverse_dynamics.hpp"
 #include "model/momentum.hpp"
@@ -39,10 +40,10 @@ struct KernelShape {
 };
 [[nodiscard]] KernelShape kernel_shape(Kernel kernel, const Mechanism& m);
 
-/// Runs one kernel. `in` and `out` hold an array for each argument of its shape.
+/// Runs one kernel as if every joint had a coordinate of its own.
 template <class S>
-void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
-                std::vector<std::vector<S>>& out) {
+void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
+                     std::vector<std::vector<S>>& out) {
   const auto i = [&](std::size_t k) { return std::span<const S>(in[k]); };
   const auto o = [&](std::size_t k) { return std::span<S>(out[k]); };
   switch (kernel) {
@@ -57,6 +58,88 @@ void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector
     case Kernel::kSiteJacobians: return site_jacobians<S>(m, i(0), o(0));
     case Kernel::kSensorWrenches: return SensorWrenches<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
   }
+}
+
+/// The kernels of a mechanism with followers. With q_tree = G q + g, G constant, each is the
+/// tree's own with its columns gathered: M = G^T M_tree G, h = G^T h_tree, J = J_tree G. Forward
+/// dynamics solves with M, for a force passes between a follower and its leader that the
+/// articulated-body algorithm, which goes along the tree, cannot carry.
+template <class S>
+class FollowerKernels {
+ public:
+  using Arrays = std::vector<std::vector<S>>;
+  explicit FollowerKernels(const Mechanism& m) : m_(m) {}
+
+  void run(Kernel kernel, const Arrays& in, Arrays& out) const {
+    switch (kernel) {
+      case Kernel::kForwardDynamics: return forward_dynamics(in, out[0]);
+      case Kernel::kMassMatrix: return mass_matrix(in, out[0]);
+      case Kernel::kInverseDynamics:
+      case Kernel::kBias: out[0] = gather_forces<S>(m_, on_tree(kernel, in)[0]); return;
+      case Kernel::kSiteJacobians: out[0] = gather_columns<S>(m_, on_tree(kernel, in)[0]); return;
+      case Kernel::kCenterOfMass:
+        out = on_tree(kernel, in);
+        out[2] = gather_columns<S>(m_, out[2]);
+        return;
+      case Kernel::kCentroidalMomentum:
+      case Kernel::kEnergy:
+      case Kernel::kSiteMotion:
+      case Kernel::kSensorWrenches: out = on_tree(kernel, in); return;
+    }
+  }
+
+ private:
+  // The tree's kernel at the positions and rates that the coordinates `in` give every joint.
+  Arrays on_tree(Kernel kernel, const Arrays& in) const {
+    const KernelShape shape = kernel_shape(kernel, m_);
+    Arrays spread = in;
+    for (std::size_t a = 0; a < in.size(); ++a) {
+      const std::string& name = shape.inputs[a].name;
+      if (name == "q") spread[a] = spread_positions<S>(m_, in[a]);
+      if (name == "v" || name == "vdot") spread[a] = spread_rates<S>(m_, in[a]);
+    }
+    Arrays out;
+    for (const int size : tree_sizes(kernel, shape)) out.emplace_back(size, S(0.0));
+    run_tree_kernel<S>(kernel, m_, spread, out);
+    return out;
+  }
+
+  // How long the tree's outputs are, which have an entry or a column for every joint.
+  std::vector<int> tree_sizes(Kernel kernel, const KernelShape& shape) const {
+    std::vector<int> sizes;
+    for (const KernelArray& array : shape.outputs) sizes.push_back(array.size);
+    const int nv = m_.nv();
+    if (kernel == Kernel::kMassMatrix) sizes[0] = nv * nv;
+    if (kernel == Kernel::kInverseDynamics || kernel == Kernel::kBias) sizes[0] = nv;
+    if (kernel == Kernel::kSiteJacobians) sizes[0] = 6 * static_cast<int>(m_.sites.size()) * nv;
+    if (kernel == Kernel::kCenterOfMass) sizes[2] = 3 * nv;
+    return sizes;
+  }
+
+  void mass_matrix(const Arrays& in, std::vector<S>& M) const {
+    const std::vector<S> rows = gather_columns<S>(m_, on_tree(Kernel::kMassMatrix, in)[0]);
+    M = gather_rows<S>(m_, rows);
+  }
+
+  void forward_dynamics(const Arrays& in, std::vector<S>& vdot) const {
+    std::vector<S> M;
+    mass_matrix({in[0]}, M);
+    const std::vector<S> none(in[1].size(), S(0.0));
+    const std::vector<S> bias =
+        gather_forces<S>(m_, on_tree(Kernel::kInverseDynamics, {in[0], in[1], none, in[3]})[0]);
+    for (std::size_t i = 0; i < vdot.size(); ++i) vdot[i] = in[2][i] - bias[i];
+    solve_from_leaves<S>(M, vdot);
+  }
+
+  const Mechanism& m_;
+};
+
+/// Runs one kernel. `in` and `out` hold an array for each argument of its shape.
+template <class S>
+void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
+                std::vector<std::vector<S>>& out) {
+  if (!m.has_followers()) return run_tree_kernel<S>(kernel, m, in, out);
+  FollowerKernels<S>(m).run(kernel, in, out);
 }
 
 /// Runs one kernel on doubles: the check on generated code.

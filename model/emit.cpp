@@ -10,6 +10,7 @@ namespace tandem::model {
 namespace {
 
 constexpr std::size_t kLongestInline = 96;  // characters of an expression written into another
+constexpr int kEarlyDepth = 3;  // of an angle: (multiplier * q + offset) + the frames' own offset
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
 // The shortest text that reads back as the same double, never an integer literal.
@@ -75,12 +76,12 @@ class Emitter {
     arguments_ += "w";
   }
 
-  // An angle that is an input, or an input and a constant: known before the first part.
-  bool is_early(std::uint32_t i) const {
+  // An angle that is a sum or product of inputs and constants: known before the first part.
+  bool is_early(std::uint32_t i, int depth = 0) const {
     const Node& node = nodes_[i];
-    if (node.op == Op::kInput || node.op == Op::kConstant) return true;
-    return (node.op == Op::kAdd || node.op == Op::kSub) && !is_operation(nodes_[node.a].op) &&
-           !is_operation(nodes_[node.b].op);
+    if (!is_operation(node.op)) return true;
+    if (node.op != Op::kAdd && node.op != Op::kSub && node.op != Op::kMul) return false;
+    return depth < kEarlyDepth && is_early(node.a, depth + 1) && is_early(node.b, depth + 1);
   }
 
   bool is_trigonometric(std::uint32_t i) const {
@@ -236,10 +237,13 @@ class Emitter {
     result_.entry =
         "void " + kernel_.shape.name + "(" + result_.parameters + ") {\n" + body + "}\n";
   }
+  // An angle in full, its operands too: nothing is computed before it.
   std::string early(std::uint32_t i) {
-    part_ = kNowhere;
-    text_[i].clear();
-    return is_operation(nodes_[i].op) ? expression(i) : operand(i);
+    const Node& node = nodes_[i];
+    if (!is_operation(node.op)) return operand(i);
+    for (const std::uint32_t k : {node.a, node.b})
+      text_[k] = is_operation(nodes_[k].op) ? early(k) : "";
+    return expression(i);
   }
 
   std::span<const Node> nodes_;

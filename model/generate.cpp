@@ -60,7 +60,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
   text += "extern const tandem_kernels table = {\n";
   text += fmt::format("    TANDEM_KERNELS_ABI, {}, {},\n    \"{}\",\n    TANDEM_VARIANT_NAME,\n",
                       m.floating_base ? 1 : 0, quoted(result.robot), result.hash);
-  text += fmt::format("    {}, {}, {}, {}, {}, {},\n", m.nq(), m.nv(), m.joint_count(),
+  text += fmt::format("    {}, {}, {}, {}, {}, {},\n", m.kernel_nq(), m.kernel_nv(), m.coordinates,
                       m.sites.size(), m.wrenches, m.sensors.size());
   text += "    joints, sites, wrenches, sensors,\n";
   text += fmt::format("    {:.17g}, {{{:.17g}, {:.17g}, {:.17g}}},\n    counts, {},\n", m.mass_kg,

@@ -83,10 +83,10 @@ SeededState::SeededState(const Mechanism& m, unsigned seed) {
       values.push_back(range * (static_cast<double>(generator()) / 2147483648.0 - 1.0));
     return values;
   };
-  q = array(m.nq(), 3.0);
-  v = array(m.nv(), 2.0);
-  vdot = array(m.nv(), 5.0);
-  tau = array(m.nv(), 10.0);
+  q = array(m.kernel_nq(), 3.0);
+  v = array(m.kernel_nv(), 2.0);
+  vdot = array(m.kernel_nv(), 5.0);
+  tau = array(m.kernel_nv(), 10.0);
   wrench = array(6 * m.wrenches, 20.0);
   if (!m.floating_base) return;
   const double norm = std::hypot(std::hypot(q[3], q[4]), std::hypot(q[5], q[6]));

@@ -131,6 +131,7 @@ struct Maker {
   }
   double size_of(int body) const;
   void bodies();
+  void coordinates();
   Status armature();
   Status sites();
   void gather_beyond(int first, MechanismSensor& sensor) const;
@@ -147,8 +148,8 @@ void Maker::bodies() {
     result.joints.push_back(make_joint(joint, frames[joint.parent], frames[j + 1]));
     result.joints.back().parent = joint.parent;
     result.children[joint.parent].push_back(static_cast<int>(j));
-    result.joint_names.push_back(joint.name);
   }
+  coordinates();
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     const bool moves = b > 0 || tree.floating_base;
     const Inertia inertia = moves ? tree.bodies[b].inertia : Inertia{};
@@ -165,6 +166,22 @@ double Maker::size_of(int body) const {
     if (link.body == body && link.inertia.mass_kg > 0.0)
       size = std::max(size, link.in_body.p.norm() + link.inertia.com_m.norm());
   return size;
+}
+
+// Leaders are numbered in the tree's order; a follower may stand before its leader.
+void Maker::coordinates() {
+  result.coordinate_of.resize(tree.joints.size());
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (tree.joints[j].follows()) continue;
+    result.coordinate_of[j].index = result.coordinates++;
+    result.joint_names.push_back(tree.joints[j].name);
+  }
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const Joint& joint = tree.joints[j];
+    if (!joint.follows()) continue;
+    const int index = result.coordinate_of[static_cast<std::size_t>(joint.leader)].index;
+    result.coordinate_of[j] = {index, joint.multiplier, joint.offset};
+  }
 }
 
 Status Maker::armature() {

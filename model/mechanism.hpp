@@ -49,10 +49,21 @@ struct MechanismSensor {
   FixedPlacement in_body;   ///< the sensor's frame in its body (body, or its parent)
 };
 
+/// Where a joint's position comes from: multiplier * q of that coordinate + offset.
+struct JointCoordinate {
+  int index = 0;  ///< among the joints that follow nobody
+  double multiplier = 1.0;
+  double offset = 0.0;
+};
+
+/// nq() and nv() count every joint, as the algorithms do; the kernels' arrays hold coordinates,
+/// of which a follower has none (model/coordinates.hpp).
 struct Mechanism {
   bool floating_base = false;
   Vec3<double> gravity{0.0, 0.0, -9.81};
   std::vector<MechanismJoint> joints;
+  std::vector<JointCoordinate> coordinate_of;  ///< per joint
+  int coordinates = 0;                         ///< joints that follow nobody
   std::vector<std::vector<int>> children;     ///< per body: the joints that start there
   std::vector<Moments<double>> moments;       ///< per body, regrouped
   std::vector<Moments<double>> true_moments;  ///< per body, as described
@@ -60,13 +71,17 @@ struct Mechanism {
   std::vector<MechanismSensor> sensors;
   int wrenches = 0;
   double mass_kg = 0.0;  ///< of everything that moves
-  std::vector<std::string> joint_names, site_names, wrench_names, sensor_names;
+  std::vector<std::string> joint_names;  ///< per coordinate
+  std::vector<std::string> site_names, wrench_names, sensor_names;
 
   [[nodiscard]] int joint_count() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] int q_index(int joint) const { return joint + (floating_base ? 7 : 0); }
   [[nodiscard]] int v_index(int joint) const { return joint + (floating_base ? 6 : 0); }
   [[nodiscard]] int nq() const { return q_index(joint_count()); }
   [[nodiscard]] int nv() const { return v_index(joint_count()); }
+  [[nodiscard]] bool has_followers() const { return coordinates < joint_count(); }
+  [[nodiscard]] int kernel_nq() const { return q_index(coordinates); }
+  [[nodiscard]] int kernel_nv() const { return v_index(coordinates); }
 };
 
 /// How a mechanism is prepared.

@@ -32,7 +32,7 @@ struct ModelSpec {
   std::string robot;  ///< the name kernels report
   std::string urdf;   ///< path of the description
   bool floating_base = false;
-  bool mimic_independent = false;  ///< treat mimic joints as independent; else they are refused
+  bool mimic_independent = false;  ///< treat mimic joints as independent; else they follow
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
   std::vector<SiteSpec> sites;

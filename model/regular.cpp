@@ -5,8 +5,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "model/mechanism.hpp"
-#include "model/momentum.hpp"
+#include "model/dynamics.hpp"
 
 namespace tandem::model {
 namespace {
@@ -42,15 +41,16 @@ std::vector<NamedPosition> all_positions(const Tree& tree, const std::vector<Nam
   return all;
 }
 
-RowMajor mass_matrix(const Mechanism& m, const std::vector<double>& position) {
-  std::vector<double> q(static_cast<std::size_t>(m.nq()), 0.0);
+// Of the coordinates: a follower stands where its leader puts it.
+RowMajor mass_matrix(const Tree& tree, const Mechanism& m, const std::vector<double>& position) {
+  std::vector<double> q(static_cast<std::size_t>(m.kernel_nq()), 0.0);
   if (m.floating_base) q[6] = 1.0;
-  for (int j = 0; j < m.joint_count(); ++j) {
-    q[static_cast<std::size_t>(m.q_index(j))] = position[static_cast<std::size_t>(j)];
+  for (std::size_t j = 0; j < position.size(); ++j) {
+    if (tree.joints[j].follows()) continue;
+    q[static_cast<std::size_t>(m.q_index(m.coordinate_of[j].index))] = position[j];
   }
-  RowMajor M(m.nv(), m.nv());
-  MassMatrix<double>(m, q, std::span<double>(M.data(), static_cast<std::size_t>(M.size()))).run();
-  return M;
+  const std::vector<double> M = evaluate_kernel(Kernel::kMassMatrix, m, {q})[0];
+  return Eigen::Map<const RowMajor>(M.data(), m.kernel_nv(), m.kernel_nv());
 }
 
 /// Velocities of a motion without energy, empty when there is none.
@@ -67,10 +67,11 @@ Eigen::VectorXd motion_without_energy(const RowMajor& M) {
 }
 
 /// "joint 'a'", "the joints 'a' and 'b'": those that take part.
+/// @param first  the first of them, as a coordinate
 std::string joints_text(const Mechanism& m, const Eigen::VectorXd& motion, int& first) {
   std::vector<std::string> names;
   const double most = motion.cwiseAbs().maxCoeff();
-  for (int j = 0; j < m.joint_count(); ++j) {
+  for (int j = 0; j < m.coordinates; ++j) {
     if (std::abs(motion[m.v_index(j)]) < 0.3 * most || names.size() == 4) continue;
     if (names.empty()) first = j;
     names.push_back("'" + m.joint_names[static_cast<std::size_t>(j)] + "'");
@@ -101,7 +102,7 @@ Status check_regular(const Tree& tree, const ModelSpec& spec,
   const Result<Mechanism> m = make_mechanism(tree, spec);
   if (!m) return std::unexpected(m.error());
   for (const NamedPosition& one : all_positions(tree, positions)) {
-    const RowMajor M = mass_matrix(*m, one.position);
+    const RowMajor M = mass_matrix(tree, *m, one.position);
     if (!M.allFinite()) {
       return refuse("the mass matrix is not finite " + one.name,
                     "check masses, inertias and lengths of the description", -1);
@@ -110,11 +111,12 @@ Status check_regular(const Tree& tree, const ModelSpec& spec,
     if (motion.size() == 0) continue;
     int first = -1;
     const std::string who = joints_text(*m, motion, first);
-    return refuse("the mass matrix is singular " + one.name + ": " + who +
-                      " can move without moving any mass",
-                  "give the link between them mass and inertia, in the description or in "
-                  "[model.link.NAME], or lock one of them",
-                  first);
+    return refuse(
+        "the mass matrix is singular " + one.name + ": " + who +
+            " can move without moving any mass",
+        "give the link between them mass and inertia, in the description or in "
+        "[model.link.NAME], or lock one of them",
+        first < 0 ? -1 : tree.joint_index(m->joint_names[static_cast<std::size_t>(first)]));
   }
   return {};
 }

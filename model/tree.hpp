@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -31,6 +32,11 @@ struct Inertia {
 
 enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 
+struct Range {
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+};
+
 /// A joint that moves: joint i moves body i + 1. Its frame is the URDF joint's frame, which is
 /// the frame of body i + 1 at q = 0.
 struct Joint {
@@ -44,6 +50,23 @@ struct Joint {
   double velocity = std::numeric_limits<double>::infinity();  ///< [rad/s or m/s]
   double effort = std::numeric_limits<double>::infinity();    ///< [Nm or N]
   int line = 0;  ///< in the description; 0 when unknown
+
+  /// A follower (URDF: mimic) has no coordinate of its own: its position is `multiplier` times
+  /// that of joint `leader`, plus `offset`. Leaders follow nobody and stand anywhere in the tree.
+  int leader = -1;  ///< index in `joints`; -1: follows nobody
+  double multiplier = 1.0;
+  double offset = 0.0;  ///< [rad or m]
+
+  [[nodiscard]] bool follows() const { return leader >= 0; }
+  /// False for a continuous joint, and where the description gives no limits.
+  [[nodiscard]] bool has_limits() const { return std::isfinite(lower) && std::isfinite(upper); }
+  /// Of a follower: where the leader keeps it within its limits.
+  [[nodiscard]] Range leaders_range() const {
+    if (!has_limits()) return {};
+    const double a = (lower - offset) / multiplier;
+    const double b = (upper - offset) / multiplier;
+    return a < b ? Range{a, b} : Range{b, a};
+  }
 };
 
 /// What moves as one piece: a link and all that is fixed to it.
@@ -74,8 +97,14 @@ struct Tree {
   std::vector<Body> bodies;  ///< joints.size() + 1; body 0 is the root's
   std::vector<Link> links;   ///< link 0 is the root
 
-  [[nodiscard]] int nv() const { return static_cast<int>(joints.size()) + (floating_base ? 6 : 0); }
-  [[nodiscard]] int nq() const { return static_cast<int>(joints.size()) + (floating_base ? 7 : 0); }
+  /// Coordinates of the joints: one for each that follows nobody.
+  [[nodiscard]] int coordinates() const {
+    int count = 0;
+    for (const Joint& joint : joints) count += joint.follows() ? 0 : 1;
+    return count;
+  }
+  [[nodiscard]] int nv() const { return coordinates() + (floating_base ? 6 : 0); }
+  [[nodiscard]] int nq() const { return coordinates() + (floating_base ? 7 : 0); }
   /// Index in `links`, or -1.
   [[nodiscard]] int link_index(const std::string& link) const {
     for (std::size_t i = 0; i < links.size(); ++i)

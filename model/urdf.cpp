@@ -10,10 +10,12 @@
 #include <filesystem>
 #include <fstream>
 #include <mutex>
+#include <span>
 #include <sstream>
 
 #include "base/nearest.hpp"
 #include "model/urdf_inertia.hpp"
+#include "model/urdf_mimic.hpp"
 #include "model/urdf_outline.hpp"
 #include "model/urdf_override.hpp"
 #include "model/urdf_repair.hpp"
@@ -112,11 +114,14 @@ class Builder {
     const auto root = model.getRoot();
     const bool floats = !outline_.floating_joint.empty();
     if (floats) check_floating(*root->child_joints.front());
-    check_locks(model);
-    check_mimics();
+    check_locks(model, options_.lock, "is locked at ");
+    mimics_ = resolve_mimics(outline_, options_, out_.tree.file, errors_);
+    check_locks(model, std::span(mimics_.still).subspan(options_.lock.size()),
+                "follows a joint that stands still, and so stands at ");
     check_overrides(options_, outline_, errors_);
     if (!errors_.empty()) return std::unexpected(errors_);
     add_all(floats ? *root->child_links.front() : *root);
+    apply_mimics(mimics_, out_.tree, errors_, out_.warnings);
     check_inertias(out_.tree, outline_, options_, errors_, out_.warnings);
     if (!errors_.empty()) return std::unexpected(errors_);
     return std::move(out_);
@@ -133,8 +138,8 @@ class Builder {
 
   const double* lock_of(const std::string& joint) const {
     const auto found =
-        std::ranges::find(options_.lock, joint, &std::pair<std::string, double>::first);
-    return found == options_.lock.end() ? nullptr : &found->second;
+        std::ranges::find(mimics_.still, joint, &std::pair<std::string, double>::first);
+    return found == mimics_.still.end() ? nullptr : &found->second;
   }
 
   /// The joint that makes the base a free one agrees with robot.toml.
@@ -152,8 +157,9 @@ class Builder {
                              outline_.floating_line, key});
   }
 
-  void check_locks(const urdf::ModelInterface& model) {
-    for (const auto& [name, position] : options_.lock) {
+  void check_locks(const urdf::ModelInterface& model,
+                   std::span<const std::pair<std::string, double>> locks, const std::string& how) {
+    for (const auto& [name, position] : locks) {
       const std::string key = "joint " + name;
       const auto joint = model.getJoint(name);
       if (joint == nullptr || !outline_.joint_lines.contains(name)) {
@@ -170,21 +176,10 @@ class Builder {
       const OutlineJoint& limits = outlined(name);
       if (moves(*joint) && (position < limits.lower || position > limits.upper)) {
         error(line, key,
-              "is locked at " + std::to_string(position) + ", beyond its limits " +
+              how + std::to_string(position) + ", beyond its limits " +
                   std::to_string(limits.lower) + " to " + std::to_string(limits.upper),
               "lock it within them");
       }
-    }
-  }
-
-  void check_mimics() {
-    for (const OutlineJoint& joint : outline_.joints) {
-      if (joint.mimic.empty() || options_.mimic_independent) continue;
-      if (joint.type == "fixed" || lock_of(joint.name) != nullptr) continue;
-      error(joint.line, "joint " + joint.name,
-            "mimics joint '" + joint.mimic + "', which is not supported yet",
-            "lock it in [model.lock], or treat it as a joint of its own by mimic = "
-            "\"independent\" in [model]");
     }
   }
 
@@ -276,6 +271,7 @@ class Builder {
   const Outline& outline_;
   const UrdfOptions& options_;
   UrdfModel out_;
+  Mimics mimics_;
   Diagnostics errors_;
 };
 

@@ -30,7 +30,7 @@ struct LinkOverride {
 
 struct UrdfOptions {
   bool floating_base = false;
-  bool mimic_independent = false;  ///< treat mimic joints as independent; else they are refused
+  bool mimic_independent = false;  ///< treat mimic joints as independent; else they follow
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> fixed position [rad or m]
   bool repair_inertia = false;  ///< take the nearest possible inertia for an impossible one
   bool exact_right_angles = false;  ///< take angles within 1e-5 rad of a right one for it
@@ -65,8 +65,9 @@ inline constexpr const char* kRepaired = "by inertia = \"repair\" in [model]";
 ///   - a name, attribute or element is missing; a number is unreadable, NaN or infinite;
 ///   - two links or joints of one name; a joint to a link that is not there (nearest suggested);
 ///   - a link with two parents, a loop, two roots, no link at all;
-///   - planar or unknown joint types; a floating one elsewhere, or with a fixed base; mimic joints,
-///     unless independent or locked; xacro that was not expanded;
+///   - planar or unknown joint types; a floating one elsewhere, or with a fixed base; a joint that
+///     mimics itself, rings of mimics, limits that leader and follower cannot both keep; xacro that
+///     was not expanded;
 ///   - a zero axis; a lock on a joint that is missing, fixed or beyond limits; an override of a
 ///     link that is not there;
 ///   - negative mass; an inertia that is not positive definite or breaks the triangle inequality

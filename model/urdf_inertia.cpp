@@ -73,8 +73,13 @@ class Checker {
     for (std::size_t i = tree_.joints.size(); i > 0; --i) {
       carried[static_cast<std::size_t>(tree_.joints[i - 1].parent)] += carried[i];
     }
+    for (std::size_t i = 0; i < tree_.joints.size(); ++i) {  // a leader moves its followers' too
+      if (const int leader = tree_.joints[i].leader; leader >= 0) {
+        carried[static_cast<std::size_t>(leader) + 1] += carried[i + 1];
+      }
+    }
     for (std::size_t i = 0; i < tree_.joints.size(); ++i) {
-      if (carried[i + 1] > 0.0) continue;
+      if (carried[i + 1] > 0.0 || tree_.joints[i].follows()) continue;
       const Joint& joint = tree_.joints[i];
       errors_.push_back({"the joint moves nothing that has mass",
                          "give link '" + tree_.bodies[i + 1].name +

@@ -245,6 +245,12 @@ class Reader {
     if (joint.type != "fixed" && joint.type != "floating") read_motion(e, joint, key);
     if (const XMLElement* mimic = child(e, "mimic", key, Needed::kNo)) {
       joint.mimic = name_of(*mimic, "joint", key);
+      const auto read = [&](const char* name, double& value) {
+        const std::vector<double> given = numbers(mimic, name, 1, key, Needed::kNo);
+        if (!given.empty()) value = given[0];
+      };
+      read("multiplier", joint.mimic_multiplier);
+      read("offset", joint.mimic_offset);
     }
     out_.joints.push_back(joint);
     XMLElement* copy = reduced_.NewElement("joint");

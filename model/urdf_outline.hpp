@@ -27,6 +27,8 @@ struct OutlineJoint {
   std::string parent;  ///< link
   std::string child;   ///< link
   std::string mimic;   ///< joint; empty: independent
+  double mimic_multiplier = 1.0;
+  double mimic_offset = 0.0;
   int line = 0;
   // kNoLimit where the text gives none, or one that makes no sense; then the note says why.
   double lower = kNoLimit;

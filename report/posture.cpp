@@ -172,8 +172,11 @@ std::vector<model::Placement> body_placements(const model::Tree& tree,
                                               const PostureSample& sample) {
   std::vector<model::Placement> bodies{sample.base};
   for (const model::Joint& joint : tree.joints) {
-    const int index = robot.joint_index(joint.name);
-    const double q = index < 0 ? 0.0 : sample.position_rad[static_cast<std::size_t>(index)];
+    const model::Joint& leader =
+        joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
+    const int index = robot.joint_index(leader.name);
+    const double own = index < 0 ? 0.0 : sample.position_rad[static_cast<std::size_t>(index)];
+    const double q = joint.multiplier * own + joint.offset;
     model::Placement motion;
     if (joint.type == model::JointType::kPrismatic) {
       motion.p = q * joint.axis;

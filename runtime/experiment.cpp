@@ -319,6 +319,12 @@ std::expected<model::UrdfModel, Diagnostics> read_description(const hal::RobotCo
 hal::RobotDescription plain(const model::UrdfModel& model) {
   hal::RobotDescription description;
   for (const model::Joint& joint : model.tree.joints) {
+    if (joint.follows()) {
+      const model::Joint& leader = model.tree.joints[static_cast<std::size_t>(joint.leader)];
+      const model::Range range = joint.leaders_range();
+      description.followers.push_back({joint.name, leader.name, range.lower, range.upper});
+      continue;
+    }
     const auto note = model.limits_notes.find(joint.name);
     description.moving_joints.push_back({joint.name, joint.lower, joint.upper, joint.velocity,
                                          joint.effort,

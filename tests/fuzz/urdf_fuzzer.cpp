@@ -23,6 +23,10 @@ void check(const Tree& tree) {
     require(std::abs(joint.axis.norm() - 1.0) < 1e-12);
     require(joint.in_parent.R.allFinite() && joint.in_parent.p.allFinite());
     require(joint.line > 0);
+    if (!joint.follows()) continue;
+    require(!tree.joints.at(static_cast<std::size_t>(joint.leader)).follows());
+    require(std::isfinite(joint.offset) && std::isfinite(joint.multiplier));
+    require(joint.multiplier != 0.0);
   }
   for (const auto& body : tree.bodies) {
     require(std::isfinite(body.inertia.mass_kg) && body.inertia.mass_kg >= 0.0);

@@ -656,6 +656,26 @@ TEST_F(Completed, RefusesAJointThatDoesNotMove) {
   EXPECT_NE(errors.find("'knee' does not move in the description"), std::string::npos);
 }
 
+TEST_F(Completed, RefusesAMotorForAJointThatFollowsAnother) {
+  description_.moving_joints.pop_back();
+  description_.followers = {{"knee", "hip", -INFINITY, INFINITY}};
+  read(kRobot);
+  EXPECT_NE(errors.find("joint.knee: the joint 'knee' mimics 'hip' in the description and has no "
+                        "motor of its own (remove the [[joint]], or set mimic = \"independent\" "
+                        "in [model])"),
+            std::string::npos)
+      << errors;
+}
+
+TEST_F(Completed, RefusesALimitThatTakesAFollowerBeyondItsOwn) {
+  description_.followers = {{"flap", "hip", -1.5, 0.9}};
+  read(kRobot);
+  EXPECT_NE(errors.find("joint.hip.max_position_rad: would take 'flap', which mimics this joint, "
+                        "beyond its own limits (stay within -1.500000 to 0.900000)"),
+            std::string::npos)
+      << errors;
+}
+
 TEST_F(Completed, RefusesUnknownLinksAndJointsOfSitesAndSensors) {
   description_.links.back() = "foott";
   description_.other_joints = {"toe", "ankel"};

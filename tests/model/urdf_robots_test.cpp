@@ -75,11 +75,15 @@ TEST(PublicRobots, WarnOfAnymalsCamerasAndHatch) {
   EXPECT_EQ(model->warnings.size(), 5u) << to_text(model->warnings);
 }
 
-TEST(PublicRobots, RefuseThePandasMimicFingerByDefault) {
+TEST(PublicRobots, HaveOneCoordinateForThePandasTwoFingers) {
   const auto model = read_urdf(TANDEM_SOURCE_DIR "/config/panda/panda.urdf", {});
-  ASSERT_FALSE(model.has_value());
-  EXPECT_EQ(model.error()[0].key, "joint panda_finger_joint2");
-  EXPECT_GT(model.error()[0].line, 0);
+  ASSERT_TRUE(model.has_value()) << to_text(model.error());
+  const Tree& tree = model->tree;
+  EXPECT_EQ(tree.nq(), 8);
+  EXPECT_EQ(tree.joints.size(), 9u);
+  const int follower = tree.joint_index("panda_finger_joint2");
+  EXPECT_EQ(tree.joints.at(static_cast<std::size_t>(follower)).leader,
+            tree.joint_index("panda_finger_joint1"));
 }
 
 }  // namespace

@@ -293,17 +293,6 @@ TEST(Urdf, SuggestsTheNearestJointType) {
             std::string::npos);
 }
 
-TEST(Urdf, RefusesAMimicUnlessItIsIndependentOrLocked) {
-  const std::string mimic =
-      with("effort=\"10\"/>", "effort=\"10\"/>\n    <mimic joint=\"shoulder\"/>");
-  EXPECT_EQ(errors_of(mimic),
-            "arm.urdf:30: joint slide: mimics joint 'shoulder', which is not supported yet "
-            "(lock it in [model.lock], or treat it as a joint of its own by mimic = "
-            "\"independent\" in [model])\n");
-  EXPECT_EQ(errors_of(mimic, {.mimic_independent = true}), "");
-  EXPECT_EQ(errors_of(mimic, {.lock = {{"slide", 0.0}}}), "");
-}
-
 TEST(Urdf, SuggestsTheNearestLinkOfAJoint) {
   expect_error(with("<child link=\"tip\"/>", "<child link=\"tipp\"/>"),
                "arm.urdf:42: joint end: there is no link 'tipp', its child (did you mean 'tip'?)");
