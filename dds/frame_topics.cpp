@@ -36,6 +36,7 @@ FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot) {
     const model::Joint& leader =
         joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
     const auto configured = std::ranges::find(robot.joints, leader.name, &hal::JointConfig::name);
+    if (configured == robot.joints.end()) continue;  // passive: nobody measures where it stands
     frames.moving.push_back({parent.name, link.name, from_parent * joint.in_parent, joint.type,
                              joint.axis,
                              static_cast<std::size_t>(configured - robot.joints.begin()),

@@ -205,6 +205,7 @@ RobotConfig read(const TomlDocument& document) {
   check_boards(boards, robot);
   for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, ids, robot);
   read_contact(root, robot);
+  read_loops(root, robot);
   TomlTable postures = root.table_or_empty("posture");
   for (const std::string& name : postures.table_names()) {
     read_posture(postures.table(name), name, robot);

@@ -14,6 +14,7 @@
 #include "base/result.hpp"
 #include "hal/image.hpp"
 #include "hal/stop_category.hpp"
+#include "model/loop_spec.hpp"
 
 namespace tandem::hal {
 
@@ -125,6 +126,20 @@ struct JointConfig {
   int line = 0;                         ///< in the TOML, for messages
 };
 
+/// [[passive]]: a joint that moves but has no motor and no encoder. It is in the dynamics and
+/// nowhere else: not in the process image, not on a board.
+struct PassiveConfig {
+  std::string name;                     ///< URDF joint
+  double position_rad = 0.0;            ///< at the start; where loops close, from near here
+  double damping_Nms_rad = 0.0;
+  int line = 0;                         ///< in the TOML, for messages
+};
+
+/// [[loop]]
+struct LoopConfig : model::LoopSpec {
+  int line = 0;                         ///< in the TOML, for messages
+};
+
 /// [[bus]]
 struct BusConfig {
   std::string name;
@@ -211,6 +226,8 @@ struct RobotConfig {
   std::vector<BusConfig> buses;
   std::vector<BoardConfig> boards;
   std::vector<JointConfig> joints;      ///< the process image's order
+  std::vector<PassiveConfig> passive;
+  std::vector<LoopConfig> loops;
   std::vector<SensorConfig> sensors;    ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
@@ -222,6 +239,13 @@ struct RobotConfig {
   [[nodiscard]] int sensor_index(std::string_view name) const;
   [[nodiscard]] const ActuatorConfig& actuator_of(const JointConfig& joint) const;
   [[nodiscard]] const GainsConfig& gains_of(const JointConfig& joint) const;
+  /// Whether a [[passive]] names this joint.
+  [[nodiscard]] bool is_passive(std::string_view name) const;
+  /// The loops without their lines, and the passive joints' names, as the model takes them.
+  [[nodiscard]] std::vector<model::LoopSpec> loop_specs() const {
+    return {loops.begin(), loops.end()};
+  }
+  [[nodiscard]] std::vector<std::string> passive_names() const;
   /// What a fault of joint `joint` for `cause` stops: an emergency stop the robot, any other fault
   /// what the joint says.
   [[nodiscard]] StopCategory category_of(std::size_t joint, FaultCause cause) const noexcept {
@@ -279,7 +303,7 @@ struct RobotDescription {
 /// Checks the configuration against its URDF and fills the limits that the TOML left to it.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
 /// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested) or
-/// follows another, a moving joint without [[joint]] or lock, a site or sensor on an unknown link
+/// follows another, a moving joint without [[joint]], [[passive]] or lock, a site or sensor on an unknown link
 /// or joint, a limit that neither gives, a limit beyond the wire's range or beyond what a follower
 /// allows, a posture beyond the limits.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,

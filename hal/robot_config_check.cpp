@@ -29,6 +29,10 @@ ImageShape RobotConfig::shape() const {
 
 int RobotConfig::joint_index(std::string_view joint) const { return index_of(joints, joint); }
 int RobotConfig::sensor_index(std::string_view sensor) const { return index_of(sensors, sensor); }
+bool RobotConfig::is_passive(std::string_view joint) const {
+  return find(passive, joint) != nullptr;
+}
+std::vector<std::string> RobotConfig::passive_names() const { return names_of(passive); }
 const BoardConfig* RobotConfig::board(std::string_view wanted) const {
   return find(boards, wanted);
 }
@@ -73,21 +77,9 @@ class NameCheck : private Check {
 
   Diagnostics run() {
     const std::vector<std::string> moving = names_of(description_.moving_joints);
-    for (const JointConfig& joint : robot_.joints) {
-      if (const auto* follower = find(description_.followers, joint.name)) {
-        error(joint.line, "joint." + joint.name,
-              "the joint '" + joint.name + "' mimics '" + follower->leader +
-                  "' in the description and has no motor of its own",
-              "remove the [[joint]], or set mimic = \"independent\" in [model]");
-      } else if (std::ranges::find(description_.other_joints, joint.name) ==
-                 description_.other_joints.end()) {
-        check_name(joint.line, "joint." + joint.name, "joint", joint.name, moving);
-      } else {
-        error(joint.line, "joint." + joint.name,
-              "the joint '" + joint.name + "' does not move in the description",
-              "remove the [[joint]]");
-      }
-    }
+    for (const JointConfig& one : robot_.joints) check_moving(one.line, "joint", one.name, moving);
+    for (const PassiveConfig& one : robot_.passive)
+      check_moving(one.line, "passive", one.name, moving);
     for (const SiteConfig& site : robot_.model.sites) {
       check_name(site.line, "site." + site.name + ".link", "link", site.link, description_.links);
     }
@@ -104,6 +96,24 @@ class NameCheck : private Check {
   }
 
  private:
+  /// A [[joint]] or [[passive]] is a joint of its own.
+  void check_moving(int line, const std::string& table, const std::string& name,
+                    const std::vector<std::string>& moving) {
+    const std::string key = table + "." + name;
+    if (const auto* follower = find(description_.followers, name)) {
+      error(line, key,
+            "the joint '" + name + "' mimics '" + follower->leader +
+                "' in the description and has no motor of its own",
+            "remove the [[" + table + "]], or set mimic = \"independent\" in [model]");
+    } else if (std::ranges::find(description_.other_joints, name) ==
+               description_.other_joints.end()) {
+      check_name(line, key, "joint", name, moving);
+    } else {
+      error(line, key, "the joint '" + name + "' does not move in the description",
+            "remove the [[" + table + "]]");
+    }
+  }
+
   void check_name(int line, const std::string& key, const std::string& kind,
                   const std::string& name, const std::vector<std::string>& known) {
     if (name.empty() || std::ranges::find(known, name) != known.end()) return;
@@ -134,8 +144,9 @@ class Completion : private Check {
   void check_driven() {
     for (const JointDescription& joint : description_.moving_joints) {
       if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
+      if (robot_.is_passive(joint.name)) continue;
       error(0, "joint", "the description's joint '" + joint.name + "' has no [[joint]]",
-            "add one, or fix it with [model.lock] " + joint.name + " = 0.0");
+            "add one or a [[passive]], or fix it with [model.lock] " + joint.name + " = 0.0");
     }
   }
 

@@ -115,5 +115,7 @@ void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robo
 /// A board's axes are numbered from 0 without a gap, there is at least one, and every joint that
 /// it lists is there.
 void check_boards(std::span<BoardTable> boards, const RobotConfig& robot);
+/// [[passive]] and [[loop]]; after the joints, the sites and the contact.
+void read_loops(TomlTable& root, RobotConfig& robot);
 
 }  // namespace tandem::hal

@@ -5,7 +5,8 @@
 namespace tandem::hal {
 namespace {
 
-std::shared_ptr<const Layout> truth_layout(std::size_t joints, std::size_t feet) {
+std::shared_ptr<const Layout> truth_layout(std::size_t joints, std::size_t feet, std::size_t loops,
+                                           std::size_t passive) {
   auto layout = std::make_shared<Layout>();
   layout->add("cycle", FieldType::kU64, 1, "number of the loop's cycle");
   layout->add("time_ns", FieldType::kI64, 1, "nominal time of the cycle since the start");
@@ -20,6 +21,13 @@ std::shared_ptr<const Layout> truth_layout(std::size_t joints, std::size_t feet)
   layout->add("foot_force_N", FieldType::kF64, 3 * feet, "of the ground on each foot, W axes");
   layout->add("foot_moment_Nm", FieldType::kF64, 3 * feet, "about the site's origin, W axes");
   layout->add("hoist_share", FieldType::kF64, 1, "1: the base is held, 0: it is free");
+  if (loops > 0) {
+    layout->add("loop_position_error_m", FieldType::kF64, loops, "how far each loop is open");
+    layout->add("loop_velocity_error_m_s", FieldType::kF64, loops, "how fast each loop opens");
+  }
+  if (passive > 0) {
+    layout->add("passive_position_rad", FieldType::kF64, passive, "of joints without a motor");
+  }
   return layout;
 }
 
@@ -31,7 +39,8 @@ std::shared_ptr<const Layout> truth_layout(std::size_t joints, std::size_t feet)
     name##_ = {found->offset, found->count};          \
   }
 
-TruthImage::TruthImage(std::size_t joints, std::size_t feet) : Image(truth_layout(joints, feet)) {
+TruthImage::TruthImage(std::size_t joints, std::size_t feet, std::size_t loops, std::size_t passive)
+    : Image(truth_layout(joints, feet, loops, passive)) {
   TANDEM_BIND(cycle)
   TANDEM_BIND(time_ns)
   TANDEM_BIND(base_position_m)
@@ -45,6 +54,11 @@ TruthImage::TruthImage(std::size_t joints, std::size_t feet) : Image(truth_layou
   TANDEM_BIND(foot_force_N)
   TANDEM_BIND(foot_moment_Nm)
   TANDEM_BIND(hoist_share)
+  if (loops > 0) {
+    TANDEM_BIND(loop_position_error_m)
+    TANDEM_BIND(loop_velocity_error_m_s)
+  }
+  if (passive > 0) TANDEM_BIND(passive_position_rad)
 }
 
 #undef TANDEM_BIND

@@ -11,10 +11,12 @@
 
 namespace tandem::hal {
 
-/// n = joints, f = feet (the contact configuration's order). W is z-up.
+/// n = joints, f = feet (the contact configuration's order), l = loops, p = passive joints (both
+/// in the robot.toml's order; a robot without any has no such fields). W is z-up.
 class TruthImage : public Image {
  public:
-  TruthImage(std::size_t joints, std::size_t feet);
+  TruthImage(std::size_t joints, std::size_t feet, std::size_t loops = 0,
+             std::size_t passive = 0);
 
 #define TANDEM_TRUTH(type, name)                                                        \
   [[nodiscard]] std::span<type> name() noexcept {                                       \
@@ -36,10 +38,15 @@ class TruthImage : public Image {
   TANDEM_TRUTH(double, foot_force_N)             ///< (3f) of the ground on the foot, W axes
   TANDEM_TRUTH(double, foot_moment_Nm)           ///< (3f) about the site's origin, W axes
   TANDEM_TRUTH(double, hoist_share)              ///< (1) 1: the base is held, 0: it is free
+  TANDEM_TRUTH(double, loop_position_error_m)    ///< (l) how far each loop is open
+  TANDEM_TRUTH(double, loop_velocity_error_m_s)  ///< (l) and how fast it opens
+  TANDEM_TRUTH(double, passive_position_rad)     ///< (p) of the joints without a motor
 #undef TANDEM_TRUTH
 
   [[nodiscard]] std::size_t joints() const noexcept { return position_rad_.count; }
   [[nodiscard]] std::size_t feet() const noexcept { return foot_position_m_.count / 3; }
+  [[nodiscard]] std::size_t passive() const noexcept { return passive_position_rad_.count; }
+  [[nodiscard]] std::size_t loops() const noexcept { return loop_position_error_m_.count; }
 
  private:
   struct Slot {
@@ -48,7 +55,8 @@ class TruthImage : public Image {
   };
   Slot cycle_, time_ns_, base_position_m_, base_quaternion_, base_velocity_, center_of_mass_m_,
       position_rad_, velocity_rad_s_, torque_Nm_, foot_position_m_, foot_force_N_,
-      foot_moment_Nm_, hoist_share_;
+      foot_moment_Nm_, hoist_share_, loop_position_error_m_, loop_velocity_error_m_s_,
+      passive_position_rad_;
 };
 
 }  // namespace tandem::hal

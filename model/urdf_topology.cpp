@@ -54,7 +54,7 @@ class Topology {
     error(joint.line, "link " + joint.child,
           "has two parents, by the joints '" + at->second->name + "' and '" + joint.name +
               "': the description has a loop",
-          "closed loops are not supported; remove one of the joints");
+          "remove one of the joints, and close the loop by a [[loop]] in robot.toml");
   }
 
   void check_roots() {

@@ -44,6 +44,8 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
     const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
     plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0});
   }
+  plant.passive = robot.passive;
+  plant.loops = robot.loop_specs();
   return plant;
 }
 
@@ -67,6 +69,16 @@ Status check_step(const PlantConfig& config, const Plant& plant) {
             .key = "sim.substep_ns"});
 }
 
+// Where robot.toml has the loop that an error is about.
+Error placed(Error error, const hal::RobotConfig& robot) {
+  for (const hal::LoopConfig& loop : robot.loops) {
+    if (error.key != "loop." + loop.name) continue;
+    error.file = robot.file;
+    error.line = loop.line;
+  }
+  return error;
+}
+
 Status named(Status status, const std::string& key) {
   if (!status)
     status.error().key = key + (status.error().key.empty() ? "" : ".") + status.error().key;
@@ -82,7 +94,7 @@ Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotCon
   Result<PlantConfig> plant = plant_config(robot, kernels, config);
   if (!plant) return std::unexpected(plant.error());
   Result<Plant> body = Plant::create(*plant);
-  if (!body) return std::unexpected(body.error());
+  if (!body) return std::unexpected(placed(body.error(), robot));
   if (Status status = check_step(*plant, *body); !status) return std::unexpected(status.error());
   Result<Sensors> sensors = Sensors::create(robot, *kernels);
   if (!sensors) return std::unexpected(sensors.error());

@@ -19,7 +19,9 @@ int find(const std::vector<std::string>& all, std::string_view name) {
 }
 
 std::vector<ActuatorModel> in_model_order(const PlantConfig& config) {
-  std::vector<ActuatorModel> models(config.joints.size());
+  // A passive joint is one whose bridge is never on, without inertia or friction of a motor.
+  const ActuatorModel none{.order = 0, .resistance_ohm = 1.0, .thermal_time_constant_s = 1.0};
+  std::vector<ActuatorModel> models(config.kernels->joints, none);
   const std::vector<std::string> all = names(config.kernels->joint_names, config.kernels->joints);
   for (const PlantJoint& joint : config.joints) {
     models[static_cast<std::size_t>(find(all, joint.name))] = *make_actuator(joint.actuator);
@@ -53,7 +55,8 @@ Result<Plant> Plant::create(const PlantConfig& config) {
   if (Status status = plant.map_joints(config); !status) return std::unexpected(status.error());
   plant.actuators_ = Actuators(in_model_order(config));
   if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
-  plant.start(config);
+  if (Status status = plant.make_loops(config); !status) return std::unexpected(status.error());
+  if (Status status = plant.start(config); !status) return std::unexpected(status.error());
   return plant;
 }
 
@@ -81,27 +84,49 @@ Plant::Plant(const PlantConfig& config)
 Status Plant::map_joints(const PlantConfig& config) {
   const std::vector<std::string> all = names(kernels_->joint_names, kernels_->joints);
   std::vector<std::uint8_t> used(all.size(), 0);
-  for (const PlantJoint& joint : config.joints) {
-    const int index = find(all, joint.name);
-    if (index < 0 || used[static_cast<std::size_t>(index)] != 0) {
+  const auto take = [&](const std::string& name, double damping) -> Result<std::size_t> {
+    const int found = find(all, name);
+    const auto index = static_cast<std::size_t>(found);
+    if (found < 0 || used[index] != 0) {
       return std::unexpected(
-          Error{.message = index < 0 ? "the model has no such joint" : "the joint is listed twice",
-                .hint = suggest(joint.name, all),
+          Error{.message = found < 0 ? "the model has no such joint" : "the joint is listed twice",
+                .hint = suggest(name, all),
                 .file = {},
-                .key = joint.name});
+                .key = name});
     }
-    used[static_cast<std::size_t>(index)] = 1;
-    map_.push_back(static_cast<std::size_t>(index));
-    damping_[static_cast<std::size_t>(index)] = joint.damping_Nms_rad;
+    used[index] = 1;
+    damping_[index] = damping;
+    return index;
+  };
+  for (const PlantJoint& joint : config.joints) {
+    const Result<std::size_t> index = take(joint.name, joint.damping_Nms_rad);
+    if (!index) return std::unexpected(index.error());
+    map_.push_back(*index);
+  }
+  for (const hal::PassiveConfig& joint : config.passive) {
+    const Result<std::size_t> index = take(joint.name, joint.damping_Nms_rad);
+    if (!index) return std::unexpected(index.error());
+    passive_.push_back(*index);
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (used[i] == 0) {
-      return std::unexpected(Error{.message = "the model's joint has no actuator",
-                                   .hint = "add a [[joint]], or lock it under [model.lock]",
-                                   .file = {},
-                                   .key = all[i]});
+      return std::unexpected(
+          Error{.message = "the model's joint has no actuator",
+                .hint = "add a [[joint]] or a [[passive]], or lock it under [model.lock]",
+                .file = {},
+                .key = all[i]});
     }
   }
+  return {};
+}
+
+Status Plant::make_loops(const PlantConfig& config) {
+  if (config.loops.empty()) return {};
+  std::vector<std::string> passive;
+  for (const hal::PassiveConfig& joint : config.passive) passive.push_back(joint.name);
+  auto loops = model::ClosedLoops::create(config.loops, passive, *kernels_);
+  if (!loops) return std::unexpected(loops.error());
+  loops_ = LoopForces(std::move(*loops), *kernels_);
   return {};
 }
 
@@ -128,7 +153,26 @@ Status Plant::place_contact(const PlantConfig& config) {
   return {};
 }
 
-void Plant::start(const PlantConfig& config) {
+Status Plant::close_loops(double* q) {
+  constexpr int kMostSteps = 200;
+  model::ClosedLoops& loops = loops_.equations();
+  if (loops_.none() || loops.close(q, kMostSteps)) return {};
+  std::size_t worst = 0;
+  for (std::size_t l = 1; l < loops.loops(); ++l)
+    if (loops.position_error_m(l) > loops.position_error_m(worst)) worst = l;
+  char gap[160];
+  std::snprintf(gap, sizeof gap,
+                "cannot be closed from the start's posture: a gap of %.6g m is left",
+                loops.position_error_m(worst));
+  return std::unexpected(Error{
+      .message = gap,
+      .hint = "change the posture of the driven joints, the position_rad of a [[passive]], or "
+              "the loop's sites",
+      .file = {},
+      .key = "loop." + loops.name(worst)});
+}
+
+Status Plant::start(const PlantConfig& config) {
   std::vector<double> q(kernels_->nq, 0.0);
   const std::vector<double> v(kernels_->nv, 0.0);
   if (base_q_ != 0) {
@@ -137,14 +181,18 @@ void Plant::start(const PlantConfig& config) {
   }
   for (std::size_t j = 0; j < map_.size(); ++j)
     q[base_q_ + map_[j]] = config.joints[j].position_rad;
+  for (std::size_t j = 0; j < passive_.size(); ++j)
+    q[base_q_ + passive_[j]] = config.passive[j].position_rad;
+  if (Status status = close_loops(q.data()); !status) return status;
   set_state(q, v);
 
   // Springs and hoist start with the load that keeps everything at rest.
   touch_ground(x_.data(), true);
   std::vector<double> load(kernels_->nv, 0.0);
   kernels_->inverse_dynamics(q.data(), v.data(), v.data(), wrench_.data(), load.data());
+  loops_.equations().carry_passive(load.data());
   const MotorState at_start = motor(x_.data());
-  for (std::size_t i = 0; i < map_.size(); ++i) {
+  for (const std::size_t i : map_) {
     const double joint_load = load[base_v_ + i];
     const ActuatorModel& model = actuators_.model(i);
     if (config.held && model.elastic()) {
@@ -154,19 +202,23 @@ void Plant::start(const PlantConfig& config) {
   }
   held_ = config.held ? 1 : 0;
   released_ = config.held ? 0 : 1;
-  if (config.held && base_q_ != 0) {
-    // Apparent inertia along each base axis: the acceleration that a unit force adds.
-    std::vector<double> rest(kernels_->nv), moved(kernels_->nv);
-    kernels_->forward_dynamics(q.data(), v.data(), load.data(), wrench_.data(), rest.data());
-    double most[2] = {0.0, 0.0};
-    for (std::size_t axis = 0; axis < 6; ++axis) {
-      std::vector<double> pushed = load;
-      pushed[axis] += 1.0;
-      kernels_->forward_dynamics(q.data(), v.data(), pushed.data(), wrench_.data(), moved.data());
-      most[axis / 3] = std::max(most[axis / 3], moved[axis] - rest[axis]);
-    }
-    hoist_.hold(1.0 / most[0], 1.0 / most[1], q.data(), load.data());
+  if (config.held && base_q_ != 0) hold(q.data(), load);
+  return {};
+}
+
+void Plant::hold(const double* q, std::span<const double> load) {
+  // Apparent inertia along each base axis: the acceleration that a unit force adds.
+  const std::vector<double> v(kernels_->nv, 0.0);
+  std::vector<double> rest(kernels_->nv), moved(kernels_->nv);
+  kernels_->forward_dynamics(q, v.data(), load.data(), wrench_.data(), rest.data());
+  double most[2] = {0.0, 0.0};
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    std::vector<double> pushed(load.begin(), load.end());
+    pushed[axis] += 1.0;
+    kernels_->forward_dynamics(q, v.data(), pushed.data(), wrench_.data(), moved.data());
+    most[axis / 3] = std::max(most[axis / 3], moved[axis] - rest[axis]);
   }
+  hoist_.hold(1.0 / most[0], 1.0 / most[1], q, load.data());
 }
 
 void Plant::set_state(std::span<const double> q, std::span<const double> v) noexcept {
@@ -174,10 +226,11 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
   std::copy(q.begin(), q.end(), x_.begin());
   std::copy(v.begin(), v.end(), x_.begin() + kernels_->nq);
   const MotorState motors = motor(x_.data());
-  for (std::size_t i = 0; i < map_.size(); ++i) {
+  for (std::size_t i = 0; i < kernels_->joints; ++i) {
     motors.position_rad[i] = q[base_q_ + i];
     motors.velocity_rad_s[i] = v[base_v_ + i];
   }
+  loops_.changed();
   contact_fresh_ = vdot_fresh_ = 0;
 }
 
@@ -193,7 +246,7 @@ void Plant::release() noexcept TANDEM_RT {
   if (released_ != 0) return;
   released_ = 1;
   hoist_.release(release_ns_);
-  for (std::size_t i = 0; i < map_.size(); ++i) actuators_.set_brake(i, false, 0.0, 0.0);
+  for (const std::size_t i : map_) actuators_.set_brake(i, false, 0.0, 0.0);
 }
 
 JointReading Plant::joint(std::size_t joint) const noexcept TANDEM_RT {
@@ -222,18 +275,19 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, contact_, hoist_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_, pose_,
-     twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_, diverged_rate_);
+  ar(actuators_, contact_, hoist_, loops_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_,
+     pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
+     diverged_rate_);
 }
 
 MotorState Plant::motor(double* x) const noexcept {
   double* th = x + kernels_->nq + kernels_->nv;
-  return {th, th + map_.size(), th + 2 * map_.size()};
+  return {th, th + kernels_->joints, th + 2 * kernels_->joints};
 }
 
 MotorStateView Plant::motor(const double* x) const noexcept {
   const double* th = x + kernels_->nq + kernels_->nv;
-  return {th, th + map_.size(), th + 2 * map_.size()};
+  return {th, th + kernels_->joints, th + 2 * kernels_->joints};
 }
 
 }  // namespace tandem::sim

@@ -15,6 +15,7 @@
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/contact.hpp"
 #include "hal/sim/hoist.hpp"
+#include "hal/sim/loop_forces.hpp"
 #include "model/kernels.h"
 
 namespace tandem::sim {
@@ -42,6 +43,8 @@ struct PlantConfig {
   /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
   bool held = false;
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
+  std::vector<hal::PassiveConfig> passive;  ///< the kernels' joints without an actuator
+  std::vector<model::LoopSpec> loops;
   double rate_limit = 1000.0;               ///< any |v| beyond it [rad/s or m/s] counts as diverged
 };
 
@@ -65,11 +68,15 @@ struct JointReading {
 ///   hoist         how far it is released                   (in Hoist)
 ///
 /// Inputs, held over a sub-step: voltage, bridge and brake of every joint. Joints are numbered
-/// as in PlantConfig; inside, and in q() and v(), they stand in the kernels' order.
+/// as in PlantConfig; inside, and in q() and v(), they stand in the kernels' order, the passive
+/// ones (whose motor's state is that of the link) among them.
+///
+/// Loops: the state lies on the closed loops, to LoopForces' bound, after every sub-step.
 class Plant {
  public:
   /// Errors: kernels of another ABI, a joint the kernels lack or that has no [[joint]], a foot
-  /// that is no wrench site, a bad actuator or contact, a sub-step that is not positive.
+  /// that is no wrench site, a bad actuator or contact, a sub-step that is not positive, a loop
+  /// that the passive joints cannot close from the start's posture.
   [[nodiscard]] static Result<Plant> create(const PlantConfig& config);
 
   /// What joint `joint`'s drive applies from now on.
@@ -112,13 +119,16 @@ class Plant {
   [[nodiscard]] const double* tau() const noexcept { return tau_.data(); }
   [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
   [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
+  [[nodiscard]] const LoopForces& loops() const noexcept { return loops_; }
   [[nodiscard]] const Contact& contact() const noexcept { return contact_; }
   [[nodiscard]] const Actuators& actuators() const noexcept { return actuators_; }
   /// Index of joint `joint` among the kernels' joints.
   [[nodiscard]] std::size_t model_index(std::size_t joint) const noexcept { return map_[joint]; }
+  /// The same of the passive joints, in PlantConfig's order.
+  [[nodiscard]] const std::vector<std::size_t>& passive() const noexcept { return passive_; }
 
   /// Puts the plant into a state of choice (tests, start of a run): joints in the kernels' order,
-  /// motors at rest with their springs relaxed.
+  /// motors at rest with their springs relaxed. @pre the loops are closed
   void set_state(std::span<const double> q, std::span<const double> v) noexcept;
 
   [[nodiscard]] bool diverged() const noexcept { return diverged_ >= 0; }
@@ -131,10 +141,14 @@ class Plant {
   explicit Plant(const PlantConfig& config);
   Status map_joints(const PlantConfig& config);
   Status place_contact(const PlantConfig& config);
-  void start(const PlantConfig& config);
+  Status make_loops(const PlantConfig& config);
+  Status start(const PlantConfig& config);
+  Status close_loops(double* q);
+  void hold(const double* q, std::span<const double> load);
 
   void touch_ground(const double* x, bool move_anchors) noexcept;
   void rates(const double* x, MotorState motor_rate) noexcept;
+  void accelerate(const double* q, const double* v) noexcept;
   void step_semi_implicit(double h_s) noexcept;
   void step_runge_kutta(double h_s) noexcept;
   void state_rate(const double* x, double* rate) noexcept;
@@ -148,10 +162,12 @@ class Plant {
   double rate_limit_;
   std::size_t base_q_, base_v_;   // 7 and 6, or 0 and 0
   std::vector<std::size_t> map_;  // joint -> model joint
-  std::vector<double> damping_;   // model order
+  std::vector<std::size_t> passive_;  // passive joint -> model joint
+  std::vector<double> damping_;       // model order
   Actuators actuators_;
   Contact contact_;
   Hoist hoist_;
+  LoopForces loops_;
 
   std::vector<double> x_;  // q, v, th, th', i
   std::vector<double> tau_, applied_tau_, vdot_, wrench_, motor_rate_;

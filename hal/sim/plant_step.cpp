@@ -19,7 +19,7 @@ void Plant::rates(const double* x, MotorState motor_rate) noexcept {
   const double* q = x;
   const double* v = x + kernels_->nq;
   actuators_.evaluate(q + base_q_, v + base_v_, motor(x), tau_.data() + base_v_, motor_rate);
-  for (std::size_t i = 0; i < map_.size(); ++i) {
+  for (std::size_t i = 0; i < kernels_->joints; ++i) {
     tau_[base_v_ + i] -= damping_[i] * v[base_v_ + i];
   }
   if (base_v_ != 0) {
@@ -29,14 +29,24 @@ void Plant::rates(const double* x, MotorState motor_rate) noexcept {
   // The same state with the same torques (elastic joints between two cycles): nothing to do.
   const std::size_t bytes = tau_.size() * sizeof(double);
   if (vdot_fresh_ != 0 && std::memcmp(tau_.data(), applied_tau_.data(), bytes) == 0) return;
-  kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+  accelerate(q, v);
   applied_tau_ = tau_;
+}
+
+// The loops' forces stand in the wrenches for the sensors; without them here, the tree is open.
+void Plant::accelerate(const double* q, const double* v) noexcept {
+  if (loops_.none()) {
+    return kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+  }
+  loops_.let_go(wrench_.data());
+  kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+  loops_.constrain(q, v, vdot_.data(), wrench_.data());
 }
 
 void Plant::evaluate() noexcept TANDEM_RT {
   if (contact_fresh_ == 0) touch_ground(x_.data(), true);
   contact_fresh_ = 1;
-  const std::size_t n = map_.size();
+  const std::size_t n = kernels_->joints;
   double* rate = motor_rate_.data();
   rates(x_.data(), {rate, rate + n, rate + 2 * n});
   vdot_fresh_ = 1;
@@ -53,6 +63,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     } else {
       step_semi_implicit(h_s);
     }
+    if (!loops_.none()) loops_.project(x_.data(), x_.data() + kernels_->nq);
     contact_fresh_ = vdot_fresh_ = 0;
     actuators_.finish_step(h_s, q() + base_q_, v() + base_v_, motor(x_.data()));
     hoist_.advance(step_ns);
@@ -73,8 +84,8 @@ void Plant::step_semi_implicit(double h_s) noexcept {
     for (std::size_t i = 0; i < 3; ++i) q[i] += h_s * velocity_W[i];
     turn_quaternion(q + 3, v + 3, h_s);
   }
-  for (std::size_t i = 0; i < map_.size(); ++i) q[base_q_ + i] += h_s * v[base_v_ + i];
-  const std::size_t n = map_.size();
+  for (std::size_t i = 0; i < kernels_->joints; ++i) q[base_q_ + i] += h_s * v[base_v_ + i];
+  const std::size_t n = kernels_->joints;
   const double* rate = motor_rate_.data();
   actuators_.step_semi_implicit(h_s, {rate, rate + n, rate + 2 * n}, motor(x_.data()));
 }
@@ -92,7 +103,7 @@ void Plant::state_rate(const double* x, double* rate) noexcept {
     const std::array<double, 4> turn = quaternion_product(x + 3, half_w);
     std::copy(turn.begin(), turn.end(), rate + 3);
   }
-  std::copy_n(v + base_v_, map_.size(), rate + base_q_);
+  std::copy_n(v + base_v_, kernels_->joints, rate + base_q_);
   std::copy(vdot_.begin(), vdot_.end(), rate + kernels_->nq);
 }
 
@@ -101,6 +112,7 @@ void Plant::step_runge_kutta(double h_s) noexcept {
   const auto stage = [&](const std::vector<double>& k, double h, std::vector<double>& rate) {
     for (std::size_t i = 0; i < size; ++i) stage_[i] = x_[i] + h * k[i];
     if (base_q_ != 0) normalise_quaternion(stage_.data() + 3);
+    loops_.changed();
     touch_ground(stage_.data(), false);
     state_rate(stage_.data(), rate.data());
   };

@@ -76,7 +76,10 @@ model::ModelSpec model_spec(const hal::RobotConfig& robot) {
   spec.lock = robot.model.lock;
   spec.gravity_m_s2 = robot.model.gravity_m_s2;
   for (const hal::SiteConfig& site : robot.model.sites) {
-    spec.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench});
+    const bool closes = std::ranges::any_of(robot.loops, [&](const hal::LoopConfig& loop) {
+      return std::ranges::count(loop.sites, site.name) != 0;
+    });
+    spec.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench || closes});
   }
   for (const hal::SensorConfig& sensor : robot.sensors) {
     if (sensor.type == hal::SensorType::kForceTorque) {

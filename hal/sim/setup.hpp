@@ -12,7 +12,7 @@
 namespace tandem::sim {
 
 /// What the robot's kernels are generated from: its sites, its sensors (an IMU is a site, see
-/// imu_site), and the rotors of rigid actuators as armature.
+/// imu_site; a loop's sites take wrenches), and the rotors of rigid actuators as armature.
 [[nodiscard]] model::ModelSpec model_spec(const hal::RobotConfig& robot);
 
 /// Indices in `robot.joints` of a board's axes, by axis.

@@ -26,7 +26,8 @@ SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
     : robot_(std::move(robot)),
       master_(std::move(master)),
       truth_filler_(robot_->plant()),
-      truth_(robot_->plant().joints(), robot_->plant().contact().feet()),
+      truth_(robot_->plant().joints(), robot_->plant().contact().feet(),
+             robot_->plant().loops().equations().loops(), robot_->plant().passive().size()),
       keep_truth_(keep_truth) {}
 
 hal::Phase SimRobot::phase() const noexcept {

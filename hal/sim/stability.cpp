@@ -42,6 +42,14 @@ void add_joints(const PlantConfig& config, const Plant& plant, Linear& to) {
   }
 }
 
+void add_passive(const PlantConfig& config, const Plant& plant, Linear& to) {
+  const Eigen::Index base = plant.kernels().nv - plant.kernels().joints;
+  for (std::size_t j = 0; j < config.passive.size(); ++j) {
+    const Eigen::Index link = base + static_cast<Eigen::Index>(plant.passive()[j]);
+    to.D(link, link) += config.passive[j].damping_Nms_rad;
+  }
+}
+
 void add_ground(const PlantConfig& config, const Plant& plant, Linear& to) {
   const tandem_kernels& k = plant.kernels();
   const Eigen::Index nv = k.nv;
@@ -88,6 +96,7 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   k.mass_matrix(plant.q(), M.data());
   system.M.topLeftCorner(k.nv, k.nv) = M;
   add_joints(config, plant, system);
+  add_passive(config, plant, system);
   add_ground(config, plant, system);
   if (system.K.isZero(0.0) && system.D.isZero(0.0)) {
     return {std::numeric_limits<double>::infinity(), {}};

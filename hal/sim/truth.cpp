@@ -29,6 +29,14 @@ void TruthFiller::fill(const Plant& plant, const hal::CycleTime& time,
     std::copy_n(wrench, 3, truth.foot_force_N().data() + 3 * f);
     std::copy_n(wrench + 3, 3, truth.foot_moment_Nm().data() + 3 * f);
   }
+  for (std::size_t l = 0; l < truth.loops(); ++l) {
+    truth.loop_position_error_m()[l] = plant.loops().position_error_m(l);
+    truth.loop_velocity_error_m_s()[l] = plant.loops().velocity_error_m_s(l);
+  }
+  for (std::size_t j = 0; j < truth.passive(); ++j) {
+    const tandem_kernels& k = plant.kernels();
+    truth.passive_position_rad()[j] = plant.q()[k.nq - k.joints + plant.passive()[j]];
+  }
   truth.hoist_share()[0] = plant.hoist_share();
 }
 

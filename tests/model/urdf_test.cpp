@@ -301,8 +301,8 @@ TEST(Urdf, SuggestsTheNearestLinkOfAJoint) {
 TEST(Urdf, RefusesALinkWithTwoParents) {
   expect_error(with("<child link=\"tip\"/>", "<child link=\"upper\"/>"),
                "arm.urdf:42: link upper: has two parents, by the joints 'shoulder' and 'end': "
-               "the description has a loop (closed loops are not supported; remove one of the "
-               "joints)");
+               "the description has a loop (remove one of the joints, and close the loop by a "
+               "[[loop]] in robot.toml)");
 }
 
 TEST(Urdf, RefusesALoop) {

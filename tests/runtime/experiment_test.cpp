@@ -437,7 +437,7 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   const auto description = complete_robot(*bundled);
   ASSERT_TRUE(description.has_value()) << description.error()[0].to_string();
   for (const Error& warning : description->warnings) EXPECT_EQ(warning.key, "dynamics");
-  EXPECT_EQ(description->tree.joints.size(), bundled->joints.size());
+  EXPECT_EQ(description->tree.joints.size(), bundled->joints.size() + bundled->passive.size());
   for (const hal::JointConfig& joint : bundled->joints) {
     EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
     EXPECT_GT(joint.max_torque_Nm, 0.0) << joint.name;
@@ -484,7 +484,8 @@ TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BundledRobot,
-                         testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum"),
+                         testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum",
+                                         "four_bar", "parallel_ankle"),
                          [](const auto& robot) { return std::string(robot.param); });
 
 }  // namespace

@@ -1,0 +1,77 @@
+// [[passive]] and [[loop]]: joints without a motor, and what closes loops of the tree.
+#include <cmath>
+
+#include "hal/robot_config_read.hpp"
+
+namespace tandem::hal {
+namespace {
+
+void read_passive(TomlTable table, RobotConfig& robot) {
+  PassiveConfig passive;
+  passive.line = table.line();
+  passive.name = table.text("name");
+  check_unique(table, robot.passive, passive.name, "passive joint");
+  if (robot.joint_index(passive.name) >= 0) {
+    table.error("name", "the joint '" + passive.name + "' has a motor: it is a [[joint]] too",
+                "remove one of the two");
+  }
+  passive.position_rad = table.number_or("position_rad", 0.0);
+  passive.damping_Nms_rad = table.number_or("damping_Nms_rad", 0.0, {0.0, 1e6});
+  table.finish();
+  robot.passive.push_back(passive);
+}
+
+void read_axis(TomlTable& table, LoopConfig& loop) {
+  const std::array<double, 3> axis = vector3(table, "axis", loop.axis);
+  const double length = std::hypot(axis[0], axis[1], axis[2]);
+  if (!table.has("axis")) {
+    table.error("axis", "a revolute loop needs its axis",
+                "give it in the sites' frames: [0, 1, 0]");
+  } else if (!(length > 0.0)) {
+    table.error("axis", "has no length", "give a direction, as [0, 1, 0]");
+  } else {
+    for (std::size_t i = 0; i < 3; ++i) loop.axis[i] = axis[i] / length;
+  }
+}
+
+void read_loop(TomlTable table, RobotConfig& robot) {
+  LoopConfig loop;
+  loop.line = table.line();
+  loop.name = table.text("name");
+  check_unique(table, robot.loops, loop.name, "loop");
+  const std::string type = table.choice("type", {"ball", "revolute", "rod"});
+  loop.type = type == "revolute" ? model::LoopType::kRevolute
+              : type == "rod"    ? model::LoopType::kRod
+                                 : model::LoopType::kBall;
+  const std::vector<std::string> sites = table.texts_or("sites", {});
+  if (sites.size() == 2) {
+    loop.sites = {sites[0], sites[1]};
+    for (const std::string& site : sites) {
+      check_reference(table, "sites", site, robot.model.sites, "[[site]]");
+      for (const FootConfig& foot : robot.contact.feet) {
+        if (foot.site != site) continue;
+        table.error("sites", "the site '" + site + "' is a foot's",
+                    "give the loop a [[site]] of its own");
+      }
+    }
+    if (sites[0] == sites[1]) {
+      table.error("sites", "a loop closes between two sites, not one", "name two");
+    }
+  } else {
+    table.error("sites", "must name two [[site]]s, and names " + std::to_string(sites.size()),
+                "sites = [\"one\", \"other\"]");
+  }
+  if (loop.type == model::LoopType::kRevolute) read_axis(table, loop);
+  if (loop.type == model::LoopType::kRod) loop.length_m = table.number("length_m", {1e-4, 100.0});
+  table.finish();
+  robot.loops.push_back(loop);
+}
+
+}  // namespace
+
+void read_loops(TomlTable& root, RobotConfig& robot) {
+  for (TomlTable& passive : root.tables("passive")) read_passive(passive, robot);
+  for (TomlTable& loop : root.tables("loop")) read_loop(loop, robot);
+}
+
+}  // namespace tandem::hal
