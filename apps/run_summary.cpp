@@ -62,6 +62,27 @@ Json base_json(const std::optional<runtime::BaseFigures>& base) {
           {"final_tilt_rad", base->final_tilt_rad}};
 }
 
+Json loops_json(const hal::RobotConfig& robot, const std::vector<runtime::LoopFigures>& loops) {
+  Json json = Json::object();
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    json[robot.loops[l].name] = {{"max_position_error_m", loops[l].max_position_error_m},
+                                 {"max_velocity_error_m_s", loops[l].max_velocity_error_m_s}};
+  }
+  return json;
+}
+
+void print_loops(const RunSummary& s, std::FILE* out) {
+  const std::vector<runtime::LoopFigures>& loops = s.cycle.statistics().loops();
+  if (loops.empty()) return;
+  Table table({"closed loops", "open at most [m]", "opening at most [m/s]"});
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    table.add({s.composition.experiment.robot.loops[l].name,
+               fmt::format("{:.1e}", loops[l].max_position_error_m),
+               fmt::format("{:.1e}", loops[l].max_velocity_error_m_s)});
+  }
+  table.print(out);
+}
+
 std::string microseconds(const rt::Percentiles& p) {
   const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f} us", us(p.p50), us(p.p99), us(p.p999),
@@ -124,6 +145,7 @@ Json RunSummary::json() const {
                                               {"max_tracking_error_rad", tracking[i].max_rad}};
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
+  json["loops"] = loops_json(e.robot, cycle.statistics().loops());
   json["base"] = base_json(cycle.statistics().base());
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
@@ -137,6 +159,7 @@ Json RunSummary::json() const {
 
 void RunSummary::print(std::FILE* out) const {
   print_worst_joints(*this, out);
+  print_loops(*this, out);
   print_faults(faults_json(cycle.faults()), out);
   fmt::print(out, "\n");
   if (composition.master != nullptr && composition.backend->waits_for_bus()) {

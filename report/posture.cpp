@@ -165,6 +165,18 @@ bool moves_sideways(const model::Tree& tree, const hal::RobotConfig& robot,
   return way.y() > way.x();
 }
 
+double position_of(const hal::RobotConfig& robot, const std::string& joint,
+                   const PostureSample& sample) {
+  std::size_t index = robot.joints.size();
+  if (const int driven = robot.joint_index(joint); driven >= 0) {
+    index = static_cast<std::size_t>(driven);
+  } else {
+    index += static_cast<std::size_t>(
+        std::ranges::find(robot.passive, joint, &hal::PassiveConfig::name) - robot.passive.begin());
+  }
+  return index < sample.position_rad.size() ? sample.position_rad[index] : 0.0;
+}
+
 }  // namespace
 
 std::vector<model::Placement> body_placements(const model::Tree& tree,
@@ -174,8 +186,7 @@ std::vector<model::Placement> body_placements(const model::Tree& tree,
   for (const model::Joint& joint : tree.joints) {
     const model::Joint& leader =
         joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
-    const int index = robot.joint_index(leader.name);
-    const double own = index < 0 ? 0.0 : sample.position_rad[static_cast<std::size_t>(index)];
+    const double own = position_of(robot, leader.name, sample);
     const double q = joint.multiplier * own + joint.offset;
     model::Placement motion;
     if (joint.type == model::JointType::kPrismatic) {

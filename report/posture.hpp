@@ -12,7 +12,8 @@
 
 namespace tandem::report {
 
-/// One moment of a run. Joints stand in the process image's order.
+/// One moment of a run. Joints stand in the process image's order, the passive ones behind them; a
+/// joint without a value stands at 0.
 struct PostureSample {
   std::string label;  ///< "lowest"
   double time_s = 0.0;
@@ -23,7 +24,7 @@ struct PostureSample {
 /// The side view, x to the right and z up, of several moments beside each other: legs (what
 /// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet
 /// that moves more to its sides than ahead is seen from the front, y to the right.
-/// @pre every joint of the tree is one of the robot's.
+/// @pre every joint of the tree is one of the robot's, or passive.
 [[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
                                     std::span<const PostureSample> moments);
 

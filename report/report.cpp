@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <numbers>
 
@@ -24,6 +25,13 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   facts.emplace_back("controllers ran" + side,
                      fmt::format("{:.3f} s", run.controllers_ran ? run.time_s.back() : 0.0));
+  for (std::size_t l = 0; 2 * l < run.loop_error.size(); ++l) {
+    const std::size_t loops = run.robot.loops.size();
+    facts.emplace_back("loop " + run.robot.loops[l].name + side,
+                       fmt::format("open by {:.1e} m at most, opens at {:.1e} m/s at most",
+                                   std::ranges::max(run.loop_error[l]),
+                                   std::ranges::max(run.loop_error[loops + l])));
+  }
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {

@@ -191,6 +191,15 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
         columns_of(file, kTruth, {"foot_position_m", "foot_force_N", "foot_moment_Nm"});
     wanted.insert(wanted.end(), of_feet.begin(), of_feet.end());
   }
+  if (!run.robot.loops.empty()) {
+    const auto loops =
+        columns_of(file, kTruth, {"loop_position_error_m", "loop_velocity_error_m_s"});
+    wanted.insert(wanted.end(), loops.begin(), loops.end());
+  }
+  if (!run.robot.passive.empty()) {
+    const auto passive = columns_of(file, kTruth, {"passive_position_rad"});
+    wanted.insert(wanted.end(), passive.begin(), passive.end());
+  }
   auto table = file.read(kTruth, wanted);
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
@@ -204,10 +213,14 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
   run.foot_position_m = take(*table, 13, feet);
   run.foot_force_N = take(*table, 13 + feet, feet);
   run.foot_moment_Nm = take(*table, 13 + 2 * feet, feet);
+  const std::size_t loops = 2 * run.robot.loops.size();
+  run.loop_error = take(*table, 13 + 3 * feet, loops);
+  run.passive_rad = take(*table, 13 + 3 * feet + loops, run.robot.passive.size());
   run.time_s.resize(rows);
   for (Columns* columns :
        {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
-        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm}) {
+        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm, &run.loop_error,
+        &run.passive_rad}) {
     for (std::vector<double>& column : *columns) column.resize(rows);
   }
   return {};
@@ -231,6 +244,7 @@ model::Placement RunData::base_placement(std::size_t row) const {
 std::vector<double> RunData::positions(std::size_t row) const {
   std::vector<double> q;
   for (const std::vector<double>& joint : position_rad) q.push_back(joint[row]);
+  for (const std::vector<double>& joint : passive_rad) q.push_back(joint[row]);
   return q;
 }
 

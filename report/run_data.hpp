@@ -54,13 +54,16 @@ struct RunData {
   Columns foot_position_m;  ///< [3 feet][row]: origin of each foot's site in W; empty as base
   Columns foot_force_N;     ///< [3 feet][row]: of the ground on each foot, W axes; empty as base
   Columns foot_moment_Nm;   ///< [3 feet][row]: about the site's origin, W axes; empty as base
+  Columns loop_error;       ///< [2 loop][row]: each loop's position error [m], then each one's
+                            ///< velocity error [m/s]; empty as base
+  Columns passive_rad;      ///< [passive joint][row]; empty as base
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
   /// First channel of sensor `index` in `sensor`.
   [[nodiscard]] std::size_t first_channel(std::size_t index) const;
   /// The root link in W; upright at the origin when the log has no truth.
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
-  /// Every joint's position at a row, in the image's order.
+  /// Every joint's position at a row, in the image's order, then the passive ones'.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
   /// Whether the log tells where the base was and what the ground did.
   [[nodiscard]] bool truth() const { return !base.empty(); }

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
+#include "model/closed_loops.hpp"
 #include "report/inverse_dynamics.hpp"
 #include "report/posture.hpp"
 
@@ -259,6 +261,25 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   return samples;
 }
 
+/// Where joint `name` stands in run.positions(); none: neither driven nor known to the truth.
+std::optional<std::size_t> position_index(const RunData& run, const std::string& name) {
+  if (const int driven = run.robot.joint_index(name); driven >= 0) return at(driven);
+  const auto passive = std::ranges::find(run.robot.passive, name, &hal::PassiveConfig::name);
+  const auto index = static_cast<std::size_t>(passive - run.robot.passive.begin());
+  if (index >= run.passive_rad.size()) return std::nullopt;
+  return run.robot.joints.size() + index;
+}
+
+/// What inverse dynamics needs to know of closed loops; nothing for a robot without passive joints.
+/// None: the forces in the loops cannot be told from those that force sensors measure.
+std::optional<model::ClosedLoops> loops_of(const RunData& run, const tandem_kernels& kernels) {
+  if (run.robot.passive.empty()) return model::ClosedLoops();
+  if (kernels.sensors > 0) return std::nullopt;
+  auto loops =
+      model::ClosedLoops::create(run.robot.loop_specs(), run.robot.passive_names(), kernels);
+  return loops ? std::optional(std::move(*loops)) : std::nullopt;
+}
+
 }  // namespace
 
 Subjects subjects_of(const RunData& run) {
@@ -334,22 +355,27 @@ Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels
   std::vector<std::size_t> model_order(kernels.joints);
   std::size_t wanted = 0;
   for (std::size_t i = 0; i < kernels.joints; ++i) {
-    const int index = run.robot.joint_index(kernels.joint_names[i]);
-    if (index < 0) return curve;  // not this robot's kernels
-    model_order[i] = at(index);
-    if (index == joint) wanted = base_v + i;
+    const std::optional<std::size_t> index = position_index(run, kernels.joint_names[i]);
+    if (!index) return curve;  // not this robot's kernels, or a log without truth
+    model_order[i] = *index;
+    if (*index == at(joint)) wanted = base_v + i;
   }
-  if (base_q > 0 && !run.truth()) return curve;
+  std::optional<model::ClosedLoops> loops = loops_of(run, kernels);
+  if (!loops || (base_q > 0 && !run.truth())) return curve;
   const std::vector<int> feet = feet_of_wrenches(run, kernels);
   for (std::size_t row = 0; row < run.rows(); row += stride) {
     std::vector<double> q(base_q);
     std::vector<double> v(base_v);
     for (std::size_t i = 0; i < base_q; ++i) q[i] = run.base[i][row];
     for (std::size_t i = 0; i < base_v; ++i) v[i] = run.base[7 + i][row];
+    const std::vector<double> positions = run.positions(row);
     for (const std::size_t j : model_order) {
-      q.push_back(run.position_rad[j][row]);
-      v.push_back(run.velocity_rad_s[j][row]);
+      q.push_back(positions[j]);
+      v.push_back(j < run.velocity_rad_s.size() ? run.velocity_rad_s[j][row] : 0.0);
     }
+    loops->move(q.data(), v.data());
+    loops->differentiate(q.data());
+    loops->close_rates(v.data());
     std::vector<double> sensors;
     for (std::size_t s = 0; s < kernels.sensors; ++s) {
       const int index = run.robot.sensor_index(kernels.sensor_names[s]);
@@ -363,8 +389,12 @@ Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels
     curve.x.push_back(run.time_s[row]);
   }
   if (!wrenches_known(kernels, motion)) return {};
-  for (const std::vector<double>& tau : inverse_dynamics(kernels, motion)) {
-    curve.y.push_back(tau[wanted]);
+  std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);
+  for (std::size_t row = 0; row < torques.size(); ++row) {
+    loops->move(motion.q[row].data(), motion.v[row].data());
+    loops->differentiate(motion.q[row].data());
+    loops->carry_passive(torques[row].data());
+    curve.y.push_back(torques[row][wanted]);
   }
   return curve;
 }

@@ -5,7 +5,8 @@
 
 namespace tandem::runtime {
 
-RunStatistics::RunStatistics(std::size_t joints, std::size_t feet) : errors_(joints), feet_(feet) {}
+RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops)
+    : errors_(joints), feet_(feet), loops_(loops) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
                          const hal::TruthImage* truth) noexcept TANDEM_RT {
@@ -18,6 +19,13 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
     errors_[j].square_sum += error * error;
     errors_[j].max = std::max(errors_[j].max, std::abs(error));
     ++errors_[j].count;
+  }
+  for (std::size_t l = 0; l < loops_.size(); ++l) {
+    LoopFigures& one = loops_[l];
+    one.max_position_error_m =
+        std::max(one.max_position_error_m, truth->loop_position_error_m()[l]);
+    one.max_velocity_error_m_s =
+        std::max(one.max_velocity_error_m_s, truth->loop_velocity_error_m_s()[l]);
   }
   if (truth != nullptr && truth->hoist_share()[0] <= 0.0) take_ground(*truth);
 }
@@ -69,7 +77,8 @@ std::optional<BaseFigures> RunStatistics::base() const {
 }
 
 void RunStatistics::archive(Archive& ar) {
-  ar(errors_, feet_, free_cycles_, force_sum_N_, slip_m_, min_height_m_, max_height_m_, tilt_rad_);
+  ar(errors_, feet_, loops_, free_cycles_, force_sum_N_, slip_m_, min_height_m_, max_height_m_,
+     tilt_rad_);
 }
 
 }  // namespace tandem::runtime

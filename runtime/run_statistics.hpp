@@ -32,10 +32,16 @@ struct BaseFigures {
   double final_tilt_rad = 0.0;  ///< angle between the base's z axis and W's
 };
 
+/// From the plant's truth: how far one closed loop was open at most, over every cycle.
+struct LoopFigures {
+  double max_position_error_m = 0.0;
+  double max_velocity_error_m_s = 0.0;
+};
+
 class RunStatistics {
  public:
-  /// @param feet  of the truth image; 0 without one.
-  RunStatistics(std::size_t joints, std::size_t feet);
+  /// @param feet, loops  of the truth image; 0 without one.
+  RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0);
 
   /// A cycle in which the controllers ran. `truth` may be null.
   void take(const hal::StateImage& state, const hal::CommandImage& command,
@@ -45,6 +51,9 @@ class RunStatistics {
   /// Empty when there was no truth, no foot, or no cycle with a free base.
   [[nodiscard]] std::optional<GroundFigures> ground(double weight_N) const;
   [[nodiscard]] std::optional<BaseFigures> base() const;
+
+  /// Per loop; empty when there was no truth.
+  [[nodiscard]] const std::vector<LoopFigures>& loops() const { return loops_; }
 
   void archive(Archive& ar);
 
@@ -62,6 +71,7 @@ class RunStatistics {
 
   std::vector<Error> errors_;
   std::vector<Foot> feet_;
+  std::vector<LoopFigures> loops_;
   std::uint64_t free_cycles_ = 0;
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
   double min_height_m_ = 0.0, max_height_m_ = 0.0, tilt_rad_ = 0.0;

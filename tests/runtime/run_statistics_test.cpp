@@ -51,6 +51,22 @@ TEST_F(RunStatisticsOfTwo, GivesTheMeanForceOfBothFeetOnceTheBaseIsFree) {
   EXPECT_EQ(statistics_.ground(320.0)->weight_N, 320.0);
 }
 
+TEST_F(RunStatisticsOfTwo, KeepsTheWorstErrorOfEachLoop) {
+  hal::TruthImage truth(2, 0, 2, 1);
+  ASSERT_EQ(truth.loops(), 2u);
+  ASSERT_EQ(truth.passive(), 1u);
+  ASSERT_EQ(truth_.layout().find("loop_position_error_m"), nullptr) << "none without loops";
+  RunStatistics statistics(2, 0, 2);
+  for (const double error : {1e-9, 3e-9, 2e-9}) {
+    truth.loop_position_error_m()[1] = error;
+    truth.loop_velocity_error_m_s()[0] = 2.0 * error;
+    statistics.take(state_, command_, &truth);
+  }
+  EXPECT_EQ(statistics.loops()[0].max_position_error_m, 0.0);
+  EXPECT_EQ(statistics.loops()[0].max_velocity_error_m_s, 6e-9);
+  EXPECT_EQ(statistics.loops()[1].max_position_error_m, 3e-9);
+}
+
 TEST_F(RunStatisticsOfTwo, MeasuresSlipFromWhereAFootTouchedDown) {
   foot(0, 0.10, 50.0);
   take(0, 0);
