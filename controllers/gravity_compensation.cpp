@@ -32,7 +32,7 @@ std::string imu_site(const hal::RobotConfig& robot, const hal::SensorConfig& sen
 class GravityCompensation : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
-    Result<ModelMap> map = ModelMap::make(setup.robot, setup.kernels);
+    Result<ModelMap> map = ModelMap::make(setup.robot, setup.kernels, PassiveJoints::kClosed);
     if (!map) return std::unexpected(map.error());
     map_ = std::move(*map);
     kernels_ = setup.kernels;
@@ -42,6 +42,7 @@ class GravityCompensation : public Controller {
     if (const Status standing = stand(setup); !standing) return standing;
     if (const Status joints = claim_joints(setup); !joints) return joints;
     q_.assign(kernels_->nq, 0.0);
+    map_.passive_to_q(q_);
     rest_.assign(kernels_->nv, 0.0);
     tau_.assign(kernels_->nv, 0.0);
     pose_.assign(12 * kernels_->sites, 0.0);
@@ -79,7 +80,7 @@ class GravityCompensation : public Controller {
     return Code::kOk;
   }
 
-  void archive(Archive& ar) override { ar(start_ns_, joints_); }
+  void archive(Archive& ar) override { ar(start_ns_, joints_, q_); }
 
  private:
   struct Joint {
@@ -138,16 +139,28 @@ class GravityCompensation : public Controller {
   void weigh(const hal::StateImage& state) noexcept TANDEM_RT {
     map_.positions_to_q(state.position_rad(), q_);
     if (kernels_->floating_base == 0) {
+      close_loops();
       kernels_->bias(q_.data(), rest_.data(), tau_.data());
+      map_.carry_passive(tau_);
       return;
     }
     q_[3] = q_[4] = q_[5] = 0.0;
     q_[6] = 1.0;
     if (imu_) turn_base(state.sensor_values(imu_->sensor));
+    close_loops();
     kernels_->bias(q_.data(), rest_.data(), tau_.data());
     locate();
     kernels_->site_jacobians(q_.data(), J_.data());
     support_->carry(*kernels_, q_, pose_, J_, tau_);
+    map_.carry_passive(tau_);
+  }
+
+  /// From where the loops were closed last, or else from where robot.toml has them. Positions that
+  /// no posture closes (a linkage stretched by noise) leave them as near as they get.
+  void close_loops() noexcept TANDEM_RT {
+    if (map_.close(q_)) return;
+    map_.passive_to_q(q_);
+    (void)map_.close(q_);
   }
 
   void locate() noexcept TANDEM_RT {

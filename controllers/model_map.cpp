@@ -13,7 +13,8 @@ std::vector<std::string> names_of(const char* const* names, std::size_t count) {
 
 }  // namespace
 
-Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kernels* kernels) {
+Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+                                PassiveJoints passive) {
   if (kernels == nullptr) {
     return fail("this controller needs the robot's generated model",
                 "run `tandem model build` with " + robot.file);
@@ -31,17 +32,39 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
     map.index_.push_back(static_cast<std::size_t>(found - model.begin()));
   }
   for (const std::string& name : model) {
-    if (robot.joint_index(name) < 0) {
+    if (robot.joint_index(name) < 0 &&
+        !(passive == PassiveJoints::kClosed && robot.is_passive(name))) {
+      if (robot.is_passive(name)) {
+        return fail("this controller cannot do with joint '" + name + "', which has no motor",
+                    "run gravity_compensation, hold or joint_trajectory");
+      }
       return fail("joint '" + name + "' of the model is not driven",
                   "give it a [[joint]] in " + robot.file + ", or lock it in [model.lock]");
     }
   }
+  if (robot.passive.empty()) return map;
+  auto loops = model::ClosedLoops::create(robot.loop_specs(), robot.passive_names(), *kernels);
+  if (!loops) return std::unexpected(loops.error());
+  map.loops_ = std::move(*loops);
+  for (const hal::PassiveConfig& joint : robot.passive)
+    map.passive_rad_.push_back(joint.position_rad);
   return map;
 }
 
 void ModelMap::positions_to_q(std::span<const double> image,
                               std::span<double> q) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < index_.size(); ++j) q[q_index(j)] = image[j];
+}
+
+void ModelMap::passive_to_q(std::span<double> q) const noexcept TANDEM_RT {
+  const std::size_t to_q = base_ == 0 ? 0 : 1;
+  for (std::size_t j = 0; j < passive_rad_.size(); ++j)
+    q[loops_.passive()[j] + to_q] = passive_rad_[j];
+}
+
+bool ModelMap::close(std::span<double> q) noexcept TANDEM_RT {
+  constexpr int kMostSteps = 20;
+  return loops_.loops() == 0 || loops_.close(q.data(), kMostSteps);
 }
 
 Result<std::size_t> site_index(const tandem_kernels& kernels, const std::string& name) {

@@ -47,6 +47,38 @@ TEST_F(Run, FollowsATrajectoryOverClassicCan) {
   EXPECT_LT(json["joints"]["joint2"]["max_tracking_error_rad"].get<double>(), 0.02);
 }
 
+TEST_F(Run, KeepsClosedLoopsClosedThroughBoardsAndFirmware) {
+  for (const std::string experiment :
+       {"four_bar/hold", "four_bar/turn", "parallel_ankle/hold", "parallel_ankle/move"}) {
+    const auto json = run(TANDEM_SOURCE_DIR "/config/" + experiment + ".toml --no-log");
+    EXPECT_TRUE(json["faults"].empty()) << experiment << json["faults"];
+    EXPECT_EQ(json["loops"].size(), experiment.starts_with("four_bar") ? 1U : 2U);
+    for (const auto& [name, loop] : json["loops"].items()) {
+      EXPECT_LT(loop["max_position_error_m"].get<double>(), 1e-11) << experiment << ' ' << name;
+      EXPECT_LT(loop["max_velocity_error_m_s"].get<double>(), 1e-11) << experiment << ' ' << name;
+    }
+    for (const auto& [name, joint] : json["joints"].items()) {
+      EXPECT_LT(joint["max_tracking_error_rad"].get<double>(), 0.05) << experiment << ' ' << name;
+    }
+  }
+}
+
+// The motors carry the foot through the rods: with the right torque it stays where it is.
+TEST_F(Run, CompensatesGravityOfJointsWithoutAMotor) {
+  for (const std::string robot : {"four_bar", "parallel_ankle"}) {
+    write_text(folder_ / "float.toml",
+               "robot = \"" TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml\"\n" +
+                   "posture = \"ready\"\nduration_s = 3.0\n[[controller]]\n" +
+                   "plugin = \"gravity_compensation\"\n[controller.parameters]\n" +
+                   "stiffness_Nm_rad = 0.2\ndamping_Nms_rad = 0.05\nramp_s = 0.01\n");
+    const auto json = run("float.toml --no-log");
+    EXPECT_TRUE(json["faults"].empty()) << robot << json["faults"];
+    for (const auto& [name, joint] : json["joints"].items()) {
+      EXPECT_LT(joint["max_tracking_error_rad"].get<double>(), 0.1) << robot << ' ' << name;
+    }
+  }
+}
+
 TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
   const auto first = run("trajectory.toml --duration 0.5");
   const auto second = run("trajectory.toml --duration 0.5");
