@@ -73,14 +73,11 @@ TEST(Standing, BendsTheKneesOfAQuadrupedToItsMiddle) {
   const NewRobot robot = made(kPublicRobots[3]);
   const Eigen::VectorXd q = posture_of(robot);
   const Posed posed(robot.tree, q);
-  const auto knee = [&](const char* joint) {
+  const auto x_of = [&](const char* joint) {
     return posed.origin(robot.tree.joint_index(joint)).x();
   };
-  const auto hip = [&](const char* joint) {
-    return posed.origin(robot.tree.joint_index(joint)).x();
-  };
-  EXPECT_LT(knee("LF_KFE"), hip("LF_HFE"));
-  EXPECT_GT(knee("LH_KFE"), hip("LH_HFE"));
+  EXPECT_LT(x_of("LF_KFE"), x_of("LF_HFE"));
+  EXPECT_GT(x_of("LH_KFE"), x_of("LH_HFE"));
   EXPECT_NEAR(q[robot.tree.joint_index("LF_KFE")], q[robot.tree.joint_index("RF_KFE")], 0.02);
 }
 
