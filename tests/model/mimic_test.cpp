@@ -305,7 +305,7 @@ TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
   EXPECT_NE(description_hash(tree, spec), description_hash(reference_tree(reference), spec));
   const std::string library = (folder / "k.so").string();
   const auto built =
-      build_kernels(tree, spec, {.library = library, .compiler = {}, .jobs = 1, .progress = {}});
+      build_kernels(tree, spec, {.library = library, .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}});
   ASSERT_TRUE(built) << built.error().to_string();
   const auto kernels = load_kernels(library, built->hash);
   ASSERT_TRUE(kernels);

@@ -70,7 +70,7 @@ TEST_P(DrivesOfPublicRobots, KeepWhatStandsOnALegFromFalling) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, DrivesOfPublicRobots, ::testing::ValuesIn(kPublicRobots),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Drives, AreFewForJointsThatNeedNearlyTheSame) {
   model::Tree tree;

@@ -54,7 +54,7 @@ TEST_P(EveryPublicRobot, GetsFilesThatAreReadBackAsTheyWereMeant) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, EveryPublicRobot, ::testing::ValuesIn(kPublicRobots),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST(NewRobot, FindsOneSensorForEachWrenchAndEachImu) {
   EXPECT_EQ(sensors_of(made(kPublicRobots[1])), std::vector<std::string>{"ft_frame"});

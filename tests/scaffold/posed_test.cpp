@@ -27,7 +27,9 @@ Eigen::VectorXd sample(const model::Tree& tree, int index) {
 TEST_P(PosedOnPublicRobots, InertiaAndGravityAreThoseOfTheMassMatrixAndInverseDynamics) {
   const NewRobot robot = made(GetParam());
   const model::Tree& tree = robot.tree;
-  const auto mechanism = model::make_mechanism(tree, {.floating_base = tree.floating_base});
+  model::ModelSpec spec;
+  spec.floating_base = tree.floating_base;
+  const auto mechanism = model::make_mechanism(tree, spec);
   ASSERT_TRUE(mechanism);
   for (int index = 0; index < 5; ++index) {
     const Eigen::VectorXd q = sample(tree, index);
@@ -69,7 +71,7 @@ TEST_P(PosedOnPublicRobots, JacobiansAreTheDerivativesOfPositions) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, PosedOnPublicRobots, ::testing::ValuesIn(kPublicRobots),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace tandem::scaffold

@@ -67,7 +67,7 @@ TEST_P(StandingRobots, AreTheSameEachTime) {
 
 INSTANTIATE_TEST_SUITE_P(, StandingRobots,
                          ::testing::ValuesIn(kPublicRobots.begin() + 3, kPublicRobots.end()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Standing, BendsTheKneesOfAQuadrupedToItsMiddle) {
   const NewRobot robot = made(kPublicRobots[3]);
