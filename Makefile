@@ -31,6 +31,7 @@ test: unit rtsan
 # What takes too long for every change.
 test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
+	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 
 unit:
 	@scripts/install-dependencies test

@@ -1,0 +1,160 @@
+// The tables of docs/dynamics.md: operations and times of the bundled robots' kernels, and cost
+// against the number of joints for chains and binary trees, compilation included.
+//   dynamics_figures [FOLDER]    where libraries are built; default: a temporary one
+// Times mean something on an idle machine only: medians of nine batches, of random states.
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <set>
+
+#include "hal/sim/setup.hpp"
+#include "model/kernel_build.hpp"
+#include "model/kernel_check.hpp"
+#include "model/kernel_library.hpp"
+#include "model/urdf.hpp"
+#include "runtime/experiment.hpp"
+
+namespace tandem::bench {
+namespace {
+
+namespace fs = std::filesystem;
+using model::Kernel;
+
+struct Robot {
+  std::string name;
+  model::Tree tree;
+  model::ModelSpec spec;
+};
+
+/// Median time of a call [us].
+double median_us(const std::function<void(std::size_t state)>& call) {
+  constexpr std::size_t kCalls = 2000;
+  std::vector<double> batches;
+  for (int batch = 0; batch < 9; ++batch) {
+    const auto start = std::chrono::steady_clock::now();
+    for (std::size_t i = 0; i < kCalls; ++i) call(i);
+    const std::chrono::duration<double, std::micro> spent =
+        std::chrono::steady_clock::now() - start;
+    batches.push_back(spent.count() / kCalls);
+  }
+  std::ranges::nth_element(batches, batches.begin() + 4);
+  return batches[4];
+}
+
+/// " 1,234 | 0.56 |": operations and time of forward dynamics, inverse dynamics and mass matrix.
+std::string cells(const tandem_kernels& k, const model::Mechanism& m) {
+  std::vector<model::SeededState> states;
+  for (unsigned seed = 1; seed <= 16; ++seed) states.emplace_back(m, seed);
+  std::vector<double> out(static_cast<std::size_t>(k.nv) * k.nv);
+  const auto at = [&](std::size_t i) -> const model::SeededState& { return states[i % 16]; };
+  const auto time = [&](Kernel kernel) {
+    return median_us([&](std::size_t i) {
+      const model::SeededState& s = at(i);
+      if (kernel == Kernel::kForwardDynamics)
+        k.forward_dynamics(s.q.data(), s.v.data(), s.tau.data(), s.wrench.data(), out.data());
+      if (kernel == Kernel::kInverseDynamics)
+        k.inverse_dynamics(s.q.data(), s.v.data(), s.vdot.data(), s.wrench.data(), out.data());
+      if (kernel == Kernel::kMassMatrix) k.mass_matrix(s.q.data(), out.data());
+    });
+  };
+  std::string text;
+  for (const Kernel kernel :
+       {Kernel::kForwardDynamics, Kernel::kInverseDynamics, Kernel::kMassMatrix}) {
+    const tandem_kernel_count& count = k.counts[static_cast<int>(kernel)];
+    text += fmt::format(" {} | {:.2f} |", count.add + count.mul, time(kernel));
+  }
+  return text;
+}
+
+/// One row, its library built first; `cost` adds what compiling took.
+Status print_row(const Robot& robot, const fs::path& folder, bool cost) {
+  rusage before{};
+  getrusage(RUSAGE_CHILDREN, &before);
+  const std::string library = (folder / (robot.name + ".so")).string();
+  const auto built = model::build_kernels(
+      robot.tree, robot.spec,
+      {.library = library, .compiler = {}, .jobs = 0, .progress = {}, .waiting = {}});
+  if (!built) return std::unexpected(built.error());
+  rusage after{};
+  getrusage(RUSAGE_CHILDREN, &after);
+  const auto kernels = model::load_kernels(library);
+  if (!kernels) return std::unexpected(kernels.error());
+  const auto m = model::make_mechanism(robot.tree, robot.spec);
+  if (!m) return std::unexpected(m.error());
+  fmt::print("| {} | {}{} |{}", robot.name, robot.tree.joints.size(),
+             robot.tree.floating_base ? " + base" : "", cells(**kernels, *m));
+  if (cost) {
+    fmt::print(" {} | {} | {} |", after.ru_utime.tv_sec - before.ru_utime.tv_sec,
+               after.ru_maxrss / 1024, fs::file_size(library) / 1024);
+  }
+  fmt::print("\n");
+  std::fflush(stdout);
+  return {};
+}
+
+/// Equal links of 1 kg whose axes are x, y, z in turn; each link carries `branches` more.
+Robot regular(const std::string& kind, int joints, int branches) {
+  std::string urdf = "<robot name=\"regular\"><link name=\"link0\"/>";
+  for (int i = 1; i <= joints; ++i) {
+    urdf += fmt::format(
+        "<link name=\"link{0}\"><inertial><origin xyz=\"0.05 0 0.1\"/><mass value=\"1\"/>"
+        "<inertia ixx=\"0.02\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.01\"/>"
+        "</inertial></link><joint name=\"joint{0:03}\" type=\"continuous\"><parent "
+        "link=\"link{1}\"/><child link=\"link{0}\"/><origin xyz=\"0.1 0.05 0.2\"/>"
+        "<axis xyz=\"{2} {3} {4}\"/></joint>",
+        i, (i - 1) / branches, i % 3 == 1 ? 1 : 0, i % 3 == 2 ? 1 : 0, i % 3 == 0 ? 1 : 0);
+  }
+  auto read = model::parse_urdf(urdf + "</robot>", "regular.urdf", {});
+  model::ModelSpec spec;
+  spec.robot = fmt::format("{}_{}", kind, joints);
+  return {spec.robot, std::move(read->tree), spec};
+}
+
+std::set<fs::path> bundled() {
+  std::set<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(TANDEM_CONFIG_FOLDER))
+    if (fs::exists(entry.path() / "robot.toml")) files.insert(entry.path() / "robot.toml");
+  return files;
+}
+
+int fail_with(const Error& error) {
+  fmt::print(stderr, "{}\n", error.to_string());
+  return 1;
+}
+
+int run(const fs::path& folder) {
+  fs::create_directories(folder);
+  ::setenv("CCACHE_DISABLE", "1", 1);  // what compiling costs without a cache
+  fmt::print(
+      "| robot | joints | FD operations | [us] | ID operations | [us] | M operations | [us] |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  for (const fs::path& file : bundled()) {
+    auto read = runtime::read_robot(file.string());
+    if (!read) return fail_with(read.error().front());
+    const Robot robot{read->config.name, std::move(read->description.tree),
+                      sim::model_spec(read->config)};
+    if (const Status row = print_row(robot, folder, false); !row) return fail_with(row.error());
+  }
+  fmt::print(
+      "\n| kind | joints | FD operations | [us] | ID operations | [us] | M operations | [us] "
+      "| compiling, CPU [s] | memory [MB] | library [KB] |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  for (const auto& [kind, branches] : {std::pair("chain", 1), {"tree", 2}})
+    for (const int joints : {10, 20, 50, 100, 200})
+      if (const Status row = print_row(regular(kind, joints, branches), folder, true); !row)
+        return fail_with(row.error());
+  return 0;
+}
+
+}  // namespace
+}  // namespace tandem::bench
+
+int main(int argc, char** argv) {
+  const auto otherwise = std::filesystem::temp_directory_path() / "tandem_dynamics_figures";
+  return tandem::bench::run(argc > 1 ? std::filesystem::path(argv[1]) : otherwise);
+}
