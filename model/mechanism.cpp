@@ -1,12 +1,12 @@
 #include "model/mechanism.hpp"
 
 #include <Eigen/Dense>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "base/nearest.hpp"
+#include "model/placements.hpp"
 #include "model/rounded.hpp"
 
 namespace tandem::model {
@@ -104,13 +104,6 @@ std::unexpected<Error> unknown(const Tree& tree, const std::string& what, const 
   return std::unexpected(std::move(error));
 }
 
-Matrix3d from_rpy(const std::array<double, 3>& rpy) {
-  return (Eigen::AngleAxisd(rpy[2], Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(rpy[1], Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy[0], Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
 // What make_mechanism works on.
 struct Maker {
   const Tree& tree;
@@ -203,7 +196,7 @@ Status Maker::sites() {
     if (link < 0) return unknown(tree, "link", user, site.link, link_names(tree));
     if (std::ranges::count(result.site_names, site.name) != 0)
       return fail(user + " is defined twice", "give each site a name of its own");
-    const Placement in_link{from_rpy(site.rpy_rad), Vector3d(site.xyz_m.data())};
+    const Placement in_link = placement_of(site.xyz_m, site.rpy_rad);
     const int body = tree.links[link].body;
     result.sites.push_back({body, in_frame(body, tree.links[link].in_body * in_link), -1});
     result.site_names.push_back(site.name);

@@ -346,7 +346,8 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   if (!errors.empty()) return std::unexpected(in_order(std::move(errors)));
   for (hal::PostureConfig& posture : robot.postures) {
     if (!std::isnan(posture.base_height_m)) continue;
-    posture.base_height_m = standing_height_m(robot, posture, found->tree);
+    const std::optional<Standing> touching = standing(robot, posture, found->tree);
+    posture.base_height_m = touching ? touching->base_height_m : 0.0;
   }
   return found;
 }

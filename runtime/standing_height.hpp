@@ -2,15 +2,24 @@
 // Layer: runtime.  Thread: non-RT only.
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "hal/robot_config.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::runtime {
 
-/// The height of an upright floating base's origin above W's at which the lowest point of the
-/// feet touches the ground in this posture. Feet on links that the description lacks are passed
-/// over; 0 without any.
-[[nodiscard]] double standing_height_m(const hal::RobotConfig& robot,
-                                       const hal::PostureConfig& posture, const model::Tree& tree);
+/// Where a robot touches the ground.
+struct Standing {
+  double base_height_m = 0.0;  ///< of the upright base's origin above W's
+  std::string foot;            ///< the site of the foot that touches
+};
+
+/// The height of an upright base at which the lowest point of the feet touches the ground in this
+/// posture. Feet on links that the description lacks are passed over; nothing without any.
+[[nodiscard]] std::optional<Standing> standing(const hal::RobotConfig& robot,
+                                               const hal::PostureConfig& posture,
+                                               const model::Tree& tree);
 
 }  // namespace tandem::runtime

@@ -9,6 +9,7 @@
 #include "model/emit.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_library.hpp"
+#include "model/placements.hpp"
 #include "model/regular.hpp"
 #include "tests/model/reference.hpp"
 
@@ -304,8 +305,8 @@ TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
   const ModelSpec spec = reference_spec(reference);
   EXPECT_NE(description_hash(tree, spec), description_hash(reference_tree(reference), spec));
   const std::string library = (folder / "k.so").string();
-  const auto built =
-      build_kernels(tree, spec, {.library = library, .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}});
+  const auto built = build_kernels(
+      tree, spec, {.library = library, .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}});
   ASSERT_TRUE(built) << built.error().to_string();
   const auto kernels = load_kernels(library, built->hash);
   ASSERT_TRUE(kernels);
@@ -324,6 +325,31 @@ TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
   k.site_jacobians(s.q.data(), J.data());
   EXPECT_LE(relative_error(J, evaluate_kernel(Kernel::kSiteJacobians, m, {s.q})[0]), 1e-14);
   std::filesystem::remove_all(folder);
+}
+
+TEST(Placements, PutFollowersWhereTheKernelsDo) {
+  const ReferenceRobot& reference = reference_robot("coman");
+  Tree tree = reference_tree(reference);
+  const ModelSpec spec = reference_spec(reference);  // sites are the feet
+  Joint& knee = tree.joints[static_cast<std::size_t>(tree.joint_index("RKneeSag"))];
+  knee.leader = tree.joint_index("LKneeSag");
+  knee.multiplier = -0.5;
+  knee.offset = 0.2;
+  const Mechanism m = *make_mechanism(tree, spec);
+  Array q(static_cast<std::size_t>(m.kernel_nq()), 0.0);  // base first, then who follows nobody
+  q[6] = 1.0;
+  std::vector<double> position(tree.joints.size(), 0.0);
+  std::size_t next = 7;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j)
+    if (!tree.joints[j].follows()) q[next++] = position[j] = 0.1 + 0.01 * static_cast<double>(j);
+  const Array rest(static_cast<std::size_t>(m.kernel_nv()), 0.0);
+  const Array pose = evaluate_kernel(Kernel::kSiteMotion, m, {q, rest, rest})[0];
+  const std::vector<Placement> bodies = place_bodies(tree, position);
+  for (std::size_t s = 0; s < spec.sites.size(); ++s) {
+    const Link& link = tree.links[static_cast<std::size_t>(tree.link_index(spec.sites[s].link))];
+    const Placement at = bodies[static_cast<std::size_t>(link.body)] * link.in_body;
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(pose[12 * s + 9 + i], at.p[i], 1e-14);
+  }
 }
 
 }  // namespace
