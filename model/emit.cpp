@@ -5,12 +5,14 @@
 #include <functional>
 #include <limits>
 #include <queue>
+#include <set>
 
 namespace tandem::model {
 namespace {
 
 constexpr std::size_t kLongestInline = 96;  // characters of an expression written into another
-constexpr int kEarlyDepth = 3;  // of an angle: (multiplier * q + offset) + the frames' own offset
+constexpr int kEarlyDepth = 3;    // of an angle: (multiplier * q + offset) + the frames' own offset
+constexpr int kMostZeros = 1000;  // of one output that are written one by one
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
 // The shortest text that reads back as the same double, never an integer literal.
@@ -66,7 +68,11 @@ class Emitter {
       parameters_ += "double* __restrict " + out.name + ", ";
       arguments_ += out.name + ", ";
       result_.parameters += ", double* " + out.name;
+      int zeros = 0;
+      for (int i = 0; i < out.size; ++i) zeros += is_zero(first + static_cast<std::uint32_t>(i));
+      if (zeros > kMostZeros) cleared_.insert(out.name);
       for (int i = 0; i < out.size; ++i, ++first) {
+        cleared_outputs_.push_back(zeros > kMostZeros && is_zero(first));
         output_names_.push_back(out.name + "[" + std::to_string(i) + "]");
         const Expr& output = kernel_.outputs[first];
         if (!output.is_constant()) outputs_of_[output.node()].push_back(first);
@@ -74,6 +80,11 @@ class Emitter {
     }
     parameters_ += "double* __restrict w";
     arguments_ += "w";
+  }
+
+  bool is_zero(std::uint32_t output) const {
+    const Expr& value = kernel_.outputs[output];
+    return value.is_constant() && value.value() == 0.0;
   }
 
   // An angle that is a sum or product of inputs and constants: known before the first part.
@@ -193,6 +204,7 @@ class Emitter {
     std::string body;
     for (std::size_t k = 0; k < kernel_.outputs.size(); ++k) {
       const Expr& output = kernel_.outputs[k];
+      if (cleared_outputs_[k]) continue;
       if (output.is_constant()) {
         body += "  " + output_names_[k] + " = " + literal(output.value()) + ";\n";
       } else if (part_of_[output.node()] == kNowhere) {
@@ -227,6 +239,10 @@ class Emitter {
       body += "  double w[" + std::to_string(workspace_) + "];\n";
     else
       body += "  double* w = nullptr;\n";
+    for (const KernelArray& out : kernel_.shape.outputs)
+      if (cleared_.contains(out.name))
+        body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
+                "[i] = 0.0;\n";
     for (std::size_t k = 0; k < angles_.size(); ++k)
       body += "  w[" + std::to_string(k) + "] = " + early(angles_[k]) + ";\n";
     const std::string n = std::to_string(angles_.size());
@@ -254,6 +270,8 @@ class Emitter {
   std::vector<std::string> text_;                       // written where it is used
   std::vector<std::vector<std::uint32_t>> outputs_of_;  // per node
   std::vector<std::string> output_names_;
+  std::set<std::string> cleared_;      // outputs, mostly zeros, that a loop clears first
+  std::vector<bool> cleared_outputs_;  // per output: nothing is left to write
   std::vector<std::uint32_t> angles_;
   std::vector<std::vector<std::uint32_t>> parts_;
   std::uint32_t part_ = 0;
