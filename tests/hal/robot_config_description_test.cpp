@@ -1,0 +1,158 @@
+// A robot.toml beside its description: limits that it leaves open, names that do not fit.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/hal/robot_config_text.hpp"
+
+namespace tandem::hal {
+namespace {
+
+class Completed : public testing::Test {
+ protected:
+  void read(const std::string& text) {
+    auto found = parse_robot_config(text, "leg.toml");
+    ASSERT_TRUE(found.has_value()) << errors_of(text);
+    robot = *found;
+    errors.clear();
+    for (const Error& error : complete_from_description(robot, description_)) {
+      errors += error.to_string() + "\n";
+    }
+  }
+  RobotConfig robot;
+  RobotDescription description_ = description();
+  std::string errors;
+};
+
+TEST_F(Completed, TakesMissingLimitsFromTheDescription) {
+  read(kRobot);
+  EXPECT_EQ(errors, "");
+  EXPECT_EQ(robot.joints[0].max_position_rad, 1.0);
+  EXPECT_EQ(robot.joints[1].max_position_rad, 2.0);
+  EXPECT_EQ(robot.joints[0].max_torque_Nm, 100.0);
+  EXPECT_EQ(robot.joints[0].rated_torque_Nm, 100.0);
+  EXPECT_EQ(robot.joints[1].max_torque_Nm, 80.0);
+  EXPECT_EQ(robot.joints[1].max_velocity_rad_s, 6.0);
+}
+
+TEST_F(Completed, GivesAContinuousJointWhatItsEncoderCounts) {
+  description_.moving_joints[1].max_position_rad = INFINITY;
+  read(kRobot);
+  EXPECT_EQ(errors, "");
+  EXPECT_GT(robot.joints[1].max_position_rad, 1e4);
+  EXPECT_LT(robot.joints[1].max_position_rad / (2 * M_PI) * 409600, 2147483647.0);
+}
+
+TEST_F(Completed, SuggestsTheNearestForAJointThatTheDescriptionLacks) {
+  description_.moving_joints[0].name = "hip_pitch";
+  description_.moving_joints[1].name = "hipp";
+  read(kRobot);
+  EXPECT_EQ(errors.substr(0, errors.find('\n')),
+            "leg.toml:37: joint.hip: the description has no joint 'hip' (did you mean 'hipp'?)");
+}
+
+TEST_F(Completed, RefusesAMovingJointThatNothingDrives) {
+  description_.moving_joints.push_back({"wrist", -1, 1, 1, 1});
+  read(kRobot);
+  EXPECT_EQ(errors,
+            "leg.toml: joint: the description's joint 'wrist' has no [[joint]] "
+            "(add one or a [[passive]], or fix it with [model.lock] wrist = 0.0)\n");
+}
+
+TEST_F(Completed, RefusesAJointThatDoesNotMove) {
+  description_.moving_joints.pop_back();
+  description_.other_joints.push_back("knee");
+  read(kRobot);
+  EXPECT_NE(errors.find("'knee' does not move in the description"), std::string::npos);
+}
+
+TEST_F(Completed, TakesAMovingJointWithoutAMotorThatIsPassive) {
+  description_.moving_joints.push_back({"wrist", -1, 1, 1, 1});
+  read(std::string(kRobot) + "[[passive]]\nname = \"wrist\"\n");
+  EXPECT_EQ(errors, "");
+  read(std::string(kRobot) + "[[passive]]\nname = \"wirst\"\n");
+  EXPECT_NE(errors.find("passive.wirst: the description has no joint 'wirst' (did you mean "
+                        "'wrist'?)"),
+            std::string::npos)
+      << errors;
+}
+
+TEST_F(Completed, RefusesAMotorForAJointThatFollowsAnother) {
+  description_.moving_joints.pop_back();
+  description_.followers = {{"knee", "hip", -INFINITY, INFINITY}};
+  read(kRobot);
+  EXPECT_NE(errors.find("joint.knee: the joint 'knee' mimics 'hip' in the description and has no "
+                        "motor of its own (remove the [[joint]], or set mimic = \"independent\" "
+                        "in [model])"),
+            std::string::npos)
+      << errors;
+}
+
+TEST_F(Completed, RefusesALimitThatTakesAFollowerBeyondItsOwn) {
+  description_.followers = {{"flap", "hip", -1.5, 0.9}};
+  read(kRobot);
+  EXPECT_NE(errors.find("joint.hip.max_position_rad: would take 'flap', which mimics this joint, "
+                        "beyond its own limits (stay within -1.500000 to 0.900000)"),
+            std::string::npos)
+      << errors;
+}
+
+TEST_F(Completed, RefusesUnknownLinksAndJointsOfSitesAndSensors) {
+  description_.links.back() = "foott";
+  description_.other_joints = {"toe", "ankel"};
+  read(kRobot);
+  EXPECT_NE(errors.find("leg.toml:7: site.sole.link: the description has no link 'foot' "
+                        "(did you mean 'foott'?)"),
+            std::string::npos);
+  EXPECT_NE(errors.find("sensor.foot_ft.joint: the description has no joint 'ankle'"),
+            std::string::npos);
+}
+
+TEST_F(Completed, AsksForALimitThatNobodyGives) {
+  description_.moving_joints[0].max_velocity_rad_s = 0.0;
+  read(kRobot);
+  EXPECT_EQ(errors,
+            "leg.toml:37: joint.hip.max_velocity_rad_s: neither this file nor the description "
+            "gives a limit (set max_velocity_rad_s)\n");
+}
+
+TEST_F(Completed, SaysWhyTheDescriptionGivesNoLimits) {
+  const double none = std::nan("");
+  description_.moving_joints[1] = {"knee", none, none, none, 200.0, "leg.urdf:12 has no <limit>"};
+  read(kRobot);
+  const std::string why =
+      "neither this file nor the description gives a limit (leg.urdf:12 has no <limit>) ";
+  const std::string key = "leg.toml:44: joint.knee.";
+  EXPECT_EQ(errors, key + "min_position_rad: " + why + "(set min_position_rad)\n" + key +
+                        "max_position_rad: " + why + "(set max_position_rad)\n" + key +
+                        "max_velocity_rad_s: " + why + "(set max_velocity_rad_s)\n");
+}
+
+TEST_F(Completed, TakesEveryLimitFromTheRobotsFileWhenTheDescriptionHasNone) {
+  const double none = std::nan("");
+  description_.moving_joints[1] = {"knee", none, none, none, none, "has no <limit>"};
+  read(with("max_torque_Nm = 80",
+            "max_torque_Nm = 80\nmin_position_rad = -1\nmax_position_rad = 2\n"
+            "max_velocity_rad_s = 3"));
+  EXPECT_EQ(errors, "");
+  EXPECT_EQ(robot.joints[1].min_position_rad, -1.0);
+  EXPECT_EQ(robot.joints[1].max_velocity_rad_s, 3.0);
+}
+
+TEST_F(Completed, RefusesLimitsThatTheEncoderCannotCount) {
+  read(with("max_position_rad = 1.0", "max_position_rad = 1e6"));
+  EXPECT_NE(errors.find("more than the encoder's 32 bits can count"), std::string::npos);
+}
+
+TEST_F(Completed, RefusesATorqueThatTheWireCannotSay) {
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nrated_torque_Nm = 1"));
+  EXPECT_NE(errors.find("more than 32 times the rated torque"), std::string::npos);
+}
+
+TEST_F(Completed, RefusesAPostureBeyondTheLimits) {
+  read(with("knee = 0.2", "knee = -0.2"));
+  EXPECT_NE(errors.find("posture.home.knee: is beyond the joint's limits"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tandem::hal
