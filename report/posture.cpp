@@ -4,8 +4,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 namespace tandem::report {
 namespace {
@@ -66,6 +68,29 @@ void add_point(Curve& curve, const Eigen::Vector3d& point, double shift_m) {
   curve.y.push_back(point.z());
 }
 
+/// Where a site of robot.toml is.
+struct SitePlace {
+  std::size_t body = 0;  ///< that carries it
+  model::Placement in_W;
+};
+
+std::optional<SitePlace> place_of(const std::string& name, const model::Tree& tree,
+                                  const hal::RobotConfig& robot,
+                                  std::span<const model::Placement> bodies) {
+  const auto site = std::ranges::find(robot.model.sites, name, &hal::SiteConfig::name);
+  const int index = site == robot.model.sites.end() ? -1 : tree.link_index(site->link);
+  if (index < 0) return std::nullopt;
+  const model::Link& link = tree.links[static_cast<std::size_t>(index)];
+  const auto rotation = [&](int axis) {
+    return Eigen::AngleAxisd(site->rpy_rad[static_cast<std::size_t>(axis)],
+                             Eigen::Vector3d::Unit(axis));
+  };
+  const model::Placement in_link{(rotation(2) * rotation(1) * rotation(0)).matrix(),
+                                 Eigen::Map<const Eigen::Vector3d>(site->xyz_m.data())};
+  const auto body = static_cast<std::size_t>(link.body);
+  return SitePlace{body, bodies[body] * link.in_body * in_link};
+}
+
 /// A foot's contact points in W, and the last body before them.
 struct FootPoints {
   std::size_t body = 0;
@@ -76,30 +101,59 @@ std::vector<FootPoints> feet_of(const model::Tree& tree, const hal::RobotConfig&
                                 std::span<const model::Placement> bodies) {
   std::vector<FootPoints> feet;
   for (const hal::FootConfig& foot : robot.contact.feet) {
-    for (const hal::SiteConfig& site : robot.model.sites) {
-      const int index = site.name == foot.site ? tree.link_index(site.link) : -1;
-      if (index < 0) continue;
-      const model::Link& link = tree.links[static_cast<std::size_t>(index)];
-      const auto rotation = [&](int axis) {
-        return Eigen::AngleAxisd(site.rpy_rad[static_cast<std::size_t>(axis)],
-                                 Eigen::Vector3d::Unit(axis));
-      };
-      const model::Placement in_link{(rotation(2) * rotation(1) * rotation(0)).matrix(),
-                                     Eigen::Map<const Eigen::Vector3d>(site.xyz_m.data())};
-      FootPoints& one = feet.emplace_back();
-      one.body = static_cast<std::size_t>(link.body);
-      const model::Placement sole = bodies[one.body] * link.in_body * in_link;
-      for (const auto& point : foot.points_m) {
-        one.points_m.push_back(sole.R * Eigen::Map<const Eigen::Vector3d>(point.data()) + sole.p);
-      }
-      if (one.points_m.empty()) one.points_m.push_back(sole.p);
+    const std::optional<SitePlace> sole = place_of(foot.site, tree, robot, bodies);
+    if (!sole) continue;
+    FootPoints& one = feet.emplace_back();
+    one.body = sole->body;
+    for (const auto& point : foot.points_m) {
+      one.points_m.push_back(sole->in_W.R * Eigen::Map<const Eigen::Vector3d>(point.data()) +
+                             sole->in_W.p);
     }
+    if (one.points_m.empty()) one.points_m.push_back(sole->in_W.p);
   }
   return feet;
 }
 
+/// What closes a loop: from the last joint on one side over both sites to the other side's. The
+/// sites coincide, or a rod is between them.
+struct LoopLine {
+  std::array<std::size_t, 2> bodies{};
+  bool leg = false;
+  std::vector<Eigen::Vector3d> points_m;
+};
+
+std::vector<LoopLine> loops_of(const model::Tree& tree, const hal::RobotConfig& robot,
+                               std::span<const model::Placement> bodies) {
+  const std::vector<bool> leg = leg_bodies(tree, robot);
+  std::vector<LoopLine> lines;
+  for (const model::LoopSpec& loop : robot.loops) {
+    const auto a = place_of(loop.sites[0], tree, robot, bodies);
+    const auto b = place_of(loop.sites[1], tree, robot, bodies);
+    if (!a || !b) continue;
+    lines.push_back({{a->body, b->body},
+                     leg[a->body] || leg[b->body],
+                     {bodies[a->body].p, a->in_W.p, b->in_W.p, bodies[b->body].p}});
+  }
+  return lines;
+}
+
+/// Every body's origin, and what is drawn beyond the last ones.
+std::vector<Eigen::Vector3d> drawn_points(const model::Tree& tree, const hal::RobotConfig& robot,
+                                          std::span<const model::Placement> bodies) {
+  std::vector<Eigen::Vector3d> points;
+  for (const model::Placement& body : bodies) points.push_back(body.p);
+  for (const FootPoints& foot : feet_of(tree, robot, bodies)) {
+    points.insert(points.end(), foot.points_m.begin(), foot.points_m.end());
+  }
+  for (const LoopLine& loop : loops_of(tree, robot, bodies)) {
+    points.insert(points.end(), loop.points_m.begin(), loop.points_m.end());
+  }
+  return points;
+}
+
 struct Spread {
-  double low_m = 0.0, high_m = 0.0;  ///< heights of the first figure
+  double low_m = 0.0, high_m = 0.0;  ///< heights of the figures
+  double middle_m = 0.0;             ///< of all figures, ahead of their bases
   double pitch_m = 0.0;              ///< from one figure to the next, so that none touch
   double line_m = 0.0;               ///< between lines of text below
 };
@@ -110,25 +164,23 @@ Spread spread(const model::Tree& tree, const hal::RobotConfig& robot,
   Spread out;
   if (!robot.contact.feet.empty()) out.low_m = out.high_m = robot.contact.height_m;
   double widest = 0.0;
+  double left = 1e300;
+  double right = -1e300;
   for (const PostureSample& sample : samples) {
-    double left = 1e300;
-    double right = -1e300;
-    const auto bodies = body_placements(tree, robot, sample);
-    for (const model::Placement& body : bodies) {
-      left = std::min(left, body.p.x());
-      right = std::max(right, body.p.x());
-      if (&sample != &samples.front()) continue;
-      out.low_m = std::min(out.low_m, body.p.z());
-      out.high_m = std::max(out.high_m, body.p.z());
+    double hind = 1e300;
+    double fore = -1e300;
+    for (const Eigen::Vector3d& point :
+         drawn_points(tree, robot, body_placements(tree, robot, sample))) {
+      hind = std::min(hind, point.x() - sample.base.p.x());
+      fore = std::max(fore, point.x() - sample.base.p.x());
+      out.low_m = std::min(out.low_m, point.z());
+      out.high_m = std::max(out.high_m, point.z());
     }
-    for (const FootPoints& foot : feet_of(tree, robot, bodies)) {
-      for (const Eigen::Vector3d& point : foot.points_m) {
-        left = std::min(left, point.x());
-        right = std::max(right, point.x());
-      }
-    }
-    widest = std::max(widest, right - left);
+    widest = std::max(widest, fore - hind);
+    left = std::min(left, hind);
+    right = std::max(right, fore);
   }
+  out.middle_m = 0.5 * (left + right);
   out.pitch_m = std::max(0.6 * (out.high_m - out.low_m), 1.2 * widest);
   const double across_m = out.pitch_m * static_cast<double>(samples.size());
   out.line_m = 0.095 * std::max(out.high_m - out.low_m, across_m / kAspect);
@@ -147,6 +199,47 @@ void add_feet(Curve& curve, std::span<const FootPoints> feet,
     curve.x.push_back(kGap);
     curve.y.push_back(kGap);
   }
+}
+
+/// The lines of all figures.
+struct Sticks {
+  explicit Sticks(std::string trunk_name) { trunk.label = std::move(trunk_name); }
+  Curve others{"arms and head", CurveStyle::kStickThird, {}, {}};
+  Curve trunk{{}, CurveStyle::kStickSecond, {}, {}};
+  Curve legs{"legs", CurveStyle::kStick, {}, {}};
+};
+
+void end_line(Curve& curve) {
+  curve.x.push_back(kGap);
+  curve.y.push_back(kGap);
+}
+
+/// One figure. A limb ends at its last body's foot, its loops or else its centre of mass.
+void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& tree,
+                const hal::RobotConfig& robot, std::span<const model::Placement> bodies,
+                double shift_m) {
+  const std::vector<LoopLine> loops = loops_of(tree, robot, bodies);
+  const bool legged = !robot.contact.feet.empty();
+  for (const Limb& limb : limbs) {
+    Curve& curve = limb.leg ? sticks.legs : (limb.trunk || !legged ? sticks.trunk : sticks.others);
+    for (const int body : limb.bodies) {
+      add_point(curve, bodies[static_cast<std::size_t>(body)].p, shift_m);
+    }
+    const auto tip = static_cast<std::size_t>(limb.bodies.back());
+    const bool goes_on = std::ranges::any_of(loops, [tip](const LoopLine& loop) {
+      return loop.bodies[0] == tip || loop.bodies[1] == tip;
+    });
+    if (!limb.leg && !goes_on) {
+      add_point(curve, bodies[tip].R * tree.bodies[tip].inertia.com_m + bodies[tip].p, shift_m);
+    }
+    end_line(curve);
+  }
+  for (const LoopLine& loop : loops) {
+    Curve& curve = loop.leg ? sticks.legs : sticks.trunk;
+    for (const Eigen::Vector3d& point : loop.points_m) add_point(curve, point, shift_m);
+    end_line(curve);
+  }
+  add_feet(sticks.legs, feet_of(tree, robot, bodies), bodies, shift_m);
 }
 
 /// Whether the bodies' centres of mass move more to the sides than ahead, from moment to moment.
@@ -215,34 +308,18 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
       from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
   figure.y_label = "z [m]";
   figure.equal_axes = true;
-  Curve others{"arms and head", CurveStyle::kStickThird, {}, {}};
-  Curve trunk{legged ? "trunk" : robot.name, CurveStyle::kStickSecond, {}, {}};
-  Curve legs{"legs", CurveStyle::kStick, {}, {}};
+  Sticks sticks(legged ? "trunk" : robot.name);
   const std::vector<Limb> limbs = limbs_of(tree, robot);
-
-  const auto [low, high, pitch_m, line_m] = spread(tree, robot, samples);
+  const auto [low, high, middle_m, pitch_m, line_m] = spread(tree, robot, samples);
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
-    const auto bodies = body_placements(tree, robot, samples[s]);
-    for (const Limb& limb : limbs) {
-      Curve& curve = limb.leg ? legs : (limb.trunk ? trunk : others);
-      for (const int body : limb.bodies) {
-        add_point(curve, bodies[static_cast<std::size_t>(body)].p, shift_m);
-      }
-      const auto tip = static_cast<std::size_t>(limb.bodies.back());
-      if (!limb.leg) {
-        add_point(curve, bodies[tip].R * tree.bodies[tip].inertia.com_m + bodies[tip].p, shift_m);
-      }
-      curve.x.push_back(kGap);
-      curve.y.push_back(kGap);
-    }
-    add_feet(legs, feet_of(tree, robot, bodies), bodies, shift_m);
-    const double x = shift_m + samples[s].base.p.x();
+    add_figure(sticks, limbs, tree, robot, body_placements(tree, robot, samples[s]), shift_m);
+    const double x = static_cast<double>(s) * pitch_m + middle_m;
     figure.notes.push_back({samples[s].label, x, low - line_m});
     figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x, low - 2.0 * line_m});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m, false});
-  for (Curve* curve : {&others, &trunk, &legs}) {
+  for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {
     if (!curve->x.empty()) figure.curves.push_back(std::move(*curve));
   }
   return figure;

@@ -22,8 +22,9 @@ struct PostureSample {
 };
 
 /// The side view, x to the right and z up, of several moments beside each other: legs (what
-/// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet
-/// that moves more to its sides than ahead is seen from the front, y to the right.
+/// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet is
+/// dark as a whole, and if it moves more to its sides than ahead, it is seen from the front, y to
+/// the right. Closed loops are drawn over their sites, with a rod between them if there is one.
 /// @pre every joint of the tree is one of the robot's, or passive.
 [[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
                                     std::span<const PostureSample> moments);

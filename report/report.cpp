@@ -17,21 +17,16 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("log" + side, run.path + (run.truncated ? " (its run was killed)" : ""));
+  const std::size_t passive = run.robot.passive.size();
   facts.emplace_back("robot" + side,
-                     fmt::format("{}, {} joints", run.info.robot, run.info.joints.size()));
+                     fmt::format("{}, {} joints{}", run.info.robot, run.info.joints.size(),
+                                 passive == 0 ? "" : fmt::format(", {} more passive", passive)));
   facts.emplace_back("backend" + side, run.info.hal);
   facts.emplace_back("seed" + side, std::to_string(run.info.seed));
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   facts.emplace_back("controllers ran" + side,
                      fmt::format("{:.3f} s", run.controllers_ran ? run.time_s.back() : 0.0));
-  for (std::size_t l = 0; 2 * l < run.loop_error.size(); ++l) {
-    const std::size_t loops = run.robot.loops.size();
-    facts.emplace_back("loop " + run.robot.loops[l].name + side,
-                       fmt::format("open by {:.1e} m at most, opens at {:.1e} m/s at most",
-                                   std::ranges::max(run.loop_error[l]),
-                                   std::ranges::max(run.loop_error[loops + l])));
-  }
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {
@@ -47,9 +42,27 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
                   {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
                   {}};
   for (const Tracking& one : run.tracking()) {
-    table.rows.push_back({one.joint, fmt::format("{:.4f}", one.rms_rad * kDegrees),
-                          fmt::format("{:.4f}", one.max_rad * kDegrees),
-                          fmt::format("{:.2f}", one.max_torque_Nm)});
+    const double factor = one.slides ? 1e3 : kDegrees;
+    const char* unit = one.slides ? " mm" : "";
+    table.rows.push_back({one.joint, fmt::format("{:.4f}{}", one.rms_rad * factor, unit),
+                          fmt::format("{:.4f}{}", one.max_rad * factor, unit),
+                          fmt::format("{:.2f}{}", one.max_torque_Nm, one.slides ? " N" : "")});
+  }
+  return table;
+}
+
+/// Of every closed loop, by the simulation's truth; without rows when the log has none.
+PageTable loops_table(const RunData& run, const std::string& side) {
+  PageTable table{"Closed loops" + side,
+                  "How far and how fast a loop was open at most in the simulation, which closes it "
+                  "after every step: what is left is rounding.",
+                  {"loop", "open [m]", "opening [m/s]"},
+                  {}};
+  const std::size_t loops = run.robot.loops.size();
+  for (std::size_t l = 0; l < run.loop_error.size() / 2; ++l) {
+    table.rows.push_back({run.robot.loops[l].name,
+                          fmt::format("{:.1e}", std::ranges::max(run.loop_error[l])),
+                          fmt::format("{:.1e}", std::ranges::max(run.loop_error[loops + l]))});
   }
   return table;
 }
@@ -73,6 +86,8 @@ void add_tables(const RunData& run, const std::string& side, Page& page) {
   page.tables.push_back(tracking_table(run, side));
   PageTable feet = feet_table(run, side);
   if (!feet.rows.empty()) page.tables.push_back(std::move(feet));
+  PageTable loops = loops_table(run, side);
+  if (!loops.rows.empty()) page.tables.push_back(std::move(loops));
 }
 
 Status create(const std::string& folder) {

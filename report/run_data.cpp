@@ -248,10 +248,16 @@ std::vector<double> RunData::positions(std::size_t row) const {
   return q;
 }
 
+bool RunData::slides(std::size_t joint) const {
+  const int index = tree.joint_index(robot.joints[joint].name);
+  return index >= 0 &&
+         tree.joints[static_cast<std::size_t>(index)].type == model::JointType::kPrismatic;
+}
+
 std::vector<Tracking> RunData::tracking() const {
   std::vector<Tracking> all;
   for (std::size_t j = 0; j < position_rad.size(); ++j) {
-    Tracking one{robot.joints[j].name, 0.0, 0.0, 0.0};
+    Tracking one{robot.joints[j].name, slides(j), 0.0, 0.0, 0.0};
     std::size_t samples = 0;
     for (std::size_t row = 0; row < rows(); ++row) {
       one.max_torque_Nm = std::max(one.max_torque_Nm, std::abs(torque_Nm[j][row]));

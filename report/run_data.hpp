@@ -15,9 +15,10 @@ namespace tandem::report {
 /// Columns over the cycles in which controllers ran: [joint][row], [channel][row], …
 using Columns = std::vector<std::vector<double>>;
 
-/// How well a joint under position control followed.
+/// How well a joint under position control followed. Of a prismatic joint: m and N.
 struct Tracking {
   std::string joint;
+  bool slides = false;  ///< prismatic
   double rms_rad = 0.0;
   double max_rad = 0.0;
   double max_torque_Nm = 0.0;  ///< the largest magnitude measured
@@ -65,6 +66,8 @@ struct RunData {
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
   /// Every joint's position at a row, in the image's order, then the passive ones'.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
+  /// Whether a joint (image) is prismatic: its columns are m, m/s and N then.
+  [[nodiscard]] bool slides(std::size_t joint) const;
   /// Whether the log tells where the base was and what the ground did.
   [[nodiscard]] bool truth() const { return !base.empty(); }
   /// Joints that were under position control, the worst first.

@@ -6,17 +6,15 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <optional>
 
-#include "model/closed_loops.hpp"
-#include "report/inverse_dynamics.hpp"
+#include "report/logged_torque.hpp"
 #include "report/posture.hpp"
 
 namespace tandem::report {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kMotionStep_s = 0.005;  // of the inverse dynamics
+constexpr double kMillimetres = 1e3;
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
@@ -79,15 +77,17 @@ Figure hip_figure(const RunData& run, const RunData* other, const Subjects& subj
   figure.name = "hip_position";
   figure.title = (subjects.leg ? "Hip" : "Joint") + std::string(" position against its reference");
   figure.x_label = "time [s]";
-  figure.y_label = name + " [deg]";
+  const bool slides = run.slides(joint);
+  const double factor = slides ? kMillimetres : kDegrees;
+  figure.y_label = name + (slides ? " [mm]" : " [deg]");
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
-                                   CurveStyle::kMeasured, run.position_rad[joint], kDegrees));
+                                   CurveStyle::kMeasured, run.position_rad[joint], factor));
   if (other != nullptr) {
-    figure.curves.push_back(curve_of(*other, "measured, B", CurveStyle::kSecond,
-                                     other->position_rad[joint], kDegrees));
+    figure.curves.push_back(
+        curve_of(*other, "measured, B", CurveStyle::kSecond, other->position_rad[joint], factor));
   }
   figure.curves.push_back(curve_of(run, other == nullptr ? "reference" : "reference, A",
-                                   CurveStyle::kReference, run.reference_rad[joint], kDegrees));
+                                   CurveStyle::kReference, run.reference_rad[joint], factor));
   return figure;
 }
 
@@ -182,8 +182,8 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   if (other != nullptr) {
     const std::vector<Force> more = foot_forces(*other, sensors);
     if (!more.empty()) {
-      figure.curves.push_back(curve_of(*other, more.front().name + ", B", CurveStyle::kSecond,
-                                       more.front().up_N, 1.0));
+      figure.curves.push_back(
+          curve_of(*other, more.front().name + ", B", CurveStyle::kSecond, more.front().up_N, 1.0));
     }
   }
   if (!run.robot.model.floating_base || feet == 0 || forces.size() != feet) return figure;
@@ -204,9 +204,10 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "knee_torque";
-  figure.title = (subjects.leg ? "Knee" : "Joint") + std::string(" torque: measured");
+  figure.title = (subjects.leg ? "Knee" : "Joint") +
+                 std::string((run.slides(joint) ? " force: measured" : " torque: measured"));
   figure.x_label = "time [s]";
-  figure.y_label = name + " [Nm]";
+  figure.y_label = name + (run.slides(joint) ? " [N]" : " [Nm]");
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
                                    CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
   if (other != nullptr) {
@@ -214,12 +215,12 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
         curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[joint], 1.0));
   }
   if (kernels == nullptr) return figure;
-  Curve computed = inverse_dynamics_curve(run, subjects.knee, *kernels);
-  if (computed.x.empty()) {
-    figure.title += " (no inverse dynamics: the log lacks the ground's forces)";
+  Result<Curve> computed = inverse_dynamics_curve(run, subjects.knee, *kernels);
+  if (!computed) {
+    figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
     figure.title += ", and by inverse dynamics";
-    figure.curves.push_back(std::move(computed));
+    figure.curves.push_back(std::move(*computed));
   }
   return figure;
 }
@@ -261,25 +262,6 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   return samples;
 }
 
-/// Where joint `name` stands in run.positions(); none: neither driven nor known to the truth.
-std::optional<std::size_t> position_index(const RunData& run, const std::string& name) {
-  if (const int driven = run.robot.joint_index(name); driven >= 0) return at(driven);
-  const auto passive = std::ranges::find(run.robot.passive, name, &hal::PassiveConfig::name);
-  const auto index = static_cast<std::size_t>(passive - run.robot.passive.begin());
-  if (index >= run.passive_rad.size()) return std::nullopt;
-  return run.robot.joints.size() + index;
-}
-
-/// What inverse dynamics needs to know of closed loops; nothing for a robot without passive joints.
-/// None: the forces in the loops cannot be told from those that force sensors measure.
-std::optional<model::ClosedLoops> loops_of(const RunData& run, const tandem_kernels& kernels) {
-  if (run.robot.passive.empty()) return model::ClosedLoops();
-  if (kernels.sensors > 0) return std::nullopt;
-  auto loops =
-      model::ClosedLoops::create(run.robot.loop_specs(), run.robot.passive_names(), kernels);
-  return loops ? std::optional(std::move(*loops)) : std::nullopt;
-}
-
 }  // namespace
 
 Subjects subjects_of(const RunData& run) {
@@ -315,88 +297,6 @@ std::vector<double> vertical_force(const RunData& run, int sensor) {
     force[row] = (bodies[at(frame.body)].R * frame.in_body.R * measured).z();
   }
   return force;
-}
-
-namespace {
-
-/// The foot at each wrench site of the kernels; -1: no foot, nothing acts there.
-std::vector<int> feet_of_wrenches(const RunData& run, const tandem_kernels& kernels) {
-  std::vector<int> feet;
-  const auto& all = run.robot.contact.feet;
-  for (std::uint32_t w = 0; w < kernels.wrenches; ++w) {
-    const auto foot = std::ranges::find(all, kernels.wrench_names[w], &hal::FootConfig::site);
-    feet.push_back(foot == all.end() ? -1 : static_cast<int>(foot - all.begin()));
-  }
-  return feet;
-}
-
-/// What the ground did at each wrench site: force and moment in W's axes.
-std::vector<double> ground_wrenches(const RunData& run, const std::vector<int>& feet,
-                                    std::size_t row) {
-  std::vector<double> wrenches(6 * feet.size(), 0.0);
-  for (std::size_t w = 0; w < feet.size(); ++w) {
-    for (std::size_t k = 0; feet[w] >= 0 && k < 3; ++k) {
-      wrenches[6 * w + k] = run.foot_force_N[3 * at(feet[w]) + k][row];
-      wrenches[6 * w + 3 + k] = run.foot_moment_Nm[3 * at(feet[w]) + k][row];
-    }
-  }
-  return wrenches;
-}
-
-}  // namespace
-
-Curve inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels& kernels) {
-  const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
-  const std::size_t base_q = kernels.floating_base != 0 ? 7 : 0;
-  const std::size_t base_v = kernels.floating_base != 0 ? 6 : 0;
-  Motion motion;
-  motion.step_s = run.step_s * static_cast<double>(stride);
-  Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
-  std::vector<std::size_t> model_order(kernels.joints);
-  std::size_t wanted = 0;
-  for (std::size_t i = 0; i < kernels.joints; ++i) {
-    const std::optional<std::size_t> index = position_index(run, kernels.joint_names[i]);
-    if (!index) return curve;  // not this robot's kernels, or a log without truth
-    model_order[i] = *index;
-    if (*index == at(joint)) wanted = base_v + i;
-  }
-  std::optional<model::ClosedLoops> loops = loops_of(run, kernels);
-  if (!loops || (base_q > 0 && !run.truth())) return curve;
-  const std::vector<int> feet = feet_of_wrenches(run, kernels);
-  for (std::size_t row = 0; row < run.rows(); row += stride) {
-    std::vector<double> q(base_q);
-    std::vector<double> v(base_v);
-    for (std::size_t i = 0; i < base_q; ++i) q[i] = run.base[i][row];
-    for (std::size_t i = 0; i < base_v; ++i) v[i] = run.base[7 + i][row];
-    const std::vector<double> positions = run.positions(row);
-    for (const std::size_t j : model_order) {
-      q.push_back(positions[j]);
-      v.push_back(j < run.velocity_rad_s.size() ? run.velocity_rad_s[j][row] : 0.0);
-    }
-    loops->move(q.data(), v.data());
-    loops->differentiate(q.data());
-    loops->close_rates(v.data());
-    std::vector<double> sensors;
-    for (std::size_t s = 0; s < kernels.sensors; ++s) {
-      const int index = run.robot.sensor_index(kernels.sensor_names[s]);
-      const std::size_t first = run.first_channel(at(std::max(index, 0)));
-      for (std::size_t i = 0; i < 6; ++i) sensors.push_back(run.sensor[first + i][row]);
-    }
-    motion.q.push_back(std::move(q));
-    motion.v.push_back(std::move(v));
-    motion.sensors.push_back(std::move(sensors));
-    if (run.truth()) motion.wrenches.push_back(ground_wrenches(run, feet, row));
-    curve.x.push_back(run.time_s[row]);
-  }
-  if (!wrenches_known(kernels, motion)) return {};
-  std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);
-  for (std::size_t row = 0; row < torques.size(); ++row) {
-    loops->move(motion.q[row].data(), motion.v[row].data());
-    loops->differentiate(motion.q[row].data());
-    loops->carry_passive(torques[row].data());
-    curve.y.push_back(torques[row][wanted]);
-  }
-  return curve;
 }
 
 std::vector<Figure> figures_of(const RunData& run, const RunData* other,

@@ -29,12 +29,6 @@ struct Subjects {
 [[nodiscard]] std::vector<Figure> figures_of(const RunData& run, const RunData* other,
                                              const tandem_kernels* kernels);
 
-/// The torque [Nm] of one joint by inverse dynamics of the logged motion, as a curve over time.
-/// The ground's forces are those that the feet's sensors measured; feet without one take them from
-/// the log's truth. Empty when neither knows them, or the base's motion.
-[[nodiscard]] Curve inverse_dynamics_curve(const RunData& run, int joint,
-                                           const tandem_kernels& kernels);
-
 /// Upward force [N] that a six-axis sensor measured, turned into the world by the run's posture.
 [[nodiscard]] std::vector<double> vertical_force(const RunData& run, int sensor);
 

@@ -1,0 +1,197 @@
+// Figures of robots with closed loops and with followers.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "model/urdf.hpp"
+#include "report/logged_torque.hpp"
+#include "report/posture.hpp"
+#include "report/run_figures.hpp"
+#include "tests/support/test_robot.hpp"
+
+namespace tandem::report {
+namespace {
+
+/// The four-bar linkage whose crank turns at a constant rate, by plane geometry alone.
+class TurningLinkage : public testing::Test {
+ protected:
+  static constexpr double kGround_m = 0.3, kCrank_m = 0.1, kCoupler_m = 0.28, kRocker_m = 0.2;
+  static constexpr double kRate_rad_s = 2.0, kStep_s = 0.005;
+  static constexpr int kRows = 601;
+
+  struct Angles {  // of crank, coupler and rocker, from +x towards +z
+    double crank, coupler, rocker;
+  };
+  /// The upper branch: the pin is where two circles meet.
+  static Angles angles(double crank) {
+    const double x = kGround_m - kCrank_m * std::cos(crank);
+    const double z = -kCrank_m * std::sin(crank);
+    const double d = std::hypot(x, z);
+    const double to_rocker = std::atan2(z, x);
+    const double at_crank =
+        std::acos((kCoupler_m * kCoupler_m + d * d - kRocker_m * kRocker_m) / (2 * kCoupler_m * d));
+    const double coupler = to_rocker + at_crank;
+    return {crank, coupler,
+            std::atan2(kCoupler_m * std::sin(coupler) - z, kCoupler_m * std::cos(coupler) - x)};
+  }
+  /// Kinetic and potential energy while the crank turns at kRate_rad_s, figures of the URDF.
+  static double energy(double crank) {
+    constexpr double kH = 1e-4;  // of the differences [rad]
+    struct Bar {
+      double mass_kg, inertia_kg_m2, com_m, x, z, angle;
+    };
+    const auto bars = [](double at) -> std::array<Bar, 3> {
+      const Angles a = angles(at);
+      return {Bar{0.2, 0.00017, 0.05, 0.0, 0.0, a.crank},
+              Bar{0.4, 0.0026, 0.14, kCrank_m * std::cos(at), kCrank_m * std::sin(at), a.coupler},
+              Bar{0.3, 0.001, 0.1, kGround_m, 0.0, a.rocker}};
+    };
+    const auto x = [](const Bar& b) { return b.x + b.com_m * std::cos(b.angle); };
+    const auto z = [](const Bar& b) { return b.z + b.com_m * std::sin(b.angle); };
+    const auto here = bars(crank), before = bars(crank - kH), after = bars(crank + kH);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double per_s = kRate_rad_s / (2.0 * kH);
+      const double vx = (x(after[i]) - x(before[i])) * per_s;
+      const double vz = (z(after[i]) - z(before[i])) * per_s;
+      const double turned = std::remainder(after[i].angle - before[i].angle, 2 * M_PI) * per_s;
+      sum += 0.5 * here[i].mass_kg * (vx * vx + vz * vz) +
+             0.5 * here[i].inertia_kg_m2 * turned * turned + here[i].mass_kg * 9.81 * z(here[i]);
+    }
+    return sum;
+  }
+
+  TurningLinkage() : robot(test::load_test_robot("four_bar")) {
+    run.robot = robot.robot;
+    run.tree = model::read_urdf(TANDEM_SOURCE_DIR "/config/four_bar/four_bar.urdf", {})->tree;
+    run.step_s = kStep_s;
+    run.position_rad.resize(1);
+    run.passive_rad.resize(2);
+    run.loop_error = {std::vector<double>(kRows, 0.0), std::vector<double>(kRows, 0.0)};
+    for (int row = 0; row < kRows; ++row) {
+      const double crank = 1.0 + kRate_rad_s * kStep_s * row;
+      const Angles a = angles(crank);
+      run.time_s.push_back(kStep_s * row);
+      run.position_rad[0].push_back(crank);
+      run.passive_rad[0].push_back(a.coupler - a.crank);
+      run.passive_rad[1].push_back(a.rocker);
+      constexpr double kH = 1e-4;
+      torque_Nm.push_back((energy(crank + kH) - energy(crank - kH)) / (2.0 * kH));
+    }
+    run.velocity_rad_s = {std::vector<double>(kRows, kRate_rad_s)};
+    run.torque_Nm = {torque_Nm};
+    run.reference_rad = run.position_rad;
+    run.base.assign(13, std::vector<double>(kRows, 0.0));
+    std::ranges::fill(run.base[6], 1.0);
+  }
+
+  test::TestRobot robot;
+  RunData run;
+  std::vector<double> torque_Nm;  ///< by the balance of power
+};
+
+TEST_F(TurningLinkage, NeedsTheTorqueThatItsEnergyTells) {
+  const Result<Curve> curve = inverse_dynamics_curve(run, 0, *robot.kernels.get());
+  ASSERT_TRUE(curve.has_value()) << curve.error().to_string();
+  ASSERT_EQ(curve->y.size(), torque_Nm.size());
+  const double largest = *std::ranges::max_element(torque_Nm);
+  ASSERT_GT(largest, 0.2);
+  // The acceleration is differenced over 0.1 s, at the ends over half of it.
+  for (std::size_t i = 20; i + 20 < torque_Nm.size(); ++i) {
+    EXPECT_NEAR(curve->y[i], torque_Nm[i], 0.02 * largest) << "at " << curve->x[i] << " s";
+  }
+}
+
+TEST_F(TurningLinkage, WithoutTruthSaysWhyThereIsNoInverseDynamics) {
+  run.base.clear();
+  run.passive_rad.clear();
+  run.loop_error.clear();
+  const std::vector<Figure> figures = figures_of(run, nullptr, robot.kernels.get());
+  EXPECT_EQ(figures[1].title,
+            "Joint torque: measured (no inverse dynamics: the log lacks the position of coupler)");
+}
+
+TEST_F(TurningLinkage, IsDrawnClosedAndAboveItsLabels) {
+  const Figure posture = figures_of(run, nullptr, robot.kernels.get()).back();
+  ASSERT_EQ(posture.curves.size(), 1U);
+  const Curve& bars = posture.curves.front();
+  const Angles start = angles(1.0);
+  const double pin_x = kGround_m + kRocker_m * std::cos(start.rocker);
+  const double pin_z = kRocker_m * std::sin(start.rocker);
+  int ends = 0;  // of coupler and of rocker
+  for (std::size_t i = 0; i < bars.x.size(); ++i) {
+    ends += std::hypot(bars.x[i] - pin_x, bars.y[i] - pin_z) < 1e-9 ? 1 : 0;
+  }
+  EXPECT_EQ(ends, 2);
+  for (const Note& note : posture.notes) {
+    for (const double z : bars.y) EXPECT_FALSE(z < note.y) << note.text;
+  }
+}
+
+TEST(Ankle, IsDrawnWithItsRods) {
+  const test::TestRobot robot = test::load_test_robot("parallel_ankle");
+  const auto tree =
+      model::read_urdf(TANDEM_SOURCE_DIR "/config/parallel_ankle/parallel_ankle.urdf", {})->tree;
+  const std::vector<PostureSample> upright{{"", 0.0, {}, {0.0, 0.0, 0.0, 0.0}}};
+  const Figure figure = posture_figure(tree, robot.robot, upright);
+  const Curve& sticks = figure.curves.front();
+  int rods = 0;  // both from the crank's tip straight down to the heel
+  for (std::size_t i = 1; i < sticks.x.size(); ++i) {
+    const bool down = std::abs(sticks.x[i] - sticks.x[i - 1]) < 1e-12;
+    rods += down && std::abs(sticks.y[i] - sticks.y[i - 1] + 0.25) < 1e-12 &&
+                    std::abs(sticks.x[i] + 0.05) < 1e-12
+                ? 1
+                : 0;
+  }
+  EXPECT_EQ(rods, 2);
+}
+
+/// The Panda, whose second finger follows the first.
+class Gripper : public testing::Test {
+ protected:
+  Gripper() {
+    const auto robot = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/panda/robot.toml");
+    run.robot = *robot;
+    run.robot.joints.push_back(run.robot.joints.back());
+    run.robot.joints.back().name = "panda_finger_joint1";
+    run.tree = model::read_urdf(TANDEM_SOURCE_DIR "/config/panda/panda.urdf", {})->tree;
+    run.step_s = 0.01;
+    run.time_s = {0.0, 0.01};
+    run.position_rad.assign(8, {0.0, 0.0});
+    run.position_rad.back() = {0.01, 0.03};
+    run.velocity_rad_s = run.torque_Nm = run.reference_rad = run.position_rad;
+    run.reference_rad.back() = {0.012, 0.032};
+    run.hip = run.knee = "panda_finger_joint1";
+  }
+  RunData run;
+};
+
+TEST_F(Gripper, MovesBothFingersApart) {
+  const std::size_t first = static_cast<std::size_t>(run.tree.joint_index("panda_finger_joint1"));
+  const std::size_t second = static_cast<std::size_t>(run.tree.joint_index("panda_finger_joint2"));
+  for (std::size_t row = 0; row < 2; ++row) {
+    const auto bodies = body_placements(run.tree, run.robot, {"", 0.0, {}, run.positions(row)});
+    EXPECT_NEAR((bodies[first + 1].p - bodies[second + 1].p).norm(),
+                2.0 * run.position_rad.back()[row], 1e-12);
+  }
+}
+
+TEST_F(Gripper, IsDrawnInMillimetresAndNewtons) {
+  const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
+  EXPECT_EQ(figures[0].y_label, "panda_finger_joint1 [mm]");
+  EXPECT_NEAR(figures[0].curves[0].y[1], 30.0, 1e-12);
+  EXPECT_EQ(figures[1].y_label, "panda_finger_joint1 [N]");
+  EXPECT_EQ(figures[1].title, "Joint force: measured");
+  for (const Curve& curve : figures[2].curves) EXPECT_NE(curve.label, "arms and head");
+}
+
+TEST_F(Gripper, TellsWhichJointsSlide) {
+  for (const Tracking& one : run.tracking()) {
+    EXPECT_EQ(one.slides, one.joint == "panda_finger_joint1") << one.joint;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::report
