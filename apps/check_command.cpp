@@ -6,6 +6,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 
@@ -64,6 +65,7 @@ void print_plan(const Composition& c, std::FILE* out) {
   Facts facts;
   add_robot_facts(e.robot, facts);
   add_kernel_facts(c.kernels, e.robot.file, facts);
+  add_loop_facts(e.robot, c.kernels.get(), {&e.posture, 1}, facts);
   facts.add("backend", backend_text(e.hal.backend));
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
@@ -89,6 +91,10 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels, s
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
+  std::vector<std::string> postures;
+  for (const hal::PostureConfig& one : robot.config.postures) postures.push_back(one.name);
+  if (postures.empty()) postures.emplace_back();
+  add_loop_facts(robot.config, kernels.get(), postures, facts);
   if (robot.config.model.repair_inertia) {
     const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
     facts.add("inertias", fmt::format("{} repaired", repaired));

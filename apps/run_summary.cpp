@@ -80,6 +80,7 @@ void print_loops(const RunSummary& s, std::FILE* out) {
                fmt::format("{:.1e}", loops[l].max_position_error_m),
                fmt::format("{:.1e}", loops[l].max_velocity_error_m_s)});
   }
+  fmt::print(out, "\n");
   table.print(out);
 }
 

@@ -61,6 +61,17 @@ TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
   EXPECT_FALSE(has_log());
 }
 
+TEST_F(Check, TellsHowLoopsCloseAndWhatCanStillMove) {
+  const Outcome robot = tandem("check " TANDEM_SOURCE_DIR "/config/four_bar/robot.toml");
+  EXPECT_EQ(robot.status, 0) << robot.err;
+  for (const std::string text :
+       {"revolute, coupler_end to rocker_end", "closes from a gap of 0.0", "1 of 3 degrees"}) {
+    EXPECT_NE(robot.out.find(text), std::string::npos) << text << "\nin: " << robot.out;
+  }
+  const Outcome run = tandem("check " TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml");
+  EXPECT_NE(run.out.find("2 of 4 degrees"), std::string::npos) << run.out;
+}
+
 TEST_F(Check, SaysOkAsJson) {
   const Outcome outcome = tandem("check hold.toml --json -");
   EXPECT_EQ(outcome.status, 0);
