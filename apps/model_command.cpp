@@ -5,8 +5,8 @@
 #include "apps/kernel_sizes.hpp"
 #include "apps/kernel_store.hpp"
 #include "apps/kernel_supply.hpp"
+#include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
-#include "model/generate.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -34,42 +34,6 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
 Json kernel_json(const tandem_kernel_count& count, std::uint64_t text_bytes) {
   return {{"add", count.add},   {"mul", count.mul},       {"div", count.div},
           {"sqrt", count.sqrt}, {"sincos", count.sincos}, {"text_bytes", text_bytes}};
-}
-
-/// Right angles of few digits: what they cost, and how far exact ones would move the robot.
-Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
-  if (robot.right_angles.count == 0) return {};
-  hal::RobotConfig other = robot.config;
-  other.model.exact_right_angles = !robot.config.model.exact_right_angles;
-  const auto turned = with_description(std::move(other));
-  if (!turned) return std::unexpected(turned.error().front());
-  const bool exact = robot.config.model.exact_right_angles;
-  const RobotFiles& exactly = exact ? robot : *turned;
-  const RobotFiles& written = exact ? *turned : robot;
-  const model::Displacement moved = model::largest_displacement(written.tree, exactly.tree);
-  const auto count = [](const RobotFiles& files) {
-    return model::count_kernel(model::Kernel::kForwardDynamics, files.tree, files.spec);
-  };
-  const Result<model::OperationCount> before = count(written);
-  const Result<model::OperationCount> after = count(exactly);
-  if (!before) return std::unexpected(before.error());
-  if (!after) return std::unexpected(after.error());
-  facts.add("right angles", fmt::format("{} of few digits, at most {:.1e} rad off; {}",
-                                        robot.right_angles.count, robot.right_angles.worst_rad,
-                                        exact ? "taken exactly" : "taken as they are written"));
-  facts.add("", fmt::format("exact ones: forward dynamics {} operations instead of {}; {} moves by "
-                            "at most {:.2g} mm",
-                            after->add + after->mul, before->add + before->mul, moved.link,
-                            1e3 * moved.distance_m));
-  if (!exact) facts.add("", "right_angles = \"exact\" in [model] takes them");
-  json["right_angles"] = {{"count", robot.right_angles.count},
-                          {"worst_rad", robot.right_angles.worst_rad},
-                          {"exact", exact},
-                          {"operations_as_written", before->add + before->mul},
-                          {"operations_exact", after->add + after->mul},
-                          {"link", moved.link},
-                          {"displacement_m", moved.distance_m}};
-  return {};
 }
 
 Status info(const RobotFiles& robot, const ModelOptions& options) {

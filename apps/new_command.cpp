@@ -8,6 +8,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
+#include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "scaffold/new_robot.hpp"
@@ -92,10 +93,12 @@ class Folder {
     return {};
   }
 
-  Diagnostics check() const {
-    const auto robot = read_robot((draft_ / "robot.toml").string());
-    if (!robot) return robot.error();
-    return hal::can::check_bus_load(robot->config, kPeriod_ns);
+  [[nodiscard]] std::expected<RobotFiles, Diagnostics> check() const {
+    auto robot = read_robot((draft_ / "robot.toml").string());
+    if (!robot) return robot;
+    Diagnostics errors = hal::can::check_bus_load(robot->config, kPeriod_ns);
+    if (!errors.empty()) return std::unexpected(std::move(errors));
+    return robot;
   }
 
   Status place() {
@@ -129,8 +132,7 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"boards", robot.config.boards.size()}};
 }
 
-void print_table(const scaffold::NewRobot& robot, const std::string& folder, std::FILE* out) {
-  Facts facts;
+void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
   facts.add("robot", fmt::format("{}: {} joints, {:.2f} kg", robot.config.name,
                                  robot.config.joints.size(), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
@@ -159,7 +161,9 @@ void print_table(const scaffold::NewRobot& robot, const std::string& folder, std
                 fmt::format("{} boards, load {:.0f} %", boards, 100.0 * load.load));
     }
   }
-  facts.print(out);
+}
+
+void print_next(const std::string& folder, std::FILE* out) {
   fmt::print(out,
              "\nNext:\n  tandem run {0}/hold.toml --report\n  tandem run {0}/move.toml --report\n"
              "Look for `guess` in {0}/robot.toml: each stands where a figure of yours belongs.\n",
@@ -190,14 +194,19 @@ Diagnostics run(const NewOptions& options) {
   if (!robot) return robot.error();
   Folder files{fs::path(folder)};
   if (Diagnostics errors = files.write(*robot, options.urdf); !errors.empty()) return errors;
-  if (Diagnostics errors = files.check(); !errors.empty()) return errors;
+  const auto written = files.check();
+  if (!written) return written.error();
+  Facts facts;
+  add_facts(*robot, facts);
+  Json json = to_json(*robot, folder);
+  if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   if (Status placed = files.place(); !placed) return {placed.error()};
   for (const Error& warning : robot->warnings)
     fmt::print(stderr, "warning: {}\n", warning.to_string());
-  print_table(*robot, folder, human_output(options.json));
-  if (Status written = write_json(options.json, to_json(*robot, folder)); !written) {
-    return {written.error()};
-  }
+  std::FILE* const out = human_output(options.json);
+  facts.print(out);
+  print_next(folder, out);
+  if (Status saved = write_json(options.json, json); !saved) return {saved.error()};
   return {};
 }
 

@@ -134,6 +134,7 @@ std::vector<DriveSize> size_drives(const model::Tree& tree,
   for (const bool slides : {false, true}) {
     std::vector<int> joints;
     for (std::size_t j = 0; j < limits.size(); ++j) {
+      if (tree.joints[j].follows()) continue;
       if ((tree.joints[j].type == model::JointType::kPrismatic) == slides) {
         joints.push_back(static_cast<int>(j));
       }

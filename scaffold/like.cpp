@@ -91,6 +91,15 @@ hal::GainsConfig scaled(hal::GainsConfig g, double s) {
   return g;
 }
 
+/// Of the joints that have a drive the one that is most alike.
+const hal::JointConfig& resembled(const Like& like, const std::vector<Trait>& theirs,
+                                  const Trait& ours) {
+  const auto far = [&](const hal::JointConfig& joint) {
+    return distance(theirs[like.tree.joint_index(joint.name)], ours);
+  };
+  return *std::ranges::min_element(like.config.joints, {}, far);
+}
+
 void soften(const std::vector<JointLoad>& loads, DriveSize& drive) {
   double lightest = loads[drive.joints[0]].least_inertia;
   for (const int j : drive.joints) lightest = std::min(lightest, loads[j].least_inertia);
@@ -115,10 +124,8 @@ void take_drives(const Like& like, const std::vector<JointLoad>& loads, NewRobot
   const std::vector<Trait> ours = traits_of(robot.tree, robot.limbs, robot.ahead);
   std::map<std::pair<std::string, std::string>, std::vector<int>> groups;
   for (std::size_t j = 0; j < ours.size(); ++j) {
-    const auto nearest = std::ranges::min_element(
-        theirs, {}, [&](const Trait& trait) { return distance(trait, ours[j]); });
-    const std::string& name = like.tree.joints[nearest - theirs.begin()].name;
-    const hal::JointConfig& joint = like.config.joints[like.config.joint_index(name)];
+    if (robot.tree.joints[j].follows()) continue;
+    const hal::JointConfig& joint = resembled(like, theirs, ours[j]);
     groups[{joint.actuator, joint.gains}].push_back(static_cast<int>(j));
   }
   for (const auto& [key, joints] : groups) {

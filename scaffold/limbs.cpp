@@ -160,10 +160,12 @@ std::vector<Limb> split_limbs(const Tree& tree, std::vector<Foot>& feet, const P
   }
   for (std::size_t i = 0; i < limbs.size(); ++i) {
     limbs[i].name = names[i];
+    std::erase_if(limbs[i].joints, [&](int j) { return tree.joints[j].follows(); });
     if (limbs[i].foot < 0) continue;
     Foot& foot = feet[static_cast<std::size_t>(limbs[i].foot)];
     foot.name = foot_name(names[i], foot.flat(), feet.size());
   }
+  std::erase_if(limbs, [](const Limb& limb) { return limb.joints.empty(); });
   return limbs;
 }
 

@@ -76,6 +76,7 @@ std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<Foot>& feet,
     const Posed posed(tree, q);
     for (std::size_t j = 0; j < loads.size(); ++j) {
       const int joint = static_cast<int>(j);
+      if (tree.joints[j].follows()) continue;
       const double inertia = posed.inertia(joint);
       JointLoad& load = loads[j];
       load.least_inertia = sample == 0 ? inertia : std::min(load.least_inertia, inertia);

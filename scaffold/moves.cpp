@@ -20,9 +20,10 @@ constexpr double kSquatShare = 0.03;    // of the height
 
 /// How far each joint may go to either side of its posture.
 VectorXd amplitudes(const NewRobot& robot, const VectorXd& posture) {
-  VectorXd most(posture.size());
+  VectorXd most = VectorXd::Zero(posture.size());
   for (Eigen::Index j = 0; j < posture.size(); ++j) {
     const model::Joint& joint = robot.tree.joints[j];
+    if (joint.follows()) continue;
     const JointLimits& limit = robot.limits[j];
     const bool slides = joint.type == model::JointType::kPrismatic;
     const double room = std::min(limit.range.upper - posture[j], posture[j] - limit.range.lower);

@@ -36,8 +36,8 @@ class Maker {
 
   std::expected<NewRobot, Diagnostics> run() {
     if (Diagnostics errors = read(); !errors.empty()) return std::unexpected(errors);
-    for (const auto step :
-         {&Maker::choose_base, &Maker::choose_posture, &Maker::choose_drives, &Maker::wire_up}) {
+    for (const auto step : {&Maker::choose_base, &Maker::choose_posture, &Maker::choose_drives,
+                            &Maker::look_at_angles, &Maker::wire_up}) {
       if (Status done = (this->*step)(); !done) {
         Error error = done.error();
         error.file = request_.urdf;
@@ -52,10 +52,12 @@ class Maker {
 
   Diagnostics read();
   Diagnostics take(model::UrdfModel found);
-  [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> read_tree(bool floating) const;
+  [[nodiscard]] std::expected<model::UrdfModel, Diagnostics> read_tree(bool floating,
+                                                                       bool exact = false) const;
   Status choose_base();
   Status choose_posture();
   Status choose_drives();
+  Status look_at_angles();
   Status wire_up();
   void fill_model();
   void fill_joints();
@@ -70,10 +72,10 @@ class Maker {
   bool must_float_ = false;  ///< the description has a floating joint at its root
 };
 
-std::expected<model::UrdfModel, Diagnostics> Maker::read_tree(bool floating) const {
+std::expected<model::UrdfModel, Diagnostics> Maker::read_tree(bool floating, bool exact) const {
   return model::read_urdf(request_.urdf, {.floating_base = floating,
-                                          .mimic_independent = true,
-                                          .repair_inertia = robot_.config.model.repair_inertia});
+                                          .repair_inertia = robot_.config.model.repair_inertia,
+                                          .exact_right_angles = exact});
 }
 
 /// As it stands if that is possible; else with what the reader offers to make it so.
@@ -104,6 +106,12 @@ Diagnostics Maker::take(model::UrdfModel found) {
   }
   robot_.tree = std::move(found.tree);
   robot_.warnings = std::move(found.warnings);
+  robot_.right_angles = found.right_angles;
+  for (const model::Joint& joint : robot_.tree.joints) {
+    if (!joint.follows()) continue;
+    robot_.remarks.push_back(fmt::format("{} follows {} and has no drive: <mimic>.", joint.name,
+                                         robot_.tree.joints[joint.leader].name));
+  }
   outfit_ = read_outfit(text_of(request_.urdf));
   return {};
 }
@@ -192,6 +200,15 @@ Status Maker::choose_drives() {
   return {};
 }
 
+/// How far the robot would move if its right angles were exact.
+Status Maker::look_at_angles() {
+  if (robot_.right_angles.count == 0) return {};
+  const auto exact = read_tree(robot_.tree.floating_base, true);
+  if (!exact) return std::unexpected(exact.error().front());
+  robot_.turned = model::largest_displacement(robot_.tree, exact->tree);
+  return {};
+}
+
 Status Maker::wire_up() {
   fill_report();
   return wire(robot_);
@@ -202,12 +219,6 @@ void Maker::fill_model() {
   config.name = request_.name;
   config.model.urdf = request_.urdf;
   config.model.floating_base = robot_.tree.floating_base;
-  config.model.mimic_independent = !outfit_.mimics.empty();
-  if (!outfit_.mimics.empty()) {
-    robot_.remarks.push_back(
-        fmt::format("Joints that mimic another one have drives of their own: {}.",
-                    fmt::join(outfit_.mimics, ", ")));
-  }
   for (const DriveSize& drive : robot_.drives) config.actuators.push_back(drive.actuator);
   for (const GainSet& set : robot_.gains) config.gains.push_back(set.gains);
 }

@@ -10,6 +10,7 @@
 
 #include "base/result.hpp"
 #include "hal/robot_config.hpp"
+#include "model/right_angles.hpp"
 #include "scaffold/drives.hpp"
 #include "scaffold/limbs.hpp"
 #include "scaffold/sensors.hpp"
@@ -58,8 +59,10 @@ struct NewRobot {
   std::string like;                 ///< name of the robot that springs come from; may be empty
   double scale = 1.0;               ///< its springs' factor
   double mass_kg = 0.0;
-  double stands_m = 0.0;  ///< height of the root; 0: the base is fixed
-  Diagnostics warnings;   ///< of the description's reader
+  double stands_m = 0.0;            ///< height of the root; 0: the base is fixed
+  Diagnostics warnings;             ///< of the description's reader
+  model::RightAngles right_angles;  ///< what the description has of few digits
+  model::Displacement turned;       ///< what exact ones would move the most
 };
 
 /// Reads the description and decides everything else.

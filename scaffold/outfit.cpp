@@ -72,8 +72,6 @@ Outfit read_outfit(std::string_view text) {
            c = c->NextSiblingElement("collision")) {
         outfit.shapes[text_of(*e, "name")].push_back(shape(*c));
       }
-    } else if (kind == "joint" && e->FirstChildElement("mimic") != nullptr) {
-      outfit.mimics.push_back(text_of(*e, "name"));
     } else if (kind == "sensor") {
       const XMLElement* parent = e->FirstChildElement("parent");
       if (parent == nullptr) continue;

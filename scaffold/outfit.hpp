@@ -30,7 +30,6 @@ struct SensorElement {
 struct Outfit {
   std::map<std::string, std::vector<Shape>> shapes;  ///< by link
   std::vector<SensorElement> sensors;
-  std::vector<std::string> mimics;  ///< joints that mimic another one
 };
 
 /// Reads a description that model::parse_urdf() has accepted. What cannot be understood here is

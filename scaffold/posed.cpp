@@ -5,6 +5,7 @@
 
 namespace tandem::scaffold {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using model::Placement;
@@ -24,8 +25,10 @@ Posed::Posed(const model::Tree& tree, const Eigen::VectorXd& q) : tree_(tree) {
   bodies_.resize(tree.bodies.size());
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const model::Joint& joint = tree.joints[j];
-    bodies_[j + 1] =
-        bodies_[joint.parent] * joint.in_parent * motion(joint, q[static_cast<Eigen::Index>(j)]);
+    const double position =
+        joint.follows() ? joint.multiplier * q[joint.leader] + joint.offset : q[Index(j)];
+    bodies_[j + 1] = bodies_[joint.parent] * joint.in_parent * motion(joint, position);
+    if (joint.follows()) followers_.push_back(static_cast<int>(j));
   }
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     beyond_.push_back(bodies_[b] * tree.bodies[b].inertia);
@@ -47,7 +50,16 @@ bool Posed::slides(int joint) const {
   return tree_.joints[joint].type == model::JointType::kPrismatic;
 }
 
+std::vector<int> Posed::followers_of(int joint) const {
+  std::vector<int> found;
+  for (const int f : followers_) {
+    if (tree_.joints[f].leader == joint) found.push_back(f);
+  }
+  return found;
+}
+
 double Posed::inertia(int joint) const {
+  if (!followers_of(joint).empty()) return inertia_with_followers(joint);
   const model::Inertia& load = beyond(joint);
   if (slides(joint)) return load.mass_kg;
   const Vector3d n = axis(joint);
@@ -55,28 +67,57 @@ double Posed::inertia(int joint) const {
   return n.dot(load.about_com_kg_m2 * n) + load.mass_kg * lever * lever;
 }
 
+/// Twice the kinetic energy at unit velocity, body by body.
+double Posed::inertia_with_followers(int joint) const {
+  double sum = 0.0;
+  for (int b = 1; b < static_cast<int>(bodies_.size()); ++b) {
+    const model::Inertia own = bodies_[b] * tree_.bodies[b].inertia;
+    const Vector3d v = point_jacobian(b, own.com_m).col(joint);
+    const Vector3d w = turn_jacobian(b).col(joint);
+    sum += own.mass_kg * v.squaredNorm() + w.dot(own.about_com_kg_m2 * w);
+  }
+  return sum;
+}
+
 double Posed::gravity_load(int joint) const {
+  double load = own_gravity_load(joint);
+  for (const int f : followers_of(joint)) {
+    load += tree_.joints[f].multiplier * own_gravity_load(f);
+  }
+  return load;
+}
+
+double Posed::own_gravity_load(int joint) const {
   const model::Inertia& load = beyond(joint);
   const Vector3d weight(0.0, 0.0, -load.mass_kg * kGravity_m_s2);
   if (slides(joint)) return -axis(joint).dot(weight);
   return -axis(joint).dot((load.com_m - origin(joint)).cross(weight));
 }
 
-MatrixXd Posed::point_jacobian(int body, const Vector3d& point) const {
-  MatrixXd J = MatrixXd::Zero(3, static_cast<Eigen::Index>(tree_.joints.size()));
-  for (; body > 0; body = tree_.joints[body - 1].parent) {
-    const Vector3d n = axis(body - 1);
-    J.col(body - 1) = slides(body - 1) ? n : n.cross(point - origin(body - 1));
+/// A follower's column is its leader's.
+MatrixXd Posed::of_coordinates(MatrixXd J) const {
+  for (const int f : followers_) {
+    J.col(tree_.joints[f].leader) += tree_.joints[f].multiplier * J.col(f);
+    J.col(f).setZero();
   }
   return J;
 }
 
+MatrixXd Posed::point_jacobian(int body, const Vector3d& point) const {
+  MatrixXd J = MatrixXd::Zero(3, Index(tree_.joints.size()));
+  for (; body > 0; body = tree_.joints[body - 1].parent) {
+    const Vector3d n = axis(body - 1);
+    J.col(body - 1) = slides(body - 1) ? n : n.cross(point - origin(body - 1));
+  }
+  return of_coordinates(std::move(J));
+}
+
 MatrixXd Posed::turn_jacobian(int body) const {
-  MatrixXd J = MatrixXd::Zero(3, static_cast<Eigen::Index>(tree_.joints.size()));
+  MatrixXd J = MatrixXd::Zero(3, Index(tree_.joints.size()));
   for (; body > 0; body = tree_.joints[body - 1].parent) {
     if (!slides(body - 1)) J.col(body - 1) = axis(body - 1);
   }
-  return J;
+  return of_coordinates(std::move(J));
 }
 
 MatrixXd Posed::com_jacobian() const {
@@ -88,12 +129,16 @@ MatrixXd Posed::com_jacobian() const {
     const Vector3d moved = slides(j) ? n : Vector3d(n.cross(load.com_m - origin(j)));
     J.col(j) = moved * (load.mass_kg / whole().mass_kg);
   }
-  return J;
+  return of_coordinates(std::move(J));
 }
 
 std::vector<int> path_to(const model::Tree& tree, int body) {
   std::vector<int> path;
-  for (; body > 0; body = tree.joints[body - 1].parent) path.push_back(body - 1);
+  for (; body > 0; body = tree.joints[body - 1].parent) {
+    const model::Joint& joint = tree.joints[body - 1];
+    const int moves = joint.follows() ? joint.leader : body - 1;
+    if (std::ranges::find(path, moves) == path.end()) path.push_back(moves);
+  }
   std::ranges::reverse(path);
   return path;
 }

@@ -11,10 +11,11 @@ namespace tandem::scaffold {
 
 inline constexpr double kGravity_m_s2 = 9.81;
 
-/// Frame W stands at the root's frame, z up. Everything is in W.
+/// Frame W stands at the root's frame, z up. Everything is in W. A follower (URDF: mimic) stands
+/// where its leader puts it; its inertia, its load and its columns count as its leader's.
 class Posed {
  public:
-  /// @param q  (joints) [rad or m], in the tree's order
+  /// @param q  (joints) [rad or m], in the tree's order; a follower's entry is not read
   /// @pre q.size() == tree.joints.size()
   Posed(const model::Tree& tree, const Eigen::VectorXd& q);
 
@@ -29,6 +30,7 @@ class Posed {
   [[nodiscard]] const model::Inertia& beyond(int joint) const { return beyond_[joint + 1]; }
   [[nodiscard]] const model::Inertia& whole() const { return beyond_[0]; }
   /// M's diagonal entry [kg m^2 or kg], without rotors: n^T I n about the joint's origin.
+  /// @pre  here and below: `joint` follows nobody
   [[nodiscard]] double inertia(int joint) const;
   /// What the joint must give against gravity when nothing beyond it is supported [Nm or N].
   [[nodiscard]] double gravity_load(int joint) const;
@@ -41,12 +43,18 @@ class Posed {
   [[nodiscard]] Eigen::MatrixXd com_jacobian() const;
 
  private:
+  [[nodiscard]] std::vector<int> followers_of(int joint) const;
+  [[nodiscard]] double inertia_with_followers(int joint) const;
+  [[nodiscard]] double own_gravity_load(int joint) const;
+  [[nodiscard]] Eigen::MatrixXd of_coordinates(Eigen::MatrixXd J) const;
+
   const model::Tree& tree_;
+  std::vector<int> followers_;
   std::vector<model::Placement> bodies_;
   std::vector<model::Inertia> beyond_;  ///< per body: its own and all that hangs on it
 };
 
-/// Joints between the root and `body`, the root's side first.
+/// Joints that move `body`, the root's side first; a follower's leader stands for it.
 [[nodiscard]] std::vector<int> path_to(const model::Tree& tree, int body);
 
 }  // namespace tandem::scaffold

@@ -97,6 +97,7 @@ VectorXd spared_posture(const Tree& tree) {
   const Bounds bounds = bounds_of(tree);
   VectorXd q = neutral_posture(tree);
   for (int joint = static_cast<int>(tree.joints.size()) - 1; joint >= 0; --joint) {
+    if (tree.joints[joint].follows()) continue;
     if (loaded(tree, Posed(tree, q), joint) <= kMostLoad) continue;
     double least = loaded(tree, Posed(tree, q), joint);
     double best = q[joint];
@@ -137,6 +138,7 @@ VectorXd waiting_posture(const Tree& tree) {
       score += std::min(dexterity(posed, tree, end), 0.3) / static_cast<double>(ends.size());
     }
     for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+      if (tree.joints[j].follows()) continue;
       score -= std::max(0.0, loaded(tree, posed, static_cast<int>(j)) - kMostLoad);
     }
     if (score <= best_score) continue;

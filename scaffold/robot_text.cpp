@@ -15,7 +15,14 @@ std::string loop(const char* name, const hal::PidGains& g) {
   std::string text = fmt::format("{} = {{ kp = {}", name, number(g.kp));
   if (g.ki > 0.0) text += ", ki = " + number(g.ki);
   if (g.kd > 0.0) text += ", kd = " + number(g.kd);
-  return text + " }\n";
+  return text + " }";
+}
+
+/// A table's lines, `key = value` each.
+using Keys = std::vector<std::string>;
+
+void add(Keys& keys, const char* key, double value) {
+  keys.push_back(fmt::format("{} = {}", key, number(value)));
 }
 
 class Writer {
@@ -27,8 +34,7 @@ class Writer {
     head();
     model();
     sites();
-    for (const DriveSize& drive : robot_.drives) actuator(drive);
-    for (const GainSet& set : robot_.gains) gains(set);
+    drives();
     line("\n# --- wires: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a board");
     line("[board_defaults]\nslow_pdo_every = {}  # motor currents and the like, every n-th cycle",
          robot_.config.boards[0].slow_pdo_every);
@@ -61,8 +67,14 @@ class Writer {
   void model() {
     line("\n[model]\nurdf = \"{}\"\nbase = \"{}\"", urdf_,
          robot_.config.model.floating_base ? "floating" : "fixed");
-    if (robot_.config.model.mimic_independent) line("mimic = \"independent\"");
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
+    if (!(robot_.turned.distance_m > 0.0)) return;  // those of inertias alone cost nothing
+    line(
+        "# {} right angles have few digits, {:.1g} rad off at most. Exact ones move no link by "
+        "more",
+        robot_.right_angles.count, robot_.right_angles.worst_rad);
+    line("# than {:.2g} mm, and make the dynamics smaller:\n# right_angles = \"exact\"",
+         1e3 * robot_.turned.distance_m);
   }
 
   void sites() {
@@ -80,42 +92,85 @@ class Writer {
     }
   }
 
-  void actuator(const DriveSize& drive) {
-    const hal::ActuatorConfig& a = drive.actuator;
-    line("\n# guess: a {} drive for {}; put your motor's data sheet here",
-         a.order < 2 ? "rigid" : "series elastic", drive.remark);
-    line("[actuator.{}]\norder = {}", a.name, a.order);
-    line("resistance_ohm = {}\ninductance_H = {}", number(a.resistance_ohm),
-         number(a.inductance_H));
-    line("torque_constant_Nm_A = {}\ngear_ratio = {}", number(a.torque_constant_Nm_A),
-         number(a.gear_ratio));
-    line("inertia_kg_m2 = {}\ndamping_Nms_rad = {}  # back-EMF included", number(a.inertia_kg_m2),
-         number(a.damping_Nms_rad));
-    if (a.order >= 2) {
-      line("spring_Nm_rad = {}\nspring_damping_Nms_rad = {}", number(a.spring_Nm_rad),
-           number(a.spring_damping_Nms_rad));
+  /// What all tables of a kind say stands once, above them.
+  void drives() {
+    std::vector<Keys> actuators, sets;
+    for (const DriveSize& drive : robot_.drives) actuators.push_back(keys(drive.actuator));
+    for (const GainSet& set : robot_.gains) sets.push_back(keys(set.gains));
+    defaults("actuator_defaults", actuators);
+    for (std::size_t i = 0; i < actuators.size(); ++i) {
+      line("\n# guess: a {} drive for {}; put your motor's data sheet here",
+           robot_.drives[i].actuator.order < 2 ? "rigid" : "series elastic",
+           robot_.drives[i].remark);
+      table("actuator." + robot_.drives[i].actuator.name, actuators[i]);
     }
-    line("current_limit_A = {}\nvoltage_limit_V = {}", number(a.current_limit_A),
-         number(a.voltage_limit_V));
-    line("thermal_resistance_K_W = {}", number(a.thermal_resistance_K_W));
-    if (a.continuous_current_A > 0.0) {
-      line("continuous_current_A = {}\nthermal_time_s = {}", number(a.continuous_current_A),
-           number(a.thermal_time_s));
+    defaults("gains_defaults", sets);
+    for (std::size_t i = 0; i < sets.size(); ++i) {
+      line("\n# {}", robot_.gains[i].remark);
+      table("gains." + robot_.gains[i].gains.name, sets[i]);
     }
   }
 
-  void gains(const GainSet& set) {
-    const hal::GainsConfig& g = set.gains;
-    line("\n# {}", set.remark);
-    line("[gains.{}]", g.name);
-    if (g.position_feedback == hal::PositionFeedback::kMotor) line("position_feedback = \"motor\"");
-    text_ += loop("position", g.position.gains);
-    text_ += loop("velocity", g.velocity.gains);
-    if (g.torque.gains.kp > 0.0) text_ += loop("torque", g.torque.gains);
-    text_ += loop("current", g.current.gains);
-    line("emf_compensation = {}", number(g.emf_compensation));
-    line("stiffness_Nm_rad = {}\ndamping_Nms_rad = {}", number(g.stiffness_Nm_rad),
-         number(g.damping_Nms_rad));
+  /// Moves the lines that all tables share into one of their own; a single table keeps them.
+  void defaults(const char* name, std::vector<Keys>& tables) {
+    if (tables.size() < 2) return;
+    Keys common = tables[0];
+    for (const Keys& other : tables) {
+      std::erase_if(common, [&](const std::string& key) {
+        return std::ranges::find(other, key) == other.end();
+      });
+    }
+    if (common.empty()) return;
+    for (Keys& own : tables) {
+      std::erase_if(own, [&](const std::string& key) {
+        return std::ranges::find(common, key) != common.end();
+      });
+    }
+    text_ += '\n';
+    table(name, common);
+  }
+
+  void table(const std::string& name, const Keys& keys) {
+    line("[{}]", name);
+    for (const std::string& key : keys) line("{}", key);
+  }
+
+  static Keys keys(const hal::ActuatorConfig& a) {
+    Keys keys{fmt::format("order = {}", a.order)};
+    add(keys, "resistance_ohm", a.resistance_ohm);
+    add(keys, "inductance_H", a.inductance_H);
+    add(keys, "torque_constant_Nm_A", a.torque_constant_Nm_A);
+    add(keys, "gear_ratio", a.gear_ratio);
+    add(keys, "inertia_kg_m2", a.inertia_kg_m2);
+    add(keys, "damping_Nms_rad", a.damping_Nms_rad);
+    keys.back() += "  # back-EMF included";
+    if (a.order >= 2) {
+      add(keys, "spring_Nm_rad", a.spring_Nm_rad);
+      add(keys, "spring_damping_Nms_rad", a.spring_damping_Nms_rad);
+    }
+    add(keys, "current_limit_A", a.current_limit_A);
+    add(keys, "voltage_limit_V", a.voltage_limit_V);
+    add(keys, "thermal_resistance_K_W", a.thermal_resistance_K_W);
+    if (a.continuous_current_A > 0.0) {
+      add(keys, "continuous_current_A", a.continuous_current_A);
+      add(keys, "thermal_time_s", a.thermal_time_s);
+    }
+    return keys;
+  }
+
+  static Keys keys(const hal::GainsConfig& g) {
+    Keys keys;
+    if (g.position_feedback == hal::PositionFeedback::kMotor) {
+      keys.emplace_back("position_feedback = \"motor\"");
+    }
+    keys.push_back(loop("position", g.position.gains));
+    keys.push_back(loop("velocity", g.velocity.gains));
+    if (g.torque.gains.kp > 0.0) keys.push_back(loop("torque", g.torque.gains));
+    keys.push_back(loop("current", g.current.gains));
+    add(keys, "emf_compensation", g.emf_compensation);
+    add(keys, "stiffness_Nm_rad", g.stiffness_Nm_rad);
+    add(keys, "damping_Nms_rad", g.damping_Nms_rad);
+    return keys;
   }
 
   void wire(const hal::BusConfig& bus) {
@@ -228,7 +283,8 @@ class Writer {
       line(
           "\n# Feet level, knees bent to 0.94 of the greatest height, centre of mass over the "
           "feet.");
-      line("[posture.{}]\nbase_height_m = {:.4f}", p.name, p.base_height_m);
+      line("[posture.{}]\nbase_height_m = \"auto\"  # the lowest point touches: {:.4f}", p.name,
+           p.base_height_m);
     } else {
       line("\n# guess: within all limits, and away from stretched limbs");
       line("[posture.{}]", p.name);

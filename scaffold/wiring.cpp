@@ -36,6 +36,10 @@ class Wirer {
         joint += count;
       }
     }
+    for (std::size_t j = 0; j < robot_.tree.joints.size(); ++j) {
+      const model::Joint& follower = robot_.tree.joints[j];
+      if (follower.follows()) bus_of_body_[j + 1] = bus_of_body_[follower.leader + 1];
+    }
     add_sensors();
   }
 

@@ -83,6 +83,7 @@ TEST_F(New, SaysWhatItChoseAsJson) {
   EXPECT_EQ(json["base"], "floating");
   EXPECT_EQ(json["joints"], 29);
   EXPECT_EQ(json["feet"].size(), 2U);
+  EXPECT_EQ(json["right_angles"]["count"], 2);
   EXPECT_NE(read_text(folder_ / "c/robot.toml").find("spring_Nm_rad"), std::string::npos);
 }
 

@@ -69,6 +69,43 @@ TEST(NewRobot, FindsOneSensorForEachWrenchAndEachImu) {
             6);
 }
 
+TEST(NewRobot, GivesAFollowerNoDriveAndItsLeaderItsLoad) {
+  const NewRobot panda = made(kPublicRobots[2]);  // the second finger mimics the first
+  const int second = panda.tree.joint_index("panda_finger_joint2");
+  ASSERT_TRUE(panda.tree.joints[second].follows());
+  EXPECT_EQ(panda.config.joints.size(), 8U);
+  const std::string text = robot_text(panda, "panda.urdf", "panda.urdf");
+  EXPECT_EQ(text.find("\"panda_finger_joint2\""), std::string::npos);
+  EXPECT_EQ(text.find("mimic ="), std::string::npos);
+  EXPECT_NE(text.find("panda_finger_joint2 follows panda_finger_joint1"), std::string::npos);
+  const Posed posed(panda.tree, neutral_posture(panda.tree));
+  const int first = panda.tree.joints[second].leader;  // both slide
+  EXPECT_NEAR(
+      posed.inertia(first),
+      panda.tree.bodies[first + 1].inertia.mass_kg + panda.tree.bodies[second + 1].inertia.mass_kg,
+      1e-9);
+}
+
+TEST(NewRobot, OffersExactRightAnglesWhereTheDescriptionHasFewDigits) {
+  const NewRobot panda = made(kPublicRobots[2]);
+  ASSERT_GT(panda.right_angles.count, 0);
+  EXPECT_GT(panda.turned.distance_m, 0.0);
+  const auto text = [](const NewRobot& robot) { return robot_text(robot, "x.urdf", "x.urdf"); };
+  EXPECT_NE(text(panda).find("\n# right_angles = \"exact\""), std::string::npos);
+  const NewRobot coman = made(kPublicRobots[5]);  // two, of inertias: exact ones save nothing
+  EXPECT_EQ(coman.right_angles.count, 2);
+  EXPECT_EQ(text(coman).find("right_angles"), std::string::npos);
+}
+
+TEST(NewRobot, SaysOnceWhatAllDrivesHaveInCommon) {
+  const std::string text = robot_text(made(kPublicRobots[7]), "icub.urdf", "icub.urdf");
+  for (const char* key : {"\norder = ", "\ngear_ratio = ", "\nemf_compensation = "}) {
+    const std::size_t first = text.find(key);
+    ASSERT_NE(first, std::string::npos) << key;
+    EXPECT_EQ(text.find(key, first + 1), std::string::npos) << key;
+  }
+}
+
 TEST(NewRobot, TakesWhereTheDescriptionHasNoLimitWhatTheModelNeeds) {
   const NewRobot pendulum = made(kPublicRobots[0]);  // effort and velocity are 0
   for (const JointLimits& limit : pendulum.limits) {

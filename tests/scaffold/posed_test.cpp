@@ -33,16 +33,21 @@ TEST_P(PosedOnPublicRobots, InertiaAndGravityAreThoseOfTheMassMatrixAndInverseDy
   ASSERT_TRUE(mechanism);
   for (int index = 0; index < 5; ++index) {
     const Eigen::VectorXd q = sample(tree, index);
-    std::vector<double> all(mechanism->nq(), 0.0);
+    std::vector<double> all(mechanism->kernel_nq(), 0.0);
     if (tree.floating_base) all[6] = 1.0;
-    for (int j = 0; j < mechanism->joint_count(); ++j) all[mechanism->q_index(j)] = q[j];
-    const std::vector<double> still(mechanism->nv(), 0.0);
+    for (int j = 0; j < mechanism->joint_count(); ++j) {
+      if (!tree.joints[j].follows())
+        all[mechanism->q_index(mechanism->coordinate_of[j].index)] = q[j];
+    }
+    const std::vector<double> still(mechanism->kernel_nv(), 0.0);
     const auto M = model::evaluate_kernel(model::Kernel::kMassMatrix, *mechanism, {all})[0];
     const auto bias = model::evaluate_kernel(model::Kernel::kBias, *mechanism, {all, still})[0];
     const Posed posed(tree, q);
     for (int j = 0; j < mechanism->joint_count(); ++j) {
-      const auto i = static_cast<std::size_t>(mechanism->v_index(j));
-      const double diagonal = M[i * static_cast<std::size_t>(mechanism->nv()) + i];
+      if (tree.joints[j].follows()) continue;
+      const auto i =
+          static_cast<std::size_t>(mechanism->v_index(mechanism->coordinate_of[j].index));
+      const double diagonal = M[i * still.size() + i];
       EXPECT_NEAR(posed.inertia(j), diagonal, 1e-9 * (1.0 + diagonal)) << tree.joints[j].name;
       EXPECT_NEAR(posed.gravity_load(j), bias[i], 1e-9 * (1.0 + std::abs(bias[i])))
           << tree.joints[j].name;
