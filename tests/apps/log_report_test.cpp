@@ -59,6 +59,18 @@ TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
   }
 }
 
+TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
+  const Outcome run = tandem("run " TANDEM_SOURCE_DIR
+                             "/config/parallel_ankle/move.toml --duration 0.5 --log . --report");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find("\n\n  closed loops"), std::string::npos) << run.out;
+  const std::string page = read_text(folder_ / "parallel_ankle-move-001/report.html");
+  for (const std::string text : {"<h2>Closed loops</h2>", "<td>rod_left</td>", "<td>rod_right</td>",
+                                 "2 joints, 2 more passive", "and by inverse dynamics"}) {
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+  }
+}
+
 TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
   const std::string log = (folder_ / "killed/double_pendulum-trajectory-001.mcap").string();
   const std::string kill_when_it_has_written =
