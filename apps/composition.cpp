@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/start_height.hpp"
@@ -95,6 +96,27 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
   return true;
 }
 
+/// The error for a robot where an experiment belongs; it names one that stands beside it.
+Diagnostics is_no_experiment(const std::string& file) {
+  std::vector<std::string> others;
+  std::error_code ignored;
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const Result<TomlDocument> document = TomlDocument::load(entry.path().string());
+    if (entry.path().extension() == ".toml" && document && document->root().has("robot"))
+      others.push_back(
+          (std::filesystem::path(file).parent_path() / entry.path().filename()).string());
+  }
+  std::ranges::sort(others);
+  Error error;
+  error.message =
+      "this is a robot, and an experiment is needed: what it shall do, and for how long";
+  error.hint = others.empty() ? "write one: docs/configuration.md, experiment.toml"
+                              : "there is " + others.front();
+  error.file = file;
+  return {error};
+}
+
 /// What to serve: an experiment, or a robot in the first of its postures.
 std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
   if (!is_robot(file)) return runtime::read_experiment(file);
@@ -144,6 +166,7 @@ std::string hal_name(const runtime::HalOptions& hal) {
 
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
                                                                  const Overrides& overrides) {
+  if (!overrides.serves && is_robot(file)) return std::unexpected(is_no_experiment(file));
   auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
   if (!experiment) return std::unexpected(experiment.error());
   auto c = std::make_unique<Composition>();

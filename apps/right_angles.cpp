@@ -23,6 +23,8 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
   const Result<model::OperationCount> after = count(exactly);
   if (!before) return std::unexpected(before.error());
   if (!after) return std::unexpected(after.error());
+  const bool saves = after->add + after->mul < before->add + before->mul;
+  if (!exact && !saves) return {};
   facts.add("right angles", fmt::format("{} of few digits, at most {:.1e} rad off; {}",
                                         robot.right_angles.count, robot.right_angles.worst_rad,
                                         exact ? "taken exactly" : "taken as they are written"));

@@ -47,6 +47,14 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
     if (error.file.empty()) error.file = config.file;
     return std::unexpected(Diagnostics{std::move(error)});
   }
+  if (config.model.floating_base && config.contact.feet.empty()) {
+    Error falls;
+    falls.message = "the base floats and there is no [contact]: the simulated robot falls for ever";
+    falls.hint = "add [contact] with the robot's feet, or base = \"fixed\"";
+    falls.file = config.file;
+    falls.key = "model.base";
+    description->warnings.push_back(std::move(falls));
+  }
   return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
                     description->right_angles, std::move(description->warnings)};
 }

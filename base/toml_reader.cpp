@@ -346,6 +346,11 @@ Result<TomlDocument> TomlDocument::load(const std::string& file) {
 }
 
 Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file) {
+  if (const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+      first != std::string_view::npos && text[first] == '<') {
+    return std::unexpected(Error{"this is XML, not TOML",
+                                 "`tandem new FILE` makes a robot of a URDF", file, 1, {}});
+  }
   TomlDocument document;
   document.shared_ = std::make_shared<TomlTable::Shared>();
   document.shared_->file = file;

@@ -53,6 +53,23 @@ class BadInput : public Program {
   }
 };
 
+TEST_F(BadInput, OfAnotherKindIsNamedWithTheCommandThatTakesIt) {
+  const Outcome robot = tandem("run robot.toml");
+  EXPECT_EQ(robot.status, 2);
+  EXPECT_NE(robot.err.find("this is a robot"), std::string::npos) << robot.err;
+  EXPECT_NE(robot.err.find("hold.toml"), std::string::npos) << robot.err;
+  EXPECT_EQ(std::ranges::count(robot.err, '\n'), 1) << robot.err;
+  const Outcome urdf = tandem("run double_pendulum.urdf");
+  EXPECT_EQ(urdf.status, 2);
+  EXPECT_NE(urdf.err.find("tandem new"), std::string::npos) << urdf.err;
+}
+
+TEST_F(BadInput, AFloatingBaseWithoutGroundIsWarnedOf) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"floating\"");
+  const Outcome outcome = tandem("check robot.toml");
+  EXPECT_NE(outcome.err.find("falls for ever"), std::string::npos) << outcome.err;
+}
+
 TEST_F(BadInput, AMissingExperimentIsRefused) {
   expect_refused({"nothing.toml", "cannot read"}, "run nothing.toml");
 }

@@ -30,7 +30,7 @@ class AnyFeet : public testing::TestWithParam<int> {
                    .value()
                    .tree;
     run.step_s = 0.005;
-    for (std::size_t row = 0; row < kRows; ++row) run.time_s.push_back(run.step_s * row);
+    for (std::size_t row = 0; row < kRows; ++row) run.time_s.push_back(run.step_s * static_cast<double>(row));
     const ModelMap& map = stance.map();
     for (std::size_t j = 0; j < map.joints(); ++j) {
       run.position_rad.push_back(constant(stance.q()[map.q_index(j)]));
