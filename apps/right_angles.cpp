@@ -23,6 +23,13 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
   const Result<model::OperationCount> after = count(exactly);
   if (!before) return std::unexpected(before.error());
   if (!after) return std::unexpected(after.error());
+  json["right_angles"] = {{"count", robot.right_angles.count},
+                          {"worst_rad", robot.right_angles.worst_rad},
+                          {"exact", exact},
+                          {"operations_as_written", before->add + before->mul},
+                          {"operations_exact", after->add + after->mul},
+                          {"link", moved.link},
+                          {"displacement_m", moved.distance_m}};
   const bool saves = after->add + after->mul < before->add + before->mul;
   if (!exact && !saves) return {};
   facts.add("right angles", fmt::format("{} of few digits, at most {:.1e} rad off; {}",
@@ -34,13 +41,6 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
                                                : fmt::format("{} moves by at most {:.2g} mm",
                                                              moved.link, 1e3 * moved.distance_m)));
   if (!exact) facts.add("", "right_angles = \"exact\" in [model] takes them");
-  json["right_angles"] = {{"count", robot.right_angles.count},
-                          {"worst_rad", robot.right_angles.worst_rad},
-                          {"exact", exact},
-                          {"operations_as_written", before->add + before->mul},
-                          {"operations_exact", after->add + after->mul},
-                          {"link", moved.link},
-                          {"displacement_m", moved.distance_m}};
   return {};
 }
 

@@ -8,8 +8,8 @@
 namespace tandem::apps {
 
 /// Adds how many there are, what they cost in forward dynamics, and how far exact ones would move
-/// the robot; nothing when there are none, or when exact ones save nothing. Generates the dynamics
-/// both ways, and compiles nothing.
+/// the robot; nothing when there are none, and no facts when exact ones save nothing. Generates the
+/// dynamics both ways, and compiles nothing.
 ///
 /// Errors: those of with_description() and of model::count_kernel().
 [[nodiscard]] Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json);
