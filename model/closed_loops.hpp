@@ -29,7 +29,7 @@ struct LoopEquation {
 /// Loops of a robot as equations of its kernels' sites. A ball has three, a revolute joint five,
 /// a rod one; of those that a planar loop repeats in space, the solvers drop the surplus.
 ///
-/// Errors of direction are told as the displacement that they make at kAngleArm_m.
+/// Errors of direction are given as the displacement that they make at kAngleArm_m.
 ///
 /// The joints named passive have no motor. For a posture of the others (and the base), close()
 /// finds theirs; carry_passive() moves their share of the torques to the driven joints.

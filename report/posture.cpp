@@ -9,6 +9,8 @@
 #include <numbers>
 #include <optional>
 
+#include "model/placements.hpp"
+
 namespace tandem::report {
 namespace {
 
@@ -81,14 +83,9 @@ std::optional<SitePlace> place_of(const std::string& name, const model::Tree& tr
   const int index = site == robot.model.sites.end() ? -1 : tree.link_index(site->link);
   if (index < 0) return std::nullopt;
   const model::Link& link = tree.links[static_cast<std::size_t>(index)];
-  const auto rotation = [&](int axis) {
-    return Eigen::AngleAxisd(site->rpy_rad[static_cast<std::size_t>(axis)],
-                             Eigen::Vector3d::Unit(axis));
-  };
-  const model::Placement in_link{(rotation(2) * rotation(1) * rotation(0)).matrix(),
-                                 Eigen::Map<const Eigen::Vector3d>(site->xyz_m.data())};
   const auto body = static_cast<std::size_t>(link.body);
-  return SitePlace{body, bodies[body] * link.in_body * in_link};
+  return SitePlace{body,
+                   bodies[body] * link.in_body * model::placement_of(site->xyz_m, site->rpy_rad)};
 }
 
 /// A foot's contact points in W, and the last body before them.
@@ -275,21 +272,10 @@ double position_of(const hal::RobotConfig& robot, const std::string& joint,
 std::vector<model::Placement> body_placements(const model::Tree& tree,
                                               const hal::RobotConfig& robot,
                                               const PostureSample& sample) {
-  std::vector<model::Placement> bodies{sample.base};
-  for (const model::Joint& joint : tree.joints) {
-    const model::Joint& leader =
-        joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
-    const double own = position_of(robot, leader.name, sample);
-    const double q = joint.multiplier * own + joint.offset;
-    model::Placement motion;
-    if (joint.type == model::JointType::kPrismatic) {
-      motion.p = q * joint.axis;
-    } else {
-      motion.R = Eigen::AngleAxisd(q, joint.axis).matrix();
-    }
-    bodies.push_back(bodies[static_cast<std::size_t>(joint.parent)] * joint.in_parent * motion);
-  }
-  return bodies;
+  std::vector<double> position;
+  for (const model::Joint& joint : tree.joints)
+    position.push_back(position_of(robot, joint.name, sample));
+  return model::place_bodies(tree, position, sample.base);
 }
 
 Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,

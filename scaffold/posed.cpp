@@ -1,7 +1,8 @@
 #include "scaffold/posed.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
+
+#include "model/placements.hpp"
 
 namespace tandem::scaffold {
 
@@ -10,26 +11,10 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using model::Placement;
 
-namespace {
-
-Placement motion(const model::Joint& joint, double q) {
-  if (joint.type == model::JointType::kPrismatic) {
-    return {Eigen::Matrix3d::Identity(), joint.axis * q};
-  }
-  return {Eigen::AngleAxisd(q, joint.axis).toRotationMatrix(), Vector3d::Zero()};
-}
-
-}  // namespace
-
 Posed::Posed(const model::Tree& tree, const Eigen::VectorXd& q) : tree_(tree) {
-  bodies_.resize(tree.bodies.size());
-  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
-    const model::Joint& joint = tree.joints[j];
-    const double position =
-        joint.follows() ? joint.multiplier * q[joint.leader] + joint.offset : q[Index(j)];
-    bodies_[j + 1] = bodies_[joint.parent] * joint.in_parent * motion(joint, position);
-    if (joint.follows()) followers_.push_back(static_cast<int>(j));
-  }
+  bodies_ = model::place_bodies(tree, {q.data(), static_cast<std::size_t>(q.size())});
+  for (std::size_t j = 0; j < tree.joints.size(); ++j)
+    if (tree.joints[j].follows()) followers_.push_back(static_cast<int>(j));
   for (std::size_t b = 0; b < tree.bodies.size(); ++b) {
     beyond_.push_back(bodies_[b] * tree.bodies[b].inertia);
   }
