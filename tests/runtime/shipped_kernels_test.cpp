@@ -174,7 +174,8 @@ TEST_P(ShippedKernels, KeepEnergyAndMomentumOverTenSecondsOfFreeMotion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, ShippedKernels,
-                         testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum"),
+                         testing::Values("coman", "walkman", "anymal_c", "panda", "ur5e",
+                                         "double_pendulum", "four_bar", "parallel_ankle"),
                          [](const auto& test) { return std::string(test.param); });
 
 // COMAN's and WALK-MAN's springs leave their links without armature: Pinocchio's very model.
