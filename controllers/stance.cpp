@@ -109,12 +109,9 @@ void Stance::choose(const std::vector<std::size_t>& columns) {
   const std::vector<Row> all = all_rows();
   Eigen::MatrixXd J(all.size(), columns.size());
   std::vector<int> priorities;
-  for (Eigen::Index row = 0; row < J.rows(); ++row) {
-    const Row& one = all[static_cast<std::size_t>(row)];
-    priorities.push_back(one.priority);
-    for (Eigen::Index i = 0; i < J.cols(); ++i) {
-      J(row, i) = jacobian(one, columns[static_cast<std::size_t>(i)]);
-    }
+  for (std::size_t row = 0; row < all.size(); ++row) {
+    priorities.push_back(all[row].priority);
+    jacobian(all[row], columns, J.row(static_cast<Eigen::Index>(row)));
   }
   const std::vector<Eigen::Index> rows = independent_rows(J, priorities);
   Eigen::MatrixXd kept(static_cast<Eigen::Index>(rows.size()), J.cols());
@@ -203,26 +200,36 @@ double Stance::error(const Row& row) const noexcept TANDEM_RT {
                                       turn(1, 0) - turn(0, 1)));
 }
 
-double Stance::jacobian(const Row& row, std::size_t v_column) const noexcept TANDEM_RT {
+/// One row of the equations' Jacobian, for `columns` of v.
+void Stance::jacobian(const Row& row, std::span<const std::size_t> columns,
+                      RowOut out) const noexcept TANDEM_RT {
   const std::size_t nv = kernels_->nv;
+  const auto axis_of_G = static_cast<std::size_t>(row.axis);
   if (row.what == What::kMass) {
-    return com_J_[static_cast<std::size_t>(row.axis) * nv + v_column];
+    const double* J = &com_J_[axis_of_G * nv];
+    for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = J[columns[static_cast<std::size_t>(i)]];
+    return;
   }
+  // The site's Jacobian, rows of nv: 3 linear, 3 angular. A place moves with linear[axis] and,
+  // the middle being off the site's origin, with e . (w x r) = (r x e) . w.
   const std::size_t site = feet_[row.foot].site;
-  const auto part = [&](std::size_t k) { return site_J_[(6 * site + k) * nv + v_column]; };
-  const Vector3d angular(part(3), part(4), part(5));
-  if (row.what == What::kTurn) return axis(row).dot(angular);
-  return part(static_cast<std::size_t>(row.axis)) +
-         angular.cross(middle(row.foot) - origin(pose_, site))[row.axis];
+  const double* J = &site_J_[6 * site * nv];
+  const bool place = row.what == What::kPlace;
+  const Vector3d turn =
+      place ? Vector3d((middle(row.foot) - origin(pose_, site)).cross(Vector3d::Unit(row.axis)))
+            : axis(row);
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
+    const double* at = J + columns[static_cast<std::size_t>(i)];
+    const double turned = turn.x() * at[3 * nv] + turn.y() * at[4 * nv] + turn.z() * at[5 * nv];
+    out[i] = place ? at[axis_of_G * nv] + turned : turned;
+  }
 }
 
 void Stance::gather() noexcept TANDEM_RT {
   for (std::size_t row = 0; row < rows_.size(); ++row) {
     const auto r = static_cast<Eigen::Index>(row);
     error_[r] = error(rows_[row]);
-    for (std::size_t i = 0; i < columns_.size(); ++i) {
-      A_(r, static_cast<Eigen::Index>(i)) = jacobian(rows_[row], columns_[i]);
-    }
+    jacobian(rows_[row], columns_, A_.row(r));
   }
 }
 
@@ -260,7 +267,10 @@ void Stance::predict(double dt_s) noexcept TANDEM_RT {
 
 void Stance::move(double rate_m_s) noexcept TANDEM_RT {
   for (std::size_t row = 0; row < rows_.size(); ++row) {
-    error_[static_cast<Eigen::Index>(row)] = -jacobian(rows_[row], 2) * rate_m_s;
+    constexpr std::size_t kHeight[] = {2};
+    Eigen::Matrix<double, 1, 1> rises;
+    jacobian(rows_[row], kHeight, rises);
+    error_[static_cast<Eigen::Index>(row)] = -rises[0] * rate_m_s;
   }
   step_ = lu_.solve(error_);
   v_[2] = rate_m_s;

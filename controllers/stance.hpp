@@ -102,7 +102,9 @@ class Stance {
   [[nodiscard]] Eigen::Vector3d middle(std::size_t foot) const noexcept TANDEM_RT;
   [[nodiscard]] Eigen::Vector3d axis(const Row& row) const noexcept TANDEM_RT;
   [[nodiscard]] double error(const Row& row) const noexcept TANDEM_RT;
-  [[nodiscard]] double jacobian(const Row& row, std::size_t v_column) const noexcept TANDEM_RT;
+  using RowOut = Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>>;
+  void jacobian(const Row& row, std::span<const std::size_t> columns,
+                RowOut out) const noexcept TANDEM_RT;
   void gather() noexcept TANDEM_RT;
   void advance(const Eigen::VectorXd& step, double factor) noexcept TANDEM_RT;
 
