@@ -23,10 +23,15 @@ demo:
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
-# What CI runs: all tests, the real-time proof, and side by side, for each takes one core, the
-# tests on a real CAN stack and a minute of each fuzz target.
-test: unit rtsan
+# What CI runs: all tests; side by side, for each takes one core, the tests on a real CAN stack and
+# a minute of each fuzz target; the real-time proof. The last lines say what ran and what did not.
+test:
+	@rm -f build/summary
+	@$(MAKE) --no-print-directory unit
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
+	@$(MAKE) --no-print-directory rtsan
+	@echo
+	@cat build/summary
 
 # What takes too long for every change.
 test-all: test
@@ -38,14 +43,14 @@ unit:
 	@scripts/install-node-modules
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
-	@scripts/run-tests build/release $(JOBS) -LE hil
+	@TITLE=unit scripts/run-tests build/release $(JOBS) -LE hil
 
 # On this machine's kernel if it has CAN, else in a User-Mode-Linux one: tests/hil/README.md.
 hil:
 	@scripts/install-dependencies test
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
-	@scripts/run-tests build/release 1 -L hil --verbose
+	@TITLE=hil scripts/run-tests build/release 1 -L hil --verbose
 
 rtsan:
 	@scripts/install-dependencies test

@@ -5,7 +5,10 @@
 
 #include "apps/command_line.hpp"
 #include "base/result.hpp"
-#include "report/report.hpp"
+
+namespace tandem::report {
+struct ReportFiles;
+}  // namespace tandem::report
 
 namespace tandem::apps {
 

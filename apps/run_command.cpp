@@ -15,6 +15,7 @@
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
+#include "report/report.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"

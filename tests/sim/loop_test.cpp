@@ -27,9 +27,10 @@ class LoopTest : public testing::Test {
   // Motors without friction, at the positions given.
   [[nodiscard]] PlantConfig config(const std::vector<double>& position,
                                    Integrator integrator = Integrator::kRungeKutta4) const {
-    PlantConfig plant{.kernels = robot.kernels.get(),
-                      .passive = robot.robot.passive,
-                      .loops = robot.robot.loop_specs()};
+    PlantConfig plant;
+    plant.kernels = robot.kernels.get();
+    plant.passive = robot.robot.passive;
+    plant.loops = robot.robot.loop_specs();
     plant.integrator = integrator;
     for (std::size_t j = 0; j < position.size(); ++j) {
       const hal::JointConfig& joint = robot.robot.joints[j];

@@ -1,0 +1,1 @@
+// The source whose precompiled header every room reuses.
