@@ -8,6 +8,8 @@
 #include "apps/console.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
+#include "apps/wrong_kind.hpp"
+#include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 
 namespace tandem::apps {
@@ -39,13 +41,13 @@ void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
   facts.add("robot", fmt::format("{} ({})", robot.name, robot.file));
   facts.add("description", robot.model.urdf);
   facts.add("base", robot.model.floating_base ? "floating" : "fixed");
-  facts.add("joints", fmt::format("{} on {} boards", robot.joints.size(), robot.boards.size()));
+  facts.add("joints", fmt::format("{} on {}", robot.joints.size(), counted(robot.boards.size(), "board")));
   facts.add("sensors", std::to_string(robot.sensors.size()));
   for (const hal::BusConfig& bus : robot.buses) {
     std::size_t nodes = 0;
     for (const hal::BoardConfig& board : robot.boards) nodes += board.bus == bus.name ? 1 : 0;
     for (const hal::SensorConfig& sensor : robot.sensors) nodes += sensor.bus == bus.name ? 1 : 0;
-    facts.add("bus " + bus.name, fmt::format("{} nodes, {}", nodes, bus.fd ? "CAN FD" : "CAN"));
+    facts.add("bus " + bus.name, fmt::format("{}, {}", counted(nodes, "node"), bus.fd ? "CAN FD" : "CAN"));
   }
 }
 
@@ -74,8 +76,8 @@ void print_plan(const Composition& c, std::FILE* out) {
   if (c.controllers == nullptr) {
     facts.add("", "their parameters and claims are checked when there are kernels");
   }
-  facts.add("loop", fmt::format("{:.3g} kHz, {} cycles, {:.3f} s after bring-up", 1e-3 / period_s,
-                                e.cycles(), e.duration_s));
+  facts.add("loop", fmt::format("{:.3g} kHz, {}, {:.3f} s after bring-up", 1e-3 / period_s,
+                                counted(e.cycles(), "cycle"), e.duration_s));
   facts.add("integrator",
             fmt::format("{}, {} us steps",
                         e.sim.integrator == sim::Integrator::kRungeKutta4 ? "Runge-Kutta 4"
@@ -146,12 +148,6 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
 
 Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
                              Json& json) {
-  if (options.repair) {
-    return {Error{.message = "--repair is for a robot by itself",
-                  .hint = "name its robot.toml",
-                  .file = options.file,
-                  .key = {}}};
-  }
   const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.warnings;
@@ -168,7 +164,11 @@ Exit check_command(const CheckOptions& options) {
   const bool robot_only = is_robot(options.file);
   Json json{{"ok", true}, {"errors", Json::array()}};
   Diagnostics errors, warnings;
-  if (options.bus) errors = check_buses(options.file, robot_only, out, json["buses"]);
+  const auto wrong = options.repair
+                         ? wrong_kind(options.file, Takes::kRobot, "tandem check --repair")
+                         : wrong_kind(options.file, Takes::kEither, "tandem check");
+  if (wrong) errors.push_back(*wrong);
+  if (errors.empty() && options.bus) errors = check_buses(options.file, robot_only, out, json["buses"]);
   if (errors.empty()) {
     errors = robot_only ? check_robot(options, out, warnings, json)
                         : check_experiment(options, out, warnings, json);

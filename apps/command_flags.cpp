@@ -139,6 +139,16 @@ CLI::Validator is_rate() {
   return {check, "0, 0.01 to 1000"};
 }
 
+CLI::Validator a_duration() {
+  const auto check = [](const std::string& text) -> std::string {
+    double duration_s = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, duration_s);
+    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
+    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
+  };
+  return {check, "above 0, to 1e6"};
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -195,7 +205,7 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("experiment", o.experiment, "Experiment TOML")->required();
   add_loop_flags(app, o);
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
-      ->check(CLI::PositiveNumber);
+      ->check(a_duration());
   app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can", "dds"}));
   app.add_flag(
@@ -382,7 +392,7 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
   app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
       ->check(CLI::Range(50, 1'000'000));
   app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")
-      ->check(CLI::PositiveNumber);
+      ->check(a_duration());
   app.add_option("--mode", o.mode, "Who has which CPU when (default: swap)")
       ->check(CLI::IsMember({"swap", "together", "turns"}));
   app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")

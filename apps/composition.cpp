@@ -96,27 +96,6 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
   return true;
 }
 
-/// The error for a robot where an experiment belongs; it names one that stands beside it.
-Diagnostics is_no_experiment(const std::string& file) {
-  std::vector<std::string> others;
-  std::error_code ignored;
-  const auto folder = std::filesystem::absolute(file).parent_path();
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    const Result<TomlDocument> document = TomlDocument::load(entry.path().string());
-    if (entry.path().extension() == ".toml" && document && document->root().has("robot"))
-      others.push_back(
-          (std::filesystem::path(file).parent_path() / entry.path().filename()).string());
-  }
-  std::ranges::sort(others);
-  Error error;
-  error.message =
-      "this is a robot, and an experiment is needed: what it shall do, and for how long";
-  error.hint = others.empty() ? "write one: docs/configuration.md, experiment.toml"
-                              : "there is " + others.front();
-  error.file = file;
-  return {error};
-}
-
 /// What to serve: an experiment, or a robot in the first of its postures.
 std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
   if (!is_robot(file)) return runtime::read_experiment(file);
@@ -166,7 +145,6 @@ std::string hal_name(const runtime::HalOptions& hal) {
 
 std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
                                                                  const Overrides& overrides) {
-  if (!overrides.serves && is_robot(file)) return std::unexpected(is_no_experiment(file));
   auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
   if (!experiment) return std::unexpected(experiment.error());
   auto c = std::make_unique<Composition>();
@@ -180,8 +158,17 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
-  if (overrides.serves) serve_only(e, overrides.lockstep);
   Collector errors;
+  if (e.cycles() == 0) {
+    errors.add({.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
+                .hint = fmt::format("run for {} s or longer",
+                                    static_cast<double>(e.loop.period_ns) * 1e-9),
+                .file = {},
+                .key = "duration_s"},
+               e.file, 0);
+    return errors.give();
+  }
+  if (overrides.serves) serve_only(e, overrides.lockstep);
   if (overrides.serves && e.hal.backend == runtime::BackendKind::kDds) {
     errors.add({.message = "a robot of another process cannot be served once more",
                 .hint = "add --hal sim or --hal can",

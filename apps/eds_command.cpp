@@ -7,6 +7,7 @@
 #include "apps/console.hpp"
 #include "apps/eds_files.hpp"
 #include "apps/robot_files.hpp"
+#include "apps/wrong_kind.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -25,6 +26,9 @@ Status write_file(const std::filesystem::path& file, const std::string& text) {
 }
 
 Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files) {
+  if (auto wrong = wrong_kind(options.robot, Takes::kRobot, "tandem eds")) {
+    return {std::move(*wrong)};
+  }
   const auto robot = read_robot(options.robot);
   if (!robot) return robot.error();
   auto made = make_eds_files(robot->config);

@@ -10,6 +10,8 @@
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
 #include "apps/start_height.hpp"
+#include "apps/wrong_kind.hpp"
+#include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/scenario.hpp"
@@ -29,6 +31,9 @@ struct Subject {
 
 /// A robot by itself starts in the first of its postures; an experiment says all.
 std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) {
+  if (auto wrong = wrong_kind(options.file, Takes::kEither, "tandem emulate")) {
+    return std::unexpected(Diagnostics{std::move(*wrong)});
+  }
   Subject subject;
   if (is_robot(options.file)) {
     auto robot = read_robot(options.file);
@@ -205,8 +210,9 @@ Exit emulate_command(const EmulateOptions& options) {
   const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
   if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
   if (!options.quiet) {
-    fmt::print(out, "{}: {} boards and {} sensors on {}, {}; Ctrl-C ends it\n",
-               e.subject.robot.name, e.subject.robot.boards.size(), e.subject.robot.sensors.size(),
+    fmt::print(out, "{}: {} and {} on {}, {}; Ctrl-C ends it\n",
+               e.subject.robot.name, counted(e.subject.robot.boards.size(), "board"),
+               counted(e.subject.robot.sensors.size(), "sensor"),
                interfaces_of(e.subject.robot),
                options.lockstep ? "a step per SYNC" : "in real time");
     std::fflush(out);

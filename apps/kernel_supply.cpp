@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "apps/kernel_store.hpp"
+#include "base/counted.hpp"
 #include "model/generate.hpp"
 
 namespace tandem::apps {
@@ -63,7 +64,7 @@ Result<model::KernelLibrary> supply_kernels(const RobotFiles& robot, const std::
   const auto report = build_shown(robot, options);
   if (!report) return std::unexpected(report.error());
   if (!report->was_up_to_date) {
-    fmt::print(stderr, "{}: {} files compiled in {:.1f} s: {}\n", name, report->compiled,
+    fmt::print(stderr, "{}: {} compiled in {:.1f} s: {}\n", name, counted(report->compiled, "file"),
                report->seconds, report->library);
   }
   return model::load_kernels(*path, hash, variant);

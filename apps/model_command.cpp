@@ -7,6 +7,8 @@
 #include "apps/kernel_supply.hpp"
 #include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
+#include "apps/wrong_kind.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -25,8 +27,8 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
   if (report->was_up_to_date) {
     fmt::print("{}: kernels are up to date ({})\n", robot.config.name, report->library);
   } else {
-    fmt::print("{}: {} files compiled in {:.1f} s: {}\n", robot.config.name, report->compiled,
-               report->seconds, report->library);
+    fmt::print("{}: {} compiled in {:.1f} s: {}\n", robot.config.name,
+               counted(report->compiled, "file"), report->seconds, report->library);
   }
   return {};
 }
@@ -78,13 +80,18 @@ Status info(const RobotFiles& robot, const ModelOptions& options) {
 }  // namespace
 
 Exit model_command(const ModelOptions& options) {
+  const bool builds = options.action == ModelOptions::Action::kBuild;
+  const char* command = builds ? "tandem model build" : "tandem model info";
+  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) {
+    print_errors({*wrong});
+    return Exit::kUsage;
+  }
   const auto robot = read_robot(options.robot);
   if (!robot) {
     print_errors(robot.error());
     return Exit::kUsage;
   }
-  const Status done = options.action == ModelOptions::Action::kBuild ? build(*robot, options)
-                                                                     : info(*robot, options);
+  const Status done = builds ? build(*robot, options) : info(*robot, options);
   if (done) return Exit::kDone;
   print_errors({done.error()});
   return Exit::kUsage;

@@ -15,6 +15,8 @@
 #include "apps/run_control.hpp"
 #include "apps/run_log.hpp"
 #include "apps/run_summary.hpp"
+#include "apps/wrong_kind.hpp"
+#include "base/counted.hpp"
 #include "report/report.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
@@ -34,7 +36,7 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                 fault.joint.empty() ? "" : ": ", fault.text));
   }
   if (log && !log->error.empty()) {
-    texts.push_back(fmt::format("the log lost {} messages: {}", log->failed, log->error));
+    texts.push_back(fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
   }
   return texts;
 }
@@ -179,8 +181,8 @@ Exit run(Composition& c, const RunOptions& options) {
                             config);
   if (*server != nullptr) tell_faults(**server, cycle);
   if (!options.quiet) {
-    fmt::print(out, "{}: {} joints, {} at {:.3g} kHz, {}{}\n", e.robot.name, e.robot.joints.size(),
-               length_text(e), 1e6 / static_cast<double>(e.loop.period_ns),
+    fmt::print(out, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
+               counted(e.robot.joints.size(), "joint"), length_text(e), 1e6 / static_cast<double>(e.loop.period_ns),
                options.serves ? served_text(e) : "", pace_text(c));
   }
   ControlRegistry commands;
@@ -245,6 +247,13 @@ Exit run_command(const RunOptions& options) {
       print_errors({writable.error()});
       return Exit::kUsage;
     }
+  }
+  const auto wrong = options.serves
+                         ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
+                         : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
+  if (wrong) {
+    print_errors({*wrong});
+    return Exit::kUsage;
   }
   Overrides overrides{.seed = options.seed,
                       .duration_s = options.duration_s,

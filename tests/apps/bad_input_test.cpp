@@ -74,8 +74,47 @@ TEST_F(BadInput, AMissingExperimentIsRefused) {
   expect_refused({"nothing.toml", "cannot read"}, "run nothing.toml");
 }
 
-TEST_F(BadInput, AFolderInPlaceOfAnExperimentIsRefused) {
-  expect_refused({"this is a folder"}, "run .");
+TEST_F(BadInput, AFolderIsRefusedWithTheCommandsForWhatIsInIt) {
+  std::filesystem::create_directory(folder_ / "arm");
+  for (const char* file : {"double_pendulum.urdf", "robot.toml", "hold.toml", "trajectory.toml"}) {
+    std::filesystem::rename(folder_ / file, folder_ / "arm" / file);
+  }
+  std::filesystem::create_directory(folder_ / "empty");
+  const std::string folder = "arm: this is a folder, and ";
+  expect_refused({folder + "an experiment is needed",
+                  "(type: tandem run arm/hold.toml, or: tandem run arm/trajectory.toml)"},
+                 "run arm");
+  expect_refused({"(type: tandem run ./arm/../arm/hold.toml, or: "}, "run ./arm/../arm/");
+  expect_refused({"write one: docs/configuration.md"}, "run empty");
+  expect_refused({folder + "a robot is needed", "(type: tandem model info arm/robot.toml)"},
+                 "model info arm");
+  expect_refused({"(type: tandem eds arm/robot.toml)"}, "eds arm");
+  for (const std::string command : {"check", "emulate", "serve"}) {
+    expect_refused({folder, "tandem " + command + " arm/hold.toml, ",
+                    ", or: tandem " + command + " arm/trajectory.toml)"},
+                   command + " arm");
+  }
+}
+
+TEST_F(BadInput, AnExperimentInPlaceOfARobotIsRefusedWithTheRobotsCommand) {
+  for (const std::string command : {"model info", "model build", "eds", "check --repair"}) {
+    expect_refused({"hold.toml: this is an experiment, and a robot is needed",
+                    "(type: tandem " + command + " robot.toml)"},
+                   command + " hold.toml");
+  }
+}
+
+TEST_F(BadInput, ADurationThatIsNoneIsRefusedInOneShortLine) {
+  for (const std::string text : {"0", "-3", "nan", "inf", "1e300", "soon"}) {
+    const Outcome outcome = tandem("run hold.toml --duration " + text);
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("--duration: '" + text + "' is no number of seconds above 0"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_LT(outcome.err.size(), 150U) << outcome.err;
+  }
+  expect_refused({"duration_s: 0.0001 s are less than half a cycle", "run for 0.001 s or longer"},
+                 "run hold.toml --duration 0.0001");
 }
 
 TEST_F(BadInput, AMissingRobotIsRefused) {

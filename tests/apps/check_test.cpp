@@ -19,7 +19,7 @@ TEST_F(Check, TellsWhatARunWouldDoAndLeavesNothingBehind) {
 TEST_F(Check, ReadsARobotByItself) {
   const Outcome outcome = tandem("check robot.toml");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("2 on 1 boards"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("2 on 1 board\n"), std::string::npos) << outcome.out;
 }
 
 TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
