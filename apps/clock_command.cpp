@@ -7,6 +7,7 @@
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
 #include "apps/control_client.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -34,8 +35,8 @@ Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
       return now;
     }
     if (line.due()) {
-      line.show(fmt::format("{:.3f} s, {} cycles to go", now->value("time_s", 0.0),
-                            now->value("pending_steps", 0)));
+      line.show(fmt::format("{:.3f} s, {} to go", now->value("time_s", 0.0),
+                            counted(now->value("pending_steps", std::uint64_t{0}), "cycle")));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -51,7 +52,7 @@ std::string state_text(const Json& answer) {
   if (!answer.value("paused", false)) return "running";
   const std::uint64_t steps = answer.value("pending_steps", std::uint64_t{0});
   if (answer.value("standing", false)) return "paused";
-  return steps > 0 ? fmt::format("paused, {} cycles to go", steps) : "paused after this cycle";
+  return steps > 0 ? "paused, " + counted(steps, "cycle") + " to go" : "paused after this cycle";
 }
 
 void print_answer(const Json& answer) {

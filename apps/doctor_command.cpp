@@ -6,6 +6,7 @@
 #include "apps/console.hpp"
 #include "apps/doctor.hpp"
 #include "apps/robot_files.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -38,10 +39,10 @@ void print_findings(const std::vector<Finding>& findings, std::FILE* out) {
 
 void print_verdict(const std::vector<Finding>& findings, std::FILE* out) {
   const auto count = [&findings](Health health) {
-    return std::ranges::count(findings, health, &Finding::health);
+    return static_cast<std::uint64_t>(std::ranges::count(findings, health, &Finding::health));
   };
-  fmt::print(out, "\n  {} ok, {} warnings, {} missing\n", count(Health::kOk),
-             count(Health::kWarning), count(Health::kMissing));
+  fmt::print(out, "\n  {} ok, {}, {} missing\n", count(Health::kOk),
+             counted(count(Health::kWarning), "warning"), count(Health::kMissing));
 }
 
 }  // namespace

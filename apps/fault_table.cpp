@@ -36,6 +36,7 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
   Table table({"faults", "joint", "board", "cause", "category", "reaction", "state"});
+  table.align_left();
   for (const Json& fault : faults) {
     const bool latched = fault.value("latched", true);
     table.add({fmt::format("{:.3f} s", fault.value("time_s", 0.0)), fault.value("joint", ""),

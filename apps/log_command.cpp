@@ -5,6 +5,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
+#include "base/counted.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
 #include "log/log_file.hpp"
@@ -45,14 +46,16 @@ void print_info(const log::LogFile& file, std::FILE* out) {
   const log::RunInfo& info = file.info();
   fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (its run was killed)" : "");
   Facts facts;
-  facts.add("robot", fmt::format("{}, {} joints, {} sensors", info.robot, info.joints.size(),
-                                 info.sensors.size()));
+  facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
+                                 counted(info.sensors.size(), "sensor")));
   facts.add("backend", info.hal);
   facts.add("seed", std::to_string(info.seed));
   facts.add("period", fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
   facts.add("kernels", info.kernel_variant);
   facts.add("written by", "tandem " + info.version);
-  for (const auto& [key, value] : file.result()) facts.add(key, value);
+  for (const auto& [key, value] : file.result()) {
+    if (key != "data_sha256") facts.add(key, value);  // computed anew below
+  }
   facts.add("data sha256", file.data_sha256());
   facts.print(out);
   Table table({"topic", "messages", "from [s]", "to [s]", "fields"});

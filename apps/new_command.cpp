@@ -10,6 +10,7 @@
 #include "apps/console.hpp"
 #include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
+#include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "scaffold/new_robot.hpp"
 
@@ -133,14 +134,14 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
 }
 
 void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
-  facts.add("robot", fmt::format("{}: {} joints, {:.2f} kg", robot.config.name,
-                                 robot.config.joints.size(), robot.mass_kg));
+  facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
+                                 counted(robot.config.joints.size(), "joint"), robot.mass_kg));
   for (const std::string& remark : robot.remarks) facts.add("", remark);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
     facts.add("foot " + foot.name,
-              fmt::format("{}, {} contact point{}{}", robot.tree.links[foot.link].name,
-                          foot.points.size(), foot.points.size() == 1 ? "" : "s",
+              fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
+                          counted(foot.points.size(), "contact point"),
                           foot.guess.empty() ? "" : " (guess)"));
   }
   if (robot.stands_m > 0.0) facts.add("stands", fmt::format("root at {:.3f} m", robot.stands_m));
@@ -152,13 +153,13 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
   }
   for (const scaffold::DriveSize& drive : robot.drives) {
     facts.add("drive " + drive.actuator.name,
-              fmt::format("{} joints, {}", drive.joints.size(), drive.remark));
+              fmt::format("{}, {}", counted(drive.joints.size(), "joint"), drive.remark));
   }
   if (const auto loads = hal::can::bus_loads(robot.config, kPeriod_ns)) {
     for (const hal::can::BusLoad& load : *loads) {
       const auto boards = std::ranges::count(robot.config.boards, load.bus, &hal::BoardConfig::bus);
       facts.add("bus " + load.bus,
-                fmt::format("{} boards, load {:.0f} %", boards, 100.0 * load.load));
+                fmt::format("{}, load {:.0f} %", counted(static_cast<std::uint64_t>(boards), "board"), 100.0 * load.load));
     }
   }
 }

@@ -11,11 +11,13 @@
 #include "apps/bus_watch.hpp"
 #include "apps/remote_link.hpp"
 #include "apps/round_trips.hpp"
+#include "base/counted.hpp"
 
 namespace tandem::apps {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kMillimetres = 1e3;
 constexpr std::size_t kJointsShown = 5;
 
 double weight_N(const tandem_kernels& k) {
@@ -90,24 +92,40 @@ std::string microseconds(const rt::Percentiles& p) {
                      us(p.max));
 }
 
+/// Whether a joint's positions are metres.
+bool slides(const model::Tree& tree, const std::string& joint) {
+  const int index = tree.joint_index(joint);
+  return index >= 0 &&
+         tree.joints[static_cast<std::size_t>(index)].type == model::JointType::kPrismatic;
+}
+
 void print_worst_joints(const RunSummary& s, std::FILE* out) {
   struct Row {
     std::string joint;
+    bool slides = false;
     runtime::TrackingError error;
   };
   std::vector<Row> rows;
   const auto tracking = s.cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
-    rows.push_back({s.composition.experiment.robot.joints[i].name, tracking[i]});
+    const std::string& joint = s.composition.experiment.robot.joints[i].name;
+    rows.push_back({joint, slides(s.composition.tree, joint), tracking[i]});
   }
+  if (rows.empty()) return;
   std::ranges::stable_sort(rows, std::ranges::greater{},
                            [](const Row& r) { return r.error.rms_rad; });
-  Table table({"worst joints", "rms [deg]", "max [deg]"});
-  for (std::size_t i = 0; i < std::min(kJointsShown, rows.size()); ++i) {
-    table.add({rows[i].joint, fmt::format("{:.3f}", rows[i].error.rms_rad * kDegrees),
-               fmt::format("{:.3f}", rows[i].error.max_rad * kDegrees)});
+  rows.resize(std::min(kJointsShown, rows.size()));
+  const bool any_slides = std::ranges::any_of(rows, &Row::slides);
+  const bool mixed = any_slides && !std::ranges::all_of(rows, &Row::slides);
+  const char* unit = mixed ? "" : (any_slides ? " [mm]" : " [deg]");
+  Table table({"worst joints", fmt::format("rms{}", unit), fmt::format("max{}", unit)});
+  for (const Row& row : rows) {
+    const double factor = row.slides ? kMillimetres : kDegrees;
+    const char* own = !mixed ? "" : (row.slides ? " mm" : " deg");
+    table.add({row.joint, fmt::format("{:.3f}{}", row.error.rms_rad * factor, own),
+               fmt::format("{:.3f}{}", row.error.max_rad * factor, own)});
   }
-  if (table.rows() > 0) table.print(out);
+  table.print(out);
 }
 
 }  // namespace
@@ -161,6 +179,7 @@ Json RunSummary::json() const {
 void RunSummary::print(std::FILE* out) const {
   print_worst_joints(*this, out);
   print_loops(*this, out);
+  if (!cycle.faults().empty()) fmt::print(out, "\n");
   print_faults(faults_json(cycle.faults()), out);
   fmt::print(out, "\n");
   if (composition.master != nullptr && composition.backend->waits_for_bus()) {
@@ -183,8 +202,8 @@ void RunSummary::print(std::FILE* out) const {
   const rt::LoopStatistics& loop = cycle.loop();
   const bool wall_clock = composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
-    facts.add("ran", fmt::format("{:.3f} s, {} cycles, {} skipped", wall_s, cycle.running_cycles(),
-                                 loop.skipped));
+    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", wall_s,
+                                 counted(cycle.running_cycles(), "cycle"), loop.skipped));
   } else {
     facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
                                        wall_s > 0.0 ? sim_s() / wall_s : 0.0));

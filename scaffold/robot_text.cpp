@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/counted.hpp"
 #include "scaffold/new_robot.hpp"
 
 namespace tandem::scaffold {
@@ -54,7 +55,8 @@ class Writer {
   }
 
   void head() {
-    line("# {}: {} joints, {} base, {:.2f} kg.", robot_.config.name, robot_.config.joints.size(),
+    line("# {}: {}, {} base, {:.2f} kg.", robot_.config.name,
+         counted(robot_.config.joints.size(), "joint"),
          robot_.config.model.floating_base ? "floating" : "fixed", robot_.mass_kg);
     line("# Written by `tandem new` from {}. The description keeps its own licence: put its",
          source_);

@@ -13,6 +13,9 @@ class LogAndReport : public Program {
     const Outcome outcome = tandem("run trajectory.toml --duration 0.5 --quiet");
     ASSERT_EQ(outcome.status, 0) << outcome.err;
   }
+  [[nodiscard]] nlohmann::json json_of_info() const {
+    return nlohmann::json::parse(tandem("log info " + log_ + " --json -").out);
+  }
   const std::string log_ = "runs/double_pendulum-trajectory-001.mcap";
 };
 
@@ -24,6 +27,16 @@ TEST_F(LogAndReport, InfoTellsTopicsAndMetadata) {
   EXPECT_EQ(json["metadata"]["robot"], "double_pendulum");
   EXPECT_GE(json["topics"]["/tandem/state"]["messages"], 500);
   EXPECT_EQ(json["data_sha256"].get<std::string>().size(), 64U);
+}
+
+TEST_F(LogAndReport, InfoTellsTheHashOnce) {
+  const Outcome outcome = tandem("log info " + log_);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::string hash = json_of_info()["data_sha256"];
+  const std::size_t first = outcome.out.find(hash);
+  ASSERT_NE(first, std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find(hash, first + 1), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("double_pendulum, 2 joints, 0 sensors"), std::string::npos);
 }
 
 TEST_F(LogAndReport, CsvWritesTheFieldsAskedFor) {

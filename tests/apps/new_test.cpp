@@ -51,6 +51,34 @@ TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
   }
 }
 
+TEST_F(New, WhatSlidesIsShownInMillimetresAndNewtons) {
+  write_text(folder_ / "cart.urdf", R"(<robot name="cart">
+  <link name="rail"/>
+  <link name="wagon"><inertial><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="pole"><inertial><origin xyz="0 0 -0.2"/><mass value="0.5"/>
+    <inertia ixx="0.005" iyy="0.005" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="drive" type="prismatic"><parent link="rail"/><child link="wagon"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="50" velocity="1"/></joint>
+  <joint name="swing" type="revolute"><parent link="wagon"/><child link="pole"/>
+    <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="5" velocity="3"/></joint>
+</robot>)");
+  const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  Outcome outcome = tandem("new cart.urdf -o cart", cache);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  outcome = tandem("run cart/move.toml --duration 2 --log . --report", cache);
+  ASSERT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+  const auto line = [&outcome](const std::string& joint) {
+    const std::size_t at = outcome.out.find("\n  " + joint) + 1;
+    return outcome.out.substr(at, outcome.out.find('\n', at) - at);
+  };
+  EXPECT_EQ(line("drive").substr(line("drive").size() - 3), " mm") << outcome.out;
+  EXPECT_EQ(line("swing").substr(line("swing").size() - 4), " deg") << outcome.out;
+  const std::string page = read_text(folder_ / "cart-move-001/report.html");
+  EXPECT_NE(page.find(" mm</td>"), std::string::npos);
+  EXPECT_NE(page.find(" N</td>"), std::string::npos);
+}
+
 TEST_F(New, WritesOverNothingWithoutForce) {
   EXPECT_EQ(tandem("new double_pendulum.urdf").status, 0);
   write_text(folder_ / "double_pendulum/hold.toml", "mine");

@@ -102,6 +102,15 @@ TEST_F(Run, OfAScenarioEndsInItsFaultWhichTheLogTells) {
       << events.out << events.err;
 }
 
+TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
+  std::ofstream(folder_ / "faults.toml")
+      << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint2\"\nafter_enabled_s = 1.2\n";
+  const Outcome outcome = tandem("run hold.toml --duration 1 --scenario faults.toml");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.out.find("\n\n  faults "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" joint   board    cause"), std::string::npos) << outcome.out;
+}
+
 TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
   std::ofstream(folder_ / "faults.toml")
       << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint3\"\n";
