@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/ahead.hpp"
 #include "scaffold/contact_points.hpp"
 #include "scaffold/posture.hpp"
 #include "scaffold/words.hpp"
@@ -18,7 +19,6 @@ using model::Placement;
 using model::Tree;
 
 constexpr double kLowestShare = 0.1;  // of the height: ends so near to the lowest are feet, too
-constexpr double kAhead_m = 0.005;    // a sole so far ahead of its ankle shows where ahead is
 constexpr double kSoleLink_m = 0.03;  // a link called sole so near to the geometry sets the level
 constexpr double kLevel = 0.98;       // cosine: a frame within 11 degrees of level
 
@@ -163,19 +163,14 @@ std::vector<Foot> find_feet(const Tree& tree, const Outfit& outfit, const Posed&
   return feet;
 }
 
-Vector3d direction_ahead(const Tree&, const std::vector<Foot>& feet, const Posed& neutral) {
-  Vector3d reach = Vector3d::Zero();
-  double count = 0.0;
+Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {
+  std::vector<model::FootReach> reach;
   for (const Foot& foot : feet) {
     if (!foot.flat()) continue;
-    reach += (neutral.link(foot.link) * foot.sole_in_link).p - neutral.origin(foot.body - 1);
-    count += 1.0;
+    reach.push_back({neutral.origin(foot.body - 1),
+                     (neutral.link(foot.link) * foot.sole_in_link).p});
   }
-  reach.z() = 0.0;
-  if (count == 0.0 || reach.norm() < kAhead_m * count) return Vector3d::UnitX();
-  Eigen::Index axis = 0;
-  reach.cwiseAbs().maxCoeff(&axis);
-  return Vector3d::Unit(axis) * (reach[axis] > 0.0 ? 1.0 : -1.0);
+  return model::direction_ahead(reach);
 }
 
 void face_ahead(const Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet) {

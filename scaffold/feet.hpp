@@ -33,10 +33,8 @@ enum class FeetBy : std::uint8_t {
 [[nodiscard]] std::vector<Foot> find_feet(const model::Tree& tree, const Outfit& outfit,
                                           const Posed& neutral, FeetBy by);
 
-/// Where the robot looks: along the feet if they reach ahead of their ankles, else the root's x.
-/// One of the root's axes, in W.
-[[nodiscard]] Eigen::Vector3d direction_ahead(const model::Tree& tree,
-                                              const std::vector<Foot>& feet, const Posed& neutral);
+/// Where the robot looks, by model::direction_ahead(): one of the root's axes, in W.
+[[nodiscard]] Eigen::Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral);
 
 /// Turns every sole's frame so that x is ahead, in the posture in which it is level.
 void face_ahead(const Eigen::Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet);

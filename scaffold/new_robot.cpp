@@ -148,7 +148,7 @@ Status Maker::choose_base() {
     auto found = read_tree(true);
     if (!found) return std::unexpected(found.error().front());
     robot_.tree = std::move(found->tree);
-    robot_.ahead = direction_ahead(robot_.tree, robot_.feet, posed);
+    robot_.ahead = direction_ahead(robot_.feet, posed);
     face_ahead(robot_.ahead, posed, robot_.feet);
   }
   robot_.limbs = split_limbs(robot_.tree, robot_.feet, posed, robot_.ahead);
