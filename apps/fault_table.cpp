@@ -35,7 +35,7 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
 
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
-  Table table({"faults", "joint", "board", "cause", "category", "reaction", "state"});
+  Table table({"faults, from the first SYNC", "joint", "board", "cause", "category", "reaction", "state"});
   table.align_left();
   for (const Json& fault : faults) {
     const bool latched = fault.value("latched", true);

@@ -162,7 +162,7 @@ void add_figures(const LatencySample& sample, std::vector<report::Figure>& figur
   tail.x_label = "latency [us]";
   tail.y_label = "share of wake-ups";
   tail.log_axes = true;
-  tail.levels = {{"p99", 1e-2, false}, {"p99.9", 1e-3, false}};
+  tail.levels = {{"p99", 1e-2}, {"p99.9", 1e-3}};
   const auto add = [&](const Bins& bins, const char* label, CurveStyle style) {
     histogram.curves.push_back(histogram_curve(bins, label, style));
     tail.curves.push_back(tail_curve(bins, label, style));

@@ -5,6 +5,7 @@
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
 #include "apps/kernel_store.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
 #include "report/report.hpp"
 
 namespace tandem::apps {
@@ -28,7 +29,8 @@ Result<report::ReportFiles> draw_report(const ReportOptions& options) {
     return kernels.get();
   };
   const std::string folder = options.output.empty() ? default_folder(options.log) : options.output;
-  return report::make_report(options.log, options.other, folder, find);
+  return report::make_report(options.log, options.other, folder, find,
+                             hal::can::DriveMaster::error_text);
 }
 
 Exit report_command(const ReportOptions& options) {

@@ -41,9 +41,7 @@ std::vector<std::string> files_in(const std::string& folder, Takes takes) {
 }
 
 /// As a shell takes it.
-std::string quoted(const std::string& file) {
-  return file.contains(' ') ? "'" + file + "'" : file;
-}
+std::string quoted(const std::string& file) { return file.contains(' ') ? "'" + file + "'" : file; }
 
 std::string to_type(const std::vector<std::string>& files, const std::string& command) {
   std::string text = "type: ";

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -37,11 +38,16 @@ struct Note {
   double y = 0.0;
 };
 
-/// A horizontal line across the plot, with its label at the right end.
+/// A horizontal line across the plot; its label stands in the key.
 struct Level {
-  std::string label;
+  std::string label;  ///< empty: none
   double y = 0.0;
-  bool label_below = false;
+};
+
+/// A vertical line at a moment, its label in the key.
+struct Mark {
+  std::string label;  ///< empty: none
+  double x = 0.0;
 };
 
 struct Figure {
@@ -51,7 +57,11 @@ struct Figure {
   std::string y_label;  ///< with unit
   std::vector<Curve> curves;
   std::vector<Level> levels;
+  std::vector<Mark> marks;
   std::vector<Note> notes;
+  double range_until_x = std::numeric_limits<double>::infinity();  ///< what lies beyond it, as what
+                                                                   ///< follows a fault, does not
+                                                                   ///< widen the range of y
   bool log_axes = false;    ///< both logarithmic; only what is positive is drawn
   bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
 };

@@ -12,7 +12,9 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
-#include <limits>
+#include <string_view>
+
+#include "report/layout.hpp"
 
 extern char** environ;
 
@@ -27,7 +29,6 @@ set border 3 lw 1 lc rgb '#5b6470'
 set tics nomirror out scale 0.6 textcolor rgb '#3a424c'
 set grid lw 1 lc rgb '#e3e7ec' lt 1 dt solid
 set xlabel textcolor rgb '#3a424c'
-set ylabel textcolor rgb '#3a424c'
 set style line 1 lw 3.4 lc rgb '#1f5fa8' dt solid
 set style line 2 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
 set style line 3 lw 1.7 lc rgb '#ff9d2e' dt (8,6)
@@ -40,17 +41,27 @@ set style line 9 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
 set style line 10 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
 set style line 11 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
 set style line 12 lw 1.8 lc rgb "#3a424c" dt (3,4)
-set key at graph 0, graph 1.085 left top horizontal reverse Left samplen 1.8 font ',12'
+set style line 13 lw 1.8 lc rgb "#c0392b" dt solid
 )";
 
 int line_style(CurveStyle style) { return static_cast<int>(style) + 1; }
 
-/// A gnuplot text in double quotes, without enhanced markup.
+/// A gnuplot text, in double quotes. What could mean anything to gnuplot, which runs what stands
+/// between backquotes, is written in octal: names come from logs that anybody may have made.
 std::string quoted(const std::string& text) {
+  constexpr std::string_view kPlain = " _-.,:()[]/+";
   std::string out = "\"";
   for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
+    const auto code = static_cast<unsigned char>(c);
+    const bool plain = code >= 0x80 || (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') ||
+                       (c >= 'a' && c <= 'z') || kPlain.find(c) != std::string_view::npos;
+    if (code < 0x20 || code == 0x7F) {
+      out += ' ';
+    } else if (plain) {
+      out += c;
+    } else {
+      out += fmt::format("\\{:03o}", code);
+    }
   }
   return out + "\"";
 }
@@ -69,102 +80,76 @@ std::string data_block(const std::string& name, const Curve& curve) {
   return out + "EOD\n";
 }
 
-struct Extent {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  void include(double value) {
-    if (!std::isfinite(value)) return;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  /// A margin of `share` on both sides; at least something when all values are equal.
-  void widen(double share) {
-    if (!(low <= high)) low = high = 0.0;
-    const double margin = std::max((high - low) * share, 1e-6 + 1e-3 * std::abs(high));
-    low -= margin;
-    high += margin;
-  }
-};
-
-/// Both axes logarithmic: half as much again beyond the positive values.
-std::string log_ranges(const Figure& figure) {
-  Extent x;
-  Extent y;
-  for (const Curve& curve : figure.curves) {
-    for (const double value : curve.x) x.include(value > 0.0 ? value : NAN);
-    for (const double value : curve.y) y.include(value > 0.0 ? value : NAN);
-  }
-  for (const Level& level : figure.levels) y.include(level.y);
-  if (!(x.low <= x.high)) x = {1.0, 10.0};
-  if (!(y.low <= y.high)) y = {1.0, 10.0};
-  return fmt::format(
-      "set logscale xy\nset format y '%g'\nset xrange [{:.6g}:{:.6g}]\nset yrange "
-      "[{:.6g}:{:.6g}]\n",
-      x.low / 1.5, x.high * 1.5, y.low / 1.5, y.high * 1.5);
-}
-
-/// Ranges of both axes. With equal axes the room beside the figure is shared on both sides.
-/// @param aspect  width by height of the drawing area.
-std::string ranges(const Figure& figure, double aspect) {
-  if (figure.log_axes) return log_ranges(figure);
-  Extent x;
-  Extent y;
-  for (const Curve& curve : figure.curves) {
-    for (const double value : curve.x) x.include(value);
-    for (const double value : curve.y) y.include(value);
-  }
-  for (const Level& level : figure.levels) y.include(level.y);
-  for (const Note& note : figure.notes) y.include(note.y);
-  y.widen(0.08);
-  if (figure.equal_axes) {
-    const double wide = std::max(1.06 * (x.high - x.low), aspect * (y.high - y.low));
-    const double more = 0.5 * (wide - (x.high - x.low));
-    x = {x.low - more, x.high + more};
-    y.high = y.low + wide / aspect;
-  } else {
-    x.widen(0.0);
-  }
-  return fmt::format("set xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\n", x.low, x.high,
-                     y.low, y.high);
-}
-
 std::string plot_command(const Figure& figure, std::size_t index) {
   std::string out;
+  const auto add = [&out](const std::string& what, const std::string& label) {
+    out += (out.empty() ? "plot " : ", ") + what +
+           (label.empty() ? " notitle" : " title " + quoted(label) + " noenhanced");
+  };
   for (std::size_t i = 0; i < figure.curves.size(); ++i) {
     const Curve& curve = figure.curves[i];
     const bool stick = curve.style >= CurveStyle::kStick;
-    const std::string title =
-        curve.label.empty() ? "notitle" : "title " + quoted(curve.label) + " noenhanced";
-    out += fmt::format("{}{} using 1:2 with {} ls {} {}", out.empty() ? "plot " : ", ",
-                       block_name(index, i), stick ? "linespoints" : "lines",
-                       line_style(curve.style), title);
+    add(fmt::format("{} using 1:2 with {} ls {}", block_name(index, i),
+                    stick ? "linespoints" : "lines", line_style(curve.style)),
+        curve.label);
   }
   for (const Level& level : figure.levels) {
-    out += fmt::format("{}{:.9g} with lines ls 12 notitle", out.empty() ? "plot " : ", ", level.y);
+    add(fmt::format("{:.9g} with lines ls 12", level.y), level.label);
+  }
+  for (const Mark& mark : figure.marks) {  // the line itself is an arrow; this is its key
+    if (!mark.label.empty()) add("NaN with lines ls 13", mark.label);
   }
   return out + "\n";
 }
 
+std::string axes_text(const Figure& figure, const Axes& axes) {
+  std::string out = fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\n",
+                                axes.x.low, axes.x.high, axes.y.low, axes.y.high);
+  out += figure.log_axes ? "set logscale xy\n" : "unset logscale\n";
+  if (figure.log_axes || axes.step == 0.0) {
+    out += "set format y '%g'\nset ytics nomirror autofreq\n";
+  } else {
+    out += fmt::format("set format y '%.{}f'\nset ytics nomirror {:.12g},{:.12g},{:.12g}\n",
+                       axes.decimals, axes.lowest, axes.step, axes.y.high);
+  }
+  return out + (figure.equal_axes
+                    ? "unset xtics\n"
+                    : "set xtics nomirror autofreq textcolor rgb '#3a424c'\nset format x\n");
+}
+
 /// Everything of one figure but terminal and output.
-std::string body(const Figure& figure, std::size_t index, double aspect) {
-  std::string out = "unset label\nunset logscale\nset format y\n" + ranges(figure, aspect);
+std::string body(const Figure& figure, std::size_t index, const Cell& cell) {
+  Axes axes = axes_of(figure);
+  const Layout at = layout_of(figure, axes, cell);
+  if (figure.equal_axes) make_equal(axes, at);
+  const auto x = [&cell](double pixels) { return pixels / cell.picture_width; };
+  const auto y = [&cell](double pixels) { return pixels / cell.picture_height; };
+  std::string out = fmt::format(
+      "unset label\nunset arrow\nset lmargin at screen {:.6f}\nset rmargin at screen {:.6f}\n"
+      "set bmargin at screen {:.6f}\nset tmargin at screen {:.6f}\n",
+      x(at.left), x(at.right), y(at.bottom), y(at.top));
+  out += axes_text(figure, axes);
   out += fmt::format(
-      "set label 1 {} at graph 0, graph 1.145 left font ',15' "
+      "set key at screen {:.6f},{:.6f} left top horizontal maxcols {} reverse Left samplen 1.8 "
+      "font ',{:.0f}'\n",
+      x(at.left), y(at.key_y), at.key_columns, kKeyFont);
+  out += fmt::format(
+      "set label 1 {} at screen {:.6f},{:.6f} left font ',{:.1f}' "
       "textcolor rgb '#1d242c' noenhanced\n",
-      quoted(figure.title));
+      quoted(figure.title), x(at.left), y(at.title_y), at.title_font);
+  out += fmt::format(
+      "set label 2 {} at screen {:.6f},{:.6f} center rotate by 90 textcolor rgb '#3a424c' "
+      "noenhanced\n",
+      quoted(figure.y_label), x(at.label_x), y(0.5 * (at.bottom + at.top)));
   for (const Note& note : figure.notes) {
     out += fmt::format("set label {} at {:.6g},{:.6g} center textcolor rgb '#3a424c' noenhanced\n",
                        quoted(note.text), note.x, note.y);
   }
-  for (const Level& level : figure.levels) {
-    out += fmt::format(
-        "set label {} at graph 0.99, first {:.9g} right offset 0,{} font ',12' "
-        "textcolor rgb '#3a424c' noenhanced front\n",
-        quoted(level.label), level.y, level.label_below ? "-0.7" : "0.65");
+  for (const Mark& mark : figure.marks) {
+    out += fmt::format("set arrow from {0:.9g}, graph 0 to {0:.9g}, graph 1 nohead ls 13 front\n",
+                       mark.x);
   }
-  out += fmt::format("set xlabel {} noenhanced\nset ylabel {} noenhanced\n", quoted(figure.x_label),
-                     quoted(figure.y_label));
-  out += figure.equal_axes ? "set format x ''\n" : "set format x\n";
+  out += fmt::format("set xlabel {} noenhanced\n", quoted(figure.x_label));
   return out + plot_command(figure, index);
 }
 
@@ -172,20 +157,17 @@ std::string body(const Figure& figure, std::size_t index, double aspect) {
 std::string overview(std::span<const Figure> figures, const std::string& folder) {
   constexpr double kWidth = 1800.0;
   constexpr double kRowHeight = 560.0;
-  constexpr double kTop = 0.17, kBottom = 0.13, kBetween = 0.30;  // shares of a row
-  const double rows = static_cast<double>((figures.size() + 1) / 2);
-  const double plot_height = (rows - kTop - kBottom - kBetween * (rows - 1.0)) / rows * kRowHeight;
-  const double aspect = (0.985 - 0.06 - 0.08) / 2.0 * kWidth / plot_height;
-  std::string out = "unset lmargin\nunset rmargin\nunset bmargin\nunset tmargin\n";
-  out += fmt::format(
+  const std::size_t rows = (figures.size() + 1) / 2;
+  const double height = kRowHeight * static_cast<double>(rows);
+  std::string out = fmt::format(
       "set terminal pngcairo size {:.0f},{:.0f} fontscale 1.15 linewidth 1.4 rounded "
-      "font 'DejaVu Sans,13'\nset output {}\n",
-      kWidth, rows * kRowHeight, quoted(folder + "/overview.png"));
-  out += fmt::format(
-      "set multiplot layout {:.0f},2 margins 0.06,0.985,{:.4f},{:.4f} "
-      "spacing 0.08,{:.4f}\n",
-      rows, kBottom / rows, 1.0 - kTop / rows, kBetween / rows);
-  for (std::size_t f = 0; f < figures.size(); ++f) out += body(figures[f], f, aspect);
+      "font 'DejaVu Sans,13'\nset output {}\nset multiplot\n",
+      kWidth, height, quoted(folder + "/overview.png"));
+  for (std::size_t f = 0; f < figures.size(); ++f) {
+    const double left = f % 2 == 0 ? 0.0 : 0.5 * kWidth;
+    const double bottom = height - kRowHeight * static_cast<double>(f / 2 + 1);
+    out += body(figures[f], f, {kWidth, height, left, bottom, 0.5 * kWidth, kRowHeight, 20.0});
+  }
   return out + "unset multiplot\nunset output\n";
 }
 
@@ -257,13 +239,9 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
       out += data_block(block_name(f, c), decimated(figures[f].curves[c], kMostPoints));
     }
   }
-  constexpr double kSingleAspect = (0.975 - 0.105) * 760.0 / ((0.84 - 0.145) * 430.0);
   for (std::size_t f = 0; f < figures.size(); ++f) {
-    const std::string drawing = body(figures[f], f, kSingleAspect);
+    const std::string drawing = body(figures[f], f, {760.0, 430.0, 0.0, 0.0, 760.0, 430.0, 13.0});
     const std::string path = folder + "/" + figures[f].name;
-    out +=
-        "set lmargin at screen 0.105\nset rmargin at screen 0.975\n"
-        "set bmargin at screen 0.145\nset tmargin at screen 0.84\n";
     out +=
         "set terminal svg size 760,430 dynamic rounded font 'DejaVu Sans,13' background "
         "rgb '#ffffff'\n";
@@ -279,7 +257,9 @@ std::string gnuplot_script(std::span<const Figure> figures, const std::string& f
 Status draw(std::span<const Figure> figures, const std::string& folder) {
   if (figures.empty()) return fail("there is nothing to draw");
   const std::string complaints = folder + "/gnuplot.err";
-  Status drawn = run_gnuplot(gnuplot_script(figures, folder), complaints);
+  // Absolute: gnuplot takes a name that begins with | for a command.
+  const std::string path = std::filesystem::absolute(folder).string();
+  Status drawn = run_gnuplot(gnuplot_script(figures, path), complaints);
   if (!drawn && drawn.error().hint.empty()) drawn.error().hint = read_text(complaints);
   std::error_code ignored;
   std::filesystem::remove(complaints, ignored);

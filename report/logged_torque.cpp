@@ -105,9 +105,10 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
   motion.step_s = run.step_s * static_cast<double>(stride);
   Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
   const std::vector<int> feet = feet_of_wrenches(run, kernels);
-  for (std::size_t row = 0; row < run.rows(); row += stride) {
+  const bool ground_known = run.truth() || run.robot.contact.feet.empty();
+  for (std::size_t row = 0; row < run.rows_before_fault(); row += stride) {
     add_row(run, row, kernels, *order, *loops, motion);
-    if (run.truth()) motion.wrenches.push_back(ground_wrenches(run, feet, row));
+    if (ground_known) motion.wrenches.push_back(ground_wrenches(run, feet, row));
     curve.x.push_back(run.time_s[row]);
   }
   if (!wrenches_known(kernels, motion)) return fail("the log lacks the ground's forces");

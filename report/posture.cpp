@@ -5,10 +5,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
 
+#include "model/ahead.hpp"
 #include "model/placements.hpp"
 
 namespace tandem::report {
@@ -267,6 +269,36 @@ double position_of(const hal::RobotConfig& robot, const std::string& joint,
   return index < sample.position_rad.size() ? sample.position_rad[index] : 0.0;
 }
 
+/// Where the robot looks, in its root's frame: by the feet's points of contact.
+Eigen::Vector3d ahead_of(const model::Tree& tree, const hal::RobotConfig& robot,
+                         PostureSample sample) {
+  sample.base = {};
+  const auto bodies = body_placements(tree, robot, sample);
+  std::vector<model::FootReach> reach;
+  for (const FootPoints& foot : feet_of(tree, robot, bodies)) {
+    if (foot.points_m.size() <= 2 || foot.body == 0) continue;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& point : foot.points_m) middle += point;
+    reach.push_back({bodies[foot.body].p, middle / static_cast<double>(foot.points_m.size())});
+  }
+  return model::direction_ahead(reach);
+}
+
+/// What passive joints move and nobody knows where it is.
+std::vector<bool> unknown_bodies(const model::Tree& tree, const hal::RobotConfig& robot,
+                                 std::span<const PostureSample> samples) {
+  std::vector<bool> unknown(tree.bodies.size(), false);
+  const std::size_t all = robot.joints.size() + robot.passive.size();
+  const bool known = std::ranges::all_of(
+      samples, [all](const PostureSample& sample) { return sample.position_rad.size() >= all; });
+  for (std::size_t j = 0; !known && j < tree.joints.size(); ++j) {
+    const bool passive = std::ranges::find(robot.passive, tree.joints[j].name,
+                                           &hal::PassiveConfig::name) != robot.passive.end();
+    unknown[j + 1] = passive || unknown[static_cast<std::size_t>(tree.joints[j].parent)];
+  }
+  return unknown;
+}
+
 }  // namespace
 
 std::vector<model::Placement> body_placements(const model::Tree& tree,
@@ -278,24 +310,34 @@ std::vector<model::Placement> body_placements(const model::Tree& tree,
   return model::place_bodies(tree, position, sample.base);
 }
 
-Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
+Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configured,
                       std::span<const PostureSample> moments) {
+  const std::vector<bool> unknown = unknown_bodies(tree, configured, moments);
+  const bool leaves_out = std::ranges::find(unknown, true) != unknown.end();
+  hal::RobotConfig robot = configured;
+  if (leaves_out) robot.loops.clear();
   const bool legged = !robot.contact.feet.empty();
   const bool from_front = !legged && moves_sideways(tree, robot, moments);
   std::vector<PostureSample> samples(moments.begin(), moments.end());
-  if (from_front) {  // W's y is drawn to the right
-    const Eigen::AngleAxisd view(-0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ());
-    const model::Placement turned{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
-    for (PostureSample& sample : samples) sample.base = turned * sample.base;
-  }
+  // What is drawn to the right: ahead or, from the front, W's y.
+  const Eigen::Vector3d right = from_front ? Eigen::Vector3d(Eigen::Vector3d::UnitY())
+                                           : ahead_of(tree, robot, samples.front());
+  const Eigen::AngleAxisd view(-std::atan2(right.y(), right.x()), Eigen::Vector3d::UnitZ());
+  const model::Placement turned{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
+  for (PostureSample& sample : samples) sample.base = turned * sample.base;
   Figure figure;
   figure.name = "posture";
   figure.title =
       from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
+  if (leaves_out) figure.title += ", without what passive joints move";
   figure.y_label = "z [m]";
   figure.equal_axes = true;
   Sticks sticks(legged ? "trunk" : robot.name);
-  const std::vector<Limb> limbs = limbs_of(tree, robot);
+  std::vector<Limb> limbs = limbs_of(tree, robot);
+  for (Limb& limb : limbs) {
+    std::erase_if(limb.bodies, [&](int body) { return unknown[static_cast<std::size_t>(body)]; });
+  }
+  std::erase_if(limbs, [](const Limb& limb) { return limb.bodies.size() < 2; });
   const auto [low, high, middle_m, pitch_m, line_m] = spread(tree, robot, samples);
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
@@ -304,7 +346,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
     figure.notes.push_back({samples[s].label, x, low - line_m});
     figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x, low - 2.0 * line_m});
   }
-  if (legged) figure.levels.push_back({"ground", robot.contact.height_m, false});
+  if (legged) figure.levels.push_back({"ground", robot.contact.height_m});
   for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {
     if (!curve->x.empty()) figure.curves.push_back(std::move(*curve));
   }

@@ -12,8 +12,8 @@
 
 namespace tandem::report {
 
-/// One moment of a run. Joints stand in the process image's order, the passive ones behind them; a
-/// joint without a value stands at 0.
+/// One moment of a run. Joints stand in the process image's order, the passive ones behind them,
+/// unless nobody knows where those are.
 struct PostureSample {
   std::string label;  ///< "lowest"
   double time_s = 0.0;
@@ -21,15 +21,17 @@ struct PostureSample {
   std::vector<double> position_rad;
 };
 
-/// The side view, x to the right and z up, of several moments beside each other: legs (what
+/// The side view from the robot's right, ahead to the right (model::direction_ahead() of its feet)
+/// and z up, of several moments beside each other: legs (what
 /// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet is
 /// dark as a whole, and if it moves more to its sides than ahead, it is seen from the front, y to
-/// the right. Closed loops are drawn over their sites, with a rod between them if there is one.
+/// the right. Closed loops are drawn over their sites, with a rod between them if there is one;
+/// where the passive joints are unknown, what they move is left out, and the title says so.
 /// @pre every joint of the tree is one of the robot's, or passive.
 [[nodiscard]] Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& robot,
                                     std::span<const PostureSample> moments);
 
-/// Placement in W of every body's frame, in the tree's order.
+/// Placement in W of every body's frame, in the tree's order. A joint without a value stands at 0.
 [[nodiscard]] std::vector<model::Placement> body_placements(const model::Tree& tree,
                                                             const hal::RobotConfig& robot,
                                                             const PostureSample& sample);

@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 
+#include "base/counted.hpp"
+#include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
 #include "report/run_figures.hpp"
@@ -15,18 +18,39 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
+/// What, which joint, when: of the first few, which the others mostly follow from.
+void add_faults(const RunData& run, const std::string& side, Facts& facts) {
+  constexpr std::size_t kMost = 5;
+  for (std::size_t i = 0; i < std::min(kMost, run.faults.size()); ++i) {
+    const RunFault& fault = run.faults[i];
+    facts.emplace_back("fault" + side,
+                       fmt::format("{}{}{}, at {:.3f} s", fault.joint,
+                                   fault.joint.empty() ? "" : ": ", fault.text, fault.time_s));
+  }
+  if (run.faults.size() > kMost) {
+    facts.emplace_back("fault" + side, fmt::format("{} more", run.faults.size() - kMost));
+  }
+}
+
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("log" + side, run.path + (run.truncated ? " (its run was killed)" : ""));
+  add_faults(run, side, facts);
   const std::size_t passive = run.robot.passive.size();
-  facts.emplace_back("robot" + side,
-                     fmt::format("{}, {} joints{}", run.info.robot, run.info.joints.size(),
-                                 passive == 0 ? "" : fmt::format(", {} more passive", passive)));
+  facts.emplace_back(
+      "robot" + side,
+      fmt::format("{}, {}{}", run.info.robot, counted(run.info.joints.size(), "joint"),
+                  passive == 0 ? "" : fmt::format(", {} more passive", passive)));
   facts.emplace_back("backend" + side, run.info.hal);
   facts.emplace_back("seed" + side, std::to_string(run.info.seed));
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
-  facts.emplace_back("controllers ran" + side,
-                     fmt::format("{:.3f} s", run.controllers_ran ? run.time_s.back() : 0.0));
+  const double start_s = run.time_s.front();
+  const double ran_s =
+      run.controllers_ran ? run.time_s[run.rows_before_fault() - 1] - start_s : 0.0;
+  if (run.controllers_ran) {
+    facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
+  }
+  facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", ran_s));
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {
@@ -41,12 +65,19 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
                   "and the largest measured torque. The worst first.",
                   {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
                   {}};
-  for (const Tracking& one : run.tracking()) {
+  if (!run.faults.empty()) table.caption += " Until the first fault.";
+  const std::vector<Tracking> joints = run.tracking();
+  const bool all_slide = !joints.empty() && std::ranges::all_of(joints, &Tracking::slides);
+  const bool mixed = !all_slide && std::ranges::any_of(joints, &Tracking::slides);
+  if (all_slide) table.header = {"joint", "rms [mm]", "max [mm]", "max force [N]"};
+  if (mixed) table.header = {"joint", "rms", "max", "max torque or force"};
+  for (const Tracking& one : joints) {
     const double factor = one.slides ? 1e3 : kDegrees;
-    const char* unit = one.slides ? " mm" : "";
-    table.rows.push_back({one.joint, fmt::format("{:.4f}{}", one.rms_rad * factor, unit),
-                          fmt::format("{:.4f}{}", one.max_rad * factor, unit),
-                          fmt::format("{:.2f}{}", one.max_torque_Nm, one.slides ? " N" : "")});
+    const char* unit = !mixed ? "" : (one.slides ? " mm" : " deg");
+    table.rows.push_back(
+        {one.joint, fmt::format("{:.4f}{}", one.rms_rad * factor, unit),
+         fmt::format("{:.4f}{}", one.max_rad * factor, unit),
+         fmt::format("{:.2f}{}", one.max_torque_Nm, !mixed ? "" : (one.slides ? " N" : " Nm"))});
   }
   return table;
 }
@@ -106,13 +137,19 @@ Page page_of(const RunData& run, const RunData* other) {
   page.title = other == nullptr ? fmt::format("{}: {}", run.info.robot,
                                               std::filesystem::path(run.path).stem().string())
                                 : fmt::format("{}: two runs", run.info.robot);
-  page.lead = run.controllers_ran
-                  ? "Time 0 is the first cycle of the controllers, after the drives' bring-up."
-                  : "The run ended before its controllers started: time 0 is the drives' bring-up.";
+  page.lead = "Times count from the run's first SYNC, as in the log.";
+  page.lead += run.controllers_ran
+                   ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
+                   : " The run ended before its controllers started.";
   add_facts(run, other == nullptr ? "" : " A", page.facts);
   add_tables(run, other == nullptr ? "" : " A", page);
   if (other == nullptr) return page;
   page.lead += " A is " + run.path + ", B is " + other->path + ".";
+  if (std::abs(other->drawn_later_s) > 0.0) {
+    page.lead += fmt::format(" B is drawn {:.3f} s {}, so that both controllers start together.",
+                             std::abs(other->drawn_later_s),
+                             other->drawn_later_s > 0.0 ? "later" : "earlier");
+  }
   add_facts(*other, " B", page.facts);
   add_tables(*other, " B", page);
   return page;
@@ -121,12 +158,13 @@ Page page_of(const RunData& run, const RunData* other) {
 }  // namespace
 
 Result<ReportFiles> make_report(const std::string& log, const std::string& other,
-                                const std::string& folder, const FindKernels& find_kernels) {
-  const Result<RunData> run = read_run(log);
+                                const std::string& folder, const FindKernels& find_kernels,
+                                const ErrorText& error_text) {
+  Result<RunData> run = read_run(log, error_text);
   if (!run) return std::unexpected(run.error());
-  Result<RunData> second = other.empty() ? Result<RunData>(RunData{}) : read_run(other);
+  Result<RunData> second = other.empty() ? Result<RunData>(RunData{}) : read_run(other, error_text);
   if (!second) return std::unexpected(second.error());
-  const RunData* over = other.empty() ? nullptr : &*second;
+  RunData* over = other.empty() ? nullptr : &*second;
   if (over != nullptr && over->info.joints != run->info.joints) {
     return std::unexpected(Error{"the two logs are of different robots",
                                  "lay runs of one robot over each other",
@@ -147,6 +185,14 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
     files.remarks.push_back(
         "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
   }
+  for (RunData* one : {&*run, over}) {
+    if (one == nullptr) continue;
+    if (const Status closed = kernels == nullptr ? Status{} : close_passive(*one, *kernels);
+        !closed) {
+      files.remarks.push_back("what passive joints move is not drawn: " + closed.error().message);
+    }
+  }
+  if (over != nullptr) over->drawn_later_s = run->time_s.front() - over->time_s.front();
   const std::vector<Figure> figures = figures_of(*run, over, kernels);
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   if (const Status s = write_page(page_of(*run, over), figures, folder); !s) {

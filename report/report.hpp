@@ -22,10 +22,12 @@ struct ReportFiles {
 };
 
 /// Draws the report of `log` (and `other`, when not empty) into `folder`, which is created.
+/// @param error_text  of drives, for the faults; empty: they are told by their codes
 /// Errors: a log that cannot be read; two logs of different robots; gnuplot is missing; the
 /// folder cannot be written.
 [[nodiscard]] Result<ReportFiles> make_report(const std::string& log, const std::string& other,
                                               const std::string& folder,
-                                              const FindKernels& find_kernels);
+                                              const FindKernels& find_kernels,
+                                              const ErrorText& error_text = {});
 
 }  // namespace tandem::report

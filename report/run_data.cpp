@@ -108,28 +108,53 @@ void crop(log::Table& table, double begin_s, double end_s) {
   for (std::vector<double>& column : table.columns) cut(column);
 }
 
+/// How long the plots go on after a fault: a quarter of the time before it, but not for ever.
+double after_fault_s(double before_s) { return std::clamp(0.25 * before_s, 0.1, 1.0); }
+
 struct Window {
   double bring_up_s = -1e300;  ///< its end
   double begin_s = -1e300;
   double end_s = 1e300;
+  double fault_s = 1e300;
 };
 
+bool is_fault(log::EventKind kind) {
+  return kind == log::EventKind::kFault || kind == log::EventKind::kEmergencyStop;
+}
+
+std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
+                                const std::vector<std::string>& joints,
+                                const ErrorText& error_text) {
+  constexpr std::uint32_t kFirstErrorCode = 0x1000;  // CiA 402; below it: other causes' figures
+  std::vector<RunFault> faults;
+  for (const auto& [event, text] : events) {
+    if (!is_fault(event.kind)) continue;
+    RunFault fault{static_cast<double>(event.time_ns) * 1e-9, {}, text};
+    const auto joint = static_cast<std::size_t>(event.joint);
+    const bool of_drive = event.joint >= 0 && joint < joints.size();
+    if (of_drive && event.code >= kFirstErrorCode && error_text) {
+      fault.joint = joints[joint];
+      fault.text = error_text(event.code);
+    }
+    faults.push_back(std::move(fault));
+  }
+  return faults;
+}
+
 /// When controllers ran, as the events tell: after bring-up and `settle_s`.
-Result<Window> window_of(const log::LogFile& file, double settle_s) {
-  const auto events = file.events();
-  if (!events) return std::unexpected(events.error());
+Window window_of(const std::vector<log::EventText>& events, double settle_s) {
   Window window;
   constexpr double kHalfNanosecond = 0.5e-9;
-  for (const log::EventText& one : *events) {
+  for (const log::EventText& one : events) {
     const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
     if (one.event.kind == log::EventKind::kBringUpDone) {
       window.bring_up_s = time_s - kHalfNanosecond;
       window.begin_s = window.bring_up_s + settle_s;
     }
     const bool end = one.event.kind == log::EventKind::kControllersDone ||
-                     one.event.kind == log::EventKind::kStopRequested ||
-                     one.event.kind == log::EventKind::kFault;
+                     one.event.kind == log::EventKind::kStopRequested;
     if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
+    if (is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
   }
   return window;
 }
@@ -145,8 +170,10 @@ Status read_state(const log::LogFile& file, Window& window, RunData& run) {
   auto table = file.read(kState, columns);
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
-  run.controllers_ran = end_s > window.begin_s;
+  run.controllers_ran = std::min(end_s, window.fault_s) > window.begin_s;
   if (!run.controllers_ran) window.begin_s = window.bring_up_s;
+  const double ran_s = window.fault_s - std::max(window.begin_s, 0.0);
+  window.end_s = std::min(window.end_s, window.fault_s + after_fault_s(ran_s));
   window.end_s = std::max(window.end_s, window.begin_s);
   crop(*table, window.begin_s, window.end_s);
   const std::size_t n = run.robot.joints.size();
@@ -228,6 +255,13 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
 
 }  // namespace
 
+std::size_t RunData::rows_before_fault() const {
+  if (faults.empty()) return rows();
+  constexpr double kHalfNanosecond = 0.5e-9;
+  const auto after = std::ranges::upper_bound(time_s, faults.front().time_s + kHalfNanosecond);
+  return std::max<std::size_t>(1, static_cast<std::size_t>(after - time_s.begin()));
+}
+
 std::size_t RunData::first_channel(std::size_t index) const {
   std::size_t first = 0;
   for (std::size_t i = 0; i < index; ++i) first += robot.sensors[i].channels();
@@ -256,10 +290,11 @@ bool RunData::slides(std::size_t joint) const {
 
 std::vector<Tracking> RunData::tracking() const {
   std::vector<Tracking> all;
+  const std::size_t until = rows_before_fault();
   for (std::size_t j = 0; j < position_rad.size(); ++j) {
     Tracking one{robot.joints[j].name, slides(j), 0.0, 0.0, 0.0};
     std::size_t samples = 0;
-    for (std::size_t row = 0; row < rows(); ++row) {
+    for (std::size_t row = 0; row < until; ++row) {
       one.max_torque_Nm = std::max(one.max_torque_Nm, std::abs(torque_Nm[j][row]));
       const double error = reference_rad[j][row] - position_rad[j][row];
       if (std::isnan(error)) continue;
@@ -277,14 +312,15 @@ std::vector<Tracking> RunData::tracking() const {
 
 std::vector<FootFigures> RunData::feet() const {
   std::vector<FootFigures> all;
+  const std::size_t until = rows_before_fault();
   for (std::size_t i = 0; truth() && i < robot.contact.feet.size(); ++i) {
     FootFigures one{.name = robot.contact.feet[i].site};
     const std::vector<double>& up_N = foot_force_N[3 * i + 2];
     const std::vector<double>& x = foot_position_m[3 * i];
     const std::vector<double>& y = foot_position_m[3 * i + 1];
     std::size_t touched = 0;
-    for (std::size_t row = 0; row < rows(); ++row) {
-      one.mean_force_N += up_N[row] / static_cast<double>(rows());
+    for (std::size_t row = 0; row < until; ++row) {
+      one.mean_force_N += up_N[row] / static_cast<double>(until);
       one.max_force_N = std::max(one.max_force_N, up_N[row]);
       if (!(up_N[row] > 0.0)) continue;
       if (row > 0 && !(up_N[row - 1] > 0.0)) touched = row;
@@ -295,7 +331,7 @@ std::vector<FootFigures> RunData::feet() const {
   return all;
 }
 
-Result<RunData> read_run(const std::string& path) {
+Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const Result<log::LogFile> file = log::LogFile::open(path);
   if (!file) return std::unexpected(file.error());
   RunData run;
@@ -306,14 +342,14 @@ Result<RunData> read_run(const std::string& path) {
   run.data_sha256 = file->data_sha256();
   if (const Status s = read_configuration(run); !s) return std::unexpected(s.error());
   if (const Status s = read_description(run); !s) return std::unexpected(s.error());
-  Result<Window> window = window_of(*file, run.settle_s);
-  if (!window) return std::unexpected(window.error());
-  if (const Status s = read_state(*file, *window, run); !s) return std::unexpected(s.error());
+  const auto events = file->events();
+  if (!events) return std::unexpected(events.error());
+  run.faults = faults_of(*events, run.info.joints, error_text);
+  Window window = window_of(*events, run.settle_s);
+  if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
-  if (const Status s = read_truth(*file, *window, run); !s) return std::unexpected(s.error());
-  const double start_s = run.time_s.front();
-  for (double& time_s : run.time_s) time_s -= start_s;
-  run.step_s = run.time_s.back() / static_cast<double>(run.rows() - 1);
+  if (const Status s = read_truth(*file, window, run); !s) return std::unexpected(s.error());
+  run.step_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.rows() - 1);
   return run;
 }
 

@@ -2,6 +2,8 @@
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,17 @@ struct FootFigures {
   double slip_m = 0.0;  ///< farthest, level, from where it last touched down
 };
 
+/// What stopped a run, as its log's events tell.
+struct RunFault {
+  double time_s = 0.0;  ///< since the first SYNC
+  std::string joint;    ///< empty: nobody's
+  std::string text;     ///< one sentence, without `joint`
+};
+
+/// A drive's error code in words.
+using ErrorText = std::function<std::string(std::uint32_t code)>;
+
+/// Times are those of the log: 0 is its first cycle, the run's first SYNC.
 struct RunData {
   std::string path;
   log::RunInfo info;
@@ -43,10 +56,12 @@ struct RunData {
   model::Tree tree;
   std::string hip, knee, foot;  ///< the experiment's [report]; may be empty
 
-  double settle_s = 0.0;        ///< from bring-up to the controllers' start
-  bool controllers_ran = true;  ///< false: the rows are those in which they were waited for
-  double step_s = 0.0;          ///< between rows
-  std::vector<double> time_s;   ///< of each row, 0 when the controllers started
+  double settle_s = 0.0;         ///< from bring-up to the controllers' start
+  bool controllers_ran = true;   ///< false: the rows are those in which they were waited for
+  double step_s = 0.0;           ///< between rows
+  std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
+  double drawn_later_s = 0.0;    ///< added to all times of this run in the figures
+  std::vector<RunFault> faults;  ///< in the order of their times
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another
@@ -57,9 +72,11 @@ struct RunData {
   Columns foot_moment_Nm;   ///< [3 feet][row]: about the site's origin, W axes; empty as base
   Columns loop_error;       ///< [2 loop][row]: each loop's position error [m], then each one's
                             ///< velocity error [m/s]; empty as base
-  Columns passive_rad;      ///< [passive joint][row]; empty as base
+  Columns passive_rad;      ///< [passive joint][row]; empty: unknown (close_passive.hpp)
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
+  /// Rows until the first fault, its cycle included; the others show what followed. At least 1.
+  [[nodiscard]] std::size_t rows_before_fault() const;
   /// First channel of sensor `index` in `sensor`.
   [[nodiscard]] std::size_t first_channel(std::size_t index) const;
   /// The root link in W; upright at the origin when the log has no truth.
@@ -77,6 +94,7 @@ struct RunData {
 };
 
 /// Errors: as log::LogFile::open; a log without state and command; one without its robot's files.
-[[nodiscard]] Result<RunData> read_run(const std::string& path);
+/// @param error_text  of drives; empty: faults are told by their codes
+[[nodiscard]] Result<RunData> read_run(const std::string& path, const ErrorText& error_text = {});
 
 }  // namespace tandem::report

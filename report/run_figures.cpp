@@ -67,19 +67,34 @@ Curve curve_of(const RunData& run, std::string label, CurveStyle style,
                const std::vector<double>& values, double factor) {
   Curve curve{std::move(label), style, run.time_s, values};
   for (double& value : curve.y) value *= factor;
+  for (double& time_s : curve.x) time_s += run.drawn_later_s;
   return curve;
 }
 
-Figure hip_figure(const RunData& run, const RunData* other, const Subjects& subjects) {
+/// What every figure over time has: its axis, and where runs ended in a fault. A fault's spike may
+/// be there before the loop knows of the fault: it does not widen the plots.
+void add_time(const RunData& run, const RunData* other, Figure& figure) {
+  constexpr double kSpike_s = 0.02;
+  figure.x_label = "time since the first SYNC [s]";
+  for (const RunData* one : {&run, other}) {
+    if (one == nullptr || one->faults.empty()) continue;
+    const double fault_s = one->faults.front().time_s + one->drawn_later_s;
+    const char* side = other == nullptr ? "fault" : (one == &run ? "fault, A" : "fault, B");
+    figure.marks.push_back({side, fault_s});
+    figure.range_until_x = std::min(figure.range_until_x, fault_s - kSpike_s);
+  }
+}
+
+Figure position_figure(const RunData& run, const RunData* other, const Subjects& subjects) {
   const std::size_t joint = at(subjects.hip);
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
-  figure.name = "hip_position";
-  figure.title = (subjects.leg ? "Hip" : "Joint") + std::string(" position against its reference");
-  figure.x_label = "time [s]";
+  figure.name = "joint_position";
+  figure.title = name + ": position against its reference";
+  add_time(run, other, figure);
   const bool slides = run.slides(joint);
   const double factor = slides ? kMillimetres : kDegrees;
-  figure.y_label = name + (slides ? " [mm]" : " [deg]");
+  figure.y_label = slides ? "position [mm]" : "position [deg]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
                                    CurveStyle::kMeasured, run.position_rad[joint], factor));
   if (other != nullptr) {
@@ -170,7 +185,7 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
                                                legged(run) ? "feet's " : "");
-  figure.x_label = "time [s]";
+  add_time(run, other, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =
       other == nullptr ? std::min(std::size(kStyles), forces.size()) : std::size_t{1};
@@ -189,11 +204,11 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   if (!run.robot.model.floating_base || feet == 0 || forces.size() != feet) return figure;
   const double share = weight_N(run) / static_cast<double>(feet);
   if (sensors.empty()) {
-    figure.levels.push_back({share_text(feet), share, true});
+    figure.levels.push_back({share_text(feet), share});
   } else {
     figure.levels.push_back(
-        {share_text(feet) + "; lower line: less the foot beyond the sensor", share, true});
-    figure.levels.push_back({"", share - weight_beyond_N(run, sensors.front()), true});
+        {share_text(feet) + "; lower line: less the foot beyond the sensor", share});
+    figure.levels.push_back({"", share - weight_beyond_N(run, sensors.front())});
   }
   return figure;
 }
@@ -203,11 +218,11 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
   const std::size_t joint = at(subjects.knee);
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
-  figure.name = "knee_torque";
-  figure.title = (subjects.leg ? "Knee" : "Joint") +
-                 std::string((run.slides(joint) ? " force: measured" : " torque: measured"));
-  figure.x_label = "time [s]";
-  figure.y_label = name + (run.slides(joint) ? " [N]" : " [Nm]");
+  const bool slides = run.slides(joint);
+  figure.name = "joint_torque";
+  figure.title = name + (slides ? ": force, measured" : ": torque, measured");
+  add_time(run, other, figure);
+  figure.y_label = slides ? "force [N]" : "torque [Nm]";
   figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
                                    CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
   if (other != nullptr) {
@@ -219,7 +234,7 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
   if (!computed) {
     figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
-    figure.title += ", and by inverse dynamics";
+    figure.title += " and by inverse dynamics";
     figure.curves.push_back(std::move(*computed));
   }
   return figure;
@@ -235,11 +250,22 @@ std::size_t nearest_row(const std::vector<double>& values, double wanted, std::s
   return best;
 }
 
-/// Moments of the first half cycle and the end: by the base's height, or by `joint`'s position.
+/// Whether the base goes down, and not only gives way: by more than a fiftieth of its height.
+bool squats(const RunData& run) {
+  if (!run.truth() || !run.robot.model.floating_base) return false;
+  const auto first = run.base[2].begin();
+  const auto [low, high] =
+      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_fault()));
+  return *high - *low > 0.02 * std::abs(*first);
+}
+
+/// Moments of the first half cycle and the end, which may be a fault: by the base's height, or by
+/// `joint`'s position.
 /// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
-  const bool base = run.truth() && run.robot.model.floating_base;
-  const std::vector<double>& depth = base ? run.base[2] : run.position_rad[at(joint)];
+  const bool base = squats(run);
+  std::vector<double> depth = base ? run.base[2] : run.position_rad[at(joint)];
+  depth.resize(run.rows_before_fault());
   const double start = depth.front();
   const auto far = std::ranges::max_element(
       depth, {}, [start](double value) { return std::abs(value - start); });
@@ -249,7 +275,7 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
       depth, [&](double value) { return std::abs(value - turn) <= 0.01 * std::abs(turn - start); });
   const auto lowest = static_cast<std::size_t>(arrived - depth.begin());
   const std::size_t half = nearest_row(depth, 0.5 * (start + turn), 0, lowest + 1);
-  const std::size_t last = run.rows() - 1;
+  const std::size_t last = depth.size() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
     samples.push_back(
@@ -258,7 +284,7 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   add("start", 0);
   if (suffix.empty()) add("half way", half);
   add(base ? "lowest" : "farthest", lowest);
-  if (suffix.empty()) add("end", last);
+  if (suffix.empty()) add(run.faults.empty() ? "end" : "fault", last);
   return samples;
 }
 
@@ -267,8 +293,7 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
 Subjects subjects_of(const RunData& run) {
   Subjects subjects;
   std::vector<int> joints = pitch_joints(run);
-  subjects.leg = joints.size() >= 2;
-  if (!subjects.leg) joints = widest_joints(run);
+  if (joints.size() < 2) joints = widest_joints(run);
   subjects.hip = run.robot.joint_index(run.hip);
   subjects.knee = run.robot.joint_index(run.knee);
   if (subjects.hip < 0) subjects.hip = joints.front();
@@ -303,7 +328,7 @@ std::vector<Figure> figures_of(const RunData& run, const RunData* other,
                                const tandem_kernels* kernels) {
   const Subjects subjects = subjects_of(run);
   std::vector<Figure> figures;
-  figures.push_back(hip_figure(run, other, subjects));
+  figures.push_back(position_figure(run, other, subjects));
   if (!subjects.foot_sensors.empty() || (run.truth() && legged(run))) {
     figures.push_back(force_figure(run, other, subjects.foot_sensors));
   }

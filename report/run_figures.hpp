@@ -15,7 +15,6 @@ namespace tandem::report {
 struct Subjects {
   int hip = -1;  ///< joint in the image
   int knee = -1;
-  bool leg = false;  ///< they turn one leg in its plane: then they are called hip and knee
   std::vector<int> foot_sensors;  ///< force/torque sensors in the image, the chosen one first
 };
 

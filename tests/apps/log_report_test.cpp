@@ -72,6 +72,22 @@ TEST_F(LogAndReport, ReportDrawsAPageAndPictures) {
   }
 }
 
+TEST_F(LogAndReport, ReportTellsTheFaultAtTheTimeThatTheRunTold) {
+  write_text(folder_ / "faults.toml",
+             "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint2\"\nafter_enabled_s = 1.2\n");
+  const Outcome run = tandem(
+      "run hold.toml --duration 2 --scenario faults.toml --log faulted --report --json run.json");
+  ASSERT_EQ(run.status, 1) << run.err;
+  const auto fault = json("run.json")["fault_log"][0];
+  char told[64];
+  std::snprintf(told, sizeof told, ", at %.3f s</dd>", fault["time_s"].get<double>());
+  const std::string page = read_text(folder_ / "faulted/double_pendulum-hold-001/report.html");
+  const std::string line = "<dt>fault</dt><dd>joint2: " + fault["cause"].get<std::string>() + told;
+  EXPECT_NE(page.find(line), std::string::npos) << line;
+  EXPECT_NE(page.find("Times count from the run's first SYNC"), std::string::npos);
+  EXPECT_NE(page.find("<dt>controllers started</dt>"), std::string::npos);
+}
+
 TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
   const Outcome run = tandem("run " TANDEM_SOURCE_DIR
                              "/config/parallel_ankle/move.toml --duration 0.5 --log . --report");

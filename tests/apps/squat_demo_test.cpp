@@ -32,7 +32,7 @@ TEST_F(SquatDemo, ComanSquatsAndStandsAtTheEnd) {
 
   const std::filesystem::path report = folder_ / "runs/coman-squat-001";
   EXPECT_TRUE(std::filesystem::exists(report / "report.html"));
-  for (const std::string image : {"hip_position", "foot_force", "knee_torque", "posture"}) {
+  for (const std::string image : {"joint_position", "foot_force", "joint_torque", "posture"}) {
     EXPECT_TRUE(read_text(report / (image + ".png")).starts_with("\x89PNG")) << image;
   }
 }

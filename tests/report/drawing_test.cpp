@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -47,7 +50,7 @@ Figure ramp(const std::string& name) {
   figure.x_label = "time [s]";
   figure.y_label = "position [deg]";
   figure.curves = {curve};
-  figure.levels = {{"the limit", 40.0, false}};
+  figure.levels = {{"the limit", 40.0}};
   return figure;
 }
 
@@ -87,6 +90,91 @@ TEST_F(Drawing, MakesSvgAndPngOfEachFigureAndAnOverview) {
   }
   EXPECT_TRUE(read("overview.png").starts_with("\x89PNG"));
   EXPECT_FALSE(fs::exists(folder_ / "gnuplot.err"));
+}
+
+/// The number behind `key` in the script.
+double number_after(const std::string& script, const std::string& key) {
+  const std::size_t at = script.find(key);
+  EXPECT_NE(at, std::string::npos) << key;
+  return at == std::string::npos ? NAN : std::stod(script.substr(at + key.size()));
+}
+
+TEST(Script, LeavesRoomForTheWidestNumberBesideTheLabel) {
+  for (const double factor : {1.0, 1e-5, 1e5, -1e9}) {
+    Figure figure = ramp("wide");
+    for (double& y : figure.curves[0].y) y = factor * (1000.0 + y);
+    figure.levels.clear();
+    const std::string script = gnuplot_script({&figure, 1}, "/tmp");
+    const double axis = 760.0 * number_after(script, "set lmargin at screen ");
+    const double label = 760.0 * number_after(script, "\"position [deg]\" at screen ");
+    const bool exponent = script.find("set format y '%g'") != std::string::npos;
+    const std::size_t at = script.find("set format y '%.");
+    ASSERT_TRUE(exponent || at != std::string::npos);
+    const int decimals = exponent ? 0 : std::stoi(script.substr(at + 16));
+    char widest[64];
+    std::snprintf(widest, sizeof widest, exponent ? "%.3g" : "%.*f", decimals, factor * 1049.0);
+    if (exponent) std::snprintf(widest, sizeof widest, "-1.02e+12");
+    EXPECT_GT(label, 0.5 * 13.0);
+    EXPECT_GT(axis - label, 13.0 + 7.0 * std::strlen(widest)) << widest;
+  }
+}
+
+TEST(Script, PutsTheKeyAboveTheAxesHoweverManyRowsItHas) {
+  Figure figure = ramp("many");
+  const double few = number_after(gnuplot_script({&figure, 1}, "/tmp"), "set tmargin at screen ");
+  for (int i = 0; i < 8; ++i) {
+    figure.curves.push_back(figure.curves[0]);
+    figure.curves.back().label = "a_rather_long_name_of_a_sensor_" + std::to_string(i);
+  }
+  const std::string script = gnuplot_script({&figure, 1}, "/tmp");
+  const int columns = static_cast<int>(number_after(script, " left top horizontal maxcols "));
+  EXPECT_EQ(columns, 2);
+  const double many = number_after(script, "set tmargin at screen ");
+  EXPECT_GT(430.0 * (few - many), 4.0 * 13.0 * 1.2) << "ten texts in five rows, two in one";
+}
+
+TEST(Script, WhatFollowsAFaultDoesNotWidenTheRange) {
+  Figure figure = ramp("fault");
+  figure.levels.clear();
+  figure.curves[0].y.back() = 1e6;
+  figure.marks = {{"fault", 0.99}};
+  figure.range_until_x = 0.98;
+  const std::string script = gnuplot_script({&figure, 1}, "/tmp");
+  EXPECT_LT(number_after(script.substr(script.find("set yrange")), ":"), 60.0);
+  EXPECT_NE(script.find("set arrow from 0.99, graph 0 to 0.99, graph 1"), std::string::npos);
+  EXPECT_NE(script.find("title \"fault\""), std::string::npos);
+}
+
+TEST_F(Drawing, RunsNothingOfWhatALogNames) {
+  const std::string touched = (folder_ / "touched").string();
+  for (const std::string name :
+       {"`touch " + touched + "`", "'; system('touch " + touched + "'); #",
+        "\"; system(\"touch " + touched + "\"); #", "\\'`touch " + touched + "`",
+        "EOD\nsystem('touch " + touched + "')\n", "@touch $(touch " + touched + ")",
+        "a\nsystem \"touch " + touched + "\""}) {
+    Figure figure = ramp("named");
+    figure.title = figure.x_label = figure.y_label = figure.curves[0].label = name;
+    figure.levels = {{name, 1.0}};
+    figure.marks = {{name, 0.5}};
+    figure.notes = {{name, 0.5, 0.5}};
+    const Status drawn = draw({&figure, 1}, folder_.string());
+    EXPECT_TRUE(drawn.has_value()) << name << ": " << drawn.error().to_string();
+    EXPECT_FALSE(fs::exists(touched)) << name;
+    EXPECT_TRUE(read("named.png").starts_with("\x89PNG")) << name;
+    EXPECT_NE(read("named.svg").find("touch"), std::string::npos) << "it is drawn as it is";
+  }
+}
+
+TEST_F(Drawing, AFolderThatLooksLikeAPipeIsAFolder) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_);
+  fs::create_directory("| touch touched; #");
+  const std::vector<Figure> figures{ramp("one")};
+  const Status drawn = draw(figures, "| touch touched; #");
+  fs::current_path(before);
+  EXPECT_TRUE(drawn.has_value()) << drawn.error().to_string();
+  EXPECT_FALSE(fs::exists(folder_ / "touched"));
+  EXPECT_TRUE(fs::exists(folder_ / "| touch touched; #" / "one.png"));
 }
 
 TEST_F(Drawing, SaysWhatToInstallWhenGnuplotIsMissing) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "model/urdf.hpp"
+#include "report/close_passive.hpp"
 #include "report/logged_torque.hpp"
 #include "report/posture.hpp"
 #include "report/run_figures.hpp"
@@ -110,7 +111,34 @@ TEST_F(TurningLinkage, WithoutTruthSaysWhyThereIsNoInverseDynamics) {
   run.loop_error.clear();
   const std::vector<Figure> figures = figures_of(run, nullptr, robot.kernels.get());
   EXPECT_EQ(figures[1].title,
-            "Joint torque: measured (no inverse dynamics: the log lacks the position of coupler)");
+            "crank: torque, measured (no inverse dynamics: the log lacks the position of coupler)");
+}
+
+TEST_F(TurningLinkage, WithoutTruthIsClosedFromTheMeasuredCrank) {
+  const Columns truth = run.passive_rad;
+  run.base.clear();
+  run.passive_rad.clear();
+  run.loop_error.clear();
+  const Status closed = close_passive(run, *robot.kernels.get());
+  ASSERT_TRUE(closed.has_value()) << closed.error().to_string();
+  ASSERT_EQ(run.passive_rad.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t row = 0; row < run.rows(); ++row) {
+      ASSERT_NEAR(std::remainder(run.passive_rad[i][row] - truth[i][row], 2 * M_PI), 0.0, 1e-9)
+          << i << " at row " << row;
+    }
+  }
+  const std::vector<Figure> figures = figures_of(run, nullptr, robot.kernels.get());
+  EXPECT_EQ(figures[1].title, "crank: torque, measured and by inverse dynamics");
+}
+
+TEST_F(TurningLinkage, WithoutTruthAndKernelsIsDrawnAsFarAsItIsKnown) {
+  run.base.clear();
+  run.passive_rad.clear();
+  run.loop_error.clear();
+  const Figure posture = figures_of(run, nullptr, nullptr).back();
+  EXPECT_TRUE(posture.title.ends_with(", without what passive joints move")) << posture.title;
+  for (const double z : posture.curves.front().y) EXPECT_FALSE(std::abs(z) > kCrank_m);
 }
 
 TEST_F(TurningLinkage, IsDrawnClosedAndAboveItsLabels) {
@@ -180,11 +208,34 @@ TEST_F(Gripper, MovesBothFingersApart) {
 
 TEST_F(Gripper, IsDrawnInMillimetresAndNewtons) {
   const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
-  EXPECT_EQ(figures[0].y_label, "panda_finger_joint1 [mm]");
+  EXPECT_EQ(figures[0].y_label, "position [mm]");
   EXPECT_NEAR(figures[0].curves[0].y[1], 30.0, 1e-12);
-  EXPECT_EQ(figures[1].y_label, "panda_finger_joint1 [N]");
-  EXPECT_EQ(figures[1].title, "Joint force: measured");
+  EXPECT_EQ(figures[1].y_label, "force [N]");
+  EXPECT_EQ(figures[1].title, "panda_finger_joint1: force, measured");
   for (const Curve& curve : figures[2].curves) EXPECT_NE(curve.label, "arms and head");
+}
+
+TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
+  run.time_s = {1.25, 1.30, 1.35, 1.40};
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm}) {
+    columns->assign(8, {0.0, 0.0, 9.0, 9.0});
+  }
+  run.reference_rad.assign(8, {0.0, 0.0, 0.0, 0.0});
+  run.faults = {{1.30, "panda_finger_joint1", "a short circuit"}, {1.40, "", "more"}};
+  EXPECT_EQ(run.rows_before_fault(), 2U);
+  for (const Tracking& one : run.tracking()) {
+    EXPECT_EQ(one.max_rad, 0.0);
+    EXPECT_EQ(one.max_torque_Nm, 0.0);
+  }
+  const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
+  for (const Figure& figure : {figures[0], figures[1]}) {
+    ASSERT_EQ(figure.marks.size(), 1U);
+    EXPECT_EQ(figure.x_label, "time since the first SYNC [s]");
+    EXPECT_EQ(figure.marks[0].x, 1.30);
+    EXPECT_LT(figure.range_until_x, 1.30);
+    EXPECT_EQ(figure.curves[0].x, run.time_s) << "what followed is drawn";
+  }
+  EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
 }
 
 TEST_F(Gripper, TellsWhichJointsSlide) {

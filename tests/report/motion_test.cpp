@@ -85,6 +85,23 @@ TEST(InverseDynamics, WithoutSensorsTakesNoWrench) {
   EXPECT_NEAR(inverse_dynamics(cart, motion)[1][0], 2.0 * 3.0, 1e-9);
 }
 
+/// iCub's URDF has x backwards: what its feet say counts.
+TEST(Posture, LooksToTheRightWhereverTheDescriptionsXPoints) {
+  for (const std::string name : {"icub", "coman"}) {
+    const std::string folder = TANDEM_SOURCE_DIR "/config/" + name + "/";
+    const auto robot = hal::read_robot_config(folder + "robot.toml");
+    ASSERT_TRUE(robot.has_value());
+    const auto description = model::read_urdf(robot->model.urdf, {.floating_base = true});
+    ASSERT_TRUE(description.has_value());
+    const PostureSample zero{"", 0.0, {}, std::vector<double>(robot->joints.size(), 0.0)};
+    const Figure figure = posture_figure(description->tree, *robot, {&zero, 1});
+    const Curve& legs = *std::ranges::find(figure.curves, "legs", &Curve::label);
+    ASSERT_GE(legs.x.size(), 4U);
+    const std::size_t ankle = legs.x.size() - 4;  // then heel, toe, gap
+    EXPECT_GT(legs.x[ankle + 2] - legs.x[ankle], legs.x[ankle] - legs.x[ankle + 1]) << name;
+  }
+}
+
 TEST(Posture, PlacesEveryBodyOfThePendulum) {
   const std::string folder = TANDEM_SOURCE_DIR "/config/double_pendulum/";
   const auto robot = hal::read_robot_config(folder + "robot.toml");
