@@ -47,7 +47,9 @@ class Checker {
       report.hint = "masses are zero or positive";
       errors_.push_back(report);
     } else if (std::isfinite(whole) && link.inertia.mass_kg < kNegligibleMassShare * whole) {
-      report.hint = "used as it is, for it has less than 1 % of its body's mass";
+      report.hint =
+          "used as it is, for it has less than 1 % of its body's mass; `tandem check --repair` "
+          "shows the nearest possible one";
       warnings_.push_back(report);
     } else {
       report.hint =

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/nearest.hpp"
+#include "base/utf8.hpp"
 #include "model/urdf_xacro.hpp"
 
 namespace tandem::model {
@@ -124,6 +125,12 @@ class Reader {
   std::string name_of(const XMLElement& e, const char* attribute_name, const std::string& key) {
     const std::string name = attribute(e, attribute_name, key, Needed::kYes);
     const bool odd = std::ranges::any_of(name, [](unsigned char c) { return c < 32 || c == 127; });
+    if (!is_utf8(name)) {
+      error(e.GetLineNum(), key,
+            std::string("'") + attribute_name + "' of <" + e.Name() + "> is not UTF-8",
+            "save the file in UTF-8, or name it in plain letters");
+      return {};
+    }
     if (name.empty() || (!odd && name.front() != ' ' && name.back() != ' ')) return name;
     error(e.GetLineNum(), key,
           std::string("'") + attribute_name + "' of <" + e.Name() +
