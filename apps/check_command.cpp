@@ -6,6 +6,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/findings.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "apps/wrong_kind.hpp"
@@ -23,18 +24,6 @@ const char* backend_text(runtime::BackendKind backend) {
     case runtime::BackendKind::kDds: return "dds: the robot of another process (tandem serve)";
   }
   return "sim: drive master, frames, boards' firmware and plant in this process";
-}
-
-Json findings_json(const Diagnostics& errors) {
-  Json list = Json::array();
-  for (const Error& error : errors) {
-    list.push_back({{"file", error.file},
-                    {"line", error.line},
-                    {"key", error.key},
-                    {"message", error.message},
-                    {"hint", error.hint}});
-  }
-  return list;
 }
 
 void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {

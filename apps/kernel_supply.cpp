@@ -36,7 +36,7 @@ Result<model::BuildReport> build_shown(const RobotFiles& robot, model::BuildOpti
     progress.show(done, total, file);
   };
   options.waiting = [&robot] {
-    fmt::print(stderr, "{}: another process builds these kernels; waiting for it\n",
+    fmt::print(stderr, "{}: another process compiles this robot's dynamics; waiting for it\n",
                robot.config.name);
   };
   return model::build_kernels(robot.tree, robot.spec, options);
@@ -60,7 +60,7 @@ Result<model::KernelLibrary> supply_kernels(const RobotFiles& robot, const std::
     if (!report) return std::unexpected(report.error());
     return model::load_kernels(*path, hash, variant);
   }
-  fmt::print(stderr, "{}: no kernels fit these files yet; they are built, once\n", name);
+  fmt::print(stderr, "{}: compiling the robot's dynamics, once: later runs find them\n", name);
   const auto report = build_shown(robot, options);
   if (!report) return std::unexpected(report.error());
   if (!report->was_up_to_date) {

@@ -32,10 +32,11 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
                           {"displacement_m", moved.distance_m}};
   const bool saves = after->add + after->mul < before->add + before->mul;
   if (!exact && !saves) return {};
-  facts.add("right angles", fmt::format("{} of few digits, at most {:.1e} rad off; {}",
-                                        robot.right_angles.count, robot.right_angles.worst_rad,
-                                        exact ? "taken exactly" : "taken as they are written"));
-  facts.add("", fmt::format("exact ones: forward dynamics {} operations instead of {}; {}",
+  facts.add("right angles",
+            fmt::format("{} are written with few digits (1.5708), at most {:.1e} rad off; {}",
+                        robot.right_angles.count, robot.right_angles.worst_rad,
+                        exact ? "taken as exact" : "taken as written"));
+  facts.add("", fmt::format("exact ones take {} operations in the dynamics instead of {}; {}",
                             after->add + after->mul, before->add + before->mul,
                             moved.link.empty() ? "no link moves"
                                                : fmt::format("{} moves by at most {:.2g} mm",

@@ -8,6 +8,7 @@
 #include "apps/console.hpp"
 #include "apps/dds_run.hpp"
 #include "apps/dds_services.hpp"
+#include "apps/findings.hpp"
 #include "apps/inject.hpp"
 #include "apps/loop_thread.hpp"
 #include "apps/remote_gate.hpp"
@@ -274,6 +275,7 @@ Exit run_command(const RunOptions& options) {
     print_errors(composition.error());
     return Exit::kUsage;
   }
+  print_inertia_warnings((*composition)->experiment.warnings);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {
     print_errors(errors);
