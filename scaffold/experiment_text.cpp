@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "scaffold/new_robot.hpp"
+#include "scaffold/toml_words.hpp"
 
 namespace tandem::scaffold {
 namespace {
@@ -9,15 +10,30 @@ namespace {
 constexpr double kLikeDamping_Nms_rad = 12.0;  // what COMAN's experiments add on soft springs
 
 std::string head(const NewRobot& robot, const std::string& what, double duration_s) {
-  return fmt::format(
-      "# {}\nrobot = \"robot.toml\"\nposture = \"{}\"\nduration_s = {:.1f}\nseed = 1\n", what,
-      robot.config.postures[0].name, duration_s);
+  return fmt::format("# {}\nrobot = \"robot.toml\"\nposture = {}\nduration_s = {:.1f}\nseed = 1\n",
+                     what, quoted(robot.config.postures[0].name), duration_s);
+}
+
+/// A sentence, true for this robot.
+std::string what_moves(const NewRobot& robot) {
+  const Move& move = robot.move;
+  if (!(robot.stands_m > 0.0)) {
+    return move.swings ? "Swings its joints about their posture, as far as the drives bear it."
+                       : "Stays in its posture: the drives are too weak to move out of it.";
+  }
+  const std::string squats =
+      move.squat_m > 0.0 ? fmt::format("Squats {:.0f} mm twice", 1e3 * move.squat_m) : "";
+  if (squats.empty()) {
+    return move.swings ? "Swings the joints that are in no leg. The legs' limits leave no squat."
+                       : "Stays as it stands: limits of the legs leave no squat.";
+  }
+  return squats + (move.swings ? " and swings the joints that are in no leg." : ".");
 }
 
 std::string report(const NewRobot& robot) {
   std::string text = "\n[report]\n";
-  text += fmt::format("hip = \"{}\"\n", robot.report.front());
-  if (robot.report.size() > 1) text += fmt::format("knee = \"{}\"\n", robot.report[1]);
+  text += fmt::format("hip = {}\n", quoted(robot.report.front()));
+  if (robot.report.size() > 1) text += fmt::format("knee = {}\n", quoted(robot.report[1]));
   return text;
 }
 
@@ -30,7 +46,7 @@ std::string hold_text(const NewRobot& robot) {
   text += "\n[[controller]]\nplugin = \"hold\"\n";
   if (!robot.like.empty()) {
     text += fmt::format(
-        "[controller.parameters]\nlink_damping_Nms_rad = {:.3g}  # the links swing on their "
+        "[controller.parameters]\nlink_damping_Nms_rad = {:.3g}  # guess: the links swing on their "
         "springs\n",
         rounded(kLikeDamping_Nms_rad * robot.scale));
   }
@@ -38,16 +54,12 @@ std::string hold_text(const NewRobot& robot) {
 }
 
 std::string move_text(const NewRobot& robot) {
-  const bool stands = robot.stands_m > 0.0;
-  std::string text = head(robot,
-                          stands ? "Squats a little twice and swings its other joints."
-                                 : "Swings every joint about its posture.",
-                          robot.move.back().time_s + 1.0);
+  std::string text = head(robot, what_moves(robot), robot.move.points.back().time_s + 1.0);
   text += "\n[[controller]]\nplugin = \"joint_trajectory\"\n";
   std::vector<std::string> names;
-  for (const hal::JointConfig& joint : robot.config.joints) names.push_back(joint.name);
-  text += fmt::format("[controller.parameters]\njoints = [\"{}\"]\n", fmt::join(names, "\", \""));
-  for (const WayPoint& point : robot.move) {
+  for (const hal::JointConfig& joint : robot.config.joints) names.push_back(quoted(joint.name));
+  text += fmt::format("[controller.parameters]\njoints = [{}]\n", fmt::join(names, ", "));
+  for (const WayPoint& point : robot.move.points) {
     text += fmt::format(
         "\n[[controller.parameters.waypoint]]\ntime_s = {:.1f}\nposition_rad = [{:.4f}]\n",
         point.time_s, fmt::join(point.position_rad, ", "));

@@ -195,6 +195,7 @@ void settle_balls(const Vector3d& ahead, const Posed& standing, std::vector<Foot
     for (Vector3d& p : foot.points) p = R.transpose() * (old.R * p);
     const Vector3d bottom = old.p - Vector3d(0.0, 0.0, foot.radius_m);
     foot.sole_in_link = inverse(link) * Placement{R, bottom};
+    foot.radius_m = 0.0;
   }
 }
 

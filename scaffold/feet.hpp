@@ -39,7 +39,8 @@ enum class FeetBy : std::uint8_t {
 /// Turns every sole's frame so that x is ahead, in the posture in which it is level.
 void face_ahead(const Eigen::Vector3d& ahead, const Posed& neutral, std::vector<Foot>& feet);
 
-/// Puts the contact point of each ball under its centre, in the posture in which it stands.
+/// Puts the contact point of each ball under its centre, in the posture in which it stands; from
+/// then on the foot is that point.
 void settle_balls(const Eigen::Vector3d& ahead, const Posed& standing, std::vector<Foot>& feet);
 
 }  // namespace tandem::scaffold

@@ -5,9 +5,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <map>
 
 #include "scaffold/posture.hpp"
+#include "scaffold/strength.hpp"
 #include "scaffold/words.hpp"
 
 namespace tandem::scaffold {
@@ -17,6 +20,8 @@ using Eigen::Vector3d;
 using model::Tree;
 
 constexpr double kFastestSpring_rad_s = 3000.0;  // of a link on it: simulated in 250 us steps
+constexpr double kMostSag_rad = 0.0175;          // 1 degree: of spring and loop under gravity
+constexpr double kLastingShare = 0.8;            // of what a drive gives for long, by gravity
 constexpr double kOtherLimb = 10.0;
 constexpr double kOtherAxis = 2.0;
 
@@ -91,22 +96,108 @@ hal::GainsConfig scaled(hal::GainsConfig g, double s) {
   return g;
 }
 
-/// Of the joints that have a drive the one that is most alike.
-const hal::JointConfig& resembled(const Like& like, const std::vector<Trait>& theirs,
-                                  const Trait& ours) {
-  const auto far = [&](const hal::JointConfig& joint) {
-    return distance(theirs[like.tree.joint_index(joint.name)], ours);
-  };
-  return *std::ranges::min_element(like.config.joints, {}, far);
+/// With which the lightest link on it can still be simulated.
+double stiffest_spring(double inertia) {
+  return inertia * kFastestSpring_rad_s * kFastestSpring_rad_s;
 }
+
+/// A drive of `like` for one joint: which, how many times as large as the rest, how it is named.
+struct Choice {
+  const hal::JointConfig* joint = nullptr;
+  double larger = 1.0;
+  bool light = false;  ///< its link is too light for the spring as it is
+};
+
+/// Chooses drives by likeness, then by strength.
+class Chooser {
+ public:
+  Chooser(const Like& like, const NewRobot& robot, double scale)
+      : like_(like), scale_(scale), ours_(traits_of(robot.tree, robot.limbs, robot.ahead)) {
+    const Posed neutral(like.tree, neutral_posture(like.tree));
+    std::vector<Foot> feet = find_feet(like.tree, {}, neutral, FeetBy::kName);
+    const std::vector<Limb> limbs = split_limbs(like.tree, feet, neutral, Vector3d::UnitX());
+    theirs_ = traits_of(like.tree, limbs, Vector3d::UnitX());
+  }
+
+  /// @param torque_Nm  that gravity asks for in the first posture
+  /// @param sinks      whether the joint has to carry it from the first moment on, on its spring
+  [[nodiscard]] Choice choose(int joint, double torque_Nm, bool sinks, double inertia) const {
+    Choice choice{.joint = &resembled(joint)};
+    if (sinks && sag(*choice.joint, torque_Nm, 1.0) > kMostSag_rad) {
+      choice.joint = &firm_enough(*choice.joint, torque_Nm);
+    }
+    for (const double larger : {1.0, 1.6, 2.4, 4.0, 6.0, 10.0, 16.0, 24.0, 40.0, 60.0, 100.0}) {
+      choice.larger = larger;
+      const bool firm = !sinks || sag(*choice.joint, torque_Nm, larger) <= kMostSag_rad;
+      if (firm && std::abs(torque_Nm) <= kLastingShare * lasting(*choice.joint, larger)) break;
+    }
+    const hal::ActuatorConfig& drive = like_.config.actuator_of(*choice.joint);
+    choice.light =
+        drive.order >= 2 && drive.spring_Nm_rad * scale_ * choice.larger > stiffest_spring(inertia);
+    return choice;
+  }
+
+  /// Of the joints that have a drive the one that is most alike.
+  [[nodiscard]] const hal::JointConfig& resembled(int joint) const {
+    const auto far = [&](const hal::JointConfig& other) {
+      return distance(theirs_[like_.tree.joint_index(other.name)], ours_[joint]);
+    };
+    return *std::ranges::min_element(like_.config.joints, {}, far);
+  }
+
+ private:
+  /// How far the joint is from its reference before the integral has begun: its loop and its
+  /// spring give way one after the other.
+  [[nodiscard]] double sag(const hal::JointConfig& theirs, double torque_Nm, double larger) const {
+    const hal::ActuatorConfig& drive = like_.config.actuator_of(theirs);
+    double compliance = 1.0 / like_.config.gains_of(theirs).position.gains.kp;
+    if (drive.order >= 2) compliance += 1.0 / drive.spring_Nm_rad;
+    return std::abs(torque_Nm) * compliance / (scale_ * larger);
+  }
+  [[nodiscard]] double lasting(const hal::JointConfig& theirs, double larger) const {
+    hal::JointConfig unlimited;
+    unlimited.max_torque_Nm = std::numeric_limits<double>::infinity();
+    return scale_ * larger * lasting_strength_of(unlimited, like_.config.actuator_of(theirs));
+  }
+  /// The drive that gives way least short of too much; the firmest of all when none is enough.
+  [[nodiscard]] const hal::JointConfig& firm_enough(const hal::JointConfig& first,
+                                                    double torque_Nm) const {
+    const hal::JointConfig* best = &first;
+    for (const hal::JointConfig& other : like_.config.joints) {
+      const double now = sag(*best, torque_Nm, 1.0), then = sag(other, torque_Nm, 1.0);
+      const bool enough = now <= kMostSag_rad;
+      if (enough ? then > now && then <= kMostSag_rad : then < now) best = &other;
+    }
+    return *best;
+  }
+
+  const Like& like_;
+  double scale_;
+  std::vector<Trait> ours_, theirs_;
+};
 
 void soften(const std::vector<JointLoad>& loads, DriveSize& drive) {
   double lightest = loads[drive.joints[0]].least_inertia;
   for (const int j : drive.joints) lightest = std::min(lightest, loads[j].least_inertia);
-  const double most = lightest * kFastestSpring_rad_s * kFastestSpring_rad_s;
-  if (drive.actuator.order < 2 || drive.actuator.spring_Nm_rad <= most) return;
-  drive.actuator.spring_Nm_rad = rounded(most);
+  drive.actuator.spring_Nm_rad = rounded(stiffest_spring(lightest));
   drive.remark += fmt::format("; softened for a link of {:.2g} kg m^2", lightest);
+}
+
+std::string name_of(const std::string& theirs, const Choice& choice) {
+  std::string name = theirs;
+  if (choice.larger > 1.0) name += fmt::format("_x{:g}", choice.larger);
+  std::ranges::replace(name, '.', '_');
+  return choice.light ? name + "_light" : name;
+}
+
+/// Drives that turn are for joints that turn: a slide gets one of its own.
+void add_slides(const std::vector<JointLoad>& loads, double period_s, NewRobot& robot) {
+  std::vector<DriveSize> sizes = size_drives(robot.tree, robot.limits);
+  std::erase_if(sizes, [&](const DriveSize& size) {
+    return robot.tree.joints[size.joints[0]].type != model::JointType::kPrismatic;
+  });
+  std::ranges::move(tune(sizes, loads, period_s), std::back_inserter(robot.gains));
+  std::ranges::move(sizes, std::back_inserter(robot.drives));
 }
 
 }  // namespace
@@ -115,40 +206,54 @@ double scale_of(const Tree& robot, const Tree& like) {
   return mass_times_reach(robot) / mass_times_reach(like);
 }
 
-void take_drives(const Like& like, const std::vector<JointLoad>& loads, NewRobot& robot) {
+void take_drives(const Like& like, const std::vector<JointLoad>& loads,
+                 const std::vector<double>& torques, double period_s, NewRobot& robot) {
   const double s = scale_of(robot.tree, like.tree);
-  const Posed neutral(like.tree, neutral_posture(like.tree));
-  std::vector<Foot> feet = find_feet(like.tree, {}, neutral, FeetBy::kName);
-  const std::vector<Limb> limbs = split_limbs(like.tree, feet, neutral, Vector3d::UnitX());
-  const std::vector<Trait> theirs = traits_of(like.tree, limbs, Vector3d::UnitX());
-  const std::vector<Trait> ours = traits_of(robot.tree, robot.limbs, robot.ahead);
-  std::map<std::pair<std::string, std::string>, std::vector<int>> groups;
-  for (std::size_t j = 0; j < ours.size(); ++j) {
-    if (robot.tree.joints[j].follows()) continue;
-    const hal::JointConfig& joint = resembled(like, theirs, ours[j]);
-    groups[{joint.actuator, joint.gains}].push_back(static_cast<int>(j));
-  }
-  for (const auto& [key, joints] : groups) {
-    hal::JointConfig named;
-    named.actuator = key.first;
-    named.gains = key.second;
-    const std::string from = fmt::format("{}'s {} times {:.3g}", like.config.name, key.first, s);
-    DriveSize drive{scaled(like.config.actuator_of(named), s), joints, from};
-    soften(loads, drive);
-    GainSet set{scaled(like.config.gains_of(named), s), joints,
-                fmt::format("{}'s {} times {:.3g}", like.config.name, key.second, s)};
-    const bool known = std::ranges::any_of(
-        robot.drives, [&](const DriveSize& d) { return d.actuator.name == drive.actuator.name; });
-    if (known) {  // the same motor with other gains
-      for (DriveSize& d : robot.drives) {
-        if (d.actuator.name == key.first)
-          d.joints.insert(d.joints.end(), joints.begin(), joints.end());
-      }
-    } else {
-      robot.drives.push_back(std::move(drive));
+  const Chooser chooser(like, robot, s);
+  const auto in_leg = [&](int joint) {
+    return std::ranges::any_of(robot.feet, [&](const Foot& foot) {
+      return std::ranges::count(path_to(robot.tree, foot.body), joint) > 0;
+    });
+  };
+  using Names = std::pair<std::string, std::string>;  // of the drive and of its gains
+  std::map<Names, std::pair<Choice, std::vector<int>>> groups;
+  for (int j = 0; j < static_cast<int>(robot.tree.joints.size()); ++j) {
+    const model::Joint& joint = robot.tree.joints[j];
+    if (joint.follows() || joint.type == model::JointType::kPrismatic) continue;
+    // The hoist lets a leg take its load little by little, so that its integral follows.
+    const Choice choice = chooser.choose(j, torques[j], !in_leg(j), loads[j].least_inertia);
+    const hal::JointConfig& first = chooser.resembled(j);
+    if (first.actuator != choice.joint->actuator || choice.larger > 1.0) {
+      robot.remarks.push_back(fmt::format("{} has {} for {}: gravity takes {:.3g} Nm of it.",
+                                          joint.name, name_of(choice.joint->actuator, choice),
+                                          first.actuator, std::abs(torques[j])));
     }
-    robot.gains.push_back(std::move(set));
+    auto& group =
+        groups[{name_of(choice.joint->actuator, choice), name_of(choice.joint->gains, choice)}];
+    group.first = choice;
+    group.second.push_back(j);
   }
+  for (auto& [names, group] : groups) {
+    const auto& [choice, joints] = group;
+    const double times = s * choice.larger;
+    DriveSize drive{
+        scaled(like.config.actuator_of(*choice.joint), times), joints,
+        fmt::format("{}'s {} times {:.3g}", like.config.name, choice.joint->actuator, times)};
+    drive.actuator.name = names.first;
+    if (choice.light) soften(loads, drive);
+    GainSet set{scaled(like.config.gains_of(*choice.joint), times), joints,
+                fmt::format("{}'s {} times {:.3g}", like.config.name, choice.joint->gains, times)};
+    set.gains.name = names.second;
+    robot.gains.push_back(std::move(set));
+    const auto known = std::ranges::find(robot.drives, names.first,
+                                         [](const DriveSize& d) { return d.actuator.name; });
+    if (known == robot.drives.end()) {
+      robot.drives.push_back(std::move(drive));
+    } else {  // the same motor with other gains
+      known->joints.insert(known->joints.end(), joints.begin(), joints.end());
+    }
+  }
+  add_slides(loads, period_s, robot);
 }
 
 }  // namespace tandem::scaffold

@@ -14,7 +14,8 @@ using model::Tree;
 constexpr int kPostures = 200;
 constexpr double kLever = 0.3;             // of a leg's length: from a bent knee to the load's line
 constexpr double kLoadMargin = 2.0;        // of a drive over gravity at its worst
-constexpr double kAcceleration = 10.0;     // [rad/s^2 or m/s^2] on top of it
+constexpr double kAcceleration = 10.0;     // [rad/s^2 or m/s^2] on top of it, in every posture
+constexpr double kNeighbour = 0.25;        // of what the stronger neighbour has
 constexpr double kLeastEffort = 0.5;       // [Nm or N]
 constexpr double kAbsurdEffort = 10.0;     // times the robot's weight at its reach
 constexpr double kAbsurdVelocity = 100.0;  // [rad/s or m/s]
@@ -40,6 +41,25 @@ double reach_of(const Tree& tree) {
     most = std::max(most, reach[j + 1] + tree.bodies[j + 1].inertia.com_m.norm());
   }
   return most;
+}
+
+bool slides(const model::Joint& joint) { return joint.type == model::JointType::kPrismatic; }
+
+/// No guess below kNeighbour of what a joint before or behind it has that moves as it does: from
+/// the tips to the root, and out again.
+void raise_to_neighbours(const Tree& tree, std::vector<JointLimits>& limits) {
+  const auto raise = [&](int joint, int other) {
+    const bool alike = slides(tree.joints[joint]) == slides(tree.joints[other]);
+    if (!limits[joint].effort_guessed || !alike || tree.joints[other].follows()) return;
+    limits[joint].effort = std::max(limits[joint].effort, kNeighbour * limits[other].effort);
+  };
+  const int count = static_cast<int>(limits.size());
+  for (int j = count; j-- > 0;) {
+    if (tree.joints[j].parent > 0) raise(tree.joints[j].parent - 1, j);
+  }
+  for (int j = 0; j < count; ++j) {
+    if (tree.joints[j].parent > 0) raise(j, tree.joints[j].parent - 1);
+  }
 }
 
 /// A leg whose foot stands swings the robot above it: its share of the whole, as a point mass.
@@ -80,12 +100,27 @@ std::vector<JointLoad> loads_of(const Tree& tree, const std::vector<Foot>& feet,
       const double inertia = posed.inertia(joint);
       JointLoad& load = loads[j];
       load.least_inertia = sample == 0 ? inertia : std::min(load.least_inertia, inertia);
-      load.most_inertia = std::max(load.most_inertia, inertia);
+      load.most_inertia = load.free_inertia = std::max(load.most_inertia, inertia);
       load.gravity_Nm = std::max(load.gravity_Nm, std::abs(posed.gravity_load(joint)));
     }
   }
   if (stance != nullptr) add_stance(tree, feet, *stance, loads);
   return loads;
+}
+
+std::vector<double> torques_at(const Tree& tree, const std::vector<Foot>& feet,
+                               const Posed& posed) {
+  const auto n = static_cast<Eigen::Index>(tree.joints.size());
+  Eigen::VectorXd torque = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    if (!tree.joints[j].follows()) torque[j] = posed.gravity_load(static_cast<int>(j));
+  }
+  for (const Foot& foot : feet) {
+    const double share_N = posed.whole().mass_kg * kGravity_m_s2 / static_cast<double>(feet.size());
+    const Vector3d sole = (posed.link(foot.link) * foot.sole_in_link).p;
+    torque -= share_N * posed.point_jacobian(foot.body, sole).row(2).transpose();
+  }
+  return {torque.begin(), torque.end()};
 }
 
 std::vector<JointLimits> limits_of(const Tree& tree, const std::vector<JointLoad>& loads) {
@@ -95,21 +130,23 @@ std::vector<JointLimits> limits_of(const Tree& tree, const std::vector<JointLoad
   std::vector<JointLimits> limits;
   for (std::size_t j = 0; j < tree.joints.size(); ++j) {
     const model::Joint& joint = tree.joints[j];
-    const bool slides = joint.type == model::JointType::kPrismatic;
     JointLimits limit;
     limit.effort = joint.effort;
     limit.velocity = joint.velocity;
     if (!(joint.effort > 0.0 && joint.effort < kAbsurdEffort * weight_at_reach)) {
-      limit.effort =
-          next_size(kLoadMargin * loads[j].gravity_Nm + kAcceleration * loads[j].least_inertia);
+      limit.effort = kLoadMargin * loads[j].gravity_Nm + kAcceleration * loads[j].free_inertia;
       limit.effort_guessed = true;
     }
     if (!(joint.velocity > 0.0 && joint.velocity < kAbsurdVelocity)) {
-      limit.velocity = slides ? kVelocity_m_s : kVelocity_rad_s;
+      limit.velocity = slides(joint) ? kVelocity_m_s : kVelocity_rad_s;
       limit.velocity_guessed = true;
     }
     limit.range = position_range(joint);
     limits.push_back(limit);
+  }
+  raise_to_neighbours(tree, limits);
+  for (JointLimits& limit : limits) {
+    if (limit.effort_guessed) limit.effort = next_size(limit.effort);
   }
   return limits;
 }

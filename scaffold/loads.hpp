@@ -14,6 +14,7 @@ namespace tandem::scaffold {
 struct JointLoad {
   double least_inertia = 0.0;  ///< smallest and largest diagonal entry of M
   double most_inertia = 0.0;   ///< a leg's: at least what it swings when its foot stands
+  double free_inertia = 0.0;   ///< the largest with its foot in the air
   double gravity_Nm = 0.0;     ///< the most that gravity asks for
   double fall_Nm_rad = 0.0;    ///< a leg's: what keeps the inverted pendulum on it from falling
 };
@@ -31,8 +32,17 @@ struct JointLimits {
   PositionRange range;
 };
 
+/// What each joint gives at one posture at rest [Nm or N], positive about its axis: against the
+/// weight that hangs on it, less what the ground carries, on every foot the same share. 0 for a
+/// follower; its leader's has it.
+/// @param feet  empty: the base is fixed
+[[nodiscard]] std::vector<double> torques_at(const model::Tree& tree, const std::vector<Foot>& feet,
+                                             const Posed& posed);
+
 /// The description's, where they can be: a limit of zero, or far beyond what the robot's weight
-/// at its full reach could use, is none, and is taken from the load.
+/// at its full reach could use, is none. An effort is then taken from the load: twice gravity at
+/// its worst and 10 rad/s^2 of the largest inertia on top, and no less than a quarter of
+/// what its neighbours in the tree have.
 [[nodiscard]] std::vector<JointLimits> limits_of(const model::Tree& tree,
                                                  const std::vector<JointLoad>& loads);
 

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
+
+#include "scaffold/strength.hpp"
 
 namespace tandem::scaffold {
 namespace {
@@ -15,7 +19,10 @@ constexpr double kStandingShare = 0.6;  // of the swing, while a robot stands
 constexpr double kRoomShare = 0.5;      // of the way to the nearer limit
 constexpr double kSpeedShare = 0.25;    // of the largest speed, in the middle of a way
 constexpr double kMinJerkPeak = 1.875;  // largest over mean speed
-constexpr double kMostLoad = 0.6;       // of an effort, by gravity alone
+constexpr double kMinJerkMost = 5.774;  // largest acceleration over way by time squared
+constexpr double kFastestAt = 0.577;    // of the way from the middle: where that is
+constexpr double kMostLoad = 0.6;       // of what a drive can give, by gravity and acceleration
+constexpr double kMoves_rad = 1e-3;     // less is no move
 constexpr double kSquatShare = 0.03;    // of the height
 
 /// How far each joint may go to either side of its posture.
@@ -48,48 +55,101 @@ VectorXd alternating(const VectorXd& amplitude) {
   return way;
 }
 
-/// Of `way` to either side of the posture as much as gravity leaves to every joint that moves: no
-/// load above kMostLoad of an effort, unless the posture itself has it.
-VectorXd bearable(const NewRobot& robot, const VectorXd& posture, const VectorXd& way) {
-  const auto load = [&](const VectorXd& q, int j) {
-    return std::abs(Posed(robot.tree, q).gravity_load(j)) / robot.limits[j].effort;
-  };
-  for (const double share : {1.0, 0.5, 0.25, 0.125}) {
-    bool fits = true;
-    for (Eigen::Index j = 0; j < way.size(); ++j) {
-      if (way[j] == 0.0) continue;
-      const int joint = static_cast<int>(j);
-      const double most = std::max(kMostLoad, load(posture, joint));
-      for (const double side : {share, -share}) {
-        fits = fits && load(posture + side * way, joint) <= most;
-      }
-    }
-    if (fits) return share * way;
+/// What a drive needs while all joints swing by `way` to either side of the posture: at the ends
+/// and in the middle gravity alone, and where a swing of minimum jerk accelerates most that, too.
+class Swinging {
+ public:
+  Swinging(const NewRobot& robot, const VectorXd& posture) : robot_(robot), posture_(posture) {
+    most_ = load(posture, VectorXd::Zero(posture.size())).cwiseMax(kMostLoad);
+    if (robot.tree.floating_base || !stands_on_its_base(robot.tree)) return;
+    floor_m_ = std::min(0.0, Posed(robot.tree, posture).lowest_m());
   }
-  return VectorXd::Zero(way.size());
+
+  /// No load above kMostLoad of what a drive can give, unless the posture itself has it; nothing
+  /// through the floor. A leg on the ground is not looked at: it carries more than itself.
+  [[nodiscard]] bool bears(const VectorXd& way) const {
+    for (const double side : {-1.0, -kFastestAt, 0.0, kFastestAt, 1.0}) {
+      const VectorXd q = posture_ + side * way;
+      const double share = std::abs(side) == kFastestAt ? -side / kFastestAt : 0.0;
+      const VectorXd qdd = share * kMinJerkMost * 2.0 / (kStep_s * kStep_s) * way;
+      if ((load(q, qdd).array() > most_.array() + 1e-9).any()) return false;
+      if (Posed(robot_.tree, q).lowest_m() < floor_m_ - 1e-9) return false;
+    }
+    return true;
+  }
+
+ private:
+  /// Shares of what the drives can give; 0 of a leg and of a follower.
+  [[nodiscard]] VectorXd load(const VectorXd& q, const VectorXd& qdd) const {
+    const Posed posed(robot_.tree, q);
+    const VectorXd torque = posed.inertial_load(qdd);
+    VectorXd shares = VectorXd::Zero(q.size());
+    for (const hal::JointConfig& joint : robot_.config.joints) {
+      const int j = robot_.tree.joint_index(joint.name);
+      if (in_leg(j)) continue;
+      const hal::ActuatorConfig& drive = robot_.config.actuator_of(joint);
+      const double all = posed.gravity_load(j) + torque[j] + drive.inertia_kg_m2 * qdd[j];
+      shares[j] = std::abs(all) / strength_of(joint, drive);
+    }
+    return shares;
+  }
+  [[nodiscard]] bool in_leg(int joint) const {
+    return std::ranges::any_of(robot_.feet, [&](const Foot& foot) {
+      const std::vector<int> path = path_to(robot_.tree, foot.body);
+      return std::ranges::find(path, joint) != path.end();
+    });
+  }
+
+  const NewRobot& robot_;
+  const VectorXd& posture_;
+  VectorXd most_;
+  double floor_m_ = -std::numeric_limits<double>::infinity();
+};
+
+/// Of `way` to either side as much as the drives bear: first all joints alike, then, when even an
+/// eighth is too much, each joint for itself, those that are too weak not at all.
+VectorXd bearable(const NewRobot& robot, const VectorXd& posture, const VectorXd& way) {
+  const Swinging swinging(robot, posture);
+  for (const double share : {1.0, 0.5, 0.25, 0.125}) {
+    if (swinging.bears(share * way)) return share * way;
+  }
+  VectorXd kept = VectorXd::Zero(way.size());
+  for (Eigen::Index j = way.size(); j-- > 0;) {
+    VectorXd more = kept;
+    more[j] = 0.125 * way[j];
+    if (swinging.bears(more)) kept = more;
+  }
+  return kept;
 }
 
-/// Limits of the legs may leave less than `down_m`, or nothing but the posture itself.
-VectorXd as_low_as_it_goes(const Standing& standing, const VectorXd& q, double down_m) {
+/// The largest share of `down_m` that the limits of the legs leave, with the joints that are in
+/// no leg as in `q`. No posture when they cannot even stay as high as they are.
+struct Lowered {
+  VectorXd q;
+  double share = 0.0;
+};
+std::optional<Lowered> as_low_as_it_goes(const Standing& standing, const VectorXd& q,
+                                         double down_m) {
   for (const double share : {1.0, 0.5, 0.25, 0.0}) {
-    if (const auto found = standing.lowered(q, share * down_m)) return *found;
+    if (const auto found = standing.lowered(q, share * down_m)) return Lowered{*found, share};
   }
-  return standing.q();
+  return {};
 }
 
 }  // namespace
 
-std::vector<WayPoint> swing(const NewRobot& robot, const VectorXd& posture) {
+Move swing(const NewRobot& robot, const VectorXd& posture) {
   const VectorXd way = bearable(robot, posture, alternating(amplitudes(robot, posture)));
-  std::vector<WayPoint> points;
+  Move move;
+  move.swings = way.cwiseAbs().maxCoeff() > kMoves_rad;
   double time_s = 0.0;
   for (const double side : {1.0, -1.0, 1.0, 0.0}) {
-    points.push_back(way_point(robot, time_s += kStep_s, posture + side * way));
+    move.points.push_back(way_point(robot, time_s += kStep_s, posture + side * way));
   }
-  return points;
+  return move;
 }
 
-std::vector<WayPoint> squat_and_swing(const NewRobot& robot, const Standing& standing) {
+Move squat_and_swing(const NewRobot& robot, const Standing& standing) {
   const VectorXd& posture = standing.q();
   VectorXd way = kStandingShare * amplitudes(robot, posture);
   for (Eigen::Index j = 0; j < way.size(); ++j) {
@@ -97,13 +157,21 @@ std::vector<WayPoint> squat_and_swing(const NewRobot& robot, const Standing& sta
   }
   way = bearable(robot, posture, way);
   const double down_m = kSquatShare * standing.height_m();
-  std::vector<WayPoint> points;
-  double time_s = 0.0;
-  for (const auto& [side, down] : {std::pair{1.0, 1.0}, {-1.0, 0.0}, {1.0, 1.0}, {0.0, 0.0}}) {
-    points.push_back(way_point(robot, time_s += kStep_s,
-                               as_low_as_it_goes(standing, posture + side * way, down * down_m)));
+  auto up = as_low_as_it_goes(standing, posture - way, 0.0);
+  auto low = as_low_as_it_goes(standing, posture + way, down_m);
+  if (!up || !low) {  // no swing that the legs can balance
+    way.setZero();
+    up = Lowered{posture, 0.0};
+    low = as_low_as_it_goes(standing, posture, down_m).value_or(*up);
   }
-  return points;
+  Move move;
+  move.swings = way.cwiseAbs().maxCoeff() > kMoves_rad;
+  move.squat_m = low->share * down_m;
+  double time_s = 0.0;
+  for (const VectorXd& q : {low->q, up->q, low->q, posture}) {
+    move.points.push_back(way_point(robot, time_s += kStep_s, q));
+  }
+  return move;
 }
 
 }  // namespace tandem::scaffold

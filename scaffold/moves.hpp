@@ -7,12 +7,13 @@
 
 namespace tandem::scaffold {
 
-/// Every joint to one side of its posture, to the other and back.
-[[nodiscard]] std::vector<WayPoint> swing(const NewRobot& robot, const Eigen::VectorXd& posture);
+/// Every joint to one side of its posture, to the other and back, as far as drives of `robot` can
+/// carry and accelerate what hangs on them.
+/// @pre  `robot` has its joints and drives
+[[nodiscard]] Move swing(const NewRobot& robot, const Eigen::VectorXd& posture);
 
 /// The same for what is no leg, while the legs lower the robot twice and keep its centre of mass
 /// over the feet.
-[[nodiscard]] std::vector<WayPoint> squat_and_swing(const NewRobot& robot,
-                                                    const Standing& standing);
+[[nodiscard]] Move squat_and_swing(const NewRobot& robot, const Standing& standing);
 
 }  // namespace tandem::scaffold

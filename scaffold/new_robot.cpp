@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <sstream>
 
@@ -13,6 +14,7 @@
 #include "scaffold/like.hpp"
 #include "scaffold/moves.hpp"
 #include "scaffold/standing.hpp"
+#include "scaffold/strength.hpp"
 #include "scaffold/wiring.hpp"
 
 namespace tandem::scaffold {
@@ -27,6 +29,13 @@ std::string text_of(const std::string& file) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
+}
+
+/// Errors of a description whose root moves, read as one that is fixed: no fault of the file.
+bool wants_to_float(const Diagnostics& errors) {
+  return std::ranges::any_of(errors, [](const Error& error) {
+    return error.message.find("of type 'floating' lets the base move") != std::string::npos;
+  });
 }
 
 /// Decides one thing after the other; each step may use what the steps before have found.
@@ -59,6 +68,7 @@ class Maker {
   Status choose_drives();
   Status look_at_angles();
   Status wire_up();
+  void warn_of_weakness(const std::vector<double>& torques);
   void fill_model();
   void fill_joints();
   void fill_posture(const std::string& name, double base_height_m);
@@ -86,7 +96,9 @@ Diagnostics Maker::read() {
     for (const bool floating : {false, true}) {
       auto found = read_tree(floating);
       if (!found) {
-        if (fewest.empty() || found.error().size() < fewest.size()) fewest = found.error();
+        const bool better =
+            fewest.empty() || wants_to_float(fewest) || found.error().size() < fewest.size();
+        if (better && (fewest.empty() || !wants_to_float(found.error()))) fewest = found.error();
         continue;
       }
       must_float_ = floating;
@@ -100,6 +112,13 @@ Diagnostics Maker::take(model::UrdfModel found) {
   if (found.tree.joints.empty()) {
     return {Error{
         "the robot has no joint that moves", "name another description", request_.urdf, 0, {}}};
+  }
+  for (const model::Joint& joint : found.tree.joints) {
+    if (joint.follows() || !(joint.lower == joint.upper)) continue;
+    return {Error{fmt::format("its limits and those of its followers leave it one position, {:.6g}",
+                              joint.lower),
+                  "correct the limits, the multiplier or the offset; or make the joint fixed",
+                  request_.urdf, joint.line, "joint " + joint.name}};
   }
   if (robot_.config.model.repair_inertia) {
     robot_.remarks.push_back("Impossible inertias are replaced by the nearest possible ones.");
@@ -121,7 +140,8 @@ Status Maker::choose_base() {
   const bool heavy = robot_.tree.bodies[0].inertia.mass_kg > 0.0;
   const bool asked = request_.base == Base::kFloating || must_float_;
   if (must_float_ && request_.base == Base::kFixed) {
-    return fail("the description's root moves by a floating joint", "leave --base out");
+    return fail("the description's root moves by a floating joint",
+                "leave --base out, or make that joint fixed");
   }
   if (request_.base != Base::kFixed && heavy) {
     robot_.feet = find_feet(robot_.tree, outfit_, posed, FeetBy::kName);
@@ -135,8 +155,14 @@ Status Maker::choose_base() {
   }
   const bool floating = !robot_.feet.empty();
   if (!floating && asked) {
-    return fail("a floating base needs mass at its root, and feet",
-                "give --base fixed, or the root link an inertial");
+    const std::string& root = robot_.tree.bodies[0].name;
+    const std::string hint = must_float_ ? "" : "give --base fixed, or leave --base out; or ";
+    if (!heavy) {
+      return fail("the root link '" + root + "' has no mass, so it cannot float",
+                  hint + "give the link an <inertial>");
+    }
+    return fail("no link can be a foot, so a floating base would fall for ever",
+                hint + "call the feet's links foot or sole");
   }
   const char* why = request_.base != Base::kAuto ? "as --base says"
                     : must_float_                ? "the description has a floating joint"
@@ -148,6 +174,7 @@ Status Maker::choose_base() {
     auto found = read_tree(true);
     if (!found) return std::unexpected(found.error().front());
     robot_.tree = std::move(found->tree);
+    robot_.warnings = std::move(found->warnings);
     robot_.ahead = direction_ahead(robot_.feet, posed);
     face_ahead(robot_.ahead, posed, robot_.feet);
   }
@@ -175,11 +202,12 @@ Status Maker::choose_drives() {
       standing_ ? std::optional<Posed>(std::in_place, robot_.tree, q_) : std::nullopt;
   const std::vector<JointLoad> loads =
       loads_of(robot_.tree, robot_.feet, stance ? &*stance : nullptr);
+  const std::vector<double> torques = torques_at(robot_.tree, robot_.feet, Posed(robot_.tree, q_));
   robot_.limits = limits_of(robot_.tree, loads);
   if (request_.like != nullptr) {
     robot_.like = request_.like->config.name;
     robot_.scale = scale_of(robot_.tree, request_.like->tree);
-    take_drives(*request_.like, loads, robot_);
+    take_drives(*request_.like, loads, torques, kControlPeriod_s, robot_);
   } else {
     robot_.drives = size_drives(robot_.tree, robot_.limits);
     robot_.gains = tune(robot_.drives, loads, kControlPeriod_s);
@@ -190,14 +218,22 @@ Status Maker::choose_drives() {
   if (!standing_) {
     fill_posture("ready", 0.0);
     robot_.move = swing(robot_, q_);
+    warn_of_weakness(torques);
     return {};
   }
-  robot_.move = squat_and_swing(robot_, *standing_);  // needs the balls' centres
   settle_balls(robot_.ahead, *stance, robot_.feet);
+  standing_->stay_on(robot_.feet);
+  robot_.move = squat_and_swing(robot_, *standing_);
   fill_ground(request_.like == nullptr ? nullptr : &request_.like->config, robot_);
   robot_.stands_m = standing_->height_m();
+  robot_.stands_share = standing_->height_m() / standing_->greatest_height_m();
   fill_posture("stand", robot_.stands_m);
+  warn_of_weakness(torques);
   return {};
+}
+
+void Maker::warn_of_weakness(const std::vector<double>& torques) {
+  std::ranges::move(weak_drives(robot_, torques), std::back_inserter(robot_.warnings));
 }
 
 /// How far the robot would move if its right angles were exact.

@@ -42,6 +42,13 @@ struct WayPoint {
   std::vector<double> position_rad;
 };
 
+/// What move.toml does.
+struct Move {
+  std::vector<WayPoint> points;
+  double squat_m = 0.0;  ///< the root goes down so far; 0: it stays
+  bool swings = false;   ///< joints that are in no leg move
+};
+
 /// Everything that the files say, before it is text.
 struct NewRobot {
   model::Tree tree;
@@ -54,12 +61,13 @@ struct NewRobot {
   std::vector<DriveSize> drives;
   std::vector<GainSet> gains;
   std::vector<std::string> remarks;  ///< of the whole: what was decided, and why
-  std::vector<WayPoint> move;
+  Move move;
   std::vector<std::string> report;  ///< one or two joints that are worth plots
   std::string like;                 ///< name of the robot that springs come from; may be empty
   double scale = 1.0;               ///< its springs' factor
   double mass_kg = 0.0;
   double stands_m = 0.0;            ///< height of the root; 0: the base is fixed
+  double stands_share = 0.0;        ///< of the greatest height in which the feet reach the ground
   Diagnostics warnings;             ///< of the description's reader
   model::RightAngles right_angles;  ///< what the description has of few digits
   model::Displacement turned;       ///< what exact ones would move the most

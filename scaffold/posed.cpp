@@ -1,6 +1,7 @@
 #include "scaffold/posed.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "model/placements.hpp"
 
@@ -77,6 +78,29 @@ double Posed::own_gravity_load(int joint) const {
   const Vector3d weight(0.0, 0.0, -load.mass_kg * kGravity_m_s2);
   if (slides(joint)) return -axis(joint).dot(weight);
   return -axis(joint).dot((load.com_m - origin(joint)).cross(weight));
+}
+
+Eigen::VectorXd Posed::inertial_load(const Eigen::VectorXd& qdd) const {
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(qdd.size());
+  for (int b = 1; b < static_cast<int>(bodies_.size()); ++b) {
+    const model::Inertia own = bodies_[b] * tree_.bodies[b].inertia;
+    const MatrixXd v = point_jacobian(b, own.com_m);
+    const MatrixXd w = turn_jacobian(b);
+    load += own.mass_kg * (v.transpose() * (v * qdd)) +
+            w.transpose() * (own.about_com_kg_m2 * (w * qdd));
+  }
+  return load;
+}
+
+double Posed::lowest_m() const {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (std::size_t b = 1; b < bodies_.size(); ++b) {
+    lowest = std::min(lowest, (bodies_[b] * tree_.bodies[b].inertia).com_m.z());
+  }
+  for (const model::Link& link : tree_.links) {
+    if (link.body > 0) lowest = std::min(lowest, (bodies_[link.body] * link.in_body).p.z());
+  }
+  return lowest;
 }
 
 /// A follower's column is its leader's.

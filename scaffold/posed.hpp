@@ -35,6 +35,13 @@ class Posed {
   /// What the joint must give against gravity when nothing beyond it is supported [Nm or N].
   [[nodiscard]] double gravity_load(int joint) const;
 
+  /// (joints) what the joints give to accelerate from rest [Nm or N]: M qdd, without rotors and
+  /// with the root at rest; 0 for followers.
+  /// @param qdd  (joints) [rad/s^2 or m/s^2]; a follower's entry is not read
+  [[nodiscard]] Eigen::VectorXd inertial_load(const Eigen::VectorXd& qdd) const;
+  /// The lowest of the frames of what moves, and of the centres of mass [m], over the root's.
+  [[nodiscard]] double lowest_m() const;
+
   /// (3 x joints) velocity of a point fixed to `body`; columns of joints before it only.
   [[nodiscard]] Eigen::MatrixXd point_jacobian(int body, const Eigen::Vector3d& point) const;
   /// (3 x joints) angular velocity of `body`.

@@ -15,10 +15,12 @@ using model::Tree;
 
 constexpr double kRoom = 0.05;      // of the range, kept to a limit
 constexpr double kMostRoom = 0.1;   // [rad or m]
+constexpr double kBelow = 10.0;     // more than all else that a posture is judged by
 constexpr double kFarthest = 1.25;  // [rad]: from the middle of the limits, of a waiting posture
 constexpr double kMostLoad = 0.5;   // of a joint's effort, by gravity alone
 constexpr double kSparedLoad = 0.33;
-constexpr double kStep = 0.02;  // [rad]: in the search for less load
+constexpr double kStep = 0.02;     // [rad]: in the search for less load
+constexpr double kClear_m = 0.05;  // over the base's plane, of a waiting posture
 
 /// The least velocity that a body's frame gets in its worst direction, per unit of joint speed
 /// and reach; with fewer than three joints, in the directions that there are.
@@ -117,11 +119,22 @@ VectorXd spared_posture(const Tree& tree) {
   return q;
 }
 
+bool stands_on_its_base(const Tree& tree) {
+  const Bounds bounds = bounds_of(tree);
+  const Posed posed(tree, 0.5 * (bounds.lower + bounds.upper));
+  model::Inertia moving;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    if (tree.joints[j].parent == 0) moving = moving + posed.beyond(static_cast<int>(j));
+  }
+  return moving.com_m.z() > 0.0;
+}
+
 VectorXd waiting_posture(const Tree& tree) {
   const Bounds bounds = bounds_of(tree);
   const VectorXd middle = 0.5 * (bounds.lower + bounds.upper);
   const VectorXd reach = (0.4 * (bounds.upper - bounds.lower)).cwiseMin(kFarthest);
   const std::vector<int> ends = end_bodies(tree);
+  const bool floor = stands_on_its_base(tree);
   VectorXd best = middle;
   double best_score = -1e9;
   for (int sample = 0; sample < 256; ++sample) {
@@ -141,6 +154,8 @@ VectorXd waiting_posture(const Tree& tree) {
       if (tree.joints[j].follows()) continue;
       score -= std::max(0.0, loaded(tree, posed, static_cast<int>(j)) - kMostLoad);
     }
+    const double below_m = floor ? kClear_m - posed.lowest_m() : 0.0;
+    if (below_m > 0.0) score -= kBelow * (1.0 + below_m);
     if (score <= best_score) continue;
     best_score = score;
     best = q;

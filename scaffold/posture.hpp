@@ -28,9 +28,14 @@ struct Bounds {
 /// it takes to make that a third.
 [[nodiscard]] Eigen::VectorXd spared_posture(const model::Tree& tree);
 
+/// Whether what moves is above the base's plane (z = 0 of the root) in the middle of its limits:
+/// then the plane may be a floor or a table. Else the robot hangs.
+[[nodiscard]] bool stands_on_its_base(const model::Tree& tree);
+
 /// A posture of a robot on a fixed base: near the middle of its limits, but where its ends can
-/// move in every direction and gravity asks for no more than half of an effort. The best of a
-/// fixed series of samples.
+/// move in every direction and gravity asks for no more than half of an effort. Of a robot that
+/// stands on its base nothing is below that, if its limits allow. The best of a fixed series of
+/// samples.
 [[nodiscard]] Eigen::VectorXd waiting_posture(const model::Tree& tree);
 
 /// The i-th point of a series that fills (0, 1)^n evenly: Halton's, by dimension.

@@ -6,6 +6,7 @@
 
 #include "base/counted.hpp"
 #include "scaffold/new_robot.hpp"
+#include "scaffold/toml_words.hpp"
 
 namespace tandem::scaffold {
 namespace {
@@ -16,14 +17,18 @@ std::string loop(const char* name, const hal::PidGains& g) {
   std::string text = fmt::format("{} = {{ kp = {}", name, number(g.kp));
   if (g.ki > 0.0) text += ", ki = " + number(g.ki);
   if (g.kd > 0.0) text += ", kd = " + number(g.kd);
-  return text + " }";
+  return text + " }" + "  # guess";
 }
 
 /// A table's lines, `key = value` each.
 using Keys = std::vector<std::string>;
 
+/// Every figure of motors and gains is made up, so every line says it.
+constexpr const char* kGuess = "  # guess";
+constexpr const char* kFromShapes = "  # from the collision shapes";
+
 void add(Keys& keys, const char* key, double value) {
-  keys.push_back(fmt::format("{} = {}", key, number(value)));
+  keys.push_back(fmt::format("{} = {}{}", key, number(value), kGuess));
 }
 
 class Writer {
@@ -37,8 +42,10 @@ class Writer {
     sites();
     drives();
     line("\n# --- wires: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a board");
-    line("[board_defaults]\nslow_pdo_every = {}  # motor currents and the like, every n-th cycle",
-         robot_.config.boards[0].slow_pdo_every);
+    line(
+        "[board_defaults]\nslow_pdo_every = {}  # guess: motor currents and the like, every n-th "
+        "cycle",
+        robot_.config.boards[0].slow_pdo_every);
     for (const hal::BusConfig& bus : robot_.config.buses) wire(bus);
     joints();
     sensors();
@@ -59,15 +66,15 @@ class Writer {
          counted(robot_.config.joints.size(), "joint"),
          robot_.config.model.floating_base ? "floating" : "fixed", robot_.mass_kg);
     line("# Written by `tandem new` from {}. The description keeps its own licence: put its",
-         source_);
+         commented(source_));
     line("# notice beside this file before you pass the folder on.");
-    for (const std::string& remark : robot_.remarks) line("# {}", remark);
+    for (const std::string& remark : robot_.remarks) line("# {}", commented(remark));
     line("# Every key: docs/configuration.md. The rules behind the figures: docs/robots.md.");
-    line("name = \"{}\"", robot_.config.name);
+    line("name = {}", quoted(robot_.config.name));
   }
 
   void model() {
-    line("\n[model]\nurdf = \"{}\"\nbase = \"{}\"", urdf_,
+    line("\n[model]\nurdf = {}\nbase = \"{}\"", quoted(urdf_),
          robot_.config.model.floating_base ? "floating" : "fixed");
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
     if (!(robot_.turned.distance_m > 0.0)) return;  // those of inertias alone cost nothing
@@ -84,12 +91,13 @@ class Writer {
       const hal::SiteConfig& site = robot_.config.model.sites[i];
       text_ += '\n';
       if (!robot_.feet[i].guess.empty()) line("# guess: {}", robot_.feet[i].guess);
-      line("[[site]]\nname = \"{}\"\nlink = \"{}\"", site.name, site.link);
+      line("[[site]]\nname = {}\nlink = {}", quoted(site.name), quoted(site.link));
+      const char* from = robot_.feet[i].guess.empty() ? kFromShapes : kGuess;
       const auto set = [](const auto& v) {
         return std::ranges::any_of(v, [](double x) { return x != 0.0; });
       };
-      if (set(site.xyz_m)) line("xyz_m = [{:.6g}]", fmt::join(site.xyz_m, ", "));
-      if (set(site.rpy_rad)) line("rpy_rad = [{:.9g}]", fmt::join(site.rpy_rad, ", "));
+      if (set(site.xyz_m)) line("xyz_m = [{:.6g}]{}", fmt::join(site.xyz_m, ", "), from);
+      if (set(site.rpy_rad)) line("rpy_rad = [{:.9g}]{}", fmt::join(site.rpy_rad, ", "), from);
       line("wrench = true");
     }
   }
@@ -138,14 +146,14 @@ class Writer {
   }
 
   static Keys keys(const hal::ActuatorConfig& a) {
-    Keys keys{fmt::format("order = {}", a.order)};
+    Keys keys{fmt::format("order = {}{}", a.order, kGuess)};
     add(keys, "resistance_ohm", a.resistance_ohm);
     add(keys, "inductance_H", a.inductance_H);
     add(keys, "torque_constant_Nm_A", a.torque_constant_Nm_A);
     add(keys, "gear_ratio", a.gear_ratio);
     add(keys, "inertia_kg_m2", a.inertia_kg_m2);
     add(keys, "damping_Nms_rad", a.damping_Nms_rad);
-    keys.back() += "  # back-EMF included";
+    keys.back() += "; back-EMF included";
     if (a.order >= 2) {
       add(keys, "spring_Nm_rad", a.spring_Nm_rad);
       add(keys, "spring_damping_Nms_rad", a.spring_damping_Nms_rad);
@@ -176,14 +184,15 @@ class Writer {
   }
 
   void wire(const hal::BusConfig& bus) {
-    line("\n[[bus]]\nname = \"{}\"\ninterface = \"{}\"\nboards = [", bus.name, bus.interface);
+    line("\n[[bus]]\nname = {}\ninterface = {}{}\nboards = [", quoted(bus.name),
+         quoted(bus.interface), kGuess);
     for (const hal::BoardConfig& board : robot_.config.boards) {
       if (board.bus != bus.name) continue;
       std::vector<std::string> joints;
       for (const hal::JointConfig& joint : robot_.config.joints) {
-        if (joint.board == board.name) joints.push_back('"' + joint.name + '"');
+        if (joint.board == board.name) joints.push_back(quoted(joint.name));
       }
-      line("  {{ name = \"{}\", joints = [{}] }},", board.name, fmt::join(joints, ", "));
+      line("  {{ name = {}, joints = [{}] }},", quoted(board.name), fmt::join(joints, ", "));
     }
     line("]");
   }
@@ -194,8 +203,8 @@ class Writer {
     line("[joint_defaults]");
     line("encoder_counts_per_rev = {:.0f}  # guess: 20 bits; put your encoders' counts here",
          robot_.config.joints[0].encoder_counts_per_rev);
-    line("motor_encoder_counts_per_rev = {:.0f}",
-         robot_.config.joints[0].motor_encoder_counts_per_rev);
+    line("motor_encoder_counts_per_rev = {:.0f}{}",
+         robot_.config.joints[0].motor_encoder_counts_per_rev, kGuess);
     for (const GainSet& set : robot_.gains) {
       std::vector<std::pair<std::string, std::vector<std::string>>> groups;  // limits -> joints
       for (const hal::JointConfig& joint : robot_.config.joints) {
@@ -203,7 +212,7 @@ class Writer {
         const std::string own = limits(joint);
         auto group = std::ranges::find(groups, own, &decltype(groups)::value_type::first);
         if (group == groups.end()) group = groups.insert(groups.end(), {own, {}});
-        group->second.push_back('"' + joint.name + '"');
+        group->second.push_back(quoted(joint.name));
       }
       for (const auto& [own, names] : groups) {
         line("\n[[joint]]\nnames = [{}]", fmt::join(names, ", "));
@@ -227,12 +236,12 @@ class Writer {
     if (limit.range.guessed) {
       text += fmt::format(
           "min_position_rad = {}  # guess: the description has no range\n"
-          "max_position_rad = {}\n",
+          "max_position_rad = {}  # guess\n",
           number(joint.min_position_rad), number(joint.max_position_rad));
     }
     if (limit.effort_guessed) {
       text += fmt::format(
-          "max_torque_Nm = {}  # guess: twice gravity at its worst; the description's is {}\n",
+          "max_torque_Nm = {}  # guess: twice gravity and 10 rad/s^2; the description's is {}\n",
           number(joint.max_torque_Nm), stated(joint.name, true));
     }
     if (limit.velocity_guessed) {
@@ -254,54 +263,49 @@ class Writer {
       text_ += '\n';
       if (!robot_.sensors[i].guess.empty()) line("# guess: {}", robot_.sensors[i].guess);
       const bool wrench = s.type == hal::SensorType::kForceTorque;
-      line("[[sensor]]\nname = \"{}\"\ntype = \"{}\"\nbus = \"{}\"", s.name,
-           wrench ? "force_torque" : "imu", s.bus);
-      if (wrench) line("joint = \"{}\"", s.joint);
-      line("link = \"{}\"", s.link);
+      line("[[sensor]]\nname = {}\ntype = \"{}\"\nbus = {}", quoted(s.name),
+           wrench ? "force_torque" : "imu", quoted(s.bus));
+      if (wrench) line("joint = {}", quoted(s.joint));
+      line("link = {}", quoted(s.link));
     }
   }
 
   void contact() {
     const hal::ContactConfig& c = robot_.config.contact;
     line("\n# guess: a firm floor, into which the robot sinks by 1.5 mm");
-    line("[contact]\nstiffness_N_m = {}\ndamping_s_m = {}", number(c.stiffness_N_m),
-         number(c.damping_s_m));
-    line("tangential_stiffness_N_m = {}\ntangential_damping_Ns_m = {}",
-         number(c.tangential_stiffness_N_m), number(c.tangential_damping_Ns_m));
-    line("static_friction = {}\nsliding_friction = {}", number(c.static_friction),
-         number(c.sliding_friction));
-    for (const hal::FootConfig& foot : c.feet) {
+    Keys floor;
+    add(floor, "stiffness_N_m", c.stiffness_N_m);
+    add(floor, "damping_s_m", c.damping_s_m);
+    add(floor, "tangential_stiffness_N_m", c.tangential_stiffness_N_m);
+    add(floor, "tangential_damping_Ns_m", c.tangential_damping_Ns_m);
+    add(floor, "static_friction", c.static_friction);
+    add(floor, "sliding_friction", c.sliding_friction);
+    table("contact", floor);
+    for (std::size_t f = 0; f < c.feet.size(); ++f) {
       std::vector<std::string> points;
-      for (const auto& p : foot.points_m)
+      for (const auto& p : c.feet[f].points_m)
         points.push_back(fmt::format("[{:.5g}]", fmt::join(p, ", ")));
-      line("\n[[contact.foot]]\nsite = \"{}\"\npoints_m = [{}]", foot.site,
-           fmt::join(points, ", "));
+      line("\n[[contact.foot]]\nsite = {}\npoints_m = [{}]{}", quoted(c.feet[f].site),
+           fmt::join(points, ", "), robot_.feet[f].guess.empty() ? kFromShapes : kGuess);
     }
   }
 
   void posture() {
     const hal::PostureConfig& p = robot_.config.postures[0];
     if (robot_.stands_m > 0.0) {
-      line(
-          "\n# Feet level, knees bent to 0.94 of the greatest height, centre of mass over the "
-          "feet.");
-      line("[posture.{}]\nbase_height_m = \"auto\"  # the lowest point touches: {:.4f}", p.name,
-           p.base_height_m);
+      line("\n# guess: feet level, {:.2f} of the greatest height, centre of mass over the feet",
+           robot_.stands_share);
+      line("[posture.{}]\nbase_height_m = \"auto\"  # the lowest point touches: {:.4f}",
+           key_of(p.name), p.base_height_m);
     } else {
       line("\n# guess: within all limits, and away from stretched limbs");
-      line("[posture.{}]", p.name);
+      line("[posture.{}]", key_of(p.name));
     }
     for (std::size_t j = 0; j < p.position_rad.size(); ++j) {
       const double value = std::round(p.position_rad[j] * 1e4) / 1e4;
-      if (value != 0.0) line("{} = {}", key(robot_.config.joints[j].name), number(value));
+      if (value == 0.0) continue;
+      line("{} = {}{}", key_of(robot_.config.joints[j].name), number(value), kGuess);
     }
-  }
-
-  /// A bare key where TOML allows it.
-  static std::string key(const std::string& name) {
-    const bool bare = std::ranges::all_of(
-        name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; });
-    return bare ? name : "\"" + name + "\"";
   }
 
   const NewRobot& robot_;

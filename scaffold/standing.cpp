@@ -260,6 +260,15 @@ Status Standing::find() {
               "give --base fixed, and edit what is written");
 }
 
+void Standing::stay_on(const std::vector<Foot>& settled) {
+  feet_ = settled;
+  const Posed posed(tree_, q_);
+  for (std::size_t f = 0; f < feet_.size(); ++f) {
+    homes_[f] = (posed.link(feet_[f].link) * feet_[f].sole_in_link).p;
+  }
+  middle_home_ = posed.whole().com_m;
+}
+
 Result<VectorXd> Standing::lowered(const VectorXd& q, double down_m) const {
   VectorXd found = q;
   if (solve(height_m_ - down_m, found)) return found;

@@ -29,6 +29,10 @@ class Standing {
   [[nodiscard]] double height_m() const { return height_m_; }
   [[nodiscard]] double greatest_height_m() const { return greatest_m_; }
 
+  /// Takes the feet as they are now, in the posture found, for those that stay where they are:
+  /// after settle_balls() the simulated contact is a point of the shank, which turns with it.
+  void stay_on(const std::vector<Foot>& settled);
+
   /// The posture `down_m` lower, from `q`, whose joints that are not in a leg stay.
   /// Errors: the legs cannot do it.
   [[nodiscard]] Result<Eigen::VectorXd> lowered(const Eigen::VectorXd& q, double down_m) const;
@@ -55,7 +59,7 @@ class Standing {
   [[nodiscard]] bool settle(Eigen::VectorXd q);
 
   const model::Tree& tree_;
-  const std::vector<Foot>& feet_;
+  std::vector<Foot> feet_;
   Eigen::Matrix3d level_;  ///< of a sole: x ahead, z up
   Bounds bounds_;
   std::vector<bool> in_leg_;

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <regex>
+#include <sstream>
 
 #include "hal/ethercat-can/bus_load.hpp"
 #include "runtime/experiment.hpp"
@@ -14,6 +17,33 @@
 
 namespace tandem::scaffold {
 namespace {
+
+std::string text_of(const PublicRobot& robot) {
+  std::ifstream in(path_of(robot), std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+NewRobot made_of(const std::string& urdf) {
+  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_made_of.urdf";
+  std::ofstream(file, std::ios::binary) << urdf;
+  auto found = make_robot({.urdf = file.string(), .name = "made"});
+  std::filesystem::remove(file);
+  if (!found) throw std::runtime_error(found.error().front().to_string());
+  return std::move(*found);
+}
+
+/// In the tree's order, from that of [[joint]].
+Eigen::VectorXd positions_in(const NewRobot& robot, const std::vector<double>& position_rad) {
+  Eigen::VectorXd q = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(robot.tree.joints.size()));
+  for (std::size_t j = 0; j < robot.config.joints.size(); ++j) {
+    q[robot.tree.joint_index(robot.config.joints[j].name)] = position_rad[j];
+  }
+  return q;
+}
+
+Eigen::VectorXd posture_in(const NewRobot& robot) {
+  return positions_in(robot, robot.config.postures[0].position_rad);
+}
 
 std::vector<std::string> sensors_of(const NewRobot& robot) {
   std::vector<std::string> names;
@@ -115,7 +145,7 @@ TEST(NewRobot, TakesWhereTheDescriptionHasNoLimitWhatTheModelNeeds) {
   const NewRobot icub = made(kPublicRobots[7]);  // 20 joints of 50000 Nm at 50000 rad/s
   EXPECT_EQ(std::ranges::count(icub.limits, true, &JointLimits::effort_guessed), 20);
   const std::string text = robot_text(icub, "icub.urdf", "icub.urdf");
-  EXPECT_NE(text.find("# guess: twice gravity at its worst; the description's is 50000"),
+  EXPECT_NE(text.find("# guess: twice gravity and 10 rad/s^2; the description's is 50000"),
             std::string::npos);
 }
 
@@ -155,6 +185,121 @@ TEST(NewRobot, TakesSpringsInProportionFromAnother) {
                 read->actuator_of(theirs).spring_Nm_rad, 0.5)
         << joint.name;
   }
+}
+
+/// Numbers come from the description, from an option, or are marked. Lists of texts, and the
+/// count in `base_height_m`'s own comment, are no numbers of ours.
+TEST_P(EveryPublicRobot, MarksEveryNumberThatIsNotTheDescriptionsAsAGuess) {
+  const NewRobot robot = made(GetParam());
+  std::istringstream lines(robot_text(robot, path_of(GetParam()), "x.urdf"));
+  int marked = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t equals = line.find(" = ");
+    if (line.starts_with('#') || equals == std::string::npos) continue;
+    bool text = false, number = false;
+    for (const char c : line.substr(equals, line.find("  # ") - equals)) {
+      if (c == '"') text = !text;
+      number = number || (!text && c >= '0' && c <= '9');
+    }
+    if (!number) continue;
+    const bool ours = line.find("  # guess") != std::string::npos;
+    EXPECT_TRUE(ours || line.find("  # from the collision shapes") != std::string::npos) << line;
+    marked += ours ? 1 : 0;
+  }
+  EXPECT_GT(marked, 20);
+}
+
+TEST(NewRobot, GivesAJointAboutAVerticalAxisTheEffortToTurnWhatItCarries) {
+  std::string text = text_of(kPublicRobots[1]);  // UR5e, as if nobody knew its drives
+  text = std::regex_replace(text, std::regex("effort=\"[0-9.]+\""), "effort=\"0\"");
+  text = std::regex_replace(text, std::regex("velocity=\"[0-9.]+\""), "velocity=\"0\"");
+  const NewRobot arm = made_of(text);
+  const std::vector<JointLoad> loads = loads_of(arm.tree, {}, nullptr);
+  for (std::size_t j = 0; j < arm.limits.size(); ++j) {
+    ASSERT_TRUE(arm.limits[j].effort_guessed);
+    EXPECT_GE(arm.limits[j].effort, 2.0 * loads[j].gravity_Nm + 10.0 * loads[j].most_inertia);
+    const double before = j == 0 ? 0.0 : arm.limits[j - 1].effort;
+    EXPECT_GE(arm.limits[j].effort, 0.15 * before);
+  }
+  const int pan = arm.tree.joint_index("shoulder_pan_joint");
+  EXPECT_LT(loads[pan].gravity_Nm, 1e-6) << "gravity alone says nothing of it";
+  EXPECT_GT(arm.limits[pan].effort, 20.0);
+}
+
+TEST(NewRobot, SaysWhichDrivesAreTooWeakForThePosture) {
+  std::string text = text_of(kPublicRobots[1]);
+  text = std::regex_replace(text, std::regex("effort=\"[0-9.]+\""), "effort=\"4\"");
+  const NewRobot arm = made_of(text);
+  const std::vector<double> torques = torques_at(arm.tree, {}, Posed(arm.tree, posture_in(arm)));
+  std::size_t weak = 0;
+  for (const double torque : torques) weak += std::abs(torque) > 0.9 * 4.0 ? 1U : 0U;
+  ASSERT_GT(weak, 0U);
+  EXPECT_EQ(arm.warnings.size(), weak);
+  for (const Error& warning : arm.warnings) {
+    EXPECT_NE(warning.message.find("its limit (<limit effort>) is 4 Nm"), std::string::npos)
+        << warning.to_string();
+    EXPECT_GT(warning.line, 0);
+  }
+  EXPECT_TRUE(made(kPublicRobots[1]).warnings.empty());
+}
+
+TEST(NewRobot, KeepsAnArmThatStandsOnItsBaseAboveIt) {
+  for (const int arm : {1, 2}) {
+    const NewRobot robot = made(kPublicRobots[arm]);
+    EXPECT_GT(Posed(robot.tree, posture_in(robot)).lowest_m(), 0.0) << robot.config.name;
+    for (const WayPoint& point : robot.move.points) {
+      EXPECT_GE(Posed(robot.tree, positions_in(robot, point.position_rad)).lowest_m(), 0.0);
+    }
+  }
+  EXPECT_FALSE(stands_on_its_base(made(kPublicRobots[0]).tree) &&
+               Posed(made(kPublicRobots[0]).tree, posture_in(made(kPublicRobots[0]))).lowest_m() <
+                   0.0);
+}
+
+TEST(NewRobot, SaysOfAMoveWhatItDoes) {
+  const NewRobot humanoid = made(kPublicRobots[4]);  // limits that do not belong together
+  EXPECT_EQ(humanoid.move.squat_m, 0.0);
+  EXPECT_EQ(move_text(humanoid).find("Squat"), std::string::npos) << move_text(humanoid);
+  const NewRobot coman = made(kPublicRobots[5]);
+  EXPECT_GT(coman.move.squat_m, 0.005);
+  EXPECT_NE(move_text(coman).find("# Squats "), std::string::npos);
+}
+
+/// The simulated contact of a ball is a point of its shank, and no slip can help feet that are
+/// told to part.
+TEST(NewRobot, LeavesPointFeetWhereTheyAreWhileTheRobotGoesDown) {
+  const NewRobot anymal = made(kPublicRobots[3]);
+  ASSERT_GT(anymal.move.squat_m, 0.005);
+  const auto spans = [&](const Eigen::VectorXd& q) {
+    const Posed posed(anymal.tree, q);
+    std::vector<double> found;
+    for (const Foot& foot : anymal.feet) {
+      const model::Placement sole = posed.link(foot.link) * foot.sole_in_link;
+      const model::Placement first = posed.link(anymal.feet[0].link) * anymal.feet[0].sole_in_link;
+      found.push_back(
+          (sole.R * foot.points[0] + sole.p - first.R * anymal.feet[0].points[0] - first.p).norm());
+    }
+    return found;
+  };
+  const std::vector<double> standing = spans(posture_in(anymal));
+  for (const WayPoint& point : anymal.move.points) {
+    const std::vector<double> now = spans(positions_in(anymal, point.position_rad));
+    for (std::size_t f = 0; f < now.size(); ++f) EXPECT_NEAR(now[f], standing[f], 1e-4);
+  }
+}
+
+TEST(NewRobot, WritesNamesAsTomlNeedsThem) {
+  std::string text = text_of(kPublicRobots[0]);
+  const std::string name = made(kPublicRobots[0]).tree.joints[1].name;
+  for (std::size_t at = 0; (at = text.find('"' + name + '"', at)) != std::string::npos; ++at) {
+    text.replace(at, name.size() + 2, "\"a &quot;b\\c\"");
+  }
+  const NewRobot robot = made_of(text);
+  const auto read =
+      hal::parse_robot_config(robot_text(robot, "x\".urdf", "x\".urdf"), "robot.toml");
+  ASSERT_TRUE(read) << read.error().front().to_string();
+  EXPECT_EQ(read->joints[1].name, "a \"b\\c");
+  EXPECT_TRUE(runtime::parse_experiment(move_text(robot), "move.toml", *read));
 }
 
 /// A one-legged hopper whose root moves by a floating joint, and whose foot's inertia is

@@ -55,6 +55,37 @@ TEST_P(PosedOnPublicRobots, InertiaAndGravityAreThoseOfTheMassMatrixAndInverseDy
   }
 }
 
+TEST_P(PosedOnPublicRobots, WhatAcceleratesIsTheMassMatrixTimesTheAcceleration) {
+  const NewRobot robot = made(GetParam());
+  const model::Tree& tree = robot.tree;
+  model::ModelSpec spec;
+  spec.floating_base = tree.floating_base;
+  const auto mechanism = model::make_mechanism(tree, spec);
+  ASSERT_TRUE(mechanism);
+  const auto nv = static_cast<std::size_t>(mechanism->kernel_nv());
+  const Eigen::VectorXd q = sample(tree, 2);
+  std::vector<double> all(mechanism->kernel_nq(), 0.0);
+  if (tree.floating_base) all[6] = 1.0;
+  Eigen::VectorXd qdd = Eigen::VectorXd::Zero(q.size());
+  for (int j = 0; j < mechanism->joint_count(); ++j) {
+    if (tree.joints[j].follows()) continue;
+    all[mechanism->q_index(mechanism->coordinate_of[j].index)] = q[j];
+    qdd[j] = 1.0 + 0.3 * j;
+  }
+  const auto M = model::evaluate_kernel(model::Kernel::kMassMatrix, *mechanism, {all})[0];
+  const Eigen::VectorXd load = Posed(tree, q).inertial_load(qdd);
+  for (int j = 0; j < mechanism->joint_count(); ++j) {
+    if (tree.joints[j].follows()) continue;
+    const std::size_t row = mechanism->v_index(mechanism->coordinate_of[j].index);
+    double expected = 0.0;
+    for (int k = 0; k < mechanism->joint_count(); ++k) {
+      if (tree.joints[k].follows()) continue;
+      expected += M[row * nv + mechanism->v_index(mechanism->coordinate_of[k].index)] * qdd[k];
+    }
+    EXPECT_NEAR(load[j], expected, 1e-9 * (1.0 + std::abs(expected))) << tree.joints[j].name;
+  }
+}
+
 TEST_P(PosedOnPublicRobots, JacobiansAreTheDerivativesOfPositions) {
   const NewRobot robot = made(GetParam());
   const Eigen::VectorXd q = sample(robot.tree, 3);

@@ -1,0 +1,60 @@
+#include "scaffold/strength.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::scaffold {
+namespace {
+
+constexpr double kReserve = 0.9;  // of a strength: more than that leaves nothing to balance with
+
+double per_ampere(const hal::ActuatorConfig& drive) {
+  return drive.gear_ratio * drive.torque_constant_Nm_A;
+}
+
+}  // namespace
+
+double strength_of(const hal::JointConfig& joint, const hal::ActuatorConfig& drive) {
+  const double by_voltage = drive.voltage_limit_V / drive.resistance_ohm;
+  return std::min(joint.max_torque_Nm,
+                  per_ampere(drive) * std::min(drive.current_limit_A, by_voltage));
+}
+
+double lasting_strength_of(const hal::JointConfig& joint, const hal::ActuatorConfig& drive) {
+  const double most = strength_of(joint, drive);
+  if (!(drive.continuous_current_A > 0.0)) return most;
+  return std::min(most, per_ampere(drive) * drive.continuous_current_A);
+}
+
+Diagnostics weak_drives(const NewRobot& robot, const std::vector<double>& torques) {
+  Diagnostics weak;
+  for (const hal::JointConfig& joint : robot.config.joints) {
+    const int j = robot.tree.joint_index(joint.name);
+    const hal::ActuatorConfig& drive = robot.config.actuator_of(joint);
+    const double needs = std::abs(torques[static_cast<std::size_t>(j)]);
+    const double has = lasting_strength_of(joint, drive);
+    if (needs <= kReserve * has) continue;
+    const bool by_limit = has >= joint.max_torque_Nm;
+    const bool slides = robot.tree.joints[j].type == model::JointType::kPrismatic;
+    const char* unit = slides ? "N" : "Nm";
+    Error report;
+    report.message = fmt::format(
+        "the posture '{}' takes {:.3g} {} of it against gravity, and {} {:.3g} {}: it will sag, or "
+        "stop with a fault",
+        robot.config.postures.front().name, needs, unit,
+        by_limit ? "its limit (<limit effort>) is" : "its drive has for long", has, unit);
+    report.hint = by_limit ? "correct the effort, or give the joint max_torque_Nm and a stronger "
+                             "drive in robot.toml; or choose another posture there"
+                           : "give it a stronger drive in robot.toml, or choose another posture "
+                             "there";
+    report.file = robot.tree.file;
+    report.line = robot.tree.joints[j].line;
+    report.key = "joint " + joint.name;
+    weak.push_back(std::move(report));
+  }
+  return weak;
+}
+
+}  // namespace tandem::scaffold
