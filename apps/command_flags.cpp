@@ -345,7 +345,7 @@ void add_flags(CLI::App& app, NewOptions& o) {
                  "Series elastic drives in proportion to this robot's: its name or robot.toml");
   app.add_option("--base", o.base, "Instead of what its feet suggest")
       ->check(CLI::IsMember({"floating", "fixed"}));
-  app.add_flag("--force", o.force, "Write over the files of a folder that exists");
+  app.add_flag("--force", o.force, "Into a folder that exists; files that differ are kept as FILE~");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kNewExamples);
 }

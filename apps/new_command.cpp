@@ -8,9 +8,11 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
+#include "apps/findings.hpp"
 #include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
 #include "base/counted.hpp"
+#include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "scaffold/new_robot.hpp"
 
@@ -83,37 +85,86 @@ class Folder {
   Diagnostics write(const scaffold::NewRobot& robot, const std::string& urdf) {
     std::error_code problem;
     fs::create_directories(draft_, problem);
+    if (problem) {
+      return one("the folder cannot be made: " + problem.message(), "choose another folder with -o",
+                 final_.string());
+    }
     const std::string copy = fs::path(urdf).filename().string();
     for (const auto& [name, text] :
          {std::pair{copy, text_of(urdf)},
           {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
           {std::string("hold.toml"), scaffold::hold_text(robot)},
           {std::string("move.toml"), scaffold::move_text(robot)}}) {
-      if (Status written = write_file(draft_ / name, text); !written) return {written.error()};
+      if (Status written = write_file(draft_ / name, text); !written) {
+        return in_place({written.error()});
+      }
     }
     return {};
   }
 
   [[nodiscard]] std::expected<RobotFiles, Diagnostics> check() const {
     auto robot = read_robot((draft_ / "robot.toml").string());
-    if (!robot) return robot;
+    if (!robot) return std::unexpected(in_place(robot.error()));
     Diagnostics errors = hal::can::check_bus_load(robot->config, kPeriod_ns);
-    if (!errors.empty()) return std::unexpected(std::move(errors));
+    if (!errors.empty()) return std::unexpected(in_place(std::move(errors)));
     return robot;
   }
 
+  /// What was there and is not what is written now stays beside it, as FILE~.
   Status place() {
     std::error_code problem;
     fs::create_directories(final_, problem);
     for (const auto& entry : fs::directory_iterator(draft_)) {
-      fs::rename(entry.path(), final_ / entry.path().filename(), problem);
-      if (problem) return fail(problem.message(), "choose another folder with -o");
+      const fs::path file = final_ / entry.path().filename();
+      if (Status kept = keep(file, entry.path()); !kept) return kept;
+      fs::rename(entry.path(), file, problem);
+      if (problem) return failed(file, problem);
     }
+    std::ranges::sort(kept_);
     return {};
   }
 
+  /// Files that place() has kept, as (name, name of the copy).
+  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& kept() const {
+    return kept_;
+  }
+
  private:
+  static Status failed(const fs::path& file, const std::error_code& problem) {
+    return std::unexpected(Error{"the file cannot be written: " + problem.message(),
+                                 "choose another folder with -o",
+                                 file.string(),
+                                 0,
+                                 {}});
+  }
+
+  Status keep(const fs::path& old, const fs::path& next) {
+    std::error_code problem;
+    if (!fs::exists(fs::symlink_status(old, problem))) return {};
+    if (fs::is_regular_file(old, problem) && text_of(old.string()) == text_of(next.string())) {
+      return {};
+    }
+    fs::path copy = old.string() + "~";
+    for (int i = 2; fs::exists(fs::symlink_status(copy, problem)); ++i) {
+      copy = old.string() + "~" + std::to_string(i);
+    }
+    fs::rename(old, copy, problem);
+    if (problem) return failed(copy, problem);
+    kept_.emplace_back(old.filename().string(), copy.filename().string());
+    return {};
+  }
+
+  /// The draft is gone when the reader sees the message: it names the files that were meant.
+  [[nodiscard]] Diagnostics in_place(Diagnostics errors) const {
+    for (Error& error : errors) {
+      const fs::path file(error.file);
+      if (file.parent_path() == draft_) error.file = (final_ / file.filename()).string();
+    }
+    return errors;
+  }
+
   fs::path final_, draft_;
+  std::vector<std::pair<std::string, std::string>> kept_;
 };
 
 Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
@@ -130,7 +181,9 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"feet", feet},
           {"sensors", sensors},
           {"drives", drives},
-          {"boards", robot.config.boards.size()}};
+          {"boards", robot.config.boards.size()},
+          {"kept", Json::object()},
+          {"warnings", findings_json(robot.warnings)}};
 }
 
 void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
@@ -171,12 +224,36 @@ void print_next(const std::string& folder, std::FILE* out) {
              folder);
 }
 
+/// What can be said of the input before it is read as XML.
+Diagnostics check_input(const std::string& file) {
+  if (!is_utf8(fs::path(file).filename().string())) {
+    return one("the file's name is not UTF-8, which robot.toml has to be", "rename it", file);
+  }
+  if (fs::path(file).extension() != ".toml") return {};
+  if (is_robot(file)) {
+    return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
+               "`tandem check " + file +
+                   "` reads it, `tandem run` takes the experiments beside "
+                   "it; or name the URDF that a new folder is to be made from",
+               file);
+  }
+  return one("this is a TOML file: `tandem new` starts from a URDF",
+             "`tandem run " + file + "` runs an experiment", file);
+}
+
 Diagnostics run(const NewOptions& options) {
   std::error_code ignored;
   const std::string name = plain_name(fs::path(options.urdf).stem().string());
   const std::string folder = options.output.empty() ? name : options.output;
-  if (fs::exists(folder, ignored) && !options.force) {
-    return one("this exists already", "give another folder with -o, or --force", folder);
+  if (Diagnostics wrong = check_input(options.urdf); !wrong.empty()) return wrong;
+  const bool exists = fs::exists(folder, ignored);
+  if (exists && !fs::is_directory(folder, ignored)) {
+    return one("this is a file, and the robot needs a folder", "give another one with -o", folder);
+  }
+  if (exists && !options.force) {
+    return one("this exists already",
+               "give another folder with -o; or --force, which keeps files that differ as FILE~",
+               folder);
   }
   std::optional<scaffold::Like> like;
   if (!options.like.empty()) {
@@ -202,9 +279,16 @@ Diagnostics run(const NewOptions& options) {
   Json json = to_json(*robot, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   if (Status placed = files.place(); !placed) return {placed.error()};
-  for (const Error& warning : robot->warnings)
+  print_inertia_warnings(robot->warnings);
+  for (const Error& warning : robot->warnings) {
+    if (warning.key.starts_with("link ")) continue;
     fmt::print(stderr, "warning: {}\n", warning.to_string());
+  }
   std::FILE* const out = human_output(options.json);
+  for (const auto& [old, copy] : files.kept()) {
+    facts.add("kept", fmt::format("{} that was there is {} now", old, copy));
+    json["kept"][old] = copy;
+  }
   facts.print(out);
   print_next(folder, out);
   if (Status saved = write_json(options.json, json); !saved) return {saved.error()};

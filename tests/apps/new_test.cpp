@@ -1,4 +1,6 @@
 // `tandem new`: a folder from a URDF alone, and what then runs.
+#include <algorithm>
+
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {
@@ -7,10 +9,10 @@ namespace {
 class New : public Program {
  protected:
   /// Makes the folder, and lets the robot hold its posture and move.
-  void holds_and_moves(const std::string& urdf, double most_rad) {
+  void holds_and_moves(const std::string& urdf, double most_rad, const std::string& flags = {}) {
     std::filesystem::remove_all(folder_ / "made");
     const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
-    Outcome outcome = tandem("new '" TANDEM_SOURCE_DIR "/" + urdf + "' -o made", cache);
+    Outcome outcome = tandem("new '" TANDEM_SOURCE_DIR "/" + urdf + "' -o made" + flags, cache);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     outcome = tandem("model build made/robot.toml", cache);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -38,6 +40,13 @@ TEST_F(New, MakesAQuadrupedStandAndMoveOnPointFeet) {
   holds_and_moves("config/anymal_c/anymal_c.urdf", 0.01);
 }
 
+TEST_F(New, MakesAnArmHoldOnSpringsWithinADegree) {
+  holds_and_moves("config/ur5e/ur5e.urdf", 0.0175, " --like coman");
+  const std::string robot = read_text(folder_ / "made/robot.toml");
+  EXPECT_NE(robot.find("shoulder_lift_joint has stiff for soft_arm: gravity takes"),
+            std::string::npos);
+}
+
 TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
   if (std::getenv("TANDEM_NEW_ALL") == nullptr) {
     GTEST_SKIP() << "compiles the kernels of six robots, minutes of work: set TANDEM_NEW_ALL=1";
@@ -48,6 +57,11 @@ TEST_F(New, MakesEveryPublicRobotHoldAndMove) {
         "tests/data/robots/simple_humanoid.urdf"}) {
     SCOPED_TRACE(urdf);
     holds_and_moves(urdf, 0.03);
+  }
+  for (const std::string urdf :
+       {"config/panda/panda.urdf", "tests/data/robots/simple_humanoid.urdf"}) {
+    SCOPED_TRACE(urdf + " on springs");
+    holds_and_moves(urdf, 0.03, " --like coman");
   }
 }
 
@@ -86,8 +100,137 @@ TEST_F(New, WritesOverNothingWithoutForce) {
   EXPECT_EQ(again.status, 2);
   EXPECT_NE(again.err.find("this exists already"), std::string::npos) << again.err;
   EXPECT_EQ(read_text(folder_ / "double_pendulum/hold.toml"), "mine");
-  EXPECT_EQ(tandem("new double_pendulum.urdf --force").status, 0);
+  const Outcome forced = tandem("new double_pendulum.urdf --force");
+  EXPECT_EQ(forced.status, 0);
   EXPECT_NE(read_text(folder_ / "double_pendulum/hold.toml"), "mine");
+  EXPECT_EQ(read_text(folder_ / "double_pendulum/hold.toml~"), "mine");
+  EXPECT_NE(forced.out.find("hold.toml that was there is hold.toml~ now"), std::string::npos)
+      << forced.out;
+  EXPECT_EQ(forced.out.find("robot.toml~"), std::string::npos) << "the same as before";
+  write_text(folder_ / "double_pendulum/hold.toml", "mine, too");
+  EXPECT_EQ(tandem("new double_pendulum.urdf --force").status, 0);
+  EXPECT_EQ(read_text(folder_ / "double_pendulum/hold.toml~"), "mine") << "nor is a copy lost";
+  EXPECT_EQ(read_text(folder_ / "double_pendulum/hold.toml~2"), "mine, too");
+}
+
+TEST_F(New, NamesWhatStandsWhereTheFolderShouldBe) {
+  write_text(folder_ / "a_file", "mine");
+  for (const std::string flags : {"", " --force"}) {
+    const Outcome outcome = tandem("new double_pendulum.urdf -o a_file" + flags);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.err,
+              "error: a_file: this is a file, and the robot needs a folder (give another one with "
+              "-o)\n");
+  }
+  EXPECT_EQ(read_text(folder_ / "a_file"), "mine");
+  const Outcome within = tandem("new double_pendulum.urdf -o a_file/robot");
+  EXPECT_EQ(within.status, 2);
+  EXPECT_EQ(within.err.rfind("error: a_file/robot: the folder cannot be made", 0), 0U)
+      << within.err;
+}
+
+TEST_F(New, SaysWhichCommandATomlFileIsFor) {
+  const Outcome robot = tandem("new robot.toml");
+  EXPECT_EQ(robot.status, 2);
+  EXPECT_NE(robot.err.find("robot.toml: this is a robot.toml already"), std::string::npos)
+      << robot.err;
+  EXPECT_NE(robot.err.find("tandem check robot.toml"), std::string::npos) << robot.err;
+  const Outcome experiment = tandem("new hold.toml");
+  EXPECT_EQ(experiment.status, 2);
+  EXPECT_NE(experiment.err.find("tandem run hold.toml"), std::string::npos) << experiment.err;
+}
+
+/// Two links that turn: `first` and `second` stand in their joints, the links are called as given.
+std::string two_links(const std::string& name, const std::string& first,
+                      const std::string& second) {
+  const std::string inertial =
+      "<inertial><origin xyz='0 0 0.1'/><mass value='1'/><inertia ixx='0.01' iyy='0.01' "
+      "izz='0.005' ixy='0' ixz='0' iyz='0'/></inertial>";
+  return "<robot name='r'><link name='base'/>\n<joint name='a' type='revolute'><parent "
+         "link='base'/><child link='l'/><axis xyz='0 1 0'/>" +
+         first + "</joint>\n<link name='l'>" + inertial + "</link>\n<joint name='" + name +
+         "' type='revolute'><origin xyz='0 0 0.2'/><parent link='l'/><child link='m'/><axis "
+         "xyz='0 1 0'/>" +
+         second + "</joint>\n<link name='m'>" + inertial + "</link></robot>";
+}
+
+constexpr char kLimit[] = "<limit lower='-1' upper='1' effort='20' velocity='3'/>";
+
+TEST_F(New, TakesNamesWithQuotesAndRefusesThoseThatAreNoUtf8) {
+  write_text(folder_ / "odd.urdf", two_links("b &quot;c\\d &#xFC;", kLimit, kLimit));
+  const Outcome odd = tandem("new odd.urdf");
+  EXPECT_EQ(odd.status, 0) << odd.err;
+  EXPECT_NE(read_text(folder_ / "odd/robot.toml").find("\"b \\\"c\\\\d \xC3\xBC\""),
+            std::string::npos);
+  EXPECT_EQ(tandem("check odd/hold.toml").status, 0);
+  write_text(folder_ / "latin.urdf", two_links("b\xFC", kLimit, kLimit));
+  const Outcome latin = tandem("new latin.urdf");
+  EXPECT_EQ(latin.status, 2);
+  EXPECT_EQ(latin.err.rfind("error: latin.urdf:4: joint", 0), 0U) << latin.err;
+  EXPECT_NE(latin.err.find("is not UTF-8"), std::string::npos) << latin.err;
+  EXPECT_EQ(std::ranges::count(latin.err, '\n'), 1) << latin.err;
+}
+
+TEST_F(New, TakesOfALeadersRangeWhatItsFollowerCanKeep) {
+  const auto follower = [](const std::string& range) {
+    return "<limit " + range + " effort='20' velocity='3'/><mimic joint='a' multiplier='2'/>";
+  };
+  write_text(folder_ / "both.urdf", two_links("b", kLimit, follower("lower='-4' upper='1'")));
+  const Outcome both = tandem("new both.urdf");
+  EXPECT_EQ(both.status, 0) << both.err;
+  EXPECT_NE(both.err.find("joint a: its range is narrowed to -1 to 0.5"), std::string::npos)
+      << both.err;
+  write_text(folder_ / "none.urdf", two_links("b", kLimit, follower("lower='3' upper='4'")));
+  const Outcome none = tandem("new none.urdf");
+  EXPECT_EQ(none.status, 2);
+  EXPECT_NE(none.err.find("joint a: no position of it keeps its follower 'b' within 3 to 4"),
+            std::string::npos)
+      << none.err;
+  write_text(folder_ / "point.urdf", two_links("b", kLimit, follower("lower='2' upper='4'")));
+  const Outcome point = tandem("new point.urdf");
+  EXPECT_EQ(point.status, 2);
+  EXPECT_EQ(point.err.rfind("error: point.urdf:2: joint a: its limits and those of its followers "
+                            "leave it one position, 1 ",
+                            0),
+            0U)
+      << point.err;
+}
+
+TEST_F(New, SaysOnceWhyABaseCannotBeAsItIsTold) {
+  write_text(folder_ / "arm.urdf", two_links("b", kLimit, kLimit));
+  const Outcome floating = tandem("new arm.urdf --base floating");
+  EXPECT_EQ(floating.status, 2);
+  EXPECT_EQ(floating.err,
+            "error: arm.urdf: the root link 'base' has no mass, so it cannot float (give --base "
+            "fixed, or leave --base out; or give the link an <inertial>)\n");
+  write_text(folder_ / "free.urdf",
+             "<robot name='f'><link name='world'/>\n<joint name='free' type='floating'><parent "
+             "link='world'/><child link='base'/></joint>" +
+                 two_links("b", kLimit, kLimit).substr(16));
+  for (const std::string base : {"floating", "fixed"}) {
+    const Outcome free = tandem("new free.urdf --base " + base);
+    EXPECT_EQ(free.status, 2);
+    EXPECT_EQ(std::ranges::count(free.err, '\n'), 1) << free.err;
+    EXPECT_NE(free.err.find("the floating base has no mass"), std::string::npos) << free.err;
+  }
+}
+
+TEST_F(New, ShowsInertiasThatNoBodyCanHave) {
+  std::string urdf = two_links("b", kLimit, kLimit);
+  urdf.replace(urdf.rfind("izz='0.005'"), 11, "izz='0.500'");
+  write_text(folder_ / "bad.urdf", urdf);
+  const Outcome made = tandem("new bad.urdf --json new.json");
+  EXPECT_EQ(made.status, 0) << made.err;
+  const Outcome ran = tandem("run bad/hold.toml --duration 0.1 --no-log",
+                             "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+  for (const Outcome& outcome : {made, ran}) {
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("link m: the inertia breaks the triangle inequality"),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.err.find("correct it in the URDF"), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(json("new.json")["warnings"].size(), 1U);
 }
 
 TEST_F(New, LeavesNothingBehindOfWhatIsWrong) {
