@@ -3,16 +3,25 @@
 #include <algorithm>
 
 namespace tandem {
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+bool is_word(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c) || c == '_';
+}
+
+std::string length_problem(std::string_view name) {
+  if (name.empty()) return "is empty";
+  if (name.size() <= kLongestFileName) return {};
+  return "is longer than " + std::to_string(kLongestFileName) + " characters";
+}
+
+}  // namespace
 
 std::string file_name_problem(std::string_view name) {
-  if (name.empty()) return "is empty";
-  if (name.size() > kLongestFileName) {
-    return "is longer than " + std::to_string(kLongestFileName) + " characters";
-  }
-  const auto allowed = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-' || c == '.';
-  };
+  if (std::string problem = length_problem(name); !problem.empty()) return problem;
+  const auto allowed = [](char c) { return is_word(c) || c == '-' || c == '.'; };
   if (!std::ranges::all_of(name, allowed)) {
     return "has other characters than letters, digits, _, - and .";
   }
@@ -20,6 +29,19 @@ std::string file_name_problem(std::string_view name) {
     return std::string("begins with ") + name.front();
   }
   return {};
+}
+
+std::string topic_name_problem(std::string_view name) {
+  if (std::string problem = length_problem(name); !problem.empty()) return problem;
+  if (!std::ranges::all_of(name, is_word)) return "has other characters than letters, digits and _";
+  return is_digit(name.front()) ? "begins with a digit" : "";
+}
+
+std::string topic_token(std::string_view name) {
+  std::string token(name.substr(0, kLongestFileName));
+  std::ranges::replace_if(token, [](char c) { return !is_word(c); }, '_');
+  if (!token.empty() && is_digit(token.front())) token.front() = '_';
+  return token;
 }
 
 }  // namespace tandem

@@ -1,4 +1,4 @@
-// Which names may become part of a file's name.
+// Which names may become part of a file's name, or of a topic's.
 // Layer: base.  Thread: non-RT only.
 #pragma once
 
@@ -14,5 +14,12 @@ inline constexpr std::size_t kLongestFileName = 64;
 /// and `.` of ASCII, no `.` or `-` at the front, 1 to kLongestFileName characters. So it leads
 /// to no other folder, hides no file and is no program's option.
 [[nodiscard]] std::string file_name_problem(std::string_view name);
+
+/// Why `name` cannot be part of a ROS 2 topic's name, or empty when it can: letters, digits and `_`
+/// of ASCII, no digit at the front, 1 to kLongestFileName characters.
+[[nodiscard]] std::string topic_name_problem(std::string_view name);
+
+/// The nearest name that can: what is neither letter nor digit becomes `_`.
+[[nodiscard]] std::string topic_token(std::string_view name);
 
 }  // namespace tandem

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/file_name.hpp"
 #include "scaffold/words.hpp"
 
 namespace tandem::scaffold {
@@ -79,6 +80,7 @@ class Finder {
         break;
       }
     }
+    name = topic_token(name);
     if (taken(joint, name)) return;
     FoundSensor sensor;
     sensor.config.name = name;
@@ -95,7 +97,8 @@ class Finder {
       if (other.config.type == hal::SensorType::kImu && other.body == body) return;
     }
     FoundSensor sensor;
-    sensor.config.name = guess.empty() ? tree_.links[link].name : "base_imu";
+    sensor.config.name = guess.empty() ? topic_token(tree_.links[link].name) : "base_imu";
+    while (taken({}, sensor.config.name)) sensor.config.name += "_2";
     sensor.config.type = hal::SensorType::kImu;
     sensor.config.link = tree_.links[link].name;
     sensor.body = body;
@@ -105,7 +108,7 @@ class Finder {
 
   [[nodiscard]] bool taken(const std::string& joint, const std::string& name) const {
     return std::ranges::any_of(found_, [&](const FoundSensor& s) {
-      return s.config.joint == joint || s.config.name == name;
+      return (!joint.empty() && s.config.joint == joint) || s.config.name == name;
     });
   }
 

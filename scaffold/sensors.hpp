@@ -19,7 +19,7 @@ struct FoundSensor {
 
 /// Force/torque sensors: <sensor> elements, and joints and links with "ft" or "force" in their
 /// names, one for each wrench. IMUs: links with "imu" in their names, one for each body; a
-/// floating base without any gets one at its root.
+/// floating base without any gets one at its root. Their names are such as topics may have.
 [[nodiscard]] std::vector<FoundSensor> find_sensors(const model::Tree& tree, const Outfit& outfit);
 
 }  // namespace tandem::scaffold

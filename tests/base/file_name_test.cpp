@@ -20,5 +20,16 @@ TEST(FileName, WhatLeadsElsewhereOrHidesIsRefused) {
   EXPECT_NE(file_name_problem(std::string_view("a\0b", 3)), "");
 }
 
+TEST(TopicName, LettersDigitsAndUnderscoresAreAllowed) {
+  for (const char* name : {"imu", "_1", "Left_Foot_2"}) EXPECT_EQ(topic_name_problem(name), "");
+  for (const char* name : {"", "a/1", "a-1", "a.1", "1a", "a b", "é"}) {
+    EXPECT_NE(topic_name_problem(name), "") << name;
+    if (*name == 0) continue;
+    EXPECT_EQ(topic_name_problem(topic_token(name)), "") << name;
+  }
+  EXPECT_NE(topic_name_problem(std::string(kLongestFileName + 1, 'a')), "");
+  EXPECT_EQ(topic_token("a/1"), "a_1");
+}
+
 }  // namespace
 }  // namespace tandem

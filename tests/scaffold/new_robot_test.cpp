@@ -86,6 +86,19 @@ TEST_P(EveryPublicRobot, GetsFilesThatAreReadBackAsTheyWereMeant) {
 INSTANTIATE_TEST_SUITE_P(, EveryPublicRobot, ::testing::ValuesIn(kPublicRobots),
                          [](const auto& test) { return std::string(test.param.name); });
 
+TEST(NewRobot, GivesSensorsNamesThatATopicMayHave) {
+  model::Tree tree;
+  tree.bodies.resize(3);
+  for (const char* name : {"imu/1", "imu.1", "1-imu"}) {
+    model::Link& link = tree.links.emplace_back();
+    link.name = name;
+    link.body = static_cast<int>(tree.links.size()) - 1;
+  }
+  std::vector<std::string> names;
+  for (const FoundSensor& sensor : find_sensors(tree, {})) names.push_back(sensor.config.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"imu_1", "imu_1_2", "__imu"}));
+}
+
 TEST(NewRobot, FindsOneSensorForEachWrenchAndEachImu) {
   EXPECT_EQ(sensors_of(made(kPublicRobots[1])), std::vector<std::string>{"ft_frame"});
   EXPECT_EQ(sensors_of(made(kPublicRobots[3])), std::vector<std::string>{"imu_link"});
