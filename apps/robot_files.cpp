@@ -60,13 +60,7 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
 }
 
 std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair) {
-  if (repair) {
-    auto config = hal::read_robot_config(file);
-    if (!config) return std::unexpected(config.error());
-    config->model.repair_inertia = true;
-    return with_description(std::move(*config));
-  }
-  auto robot = runtime::read_robot(file);
+  auto robot = runtime::read_robot(file, repair);
   if (!robot) return std::unexpected(robot.error());
   return with_description(std::move(robot->config));
 }

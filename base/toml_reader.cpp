@@ -15,6 +15,7 @@ struct TomlTable::Shared {
   toml::table root;
   std::string file;
   Diagnostics diagnostics;
+  std::set<std::string> meant;  // keys that a misspelt one stands for: not missing besides
 };
 
 namespace {
@@ -22,10 +23,22 @@ namespace {
 const toml::table kEmpty;   // stands for an optional table that is not there
 const toml::table kBroken;  // stands for a table whose absence or type was reported
 
+constexpr double kLargest = 1e30;  // so that no product of a few overflows
+
+constexpr const char* kMissing = "this key is missing";
+
 std::string kind(const toml::node& node) {
   std::ostringstream out;
   out << node.type();
   return out.str();
+}
+
+/// A dotted path as a table's header has it: without the numbers of arrays.
+std::string header_of(std::string path) {
+  for (std::size_t at = path.find('['); at != std::string::npos; at = path.find('[')) {
+    path.erase(at, path.find(']', at) + 1 - at);
+  }
+  return path;
 }
 
 std::string number_text(double value) {
@@ -68,8 +81,9 @@ const toml::node* TomlTable::find(std::string_view key) {
 
 const toml::node* TomlTable::require(std::string_view key) {
   const toml::node* node = find(key);
-  if (node == nullptr && !partial_ && table_ != &kBroken && defaults_ != &kBroken) {
-    error(key, "this key is missing",
+  const bool misspelt = shared_->meant.contains(defaults_path_ + "." + std::string(key));
+  if (node == nullptr && !misspelt && !partial_ && table_ != &kBroken && defaults_ != &kBroken) {
+    error(key, kMissing,
           "add it to the table" +
               (defaults_path_.empty() ? "" : ", or to [" + defaults_path_ + "] for all"));
   }
@@ -90,16 +104,27 @@ int TomlTable::line(std::string_view key) const {
   return node == nullptr ? line() : static_cast<int>(node->source().begin.line);
 }
 
+Error TomlTable::error_at(std::string_view key, std::string message, std::string hint) const {
+  return {.message = std::move(message),
+          .hint = std::move(hint),
+          .file = shared_->file,
+          .line = line(key),
+          .key = dotted(key)};
+}
+
 void TomlTable::error(std::string_view key, std::string message, std::string hint) {
-  Error error{.message = std::move(message),
-              .hint = std::move(hint),
-              .file = shared_->file,
-              .line = line(key),
-              .key = dotted(key)};
+  Error error = error_at(key, std::move(message), std::move(hint));
   const bool known = std::ranges::any_of(shared_->diagnostics, [&](const Error& other) {
     return other.line == error.line && other.key == error.key && other.message == error.message;
   });
   if (!known) shared_->diagnostics.push_back(std::move(error));
+}
+
+bool TomlTable::has_errors() const {
+  return std::ranges::any_of(shared_->diagnostics, [&](const Error& error) {
+    return error.key == path_ || error.key.starts_with(path_ + ".") ||
+           (!defaults_path_.empty() && error.key.starts_with(defaults_path_ + "."));
+  });
 }
 
 void TomlTable::finish() {
@@ -107,6 +132,11 @@ void TomlTable::finish() {
   for (const auto& [key, node] : *table_) {
     if (asked_.contains(key.str())) continue;
     error(key.str(), "unknown key", suggest(key.str(), known));
+    const std::string meant = nearest(key.str(), known);
+    shared_->meant.insert(dotted(meant));
+    std::erase_if(shared_->diagnostics, [&](const Error& other) {
+      return other.message == kMissing && other.key == dotted(meant) && other.line == line();
+    });
   }
 }
 
@@ -119,6 +149,10 @@ bool TomlTable::check_number(std::string_view key, const toml::node& node, Range
   const double value = *node.value<double>();
   if (!std::isfinite(value)) {
     error(key, "must be finite");
+    return false;
+  }
+  if (value != 0.0 && (std::abs(value) > kLargest || std::abs(value) < 1.0 / kLargest)) {
+    error(key, number_text(value) + " is far out of range", "give 0, or a size of 1e-30 to 1e30");
     return false;
   }
   if (value < range.min || (range.open_min && value <= range.min) || value > range.max) {
@@ -294,7 +328,7 @@ TomlTable TomlTable::table_or_empty(std::string_view key) {
   if (const toml::table* found = node->as_table()) {
     return {shared_, found, dotted(key), line(key)};
   }
-  error(key, "must be a table, not " + kind(*node), "write [" + dotted(key) + "]");
+  error(key, "must be a table, not " + kind(*node), "write [" + header_of(dotted(key)) + "]");
   return {shared_, &kBroken, dotted(key), line(key)};
 }
 
@@ -303,7 +337,7 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
   if (node == nullptr) return {};
   const toml::array* array = node->as_array();
   if (array == nullptr || !array->is_homogeneous<toml::table>()) {
-    error(key, "must be an array of tables", "write [[" + dotted(key) + "]]");
+    error(key, "must be an array of tables", "write [[" + header_of(dotted(key)) + "]]");
     return {};
   }
   std::vector<TomlTable> found;
@@ -315,14 +349,6 @@ std::vector<TomlTable> TomlTable::tables(std::string_view key) {
   return found;
 }
 
-std::vector<std::string> TomlTable::table_names() const {
-  std::vector<std::string> names;
-  for (const auto& [key, node] : *table_) {
-    if (node.is_table()) names.emplace_back(key.str());
-  }
-  return names;
-}
-
 std::vector<std::string> TomlTable::keys() const {
   std::vector<std::string> names;
   for (const auto& [key, node] : *table_) names.emplace_back(key.str());
@@ -330,9 +356,15 @@ std::vector<std::string> TomlTable::keys() const {
 }
 
 Result<TomlDocument> TomlDocument::load(const std::string& file) {
+  if (file.empty()) {
+    return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
+  }
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) {
     return std::unexpected(Error{"this is a folder", "name a .toml file", file, 0, {}});
+  }
+  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
+    return std::unexpected(Error{"this is no regular file", "name a .toml file", file, 0, {}});
   }
   std::ifstream in(file, std::ios::binary);
   if (!in) {
@@ -342,6 +374,9 @@ Result<TomlDocument> TomlDocument::load(const std::string& file) {
   std::ostringstream text;
   text << in.rdbuf();
   if (in.bad()) return std::unexpected(Error{"reading failed", "check the disk", file, 0, {}});
+  if (text.view().find_first_not_of(" \t\r\n") == std::string_view::npos) {
+    return std::unexpected(Error{"the file is empty", "name another, or write it", file, 0, {}});
+  }
   return parse(text.str(), file);
 }
 
@@ -357,8 +392,10 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   try {
     document.shared_->root = toml::parse(text, file);
   } catch (const toml::parse_error& e) {
+    const bool encoding = e.description().find("utf-8") != std::string_view::npos;
     return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
-                                 "correct the syntax at this line",
+                                 encoding ? "save the file as UTF-8"
+                                          : "correct the syntax at this line",
                                  file,
                                  static_cast<int>(e.source().begin.line),
                                  {}});

@@ -71,9 +71,8 @@ class TomlTable {
   [[nodiscard]] TomlTable table_or_empty(std::string_view key);
   /// The array of tables [[key]] in the order of the file; empty when it is missing.
   [[nodiscard]] std::vector<TomlTable> tables(std::string_view key);
-  /// The keys of this table that hold tables, sorted: for [actuator.NAME].
-  [[nodiscard]] std::vector<std::string> table_names() const;
-  /// Every key of this table itself, sorted; marks none as read. For free-form maps (posture.home).
+  /// Every key of this table itself, sorted; marks none as read. For free-form maps (posture.home)
+  /// and tables of tables ([actuator.NAME]).
   [[nodiscard]] std::vector<std::string> keys() const;
 
   /// From now on the keys that this table lacks are those of `defaults`: a sub-table or list as a
@@ -85,7 +84,13 @@ class TomlTable {
   /// Reports an error of the caller's own at `key` (or at the table when empty). The same error
   /// twice is one.
   void error(std::string_view key, std::string message, std::string hint = {});
-  /// Reports every key that no getter asked for.
+  /// Whether an error of one of its keys has been reported, its defaults' included.
+  [[nodiscard]] bool has_errors() const;
+  /// The same error without reporting it.
+  [[nodiscard]] Error error_at(std::string_view key, std::string message,
+                               std::string hint = {}) const;
+  /// Reports every key that no getter asked for; where one of them looks like a required key that
+  /// is missing, that is not reported beside it.
   void finish();
 
   [[nodiscard]] const std::string& path() const { return path_; }  ///< dotted, "" for the root

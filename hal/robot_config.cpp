@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <limits>
 
-#include "base/file_name.hpp"
 #include "hal/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -12,7 +11,7 @@ namespace {
 void read_site(TomlTable table, ModelConfig& model) {
   SiteConfig site;
   site.line = table.line();
-  site.name = table.text("name");
+  site.name = read_own_name(table);
   check_unique(table, model.sites, site.name, "site");
   site.link = table.text("link");
   site.xyz_m = vector3(table, "xyz_m", {});
@@ -32,7 +31,7 @@ LinkConfig read_link(TomlTable table, const std::string& name) {
     link.inertia_kg_m2.emplace();
     std::ranges::copy(table.numbers("inertia_kg_m2", 6), link.inertia_kg_m2->begin());
   }
-  if (!link.mass_kg && !link.com_m && !link.inertia_kg_m2) {
+  if (!link.mass_kg && !link.com_m && !link.inertia_kg_m2 && !table.has_errors()) {
     table.error("", "gives nothing", "give mass_kg, com_m or inertia_kg_m2, or remove it");
   }
   table.finish();
@@ -55,10 +54,13 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
       table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
   model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
   TomlTable lock = table.table_or_empty("lock");
-  for (const std::string& joint : lock.keys()) model.lock.emplace_back(joint, lock.number(joint));
+  for (const std::string& joint : lock.keys()) {
+    model.lock.emplace_back(joint, lock.number(joint));
+    model.lock_lines.emplace(joint, lock.line(joint));
+  }
   lock.finish();
   TomlTable links = table.table_or_empty("link");
-  for (const std::string& name : links.table_names()) {
+  for (const std::string& name : links.keys()) {
     model.links.push_back(read_link(links.table(name), name));
   }
   links.finish();
@@ -77,14 +79,20 @@ std::vector<double> read_channels(TomlTable& table, const char* key, std::size_t
   return values;
 }
 
-void read_sensor(TomlTable table, NodeIds& ids, RobotConfig& robot) {
+/// @param bus  whose table holds this one; empty for a [[sensor]]
+void read_sensor(TomlTable table, const std::string& bus, NodeIds& ids, RobotConfig& robot) {
   SensorConfig sensor;
   sensor.line = table.line();
   sensor.name = table.text("name");
+  if (const std::string problem = topic_name_problem(sensor.name);
+      !problem.empty() && !sensor.name.empty()) {
+    table.error("name", "'" + sensor.name + "' " + problem + ", but it becomes part of a topic",
+                "use letters, digits and _");
+  }
   check_unique(table, robot.sensors, sensor.name, "sensor");
   const bool imu = table.choice("type", {"force_torque", "imu"}) == "imu";
   sensor.type = imu ? SensorType::kImu : SensorType::kForceTorque;
-  sensor.bus = table.text("bus");
+  sensor.bus = read_bus_name(table, bus);
   check_reference(table, "bus", sensor.bus, robot.buses, "bus");
   sensor.node_id = ids.read(table, sensor.bus);
   if (imu && table.has("joint")) {
@@ -150,22 +158,41 @@ double read_base_height(TomlTable& table, const RobotConfig& robot) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-void read_posture(TomlTable table, const std::string& name, RobotConfig& robot) {
+/// What is wrong with a joint of a posture, as far as robot.toml alone says so.
+JointReference not_driven(TomlTable& table, const std::string& key, const RobotConfig& robot) {
+  if (robot.is_passive(key)) {
+    return {{}, table.error_at(key, "the joint '" + key + "' is passive: " +
+                                        (robot.loops.empty() ? "no motor holds it"
+                                                             : "where it stands follows from the "
+                                                               "closed loops"),
+                               "remove it here; position_rad of its [[passive]] says where it "
+                               "starts from")};
+  }
+  if (robot.model.lock_lines.contains(key)) {
+    return {{}, table.error_at(key, "the joint '" + key + "' is locked in [model.lock]",
+                               "remove it here, or the lock")};
+  }
+  return {key, table.error_at(key, "there is no [[joint]] '" + key + "'")};
+}
+
+void read_posture(TomlTable table, const std::string& name, bool fixed_base, RobotConfig& robot,
+                  std::vector<JointReference>& loose) {
   PostureConfig posture;
   posture.name = name;
   posture.line = table.line();
   posture.position_rad.assign(robot.joints.size(), 0.0);
-  std::vector<std::string> known = names_of(robot.joints);
   if (robot.model.floating_base) {
-    known.emplace_back("base_height_m");
     posture.base_height_m = read_base_height(table, robot);
+  } else if (fixed_base && table.has("base_height_m")) {
+    table.error("base_height_m", "a fixed base has no height",
+                "remove this key, or set base = \"floating\" in [model]");
   }
   for (const std::string& key : table.keys()) {
-    if (robot.model.floating_base && key == "base_height_m") continue;
+    if (key == "base_height_m") continue;
     const int index = robot.joint_index(key);
     const double position = table.number_or(key, 0.0);
     if (index < 0) {
-      table.error(key, "there is no joint '" + key + "'", suggest(key, known));
+      loose.push_back(not_driven(table, key, robot));
     } else {
       posture.position_rad[static_cast<std::size_t>(index)] = position;
     }
@@ -192,7 +219,7 @@ std::string read_name(TomlTable& root) {
 }
 
 /// Reads in the order of the references: what is named before what names it.
-RobotConfig read(const TomlDocument& document) {
+RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loose) {
   RobotConfig robot;
   robot.file = document.file();
   TomlTable root = document.root();
@@ -200,27 +227,51 @@ RobotConfig read(const TomlDocument& document) {
   robot.model = read_model(root, document.folder());
   read_drive_tables(root, robot);
   NodeIds ids;
-  std::vector<BoardTable> boards = read_buses(root, ids, robot);
-  read_joints(root, seats_of(boards), robot);
-  check_boards(boards, robot);
-  for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, ids, robot);
+  std::vector<SensorTable> sensors;
+  std::vector<BoardTable> boards = read_buses(root, ids, robot, sensors);
+  read_joints(root, seats_of(boards), robot, loose);
+  const auto wrong = [](const BoardTable& board) { return board.table.has_errors(); };
+  if (std::ranges::any_of(boards, wrong)) loose.clear();  // a list that could not be read
+  check_boards(boards, robot, loose);
+  for (const SensorTable& sensor : sensors) read_sensor(sensor.table, sensor.bus, ids, robot);
+  for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, {}, ids, robot);
   read_contact(root, robot);
   read_loops(root, robot);
   TomlTable postures = root.table_or_empty("posture");
-  for (const std::string& name : postures.table_names()) {
-    read_posture(postures.table(name), name, robot);
+  // Neither floating nor fixed is an error that has been reported.
+  const bool fixed_base = root.table_or_empty("model").text_or("base", {}) == "fixed";
+  for (const std::string& name : postures.keys()) {
+    read_posture(postures.table(name), name, fixed_base, robot, loose);
   }
   postures.finish();
+  const auto of_list = [](const Error& error) { return error.key.ends_with(".names"); };
+  if (std::ranges::any_of(document.diagnostics(), of_list) ||
+      (robot.joints.empty() && !document.diagnostics().empty())) {
+    loose.clear();  // which joints there are is not known
+  }
   read_safety(root.table_or_empty("safety"), robot);
   root.finish();
   return robot;
 }
 
+/// An experiment names a robot, a robot has a [model].
+Result<TomlDocument> robot_alone(Result<TomlDocument> document) {
+  if (!document || document->root().has("model") || !document->root().has("robot")) return document;
+  return std::unexpected(Error{"this is an experiment, and a robot is needed",
+                               "name the robot.toml that it names",
+                               document->file(),
+                               document->root().line("robot"),
+                               "robot"});
+}
+
 std::expected<RobotConfig, Diagnostics> finish(Result<TomlDocument> document) {
+  document = robot_alone(std::move(document));
   if (!document) return std::unexpected(Diagnostics{document.error()});
-  RobotConfig robot = read(*document);
-  if (document->diagnostics().empty()) return robot;
-  Diagnostics errors = document->diagnostics();
+  std::vector<JointReference> loose;
+  RobotConfig robot = read(*document, loose);
+  Diagnostics errors = check_names(robot, loose);
+  errors.insert(errors.begin(), document->diagnostics().begin(), document->diagnostics().end());
+  if (errors.empty()) return robot;
   sort_by_line(errors);
   return std::unexpected(errors);
 }
@@ -231,13 +282,14 @@ std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& fil
   return finish(TomlDocument::load(file));
 }
 
-RobotConfig read_robot_config(const std::string& file, Diagnostics& errors) {
-  const Result<TomlDocument> document = TomlDocument::load(file);
+RobotConfig read_robot_config(const std::string& file, Diagnostics& errors,
+                              std::vector<JointReference>& loose) {
+  const Result<TomlDocument> document = robot_alone(TomlDocument::load(file));
   if (!document) {
     errors.push_back(document.error());
     return {};
   }
-  RobotConfig robot = read(*document);
+  RobotConfig robot = read(*document, loose);
   errors.insert(errors.end(), document->diagnostics().begin(), document->diagnostics().end());
   return robot;
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -46,6 +47,7 @@ struct ModelConfig {
   bool repair_inertia = false;          ///< inertia = "repair"; the default "strict" is an error
   bool exact_right_angles = false;      ///< right_angles = "exact"; the default is "as_written"
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
+  std::map<std::string, int> lock_lines;  ///< joint of it -> line in the TOML, for messages
   std::vector<LinkConfig> links;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
   std::vector<SiteConfig> sites;
@@ -261,9 +263,18 @@ struct RobotConfig {
 /// a reference to a board, bus, actuator or gains table that does not exist, a joint on two
 /// boards or twice, an axis twice, a node id twice on a bus, a gain of the wrong sign.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file);
+/// A place that names a joint where there is no [[joint]] of that name. Which of the two is
+/// misspelt, only the description knows.
+struct JointReference {
+  std::string joint;
+  Error error;  ///< without a hint when the nearest name is one
+};
 /// The same, but appends the errors and answers what could be read in spite of them: references
 /// may lead nowhere and names be empty. Only for finding errors in what comes next.
-[[nodiscard]] RobotConfig read_robot_config(const std::string& file, Diagnostics& errors);
+///
+/// @param loose  in: empty; out: errors that are not among `errors`; check_names() judges them
+[[nodiscard]] RobotConfig read_robot_config(const std::string& file, Diagnostics& errors,
+                                            std::vector<JointReference>& loose);
 /// The same from memory; `file` names it in errors and gives the folder of relative paths.
 [[nodiscard]] std::expected<RobotConfig, Diagnostics> parse_robot_config(std::string_view text,
                                                                          const std::string& file);
@@ -297,8 +308,14 @@ struct RobotDescription {
 
 /// The names of joints and links that the URDF lacks, each with the nearest; empty names are passed
 /// over. A configuration that has errors of its own can be checked so far.
+///
+/// @param loose  as read_robot_config() found them: what follows from a misspelt [[joint]] is
+///               passed over, and the nearest names of the others are the description's
+[[nodiscard]] Diagnostics check_names(const RobotConfig& robot, const RobotDescription& description,
+                                      const std::vector<JointReference>& loose = {});
+/// The same where there is no description to ask: the nearest names are those of [[joint]]s.
 [[nodiscard]] Diagnostics check_names(const RobotConfig& robot,
-                                      const RobotDescription& description);
+                                      const std::vector<JointReference>& loose);
 
 /// Checks the configuration against its URDF and fills the limits that the TOML left to it.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.

@@ -17,7 +17,7 @@ BusConfig read_bus(TomlTable& table) {
 void add_bus(TomlTable& table, RobotConfig& robot) {
   BusConfig bus = read_bus(table);
   bus.line = table.line();
-  bus.name = table.text("name");
+  bus.name = read_own_name(table);
   check_unique(table, robot.buses, bus.name, "bus");
   bus.interface = table.text_or("interface", bus.name);
   if (bus.fd && bus.data_bitrate < bus.bitrate) {
@@ -73,9 +73,9 @@ std::vector<std::string> read_list(TomlTable& table, const std::string& board,
 void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
                std::vector<BoardTable>& boards, RobotConfig& robot) {
   BoardConfig board = read_board(table);
-  board.name = table.text("name");
+  board.name = read_own_name(table);
   check_unique(table, robot.boards, board.name, "board");
-  board.bus = bus.empty() ? table.text("bus") : bus;
+  board.bus = read_bus_name(table, bus);
   check_reference(table, "bus", board.bus, robot.buses, "bus");
   board.node_id = ids.read(table, board.bus);
   board.serial = read_identity(table, "serial");
@@ -87,7 +87,8 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
 
 }  // namespace
 
-std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot) {
+std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot,
+                                   std::vector<SensorTable>& sensors) {
   const TomlTable bus_defaults = read_defaults(root, "bus_defaults", read_bus);
   const TomlTable board_defaults = read_defaults(root, "board_defaults", read_board);
   std::vector<BoardTable> boards;
@@ -99,6 +100,7 @@ std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& r
       board.inherit(board_defaults);
       add_board(board, name, ids, boards, robot);
     }
+    for (TomlTable& sensor : bus.tables("sensors")) sensors.push_back({std::move(sensor), name});
     bus.finish();
   }
   for (TomlTable& board : root.tables("board")) {
@@ -118,12 +120,13 @@ std::vector<Seat> seats_of(std::span<const BoardTable> boards) {
   return seats;
 }
 
-void check_boards(std::span<BoardTable> boards, const RobotConfig& robot) {
-  const std::vector<std::string> known = names_of(robot.joints);
+void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,
+                  std::vector<JointReference>& loose) {
   for (BoardTable& board : boards) {
     for (const std::string& joint : board.joints) {
       if (robot.joint_index(joint) >= 0) continue;
-      board.table.error("joints", "there is no [[joint]] '" + joint + "'", suggest(joint, known));
+      loose.push_back(
+          {joint, board.table.error_at("joints", "there is no [[joint]] '" + joint + "'")});
     }
     std::set<int> axes;
     for (std::size_t axis = 0; axis < board.joints.size(); ++axis) {
@@ -132,6 +135,7 @@ void check_boards(std::span<BoardTable> boards, const RobotConfig& robot) {
     for (const JointConfig& joint : robot.joints) {
       if (joint.board == board.board) axes.insert(joint.axis);
     }
+    if (axes.empty() && board.table.has_errors()) continue;
     if (axes.empty()) {
       board.table.error("name", "no joint is on board '" + board.board + "'",
                         "list its joints, or remove the board");

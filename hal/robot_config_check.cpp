@@ -75,8 +75,9 @@ class NameCheck : private Check {
  public:
   using Check::Check;
 
-  Diagnostics run() {
+  Diagnostics run(const std::vector<JointReference>& loose) {
     const std::vector<std::string> moving = names_of(description_.moving_joints);
+    for (const JointReference& one : loose) judge(one, moving);
     for (const JointConfig& one : robot_.joints) check_moving(one.line, "joint", one.name, moving);
     for (const PassiveConfig& one : robot_.passive)
       check_moving(one.line, "passive", one.name, moving);
@@ -96,9 +97,47 @@ class NameCheck : private Check {
   }
 
  private:
+  /// Whether the description has a joint so named, of any kind.
+  [[nodiscard]] bool is_described(const std::string& joint) const {
+    return find(description_.moving_joints, joint) != nullptr ||
+           find(description_.followers, joint) != nullptr ||
+           std::ranges::find(description_.other_joints, joint) != description_.other_joints.end();
+  }
+
+  /// Whether it follows from a [[joint]] that cannot be one, which is reported itself.
+  [[nodiscard]] bool follows_from_another(const std::string& joint,
+                                          const std::vector<std::string>& moving) const {
+    return std::ranges::any_of(robot_.joints, [&](const JointConfig& one) {
+      if (one.name == joint) return find(description_.moving_joints, joint) == nullptr;
+      return !one.name.empty() && !is_described(one.name) && nearest(one.name, moving) == joint;
+    });
+  }
+
+  void judge(JointReference one, const std::vector<std::string>& moving) {
+    if (one.joint.empty()) return errors_.push_back(std::move(one.error));
+    if (follows_from_another(one.joint, moving)) return;
+    if (const auto* follower = find(description_.followers, one.joint)) {
+      one.error.message = "the joint '" + one.joint + "' mimics '" + follower->leader +
+                          "' in the description";
+      one.error.hint = "remove it here: it follows";
+    } else if (!one.error.hint.empty()) {
+      // says already what to do
+    } else if (find(description_.moving_joints, one.joint) != nullptr) {
+      one.error.hint = "add one with its actuator";
+    } else if (is_described(one.joint)) {
+      one.error.message = "the joint '" + one.joint + "' does not move in the description";
+      one.error.hint = "remove it here";
+    } else {
+      one.error.message = "the description has no joint '" + one.joint + "'";
+      one.error.hint = suggest(one.joint, moving);
+    }
+    errors_.push_back(std::move(one.error));
+  }
+
   /// A [[joint]] or [[passive]] is a joint of its own.
   void check_moving(int line, const std::string& table, const std::string& name,
                     const std::vector<std::string>& moving) {
+    if (robot_.model.lock_lines.contains(name)) return;  // has been said
     const std::string key = table + "." + name;
     if (const auto* follower = find(description_.followers, name)) {
       error(line, key,
@@ -134,13 +173,16 @@ class Completion : private Check {
       if (found != nullptr) complete(joint, *found);
       all_known = all_known && found != nullptr;
     }
+    for (const PassiveConfig& joint : robot_.passive) {
+      all_known = all_known && find(description_.moving_joints, joint.name) != nullptr;
+    }
     if (all_known) check_driven();
     for (const PostureConfig& posture : robot_.postures) check(posture);
     return std::move(errors_);
   }
 
  private:
-  /// Only once every [[joint]] is known: a misspelt one would be reported twice.
+  /// Only once every [[joint]] and [[passive]] is known: a misspelt one would be reported twice.
   void check_driven() {
     for (const JointDescription& joint : description_.moving_joints) {
       if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
@@ -239,8 +281,20 @@ class Completion : private Check {
 
 }  // namespace
 
-Diagnostics check_names(const RobotConfig& robot, const RobotDescription& description) {
-  return NameCheck(robot, description).run();
+Diagnostics check_names(const RobotConfig& robot, const RobotDescription& description,
+                        const std::vector<JointReference>& loose) {
+  return NameCheck(robot, description).run(loose);
+}
+
+Diagnostics check_names(const RobotConfig& robot, const std::vector<JointReference>& loose) {
+  Diagnostics errors;
+  for (const JointReference& one : loose) {
+    errors.push_back(one.error);
+    if (one.error.hint.empty()) {
+      errors.back().hint = suggest(one.joint, names_of(robot.joints));
+    }
+  }
+  return errors;
 }
 
 Diagnostics complete_from_description(RobotConfig& robot, const RobotDescription& description) {

@@ -59,6 +59,7 @@ GainsConfig read_gains(TomlTable& table) {
 }
 
 void check_actuator(TomlTable& table, const ActuatorConfig& actuator) {
+  if (table.has_errors()) return;  // what is wrong may follow from them
   const std::string problem = actuator_problem(actuator);
   if (problem.empty()) return;
   table.error("", "of order " + std::to_string(actuator.order) + ": " + problem,
@@ -84,7 +85,7 @@ std::string actuator_problem(const ActuatorConfig& a) {
 void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   const TomlTable actuator_defaults = read_defaults(root, "actuator_defaults", read_actuator);
   TomlTable actuators = root.table_or_empty("actuator");
-  for (const std::string& name : actuators.table_names()) {
+  for (const std::string& name : actuators.keys()) {
     TomlTable table = actuators.table(name);
     table.inherit(actuator_defaults);
     robot.actuators.push_back(read_actuator(table));
@@ -95,7 +96,7 @@ void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   actuators.finish();
   const TomlTable gains_defaults = read_defaults(root, "gains_defaults", read_gains);
   TomlTable gains = root.table_or_empty("gains");
-  for (const std::string& name : gains.table_names()) {
+  for (const std::string& name : gains.keys()) {
     TomlTable table = gains.table(name);
     table.inherit(gains_defaults);
     robot.gains.push_back(read_gains(table));

@@ -42,7 +42,8 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
 void check_gains(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
   if (table.has("gains")) {
     check_reference(table, "gains", joint.gains, robot.gains, "gains table");
-  } else if (!joint.gains.empty() &&
+  } else if (std::ranges::find(robot.actuators, joint.actuator, &ActuatorConfig::name) !=
+                 robot.actuators.end() &&
              std::ranges::find(robot.gains, joint.gains, &GainsConfig::name) == robot.gains.end()) {
     table.error("gains", "there is no [gains." + joint.gains + "] for the actuator of that name",
                 "add that table, or set gains");
@@ -56,14 +57,16 @@ std::vector<std::string> read_names(TomlTable& table) {
     table.error("names", "a joint's table has a name or names, not both", "remove one of the two");
   }
   std::vector<std::string> names = table.texts_or("names", {});
-  if (names.empty()) table.error("names", "names no joint", "give at least one");
+  if (names.empty() && !table.has_errors()) {
+    table.error("names", "names no joint", "give at least one");
+  }
   if (std::ranges::count(names, std::string()) != 0) table.error("names", "must not be empty");
   return names;
 }
 
 /// Its board and axis: where a board lists it, or as its table says.
 void read_seat(TomlTable& table, std::span<const Seat> seats, const RobotConfig& robot,
-               JointConfig& joint) {
+               JointConfig& joint, std::vector<JointReference>& loose) {
   const std::string board = table.text_or("board", {});
   const int axis = static_cast<int>(table.integer_or("axis", 0, 0, 7));
   const auto seat = std::ranges::find(seats, joint.name, &Seat::joint);
@@ -76,8 +79,9 @@ void read_seat(TomlTable& table, std::span<const Seat> seats, const RobotConfig&
                   "remove this key");
     }
   } else if (table.has("names")) {
-    table.error("names", "no board lists joint '" + joint.name + "'",
-                "add it to the joints of its board");
+    loose.push_back(
+        {joint.name, table.error_at("names", "no board lists joint '" + joint.name + "'",
+                                    "add it to the joints of its board")});
   } else {
     if (!table.has("board")) {
       table.error("board", "this key is missing",
@@ -90,9 +94,10 @@ void read_seat(TomlTable& table, std::span<const Seat> seats, const RobotConfig&
 }
 
 void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
+  const char* key = table.has("names") ? "names" : "name";
   for (const JointConfig& other : robot.joints) {
     if (!joint.name.empty() && other.name == joint.name) {
-      table.error("name",
+      table.error(key,
                   other.board == joint.board
                       ? "the joint '" + joint.name + "' is described twice"
                       : "the joint '" + joint.name + "' is on two boards, '" + other.board +
@@ -105,14 +110,11 @@ void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& 
                   "give each joint of a board an axis of its own");
     }
   }
-  for (const auto& [locked, position] : robot.model.lock) {
-    if (locked != joint.name) continue;
-    table.error("name", "the joint '" + joint.name + "' is locked in [model.lock]",
-                "remove the lock or the [[joint]]");
-  }
+  check_not_locked(table, key, joint.name, robot);
 }
 
-void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robot) {
+void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robot,
+                std::vector<JointReference>& loose) {
   JointConfig common = read_joint(table, robot);
   common.line = table.line();
   check_gains(table, common, robot);
@@ -123,7 +125,7 @@ void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robo
   for (const std::string& name : read_names(table)) {
     JointConfig joint = common;
     joint.name = name;
-    read_seat(table, seats, robot, joint);
+    read_seat(table, seats, robot, joint, loose);
     check_joint(table, joint, robot);
     robot.joints.push_back(joint);
   }
@@ -132,12 +134,13 @@ void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robo
 
 }  // namespace
 
-void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot) {
+void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot,
+                 std::vector<JointReference>& loose) {
   const TomlTable defaults = read_defaults(
       root, "joint_defaults", [&](TomlTable& table) { return read_joint(table, robot); });
   for (TomlTable& joint : root.tables("joint")) {
     joint.inherit(defaults);
-    add_joints(joint, seats, robot);
+    add_joints(joint, seats, robot, loose);
   }
   std::ranges::stable_sort(robot.joints, {}, [&](const JointConfig& joint) {
     return std::ranges::find(seats, joint.name, &Seat::joint) - seats.begin();

@@ -15,6 +15,7 @@ void read_passive(TomlTable table, RobotConfig& robot) {
     table.error("name", "the joint '" + passive.name + "' has a motor: it is a [[joint]] too",
                 "remove one of the two");
   }
+  check_not_locked(table, "name", passive.name, robot);
   passive.position_rad = table.number_or("position_rad", 0.0);
   passive.damping_Nms_rad = table.number_or("damping_Nms_rad", 0.0, {0.0, 1e6});
   table.finish();
@@ -37,7 +38,7 @@ void read_axis(TomlTable& table, LoopConfig& loop) {
 void read_loop(TomlTable table, RobotConfig& robot) {
   LoopConfig loop;
   loop.line = table.line();
-  loop.name = table.text("name");
+  loop.name = read_own_name(table);
   check_unique(table, robot.loops, loop.name, "loop");
   const std::string type = table.choice("type", {"ball", "revolute", "rod"});
   loop.type = type == "revolute" ? model::LoopType::kRevolute
@@ -63,6 +64,10 @@ void read_loop(TomlTable table, RobotConfig& robot) {
   }
   if (loop.type == model::LoopType::kRevolute) read_axis(table, loop);
   if (loop.type == model::LoopType::kRod) loop.length_m = table.number("length_m", {1e-4, 100.0});
+  if (type.empty()) {  // either key may belong to the one that is meant
+    (void)table.numbers_or("axis", {});
+    (void)table.number_or("length_m", 0.0);
+  }
   table.finish();
   robot.loops.push_back(loop);
 }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "base/toml_reader.hpp"
 #include "hal/robot_config.hpp"
@@ -23,6 +24,26 @@ std::vector<std::string> names_of(const std::vector<T>& items) {
   std::vector<std::string> names;
   for (const T& item : items) names.push_back(item.name);
   return names;
+}
+
+/// The `name` of what robot.toml itself gives a name to: it may stand in files and messages.
+inline std::string read_own_name(TomlTable& table) {
+  std::string name = table.text("name");
+  if (name.empty()) return name;  // has been said
+  if (const std::string problem = file_name_problem(name); !problem.empty()) {
+    table.error("name", "'" + name + "' " + problem, "use letters, digits, _, - and .");
+  }
+  return name;
+}
+
+/// The bus of a board or sensor. @param bus  whose table holds this one; empty: `bus` names it
+inline std::string read_bus_name(TomlTable& table, const std::string& bus) {
+  if (bus.empty()) return table.text("bus");
+  if (table.has("bus")) {
+    (void)table.text_or("bus", {});
+    table.error("bus", "this stands in the table of bus '" + bus + "' already", "remove this key");
+  }
+  return bus;
 }
 
 /// Reports a `name` that an earlier item of `items` has.
@@ -46,6 +67,14 @@ void check_reference(TomlTable& table, std::string_view key, const std::string& 
   const std::vector<std::string> known = names_of(items);
   if (name.empty() || std::ranges::find(known, name) != known.end()) return;
   table.error(key, "there is no " + kind + " '" + name + "'", suggest(name, known));
+}
+
+/// Reports a [[joint]] or [[passive]] that [model.lock] fixes.
+inline void check_not_locked(TomlTable& table, std::string_view key, const std::string& joint,
+                             const RobotConfig& robot) {
+  if (!robot.model.lock_lines.contains(joint)) return;
+  table.error(key, "the joint '" + joint + "' is locked in [model.lock]",
+              "remove it here, or the lock");
 }
 
 inline std::array<double, 3> vector3(TomlTable& table, std::string_view key,
@@ -105,16 +134,25 @@ struct Seat {
 
 /// [actuator.NAME], [gains.NAME] and their defaults.
 void read_drive_tables(TomlTable& root, RobotConfig& robot);
+/// A table of a bus' `sensors`, to be read after every board.
+struct SensorTable {
+  TomlTable table;
+  std::string bus;
+};
 /// [[bus]] with its boards, then [[board]]; and their defaults.
-[[nodiscard]] std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot);
+/// @param sensors  out: those that stand in a bus
+[[nodiscard]] std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot,
+                                                 std::vector<SensorTable>& sensors);
 /// The joints that boards list, in that order.
 [[nodiscard]] std::vector<Seat> seats_of(std::span<const BoardTable> boards);
 /// [joint_defaults] and [[joint]]; after everything that a joint refers to. Those with a seat come
 /// first, in that order.
-void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot);
+void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot,
+                 std::vector<JointReference>& loose);
 /// A board's axes are numbered from 0 without a gap, there is at least one, and every joint that
 /// it lists is there.
-void check_boards(std::span<BoardTable> boards, const RobotConfig& robot);
+void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,
+                  std::vector<JointReference>& loose);
 /// [[passive]] and [[loop]]; after the joints, the sites and the contact.
 void read_loops(TomlTable& root, RobotConfig& robot);
 

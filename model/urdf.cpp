@@ -114,10 +114,9 @@ class Builder {
     const auto root = model.getRoot();
     const bool floats = !outline_.floating_joint.empty();
     if (floats) check_floating(*root->child_joints.front());
-    check_locks(model, options_.lock, "is locked at ");
+    check_locks(model);
     mimics_ = resolve_mimics(outline_, options_, out_.tree.file, errors_);
-    check_locks(model, std::span(mimics_.still).subspan(options_.lock.size()),
-                "follows a joint that stands still, and so stands at ");
+    check_still(std::span(mimics_.still).subspan(options_.lock.size()));
     check_overrides(options_, outline_, errors_);
     if (!errors_.empty()) return std::unexpected(errors_);
     add_all(floats ? *root->child_links.front() : *root);
@@ -157,30 +156,55 @@ class Builder {
                              outline_.floating_line, key});
   }
 
-  void check_locks(const urdf::ModelInterface& model,
-                   std::span<const std::pair<std::string, double>> locks, const std::string& how) {
-    for (const auto& [name, position] : locks) {
-      const std::string key = "joint " + name;
+  /// An error of [model.lock], at its place in robot.toml.
+  void lock_error(const std::string& joint, std::string message, std::string hint) {
+    const auto line = options_.lock_lines.find(joint);
+    errors_.push_back({std::move(message), std::move(hint), options_.overrides_file,
+                       line == options_.lock_lines.end() ? 0 : line->second,
+                       "model.lock." + joint});
+  }
+
+  void check_locks(const urdf::ModelInterface& model) {
+    for (const auto& [name, position] : options_.lock) {
       const auto joint = model.getJoint(name);
       if (joint == nullptr || !outline_.joint_lines.contains(name)) {
         std::vector<std::string> known;
         for (const auto& [one, line] : outline_.joint_lines) known.push_back(one);
-        error(0, key, "there is no joint '" + name + "' to lock", suggest(name, known));
+        lock_error(name, "the description has no joint '" + name + "' to lock",
+                   suggest(name, known));
         continue;
       }
-      const int line = outline_.joint_lines.at(name);
-      if (!moves(*joint))
-        error(line, key, "a fixed joint is locked", "remove it from [model.lock]");
-      if (!std::isfinite(position))
-        error(line, key, "is locked at a position that is not finite", "");
-      const OutlineJoint& limits = outlined(name);
-      if (moves(*joint) && (position < limits.lower || position > limits.upper)) {
-        error(line, key,
-              how + std::to_string(position) + ", beyond its limits " +
-                  std::to_string(limits.lower) + " to " + std::to_string(limits.upper),
-              "lock it within them");
+      if (!moves(*joint)) {
+        lock_error(name, "the joint '" + name + "' is fixed in the description",
+                   "remove it from [model.lock]");
+      } else if (!std::isfinite(position)) {
+        lock_error(name, "is locked at a position that is not finite", "give a finite one");
+      } else if (const OutlineJoint& limits = outlined(name);
+                 position < limits.lower || position > limits.upper) {
+        lock_error(name, "locks the joint at " + beyond(limits, position),
+                   "lock it within them: " + place(limits.line));
       }
     }
+  }
+
+  /// Followers of joints that stand still.
+  void check_still(std::span<const std::pair<std::string, double>> still) {
+    for (const auto& [name, position] : still) {
+      const OutlineJoint& limits = outlined(name);
+      if (!(position < limits.lower) && !(position > limits.upper)) continue;
+      error(limits.line, "joint " + name,
+            "follows a joint that stands still, and so stands at " + beyond(limits, position),
+            "lock it within them");
+    }
+  }
+
+  static std::string beyond(const OutlineJoint& limits, double position) {
+    return std::to_string(position) + ", beyond its limits " + std::to_string(limits.lower) +
+           " to " + std::to_string(limits.upper);
+  }
+
+  [[nodiscard]] std::string place(int line) const {
+    return out_.tree.file + ":" + std::to_string(line);
   }
 
   /// Depth first with a stack of our own: the deepest chain is the file's choice.
@@ -297,14 +321,19 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
 std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
                                                 const UrdfOptions& options) {
   std::error_code ignored;
+  const std::string named =
+      options.overrides_file.empty() ? "" : "; it is the urdf of [model] in " + options.overrides_file;
   if (std::filesystem::is_directory(file, ignored)) {
-    return std::unexpected(one_error("this is a folder", "name a .urdf file", file));
+    return std::unexpected(one_error("this is a folder", "name a .urdf file" + named, file));
+  }
+  if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
+    return std::unexpected(one_error("this is no regular file", "name a .urdf file" + named, file));
   }
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   if (!in || (text << in.rdbuf(), in.bad())) {
-    return std::unexpected(
-        one_error("cannot read this description", "check the path and its permissions", file));
+    return std::unexpected(one_error("cannot read this description",
+                                     "check the path and its permissions" + named, file));
   }
   return parse_urdf(text.str(), file, options);
 }

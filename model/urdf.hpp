@@ -35,7 +35,8 @@ struct UrdfOptions {
   bool repair_inertia = false;  ///< take the nearest possible inertia for an impossible one
   bool exact_right_angles = false;  ///< take angles within 1e-5 rad of a right one for it
   std::vector<LinkOverride> links{};
-  std::string overrides_file{};  ///< the file that `links` stand in, for messages
+  std::map<std::string, int> lock_lines{};  ///< joint of `lock` -> line in the next
+  std::string overrides_file{};  ///< the file that `lock` and `links` stand in, for messages
 };
 
 struct UrdfModel {

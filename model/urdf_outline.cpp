@@ -31,6 +31,11 @@ class Reader {
       error(0, "", "the file holds a zero byte, so it is no XML", "name a URDF text file");
       return std::move(out_);
     }
+    const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+    if (first != std::string_view::npos && text[first] != '<') {
+      error(1, "", "this is no XML, so no URDF", "name a .urdf file");
+      return std::move(out_);
+    }
     if (document_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
       report_xml_error();
       return std::move(out_);

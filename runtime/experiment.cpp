@@ -154,7 +154,7 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
     controllers.push_back({plugin, name, active, table.table_or_empty("parameters")});
     table.finish();
   }
-  if (controllers.empty()) {
+  if (controllers.empty() && !root.has("controller")) {
     root.error("controller", "there is no controller",
                "add [[controller]] with plugin = \"hold\", for one");
   }
@@ -217,7 +217,7 @@ void check_periods(const Experiment& e, TomlTable& root) {
                      ns(control) + ", do not divide each other",
                  "make one a multiple of the other");
     }
-    if (control % e.sim.substep_ns != 0) {
+    if (control != period && control % e.sim.substep_ns != 0) {
       sim.error("substep_ns",
                 ns(e.sim.substep_ns) + " does not divide the control period of board '" +
                     board.name + "', " + ns(control),
@@ -305,6 +305,7 @@ model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string
                              .lock = model.lock,
                              .repair_inertia = model.repair_inertia,
                              .exact_right_angles = model.exact_right_angles,
+                             .lock_lines = model.lock_lines,
                              .overrides_file = file};
   for (const hal::LinkConfig& link : model.links) {
     options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});
@@ -352,10 +353,12 @@ std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& ro
   return found;
 }
 
-std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file) {
+std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file, bool repair) {
   Diagnostics errors;
-  hal::RobotConfig config = hal::read_robot_config(file, errors);
-  if (errors.empty()) {
+  std::vector<hal::JointReference> loose;
+  hal::RobotConfig config = hal::read_robot_config(file, errors, loose);
+  config.model.repair_inertia = config.model.repair_inertia || repair;
+  if (errors.empty() && loose.empty()) {
     auto description = complete_robot(config);
     if (!description) return std::unexpected(description.error());
     return CompleteRobot{std::move(config), std::move(*description)};
@@ -363,10 +366,9 @@ std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file) {
   // The file is wrong by itself; what can be said of its names beside that is said too.
   const auto description =
       config.model.urdf.empty() ? std::unexpected(Diagnostics{}) : read_description(config);
-  if (description) {
-    const Diagnostics names = hal::check_names(config, plain(*description));
-    errors.insert(errors.end(), names.begin(), names.end());
-  }
+  const Diagnostics names = description ? hal::check_names(config, plain(*description), loose)
+                                        : hal::check_names(config, loose);
+  errors.insert(errors.end(), names.begin(), names.end());
   errors = in_order(std::move(errors));
   if (!description) {
     errors.insert(errors.end(), description.error().begin(), description.error().end());
@@ -387,6 +389,10 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
       combine(e, root);
     } else {
       robot_errors = robot.error();
+      Error& first = robot_errors.front();
+      if (first.file == e.robot_file && first.line == 0 && first.key.empty()) {  // not even read
+        first.hint += "; it is the robot of " + file + ":" + std::to_string(root.line("robot"));
+      }
     }
   }
   Diagnostics errors = in_order(document->diagnostics());

@@ -134,7 +134,9 @@ struct CompleteRobot {
 
 /// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
 /// complete_robot()'s.
-[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file);
+/// @param repair  as if it said inertia = "repair"
+[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file,
+                                                                   bool repair = false);
 
 /// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
 /// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer

@@ -143,9 +143,49 @@ TEST(RobotConfigDefaults, AreCheckedOnceWhoeverUsesThem) {
                "(gains are not negative: they act on reference minus measurement)");
   expect_error(shortened("gear_ratio = 100\n", "gear_ration = 100\n"),
                "robots/leg.toml:8: actuator_defaults.gear_ration: unknown key "
-               "(did you mean 'gear_ratio'?)\n"
-               "robots/leg.toml:13: actuator.big.gear_ratio: this key is missing "
+               "(did you mean 'gear_ratio'?)");
+  expect_error(shortened("gear_ratio = 100\n", ""),
+               "robots/leg.toml:12: actuator.big.gear_ratio: this key is missing "
                "(add it to the table, or to [actuator_defaults] for all)");
+}
+
+TEST(RobotConfigDefaults, ReportAListThatCannotBeReadOnce) {
+  expect_error(shortened("joints = [\"ankle\"]", "joints = \"ankle\""),
+               "robots/leg.toml:32: bus[0].boards[1].joints: must be a list of texts, not string");
+  expect_error(shortened("names = [\"ankle\", \"hip\"]", "names = 3"),
+               "robots/leg.toml:46: joint[1].names: must be a list of texts, not integer");
+  expect_error(shortened("actuator = \"big\"\n", "actuator = \"bigger\"\n"),
+               "robots/leg.toml:40: joint_defaults.actuator: there is no actuator 'bigger' "
+               "(did you mean 'big'?)");
+}
+
+TEST(RobotConfigDefaults, LetSensorsStandBelowTheirBus) {
+  const std::string table = "[[sensor]]\nname = \"imu\"\ntype = \"imu\"\nbus = \"left\"\n"
+                            "link = \"pelvis\"\n";
+  std::string text = shortened(table, "[[sensor]]\nname = \"imu2\"\ntype = \"imu\"\n"
+                                      "bus = \"left\"\nlink = \"foot\"\n");
+  const std::string end = "slow_pdo_every = 2 },\n]\n";
+  text.insert(text.find(end) + end.size(),
+              "sensors = [{ name = \"imu\", type = \"imu\", link = \"pelvis\" }]\n");
+  const auto robot = parse_robot_config(text, "robots/leg.toml");
+  ASSERT_TRUE(robot.has_value()) << errors_of(text);
+  ASSERT_EQ(robot->sensors.size(), 2u);
+  const auto apart = parse_robot_config(kShort, "robots/leg.toml");
+  ASSERT_TRUE(apart.has_value());
+  const SensorConfig& inside = robot->sensors[0];
+  const SensorConfig& outside = apart->sensors[0];
+  EXPECT_EQ(inside.name, outside.name);
+  EXPECT_EQ(inside.type, outside.type);
+  EXPECT_EQ(inside.bus, outside.bus);
+  EXPECT_EQ(inside.node_id, outside.node_id) << "after the boards, those of [[board]] too";
+  EXPECT_EQ(inside.link, outside.link);
+  EXPECT_EQ(robot->sensors[1].name, "imu2");
+  EXPECT_EQ(robot->sensors[1].node_id, inside.node_id + 1);
+  const std::string key = "sensors = [{";
+  text.insert(text.find(key) + key.size(), " bus = \"left\",");
+  expect_error(text,
+               "robots/leg.toml:34: bus[0].sensors[0].bus: this stands in the table of bus 'left' "
+               "already (remove this key)");
 }
 
 TEST(RobotConfigDefaults, AreCheckedWhenNobodyUsesThem) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "tests/hal/robot_config_text.hpp"
 
@@ -49,6 +50,40 @@ TEST_F(Completed, SuggestsTheNearestForAJointThatTheDescriptionLacks) {
   read(kRobot);
   EXPECT_EQ(errors.substr(0, errors.find('\n')),
             "leg.toml:37: joint.hip: the description has no joint 'hip' (did you mean 'hipp'?)");
+}
+
+/// What a text without other errors says of names, beside the description.
+std::string names_wrong(const std::string& text, const RobotDescription& d = description()) {
+  const std::string file = testing::TempDir() + "names.toml";
+  std::ofstream(file) << text;
+  Diagnostics errors;
+  std::vector<JointReference> loose;
+  const RobotConfig robot = read_robot_config(file, errors, loose);
+  EXPECT_TRUE(errors.empty()) << errors.front().to_string();
+  std::string all;
+  for (const Error& error : check_names(robot, d, loose)) {
+    all += error.to_string().substr(file.size()) + "\n";
+  }
+  return all;
+}
+
+TEST(RobotConfigNames, ReportAMisspeltJointOnceWhereItIsMisspelt) {
+  EXPECT_EQ(names_wrong(with("name = \"knee\"", "name = \"kneee\"")),
+            ":44: joint.kneee: the description has no joint 'kneee' (did you mean 'knee'?)\n");
+  EXPECT_EQ(names_wrong(with("knee = 0.2", "kneee = 0.2")),
+            ":72: posture.home.kneee: the description has no joint 'kneee' (did you mean "
+            "'knee'?)\n");
+}
+
+TEST(RobotConfigNames, SayWhyAPostureCannotPlaceAJoint) {
+  RobotDescription d = description();
+  d.followers.push_back({"finger", "knee", -1.0, 1.0});
+  EXPECT_EQ(names_wrong(with("knee = 0.2", "finger = 0.2"), d),
+            ":72: posture.home.finger: the joint 'finger' mimics 'knee' in the description "
+            "(remove it here: it follows)\n");
+  EXPECT_EQ(names_wrong(with("knee = 0.2", "ankle = 0.2"), d),
+            ":72: posture.home.ankle: the joint 'ankle' does not move in the description "
+            "(remove it here)\n");
 }
 
 TEST_F(Completed, RefusesAMovingJointThatNothingDrives) {

@@ -66,5 +66,17 @@ TEST(RobotConfig, SaysWhatIsWrongWithALoop) {
             std::string::npos);
 }
 
+TEST(RobotConfig, SaysThatAPostureCannotPlaceAPassiveJoint) {
+  const std::string text = with_loop(
+      "[[passive]]\nname = \"slider\"\n[[loop]]\nname = \"hinge\"\ntype = \"ball\"\n"
+      "sites = [\"pin\", \"eye\"]\n[posture.other]\nslider = 0.3\n");
+  EXPECT_NE(errors_of(text).find(
+                "posture.other.slider: the joint 'slider' is passive: where it stands follows "
+                "from the closed loops (remove it here; position_rad of its [[passive]] says "
+                "where it starts from)\n"),
+            std::string::npos)
+      << errors_of(text);
+}
+
 }  // namespace
 }  // namespace tandem::hal

@@ -237,7 +237,7 @@ TEST(RobotConfig, SuggestsTheNearestForAnUnknownReference) {
 
 TEST(RobotConfig, RefusesAPostureOfAnUnknownJoint) {
   expect_error(with("knee = 0.2", "kne = 0.2"),
-               "robots/leg.toml:72: posture.home.kne: there is no joint 'kne' "
+               "robots/leg.toml:72: posture.home.kne: there is no [[joint]] 'kne' "
                "(did you mean 'knee'?)");
 }
 
@@ -271,8 +271,73 @@ TEST(RobotConfig, RefusesNoiseOfTheWrongLength) {
 }
 
 TEST(RobotConfig, RefusesALockedJointThatIsDriven) {
-  EXPECT_NE(errors_of(with("toe = 0.1", "hip = 0.1")).find("is locked in [model.lock]"),
-            std::string::npos);
+  expect_error(with("toe = 0.1", "hip = 0.1"),
+               "robots/leg.toml:38: joint[0].name: the joint 'hip' is locked in [model.lock] "
+               "(remove it here, or the lock)");
+  expect_error(with("toe = 0.1", "knee = 0.1"),
+               "robots/leg.toml:45: joint[1].name: the joint 'knee' is locked in [model.lock] "
+               "(remove it here, or the lock)");
+  expect_error(with("knee = 0.2", "toe = 0.2"),
+               "robots/leg.toml:72: posture.home.toe: the joint 'toe' is locked in [model.lock] "
+               "(remove it here, or the lock)");
+}
+
+TEST(RobotConfig, ReportsAnOrderThatIsNoneOnce) {
+  expect_error(with("spring_Nm_rad = 395.46\n", "order = 7\n"),
+               "robots/leg.toml:18: actuator.big.order: 7 is out of range (must be 0 to 3)");
+}
+
+TEST(RobotConfig, RefusesNumbersFarOutOfRange) {
+  for (const std::string number : {"1e300", "-1e31", "1e-300"}) {
+    const std::string errors = errors_of(with("gear_ratio = 100", "gear_ratio = " + number));
+    EXPECT_NE(errors.find("robots/leg.toml:15: actuator.big.gear_ratio: " ), std::string::npos);
+    EXPECT_NE(errors.find("is far out of range (give 0, or a size of 1e-30 to 1e30)\n"),
+              std::string::npos)
+        << errors;
+  }
+}
+
+TEST(RobotConfig, RefusesATableOfTheWrongKindWithTheHeaderToWrite) {
+  expect_error(with("[posture.home]", "[posture]\nhome = 3\n[posture.other]"),
+               "robots/leg.toml:71: posture.home: must be a table, not integer "
+               "(write [posture.home])");
+  expect_error(with("[[sensor]]", "[sensor]"),
+               "robots/leg.toml:52: sensor: must be an array of tables (write [[sensor]])");
+}
+
+TEST(RobotConfig, RefusesAnExperimentInItsPlace) {
+  expect_error("duration_s = 1\nrobot = 'robot.toml'\n[[controller]]\nplugin = 'hold'\n",
+               "robots/leg.toml:2: robot: this is an experiment, and a robot is needed "
+               "(name the robot.toml that it names)");
+}
+
+TEST(RobotConfig, RefusesNamesThatCannotStandInFilesOrTopics) {
+  for (const std::string name : {"a/1", "a b", ".a", "\\u00e4"}) {
+    const std::string quoted = '"' + name + '"';
+    for (const auto& [from, place] :
+         {std::pair("\"sole\"\nlink", ":8: site[0].name: '"),
+          std::pair("\"left\"\ninterface", ":28: bus[0].name: '"),
+          std::pair("\"hip_board\"\nbus", ":31: board[0].name: '"),
+          std::pair("\"foot_ft\"\ntype", ":53: sensor[0].name: '")}) {
+      const std::string old = from;
+      const std::string text = with(old, quoted + old.substr(old.find('\n')));
+      EXPECT_NE(errors_of(text).find("robots/leg.toml" + std::string(place)), std::string::npos)
+          << name << " " << place << "\n" << errors_of(text);
+    }
+  }
+  expect_error(with("\"foot_ft\"", "\"foot-ft\""),
+               "robots/leg.toml:53: sensor[0].name: 'foot-ft' has other characters than letters, "
+               "digits and _, but it becomes part of a topic (use letters, digits and _)");
+}
+
+TEST(RobotConfig, RefusesAHeightOfAFixedBase) {
+  const std::string text = with("base = \"floating\"", "base = \"fixed\"");
+  expect_error(text,
+               "robots/leg.toml:71: posture.home.base_height_m: a fixed base has no height "
+               "(remove this key, or set base = \"floating\" in [model])");
+  expect_error(with("base = \"floating\"", "base = \"fixd\""),
+               "robots/leg.toml:4: model.base: 'fixd' is not one of the choices "
+               "(did you mean 'fixed'?)");
 }
 
 TEST(RobotConfig, RefusesAStaticFrictionBelowTheSlidingOne) {

@@ -114,7 +114,7 @@ TEST(UrdfFloating, IsRefusedAnywhereElse) {
 TEST(UrdfFloating, CannotBeLocked) {
   UrdfOptions options = kFree;
   options.lock = {{"free", 0.0}};
-  EXPECT_NE(errors_of(walker(), options).find("there is no joint 'free' to lock"),
+  EXPECT_NE(errors_of(walker(), options).find("the description has no joint 'free' to lock"),
             std::string::npos);
 }
 

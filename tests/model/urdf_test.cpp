@@ -318,14 +318,23 @@ TEST(Urdf, RefusesTwoRoots) {
 }
 
 TEST(Urdf, RefusesALockThatCannotBe) {
+  const auto lock = [](const std::string& joint, double position) {
+    return UrdfOptions{.lock = {{joint, position}},
+                       .lock_lines = {{joint, 7}},
+                       .overrides_file = "robot.toml"};
+  };
   expect_error(kRobot,
-               "arm.urdf: joint slid: there is no joint 'slid' to lock "
+               "robot.toml:7: model.lock.slid: the description has no joint 'slid' to lock "
                "(did you mean 'slide'?)",
-               {.lock = {{"slid", 0.0}}});
-  EXPECT_NE(errors_of(kRobot, {.lock = {{"bolt", 0.0}}}).find("a fixed joint is locked"),
-            std::string::npos);
-  EXPECT_NE(errors_of(kRobot, {.lock = {{"slide", 0.7}}}).find("beyond its limits"),
-            std::string::npos);
+               lock("slid", 0.0));
+  expect_error(kRobot,
+               "robot.toml:7: model.lock.bolt: the joint 'bolt' is fixed in the description "
+               "(remove it from [model.lock])",
+               lock("bolt", 0.0));
+  expect_error(kRobot,
+               "robot.toml:7: model.lock.slide: locks the joint at 0.700000, beyond its limits "
+               "0.000000 to 0.500000 (lock it within them: arm.urdf:30)",
+               lock("slide", 0.7));
 }
 
 TEST(Urdf, ReportsSeveralErrorsInTheFilesOrder) {
