@@ -50,13 +50,13 @@ void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& ro
 }
 
 /// What a run would do.
-void print_plan(const Composition& c, std::FILE* out) {
+void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   Facts facts;
   add_robot_facts(e.robot, facts);
   add_kernel_facts(c.kernels, e.robot.file, facts);
-  add_loop_facts(e.robot, c.kernels.get(), {&e.posture, 1}, facts);
+  add_loop_facts(e.robot, loops, facts);
   facts.add("backend", backend_text(e.hal.backend));
   facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
   for (const ControllerNote& note : c.notes) {
@@ -78,14 +78,12 @@ void print_plan(const Composition& c, std::FILE* out) {
   facts.print(out);
 }
 
-void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels, std::FILE* out) {
+void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
+                 const LoopStudy& loops, std::FILE* out) {
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
-  std::vector<std::string> postures;
-  for (const hal::PostureConfig& one : robot.config.postures) postures.push_back(one.name);
-  if (postures.empty()) postures.emplace_back();
-  add_loop_facts(robot.config, kernels.get(), postures, facts);
+  add_loop_facts(robot.config, loops, facts);
   if (robot.config.model.repair_inertia) {
     const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
     facts.add("inertias", fmt::format("{} repaired", repaired));
@@ -128,9 +126,12 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   if (!robot) return robot.error();
   warnings = warnings_of(*robot);
   print_warnings(warnings);
+  const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
+  add_loop_json(robot->config, loops, json);
+  if (!loops.errors.empty()) return loops.errors;
   const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
-  print_robot(*robot, *kernels, out);
+  print_robot(*robot, *kernels, loops, out);
   json["kernels"] = kernels->path();
   return {};
 }
@@ -141,7 +142,10 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.warnings;
   print_warnings(warnings);
-  print_plan(**composition, out);
+  const runtime::Experiment& e = (*composition)->experiment;
+  const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});
+  add_loop_json(e.robot, loops, json);
+  print_plan(**composition, loops, out);
   json["kernels"] = (*composition)->kernels.path();
   return {};
 }
@@ -164,8 +168,8 @@ Exit check_command(const CheckOptions& options) {
   }
   print_errors(errors);
   json["ok"] = errors.empty();
-  json["errors"] = findings_json(errors);
-  json["warnings"] = findings_json(warnings);
+  json["errors"] = errors_json(errors);
+  json["warnings"] = errors_json(warnings);
   if (const Status written = write_json(options.json, json); !written) {
     print_errors({written.error()});
     return Exit::kUsage;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -51,8 +52,13 @@ void add_controllers(Composition& c, Collector& errors) {
     Result<LoadedController> loaded =
         load_controller(plugin_path(c.experiment, spec.plugin), folders);
     const int line = spec.parameters.line();
-    if (!loaded) {
-      errors.add(loaded.error(), c.experiment.file, line);
+    const std::string key = "controller." + spec.name;
+    if (!loaded) {  // of a library; the line that names it is in the experiment
+      Error error = loaded.error();
+      if (!error.file.empty()) error.message = error.file + ": " + error.message;
+      error.file.clear();
+      error.key = key;
+      errors.add(std::move(error), c.experiment.file, line);
       continue;
     }
     const std::string doc = loaded->plugin().doc;
@@ -60,7 +66,9 @@ void add_controllers(Composition& c, Collector& errors) {
       const Status added =
           c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
       if (!added) {
-        errors.add(added.error(), c.experiment.file, line);
+        Error error = added.error();
+        error.key = key + (error.key.empty() ? "" : ": " + error.key);
+        errors.add(std::move(error), c.experiment.file, line);
         continue;
       }
     }
@@ -191,6 +199,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   c->tree = robot->tree;
   if (e.hal.backend == runtime::BackendKind::kSim) {
     if (auto error = start_in_ground(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
+    errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
   }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();

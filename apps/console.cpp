@@ -11,6 +11,9 @@
 namespace tandem::apps {
 namespace {
 
+Diagnostics told;         // by print_errors(), for write_failure()
+bool has_written = false;  // by write_json()
+
 /// Columns that a UTF-8 text takes: bytes that do not continue a character.
 std::size_t width(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count_if(
@@ -49,6 +52,7 @@ std::string json_text(const Json& value, int indent) {
 
 Status write_json(const std::string& file, const Json& value) {
   if (file.empty()) return {};
+  has_written = true;
   const std::string text = json_text(value, 2) + "\n";
   if (file == "-") {
     fmt::print("{}", text);
@@ -61,11 +65,31 @@ Status write_json(const std::string& file, const Json& value) {
   return out ? Status{} : std::unexpected(json_error(file));
 }
 
+Json errors_json(const Diagnostics& errors) {
+  Json list = Json::array();
+  for (const Error& error : errors) {
+    list.push_back({{"file", error.file},
+                    {"line", error.line},
+                    {"key", error.key},
+                    {"message", error.message},
+                    {"hint", error.hint}});
+  }
+  return list;
+}
+
+void remember_error(Error error) { told.push_back(std::move(error)); }
+
+void write_failure(const std::string& file) {
+  if (has_written) return;
+  (void)write_json(file, {{"ok", false}, {"errors", errors_json(told)}});
+}
+
 Json percentiles_json(const rt::Percentiles& p) {
   return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
 }
 
 void print_errors(const Diagnostics& errors) {
+  told.insert(told.end(), errors.begin(), errors.end());
   for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
 }
 

@@ -37,6 +37,16 @@ using Json = nlohmann::ordered_json;
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);
 
+/// For write_failure(): an error that has been told in other words than print_errors()'s.
+void remember_error(Error error);
+
+/// A list of objects: file, line, key, message, hint.
+[[nodiscard]] Json errors_json(const Diagnostics& errors);
+
+/// For a command that failed: {"ok": false, "errors": [...]} with all that print_errors() told,
+/// unless write_json() has written something already. `file` as there.
+void write_failure(const std::string& file);
+
 /// A table of two or more columns, the first left-aligned and the others to the right, unless all
 /// are texts.
 class Table {

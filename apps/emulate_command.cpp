@@ -9,6 +9,7 @@
 #include "apps/kernel_supply.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
+#include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "apps/wrong_kind.hpp"
 #include "base/counted.hpp"
@@ -92,6 +93,11 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   if (!description) return std::unexpected(description.error());
   if (auto error = start_in_ground(*description, e->subject.sim.posture)) {
     return std::unexpected(Diagnostics{std::move(*error)});
+  }
+  const std::string& posture = e->subject.sim.posture;
+  if (LoopStudy loops = study_loops(robot, description->tree, {&posture, 1});
+      !loops.errors.empty()) {
+    return std::unexpected(std::move(loops.errors));
   }
   auto kernels = supply_kernels(*description, options.kernel_variant,
                                 missing_kernels(options.no_build, options.quiet));

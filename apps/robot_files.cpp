@@ -3,6 +3,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "apps/loop_facts.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/regular.hpp"
 #include "runtime/experiment.hpp"
@@ -39,6 +40,9 @@ std::vector<model::NamedPosition> positions_of(const hal::RobotConfig& robot,
 std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
   auto description = runtime::complete_robot(config);
   if (!description) return std::unexpected(description.error());
+  if (Diagnostics errors = check_loop_bodies(config, description->tree); !errors.empty()) {
+    return std::unexpected(std::move(errors));
+  }
   model::ModelSpec spec = sim::model_spec(config);
   const Status regular =
       model::check_regular(description->tree, spec, positions_of(config, description->tree));

@@ -35,8 +35,9 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
     if (robot.joint_index(name) < 0 &&
         !(passive == PassiveJoints::kClosed && robot.is_passive(name))) {
       if (robot.is_passive(name)) {
-        return fail("this controller cannot do with joint '" + name + "', which has no motor",
-                    "run gravity_compensation, hold or joint_trajectory");
+        return fail("the joint '" + name + "' is passive, and this controller needs a motor at "
+                    "every joint",
+                    "run hold, joint_trajectory or gravity_compensation");
       }
       return fail("joint '" + name + "' of the model is not driven",
                   "give it a [[joint]] in " + robot.file + ", or lock it in [model.lock]");

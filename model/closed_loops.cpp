@@ -1,8 +1,11 @@
 #include "model/closed_loops.hpp"
 
+#include <fmt/core.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/nearest.hpp"
 
@@ -36,6 +39,15 @@ std::size_t equations_of(LoopType type) {
 }
 
 }  // namespace
+
+std::string LoopGap::to_string() const {
+  constexpr double kSmall = 1e-9;
+  const double degrees = axis_rad * 180.0 / std::numbers::pi;
+  const std::string axes = fmt::format("its axes are {:.4g} degrees apart", degrees);
+  if (!(axis_rad > kSmall)) return fmt::format("a gap of {:.4g} m is left", position_m);
+  if (!(position_m > kSmall)) return axes;
+  return axes + fmt::format(", and a gap of {:.4g} m is left", position_m);
+}
 
 Result<ClosedLoops> ClosedLoops::create(const std::vector<LoopSpec>& loops,
                                         const std::vector<std::string>& passive,
@@ -166,6 +178,17 @@ double ClosedLoops::position_error_m(std::size_t loop) const noexcept TANDEM_RT 
   for (const LoopEquation& row : rows_)
     if (row.loop == loop) sum += row.error * row.error;
   return std::sqrt(sum);
+}
+
+LoopGap ClosedLoops::gap(std::size_t loop) const noexcept TANDEM_RT {
+  const Loop& one = loops_[loop];
+  const auto [a, b] = one.site;
+  const Vector3d d = Map3(&pose_[12 * a + 9]) - Map3(&pose_[12 * b + 9]);
+  if (one.spec.type == LoopType::kRod) return {std::abs(d.norm() - one.spec.length_m), 0.0};
+  if (one.spec.type == LoopType::kBall) return {d.norm(), 0.0};
+  const Vector3d z1 = MapR(&pose_[12 * a]) * one.axis;
+  const Vector3d z2 = MapR(&pose_[12 * b]) * one.axis;
+  return {d.norm(), std::atan2(z1.cross(z2).norm(), z1.dot(z2))};
 }
 
 double ClosedLoops::velocity_error_m_s(std::size_t loop, const double* v) const noexcept TANDEM_RT {

@@ -26,6 +26,14 @@ struct LoopEquation {
   Eigen::Vector3d m = Eigen::Vector3d::Zero();
 };
 
+/// How far a loop is from closed.
+struct LoopGap {
+  double position_m = 0.0;  ///< between its sites; of a rod, how much it is too long or short
+  double axis_rad = 0.0;    ///< between the axes of a revolute loop, 0 to pi
+  /// "a gap of 0.01 m is left", "its axes are 90 degrees apart", or both.
+  [[nodiscard]] std::string to_string() const;
+};
+
 /// Loops of a robot as equations of its kernels' sites. A ball has three, a revolute joint five,
 /// a rod one; of those that a planar loop repeats in space, the solvers drop the surplus.
 ///
@@ -62,6 +70,8 @@ class ClosedLoops {
 
   /// How far a loop is open, as of move() [m]; for a rod, how much too long or short.
   [[nodiscard]] double position_error_m(std::size_t loop) const noexcept TANDEM_RT;
+  /// The same, by position and direction.
+  [[nodiscard]] LoopGap gap(std::size_t loop) const noexcept TANDEM_RT;
   /// How fast it opens, as of differentiate(). @param v (nv)
   [[nodiscard]] double velocity_error_m_s(std::size_t loop,
                                           const double* v) const noexcept TANDEM_RT;

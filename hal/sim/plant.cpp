@@ -160,12 +160,8 @@ Status Plant::close_loops(double* q) {
   std::size_t worst = 0;
   for (std::size_t l = 1; l < loops.loops(); ++l)
     if (loops.position_error_m(l) > loops.position_error_m(worst)) worst = l;
-  char gap[160];
-  std::snprintf(gap, sizeof gap,
-                "cannot be closed from the start's posture: a gap of %.6g m is left",
-                loops.position_error_m(worst));
   return std::unexpected(Error{
-      .message = gap,
+      .message = "cannot be closed from the start's posture: " + loops.gap(worst).to_string(),
       .hint = "change the posture of the driven joints, the position_rad of a [[passive]], or "
               "the loop's sites",
       .file = {},

@@ -1,4 +1,6 @@
 // `tandem check`: every error of every file, and nothing moves.
+#include <algorithm>
+
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {
@@ -70,6 +72,118 @@ TEST_F(Check, TellsHowLoopsCloseAndWhatCanStillMove) {
   }
   const Outcome run = tandem("check " TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml");
   EXPECT_NE(run.out.find("2 of 4 degrees"), std::string::npos) << run.out;
+}
+
+/// Closed loops, in files that a test may spoil.
+class CheckLoops : public Check {
+ protected:
+  void SetUp() override {
+    Check::SetUp();
+    for (const char* file : {"robot.toml", "four_bar.urdf", "hold.toml"}) {
+      std::filesystem::copy_file(TANDEM_SOURCE_DIR "/config/four_bar/" + std::string(file),
+                                 folder_ / file,
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+  }
+
+  /// One error, of `check` on robot and experiment and of `run`.
+  void expect_refused(const std::string& expected) const {
+    for (const std::string command : {"check robot.toml", "check hold.toml", "run hold.toml"}) {
+      const Outcome outcome = tandem(command);
+      EXPECT_EQ(outcome.status, 2) << command;
+      EXPECT_EQ(outcome.err.substr(0, outcome.err.find('\n')), "error: " + expected) << command;
+      EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+      EXPECT_EQ(outcome.out, "") << "not called fine";
+    }
+  }
+};
+
+TEST_F(CheckLoops, RefusesAnAxisThatDiffersAndSaysByHowMuch) {
+  edit("robot.toml", "rocker\"\nxyz_m", "rocker\"\nrpy_rad = [0.5, 0, 0]\nxyz_m");
+  expect_refused(
+      "robot.toml:21: loop.pin: the loop does not close in the posture 'ready': where its sites "
+      "meet, its axes are 28.65 degrees apart (axis is a direction in both sites' frames: correct "
+      "it, or turn a site by rpy_rad)");
+}
+
+TEST_F(CheckLoops, RefusesAGapThatNoPositionCloses) {
+  edit("robot.toml", "[0.28, 0.0, 0.0]", "[2.28, 0.0, 0.0]");
+  const Outcome outcome = tandem("check robot.toml --json -");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("robot.toml:20: loop.pin: the loop does not close in the posture "
+                             "'ready': a gap of "),
+            std::string::npos)
+      << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["ok"], false);
+  EXPECT_EQ(json["loop_postures"][0]["closed"], false);
+}
+
+TEST_F(CheckLoops, RefusesTwoSitesOfOneBody) {
+  edit("robot.toml", "link = \"rocker\"", "link = \"coupler\"");
+  expect_refused(
+      "robot.toml:20: loop.pin: both sites are on the link 'coupler', so the loop closes nothing "
+      "(put one of them on the link that it shall meet)");
+}
+
+TEST_F(CheckLoops, RefusesAPassiveJointInAPosture) {
+  edit("robot.toml", "crank = 1.0", "crank = 1.0\ncoupler = 0.3");
+  expect_refused(
+      "robot.toml:76: posture.ready.coupler: the joint 'coupler' is passive: where it stands "
+      "follows from the closed loops (remove it here; position_rad of its [[passive]] says where "
+      "it starts from)");
+}
+
+TEST_F(CheckLoops, NamesTheControllerThatNeedsAMotorAtEveryJoint) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"squat\"\nparameters = { depth_m = 0.1, period_s = 2 }");
+  for (const std::string command : {"check hold.toml", "run hold.toml"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.err,
+              "error: hold.toml:9: controller.squat: the joint 'coupler' is passive, and this "
+              "controller needs a motor at every joint (run hold, joint_trajectory or "
+              "gravity_compensation)\n");
+  }
+}
+
+TEST_F(CheckLoops, TellsOfThemAsJsonBeforeKernelsAreBuilt) {
+  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.0021");  // other kernels
+  for (const std::string file : {"robot.toml", "hold.toml"}) {
+    const Outcome outcome = tandem("check " + file + " --json -");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(json["kernels"], "");
+    EXPECT_EQ(json["loops"][0]["name"], "pin");
+    EXPECT_EQ(json["loops"][0]["type"], "revolute");
+    EXPECT_EQ(json["loops"][0]["sites"][1], "rocker_end");
+    const auto posture = json["loop_postures"][0];
+    EXPECT_EQ(posture["posture"], "ready");
+    EXPECT_EQ(posture["closed"], true);
+    EXPECT_GT(posture["start_gap_m"], 0.0);
+    EXPECT_NEAR(posture["passive"]["coupler"], -0.6, 0.2);
+    EXPECT_EQ(json["freedom"]["degrees"], 1);
+    EXPECT_EQ(json["freedom"]["open_degrees"], 3);
+    EXPECT_EQ(json["freedom"]["motors"], 1);
+  }
+}
+
+TEST_F(Check, NamesALockThatCannotBeAtItsLine) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\n[model.lock]\njiont2 = 0.0");
+  const Outcome outcome = tandem("check robot.toml");
+  EXPECT_EQ(outcome.err,
+            "error: robot.toml:9: model.lock.jiont2: the description has no joint 'jiont2' to "
+            "lock (did you mean 'joint2'?)\n");
+}
+
+TEST_F(Check, ReportsALockedJointOfAListOnce) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\n[model.lock]\njoint1 = 0.0");
+  const Outcome outcome = tandem("check robot.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("names: the joint 'joint1' is locked in [model.lock]"),
+            std::string::npos)
+      << outcome.err;
 }
 
 TEST_F(Check, SaysOkAsJson) {

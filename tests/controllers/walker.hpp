@@ -10,8 +10,8 @@
 
 #include "hal/robot_config.hpp"
 #include "hal/sim/setup.hpp"
+#include "model/interpreted_kernels.hpp"
 #include "model/urdf.hpp"
-#include "tests/support/interpreted_kernels.hpp"
 
 namespace tandem::test {
 
@@ -102,12 +102,16 @@ inline hal::RobotConfig walker_robot(const Walker& walker) {
 struct WalkerRobot {
   explicit WalkerRobot(const Walker& walker)
       : robot(walker_robot(walker)),
-        kernels(model::parse_urdf(walker_urdf(walker), "walker.urdf", {.floating_base = true})
+        kernels(
+            model::make_mechanism(
+                model::parse_urdf(walker_urdf(walker), "walker.urdf", {.floating_base = true})
                     .value()
                     .tree,
-                sim::model_spec(robot)) {}
+                sim::model_spec(robot))
+                .value(),
+            robot.name) {}
   hal::RobotConfig robot;
-  InterpretedKernels kernels;
+  model::InterpretedKernels kernels;
 };
 
 }  // namespace tandem::test

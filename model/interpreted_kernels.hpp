@@ -1,22 +1,22 @@
 // The kernels of any tree without a compiler: the algorithms of model/ on doubles behind the C
-// interface. Slow, and they allocate, so a test in the cycle takes generated kernels instead.
-// Layer: tests.  Thread: one; one robot at a time.
+// interface. Slow, and they allocate: for what is looked at before a run, never for the cycle.
+// Layer: model.  Thread: one; one robot at a time, for the C interface has no place for `this`.
 #pragma once
 
-#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/dynamics.hpp"
 #include "model/kernels.h"
 
-namespace tandem::test {
+namespace tandem::model {
 
 class InterpretedKernels {
  public:
-  /// Throws std::runtime_error with the message of what is wrong with the robot.
-  InterpretedKernels(const model::Tree& tree, const model::ModelSpec& spec)
-      : mechanism_(made(tree, spec)), name_(spec.robot) {
+  /// @param mechanism  make_mechanism()'s
+  explicit InterpretedKernels(Mechanism mechanism, std::string robot = {})
+      : mechanism_(std::move(mechanism)), name_(std::move(robot)) {
     kernels_.abi = TANDEM_KERNELS_ABI;
     kernels_.floating_base = mechanism_.floating_base ? 1 : 0;
     kernels_.robot = name_.c_str();
@@ -40,22 +40,17 @@ class InterpretedKernels {
 
  private:
   using In = const double*;
-  static model::Mechanism made(const model::Tree& tree, const model::ModelSpec& spec) {
-    auto mechanism = model::make_mechanism(tree, spec);
-    if (!mechanism) throw std::runtime_error(mechanism.error().to_string());
-    return std::move(*mechanism);
-  }
   const char* const* list(const std::vector<std::string>& names, std::uint32_t& count) {
     auto& pointers = lists_[used_++];
     for (const std::string& name : names) pointers.push_back(name.c_str());
     count = static_cast<std::uint32_t>(names.size());
     return pointers.data();
   }
-  static const model::Mechanism*& current() {
-    static const model::Mechanism* mechanism = nullptr;
+  static const Mechanism*& current() {
+    static const Mechanism* mechanism = nullptr;
     return mechanism;
   }
-  static const model::Mechanism& m() { return *current(); }
+  static const Mechanism& m() { return *current(); }
   static std::span<const double> q(In in) { return {in, static_cast<std::size_t>(m().nq())}; }
   static std::span<const double> v(In in) { return {in, static_cast<std::size_t>(m().nv())}; }
   static std::span<const double> f(In in) {
@@ -66,7 +61,6 @@ class InterpretedKernels {
   static std::size_t sites() { return m().sites.size(); }
 
   void set_functions() {
-    using namespace model;
     kernels_.forward_dynamics = [](In a, In b, In c, In d, double* r) {
       ForwardDynamics<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
     };
@@ -94,11 +88,11 @@ class InterpretedKernels {
     };
   }
 
-  model::Mechanism mechanism_;
+  Mechanism mechanism_;
   std::string name_;
   std::vector<const char*> lists_[4];
   std::size_t used_ = 0;
   tandem_kernels kernels_{};
 };
 
-}  // namespace tandem::test
+}  // namespace tandem::model
