@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "apps/command_flags.hpp"
+#include "apps/console.hpp"
 #include "base/nearest.hpp"
 
 namespace tandem::apps {
@@ -69,6 +70,8 @@ Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string message =
       unknown.empty() ? std::string(error.what()) : unknown_word(command, unknown.front());
   fmt::print(stderr, "tandem: {}\nTry `{} --help`.\n", message, path_of(command));
+  remember_error(
+      {.message = message, .hint = "try `" + path_of(command) + " --help`", .file = {}, .key = {}});
   return Exit::kUsage;
 }
 

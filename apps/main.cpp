@@ -1,6 +1,21 @@
+#include <string_view>
+
 #include "apps/commands.hpp"
+#include "apps/console.hpp"
 
 namespace {
+
+/// What --json was given, also on a command line that is wrong elsewhere; empty without.
+std::string json_argument(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word.starts_with("--json=")) return std::string(word.substr(7));
+    if (word != "--json" || i + 1 == argc) continue;
+    const std::string_view value = argv[i + 1];
+    return value == "-" || !value.starts_with('-') ? std::string(value) : std::string();
+  }
+  return {};
+}
 
 template <class... F>
 struct Overloaded : F... {
@@ -36,5 +51,6 @@ int main(int argc, char** argv) {
                      [](const LatencyOptions& options) { return latency_command(options); },
                  },
                  command);
+  if (exit == Exit::kUsage) write_failure(json_argument(argc, argv));
   return static_cast<int>(exit);
 }

@@ -1,4 +1,6 @@
 // Wrong input ends with exit status 2, one clear message, and no run.
+#include <sys/stat.h>
+
 #include <algorithm>
 
 #include "tests/apps/program.hpp"
@@ -115,6 +117,58 @@ TEST_F(BadInput, ADurationThatIsNoneIsRefusedInOneShortLine) {
   }
   expect_refused({"duration_s: 0.0001 s are less than half a cycle", "run for 0.001 s or longer"},
                  "run hold.toml --duration 0.0001");
+}
+
+TEST_F(BadInput, AnEmptyNameIsRefusedAsOne) {
+  for (const std::string command :
+       {"run \"\"", "check \"\"", "check \"\" --repair", "model info \"\""}) {
+    expect_refused({"the file's name is empty"}, command);
+  }
+}
+
+TEST_F(BadInput, AMissingRobotIsNoExperimentToRepair) {
+  expect_refused({"error: nothing.toml: cannot read this file"}, "check nothing.toml --repair");
+}
+
+TEST_F(BadInput, AnEmptyFileIsRefusedAsOne) {
+  write_text(folder_ / "hold.toml", " \n\n");
+  expect_refused({"hold.toml: the file is empty"});
+  write_text(folder_ / "hold.toml", "robot = 'robot.toml'\nduration_s = 1\n[[controller]]\n"
+                                    "plugin = 'hold'\n");
+  write_text(folder_ / "robot.toml", "");
+  expect_refused({"robot.toml: the file is empty", "it is the robot of hold.toml:1"});
+}
+
+TEST_F(BadInput, APipeIsRefusedAndNotWaitedFor) {
+  for (const char* file : {"double_pendulum.urdf", "robot.toml", "hold.toml"}) {
+    std::filesystem::remove(folder_ / file);
+    ASSERT_EQ(mkfifo((folder_ / file).c_str(), 0600), 0);
+    expect_refused({std::string(file) + ": this is no regular file"});
+  }
+}
+
+TEST_F(BadInput, TextThatIsNoXmlIsRefusedAsADescription) {
+  edit("robot.toml", "urdf = \"double_pendulum.urdf\"", "urdf = \"hold.toml\"");
+  expect_refused({"hold.toml:1: this is no XML, so no URDF"});
+}
+
+TEST_F(BadInput, AnExperimentInPlaceOfARobotIsRefused) {
+  edit("hold.toml", "robot = \"robot.toml\"", "robot = \"trajectory.toml\"");
+  expect_refused({"trajectory.toml:", "robot: this is an experiment, and a robot is needed"});
+}
+
+TEST_F(BadInput, AControllerInSingleBracketsIsRefusedWithTheHeaderToWrite) {
+  edit("hold.toml", "[[controller]]", "[controller]");
+  expect_refused({"hold.toml:7: controller: must be an array of tables (write [[controller]])"});
+}
+
+TEST_F(BadInput, AFileThatIsNoControllerIsNamedAtItsLine) {
+  edit("hold.toml", "\"hold\"", "\"./robot.toml\"");
+  expect_refused({"error: hold.toml:7: controller.robot: ", "cannot be loaded"});
+}
+
+TEST_F(BadInput, AFolderInPlaceOfAnExperimentIsRefused) {
+  expect_refused({"this is a folder"}, "run .");
 }
 
 TEST_F(BadInput, AMissingRobotIsRefused) {
@@ -262,6 +316,27 @@ TEST_F(BadInput, KernelsOfAnotherDescriptionAreRefusedWithTheCommandThatMendsIt)
 
 TEST_F(BadInput, AKernelVariantThatIsNotThereIsRefused) {
   expect_refused({"no variant 'x87'"}, "run hold.toml --kernel-variant x87");
+}
+
+TEST_F(BadInput, IsReportedAsJsonByEveryCommand) {
+  for (const std::string command :
+       {"run nothing.toml", "check nothing.toml", "model info nothing.toml", "log info nothing.mcap",
+        "log diff nothing.mcap nothing.mcap", "report nothing.mcap", "eds nothing.toml",
+        "new nothing.urdf", "emulate nothing.toml", "serve nothing.toml", "doctor nothing.toml"}) {
+    const Outcome outcome = tandem(command + " --json -");
+    EXPECT_EQ(outcome.status, 2) << command;
+    const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
+    ASSERT_TRUE(json.is_object()) << command << "\n" << outcome.out;
+    EXPECT_EQ(json["ok"], false) << command;
+    ASSERT_EQ(json["errors"].size(), 1U) << command << "\n" << outcome.out;
+    const std::string file = json["errors"][0]["file"];
+    EXPECT_TRUE(file.starts_with("nothing.")) << command << "\n" << outcome.out;
+  }
+  const Outcome asked = tandem("fault show --socket nothing.sock --json -");
+  EXPECT_EQ(nlohmann::json::parse(asked.out)["ok"], false) << asked.out;
+  const Outcome usage = tandem("run hold.toml --rate x --json -");
+  EXPECT_EQ(usage.status, 2);
+  EXPECT_EQ(nlohmann::json::parse(usage.out)["errors"].size(), 1U) << usage.out;
 }
 
 TEST_F(BadInput, AJsonFileThatCannotBeWrittenIsRefused) {
