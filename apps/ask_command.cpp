@@ -3,19 +3,17 @@
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
 #include "apps/control_client.hpp"
+#include "apps/json_reader.hpp"
 
 namespace tandem::apps {
 
 Exit ask_command(const AskOptions& options) {
-  const Json question = Json::parse(options.question, nullptr, false);
-  if (!question.is_object()) {
-    print_errors({{.message = "the question is no JSON object",
-                   .hint = R"(for instance: tandem ask '{"do": "help"}')",
-                   .file = {},
-                   .key = {}}});
+  const Result<Json> question = read_json_object(options.question);
+  if (!question) {
+    print_errors({question.error()});
     return Exit::kUsage;
   }
-  const Result<Json> answer = ask(options.target, "", question);
+  const Result<Json> answer = ask(options.target, "", *question);
   if (!answer) {
     print_errors({answer.error()});
     return Exit::kUsage;

@@ -16,6 +16,7 @@
 
 #include "apps/control_socket.hpp"
 #include "apps/dds_client.hpp"
+#include "apps/json_reader.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -156,12 +157,17 @@ Result<Json> ask(const std::string& path, const Json& question) {
 }
 
 Result<Json> read_answer(std::string_view text, const std::string& who) {
-  Json answer = Json::parse(text, nullptr, false);
-  if (!answer.is_object() || !answer.contains("ok") || !answer["ok"].is_boolean()) {
+  Result<Json> answer = read_json_object(text);
+  const auto text_of = [&](const char* key) {
+    return answer->contains(key) && (*answer)[key].is_string() ? (*answer)[key].get<std::string>()
+                                                               : std::string();
+  };
+  if (!answer || !answer->contains("ok") || !(*answer)["ok"].is_boolean()) {
     return fail(who + " is no tandem", "name another one with --socket");
   }
-  if (answer["ok"].get<bool>()) return answer;
-  return fail(answer.value("error", std::string("refused")), answer.value("hint", std::string()));
+  if ((*answer)["ok"].get<bool>()) return answer;
+  const std::string error = text_of("error");
+  return fail(error.empty() ? "refused" : error, text_of("hint"));
 }
 
 Result<std::unique_ptr<ControlClient>> ControlClient::open(const ControlTarget& target,

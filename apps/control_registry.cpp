@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <exception>
-#include <set>
 #include <utility>
 
+#include "apps/json_reader.hpp"
 #include "base/nearest.hpp"
 
 namespace tandem::apps {
@@ -40,30 +40,11 @@ bool is_of(const Json& value, ControlKey::Type type) {
   return false;
 }
 
-/// A JSON object without a key twice.
 Result<Json> parse(std::string_view text) {
   if (text.size() > kMaxQuestion) {
     return fail(fmt::format("a question of more than {} bytes", kMaxQuestion), "ask shorter ones");
   }
-  std::vector<std::set<std::string>> open;
-  std::string twice;
-  const Json::parser_callback_t watch = [&](int, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) open.emplace_back();
-    if (event == Json::parse_event_t::object_end) open.pop_back();
-    if (event == Json::parse_event_t::key && !open.back().insert(value).second) twice = value;
-    return true;
-  };
-  try {
-    Json value = Json::parse(text, watch);
-    if (!twice.empty()) {
-      return fail(fmt::format("the key \"{}\" is there twice", twice), "give it once");
-    }
-    if (value.is_object()) return value;
-  } catch (const Json::parse_error& error) {
-    return fail(fmt::format("no JSON, at byte {}", error.byte),
-                R"(send one object per line: {"do": "help"})");
-  }
-  return fail("no JSON object", R"(send one object per line: {"do": "help"})");
+  return read_json_object(text);
 }
 
 Status check_keys(const Json& request, const std::string& command,

@@ -146,7 +146,12 @@ bool TomlTable::check_number(std::string_view key, const toml::node& node, Range
     error(key, "must be a number, not " + kind(node));
     return false;
   }
-  const double value = *node.value<double>();
+  const std::optional<double> exact = node.value<double>();
+  if (!exact) {
+    error(key, "no double is exactly this integer", "write it with a decimal point");
+    return false;
+  }
+  const double value = *exact;
   if (!std::isfinite(value)) {
     error(key, "must be finite");
     return false;

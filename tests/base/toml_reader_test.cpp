@@ -49,6 +49,19 @@ TEST(TomlReader, RefusesNumbersThatAreNotFiniteOrOutOfRange) {
   EXPECT_EQ(document.diagnostics()[5].message, "this key is missing");
 }
 
+TEST(TomlReader, RefusesIntegersThatNoDoubleHolds) {
+  const TomlDocument document = parse("kp = 9007199254740993\nlist = [1, 9007199254740993]\n"
+                                      "exact = 9007199254740992\n");
+  TomlTable root = document.root();
+  (void)root.number("kp");
+  (void)root.numbers("list", 2);
+  EXPECT_EQ(root.number("exact"), 9007199254740992.0);
+  ASSERT_EQ(document.diagnostics().size(), 2U);
+  for (const Error& error : document.diagnostics()) {
+    EXPECT_EQ(error.message, "no double is exactly this integer");
+  }
+}
+
 TEST(TomlReader, TakesWhatATableLacksFromItsDefaults) {
   const TomlDocument document = parse("[defaults]\na = 1\nb = -2\n[t]\na = 3\n[u]\nb = 4\nc = 5\n");
   TomlTable root = document.root();
