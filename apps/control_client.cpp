@@ -44,6 +44,17 @@ int connect_to(const Descriptor& descriptor, const sockaddr_un& address) {
   return ::connect(descriptor.get(), raw, sizeof address) == 0 ? 0 : errno;
 }
 
+/// Whoever listens must be this user, or root. Root may ask anybody's process when it names it.
+Status check_listener(int descriptor, const std::string& path) {
+  const std::int64_t user = peer_user(descriptor);
+  if (user == ::geteuid() || user == 0) return {};
+  const bool named = std::filesystem::path(path).parent_path() != control_folder();
+  if (::geteuid() == 0 && named && user >= 0) return {};
+  return fail(fmt::format("what listens at {} belongs to user {}, not to you: nothing was asked",
+                          path, user),
+              "name your own run's socket with --socket, or stop the robot by its own means");
+}
+
 /// Whether the process that "<kind>-<pid>.sock" names is gone.
 bool owner_is_dead(const std::string& name) {
   int pid = 0;
@@ -130,6 +141,12 @@ std::vector<std::string> running_control_sockets(const std::string& kind) {
 
 Result<std::string> find_control_socket(const std::string& path, const std::string& kind) {
   if (!path.empty()) return path;
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(control_folder(), error))) {
+    if (const Status ours = check_private_folder(control_folder()); !ours) {
+      return std::unexpected(ours.error());
+    }
+  }
   const std::vector<std::string> running = running_control_sockets(kind);
   if (running.size() == 1) return running.front();
   const std::string what = kind.empty() ? "tandem" : "tandem " + kind;
@@ -149,6 +166,9 @@ Result<Json> ask(const std::string& path, const Json& question) {
   if (const int error = connect_to(descriptor, *address); error != 0) {
     return fail(fmt::format("nobody listens at {}: {}", path, std::strerror(error)),
                 "is the process running?");
+  }
+  if (const Status ours = check_listener(descriptor.get(), path); !ours) {
+    return std::unexpected(ours.error());
   }
   const auto deadline = SteadyClock::now() + std::chrono::milliseconds(kControlAnswer_ms);
   const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", deadline);

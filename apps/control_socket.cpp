@@ -40,11 +40,7 @@ Status prepare_folder(const std::string& folder) {
     return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
                 "choose another place with --socket");
   }
-  struct stat found {};
-  const bool there = ::lstat(folder.c_str(), &found) == 0 && S_ISDIR(found.st_mode);
-  if (there && found.st_uid == ::geteuid() && (found.st_mode & 0077) == 0) return {};
-  return fail(folder + " is no folder of this user alone",
-              "remove it, or choose another place with --socket");
+  return check_private_folder(folder);
 }
 
 /// Removes the socket of a dead process; what is anything else stays.
@@ -86,6 +82,27 @@ std::string control_folder() {
     return (std::filesystem::path(runtime) / "tandem").string();
   }
   return fmt::format("/tmp/tandem-{}", ::geteuid());
+}
+
+Status check_private_folder(const std::string& folder) {
+  struct stat found {};
+  if (::lstat(folder.c_str(), &found) != 0) {
+    return fail(fmt::format("cannot look at {}: {}", folder, reason()),
+                "choose another place with --socket");
+  }
+  if (S_ISDIR(found.st_mode) && found.st_uid == ::geteuid() && (found.st_mode & 0077) == 0) {
+    return {};
+  }
+  return fail(fmt::format("{} is no folder of this user alone (its owner is user {}, its mode {:o})",
+                          folder, found.st_uid, found.st_mode & 07777),
+              "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
+}
+
+std::int64_t peer_user(int descriptor) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  const bool known = ::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return known ? static_cast<std::int64_t>(peer.uid) : -1;
 }
 
 std::string default_control_path(const std::string& kind) {
@@ -188,6 +205,11 @@ void ControlSocket::serve() {
 void ControlSocket::accept() {
   const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) return;
+  // The socket's mode keeps others out already: this holds where a folder's or a copy's does not.
+  if (const std::int64_t user = peer_user(fd); user != ::geteuid() && user != 0) {
+    ::close(fd);
+    return;
+  }
   if (clients_.size() == kMaxControlClients) {
     clients_.erase(std::ranges::min_element(clients_, {},
                                             [](const auto& client) { return client->last_turn; }));

@@ -32,6 +32,11 @@ inline constexpr std::size_t kMaxControlWaiting = 64;
 /// The folder of every socket of this user: $XDG_RUNTIME_DIR/tandem, or /tmp/tandem-<uid> where
 /// there is no such folder.
 [[nodiscard]] std::string control_folder();
+/// Whether `folder` is a folder that this user alone may change: in any other one somebody else may
+/// have put a socket of theirs. Errors: it is not, with its owner; it is not there.
+[[nodiscard]] Status check_private_folder(const std::string& folder);
+/// The user at the other end of a connection of AF_UNIX.  @return -1: unknown
+[[nodiscard]] std::int64_t peer_user(int descriptor);
 /// "<control_folder()>/<kind>-<pid>.sock" of this process.
 /// @param kind  the command that runs: "run", "emulate"
 [[nodiscard]] std::string default_control_path(const std::string& kind);

@@ -237,7 +237,8 @@ Exit emulate_command(const EmulateOptions& options) {
     });
     return done ? Status() : Status(std::unexpected(done.error()));
   });
-  const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "emulate");
+  const auto socket = serve(
+      commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, errands, out, options.quiet);
   if (!options.quiet) print_summary(e, out);
   if (const Status written = write_json(options.json, summary_json(e, options.lockstep));

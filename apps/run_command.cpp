@@ -194,7 +194,15 @@ Exit run(Composition& c, const RunOptions& options) {
       return injected(c.sim->post(fault) ? Code::kOk : Code::kQueueFull);
     });
   }
-  const auto socket = options.no_socket ? nullptr : serve(commands, options.socket, "run");
+  const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
+  const auto socket = serve(commands, {.path = options.socket,
+                                       .kind = "run",
+                                       .wanted = !options.no_socket,
+                                       .needed = on_robot});
+  if (!socket) {
+    print_errors({socket.error()});
+    return Exit::kUsage;
+  }
   const auto services = open_services(dds->get(), commands, e.remote, server->get());
   if (!services) {
     print_errors({services.error()});

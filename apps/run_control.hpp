@@ -16,10 +16,17 @@ namespace tandem::apps {
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot);
 
-/// Serves `registry` at `path`, the default one of `kind` when it is empty. A socket that cannot be
-/// opened is told on standard error and left out: it never stops a run.
-[[nodiscard]] std::unique_ptr<ControlSocket> serve(const ControlRegistry& registry,
-                                                   const std::string& path,
-                                                   const std::string& kind);
+/// How a process takes questions over a socket.
+struct ControlSocketOptions {
+  std::string path;     ///< empty: the default one of `kind`
+  std::string kind;     ///< "run", "emulate"
+  bool wanted = true;   ///< false: none is opened
+  bool needed = false;  ///< a robot moves: without a way to stop it nothing starts
+};
+
+/// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
+/// which is told on standard error. Errors: a socket that is needed and cannot be opened.
+[[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
+                                                           const ControlSocketOptions& options);
 
 }  // namespace tandem::apps

@@ -2,18 +2,22 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "apps/control_client.hpp"
 #include "apps/control_socket.hpp"
 #include "apps/remote_gate.hpp"
+#include "apps/run_control.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -351,6 +355,17 @@ TEST_F(Socket, RefusesPathsThatCannotBe) {
   EXPECT_NE(refusal("").find("path is empty"), std::string::npos);
 }
 
+TEST_F(Socket, IsAConditionWhereARobotMoves) {
+  const std::string nowhere = folder + "/none/s.sock";
+  const auto simulated = serve(registry, {.path = nowhere, .kind = "run"});
+  ASSERT_TRUE(simulated.has_value());
+  EXPECT_EQ(*simulated, nullptr);
+  const auto robot = serve(registry, {.path = nowhere, .kind = "run", .needed = true});
+  ASSERT_FALSE(robot.has_value());
+  EXPECT_EQ(robot.error().message.find("`tandem estop` would not reach this robot: cannot listen"),
+            0U);
+}
+
 TEST_F(Socket, IsFoundWhenItIsTheOnlyOne) {
   EXPECT_NE(find_control_socket("", "run").error().message.find("no running `tandem run`"),
             std::string::npos);
@@ -373,6 +388,78 @@ TEST_F(Socket, OfADeadProcessIsRemovedByWhoLooks) {
   ::close(dead);
   EXPECT_TRUE(running_control_sockets("run").empty());
   EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+/// Runs `work` as user `uid` in a process of its own.  @return what `work` returned, -1 on failure
+int as_user(uid_t uid, const std::function<int()>& work) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(::setresgid(uid, uid, uid) == 0 && ::setresuid(uid, uid, uid) == 0
+                              ? work() : 111);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// A stranger who listens where a run of this user would, and says "ok" to everything.
+struct Impostor : Socket {
+  static constexpr uid_t kStranger = 65534, kVictim = 65533;
+  void SetUp() override {
+    if (::geteuid() != 0) GTEST_SKIP() << "only root can act as two users";
+    ASSERT_EQ(::chmod(folder.c_str(), 0777), 0);
+  }
+  void TearDown() override {
+    if (child > 0) {
+      ::kill(child, SIGKILL);
+      ::waitpid(child, nullptr, 0);
+    }
+  }
+  void listen_as_stranger(const std::string& where) {
+    child = ::fork();
+    if (child == 0) {
+      (void)!::setresuid(kStranger, kStranger, kStranger);
+      std::filesystem::create_directories(std::filesystem::path(where).parent_path());
+      ::chmod(std::filesystem::path(where).parent_path().c_str(), 0755);
+      const int fd = ::socket(AF_UNIX, SOCK_STREAM, 0);
+      const auto address = control_address(where);
+      (void)!::bind(fd, reinterpret_cast<const sockaddr*>(&*address), sizeof *address);
+      ::chmod(where.c_str(), 0777);
+      ::listen(fd, 4);
+      for (;;) {
+        const int client = ::accept(fd, nullptr, nullptr);
+        static const char kAnswer[] = "{\"ok\": true}\n";
+        (void)!::send(client, kAnswer, sizeof kAnswer - 1, MSG_NOSIGNAL);
+        ::close(client);
+      }
+    }
+    while (!control_socket_alive(where)) std::this_thread::yield();
+  }
+  pid_t child = 0;
+};
+
+// `tandem estop` had told this one, printed success and returned 0.
+TEST_F(Impostor, IsNotToldOfAnEmergencyStop) {
+  const std::string where = control_folder() + "/run-1.sock";
+  listen_as_stranger(where);
+  const auto found = find_control_socket("", "run");
+  ASSERT_FALSE(found.has_value());
+  EXPECT_NE(found.error().message.find("its owner is user 65534"), std::string::npos)
+      << found.error().message;
+  EXPECT_EQ(as_user(kVictim, [&] { return ask(where, {{"do", "estop"}}).has_value() ? 1 : 0; }), 0);
+  EXPECT_EQ(as_user(kStranger, [&] { return ask(where, {{"do", "x"}}).has_value() ? 0 : 1; }), 0);
+}
+
+TEST_F(Impostor, CannotTakeTheFolderOfARunToCome) {
+  listen_as_stranger(control_folder() + "/run-1.sock");
+  EXPECT_NE(refusal(default_control_path("run")).find("no folder of this user alone"),
+            std::string::npos);
+}
+
+TEST_F(Impostor, FindsTheSocketOfARunShut) {
+  const auto mine = open(path);
+  ASSERT_EQ(::chmod(path.c_str(), 0777), 0);  // as if its mode did not hold
+  const auto estop = [&] { return ask(path, {{"do", "help"}}).has_value() ? 1 : 0; };
+  EXPECT_EQ(as_user(kStranger, estop), 0);
+  EXPECT_TRUE(ask(path, {{"do", "help"}}).has_value());
 }
 
 }  // namespace
