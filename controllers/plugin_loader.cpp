@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/nearest.hpp"
+#include "base/trusted_code.hpp"
 
 namespace tandem {
 namespace {
@@ -122,6 +123,9 @@ Result<LoadedController> load_controller(const std::string& name,
   const Result<std::string> file = find(name, folders);
   if (!file) return std::unexpected(file.error());
 
+  if (const Status mine = check_trusted_code(*file); !mine) {
+    return refuse(name, *file, mine.error().message, mine.error().hint);
+  }
   LoadedController loaded;
   loaded.path_ = *file;
   loaded.library_.reset(dlopen(file->c_str(), RTLD_NOW | RTLD_LOCAL));

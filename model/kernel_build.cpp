@@ -11,6 +11,7 @@
 #include <mutex>
 #include <thread>
 
+#include "base/trusted_code.hpp"
 #include "model/file_lock.hpp"
 #include "model/hash.hpp"
 #include "model/kernel_check.hpp"
@@ -193,8 +194,10 @@ Status link(const std::vector<Job>& jobs, const std::vector<std::string>& compil
   std::vector<std::string> command = compiler;
   for (const char* word : {"-shared", "-o", kFreshLibrary}) command.emplace_back(word);
   for (const Job& job : jobs) command.push_back(job.object);
-  if (run_program(command, directory, directory / "link.log")) return {};
-  return std::unexpected(compile_error(directory, "link"));
+  if (!run_program(command, directory, directory / "link.log")) {
+    return std::unexpected(compile_error(directory, "link"));
+  }
+  return seal_library((directory / kFreshLibrary).string());
 }
 
 // Renamed, not written: a program that runs keeps the old one.
@@ -243,7 +246,7 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   std::string all;
   for (const Job& job : jobs) all += job.stamp;
   const std::string stamp = sha256_hex(all);
-  if (fs::exists(library) && read_file(directory / "library.stamp") == stamp) {
+  if (read_file(directory / "library.stamp") == stamp && check_seal(library.string())) {
     report.was_up_to_date = true;
     return report;
   }

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 
+#include "base/trusted_code.hpp"
+
 namespace tandem::model {
 namespace {
 
@@ -22,9 +24,13 @@ std::unexpected<Error> refuse(const std::string& path, std::string message, std:
 Result<KernelLibrary> load_kernels(const std::string& path, const std::string& hash,
                                    const std::string& variant) {
   if (!std::filesystem::exists(path)) return refuse(path, "no such kernel library", kBuildHint);
+  const std::string absolute = std::filesystem::absolute(path).string();
+  if (const Status mine = check_trusted_code(absolute); !mine) return std::unexpected(mine.error());
+  if (const Status whole = check_seal(absolute); !whole) {
+    return refuse(path, whole.error().message, kBuildHint);
+  }
   KernelLibrary library;
   library.path_ = path;
-  const std::string absolute = std::filesystem::absolute(path).string();
   void* handle = dlopen(absolute.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) return refuse(path, std::string("cannot load: ") + dlerror(), kBuildHint);
   library.handle_ = std::shared_ptr<void>(handle, [](void* h) { dlclose(h); });

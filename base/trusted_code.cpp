@@ -1,0 +1,118 @@
+#include "base/trusted_code.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <sstream>
+
+#include "base/sha256.hpp"
+
+namespace tandem {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kDigits = 64;
+const std::string kSeal = "\ntandem-sha256:";
+
+fs::path program() {
+  std::error_code ignored;
+  return fs::read_symlink("/proc/self/exe", ignored);
+}
+
+/// Whose code runs here already: this user's, root's, the program's owner's.
+bool trusted(uid_t user) {
+  struct stat own {};
+  const bool known = ::stat("/proc/self/exe", &own) == 0;
+  return user == ::geteuid() || user == 0 || (known && user == own.st_uid);
+}
+
+/// Empty, or what is wrong with the owner or mode of a file or folder.
+std::string problem_of(const struct stat& found) {
+  if (!trusted(found.st_uid)) return "belongs to user " + std::to_string(found.st_uid);
+  const bool sticky_folder = S_ISDIR(found.st_mode) && (found.st_mode & S_ISVTX) != 0;
+  if ((found.st_mode & S_IWOTH) != 0 && !sticky_folder) return "may be changed by everybody";
+  const bool own_group = found.st_gid == ::getegid() || found.st_gid == 0;
+  if ((found.st_mode & S_IWGRP) != 0 && !sticky_folder && !own_group) {
+    return "may be changed by group " + std::to_string(found.st_gid);
+  }
+  return {};
+}
+
+std::unexpected<Error> refuse(const std::string& path, std::string message, std::string hint) {
+  return std::unexpected(
+      Error{.message = std::move(message), .hint = std::move(hint), .file = path, .key = {}});
+}
+
+bool is_above_program(const fs::path& folder) {
+  const std::string prefix = folder == "/" ? "/" : folder.string() + "/";
+  return program().string().starts_with(prefix);
+}
+
+std::string digest(const std::string& bytes) { return sha256(std::as_bytes(std::span(bytes))); }
+
+Result<std::string> read(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << in.rdbuf();
+  if (!in || !bytes) return refuse(path, "cannot be read", "check the path and its permissions");
+  return std::move(bytes).str();
+}
+
+/// Where the seal begins; npos: not sealed.
+std::size_t seal_at(const std::string& bytes) {
+  const std::size_t length = kSeal.size() + kDigits;
+  if (bytes.size() < length) return std::string::npos;
+  const std::size_t at = bytes.size() - length;
+  return bytes.compare(at, kSeal.size(), kSeal) == 0 ? at : std::string::npos;
+}
+
+}  // namespace
+
+Status check_trusted_code(const std::string& path) {
+  std::error_code error;
+  const fs::path file = fs::canonical(path, error);
+  struct stat found {};
+  if (error || ::stat(file.c_str(), &found) != 0 || !S_ISREG(found.st_mode)) {
+    return refuse(path, "there is no such file", "correct the path");
+  }
+  const std::string hint = "code that others may change is not loaded: give it to this user or root, "
+                           "and take the right to write from others (chmod go-w)";
+  if (const std::string problem = problem_of(found); !problem.empty()) {
+    return refuse(path, problem, hint);
+  }
+  for (fs::path folder = file.parent_path();; folder = folder.parent_path()) {
+    if (is_above_program(folder)) return {};
+    if (::stat(folder.c_str(), &found) != 0) {
+      return refuse(path, "cannot look at its folder " + folder.string(), "check its permissions");
+    }
+    if (const std::string problem = problem_of(found); !problem.empty()) {
+      return refuse(path, "its folder " + folder.string() + " " + problem, hint);
+    }
+  }
+}
+
+Status seal_library(const std::string& path) {
+  const Result<std::string> bytes = read(path);
+  if (!bytes) return std::unexpected(bytes.error());
+  std::ofstream out(path, std::ios::binary | std::ios::app);
+  out << kSeal << digest(*bytes) << std::flush;
+  if (!out) return refuse(path, "cannot be written", "check permissions and free space");
+  return {};
+}
+
+Status check_seal(const std::string& path) {
+  Result<std::string> bytes = read(path);
+  if (!bytes) return std::unexpected(bytes.error());
+  const std::size_t at = seal_at(*bytes);
+  if (at == std::string::npos) return refuse(path, "is cut short, or was not made by tandem", {});
+  const std::string said = bytes->substr(at + kSeal.size());
+  bytes->resize(at);
+  if (digest(*bytes) == said) return {};
+  return refuse(path, "has been damaged since it was made", {});
+}
+
+}  // namespace tandem

@@ -1,0 +1,28 @@
+// Whether a library may be loaded: only code that nobody else could have put there.
+// Layer: base.  Thread: any, not RT.
+#pragma once
+
+#include <string>
+
+#include "base/result.hpp"
+
+namespace tandem {
+
+/// Code that a process loads runs with all its rights, so nobody else may have had a hand in it:
+/// the file and every folder above it belong to this user, to root or to whoever owns the program
+/// itself, and others may not write to them. A group may, when it is root's or this user's own; a
+/// folder like /tmp, in which everybody may only change what is his, may lie above. Folders above
+/// the program itself are not judged: who can change those can change the program.
+///
+/// @param path  of a file, followed through links
+/// Errors: no such file, or no regular one; who may write where, with the path.
+[[nodiscard]] Status check_trusted_code(const std::string& path);
+
+/// Adds the SHA-256 of a library's bytes behind its end, where no loader looks.
+/// Errors: the file cannot be read or written.
+[[nodiscard]] Status seal_library(const std::string& path);
+/// Whether a library is as it was when it was sealed. A damaged one would end the process while it
+/// is being loaded. Errors: it cannot be read, is not sealed, or has changed since.
+[[nodiscard]] Status check_seal(const std::string& path);
+
+}  // namespace tandem
