@@ -11,7 +11,7 @@ constexpr double kLikeDamping_Nms_rad = 12.0;  // what COMAN's experiments add o
 
 std::string head(const NewRobot& robot, const std::string& what, double duration_s) {
   return fmt::format("# {}\nrobot = \"robot.toml\"\nposture = {}\nduration_s = {:.1f}\nseed = 1\n",
-                     what, quoted(robot.config.postures[0].name), duration_s);
+                     what, toml_string(robot.config.postures[0].name), duration_s);
 }
 
 /// A sentence, true for this robot.
@@ -32,8 +32,8 @@ std::string what_moves(const NewRobot& robot) {
 
 std::string report(const NewRobot& robot) {
   std::string text = "\n[report]\n";
-  text += fmt::format("hip = {}\n", quoted(robot.report.front()));
-  if (robot.report.size() > 1) text += fmt::format("knee = {}\n", quoted(robot.report[1]));
+  text += fmt::format("hip = {}\n", toml_string(robot.report.front()));
+  if (robot.report.size() > 1) text += fmt::format("knee = {}\n", toml_string(robot.report[1]));
   return text;
 }
 
@@ -57,7 +57,7 @@ std::string move_text(const NewRobot& robot) {
   std::string text = head(robot, what_moves(robot), robot.move.points.back().time_s + 1.0);
   text += "\n[[controller]]\nplugin = \"joint_trajectory\"\n";
   std::vector<std::string> names;
-  for (const hal::JointConfig& joint : robot.config.joints) names.push_back(quoted(joint.name));
+  for (const hal::JointConfig& joint : robot.config.joints) names.push_back(toml_string(joint.name));
   text += fmt::format("[controller.parameters]\njoints = [{}]\n", fmt::join(names, ", "));
   for (const WayPoint& point : robot.move.points) {
     text += fmt::format(

@@ -13,7 +13,7 @@ namespace tandem::scaffold {
 
 /// A basic string: quotes, backslashes and control characters escaped.
 /// @pre  `text` is UTF-8
-[[nodiscard]] inline std::string quoted(std::string_view text) {
+[[nodiscard]] inline std::string toml_string(std::string_view text) {
   std::string result = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') result += '\\';
@@ -31,7 +31,7 @@ namespace tandem::scaffold {
   const bool bare = !name.empty() && std::ranges::all_of(name, [](unsigned char c) {
     return c < 128 && (std::isalnum(c) != 0 || c == '_' || c == '-');
   });
-  return bare ? std::string(name) : quoted(name);
+  return bare ? std::string(name) : toml_string(name);
 }
 
 /// What stands in a comment: on one line.
