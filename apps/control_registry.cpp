@@ -122,7 +122,7 @@ Result<Json> ControlRegistry::run(std::string_view question, const Gate& gate) c
     return std::unexpected(keys.error());
   }
   if (gate) {
-    if (Status open = gate((*command)->name, (*command)->effect); !open) {
+    if (Status open = gate((*command)->name, (*command)->effect, *request); !open) {
       return std::unexpected(open.error());
     }
   }

@@ -54,7 +54,8 @@ class ControlRegistry {
   /// @return an object: its keys follow "ok" in the answer.
   using Handler = std::function<Result<Json>(const Json& request)>;
   /// Says whether a command may be asked for; the error is the answer otherwise.
-  using Gate = std::function<Status(const std::string& command, ControlEffect effect)>;
+  using Gate = std::function<Status(const std::string& command, ControlEffect effect,
+                                    const Json& request)>;
 
   /// The command "help" is there from the start: it lists the others.
   ControlRegistry();

@@ -137,12 +137,11 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
                                                    const runtime::RemoteOptions& remote,
                                                    const remote::Server* server) {
   if (run == nullptr) return nullptr;
-  const auto command = remote.command.value_or(runtime::RemoteCommand::kOff);
   const auto owner = [server] {
     const bool owned = server != nullptr && server->lease().owner() != 0;
     return owned ? server->lease().name() : std::string();
   };
-  return DdsServices::open(run->participant(), commands, remote_gate(command, owner));
+  return DdsServices::open(run->participant(), commands, remote_gate(remote, owner));
 }
 
 Exit run(Composition& c, const RunOptions& options) {

@@ -112,6 +112,7 @@ RemoteOptions read_remote(TomlTable table) {
     remote.command =
         read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
   }
+  remote.load = table.boolean_or("load", remote.load);
   remote.lockstep = table.boolean_or("lockstep", remote.lockstep);
   remote.lease_timeout_s = table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
   remote.lockstep_timeout_s =

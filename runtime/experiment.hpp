@@ -55,6 +55,7 @@ enum class RemoteCommand : std::uint8_t {
 };
 struct RemoteOptions {
   std::optional<RemoteCommand> command;  ///< empty: off in `run`, local in `serve`
+  bool load = false;                     ///< controllers may be loaded over DDS, by name
   // Of an owner (docs/remote.md).
   bool lockstep = false;               ///< each cycle waits for its command
   double lease_timeout_s = 1.0;        ///< one that is silent for so long has lost the robot

@@ -26,10 +26,11 @@ class RunOverDds : public Running {
     participant_ = std::move(*joined);
   }
   /// A run in this program's domain. @param remote  [remote] command; empty: none
-  void begin_with(const std::string& remote) {
+  /// @param more  lines of [remote]
+  void begin_with(const std::string& remote, const std::string& more = "") {
     if (!remote.empty()) {
       write_text(folder_ / "hold.toml",
-                 read_text(folder_ / "hold.toml") + "[remote]\ncommand = \"" + remote + "\"\n");
+                 read_text(folder_ / "hold.toml") + "[remote]\ncommand = \"" + remote + "\"\n" + more);
     }
     begin("--on-fault wait --dds --domain " + std::to_string(dds::test::own_domain()));
   }
@@ -120,8 +121,20 @@ TEST_F(RunOverDds, ChangeNothingUnlessTheExperimentAllowsIt) {
   EXPECT_EQ(end(), 1) << "it is latched";
 }
 
-TEST_F(RunOverDds, LoadSwitchListAndUnloadControllers) {
+TEST_F(RunOverDds, LoadsNoCodeUnlessAskedFor) {
   begin_with("local");
+  std::string plugin = "/tmp/x.so", name = "x", parameters;
+  LoadController_Request load{0, 0, plugin.data(), name.data(), parameters.data()};
+  call<LoadController_Response>("load_controller", load, [](const LoadController_Response& reply) {
+    EXPECT_FALSE(reply.success);
+    EXPECT_NE(std::string(reply.message).find("loads no code over DDS"), std::string::npos)
+        << reply.message;
+  });
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(RunOverDds, LoadSwitchListAndUnloadControllers) {
+  begin_with("local", "load = true\n");
   std::string plugin = "hold", name = "rest", parameters = "joints = ['joint2']";
   LoadController_Request load{0, 0, plugin.data(), name.data(), parameters.data()};
   const auto loaded = [](const LoadController_Response& reply) {
