@@ -72,7 +72,8 @@ TEST_F(Answers, KnowWhatACommandDoesBeforeItIsAsked) {
 }
 
 TEST_F(Answers, RefuseWhatTheGateOfWhoAsksDoesNotLetThrough) {
-  const ControlRegistry::Gate gate = [](const std::string& name, ControlEffect effect) -> Status {
+  const ControlRegistry::Gate gate = [](const std::string& name, ControlEffect effect,
+                                        const Json&) -> Status {
     if (effect == ControlEffect::kReads) return {};
     return fail(name + " is not for everybody", "ask somebody else");
   };

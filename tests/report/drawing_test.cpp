@@ -112,10 +112,13 @@ TEST(Script, LeavesRoomForTheWidestNumberBesideTheLabel) {
     ASSERT_TRUE(exponent || at != std::string::npos);
     const int decimals = exponent ? 0 : std::stoi(script.substr(at + 16));
     char widest[64];
-    std::snprintf(widest, sizeof widest, exponent ? "%.3g" : "%.*f", decimals, factor * 1049.0);
-    if (exponent) std::snprintf(widest, sizeof widest, "-1.02e+12");
+    if (exponent) {
+      std::snprintf(widest, sizeof widest, "-1.02e+12");
+    } else {
+      std::snprintf(widest, sizeof widest, "%.*f", decimals, factor * 1049.0);
+    }
     EXPECT_GT(label, 0.5 * 13.0);
-    EXPECT_GT(axis - label, 13.0 + 7.0 * std::strlen(widest)) << widest;
+    EXPECT_GT(axis - label, 13.0 + 7.0 * static_cast<double>(std::strlen(widest))) << widest;
   }
 }
 
@@ -147,7 +150,7 @@ TEST(Script, WhatFollowsAFaultDoesNotWidenTheRange) {
 
 TEST_F(Drawing, RunsNothingOfWhatALogNames) {
   const std::string touched = (folder_ / "touched").string();
-  for (const std::string name :
+  for (const std::string& name :
        {"`touch " + touched + "`", "'; system('touch " + touched + "'); #",
         "\"; system(\"touch " + touched + "\"); #", "\\'`touch " + touched + "`",
         "EOD\nsystem('touch " + touched + "')\n", "@touch $(touch " + touched + ")",
