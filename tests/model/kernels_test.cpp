@@ -1,5 +1,6 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -191,11 +192,16 @@ TEST(Generator, HashFollowsWhatMattersAndNothingElse) {
   EXPECT_NE(description_hash(tree, spec), hash);
 }
 
+/// A file of this process' own: tests run side by side.
+std::filesystem::path own_file(const std::string& name) {
+  return std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "-" + name);
+}
+
 TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
   auto library = load_kernels("/nonexistent/kernels.so");
   ASSERT_FALSE(library);
   EXPECT_NE(library.error().to_string().find("tandem model build"), std::string::npos);
-  const auto text = std::filesystem::path(testing::TempDir()) / "text.so";
+  const auto text = own_file("text.so");
   std::ofstream(text) << "no library";
   library = load_kernels(text.string());
   ASSERT_FALSE(library);
@@ -212,7 +218,7 @@ TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
 TEST(KernelLibrary, OpensNoDamagedOne) {
   std::ifstream in(built_library("double_pendulum"), std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(in), {}};
-  const auto path = std::filesystem::path(testing::TempDir()) / "damaged.so";
+  const auto path = own_file("damaged.so");
   for (std::size_t i = 0; i < 60; ++i) {
     std::string damaged = whole;
     const std::size_t at = i < 30 ? 2 * i : whole.size() * (i - 30) / 30;
@@ -231,7 +237,7 @@ TEST(KernelLibrary, OpensNoDamagedOne) {
 }
 
 TEST(KernelLibrary, OpensNoneThatOthersMayChange) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "shared.so";
+  const auto path = own_file("shared.so");
   std::filesystem::copy_file(built_library("double_pendulum"), path,
                              std::filesystem::copy_options::overwrite_existing);
   std::filesystem::permissions(path, std::filesystem::perms::all);
