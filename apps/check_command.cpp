@@ -79,7 +79,7 @@ void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
 }
 
 void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
-                 const LoopStudy& loops, std::FILE* out) {
+                 const LoopStudy& loops, bool warned, std::FILE* out) {
   Facts facts;
   add_robot_facts(robot.config, facts);
   add_kernel_facts(kernels, robot.config.file, facts);
@@ -88,7 +88,8 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
     const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
     facts.add("inertias", fmt::format("{} repaired", repaired));
   }
-  fmt::print(out, "{} is right.\n", robot.config.file);
+  fmt::print(out, warned ? "{} can be used; look at the warnings.\n" : "{} is right.\n",
+             robot.config.file);
   facts.print(out);
 }
 
@@ -131,7 +132,7 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
   if (!loops.errors.empty()) return loops.errors;
   const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
   if (!kernels) return {kernels.error()};
-  print_robot(*robot, *kernels, loops, out);
+  print_robot(*robot, *kernels, loops, !warnings.empty(), out);
   json["kernels"] = kernels->path();
   return {};
 }

@@ -33,7 +33,7 @@ Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
   const bool saves = after->add + after->mul < before->add + before->mul;
   if (!exact && !saves) return {};
   facts.add("right angles",
-            fmt::format("{} are written with few digits (1.5708), at most {:.1e} rad off; {}",
+            fmt::format("{} are written with few digits, at most {:.1g} rad off; {}",
                         robot.right_angles.count, robot.right_angles.worst_rad,
                         exact ? "taken as exact" : "taken as written"));
   facts.add("", fmt::format("exact ones take {} operations in the dynamics instead of {}; {}",

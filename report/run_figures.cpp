@@ -184,7 +184,7 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   figure.name = "foot_force";
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
-                                               legged(run) ? "feet's " : "");
+                                               legged(run) ? "legs' " : "");
   add_time(run, other, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =

@@ -241,7 +241,7 @@ class Writer {
     }
     if (limit.effort_guessed) {
       text += fmt::format(
-          "max_torque_Nm = {}  # guess: twice gravity and 10 rad/s^2; the description's is {}\n",
+          "max_torque_Nm = {}  # guess: from its load and its neighbours'; the description's is {}\n",
           number(joint.max_torque_Nm), stated(joint.name, true));
     }
     if (limit.velocity_guessed) {

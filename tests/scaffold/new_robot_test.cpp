@@ -158,7 +158,7 @@ TEST(NewRobot, TakesWhereTheDescriptionHasNoLimitWhatTheModelNeeds) {
   const NewRobot icub = made(kPublicRobots[7]);  // 20 joints of 50000 Nm at 50000 rad/s
   EXPECT_EQ(std::ranges::count(icub.limits, true, &JointLimits::effort_guessed), 20);
   const std::string text = robot_text(icub, "icub.urdf", "icub.urdf");
-  EXPECT_NE(text.find("# guess: twice gravity and 10 rad/s^2; the description's is 50000"),
+  EXPECT_NE(text.find("# guess: from its load and its neighbours'; the description's is 50000"),
             std::string::npos);
 }
 
