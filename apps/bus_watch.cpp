@@ -1,7 +1,6 @@
 #include "apps/bus_watch.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 namespace tandem::apps {
 
@@ -18,7 +17,7 @@ void BusWatch::look() {
     if (text == told.text) continue;
     const Clock::time_point now = Clock::now();
     if (now < told.next) continue;
-    const char* clear = ::isatty(::fileno(out_)) != 0 ? "\r\x1b[K" : "";  // a progress bar
+    const char* clear = is_terminal(out_) ? "\r\x1b[K" : "";  // a progress bar
     fmt::print(out_, "{}note: {}\n", clear,
                text.empty() ? fmt::format("CAN interface {} is well again", buses_[b]->interface())
                             : text);

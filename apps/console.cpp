@@ -5,8 +5,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
+
+#include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -35,9 +39,46 @@ Error json_error(const std::string& file) {
           .key = {}};
 }
 
+/// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
+ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
+  const int fd = static_cast<int>(reinterpret_cast<std::intptr_t>(cookie));
+  for (std::size_t done = 0; done < size;) {
+    const ssize_t count = ::write(fd, text + done, size - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      rt::request_stop();
+      break;
+    }
+    done += static_cast<std::size_t>(count);
+  }
+  return static_cast<ssize_t>(size);
+}
+
+/// A stream on a descriptor that never fails; the program's, so it is not closed.
+std::FILE* lasting(int fd, int buffering) {
+  void* cookie = reinterpret_cast<void*>(static_cast<std::intptr_t>(fd));
+  std::FILE* stream = ::fopencookie(cookie, "w", {nullptr, &write_or_lose, nullptr, nullptr});
+  if (stream == nullptr) return fd == STDERR_FILENO ? stderr : stdout;
+  std::setvbuf(stream, nullptr, buffering, BUFSIZ);
+  return stream;
+}
+
 }  // namespace
 
 std::FILE* human_output(const std::string& json_file) { return json_file == "-" ? stderr : stdout; }
+
+bool is_terminal(std::FILE* out) {
+  if (out == stdout) return ::isatty(STDOUT_FILENO) != 0;
+  if (out == stderr) return ::isatty(STDERR_FILENO) != 0;
+  return ::isatty(::fileno(out)) != 0;
+}
+
+void outlive_readers() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::fflush(stdout);
+  stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
+  stderr = lasting(STDERR_FILENO, _IONBF);
+}
 
 Status check_writable(const std::string& file) {
   if (file.empty() || file == "-") return {};
@@ -126,7 +167,7 @@ void Facts::print(std::FILE* out) const {
 }
 
 StatusLine::StatusLine(std::FILE* out)
-    : out_(out), terminal_(isatty(fileno(out)) != 0), next_(std::chrono::steady_clock::now()) {}
+    : out_(out), terminal_(is_terminal(out)), next_(std::chrono::steady_clock::now()) {}
 
 StatusLine::~StatusLine() {
   if (drawn_) fmt::print(out_, "\n");
@@ -148,7 +189,7 @@ void StatusLine::show(const std::string& text) {
 Progress::Progress(std::FILE* out, double total_s)
     : out_(out),
       total_s_(total_s),
-      terminal_(isatty(fileno(out)) != 0),
+      terminal_(is_terminal(out)),
       started_(std::chrono::steady_clock::now()),
       next_(started_) {}
 

@@ -21,6 +21,14 @@ using Json = nlohmann::ordered_json;
 /// Where text for people goes: standard error when the JSON takes standard output ("-").
 [[nodiscard]] std::FILE* human_output(const std::string& json_file);
 
+/// Whether people read along: `out` is a terminal.
+[[nodiscard]] bool is_terminal(std::FILE* out);
+
+/// From now on standard output and error outlive their readers: when a pipe's reader or the terminal
+/// is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()), instead of
+/// the process being ended in the middle of a cycle. Call it before other threads print.
+void outlive_readers();
+
 /// Whether `file` can be written, found out before a run: an error that names it when not.
 [[nodiscard]] Status check_writable(const std::string& file);
 

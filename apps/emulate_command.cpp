@@ -201,6 +201,7 @@ void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
 }  // namespace
 
 Exit emulate_command(const EmulateOptions& options) {
+  outlive_readers();
   std::FILE* out = human_output(options.json);
   if (const Status writable = check_writable(options.json); !writable) {
     print_errors({writable.error()});

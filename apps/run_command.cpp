@@ -284,6 +284,7 @@ Exit run_command(const RunOptions& options) {
   }
   print_inertia_warnings((*composition)->experiment.warnings);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
+  outlive_readers();
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {
     print_errors(errors);
     return Exit::kUsage;

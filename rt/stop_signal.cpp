@@ -24,6 +24,10 @@ void install_stop_signals() {
   sigemptyset(&action.sa_mask);
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  // The terminal has gone; nohup says beforehand that this shall mean nothing.
+  struct sigaction former {};
+  ::sigaction(SIGHUP, nullptr, &former);
+  if (former.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
 }
 
 void install_emergency_signal() {

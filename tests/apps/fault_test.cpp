@@ -45,6 +45,26 @@ TEST_F(Faults, EndASimulatedRunThatWasNotToldToWait) {
   EXPECT_NE(read_text(folder_ / "run.txt").find("emergency stop on request"), std::string::npos);
 }
 
+// A closed terminal, or a pipe whose reader is gone, had killed the run in the middle of a cycle.
+TEST_F(Faults, AClosedTerminalIsAStopInOrder) {
+  begin("--on-fault wait");
+  signal("HUP");
+  EXPECT_EQ(join(), 0);
+  EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"], 2'000'000);
+}
+
+TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
+  for (const std::string pipe : {"| head -n 1", "2>&1 | head -n 1"}) {
+    const std::string command =
+        "cd '" + folder_.string() + "' && { timeout 100 '" TANDEM_BINARY_DIR
+        "/bin/tandem' run hold.toml --no-log --no-socket --duration 900000 --json run.json; "
+        "echo $? >status; } " + pipe + " >out.txt";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    EXPECT_EQ(read_text(folder_ / "status"), "0\n");
+    EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"], 900'000'000) << pipe;
+  }
+}
+
 TEST_F(Faults, OfNoRunAreAnError) {
   const Outcome outcome = to_run("fault show");
   EXPECT_EQ(outcome.status, 2);

@@ -6,7 +6,7 @@ namespace tandem::rt {
 namespace {
 
 TEST(StopSignal, TurnsSigtermAndSigintIntoAFlag) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     clear_stop();
     install_stop_signals();
     EXPECT_FALSE(stop_requested());
@@ -25,6 +25,15 @@ TEST(StopSignal, LetsASecondSignalEndAHungProgram) {
         std::raise(SIGTERM);
       },
       testing::KilledBySignal(SIGTERM), "");
+}
+
+TEST(StopSignal, LeavesAClosedTerminalIgnoredUnderNohup) {
+  std::signal(SIGHUP, SIG_IGN);
+  clear_stop();
+  install_stop_signals();
+  std::raise(SIGHUP);
+  EXPECT_FALSE(stop_requested());
+  std::signal(SIGHUP, SIG_DFL);
 }
 
 }  // namespace
