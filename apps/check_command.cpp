@@ -88,8 +88,8 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
     const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
     facts.add("inertias", fmt::format("{} repaired", repaired));
   }
-  fmt::print(out, warned ? "{} can be used; look at the warnings.\n" : "{} is right.\n",
-             robot.config.file);
+  fmt::print(out, "{} {}.\n", robot.config.file,
+             warned ? "can be used; look at the warnings" : "is right");
   facts.print(out);
 }
 
