@@ -443,6 +443,8 @@ struct Impostor : Socket {
       for (;;) {
         const int client = ::accept(fd, nullptr, nullptr);
         static const char kAnswer[] = "{\"ok\": true}\n";
+        char question[4096];
+        (void)!::recv(client, question, sizeof question, 0);
         (void)!::send(client, kAnswer, sizeof kAnswer - 1, MSG_NOSIGNAL);
         ::close(client);
       }
