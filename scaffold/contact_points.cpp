@@ -12,6 +12,7 @@ using Eigen::Vector3d;
 constexpr double kSameLevel_m = 0.01;  // points so much above the lowest still belong to the sole
 constexpr std::size_t kMostPoints = 8;
 constexpr double kAheadOfAnkle = 0.15;  // of a guessed sole's length
+constexpr double kClearlyLonger = 1.1;  // in y: less is as good as square, and soles lie along x
 
 struct Candidate {
   std::vector<Vector3d> points;
@@ -124,7 +125,7 @@ ContactPatch equivalent_sole(const model::Inertia& in_w, const Vector3d& ankle, 
   }
   const double length = std::clamp(std::max(edge.x(), edge.y()), 0.2 * scale_m, 0.4 * scale_m);
   const double width = std::clamp(std::min(edge.x(), edge.y()), 0.1 * scale_m, 0.2 * scale_m);
-  const bool along_x = edge.x() >= edge.y();
+  const bool along_x = edge.y() < kClearlyLonger * edge.x();
   Vector3d middle = in_w.com_m;
   if (length < edge.head<2>().maxCoeff() || width < edge.head<2>().minCoeff()) {
     middle = ankle + Vector3d(kAheadOfAnkle * length, 0.0, 0.0);  // it fits no foot

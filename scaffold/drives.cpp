@@ -33,6 +33,7 @@ constexpr double kFallMargin = 3.0;      // stiffness over what an inverted pend
 constexpr double kIntegralMargin = 4.0;  // in Routh's criterion
 constexpr double kIntegralRate_1_s = 2.0;
 constexpr double kSameGains = 2.5;
+constexpr double kChatter = 0.02;  // of the effort: what one count of the encoder may ask for
 
 struct Range {
   double least = 0.0, most = 0.0, fall = 0.0;
@@ -48,9 +49,20 @@ Range range_of(const std::vector<int>& joints, const std::vector<JointLoad>& loa
   return range;
 }
 
+/// What the firmware's low-pass of the velocity keeps of its last value, cycle by cycle.
+double estimator_memory(double period_s) {
+  return std::exp(-2.0 * std::numbers::pi * kEstimator_Hz * period_s);
+}
+
 double estimator_lag_s(double period_s) {
-  const double a = std::exp(-2.0 * std::numbers::pi * kEstimator_Hz * period_s);
+  const double a = estimator_memory(period_s);
   return 0.5 * period_s + a * period_s / (1.0 - a);
+}
+
+/// One count of the encoder in the velocity estimate [rad/s, or m/s].
+double velocity_step(double period_s) {
+  const double count = 2.0 * std::numbers::pi / kEncoderCounts;
+  return (1.0 - estimator_memory(period_s)) * count / period_s;
 }
 
 struct PositionGains {
@@ -62,8 +74,10 @@ PositionGains position_gains(const hal::ActuatorConfig& drive, const Range& iner
   const double crossover = kLagMargin / (0.5 * period_s + estimator_lag_s(period_s));
   const double motor_constant = drive.gear_ratio * drive.torque_constant_Nm_A;
   const double emf = motor_constant * motor_constant / drive.resistance_ohm;
+  const double effort = motor_constant * drive.current_limit_A / kCurrentMargin;
   PositionGains g;
-  g.kd = kEmfCompensation * emf + crossover * inertia.least;
+  g.kd = kEmfCompensation * emf +
+         std::min(crossover * inertia.least, kChatter * effort / velocity_step(period_s));
   g.damping = g.kd + drive.damping_Nms_rad - kEmfCompensation * emf;
   const double fastest = g.damping * crossover / kCascade;
   const double damped = g.damping * g.damping / (4.0 * kDamping * kDamping * inertia.most);

@@ -11,6 +11,9 @@
 
 namespace tandem::scaffold {
 
+/// Of every encoder that is made up, per revolution of the link: 20 bits.
+inline constexpr double kEncoderCounts = 1048576.0;
+
 /// A table of robot.toml, what it serves, and the remark that stands over it.
 struct DriveSize {
   hal::ActuatorConfig actuator;

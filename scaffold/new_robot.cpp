@@ -21,7 +21,6 @@ namespace tandem::scaffold {
 namespace {
 
 constexpr double kControlPeriod_s = 1e-3;
-constexpr double kEncoderCounts = 1048576.0;
 constexpr double kMotorCounts = 1638400.0;
 
 std::string text_of(const std::string& file) {

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
+#include <numbers>
 
+#include "scaffold/contact_points.hpp"
 #include "tests/scaffold/robots.hpp"
 
 namespace tandem::scaffold {
@@ -83,6 +86,35 @@ TEST(Drives, AreFewForJointsThatNeedNearlyTheSame) {
   ASSERT_EQ(sizes.size(), 3U);
   EXPECT_EQ(sizes[0].joints, (std::vector<int>{0, 1}));
   EXPECT_EQ(sizes[0].actuator.name, "drive_100Nm");
+}
+
+/// A waist of 30 Nm that carries a trunk: gains for its inertia alone made one count of the encoder
+/// ask for half its effort, and it chattered between both limits.
+TEST(Drives, DoNotChatterUnderALoadThatIsHeavyForThem) {
+  const double period_s = 1e-3;
+  model::Tree tree;
+  tree.joints.resize(1);
+  const std::vector<JointLimits> limits{{.effort = 30.0, .velocity = 4.6, .range = {}}};
+  const JointLoad trunk{.least_inertia = 15.0, .most_inertia = 20.0};
+  const std::vector<DriveSize> sizes = size_drives(tree, limits);
+  const hal::GainsConfig g = tune(sizes, {trunk}, period_s).at(0).gains;
+  const hal::ActuatorConfig& a = sizes[0].actuator;
+  const double emf = std::pow(a.gear_ratio * a.torque_constant_Nm_A, 2.0) / a.resistance_ohm;
+  const double raw_step_rad_s = 2.0 * std::numbers::pi / kEncoderCounts / period_s;
+  EXPECT_LT((g.position.gains.kd - g.emf_compensation * emf) * raw_step_rad_s, 0.05 * 30.0);
+  EXPECT_GT(g.position.gains.kp, 15.0 * kGravity_m_s2) << "it would not carry a trunk of 15 kg";
+}
+
+/// A cube's inertia says nothing of ahead: soles of both feet lie along x, whatever the last digit.
+TEST(Feet, OfACubesInertiaLieAlikeLeftAndRight) {
+  for (const double last_digit : {-1e-12, 1e-12}) {
+    model::Inertia foot{.mass_kg = 2.0};
+    foot.about_com_kg_m2 = Eigen::Vector3d(0.01, 0.01 + last_digit, 0.01).asDiagonal();
+    const ContactPatch sole = equivalent_sole(foot, Eigen::Vector3d(0.0, 0.1, 0.1), 0.8);
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : sole.points) box.extend(p);
+    EXPECT_GT(box.sizes().x(), box.sizes().y());
+  }
 }
 
 TEST(Drives, RoundToSignificantDigits) {
