@@ -221,7 +221,13 @@ void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& 
   const bool legged = !robot.contact.feet.empty();
   for (const Limb& limb : limbs) {
     Curve& curve = limb.leg ? sticks.legs : (limb.trunk || !legged ? sticks.trunk : sticks.others);
-    for (const int body : limb.bodies) {
+    if (limb.leg) {  // as far as the hip it is trunk
+      for (int i = 0; i < 2; ++i) {
+        add_point(sticks.trunk, bodies[static_cast<std::size_t>(limb.bodies[i])].p, shift_m);
+      }
+      end_line(sticks.trunk);
+    }
+    for (const int body : std::span(limb.bodies).subspan(limb.leg ? 1 : 0)) {
       add_point(curve, bodies[static_cast<std::size_t>(body)].p, shift_m);
     }
     const auto tip = static_cast<std::size_t>(limb.bodies.back());
@@ -241,9 +247,11 @@ void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& 
   add_feet(sticks.legs, feet_of(tree, robot, bodies), bodies, shift_m);
 }
 
-/// Whether the bodies' centres of mass move more to the sides than ahead, from moment to moment.
-bool moves_sideways(const model::Tree& tree, const hal::RobotConfig& robot,
-                    std::span<const PostureSample> samples) {
+/// Whether there is more to see from the front than from the side: by how far the bodies' centres
+/// of mass move, or, when nothing moves, by how far it reaches.
+bool shows_more_from_front(const model::Tree& tree, const hal::RobotConfig& robot,
+                           std::span<const PostureSample> samples) {
+  constexpr double kStill_m = 0.01;
   const auto first = body_placements(tree, robot, samples.front());
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const PostureSample& sample : samples) {
@@ -253,6 +261,11 @@ bool moves_sideways(const model::Tree& tree, const hal::RobotConfig& robot,
       const Eigen::Vector3d moved = bodies[i].R * com + bodies[i].p - first[i].R * com - first[i].p;
       way = way.cwiseMax(moved.cwiseAbs());
     }
+  }
+  if (way.head<2>().maxCoeff() < kStill_m) {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& point : drawn_points(tree, robot, first)) box.extend(point);
+    way = box.sizes();
   }
   return way.y() > way.x();
 }
@@ -317,7 +330,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
   hal::RobotConfig robot = configured;
   if (leaves_out) robot.loops.clear();
   const bool legged = !robot.contact.feet.empty();
-  const bool from_front = !legged && moves_sideways(tree, robot, moments);
+  const bool from_front = !legged && shows_more_from_front(tree, robot, moments);
   std::vector<PostureSample> samples(moments.begin(), moments.end());
   // What is drawn to the right: ahead or, from the front, W's y.
   const Eigen::Vector3d right = from_front ? Eigen::Vector3d(Eigen::Vector3d::UnitY())

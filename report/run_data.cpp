@@ -44,8 +44,8 @@ Status read_configuration(RunData& run) {
       found = true;
     } else if (root.has("robot")) {  // the experiment; a scenario has none
       TomlTable report = root.table_or_empty("report");
-      run.hip = report.text_or("hip", {});
-      run.knee = report.text_or("knee", {});
+      run.position_of = report.text_or("position_of", {});
+      run.torque_of = report.text_or("torque_of", {});
       run.foot = report.text_or("foot", {});
       run.settle_s = settle_of(root);
     }

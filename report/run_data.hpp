@@ -54,7 +54,7 @@ struct RunData {
 
   hal::RobotConfig robot;  ///< as it was logged
   model::Tree tree;
-  std::string hip, knee, foot;  ///< the experiment's [report]; may be empty
+  std::string position_of, torque_of, foot;  ///< the experiment's [report]; may be empty
 
   double settle_s = 0.0;         ///< from bring-up to the controllers' start
   bool controllers_ran = true;   ///< false: the rows are those in which they were waited for

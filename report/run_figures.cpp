@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kMillimetres = 1e3;
+constexpr double kMoves = 0.01;  // [rad, m]: less between two postures is none that one can see
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
@@ -86,7 +87,7 @@ void add_time(const RunData& run, const RunData* other, Figure& figure) {
 }
 
 Figure position_figure(const RunData& run, const RunData* other, const Subjects& subjects) {
-  const std::size_t joint = at(subjects.hip);
+  const std::size_t joint = at(subjects.position_of);
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "joint_position";
@@ -215,7 +216,7 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
 
 Figure torque_figure(const RunData& run, const RunData* other, const Subjects& subjects,
                      const tandem_kernels* kernels) {
-  const std::size_t joint = at(subjects.knee);
+  const std::size_t joint = at(subjects.torque_of);
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   const bool slides = run.slides(joint);
@@ -230,7 +231,7 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
         curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[joint], 1.0));
   }
   if (kernels == nullptr) return figure;
-  Result<Curve> computed = inverse_dynamics_curve(run, subjects.knee, *kernels);
+  Result<Curve> computed = inverse_dynamics_curve(run, subjects.torque_of, *kernels);
   if (!computed) {
     figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
@@ -266,6 +267,12 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const bool base = squats(run);
   std::vector<double> depth = base ? run.base[2] : run.position_rad[at(joint)];
   depth.resize(run.rows_before_fault());
+  const std::size_t last = depth.size() - 1;
+  std::vector<PostureSample> samples;
+  const auto add = [&](const char* what, std::size_t row) {
+    samples.push_back(
+        {what + suffix, run.time_s[row], run.base_placement(row), run.positions(row)});
+  };
   const double start = depth.front();
   const auto far = std::ranges::max_element(
       depth, {}, [start](double value) { return std::abs(value - start); });
@@ -275,15 +282,10 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
       depth, [&](double value) { return std::abs(value - turn) <= 0.01 * std::abs(turn - start); });
   const auto lowest = static_cast<std::size_t>(arrived - depth.begin());
   const std::size_t half = nearest_row(depth, 0.5 * (start + turn), 0, lowest + 1);
-  const std::size_t last = depth.size() - 1;
-  std::vector<PostureSample> samples;
-  const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back(
-        {what + suffix, run.time_s[row], run.base_placement(row), run.positions(row)});
-  };
   add("start", 0);
-  if (suffix.empty()) add("half way", half);
-  add(base ? "lowest" : "farthest", lowest);
+  const bool moves = base || std::abs(turn - start) > kMoves;
+  if (suffix.empty() && moves) add("half way", half);
+  if (moves) add(base ? "lowest" : "farthest", lowest);
   if (suffix.empty()) add(run.faults.empty() ? "end" : "fault", last);
   return samples;
 }
@@ -294,10 +296,11 @@ Subjects subjects_of(const RunData& run) {
   Subjects subjects;
   std::vector<int> joints = pitch_joints(run);
   if (joints.size() < 2) joints = widest_joints(run);
-  subjects.hip = run.robot.joint_index(run.hip);
-  subjects.knee = run.robot.joint_index(run.knee);
-  if (subjects.hip < 0) subjects.hip = joints.front();
-  if (subjects.knee < 0) subjects.knee = joints[std::min<std::size_t>(1, joints.size() - 1)];
+  subjects.position_of = run.robot.joint_index(run.position_of);
+  subjects.torque_of = run.robot.joint_index(run.torque_of);
+  if (subjects.position_of < 0) subjects.position_of = joints.front();
+  if (subjects.torque_of < 0)
+    subjects.torque_of = joints[std::min<std::size_t>(1, joints.size() - 1)];
   for (std::size_t i = 0; i < run.robot.sensors.size(); ++i) {
     const hal::SensorConfig& sensor = run.robot.sensors[i];
     const bool first = sensor.name == run.foot;
@@ -333,9 +336,10 @@ std::vector<Figure> figures_of(const RunData& run, const RunData* other,
     figures.push_back(force_figure(run, other, subjects.foot_sensors));
   }
   figures.push_back(torque_figure(run, other, subjects, kernels));
-  std::vector<PostureSample> samples = moments(run, subjects.hip, other == nullptr ? "" : " A");
+  std::vector<PostureSample> samples =
+      moments(run, subjects.position_of, other == nullptr ? "" : " A");
   if (other != nullptr) {
-    const auto more = moments(*other, subjects.hip, " B");
+    const auto more = moments(*other, subjects.position_of, " B");
     samples.insert(samples.end(), more.begin(), more.end());
   }
   figures.push_back(posture_figure(run.tree, run.robot, samples));

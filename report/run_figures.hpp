@@ -13,8 +13,8 @@ namespace tandem::report {
 
 /// Which joints and sensor the figures show.
 struct Subjects {
-  int hip = -1;  ///< joint in the image
-  int knee = -1;
+  int position_of = -1;           ///< joint in the image
+  int torque_of = -1;             ///< the same
   std::vector<int> foot_sensors;  ///< force/torque sensors in the image, the chosen one first
 };
 

@@ -163,8 +163,8 @@ void read_controllers(TomlTable& root, std::vector<ControllerSpec>& controllers)
 
 ReportOptions read_report(TomlTable table) {
   ReportOptions report;
-  report.hip = table.text_or("hip", {});
-  report.knee = table.text_or("knee", {});
+  report.position_of = table.text_or("position_of", {});
+  report.torque_of = table.text_or("torque_of", {});
   report.foot = table.text_or("foot", {});
   table.finish();
   return report;
@@ -258,8 +258,8 @@ void combine(Experiment& e, TomlTable& root) {
                "add joints, boards and a bus to " + e.robot.file);
   }
   TomlTable report = root.table_or_empty("report");
-  check_reference(report, "hip", e.report.hip, e.robot.joints, "joint");
-  check_reference(report, "knee", e.report.knee, e.robot.joints, "joint");
+  check_reference(report, "position_of", e.report.position_of, e.robot.joints, "joint");
+  check_reference(report, "torque_of", e.report.torque_of, e.robot.joints, "joint");
   check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
   apply_order(e, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);

@@ -73,9 +73,9 @@ struct LogOptions {
 
 /// [report]: what the four plots show. Empty: the report chooses.
 struct ReportOptions {
-  std::string hip;   ///< joint
-  std::string knee;  ///< joint
-  std::string foot;  ///< force/torque sensor
+  std::string position_of;  ///< joint whose position is drawn, with its reference
+  std::string torque_of;    ///< joint whose torque is drawn, beside inverse dynamics
+  std::string foot;         ///< force/torque sensor
 };
 
 /// [[controller]]

@@ -106,20 +106,33 @@ class Swinging {
   double floor_m_ = -std::numeric_limits<double>::infinity();
 };
 
-/// Of `way` to either side as much as the drives bear: first all joints alike, then, when even an
-/// eighth is too much, each joint for itself, those that are too weak not at all.
+/// Of `way` to either side as much as the drives bear: all of it, or each joint for itself, from
+/// the ends of the limbs to the root, what leaves those before it theirs.
 VectorXd bearable(const NewRobot& robot, const VectorXd& posture, const VectorXd& way) {
   const Swinging swinging(robot, posture);
-  for (const double share : {1.0, 0.5, 0.25, 0.125}) {
-    if (swinging.bears(share * way)) return share * way;
-  }
+  if (swinging.bears(way)) return way;
   VectorXd kept = VectorXd::Zero(way.size());
   for (Eigen::Index j = way.size(); j-- > 0;) {
-    VectorXd more = kept;
-    more[j] = 0.125 * way[j];
-    if (swinging.bears(more)) kept = more;
+    for (const double share : {1.0, 0.5, 0.25, 0.125}) {
+      VectorXd more = kept;
+      more[j] = share * way[j];
+      if (!swinging.bears(more)) continue;
+      kept = more;
+      break;
+    }
   }
   return kept;
+}
+
+/// The joints that swing less than `wanted`.
+std::vector<Move::HeldBack> held_back(const NewRobot& robot, const VectorXd& wanted,
+                                      const VectorXd& way) {
+  std::vector<Move::HeldBack> found;
+  for (Eigen::Index j = 0; j < way.size(); ++j) {
+    if (std::abs(way[j]) >= std::abs(wanted[j])) continue;
+    found.push_back({robot.tree.joints[j].name, std::abs(way[j])});
+  }
+  return found;
 }
 
 /// The largest share of `down_m` that the limits of the legs leave, with the joints that are in
@@ -139,8 +152,10 @@ std::optional<Lowered> as_low_as_it_goes(const Standing& standing, const VectorX
 }  // namespace
 
 Move swing(const NewRobot& robot, const VectorXd& posture) {
-  const VectorXd way = bearable(robot, posture, alternating(amplitudes(robot, posture)));
+  const VectorXd wanted = alternating(amplitudes(robot, posture));
+  const VectorXd way = bearable(robot, posture, wanted);
   Move move;
+  move.held_back = held_back(robot, wanted, way);
   move.swings = way.cwiseAbs().maxCoeff() > kMoves_rad;
   double time_s = 0.0;
   for (const double side : {1.0, -1.0, 1.0, 0.0}) {
@@ -151,11 +166,11 @@ Move swing(const NewRobot& robot, const VectorXd& posture) {
 
 Move squat_and_swing(const NewRobot& robot, const Standing& standing) {
   const VectorXd& posture = standing.q();
-  VectorXd way = kStandingShare * amplitudes(robot, posture);
-  for (Eigen::Index j = 0; j < way.size(); ++j) {
-    if (standing.in_leg(static_cast<int>(j))) way[j] = 0.0;
+  VectorXd wanted = kStandingShare * amplitudes(robot, posture);
+  for (Eigen::Index j = 0; j < wanted.size(); ++j) {
+    if (standing.in_leg(static_cast<int>(j))) wanted[j] = 0.0;
   }
-  way = bearable(robot, posture, way);
+  VectorXd way = bearable(robot, posture, wanted);
   const double down_m = kSquatShare * standing.height_m();
   auto up = as_low_as_it_goes(standing, posture - way, 0.0);
   auto low = as_low_as_it_goes(standing, posture + way, down_m);
@@ -165,6 +180,7 @@ Move squat_and_swing(const NewRobot& robot, const Standing& standing) {
     low = as_low_as_it_goes(standing, posture, down_m).value_or(*up);
   }
   Move move;
+  move.held_back = held_back(robot, wanted, way);
   move.swings = way.cwiseAbs().maxCoeff() > kMoves_rad;
   move.squat_m = low->share * down_m;
   double time_s = 0.0;

@@ -44,9 +44,14 @@ struct WayPoint {
 
 /// What move.toml does.
 struct Move {
+  struct HeldBack {
+    std::string joint;
+    double swing = 0.0;  ///< what is left to either side [rad or m]
+  };
   std::vector<WayPoint> points;
-  double squat_m = 0.0;  ///< the root goes down so far; 0: it stays
-  bool swings = false;   ///< joints that are in no leg move
+  std::vector<HeldBack> held_back;  ///< by weak drives, the floor, or the legs' limits
+  double squat_m = 0.0;             ///< the root goes down so far; 0: it stays
+  bool swings = false;              ///< joints that are in no leg move
 };
 
 /// Everything that the files say, before it is text.

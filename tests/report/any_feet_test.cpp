@@ -30,7 +30,8 @@ class AnyFeet : public testing::TestWithParam<int> {
                    .value()
                    .tree;
     run.step_s = 0.005;
-    for (std::size_t row = 0; row < kRows; ++row) run.time_s.push_back(run.step_s * static_cast<double>(row));
+    for (std::size_t row = 0; row < kRows; ++row)
+      run.time_s.push_back(run.step_s * static_cast<double>(row));
     const ModelMap& map = stance.map();
     for (std::size_t j = 0; j < map.joints(); ++j) {
       run.position_rad.push_back(constant(stance.q()[map.q_index(j)]));
@@ -110,14 +111,23 @@ TEST_P(AnyFeet, WithoutTruthNoMisleadingTorqueIsDrawn) {
   run.foot_moment_Nm.clear();
   EXPECT_FALSE(inverse_dynamics_curve(run, 0, *one.kernels.get()).has_value());
   const Figure& torque = figure("joint_torque");
-  EXPECT_EQ(torque.title, run.robot.joints[static_cast<std::size_t>(subjects_of(run).knee)].name +
-                              ": torque, measured (no inverse dynamics: the log lacks the base's "
-                              "motion)");
+  EXPECT_EQ(torque.title,
+            run.robot.joints[static_cast<std::size_t>(subjects_of(run).torque_of)].name +
+                ": torque, measured (no inverse dynamics: the log lacks the base's "
+                "motion)");
   EXPECT_EQ(torque.curves.size(), 1U);
   EXPECT_EQ(figures.size(), 3U) << "position, torque, posture";
 }
 
+TEST_P(AnyFeet, OfAStillRobotStartAndEndAreEnough) {
+  const Figure& posture = figure("posture");
+  ASSERT_EQ(posture.notes.size(), 4U) << "two moments and their times";
+}
+
 TEST_P(AnyFeet, PosturesBesideEachOtherDoNotTouch) {
+  for (std::size_t row = 0; row < kRows; ++row) {
+    run.base[2][row] -= 0.05 * static_cast<double>(row) / kRows;  // it goes down
+  }
   const Figure& posture = figure("posture");
   const Curve& legs = *std::ranges::find(posture.curves, "legs", &Curve::label);
   const std::size_t each = legs.x.size() / 4;  // start, half way, lowest, end
@@ -148,8 +158,8 @@ TEST(NoFeet, ArmsAreDrawnByTheJointsThatMoveMost) {
   run.position_rad = {{0.0, 0.1}, {0.0, 0.3}, {0.0, 0.2}};
   run.velocity_rad_s = run.torque_Nm = run.reference_rad = run.position_rad;
   const Subjects subjects = subjects_of(run);
-  EXPECT_EQ(subjects.hip, 1);
-  EXPECT_EQ(subjects.knee, 2);
+  EXPECT_EQ(subjects.position_of, 1);
+  EXPECT_EQ(subjects.torque_of, 2);
   const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
   ASSERT_EQ(figures.size(), 3U);
   EXPECT_EQ(figures[0].title, run.robot.joints[1].name + ": position against its reference");

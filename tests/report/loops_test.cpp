@@ -165,11 +165,11 @@ TEST(Ankle, IsDrawnWithItsRods) {
   const std::vector<PostureSample> upright{{"", 0.0, {}, {0.0, 0.0, 0.0, 0.0}}};
   const Figure figure = posture_figure(tree, robot.robot, upright);
   const Curve& sticks = figure.curves.front();
-  int rods = 0;  // both from the crank's tip straight down to the heel
+  int rods = 0;  // from the front: both from a crank's tip straight down, left and right
   for (std::size_t i = 1; i < sticks.x.size(); ++i) {
     const bool down = std::abs(sticks.x[i] - sticks.x[i - 1]) < 1e-12;
     rods += down && std::abs(sticks.y[i] - sticks.y[i - 1] + 0.25) < 1e-12 &&
-                    std::abs(sticks.x[i] + 0.05) < 1e-12
+                    std::abs(std::abs(sticks.x[i]) - 0.05) < 1e-12
                 ? 1
                 : 0;
   }
@@ -191,7 +191,7 @@ class Gripper : public testing::Test {
     run.position_rad.back() = {0.01, 0.03};
     run.velocity_rad_s = run.torque_Nm = run.reference_rad = run.position_rad;
     run.reference_rad.back() = {0.012, 0.032};
-    run.hip = run.knee = "panda_finger_joint1";
+    run.position_of = run.torque_of = "panda_finger_joint1";
   }
   RunData run;
 };

@@ -149,8 +149,8 @@ command = "local"
 folder = "logs"
 compression = "zstd"
 [report]
-hip = "elbow"
-knee = "elbow"
+position_of = "elbow"
+torque_of = "elbow"
 foot = "wrist_ft")"),
                                   "arm/x.toml", robot());
   ASSERT_TRUE(e.has_value());
@@ -252,10 +252,11 @@ TEST(Experiment, AsksForThePostureOfAFloatingRobot) {
 }
 
 TEST(Experiment, SuggestsTheNearestJointAndSensorOfTheReport) {
-  EXPECT_EQ(errors_of(with("[report]\nknee = 'ellbow'\nfoot = 'wristft'")),
-            "arm/x.toml:5: report.knee: the robot has no joint 'ellbow' (did you mean 'elbow'?)\n"
-            "arm/x.toml:6: report.foot: the robot has no sensor 'wristft' "
-            "(did you mean 'wrist_ft'?)\n");
+  EXPECT_EQ(
+      errors_of(with("[report]\ntorque_of = 'ellbow'\nfoot = 'wristft'")),
+      "arm/x.toml:5: report.torque_of: the robot has no joint 'ellbow' (did you mean 'elbow'?)\n"
+      "arm/x.toml:6: report.foot: the robot has no sensor 'wristft' "
+      "(did you mean 'wrist_ft'?)\n");
 }
 
 TEST(Experiment, RefusesAnOrderThatTheActuatorsLackDataFor) {
@@ -378,8 +379,8 @@ TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
 }
 
 TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
-  write("arm.urdf", replaced(kUrdf, "<limit lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"/>",
-                             ""));
+  write("arm.urdf",
+        replaced(kUrdf, "<limit lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"/>", ""));
   const auto none = read_robot(write("robot.toml", kRobot));
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error()[0].to_string(),
@@ -400,16 +401,16 @@ TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
 TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
   write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
   EXPECT_FALSE(read_robot(write("robot.toml", kRobot)).has_value());
-  const auto given = read_robot(write(
-      "robot.toml", replaced(kRobot, "[actuator.motor]",
-                             "[model.link.upper]\nmass_kg = 2\n"
-                             "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
+  const auto given = read_robot(
+      write("robot.toml", replaced(kRobot, "[actuator.motor]",
+                                   "[model.link.upper]\nmass_kg = 2\n"
+                                   "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
   ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
   EXPECT_EQ(given->description.tree.bodies[1].inertia.mass_kg, 2.0);
   EXPECT_EQ(given->description.tree.bodies[1].inertia.about_com_kg_m2(2, 2), 1.5);
-  const auto unknown = read_robot(write(
-      "robot.toml",
-      replaced(kRobot, "[actuator.motor]", "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
+  const auto unknown =
+      read_robot(write("robot.toml", replaced(kRobot, "[actuator.motor]",
+                                              "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
   ASSERT_FALSE(unknown.has_value());
   EXPECT_EQ(unknown.error()[0].to_string(), (folder_ / "robot.toml").string() +
                                                 ":5: model.link.uper: the description has no link "
@@ -418,9 +419,9 @@ TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
 
 TEST_F(ExperimentFiles, RepairInertiasWhenTheRobotSaysSo) {
   write("arm.urdf", replaced(kUrdf, "izz=\"1\"", "izz=\"9\""));
-  const auto repaired = read_robot(
-      write("robot.toml",
-            replaced(kRobot, "base = \"fixed\"", "base = \"fixed\"\ninertia = \"repair\"")));
+  const auto repaired =
+      read_robot(write("robot.toml", replaced(kRobot, "base = \"fixed\"",
+                                              "base = \"fixed\"\ninertia = \"repair\"")));
   ASSERT_TRUE(repaired.has_value()) << repaired.error()[0].to_string();
   ASSERT_EQ(repaired->description.warnings.size(), 1u);
   EXPECT_EQ(repaired->description.warnings[0].key, "link upper");

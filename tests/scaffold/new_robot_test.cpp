@@ -273,6 +273,14 @@ TEST(NewRobot, SaysOfAMoveWhatItDoes) {
   const NewRobot humanoid = made(kPublicRobots[4]);  // limits that do not belong together
   EXPECT_EQ(humanoid.move.squat_m, 0.0);
   EXPECT_EQ(move_text(humanoid).find("Squat"), std::string::npos) << move_text(humanoid);
+  EXPECT_NE(move_text(humanoid).find("hold back [rad or m]: "), std::string::npos);
+  EXPECT_TRUE(std::ranges::any_of(humanoid.move.held_back,
+                                  [](const auto& held) { return held.joint == "WAIST_P"; }));
+  const int elbow = humanoid.config.joint_index("LARM_ELBOW");
+  EXPECT_GT(
+      humanoid.move.points[0].position_rad[elbow] - humanoid.move.points[1].position_rad[elbow],
+      0.1)
+      << "a weak waist is no reason for the arms to stay";
   const NewRobot coman = made(kPublicRobots[5]);
   EXPECT_GT(coman.move.squat_m, 0.005);
   EXPECT_NE(move_text(coman).find("# Squats "), std::string::npos);
