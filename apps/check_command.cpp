@@ -6,7 +6,6 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
-#include "apps/findings.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "apps/wrong_kind.hpp"
@@ -30,13 +29,15 @@ void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
   facts.add("robot", fmt::format("{} ({})", robot.name, robot.file));
   facts.add("description", robot.model.urdf);
   facts.add("base", robot.model.floating_base ? "floating" : "fixed");
-  facts.add("joints", fmt::format("{} on {}", robot.joints.size(), counted(robot.boards.size(), "board")));
+  facts.add("joints",
+            fmt::format("{} on {}", robot.joints.size(), counted(robot.boards.size(), "board")));
   facts.add("sensors", std::to_string(robot.sensors.size()));
   for (const hal::BusConfig& bus : robot.buses) {
     std::size_t nodes = 0;
     for (const hal::BoardConfig& board : robot.boards) nodes += board.bus == bus.name ? 1 : 0;
     for (const hal::SensorConfig& sensor : robot.sensors) nodes += sensor.bus == bus.name ? 1 : 0;
-    facts.add("bus " + bus.name, fmt::format("{}, {}", counted(nodes, "node"), bus.fd ? "CAN FD" : "CAN"));
+    facts.add("bus " + bus.name,
+              fmt::format("{}, {}", counted(nodes, "node"), bus.fd ? "CAN FD" : "CAN"));
   }
 }
 
@@ -91,10 +92,6 @@ void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
   fmt::print(out, "{} {}.\n", robot.config.file,
              warned ? "can be used; look at the warnings" : "is right");
   facts.print(out);
-}
-
-void print_warnings(const Diagnostics& warnings) {
-  for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
 }
 
 /// What `--bus` shows, before anything is refused: a robot's own file has no period.
@@ -162,7 +159,8 @@ Exit check_command(const CheckOptions& options) {
                          ? wrong_kind(options.file, Takes::kRobot, "tandem check --repair")
                          : wrong_kind(options.file, Takes::kEither, "tandem check");
   if (wrong) errors.push_back(*wrong);
-  if (errors.empty() && options.bus) errors = check_buses(options.file, robot_only, out, json["buses"]);
+  if (errors.empty() && options.bus)
+    errors = check_buses(options.file, robot_only, out, json["buses"]);
   if (errors.empty()) {
     errors = robot_only ? check_robot(options, out, warnings, json)
                         : check_experiment(options, out, warnings, json);

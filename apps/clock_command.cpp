@@ -75,7 +75,7 @@ Result<Json> carry_out(const ClockOptions& options) {
   const bool waits = options.action == Action::kPause || options.action == Action::kStep;
   if (!answer || !waits) return answer;
   Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
-  if (!stands) return fail("the run ended before its clock stood still", "it has told why");
+  if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
   if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
   return stands;
 }

@@ -15,7 +15,7 @@
 namespace tandem::apps {
 namespace {
 
-Diagnostics told;         // by print_errors(), for write_failure()
+Diagnostics reported;      // by print_errors(), for write_failure()
 bool has_written = false;  // by write_json()
 
 /// Columns that a UTF-8 text takes: bytes that do not continue a character.
@@ -118,11 +118,11 @@ Json errors_json(const Diagnostics& errors) {
   return list;
 }
 
-void remember_error(Error error) { told.push_back(std::move(error)); }
+void remember_error(Error error) { reported.push_back(std::move(error)); }
 
 void write_failure(const std::string& file) {
   if (has_written) return;
-  (void)write_json(file, {{"ok", false}, {"errors", errors_json(told)}});
+  (void)write_json(file, {{"ok", false}, {"errors", errors_json(reported)}});
 }
 
 Json percentiles_json(const rt::Percentiles& p) {
@@ -130,8 +130,12 @@ Json percentiles_json(const rt::Percentiles& p) {
 }
 
 void print_errors(const Diagnostics& errors) {
-  told.insert(told.end(), errors.begin(), errors.end());
+  reported.insert(reported.end(), errors.begin(), errors.end());
   for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
+}
+
+void print_warnings(const Diagnostics& warnings) {
+  for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
 }
 
 void Table::print(std::FILE* out) const {

@@ -24,9 +24,9 @@ using Json = nlohmann::ordered_json;
 /// Whether people read along: `out` is a terminal.
 [[nodiscard]] bool is_terminal(std::FILE* out);
 
-/// From now on standard output and error outlive their readers: when a pipe's reader or the terminal
-/// is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()), instead of
-/// the process being ended in the middle of a cycle. Call it before other threads print.
+/// From now on standard output and error outlive their readers: when a pipe's reader or the
+/// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()),
+/// instead of the process being ended in the middle of a cycle. Call it before other threads print.
 void outlive_readers();
 
 /// Whether `file` can be written, found out before a run: an error that names it when not.
@@ -45,13 +45,16 @@ void outlive_readers();
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);
 
-/// For write_failure(): an error that has been told in other words than print_errors()'s.
+/// The same of warnings; write_failure() has no part in them.
+void print_warnings(const Diagnostics& warnings);
+
+/// For write_failure(): an error that has been reported in other words than print_errors()'s.
 void remember_error(Error error);
 
 /// A list of objects: file, line, key, message, hint.
 [[nodiscard]] Json errors_json(const Diagnostics& errors);
 
-/// For a command that failed: {"ok": false, "errors": [...]} with all that print_errors() told,
+/// For a command that failed: {"ok": false, "errors": [...]} with all that print_errors() said,
 /// unless write_json() has written something already. `file` as there.
 void write_failure(const std::string& file);
 

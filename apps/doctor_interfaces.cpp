@@ -22,7 +22,7 @@ struct Bus {
   [[nodiscard]] std::string kind() const {
     return link.value("/linkinfo/info_kind"_json_pointer, std::string("?"));
   }
-  /// A number of `info_data`; 0 when it is not told.
+  /// A number of `info_data`; 0 when it is not given.
   [[nodiscard]] std::int64_t number(const char* pointer) const {
     return link.value(Link::json_pointer(std::string("/linkinfo/info_data") + pointer),
                       std::int64_t{0});
@@ -160,7 +160,7 @@ std::size_t nodes_of(const hal::RobotConfig& robot, const std::string& bus) {
 std::vector<Finding> examine_interfaces(const Machine& machine, const hal::RobotConfig& robot) {
   const Link links = Link::parse(machine.interfaces(), nullptr, false);
   if (!links.is_array()) {
-    return {{"CAN interfaces", Health::kWarning, "unknown", "`ip` told nothing of them",
+    return {{"CAN interfaces", Health::kWarning, "unknown", "`ip` says nothing of them",
              "apt-get install iproute2"}};
   }
   std::vector<Finding> findings;

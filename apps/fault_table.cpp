@@ -10,7 +10,7 @@ const char* reaction(hal::StopCategory category) {
     case hal::StopCategory::kCategory0: return "torque off";
     case hal::StopCategory::kCategory1: return "stop, then torque off";
     case hal::StopCategory::kHold: return "every joint held";
-    case hal::StopCategory::kWarn: return "told";
+    case hal::StopCategory::kWarn: return "reported";
   }
   return "?";
 }
@@ -35,7 +35,8 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
 
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
-  Table table({"faults, from the first SYNC", "joint", "board", "cause", "category", "reaction", "state"});
+  Table table(
+      {"faults, from the first SYNC", "joint", "board", "cause", "category", "reaction", "state"});
   table.align_left();
   for (const Json& fault : faults) {
     const bool latched = fault.value("latched", true);

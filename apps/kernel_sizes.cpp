@@ -87,7 +87,7 @@ Result<std::map<std::string, std::uint64_t>> kernel_text_bytes(const std::string
       if (!kernel.empty()) sizes[kernel] += symbol.st_size;
     }
   }
-  if (!found) return refuse(library, "has no symbol table, so sizes cannot be told");
+  if (!found) return refuse(library, "has no symbol table, so its sizes are not known");
   return sizes;
 }
 

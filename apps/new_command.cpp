@@ -8,7 +8,6 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
-#include "apps/findings.hpp"
 #include "apps/right_angles.hpp"
 #include "apps/robot_files.hpp"
 #include "base/counted.hpp"
@@ -183,7 +182,7 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"drives", drives},
           {"boards", robot.config.boards.size()},
           {"kept", Json::object()},
-          {"warnings", findings_json(robot.warnings)}};
+          {"warnings", errors_json(robot.warnings)}};
 }
 
 void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
@@ -192,10 +191,9 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
   for (const std::string& remark : robot.remarks) facts.add("", remark);
   for (std::size_t f = 0; f < robot.feet.size(); ++f) {
     const scaffold::Foot& foot = robot.feet[f];
-    facts.add("foot " + foot.name,
-              fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
-                          counted(foot.points.size(), "contact point"),
-                          foot.guess.empty() ? "" : " (guess)"));
+    facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
+                                               counted(foot.points.size(), "contact point"),
+                                               foot.guess.empty() ? "" : " (guess)"));
   }
   if (robot.stands_m > 0.0) facts.add("stands", fmt::format("root at {:.3f} m", robot.stands_m));
   for (const scaffold::FoundSensor& sensor : robot.sensors) {
@@ -211,8 +209,9 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
   if (const auto loads = hal::can::bus_loads(robot.config, kPeriod_ns)) {
     for (const hal::can::BusLoad& load : *loads) {
       const auto boards = std::ranges::count(robot.config.boards, load.bus, &hal::BoardConfig::bus);
-      facts.add("bus " + load.bus,
-                fmt::format("{}, load {:.0f} %", counted(static_cast<std::uint64_t>(boards), "board"), 100.0 * load.load));
+      facts.add("bus " + load.bus, fmt::format("{}, load {:.0f} %",
+                                               counted(static_cast<std::uint64_t>(boards), "board"),
+                                               100.0 * load.load));
     }
   }
 }
@@ -279,11 +278,7 @@ Diagnostics run(const NewOptions& options) {
   Json json = to_json(*robot, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   if (Status placed = files.place(); !placed) return {placed.error()};
-  print_inertia_warnings(robot->warnings);
-  for (const Error& warning : robot->warnings) {
-    if (warning.key.starts_with("link ")) continue;
-    fmt::print(stderr, "warning: {}\n", warning.to_string());
-  }
+  print_warnings(robot->warnings);
   std::FILE* const out = human_output(options.json);
   for (const auto& [old, copy] : files.kept()) {
     facts.add("kept", fmt::format("{} that was there is {} now", old, copy));

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
@@ -8,7 +8,6 @@
 #include "apps/console.hpp"
 #include "apps/dds_run.hpp"
 #include "apps/dds_services.hpp"
-#include "apps/findings.hpp"
 #include "apps/inject.hpp"
 #include "apps/loop_thread.hpp"
 #include "apps/remote_gate.hpp"
@@ -37,7 +36,8 @@ std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                 fault.joint.empty() ? "" : ": ", fault.text));
   }
   if (log && !log->error.empty()) {
-    texts.push_back(fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
+    texts.push_back(
+        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
   }
   return texts;
 }
@@ -182,8 +182,9 @@ Exit run(Composition& c, const RunOptions& options) {
   if (*server != nullptr) tell_faults(**server, cycle);
   if (!options.quiet) {
     fmt::print(out, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
-               counted(e.robot.joints.size(), "joint"), length_text(e), 1e6 / static_cast<double>(e.loop.period_ns),
-               options.serves ? served_text(e) : "", pace_text(c));
+               counted(e.robot.joints.size(), "joint"), length_text(e),
+               1e6 / static_cast<double>(e.loop.period_ns), options.serves ? served_text(e) : "",
+               pace_text(c));
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle, e.robot);
@@ -194,10 +195,9 @@ Exit run(Composition& c, const RunOptions& options) {
     });
   }
   const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
-  const auto socket = serve(commands, {.path = options.socket,
-                                       .kind = "run",
-                                       .wanted = !options.no_socket,
-                                       .needed = on_robot});
+  const auto socket = serve(
+      commands,
+      {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
   if (!socket) {
     print_errors({socket.error()});
     return Exit::kUsage;
@@ -247,6 +247,17 @@ Exit run(Composition& c, const RunOptions& options) {
   return summary.faults.empty() ? Exit::kDone : Exit::kFault;
 }
 
+/// What is simulated is then not quite what the description says. `tandem check` has the details.
+void warn_of_inertias(const runtime::Experiment& e) {
+  std::vector<std::string> links;
+  for (const Error& warning : e.warnings) {
+    if (warning.key.starts_with("link ")) links.push_back(warning.key.substr(5));
+  }
+  if (links.empty()) return;
+  fmt::print(stderr, "warning: {}: no body can have the inertia of {} (`tandem check {}`)\n",
+             e.robot.model.urdf, fmt::join(links, ", "), e.robot.file);
+}
+
 }  // namespace
 
 Exit run_command(const RunOptions& options) {
@@ -282,7 +293,7 @@ Exit run_command(const RunOptions& options) {
     print_errors(composition.error());
     return Exit::kUsage;
   }
-  print_inertia_warnings((*composition)->experiment.warnings);
+  warn_of_inertias((*composition)->experiment);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   outlive_readers();
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {

@@ -25,7 +25,7 @@ struct ControlSocketOptions {
 };
 
 /// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
-/// which is told on standard error. Errors: a socket that is needed and cannot be opened.
+/// which is said on standard error. Errors: a socket that is needed and cannot be opened.
 [[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
                                                            const ControlSocketOptions& options);
 

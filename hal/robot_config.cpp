@@ -161,16 +161,19 @@ double read_base_height(TomlTable& table, const RobotConfig& robot) {
 /// What is wrong with a joint of a posture, as far as robot.toml alone says so.
 JointReference not_driven(TomlTable& table, const std::string& key, const RobotConfig& robot) {
   if (robot.is_passive(key)) {
-    return {{}, table.error_at(key, "the joint '" + key + "' is passive: " +
-                                        (robot.loops.empty() ? "no motor holds it"
-                                                             : "where it stands follows from the "
-                                                               "closed loops"),
-                               "remove it here; position_rad of its [[passive]] says where it "
-                               "starts from")};
+    return {{},
+            table.error_at(key,
+                           "the joint '" + key + "' is passive: " +
+                               (robot.loops.empty() ? "no motor holds it"
+                                                    : "where it stands follows from the "
+                                                      "closed loops"),
+                           "remove it here; position_rad of its [[passive]] says where it "
+                           "starts from")};
   }
   if (robot.model.lock_lines.contains(key)) {
-    return {{}, table.error_at(key, "the joint '" + key + "' is locked in [model.lock]",
-                               "remove it here, or the lock")};
+    return {{},
+            table.error_at(key, "the joint '" + key + "' is locked in [model.lock]",
+                           "remove it here, or the lock")};
   }
   return {key, table.error_at(key, "there is no [[joint]] '" + key + "'")};
 }
@@ -229,6 +232,11 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
   NodeIds ids;
   std::vector<SensorTable> sensors;
   std::vector<BoardTable> boards = read_buses(root, ids, robot, sensors);
+  const auto of_lists = [](const Error& error) {
+    return error.key == "bus" || error.key == "board";
+  };
+  if (std::ranges::any_of(document.diagnostics(), of_lists))
+    return robot;  // what follows names them
   read_joints(root, seats_of(boards), robot, loose);
   const auto wrong = [](const BoardTable& board) { return board.table.has_errors(); };
   if (std::ranges::any_of(boards, wrong)) loose.clear();  // a list that could not be read
@@ -258,10 +266,8 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
 Result<TomlDocument> robot_alone(Result<TomlDocument> document) {
   if (!document || document->root().has("model") || !document->root().has("robot")) return document;
   return std::unexpected(Error{"this is an experiment, and a robot is needed",
-                               "name the robot.toml that it names",
-                               document->file(),
-                               document->root().line("robot"),
-                               "robot"});
+                               "name the robot.toml that it names", document->file(),
+                               document->root().line("robot"), "robot"});
 }
 
 std::expected<RobotConfig, Diagnostics> finish(Result<TomlDocument> document) {

@@ -32,7 +32,7 @@ struct UrdfOptions {
   bool floating_base = false;
   bool mimic_independent = false;  ///< treat mimic joints as independent; else they follow
   std::vector<std::pair<std::string, double>> lock{};  ///< joint -> fixed position [rad or m]
-  bool repair_inertia = false;  ///< take the nearest possible inertia for an impossible one
+  bool repair_inertia = false;      ///< take the nearest possible inertia for an impossible one
   bool exact_right_angles = false;  ///< take angles within 1e-5 rad of a right one for it
   std::vector<LinkOverride> links{};
   std::map<std::string, int> lock_lines{};  ///< joint of `lock` -> line in the next
@@ -41,7 +41,7 @@ struct UrdfOptions {
 
 struct UrdfModel {
   Tree tree;
-  Diagnostics warnings;  ///< what was tolerated, left out or repaired
+  Diagnostics warnings;        ///< what was tolerated, left out or repaired
   RightAngles right_angles{};  ///< those that the text writes with few digits
   /// Joint -> why its limits in `tree` are NaN where they are. A joint without limits has none.
   std::map<std::string, std::string> limits_notes{};
@@ -53,7 +53,8 @@ struct UrdfModel {
 inline constexpr double kNegligibleMassShare = 0.01;
 
 /// The hint of the warning that each repaired inertia has.
-inline constexpr const char* kRepaired = "by inertia = \"repair\" in [model]";
+inline constexpr const char* kRepaired =
+    "by inertia = \"repair\" in [model]; correct it in the URDF";
 
 /// Understands revolute, continuous, prismatic and fixed joints, and a floating one from a root
 /// without mass, which is left out: its child is then the floating base. A link without mass, or

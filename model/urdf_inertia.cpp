@@ -9,7 +9,14 @@ namespace tandem::model {
 namespace {
 
 constexpr double kDefiniteTolerance = 1e-12;  // of the largest principal moment
+constexpr double kMostMass_kg = 1e6;          // a slip of units or digits
 constexpr double kTriangleTolerance = 1e-6;   // rounding of the description's own digits
+
+std::string mass_text(const Inertia& inertia) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g kg", inertia.mass_kg);
+  return text;
+}
 
 Eigen::Vector3d principal_moments(const Eigen::Matrix3d& I) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(I, Eigen::EigenvaluesOnly);
@@ -45,6 +52,9 @@ class Checker {
     }
     if (link.inertia.mass_kg < 0.0) {
       report.hint = "masses are zero or positive";
+      errors_.push_back(report);
+    } else if (link.inertia.mass_kg > kMostMass_kg) {
+      report.hint = "masses are in kilograms";
       errors_.push_back(report);
     } else if (std::isfinite(whole) && link.inertia.mass_kg < kNegligibleMassShare * whole) {
       report.hint =
@@ -115,7 +125,10 @@ std::string inertia_problem(const Inertia& inertia) {
   if (!I.allFinite() || !inertia.com_m.allFinite() || !std::isfinite(inertia.mass_kg)) {
     return "the mass or inertia is too large to be computed with";
   }
-  if (inertia.mass_kg < 0.0) return "the mass is negative";
+  if (inertia.mass_kg < 0.0) return "the mass is negative, " + mass_text(inertia);
+  if (inertia.mass_kg > kMostMass_kg) {
+    return "the mass is " + mass_text(inertia) + ", more than any robot has";
+  }
   if (inertia.mass_kg == 0.0) return I.isZero(0.0) ? "" : "there is an inertia without mass";
   const Eigen::Vector3d moments = principal_moments(I);
   if (!(moments[0] > kDefiniteTolerance * std::abs(moments[2]))) {

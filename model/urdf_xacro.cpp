@@ -31,7 +31,8 @@ class Search {
       }
     }
     if (first_ && places_ > 1) {
-      first_->message += ", as in " + std::to_string(places_ - 1) + " more places";
+      first_->message += places_ == 2 ? ", as in one more place"
+                                      : ", as in " + std::to_string(places_ - 1) + " more places";
     }
     return first_;
   }

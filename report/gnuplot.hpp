@@ -16,7 +16,7 @@ namespace tandem::report {
 /// not be written.
 [[nodiscard]] Status draw(std::span<const Figure> figures, const std::string& folder);
 
-/// The script that draw() sends, for a look at what gnuplot was told.
+/// The script that draw() sends, for a look at it.
 [[nodiscard]] std::string gnuplot_script(std::span<const Figure> figures,
                                          const std::string& folder);
 

@@ -22,7 +22,7 @@ struct ReportFiles {
 };
 
 /// Draws the report of `log` (and `other`, when not empty) into `folder`, which is created.
-/// @param error_text  of drives, for the faults; empty: they are told by their codes
+/// @param error_text  of drives, for the faults; empty: they go by their codes
 /// Errors: a log that cannot be read; two logs of different robots; gnuplot is missing; the
 /// folder cannot be written.
 [[nodiscard]] Result<ReportFiles> make_report(const std::string& log, const std::string& other,

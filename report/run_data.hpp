@@ -94,7 +94,7 @@ struct RunData {
 };
 
 /// Errors: as log::LogFile::open; a log without state and command; one without its robot's files.
-/// @param error_text  of drives; empty: faults are told by their codes
+/// @param error_text  of drives; empty: faults go by their codes
 [[nodiscard]] Result<RunData> read_run(const std::string& path, const ErrorText& error_text = {});
 
 }  // namespace tandem::report

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <ranges>
 
 #include "base/nearest.hpp"
 #include "rt/clock_control.hpp"
@@ -203,27 +204,40 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
 
 std::string ns(std::int64_t value) { return std::to_string(value) + " ns"; }
 
+/// One message: for the first board whose period does not fit, and how many others there are.
 void check_periods(const Experiment& e, TomlTable& root) {
   const std::int64_t period = e.loop.period_ns;
+  const std::int64_t step = e.sim.substep_ns;
   TomlTable sim = root.table_or_empty("sim");
-  if (period % e.sim.substep_ns != 0) {
-    sim.error("substep_ns", ns(e.sim.substep_ns) + " does not divide the period of " + ns(period),
-              "choose a divisor of period_ns");
+  const auto name = [](auto& boards) {
+    const std::ptrdiff_t others = std::ranges::distance(boards) - 1;
+    return "'" + boards.front().name + "'" +
+           (others == 0 ? "" : " and of " + std::to_string(others) + " more");
+  };
+  auto apart = e.robot.boards | std::views::filter([&](const hal::BoardConfig& board) {
+                 const std::int64_t control = board.control_period_ns;
+                 return period % control != 0 && control % period != 0;
+               });
+  if (!apart.empty()) {
+    root.error("period_ns",
+               ns(period) + " and the control period of board " + name(apart) + ", " +
+                   ns(apart.front().control_period_ns) + ", do not divide each other",
+               "make one a multiple of the other");
+    return;
   }
-  for (const hal::BoardConfig& board : e.robot.boards) {
-    const std::int64_t control = board.control_period_ns;
-    if (period % control != 0 && control % period != 0) {
-      root.error("period_ns",
-                 ns(period) + " and the control period of board '" + board.name + "', " +
-                     ns(control) + ", do not divide each other",
-                 "make one a multiple of the other");
-    }
-    if (control != period && control % e.sim.substep_ns != 0) {
-      sim.error("substep_ns",
-                ns(e.sim.substep_ns) + " does not divide the control period of board '" +
-                    board.name + "', " + ns(control),
-                "choose a common divisor of both");
-    }
+  if (period % step != 0) {
+    sim.error("substep_ns", ns(step) + " does not divide the period of " + ns(period),
+              "choose a divisor of period_ns");
+    return;
+  }
+  auto undivided = e.robot.boards | std::views::filter([&](const hal::BoardConfig& board) {
+                     return board.control_period_ns % step != 0;
+                   });
+  if (!undivided.empty()) {
+    sim.error("substep_ns",
+              ns(step) + " does not divide the control period of board " + name(undivided) + ", " +
+                  ns(undivided.front().control_period_ns),
+              "choose a common divisor of both");
   }
 }
 

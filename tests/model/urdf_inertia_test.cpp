@@ -8,8 +8,16 @@ const char* const kHint =
     "[model] takes the nearest possible one, and `tandem check --repair` shows it)";
 
 TEST(UrdfInertia, RefusesANegativeMass) {
-  expect_error(with("<mass value=\"3\"/>", "<mass value=\"-3\"/>"),
-               "arm.urdf:16: link weight: the mass is negative (masses are zero or positive)");
+  expect_error(
+      with("<mass value=\"3\"/>", "<mass value=\"-3\"/>"),
+      "arm.urdf:16: link weight: the mass is negative, -3 kg (masses are zero or positive)");
+}
+
+TEST(UrdfInertia, RefusesAMassThatNoRobotHas) {
+  expect_error(
+      with("<mass value=\"3\"/>", "<mass value=\"3e29\"/>"),
+      "arm.urdf:16: link weight: the mass is 3e+29 kg, more than any robot has (masses are "
+      "in kilograms)");
 }
 
 TEST(UrdfInertia, RefusesAnInertiaThatIsNotPositiveDefinite) {

@@ -124,7 +124,7 @@ TEST(UrdfXacro, NamesTheFirstPlaceAndHowManyThereAre) {
   std::string text = with("<mass value=\"2\"/>", "<mass value=\"${mass}\"/>");
   text = replaced(text, "<mass value=\"3\"/>", "<mass value=\"${2 * mass}\"/>");
   expect_error(text,
-               "arm.urdf:6: link upper: '${mass}' was left by xacro, as in 1 more places "
+               "arm.urdf:6: link upper: '${mass}' was left by xacro, as in one more place "
                "(expand the xacro first: xacro FILE > robot.urdf)");
 }
 
@@ -272,7 +272,7 @@ TEST(UrdfRepair, OfABrokenTriangleRaisesTheSecondMomentThatIsNegative) {
   EXPECT_EQ(said,
             "arm.urdf:22: link tip: the inertia breaks the triangle inequality: principal moments "
             "0.03, 0.03, 0.07 kg m^2; taken: 0.035, 0.035, 0.07 kg m^2 "
-            "(by inertia = \"repair\" in [model])\n");
+            "(by inertia = \"repair\" in [model]; correct it in the URDF)\n");
 }
 
 TEST(UrdfRepair, IsNearerThanAnyOtherPossibleInertia) {
@@ -317,7 +317,7 @@ TEST(UrdfRepair, OfAnInertiaWithoutMassDropsIt) {
   ASSERT_TRUE(model.has_value()) << to_text(model.error());
   EXPECT_EQ(to_text(model->warnings),
             "arm.urdf:22: link tip: there is an inertia without mass; taken: none "
-            "(by inertia = \"repair\" in [model])\n");
+            "(by inertia = \"repair\" in [model]; correct it in the URDF)\n");
   EXPECT_TRUE(model->tree.links[4].inertia.about_com_kg_m2.isZero(0.0));
 }
 

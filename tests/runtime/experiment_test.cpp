@@ -214,6 +214,11 @@ TEST(Experiment, RefusesAPeriodThatDoesNotFitABoard) {
   EXPECT_EQ(errors_of(with("period_ns = 1_500_000")),
             "arm/x.toml:4: period_ns: 1500000 ns and the control period of board 'board', "
             "1000000 ns, do not divide each other (make one a multiple of the other)\n");
+  hal::RobotConfig two = robot();
+  two.boards.push_back(two.boards[0]);
+  const auto both = parse_experiment(with("period_ns = 1_500_000"), "arm/x.toml", two);
+  ASSERT_EQ(both.error().size(), 1U) << "one message for all boards";
+  EXPECT_NE(both.error()[0].message.find("of board 'board' and of 1 more"), std::string::npos);
 }
 
 TEST(Experiment, RefusesASubstepThatDoesNotDivide) {
