@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "rt/stop_signal.hpp"
@@ -37,6 +38,17 @@ Error json_error(const std::string& file) {
           .hint = "name a file in a folder that exists and can be written",
           .file = file,
           .key = {}};
+}
+
+/// Whether a file is there whose text is no JSON of ours: a description, a robot, a log.
+bool holds_something_else(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return false;
+  std::ifstream in(file, std::ios::binary);
+  std::string begins(2, ' ');
+  in >> begins[0] >> begins[1];
+  if (begins[0] == ' ') return false;  // empty
+  return begins[0] != '{' && begins != "[{" && begins != "[]";
 }
 
 /// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
@@ -82,6 +94,10 @@ void outlive_readers() {
 
 Status check_writable(const std::string& file) {
   if (file.empty() || file == "-") return {};
+  if (holds_something_else(file)) {
+    return std::unexpected(Error{"this file is there, and it is no JSON: it would be lost",
+                                 "name another file, or remove it first", file, 0, {}});
+  }
   errno = 0;
   const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
   return out ? Status{} : std::unexpected(json_error(file));
@@ -93,6 +109,7 @@ std::string json_text(const Json& value, int indent) {
 
 Status write_json(const std::string& file, const Json& value) {
   if (file.empty()) return {};
+  if (Status writable = check_writable(file); !writable) return writable;
   has_written = true;
   const std::string text = json_text(value, 2) + "\n";
   if (file == "-") {

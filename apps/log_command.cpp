@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 
@@ -79,6 +80,11 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
   const std::string topic = full_topic(options.topic);
   if (options.output.empty()) {
     return log::write_csv(file, topic, options.every, std::cout, options.fields);
+  }
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.output, options.log, ignored)) {
+    return std::unexpected(
+        Error{"this is the log itself", "name another file with -o", options.output, 0, {}});
   }
   std::ofstream out(options.output, std::ios::binary);
   if (!out) {

@@ -1,5 +1,6 @@
 #include "apps/run_log.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -42,7 +43,12 @@ std::uint64_t bytes_needed(const Composition& c) {
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
   const std::uint64_t whole = e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + kFixed;
-  return e.log.compression == runtime::LogCompression::kNone ? whole : whole / 4;
+  switch (e.log.compression) {
+    case runtime::LogCompression::kNone: return whole;
+    case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
+    case runtime::LogCompression::kZstd: return whole / 3;
+  }
+  return whole;
 }
 
 Error folder_error(const std::string& folder, std::string message) {
@@ -73,11 +79,19 @@ Status check_folder(const std::string& folder, std::uint64_t needed) {
                           static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6)));
 }
 
-std::string next_path(const std::string& folder, const std::string& name) {
+/// The first free name, taken by an empty file: of two runs that begin at once each has its own.
+Result<std::string> claim_path(const std::string& folder, const std::string& name) {
   for (int number = 1;; ++number) {
-    const std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
-    std::error_code ignored;
-    if (!fs::exists(path, ignored)) return path;
+    std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
+    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (file >= 0) {
+      ::close(file);
+      return path;
+    }
+    if (errno != EEXIST) {
+      return std::unexpected(
+          folder_error(path, std::string("cannot make the log: ") + std::strerror(errno)));
+    }
   }
 }
 
@@ -101,8 +115,9 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
   if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());
   const std::string name =
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
-  return log::Recorder::open(next_path(folder, name), info_of(c),
-                             recorder_options(c.experiment.log.compression));
+  const Result<std::string> path = claim_path(folder, name);
+  if (!path) return std::unexpected(path.error());
+  return log::Recorder::open(*path, info_of(c), recorder_options(c.experiment.log.compression));
 }
 
 }  // namespace tandem::apps

@@ -24,6 +24,19 @@ TEST_F(Check, ReadsARobotByItself) {
   EXPECT_NE(outcome.out.find("2 on 1 board\n"), std::string::npos) << outcome.out;
 }
 
+/// `--json robot.toml` had replaced the robot.
+TEST_F(Check, DoesNotWriteItsJsonOverAFileThatIsNone) {
+  const std::string robot = read_text(folder_ / "robot.toml");
+  const Outcome outcome = tandem("check robot.toml --json robot.toml");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("error: robot.toml: this file is there, and it is no JSON"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(read_text(folder_ / "robot.toml"), robot);
+  EXPECT_EQ(tandem("check robot.toml --json new.json").status, 0);
+  EXPECT_EQ(tandem("check robot.toml --json new.json").status, 0) << "its own is written again";
+}
+
 TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
   edit("robot.toml", "kp = 6.0", "kp = -6.0");
   edit("robot.toml", "gear_ratio", "gear_ration");

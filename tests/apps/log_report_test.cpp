@@ -47,6 +47,13 @@ TEST_F(LogAndReport, CsvWritesTheFieldsAskedFor) {
   EXPECT_GE(std::ranges::count(outcome.out, '\n'), 501);
 }
 
+TEST_F(LogAndReport, CsvDoesNotWriteOverTheLog) {
+  const Outcome outcome = tandem("log csv " + log_ + " -o " + log_);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("this is the log itself"), std::string::npos) << outcome.err;
+  EXPECT_EQ(tandem("log info " + log_).status, 0);
+}
+
 TEST_F(LogAndReport, CsvSuggestsTheNearestTopic) {
   const Outcome outcome = tandem("log csv " + log_ + " --topic sttae");
   EXPECT_EQ(outcome.status, 2);

@@ -89,6 +89,20 @@ TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
   EXPECT_EQ(first["joints"], paced["joints"]);
 }
 
+/// Twenty runs that began at once had left nineteen logs.
+TEST_F(Run, EachOfManyThatBeginAtOnceHasALogOfItsOwn) {
+  constexpr int kRuns = 8;
+  std::vector<std::jthread> runs;
+  for (int i = 0; i < kRuns; ++i) {
+    runs.emplace_back([this] {
+      EXPECT_EQ(tandem("run hold.toml --duration 0.01 --quiet --log many").status, 0);
+    });
+  }
+  runs.clear();
+  const auto logs = std::filesystem::directory_iterator(folder_ / "many");
+  EXPECT_EQ(std::distance(begin(logs), end(logs)), kRuns);
+}
+
 TEST_F(Run, OfAScenarioEndsInItsFaultWhichTheLogTells) {
   std::ofstream(folder_ / "faults.toml")
       << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint2\"\nafter_enabled_s = 1.2\n";
