@@ -10,6 +10,7 @@
 
 #include "base/nearest.hpp"
 #include "base/trusted_code.hpp"
+#include "controllers/hosted_call.hpp"
 
 namespace tandem {
 namespace {
@@ -128,23 +129,27 @@ Result<LoadedController> load_controller(const std::string& name,
   }
   LoadedController loaded;
   loaded.path_ = *file;
-  loaded.library_.reset(dlopen(file->c_str(), RTLD_NOW | RTLD_LOCAL));
-  if (!loaded.library_) {
-    return refuse(name, *file, "cannot be loaded: " + std::string(dlerror()),
+  const Status opened = hosted_call(name, [&] { return loaded.open(name); });
+  if (!opened) return std::unexpected(opened.error());
+  return loaded;
+}
+
+Status LoadedController::open(const std::string& name) {
+  library_.reset(dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL));
+  if (!library_) {
+    return refuse(name, path_, "cannot be loaded: " + std::string(dlerror()),
                   "build it again, and link what it uses");
   }
   using Entry = const ControllerPlugin* (*)();
-  const auto entry = reinterpret_cast<Entry>(dlsym(loaded.library_.get(), kEntry));
+  const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));
   if (entry == nullptr) {
-    return refuse(name, *file, "has no entry point " + std::string(kEntry) + "()",
+    return refuse(name, path_, "has no entry point " + std::string(kEntry) + "()",
                   "end its source with TANDEM_CONTROLLER(Class, \"name\", \"One line.\")");
   }
-  loaded.plugin_ = entry();
-  if (const Status ok = check(*loaded.plugin_, name, *file); !ok) {
-    return std::unexpected(ok.error());
-  }
-  loaded.controller_.reset(loaded.plugin_->create());
-  return loaded;
+  plugin_ = entry();
+  if (Status ok = check(*plugin_, name, path_); !ok) return ok;
+  controller_.reset(plugin_->create());
+  return {};
 }
 
 }  // namespace tandem

@@ -22,6 +22,7 @@ class LoadedController {
  private:
   friend Result<LoadedController> load_controller(const std::string&,
                                                   const std::vector<std::string>&);
+  [[nodiscard]] Status open(const std::string& name);
   struct Close {
     void operator()(void* library) const noexcept;
   };
@@ -46,7 +47,8 @@ class LoadedController {
 /// Errors: there is no such file (with the folders searched and the nearest name); others may change
 /// it (check_trusted_code()), found out before it is opened; the system
 /// cannot load it; it lacks tandem_controller_plugin(); it was built for another plugin ABI, or
-/// by another compiler. `key` of the error is `name`.
+/// by another compiler; it throws. A library that calls exit() ends the process with status 2.
+/// `key` of the error is `name`.
 [[nodiscard]] Result<LoadedController> load_controller(const std::string& name,
                                                        const std::vector<std::string>& folders);
 

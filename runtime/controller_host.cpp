@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "controllers/hosted_call.hpp"
+
 namespace tandem::runtime {
 namespace {
 
@@ -74,7 +76,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(const std::s
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters) {
   ControllerSetup setup(*robot_, kernels_, period_ns_, std::move(parameters));
-  Status configured = controller->configure(setup);
+  Status configured = hosted_call(name, [&] { return controller->configure(setup); });
   setup.parameters.finish();
   if (configured) configured = check_claims(name, setup.claims());
   if (!configured) return std::unexpected(configured.error());

@@ -55,6 +55,24 @@ class BadInput : public Program {
   }
 };
 
+/// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with success.
+TEST_F(BadInput, FromAControllersLibraryIsRefused) {
+  const std::string folder = "TANDEM_CONTROLLERS=" TANDEM_BINARY_DIR "/tests/broken_plugins";
+  for (const std::string command : {"check", "run"}) {
+    edit("hold.toml", "plugin = \"hold\"", "plugin = \"throws\"");
+    const Outcome threw = tandem(command + " hold.toml", folder);
+    EXPECT_EQ(threw.status, 2) << threw.err;
+    EXPECT_NE(threw.err.find("threw an exception: no such thing"), std::string::npos) << threw.err;
+    edit("hold.toml", "plugin = \"throws\"", "plugin = \"exits\"");
+    const Outcome ended = tandem(command + " hold.toml", folder);
+    EXPECT_EQ(ended.status, 2) << ended.err;
+    EXPECT_NE(ended.err.find("the controller ended the process with exit()"), std::string::npos)
+        << ended.err;
+    edit("hold.toml", "plugin = \"exits\"", "plugin = \"hold\"");
+  }
+  EXPECT_FALSE(has_log());
+}
+
 TEST_F(BadInput, OfAnotherKindIsNamedWithTheCommandThatTakesIt) {
   const Outcome robot = tandem("run robot.toml");
   EXPECT_EQ(robot.status, 2);

@@ -80,5 +80,19 @@ TEST(PluginLoader, LooksIntoTheEnvironmentsFoldersFirst) {
   EXPECT_TRUE(folders[2].ends_with("/lib/controllers")) << folders[2];
 }
 
+TEST(PluginLoader, TurnsWhatALibraryThrowsIntoAnError) {
+  const auto loaded = load_controller("throws_when_made", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().to_string(),
+            "throws_when_made: the controller threw an exception: no such thing (a controller "
+            "returns its errors; correct it)");
+}
+
+/// A library that called exit(0) had ended `tandem check` with success.
+TEST(PluginLoader, DoesNotLetALibraryEndTheProcessAsIfAllWereWell) {
+  EXPECT_EXIT((void)load_controller("exits_when_made", kBroken), testing::ExitedWithCode(2),
+              "error: exits_when_made: the controller ended the process with exit\\(\\)");
+}
+
 }  // namespace
 }  // namespace tandem
