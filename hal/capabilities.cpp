@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace tandem::hal {
 namespace {
@@ -24,6 +25,20 @@ Capability needed(ControlMode mode) noexcept TANDEM_RT {
   return Capability::kPosition;
 }
 
+/// @param full  of the output over that of the input
+PidGains most(double full, double kp, double ki, double kd) {
+  return {.kp = kp * full, .ki = ki * full, .kd = kd * full};
+}
+
+std::array<PidGains, kPidLoops> most_gains(double torque, double voltage, double current) {
+  const double volts_Nm = torque > 0.0 ? voltage / torque : 0.0;
+  const double volts_A = current > 0.0 ? voltage / current : 0.0;
+  return {most(torque, 1e4, 1e5, 1e2), most(torque, 1e2, 1e4, 1.0), most(volts_Nm, 1e2, 1e5, 1.0),
+          most(volts_A, 1e2, 1e6, 1.0)};
+}
+
+}  // namespace
+
 JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint) {
   const ActuatorConfig& actuator = robot.actuator_of(joint);
   const GainsConfig& gains = robot.gains_of(joint);
@@ -44,6 +59,7 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   out.max_current_A = actuator.current_limit_A;
   if (torque) {
     out.max_torque_Nm = joint.max_torque_Nm;
+    out.most_gains = most_gains(out.max_torque_Nm, out.max_voltage_V, out.max_current_A);
     out.stiffness_Nm_rad = gains.stiffness_Nm_rad;
     out.damping_Nms_rad = gains.damping_Nms_rad;
     out.max_stiffness_Nm_rad = std::max(gains.position.gains.kp, gains.stiffness_Nm_rad);
@@ -52,8 +68,6 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   }
   return out;
 }
-
-}  // namespace
 
 const char* to_string(Capability capability) noexcept {
   switch (capability) {
@@ -72,6 +86,21 @@ bool JointCapabilities::can(ControlMode mode,
   if (mode == ControlMode::kIdle) return true;
   if (!can(needed(mode))) return false;
   return interaction == InteractionMode::kStiff || can(Capability::kCompliant);
+}
+
+std::string gains_problem(const JointCapabilities& joint, PidLoop loop, const PidGains& gains) {
+  const PidGains& most = joint.most_gains[static_cast<std::size_t>(loop)];
+  const auto beyond = [](const char* what, double value, double limit) {
+    char text[96];
+    std::snprintf(text, sizeof text,
+                  "%s = %g is beyond %g, the most that the joint's limits can use", what, value,
+                  limit);
+    return std::string(text);
+  };
+  if (!(gains.kp <= most.kp)) return beyond("kp", gains.kp, most.kp);
+  if (!(gains.ki <= most.ki)) return beyond("ki", gains.ki, most.ki);
+  if (!(gains.kd <= most.kd)) return beyond("kd", gains.kd, most.kd);
+  return {};
 }
 
 std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot) {

@@ -2,7 +2,9 @@
 // Layer: hal.  Thread: non-RT to make; immutable afterwards.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "base/realtime.hpp"
@@ -41,6 +43,11 @@ struct JointCapabilities {
   double stiffness_Nm_rad = 0.0;  ///< the gains table's default, when compliant
   double damping_Nms_rad = 0.0;
   std::uint8_t bits = 0;
+  /// Of each loop, by PidLoop: no gain can be more, in robot.toml or while it runs. Of an input at
+  /// its full range (1 rad, 1 rad/s, the torque limit, the current limit) a loop's kp asks for
+  /// 10^4, 100, 100 and 100 times the full output (torque limit or voltage limit): what is beyond
+  /// is a slip of digits or units. 0: no such loop.
+  std::array<PidGains, kPidLoops> most_gains{};
 
   [[nodiscard]] bool can(Capability capability) const noexcept TANDEM_RT {
     return (bits & static_cast<std::uint8_t>(capability)) != 0;
@@ -49,8 +56,15 @@ struct JointCapabilities {
   [[nodiscard]] bool can(ControlMode mode, InteractionMode interaction) const noexcept TANDEM_RT;
 };
 
+/// @pre  the joint's limits are known
+[[nodiscard]] JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint);
+
 /// Of every joint, in the image's order.
 [[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
+
+/// "" or what is wrong with gains of `loop`: "kp = 1e+30 is beyond …, all that … can use".
+[[nodiscard]] std::string gains_problem(const JointCapabilities& joint, PidLoop loop,
+                                        const PidGains& gains);
 
 /// Whether a joint can be put into a mode; asked for every claim at configuration.
 /// @return an Error that names the joint, the mode and the gains table that lacks a loop.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/capabilities.hpp"
 #include "hal/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -117,8 +118,8 @@ class NameCheck : private Check {
     if (one.joint.empty()) return errors_.push_back(std::move(one.error));
     if (follows_from_another(one.joint, moving)) return;
     if (const auto* follower = find(description_.followers, one.joint)) {
-      one.error.message = "the joint '" + one.joint + "' mimics '" + follower->leader +
-                          "' in the description";
+      one.error.message =
+          "the joint '" + one.joint + "' mimics '" + follower->leader + "' in the description";
       one.error.hint = "remove it here: it follows";
     } else if (!one.error.hint.empty()) {
       // says already what to do
@@ -236,6 +237,23 @@ class Completion : private Check {
       error(joint.line, key + ".rated_torque_Nm",
             "max_torque_Nm is more than 32 times the rated torque, the most the wire can say",
             "raise rated_torque_Nm");
+    }
+    check_gains(joint, key);
+  }
+
+  void check_gains(const JointConfig& joint, const std::string& key) {
+    if (!(joint.max_torque_Nm > 0.0)) return;
+    const GainsConfig& gains = robot_.gains_of(joint);
+    const JointCapabilities can = capabilities_of(robot_, joint);
+    for (const auto& [loop, config] : {std::pair{PidLoop::kPosition, &gains.position},
+                                       {PidLoop::kVelocity, &gains.velocity},
+                                       {PidLoop::kTorque, &gains.torque},
+                                       {PidLoop::kCurrent, &gains.current}}) {
+      const std::string problem = gains_problem(can, loop, config->gains);
+      if (problem.empty()) continue;
+      error(joint.line, key + ".gains",
+            "of [gains." + gains.name + "] the " + to_string(loop) + " loop's " + problem,
+            "correct the gain, or the joint's limits");
     }
   }
 

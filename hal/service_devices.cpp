@@ -6,8 +6,11 @@
 namespace tandem::hal {
 
 Code PidControl::set_pid(std::size_t j, PidLoop loop, const PidGains& gains) noexcept TANDEM_RT {
-  for (const double gain : {gains.kp, gains.ki, gains.kd}) {
-    const Code code = checked(io_, j, gain, 0.0, std::numeric_limits<double>::max());
+  const PidGains most =
+      j < io_.joints.size() ? io_.joints[j].most_gains[static_cast<std::size_t>(loop)] : PidGains{};
+  for (const auto& [gain, limit] :
+       {std::pair{gains.kp, most.kp}, {gains.ki, most.ki}, {gains.kd, most.kd}}) {
+    const Code code = checked(io_, j, gain, 0.0, limit);
     if (code != Code::kOk) return code;
   }
   io_.parameters.set_gains(j, loop, gains);

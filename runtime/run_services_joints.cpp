@@ -136,9 +136,11 @@ Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop
     return about(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",
                  "give [gains." + robot_->joints[*index].gains + "] one");
   }
-  constexpr double kMost = std::numeric_limits<float>::max();  // they travel as 32-bit numbers
-  for (const auto& [what, value] : {std::pair{"kp", wish.kp}, {"ki", wish.ki}, {"kd", wish.kd}}) {
-    const Status in_range = check_range(joint, what, value.value_or(0.0), kMost);
+  const hal::PidGains& most =
+      host_->capabilities()[*index].most_gains[static_cast<std::size_t>(loop)];
+  for (const auto& [what, value, limit] :
+       {std::tuple{"kp", wish.kp, most.kp}, {"ki", wish.ki, most.ki}, {"kd", wish.kd, most.kd}}) {
+    const Status in_range = check_range(joint, what, value.value_or(0.0), limit);
     if (!in_range) return std::unexpected(in_range.error());
   }
   const hal::PidGains before = gains_.gains(*index, loop);

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "hal/capabilities.hpp"
-
 namespace tandem::remote {
 
 using hal::OwnerLoss;
@@ -55,6 +53,7 @@ Server::Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity iden
       ring_(sizeof(Shown) + identity_.state_bytes + identity_.command_bytes + robot.joints.size(),
             kRingCycles),
       joints_(robot.joints.size()),
+      capabilities_(hal::joint_capabilities(robot)),
       thread_([this] { run(); }) {
   on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
   on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });
@@ -151,10 +150,17 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   if (!std::all_of(value, value + gains, [](double v) { return std::isfinite(v) && v >= 0.0; })) {
     return false;
   }
+  hal::ParameterImage wanted = gains_;
   for (std::size_t i = 0; i < gains; i += 3) {
-    gains_.set_gains(i / kGains, static_cast<hal::PidLoop>(i % kGains / 3),
-                     {.kp = value[i], .ki = value[i + 1], .kd = value[i + 2]});
+    const auto loop = static_cast<hal::PidLoop>(i % kGains / 3);
+    const hal::PidGains one{.kp = value[i], .ki = value[i + 1], .kd = value[i + 2]};
+    if (one != gains_.gains(i / kGains, loop) &&
+        !hal::gains_problem(capabilities_[i / kGains], loop, one).empty()) {
+      return false;
+    }
+    wanted.set_gains(i / kGains, loop, one);
   }
+  gains_ = std::move(wanted);
   if (gains != 0) ++gains_number_;
   if (to.gains_number != gains_number_) to.gains = gains_;
   to.gains_number = gains_number_;

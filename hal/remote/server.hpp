@@ -14,6 +14,7 @@
 
 #include "base/result.hpp"
 #include "base/spsc_ring.hpp"
+#include "hal/capabilities.hpp"
 #include "hal/command_port.hpp"
 #include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
@@ -143,6 +144,7 @@ class Server final : public hal::CommandPort {
   // The sending thread's.
   SpscRing ring_;
   std::size_t joints_;
+  std::vector<hal::JointCapabilities> capabilities_;
   std::mutex mutex_;  // of what follows
   std::condition_variable wake_;
   std::function<std::string()> status_;

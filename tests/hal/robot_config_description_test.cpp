@@ -155,6 +155,18 @@ TEST_F(Completed, AsksForALimitThatNobodyGives) {
             "gives a limit (set max_velocity_rad_s)\n");
 }
 
+/// A thousand times COMAN's gains gave torque steps of 183 Nm from one millisecond to the next.
+TEST_F(Completed, RefusesGainsThatNoJointCanUse) {
+  read(with("kp = 200, kd = 5", "kp = 2e6, kd = 5"));
+  EXPECT_NE(errors.find("leg.toml:44: joint.knee.gains: of [gains.big] the position loop's kp = "
+                        "2e+06 is beyond 800000, the most that the joint's limits can use (correct "
+                        "the gain, or the joint's limits)"),
+            std::string::npos)
+      << errors;
+  read(with("torque = {kp = 0.3}", "torque = {kp = 300}"));
+  EXPECT_NE(errors.find("the torque loop's kp = 300 is beyond"), std::string::npos) << errors;
+}
+
 TEST_F(Completed, SaysWhyTheDescriptionGivesNoLimits) {
   const double none = std::nan("");
   description_.moving_joints[1] = {"knee", none, none, none, 200.0, "leg.urdf:12 has no <limit>"};

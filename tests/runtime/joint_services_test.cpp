@@ -141,7 +141,7 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
     return text(services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, kNow));
   };
   EXPECT_NE(gain(-1.0).find("elbow: kp -1 is beyond"), std::string::npos);
-  EXPECT_NE(gain(1e39).find("beyond"), std::string::npos);
+  EXPECT_NE(gain(1e30).find("beyond the joint's limit"), std::string::npos) << "taken live before";
   EXPECT_NE(gain(std::nan("")).find("beyond"), std::string::npos);
   steps(2);
   EXPECT_EQ(services().joints()[1].gains[0].kp, 200.0);
