@@ -184,21 +184,36 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
 
 }  // namespace
 
+CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds) {
+  CLI::Option* domain =
+      app.add_option("--domain", place.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
+          ->check(CLI::Range(0, 232));
+  CLI::Option* interface = app.add_option("--interface", place.interfaces,
+                                          "Network interface of DDS (default: lo); may be repeated")
+                               ->allow_extra_args(false);
+  CLI::Option* from =
+      app.add_option("--dds-from", place.from,
+                     "Domain, interfaces, peers and DDS Security as [dds] of this TOML has them")
+          ->excludes(domain)
+          ->excludes(interface);
+  if (dds != nullptr) {
+    domain->needs(dds);
+    interface->needs(dds);
+  }
+  return from;
+}
+
 void add_target(CLI::App& app, ControlTarget& target) {
   CLI::Option* socket = app.add_option("--socket", target.socket, kSocketHelp);
   CLI::Option* dds =
       app.add_flag("--dds", target.dds, "Ask over DDS instead: the service tandem/ask")
           ->excludes(socket);
-  app.add_option("--domain", target.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
-      ->needs(dds)
-      ->check(CLI::Range(0, 232));
+  add_place(app, target.place, dds)->excludes(socket)->each([&target](const std::string&) {
+    target.dds = true;
+  });
   app.add_option("--namespace", target.name_space,
                  "Of the process in its domain (default: that of the only one)")
       ->needs(dds);
-  app.add_option("--interface", target.interfaces,
-                 "Network interface of DDS (default: lo); may be repeated")
-      ->needs(dds)
-      ->allow_extra_args(false);
 }
 
 void add_flags(CLI::App& app, RunOptions& o) {
@@ -345,7 +360,8 @@ void add_flags(CLI::App& app, NewOptions& o) {
                  "Series elastic drives in proportion to this robot's: its name or robot.toml");
   app.add_option("--base", o.base, "Instead of what its feet suggest")
       ->check(CLI::IsMember({"floating", "fixed"}));
-  app.add_flag("--force", o.force, "Into a folder that exists; files that differ are kept as FILE~");
+  app.add_flag("--force", o.force,
+               "Into a folder that exists; files that differ are kept as FILE~");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kNewExamples);
 }
@@ -391,8 +407,7 @@ void add_flags(CLI::App& app, ReportOptions& o) {
 void add_flags(CLI::App& app, LatencyOptions& o) {
   app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
       ->check(CLI::Range(50, 1'000'000));
-  app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")
-      ->check(a_duration());
+  app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")->check(a_duration());
   app.add_option("--mode", o.mode, "Who has which CPU when (default: swap)")
       ->check(CLI::IsMember({"swap", "together", "turns"}));
   app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")

@@ -16,6 +16,9 @@ inline constexpr char kSocketHelp[] =
 
 /// The flags that say which running process is asked, and by which way.
 void add_target(CLI::App& app, ControlTarget& target);
+/// --domain, --interface, --dds-from.
+/// @param dds  the flag that the first two need; null: none.  @return --dds-from
+CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds = nullptr);
 
 /// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
 /// has to outlive the parsing.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/control_target.hpp"
+#include "apps/dds_place.hpp"
 
 namespace tandem::apps {
 
@@ -29,20 +30,20 @@ struct RunOptions {
   std::string log_folder;             ///< empty: the experiment's
   std::string scenario;               ///< TOML of faults to inject; empty: none
   bool no_log = false;
-  std::string kernel_variant;           ///< empty: the best that this CPU runs
-  bool no_build = false;                ///< missing kernels are an error
-  std::string hal;                      ///< "sim", "can", "dds"; empty: the experiment's
-  bool lockstep = false;                ///< CAN, DDS: wait for the other end; serve: for an owner
+  std::string kernel_variant;  ///< empty: the best that this CPU runs
+  bool no_build = false;       ///< missing kernels are an error
+  std::string hal;             ///< "sim", "can", "dds"; empty: the experiment's
+  bool lockstep = false;       ///< CAN, DDS: wait for the other end; serve: for an owner
   std::optional<std::uint32_t> delay_cycles;  ///< instead of the experiment's
-  bool serves = false;                  ///< `tandem serve`: no controllers but an owner's
-  bool once = false;                    ///< ends when an owner gives the robot back
-  std::vector<std::string> interfaces;  ///< "can0=vcan0"
-  std::string record_frames;            ///< file of the bus' frames; empty: none
-  bool report = false;                  ///< draw the report after the run
-  std::string trace;                    ///< file of trace events; empty: none
-  std::size_t trace_cycles = 10'000;    ///< the last that `trace` holds
-  bool quiet = false;                   ///< neither progress nor table
-  std::string json;                     ///< file, "-" for standard output, empty for none
+  bool serves = false;                        ///< `tandem serve`: no controllers but an owner's
+  bool once = false;                          ///< ends when an owner gives the robot back
+  std::vector<std::string> interfaces;        ///< "can0=vcan0"
+  std::string record_frames;                  ///< file of the bus' frames; empty: none
+  bool report = false;                        ///< draw the report after the run
+  std::string trace;                          ///< file of trace events; empty: none
+  std::size_t trace_cycles = 10'000;          ///< the last that `trace` holds
+  bool quiet = false;                         ///< neither progress nor table
+  std::string json;                           ///< file, "-" for standard output, empty for none
   std::string socket;  ///< of the run's control; empty: default_control_path("run")
   bool no_socket = false;
   std::string on_fault;       ///< "end", "wait"; empty: the experiment's
@@ -215,8 +216,7 @@ struct DoctorOptions {
 struct TopicOptions {
   enum class Action : std::uint8_t { kList, kEcho, kHz } action = Action::kList;
   std::string topic;  ///< echo, hz: "/joint_states"
-  int domain = 0;
-  std::vector<std::string> interfaces{"lo"};
+  DdsPlace place;
   std::optional<double> wait_s;        ///< for discovery; empty: 1 (list), 5 (echo, hz)
   std::optional<std::uint64_t> count;  ///< echo, hz: samples, then it ends
   std::string field;                   ///< echo: "position[2]"; empty: all
@@ -227,26 +227,11 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command = std::variant<Exit,
-                             RunOptions,
-                             ServeOptions,
-                             AskOptions,
-                             FaultOptions,
-                             EstopOptions,
-                             ClockOptions,
-                             ControllerOptions,
-                             JointOptions,
-                             InjectOptions,
-                             CheckOptions,
-                             ModelOptions,
-                             NewOptions,
-                             LogOptions,
-                             EdsOptions,
-                             ReportOptions,
-                             LatencyOptions,
-                             DoctorOptions,
-                             EmulateOptions,
-                             TopicOptions>;
+using Command =
+    std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
+                 ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
+                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
+                 DoctorOptions, EmulateOptions, TopicOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

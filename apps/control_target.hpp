@@ -4,16 +4,16 @@
 
 #include <optional>
 #include <string>
-#include <vector>
+
+#include "apps/dds_place.hpp"
 
 namespace tandem::apps {
 
 struct ControlTarget {
-  std::string socket;  ///< of the process; empty: the only one of this user
-  bool dds = false;    ///< ask over DDS instead
-  int domain = 0;
-  std::optional<std::string> name_space;      ///< "left"; empty: the only process of the domain
-  std::vector<std::string> interfaces{"lo"};  ///< network interfaces, of DDS
+  std::string socket;                     ///< of the process; empty: the only one of this user
+  bool dds = false;                       ///< ask over DDS instead
+  DdsPlace place;                         ///< of DDS
+  std::optional<std::string> name_space;  ///< "left"; empty: the only process of the domain
 };
 
 }  // namespace tandem::apps

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/dds_config.hpp"
 #include "dds/service_client.hpp"
 
 namespace tandem::apps {
@@ -59,24 +60,24 @@ std::vector<dds::FoundService> look(const dds::ServiceFinder& finder, const Cont
   return found;
 }
 
-Error nobody(const ControlTarget& target) {
+Error nobody(const ControlTarget& target, const dds::Config& config) {
   const std::string where =
       target.name_space ? fmt::format(" in the namespace '{}'", *target.name_space) : "";
   return fail(
-             fmt::format("nobody serves {} in the DDS domain {}{}", kService, target.domain, where),
+             fmt::format("nobody serves {} in the DDS domain {}{}", kService, config.domain, where),
              "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace, and on "
-             "this network interface?")
+             "this network interface? One with DDS Security hears --dds-from alone")
       .error();
 }
 
-Error several(const std::vector<dds::FoundService>& found, const ControlTarget& target) {
+Error several(const std::vector<dds::FoundService>& found, const dds::Config& config) {
   std::string list;
   for (const dds::FoundService& one : found) {
     list +=
         fmt::format("\n  --namespace '{}' is {}, process {}", one.name_space, one.node, one.pid);
   }
   return fail(fmt::format("{} processes serve {} in the DDS domain {}", found.size(), kService,
-                          target.domain),
+                          config.domain),
               "say which; [dds] of an experiment gives it a namespace or a domain of its own:" +
                   list)
       .error();
@@ -84,20 +85,20 @@ Error several(const std::vector<dds::FoundService>& found, const ControlTarget& 
 
 }  // namespace
 
-Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& target) {
-  dds::Config config;
-  config.enabled = true;
-  config.domain = target.domain;
-  config.interfaces = target.interfaces;
-  auto domain = dds::Domain::open(config);
+Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& asked) {
+  const Result<dds::Config> config = dds_config(asked.place);
+  if (!config) return std::unexpected(config.error());
+  ControlTarget target = asked;
+  if (!target.name_space && !config->name_space.empty()) target.name_space = config->name_space;
+  auto domain = dds::Domain::open(*config);
   if (!domain) return std::unexpected(domain.error());
   auto participant = dds::Participant::open(std::move(*domain), "tandem_ask");
   if (!participant) return std::unexpected(participant.error());
   const auto finder = dds::ServiceFinder::create(**participant);
   if (!finder) return std::unexpected(finder.error());
   const std::vector<dds::FoundService> found = look(*finder, target);
-  if (found.empty()) return std::unexpected(nobody(target));
-  if (found.size() > 1) return std::unexpected(several(found, target));
+  if (found.empty()) return std::unexpected(nobody(target, *config));
+  if (found.size() > 1) return std::unexpected(several(found, *config));
   const std::string& name_space = found.front().name_space;
   auto client = AskClient::create(**participant,
                                   (name_space.empty() ? "/" : "/" + name_space + "/") + kService);

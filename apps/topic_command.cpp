@@ -6,6 +6,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/console.hpp"
+#include "apps/dds_config.hpp"
 #include "apps/topic_print.hpp"
 #include "apps/topic_rate.hpp"
 #include "base/nearest.hpp"
@@ -29,11 +30,9 @@ struct Part {
 };
 
 Result<Part> take_part(const TopicOptions& options) {
-  dds::Config config;
-  config.enabled = true;
-  config.domain = options.domain;
-  config.interfaces = options.interfaces;
-  auto domain = dds::Domain::open(config);
+  const Result<dds::Config> config = dds_config(options.place);
+  if (!config) return std::unexpected(config.error());
+  auto domain = dds::Domain::open(*config);
   if (!domain) return std::unexpected(domain.error());
   auto participant = dds::Participant::open(std::move(*domain), "tandem_topic");
   if (!participant) return std::unexpected(participant.error());
@@ -48,15 +47,16 @@ SteadyClock::time_point end_of_wait(const TopicOptions& options, double otherwis
              std::chrono::duration<double>(options.wait_s.value_or(otherwise_s)));
 }
 
-std::string where(const TopicOptions& options) {
-  std::string text = fmt::format("in domain {} on", options.domain);
-  for (const std::string& interface : options.interfaces) text += " " + interface;
+std::string where(const Part& part) {
+  const dds::Config& config = part.participant->config();
+  std::string text = fmt::format("in domain {} on", config.domain);
+  for (const std::string& interface : config.interfaces) text += " " + interface;
   return text;
 }
 
 const char kSilence[] =
     "does the other process talk DDS (--dds), in this domain (--domain), "
-    "over this interface (--interface)?";
+    "over this interface (--interface)? With DDS Security on it hears --dds-from alone";
 
 std::string qos_text(const dds::Qos& qos) {
   return fmt::format("{}, {}{}", qos.reliable ? "reliable" : "best effort",
@@ -89,7 +89,7 @@ Exit print_list(const TopicOptions& options, const Part& part) {
   if (table.rows() > 0) {
     table.print(out);
   } else {
-    fmt::print(out, "no topic {}: {}\n", where(options), kSilence);
+    fmt::print(out, "no topic {}: {}\n", where(part), kSilence);
   }
   if (const Status written = write_json(options.json, json); !written) {
     print_errors({written.error()});
@@ -113,7 +113,7 @@ Result<dds::TopicInfo> find_topic(const TopicOptions& options, const Part& part)
     }
     std::this_thread::sleep_for(kPoll);
   } while (SteadyClock::now() < end && !rt::stop_requested());
-  return fail(fmt::format("nobody writes {} {}", name, where(options)),
+  return fail(fmt::format("nobody writes {} {}", name, where(part)),
               known.empty() ? kSilence : suggest(name, known));
 }
 

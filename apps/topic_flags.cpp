@@ -5,6 +5,7 @@ namespace {
 
 const char kListExamples[] = R"(Examples:
   tandem topic list                                  in domain 0, on this machine
+  tandem topic list --dds-from squat.toml            where DDS Security is on: with its keys
   tandem topic list --domain 7 --interface eth0      as ROS_DOMAIN_ID=7, over the network
   tandem topic list --all --json - | jq .            services and the graph's topics, too)";
 
@@ -25,9 +26,7 @@ const char kTopicExamples[] = R"(Examples:
 Each subcommand's --help tells more.)";
 
 void add_domain(CLI::App& app, TopicOptions& o) {
-  app.add_option("--domain", o.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
-      ->check(CLI::Range(0, 232));
-  app.add_option("--interface", o.interfaces, "Network interface (default: lo); may be repeated");
+  add_place(app, o.place);
   app.add_option("--wait", o.wait_s,
                  "Seconds to look for others (default: 1 for list, at most 5 for echo and hz)")
       ->check(CLI::Range(0.0, 600.0));

@@ -235,5 +235,47 @@ TEST_F(Topic, NeedNoNetwork) {
   EXPECT_EQ(read_text(folder_ / "out.txt"), "- joint1\n- joint2\n---\n");
 }
 
+/// Before --dds-from an operator in a secured domain could not stop the robot over DDS.
+TEST_F(Topic, InASecuredDomainTheKeysOfATomlOpenEveryCommand) {
+#ifndef TANDEM_DDS_SECURITY
+  GTEST_SKIP() << "Cyclone DDS has no security plugins here";
+#endif
+  if (std::system("openssl version > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "the openssl command is not installed";
+  }
+  const std::string keys = (folder_ / "keys").string();
+  ASSERT_EQ(std::system((TANDEM_SOURCE_DIR "/examples/dds_security/make-files '" + keys +
+                         "' > /dev/null 2>&1")
+                            .c_str()),
+            0);
+  write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") + R"(
+[dds]
+namespace = "cell"
+domain = )" + std::to_string(dds::test::own_domain()) +
+                                        R"(
+[dds.security]
+identity_ca = "keys/ca.pem"
+identity_certificate = "keys/robot.pem"
+private_key = "keys/robot.key"
+permissions_ca = "keys/ca.pem"
+governance = "keys/governance.p7s"
+permissions = "keys/permissions.p7s"
+)");
+  begin("");
+  EXPECT_EQ(topic("echo /cell/joint_states --once --wait 1").status, 2)
+      << "a stranger hears nothing";
+  const Outcome stranger = tandem("estop --dds" + domain_);
+  EXPECT_NE(stranger.status, 0);
+  EXPECT_NE(stranger.err.find("--dds-from"), std::string::npos) << stranger.err;
+  const Outcome echo = tandem("topic echo /cell/joint_states --once --dds-from hold.toml");
+  EXPECT_EQ(echo.status, 0) << echo.err;
+  const Outcome stop = tandem("estop --dds-from hold.toml");
+  EXPECT_EQ(stop.status, 0) << stop.err;
+  EXPECT_NE(stop.out.find("emergency stop"), std::string::npos);
+  const Outcome without = tandem("estop --dds-from robot.toml");
+  EXPECT_NE(without.err.find("robot.toml: there is no table [dds]"), std::string::npos);
+  EXPECT_EQ(join(), 1) << "simulated time: the run ends with the stop";
+}
+
 }  // namespace
 }  // namespace tandem::apps
