@@ -41,7 +41,7 @@ class Writer {
     model();
     sites();
     drives();
-    line("\n# --- wires: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a board");
+    line("\n# --- wires, all of them a guess: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a board");
     line(
         "[board_defaults]\nslow_pdo_every = {}  # guess: motor currents and the like, every n-th "
         "cycle",

@@ -27,25 +27,30 @@ class Finder {
   std::vector<FoundSensor> run(const Outfit& outfit) {
     for (const SensorElement& element : outfit.sensors) {
       if (!mentions(element.type, "force")) continue;
-      add_wrench(tree_.child_link_index(element.parent), element.name);
+      add_wrench(tree_.child_link_index(element.parent), element.name, {});
     }
     for (std::size_t i = 0; i < tree_.links.size(); ++i) {
       const model::Link& link = tree_.links[i];
-      if (is_force_torque(link.name)) add_wrench(static_cast<int>(i), link.name);
+      if (is_force_torque(link.name)) {
+        add_wrench(static_cast<int>(i), link.name, by_name("link", link.name));
+      }
     }
     for (std::size_t i = 0; i < tree_.links.size(); ++i) {
       const model::Link& link = tree_.links[i];
       if (mass_kg_[i] > 0.0 && is_force_torque(link.joint)) {
-        add_wrench(static_cast<int>(i), link.joint);
+        add_wrench(static_cast<int>(i), link.joint, by_name("joint", link.joint));
       }
     }
     for (std::size_t i = 0; i < tree_.links.size(); ++i) {
-      if (mentions(tree_.links[i].name, "imu")) add_imu(static_cast<int>(i), {});
+      const std::string& name = tree_.links[i].name;
+      if (mentions(name, "imu")) {
+        add_imu(static_cast<int>(i), topic_token(name), by_name("link", name));
+      }
     }
     const bool imu = std::ranges::any_of(
         found_, [](const FoundSensor& s) { return s.config.type == hal::SensorType::kImu; });
     if (tree_.floating_base && !imu) {
-      add_imu(0, "the description names no IMU; say where it is, or remove it");
+      add_imu(0, "base_imu", "the description names no IMU; say where it is, or remove it");
     }
     return std::move(found_);
   }
@@ -67,7 +72,11 @@ class Finder {
     return link;
   }
 
-  void add_wrench(int named, std::string name) {
+  static std::string by_name(const std::string& what, const std::string& name) {
+    return "by the name of the " + what + " " + name + "; remove it if your robot has none";
+  }
+
+  void add_wrench(int named, std::string name, const std::string& guess) {
     const int link = named < 0 ? -1 : measured(named);
     if (link <= 0 || (!tree_.floating_base && tree_.links[link].body == 0)) return;
     const std::string& joint = tree_.links[link].joint;
@@ -88,16 +97,17 @@ class Finder {
     sensor.config.joint = joint;
     sensor.config.link = tree_.links[frame].name;
     sensor.body = tree_.links[link].body;
+    sensor.guess = guess;
     found_.push_back(std::move(sensor));
   }
 
-  void add_imu(int link, const std::string& guess) {
+  void add_imu(int link, std::string name, const std::string& guess) {
     const int body = tree_.links[link].body;
     for (const FoundSensor& other : found_) {
       if (other.config.type == hal::SensorType::kImu && other.body == body) return;
     }
     FoundSensor sensor;
-    sensor.config.name = guess.empty() ? topic_token(tree_.links[link].name) : "base_imu";
+    sensor.config.name = std::move(name);
     while (taken({}, sensor.config.name)) sensor.config.name += "_2";
     sensor.config.type = hal::SensorType::kImu;
     sensor.config.link = tree_.links[link].name;

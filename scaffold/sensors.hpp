@@ -14,7 +14,7 @@ namespace tandem::scaffold {
 struct FoundSensor {
   hal::SensorConfig config;  ///< name, type, joint, link
   int body = 0;              ///< that it sits on
-  std::string guess;         ///< what was assumed; empty: the description names it
+  std::string guess;         ///< what was assumed; empty: a <sensor> of the description
 };
 
 /// Force/torque sensors: <sensor> elements, and joints and links with "ft" or "force" in their
