@@ -33,7 +33,8 @@ Without --socket or --dds it is the only `tandem run` of this user.)";
 const char kEstopExamples[] = R"(Examples:
   tandem estop                                       with the category of robot.toml's [safety]
   tandem estop --category 0                          take the torque away at once
-`kill -USR1 PID` does the same without a socket.)";
+Exit status: 0 the loop has carried it out (or simulated time stands, and it is next); 1 no stop
+is confirmed. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
 
 const char kClockExamples[] = R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed

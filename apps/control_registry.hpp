@@ -63,7 +63,7 @@ class ControlRegistry {
   ControlRegistry& operator=(const ControlRegistry&) = delete;
 
   /// One handler runs at a time, except those that stop the robot: they wait for no other, so they
-  /// have to be safe beside them.
+  /// have to be safe beside them, and they hold up who carries them until the loop has confirmed.
   /// @param doc  one line, for "help".  @pre `name` is new
   void add(std::string name, ControlEffect effect, std::string doc, std::vector<ControlKey> keys,
            Handler handler);

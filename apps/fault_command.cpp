@@ -85,7 +85,10 @@ Exit estop_command(const EstopOptions& options) {
   Json question{{"do", "estop"}};
   if (options.category) question["category"] = *options.category;
   const Result<Json> answer = ask(options.target, "run", question);
-  if (!answer) return refused(answer.error());
+  if (!answer) {
+    print_errors({answer.error()});
+    return Exit::kFault;
+  }
   fmt::print("emergency stop, {}\n", answer->value("category", "?"));
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);
   return Exit::kDone;

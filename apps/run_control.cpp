@@ -2,6 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
 #include "apps/clock_control.hpp"
 #include "apps/controller_control.hpp"
 #include "apps/fault_table.hpp"
@@ -9,6 +13,24 @@
 
 namespace tandem::apps {
 namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::microseconds kLook{200};  // between two looks for a confirmation
+
+/// How long a stop may take to be confirmed. What is simulated may be slow without being stuck.
+std::chrono::nanoseconds stop_patience(const rt::ClockState& clock) {
+  constexpr std::chrono::nanoseconds kOnRobot = std::chrono::milliseconds(100);
+  constexpr std::chrono::nanoseconds kElsewhere = std::chrono::seconds(1);
+  constexpr std::chrono::nanoseconds kMost = std::chrono::seconds(3);  // less than clients wait
+  constexpr double kCycles = 10.0;
+  const double rate = clock.rate > 0.0 ? clock.rate : 1.0;
+  const double cycles_ns = kCycles * static_cast<double>(clock.period_ns) / rate;
+  if (cycles_ns >= static_cast<double>(kMost.count())) return kMost;
+  const bool on_robot = clock.pacing == rt::Pacing::kWallClock;
+  const std::chrono::nanoseconds cycles(static_cast<std::int64_t>(cycles_ns));
+  return std::min(kMost, cycles + (on_robot ? kOnRobot : kElsewhere));
+}
 
 Json status(const runtime::RobotCycle& cycle) {
   const runtime::Progress& progress = cycle.progress();
@@ -43,8 +65,31 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
     if (number != 0 && number != 1) return fail("estop: \"category\" is not 0 or 1");
     category = number == 0 ? hal::StopCategory::kCategory0 : hal::StopCategory::kCategory1;
   }
-  cycle.requests().emergency_stop(category);
-  return Json{{"category", hal::to_string(category)}, {"paused", time_stands(cycle)}};
+  const std::uint32_t number = cycle.requests().emergency_stop(category);
+  const rt::ClockState clock = cycle.clock_control().state();
+  const auto patience = stop_patience(clock);
+  const auto deadline = SteadyClock::now() + patience;
+  Json answer{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
+  for (;;) {
+    if (const auto carried_out = cycle.requests().confirmed(number)) {
+      answer["cycle"] = *carried_out;
+      return answer;
+    }
+    if (time_stands(cycle)) {  // the loop waits, and nothing moves until it has seen the stop
+      answer["paused"] = true;
+      answer["confirmed"] = false;
+      return answer;
+    }
+    if (cycle.progress().phase.load() == runtime::RunPhase::kDone) {
+      return fail("the run is over: its loop stops nothing any more");
+    }
+    if (SteadyClock::now() > deadline) break;
+    std::this_thread::sleep_for(kLook);
+  }
+  return fail(fmt::format("the emergency stop is latched, but not confirmed by the loop within "
+                          "{:.3g} s: the loop hangs, or is very slow",
+                          std::chrono::duration<double>(patience).count()),
+              "stop the robot by its own stop circuit");
 }
 
 }  // namespace
@@ -64,7 +109,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                "clears what is latched; resets or failed_resets counts on when done", {},
                [&cycle](const Json&) { return reset(cycle); });
   registry.add(
-      "estop", ControlEffect::kStops, "emergency stop, latched",
+      "estop", ControlEffect::kStops, "emergency stop, latched; waits until the loop confirms it",
       {{.name = "category",
         .type = ControlKey::Type::kInteger,
         .doc = "0 or 1; else what robot.toml's [safety] says"}},

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 
 #include "base/realtime.hpp"
 #include "hal/stop_category.hpp"
@@ -12,7 +13,7 @@
 namespace tandem::runtime {
 
 /// Wait-free both ways. A request waits until the loop takes it; the same one twice is one. A loop
-/// that blocks hears of it by its doorbell.
+/// that blocks hears of it by its doorbell. Emergency stops are confirmed.
 class Requests {
  public:
   /// What was asked for since the last take().
@@ -31,26 +32,54 @@ class Requests {
   }
   void reset_faults() noexcept { ask(kReset); }
   /// kCategory0; every other category stops as category 1.
-  void emergency_stop(hal::StopCategory category) noexcept {
-    ask(category == hal::StopCategory::kCategory0 ? kStop0 : kStop1);
+  /// @return the stop's number, for confirmed()
+  std::uint32_t emergency_stop(hal::StopCategory category) noexcept {
+    asked_.fetch_or(category == hal::StopCategory::kCategory0 ? kStop0 : kStop1,
+                    std::memory_order_relaxed);
+    // After its flag: whoever takes this number has taken the flag too, now or before.
+    const std::uint32_t before = asked_.fetch_add(kOneStop, std::memory_order_relaxed);
+    bell_->ring();
+    return number_of(before + kOneStop);
+  }
+  /// The number of the cycle that has carried out the stop `number`; empty: none has yet. A loop
+  /// that hangs never does. Not more than 2^23 stops later.
+  [[nodiscard]] std::optional<std::uint64_t> confirmed(std::uint32_t number) const noexcept {
+    const std::uint32_t ahead = (confirmed_.load(std::memory_order_acquire) - number) & kNumbers;
+    if (ahead > kNumbers / 2) return std::nullopt;
+    return confirmed_cycle_.load(std::memory_order_relaxed);
   }
 
   /// Whether take() has something to tell.
   [[nodiscard]] bool pending() const noexcept {
-    return asked_.load(std::memory_order_relaxed) != 0;
+    return (asked_.load(std::memory_order_relaxed) & kFlags) != 0;
   }
+  /// The loop's.
   [[nodiscard]] Asked take() noexcept TANDEM_RT {
-    if (asked_.load(std::memory_order_relaxed) == 0) return {};
-    const std::uint32_t asked = asked_.exchange(0, std::memory_order_relaxed);
+    const std::uint32_t seen = asked_.load(std::memory_order_relaxed);
+    taken_ = number_of(seen);
+    if ((seen & kFlags) == 0) return {};
+    const std::uint32_t asked = asked_.fetch_and(~kFlags, std::memory_order_relaxed);
+    taken_ = number_of(asked);
     return {.end = (asked & kEnd) != 0,
             .reset = (asked & kReset) != 0,
             .emergency_stop = (asked & kStop0) != 0   ? hal::StopCategory::kCategory0
                               : (asked & kStop1) != 0 ? hal::StopCategory::kCategory1
                                                       : hal::StopCategory::kWarn};
   }
+  /// The loop's, when the commands of `cycle` are out: what take() told of is carried out.
+  void confirm(std::uint64_t cycle) noexcept TANDEM_RT {
+    if (taken_ == confirmed_.load(std::memory_order_relaxed)) return;
+    confirmed_cycle_.store(cycle, std::memory_order_relaxed);
+    confirmed_.store(taken_, std::memory_order_release);
+  }
 
  private:
+  // One word: flags below, the count of emergency stops above them.
   static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8;
+  static constexpr std::uint32_t kFlags = 0xFF, kOneStop = 0x100, kNumbers = 0xFF'FFFF;
+  static constexpr std::uint32_t number_of(std::uint32_t word) noexcept {
+    return word / kOneStop;
+  }
   void ask(std::uint32_t what) noexcept {
     asked_.fetch_or(what, std::memory_order_relaxed);
     bell_->ring();
@@ -58,6 +87,9 @@ class Requests {
 
   rt::Doorbell* bell_;
   std::atomic<std::uint32_t> asked_{0};
+  std::uint32_t taken_ = 0;  // the loop's
+  std::atomic<std::uint32_t> confirmed_{0};
+  std::atomic<std::uint64_t> confirmed_cycle_{0};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 };
 

@@ -41,6 +41,7 @@ void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
   write();
   mark(Stage::kWrite);
   hand_over();
+  requests_.confirm(time_.cycle);
   finished_ns_ = loop_.finish();
   mark(Stage::kHandOver, finished_ns_);
 }

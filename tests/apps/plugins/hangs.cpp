@@ -1,0 +1,39 @@
+// A controller that holds its joints, until it does not return from one update.
+#include <chrono>
+#include <vector>
+
+#include "controllers/controller.hpp"
+
+namespace {
+
+using namespace tandem;
+using SteadyClock = std::chrono::steady_clock;
+
+class Hangs final : public Controller {
+ public:
+  Status configure(ControllerSetup& setup) override {
+    after_ = setup.parameters.integer_or("after_cycles", 100, 0, 1'000'000'000);
+    for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
+    for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
+      setup.claim(j, hal::ControlMode::kPosition);
+    }
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&,
+             hal::CommandImage&) noexcept TANDEM_RT override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage&) noexcept TANDEM_RT override {
+    if (++cycles_ != after_) return Code::kOk;
+    const auto until = SteadyClock::now() + std::chrono::duration<double>(for_s_);
+    while (for_s_ == 0.0 || SteadyClock::now() < until) asm volatile("" ::: "memory");
+    return Code::kOk;
+  }
+
+ private:
+  std::int64_t after_ = 0, cycles_ = 0;
+  double for_s_ = 0.0;
+};
+
+}  // namespace
+
+TANDEM_CONTROLLER(Hangs, "hangs", "Does not return from one of its updates.")
