@@ -39,13 +39,13 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
 }
 
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           std::FILE* out, bool quiet) {
+           const LoopGuard& guard, std::FILE* out, bool quiet) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
   Progress bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.can_buses(), stderr);
-  while (!loop.done()) {
+  while (!loop.done() && !guard.gave_up()) {
     if (!quiet) buses.look();
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "apps/composition.hpp"
+#include "apps/loop_guard.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -31,8 +32,9 @@ class LoopThread {
   std::thread thread_;  // last: it uses the others
 };
 
-/// Shows progress and the buses' states until the loop is done; with `quiet` it only waits.
+/// Shows progress and the buses' states until the loop is done, or given up; with `quiet` it only
+/// waits.
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           std::FILE* out, bool quiet);
+           const LoopGuard& guard, std::FILE* out, bool quiet);
 
 }  // namespace tandem::apps

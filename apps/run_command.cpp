@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <optional>
@@ -9,6 +10,7 @@
 #include "apps/dds_run.hpp"
 #include "apps/dds_services.hpp"
 #include "apps/inject.hpp"
+#include "apps/loop_guard.hpp"
 #include "apps/loop_thread.hpp"
 #include "apps/remote_gate.hpp"
 #include "apps/remote_link.hpp"
@@ -144,6 +146,22 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
   return DdsServices::open(run->participant(), commands, remote_gate(remote, owner));
 }
 
+/// The loop was given up. Its thread is still there, and may go on at any time: what it uses stays.
+[[noreturn]] void end_without_loop(const LoopGuard& guard, const RunOptions& options,
+                                   Composition& c, log::Recorder* recorder,
+                                   std::unique_ptr<ControlSocket>& socket) {
+  const std::string fault = "the loop hung " + guard.where() + " and did not come back";
+  std::string log;
+  if (recorder != nullptr) log = recorder->close({{"ended", fault}}).path;
+  if (c.frames != nullptr) (void)c.frames->close();
+  remember_error({.message = fault, .hint = {}, .file = {}, .key = {}});
+  write_failure(options.json);
+  socket.reset();
+  fmt::print(stderr, "fault: {}{}\n", fault, log.empty() ? "" : "; the log up to then is " + log);
+  std::fflush(nullptr);
+  ::_exit(static_cast<int>(Exit::kFault));
+}
+
 Exit run(Composition& c, const RunOptions& options) {
   std::FILE* out = human_output(options.json);
   runtime::Experiment& e = c.experiment;
@@ -195,7 +213,7 @@ Exit run(Composition& c, const RunOptions& options) {
     });
   }
   const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
-  const auto socket = serve(
+  auto socket = serve(
       commands,
       {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
   if (!socket) {
@@ -212,9 +230,16 @@ Exit run(Composition& c, const RunOptions& options) {
   std::optional<rt::NoCpuSleep> awake;
   if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
   if (*dds != nullptr) (*dds)->start(cycle);
+  auto guard = LoopGuard::open(c, cycle);
+  if (!guard) {
+    print_errors({guard.error()});
+    return Exit::kUsage;
+  }
   LoopThread loop(cycle, e.thread);
-  watch(cycle, loop, c, out, options.quiet);
+  watch(cycle, loop, c, **guard, out, options.quiet);
+  if ((*guard)->gave_up()) end_without_loop(**guard, options, c, recorder.get(), *socket);
   loop.join();
+  guard->reset();
   if (*server != nullptr) (*server)->close();
   if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 

@@ -38,7 +38,9 @@ std::string describe(const Event& event, std::span<const std::string> joints) {
   const bool has_joint = event.joint >= 0 && static_cast<std::size_t>(event.joint) < joints.size();
   if (has_joint) text += " of " + joints[static_cast<std::size_t>(event.joint)];
   if (event.kind == EventKind::kEmergencyStop) {
-    return text + (event.code == 1 ? " by a signal" : " on request");
+    return text + (event.code == 1   ? " by a signal"
+                   : event.code == 3 ? " by the watchdog"
+                                     : " on request");
   }
   if (event.code == 0 || event.kind == EventKind::kInjected) return text;
   char code[32];

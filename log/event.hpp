@@ -23,7 +23,7 @@ enum class EventKind : std::uint8_t {
   kStopRequested,    ///< from outside: signal or caller
   kShutDown,         ///< the drives are disabled
   kInjected,         ///< a fault was injected: `code` is its hal::FaultKind
-  kEmergencyStop,    ///< `code`: 1 by a signal, 2 on request
+  kEmergencyStop,    ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
   kResetRequested,   ///< of the latched faults
   kResetDone,        ///< every joint is enabled again
   kResetFailed,      ///< a cause is still there

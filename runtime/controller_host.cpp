@@ -175,8 +175,9 @@ void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& st
     if (is_active(slot)) set_modes(*table_[slot], command);
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) table_[slot]->controller->start(time, state, command);
+    if (is_active(slot)) enter(*table_[slot]).start(time, state, command);
   }
+  leave_calls();
 }
 
 Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
@@ -187,16 +188,18 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
     if (!is_active(slot)) continue;
     const HostedController& one = *table_[slot];
     if ((done_ & only(slot)) == 0) {
-      const Code code = one.controller->update(time, state, command);
+      const Code code = enter(one).update(time, state, command);
       if (code == Code::kStopped) {
         done_ |= only(slot);
       } else if (code != Code::kOk) {
         culprit_ = one.id;
+        leave_calls();
         return code;
       }
     }
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
+  leave_calls();
   take_over_.after_update(state, command);
   show();
   return ends ? Code::kStopped : Code::kOk;
@@ -204,8 +207,9 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
 
 void ControllerHost::stop() noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) table_[slot]->controller->stop();
+    if (is_active(slot)) enter(*table_[slot]).stop();
   }
+  leave_calls();
   take_over_.clear();
 }
 

@@ -144,6 +144,10 @@ class ControllerHost {
   [[nodiscard]] std::size_t size() const noexcept;
   /// For name(): the controller whose code update() returned last.
   [[nodiscard]] std::size_t culprit() const noexcept { return culprit_; }
+  /// For name(): the controller that is in a call of the cycle; -1: none. Any thread.
+  [[nodiscard]] std::int32_t at_work() const noexcept {
+    return at_work_.load(std::memory_order_relaxed);
+  }
   /// The slot of the active controller that claims `joint`, or -1.
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
@@ -167,6 +171,11 @@ class ControllerHost {
   [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   void set_active(ControllerSet active) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
+  [[nodiscard]] Controller& enter(const HostedController& one) noexcept TANDEM_RT {
+    at_work_.store(static_cast<std::int32_t>(one.id), std::memory_order_relaxed);
+    return *one.controller;
+  }
+  void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
 
   struct Impedance {
     double stiffness_Nm_rad = 0.0;
@@ -186,6 +195,7 @@ class ControllerHost {
   TakeOver take_over_;
   std::size_t culprit_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
+  std::atomic<std::int32_t> at_work_{-1};
 
   mutable std::mutex names_mutex_;
   std::vector<std::string> names_;  // by id; of all that ever were

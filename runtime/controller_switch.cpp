@@ -133,14 +133,15 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((stop & only(slot)) == 0) continue;
-    table_[slot]->controller->stop();
+    enter(*table_[slot]).stop();
     for (const auto& claim : table_[slot]->claims) leave(claim.joint, state, command);
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     set_modes(*table_[slot], command);
-    table_[slot]->controller->start(time, state, command);
+    enter(*table_[slot]).start(time, state, command);
   }
+  leave_calls();
   return {};
 }
 

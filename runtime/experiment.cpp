@@ -97,14 +97,13 @@ rt::ThreadConfig read_realtime(TomlTable& root) {
   return thread;
 }
 
-std::optional<AfterStop> read_faults(TomlTable table) {
-  std::optional<AfterStop> after_stop;
+void read_faults(TomlTable table, Experiment& e) {
   if (table.has("after_stop")) {
     const bool ends = table.choice("after_stop", {"end", "wait"}) == "end";
-    after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
+    e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
   }
+  if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
   table.finish();
-  return after_stop;
 }
 
 RemoteOptions read_remote(TomlTable table) {
@@ -191,7 +190,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   read_overrun(root.table_or_empty("overrun"), e.loop);
   read_clock(root.table_or_empty("clock"), e.loop);
   e.thread = read_realtime(root);
-  e.after_stop = read_faults(root.table_or_empty("faults"));
+  read_faults(root.table_or_empty("faults"), e);
   e.remote = read_remote(root.table_or_empty("remote"));
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));

@@ -28,7 +28,11 @@ enum class FaultSource : std::uint8_t {
 };
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.
-enum class EmergencyInput : std::uint32_t { kSignal = 1, kRequest = 2 };
+enum class EmergencyInput : std::uint32_t {
+  kSignal = 1,
+  kRequest = 2,
+  kWatchdog = 3,  ///< the loop hung, in the controller `index`; -1: in none
+};
 
 struct FaultRecord {
   std::uint64_t cycle = 0;

@@ -21,6 +21,8 @@ class Requests {
     bool end = false;                                             ///< of the run, in order
     bool reset = false;                                           ///< of every latched fault
     hal::StopCategory emergency_stop = hal::StopCategory::kWarn;  ///< the hardest; kWarn: none
+    bool by_watchdog = false;      ///< an emergency stop, of the robot's category
+    std::int32_t controller = -1;  ///< with it: the loop hung in this one; -1: in none
   };
 
   /// @param bell  rings with every request, and knows when the run is to end; outlives this
@@ -41,6 +43,13 @@ class Requests {
     bell_->ring();
     return number_of(before + kOneStop);
   }
+  /// The loop hangs; it stops the robot as soon as it can, and ends the run.
+  /// @param controller  ControllerHost::at_work(). One watchdog asks.
+  void watchdog_stop(std::int32_t controller) noexcept {
+    hung_in_.store(controller, std::memory_order_relaxed);
+    asked_.fetch_or(kWatchdog | kEnd, std::memory_order_release);
+    bell_->end();
+  }
   /// The number of the cycle that has carried out the stop `number`; empty: none has yet. A loop
   /// that hangs never does. Not more than 2^23 stops later.
   [[nodiscard]] std::optional<std::uint64_t> confirmed(std::uint32_t number) const noexcept {
@@ -58,13 +67,15 @@ class Requests {
     const std::uint32_t seen = asked_.load(std::memory_order_relaxed);
     taken_ = number_of(seen);
     if ((seen & kFlags) == 0) return {};
-    const std::uint32_t asked = asked_.fetch_and(~kFlags, std::memory_order_relaxed);
+    const std::uint32_t asked = asked_.fetch_and(~kFlags, std::memory_order_acquire);
     taken_ = number_of(asked);
     return {.end = (asked & kEnd) != 0,
             .reset = (asked & kReset) != 0,
             .emergency_stop = (asked & kStop0) != 0   ? hal::StopCategory::kCategory0
                               : (asked & kStop1) != 0 ? hal::StopCategory::kCategory1
-                                                      : hal::StopCategory::kWarn};
+                                                      : hal::StopCategory::kWarn,
+            .by_watchdog = (asked & kWatchdog) != 0,
+            .controller = hung_in_.load(std::memory_order_relaxed)};
   }
   /// The loop's, when the commands of `cycle` are out: what take() told of is carried out.
   void confirm(std::uint64_t cycle) noexcept TANDEM_RT {
@@ -75,7 +86,7 @@ class Requests {
 
  private:
   // One word: flags below, the count of emergency stops above them.
-  static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8;
+  static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8, kWatchdog = 16;
   static constexpr std::uint32_t kFlags = 0xFF, kOneStop = 0x100, kNumbers = 0xFF'FFFF;
   static constexpr std::uint32_t number_of(std::uint32_t word) noexcept {
     return word / kOneStop;
@@ -88,6 +99,7 @@ class Requests {
   rt::Doorbell* bell_;
   std::atomic<std::uint32_t> asked_{0};
   std::uint32_t taken_ = 0;  // the loop's
+  std::atomic<std::int32_t> hung_in_{-1};
   std::atomic<std::uint32_t> confirmed_{0};
   std::atomic<std::uint64_t> confirmed_cycle_{0};
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free);

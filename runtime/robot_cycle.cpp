@@ -24,13 +24,16 @@ bool RobotCycle::step() noexcept {
 
 void RobotCycle::sense(const rt::Tick& tick) noexcept TANDEM_RT {
   const rt::ScopedRealtime in_cycle;
+  heartbeat_.enter();
   read();
   mark(Stage::kRead);
   check(tick);
+  heartbeat_.leave();
 }
 
 void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
   const rt::ScopedRealtime in_cycle;
+  heartbeat_.enter();
   follow_owner();
   take_requests();
   mark(Stage::kCheck);
@@ -44,6 +47,7 @@ void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
   requests_.confirm(time_.cycle);
   finished_ns_ = loop_.finish();
   mark(Stage::kHandOver, finished_ns_);
+  heartbeat_.leave();
 }
 
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time

@@ -20,6 +20,7 @@
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_trace.hpp"
 #include "runtime/fault.hpp"
+#include "runtime/heartbeat.hpp"
 #include "runtime/owner_controller.hpp"
 #include "runtime/progress.hpp"
 #include "runtime/requests.hpp"
@@ -89,6 +90,9 @@ class RobotCycle {
   [[nodiscard]] rt::ClockControl& clock_control() noexcept { return clock_control_; }
   [[nodiscard]] const rt::ClockControl& clock_control() const noexcept { return clock_control_; }
 
+  /// For any thread: whether the loop still cycles.
+  [[nodiscard]] const Heartbeat& heartbeat() const noexcept { return heartbeat_; }
+
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return phase_; }
   [[nodiscard]] const hal::StateImage& state() const noexcept { return state_; }
@@ -147,7 +151,8 @@ class RobotCycle {
 
   // robot_cycle_faults.cpp
   void take_requests() noexcept TANDEM_RT;
-  void emergency_stop(EmergencyInput input, hal::StopCategory category) noexcept TANDEM_RT;
+  void emergency_stop(EmergencyInput input, hal::StopCategory category,
+                      std::int32_t controller = -1) noexcept TANDEM_RT;
   [[nodiscard]] bool in_fault(std::size_t joint) const noexcept TANDEM_RT;
   [[nodiscard]] bool is_lost(std::size_t joint) const noexcept TANDEM_RT;
   void fault(FaultRecord record) noexcept TANDEM_RT;
@@ -215,6 +220,7 @@ class RobotCycle {
   log::Recorder::Channel state_channel_ = 0, command_channel_ = 0, truth_channel_ = 0;
   Requests requests_{bell_};
   Progress progress_;
+  Heartbeat heartbeat_;
   LoopMailbox mailbox_;
   RunServices services_;
   std::vector<JointLook> looks_;

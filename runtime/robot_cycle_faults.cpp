@@ -15,6 +15,9 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
   if (asked.emergency_stop != StopCategory::kWarn) {
     emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
   }
+  if (asked.by_watchdog) {
+    emergency_stop(EmergencyInput::kWatchdog, robot_->emergency_stop, asked.controller);
+  }
   if (rt::take_emergency_stop()) emergency_stop(EmergencyInput::kSignal, robot_->emergency_stop);
   if (asked.reset) begin_reset();
   const bool end = asked.end || rt::stop_requested();
@@ -25,9 +28,11 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
   take_services();
 }
 
-void RobotCycle::emergency_stop(EmergencyInput input, StopCategory category) noexcept TANDEM_RT {
+void RobotCycle::emergency_stop(EmergencyInput input, StopCategory category,
+                                std::int32_t controller) noexcept TANDEM_RT {
   event(EventKind::kEmergencyStop, -1, static_cast<std::uint32_t>(input));
-  fault({.code = static_cast<std::uint32_t>(input),
+  fault({.index = controller,
+         .code = static_cast<std::uint32_t>(input),
          .source = FaultSource::kEmergencyStop,
          .category = category});
 }

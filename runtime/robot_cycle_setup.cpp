@@ -121,9 +121,14 @@ Fault RobotCycle::tell(std::size_t number) const {
       break;
     case FaultSource::kBringUp: fault.text = "the drives were not enabled in time"; break;
     case FaultSource::kEmergencyStop:
-      fault.text = static_cast<EmergencyInput>(record.code) == EmergencyInput::kSignal
-                       ? "emergency stop by a signal"
-                       : "emergency stop on request";
+      switch (static_cast<EmergencyInput>(record.code)) {
+        case EmergencyInput::kSignal: fault.text = "emergency stop by a signal"; break;
+        case EmergencyInput::kRequest: fault.text = "emergency stop on request"; break;
+        case EmergencyInput::kWatchdog:
+          if (record.index >= 0) fault.joint = controllers_->name(index);
+          fault.text = "emergency stop by the watchdog: the loop hung";
+          break;
+      }
       break;
     case FaultSource::kOwner:
       switch (static_cast<hal::OwnerLoss>(record.code)) {

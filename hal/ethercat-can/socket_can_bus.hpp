@@ -24,6 +24,7 @@ enum class SocketSide : std::uint8_t {
   kMaster,   ///< what nodes send: emergencies, TPDOs, SDO answers, heartbeats, TIME
   kBoards,   ///< what a master sends: NMT, SYNC, RPDOs, SDO requests, the master's heartbeat
   kWitness,  ///< every frame
+  kSender,   ///< nothing: for who only sends
 };
 
 struct SocketCanOptions {

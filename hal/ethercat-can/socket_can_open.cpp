@@ -148,7 +148,7 @@ std::vector<can_filter> filters(SocketSide side) {
     }
     let(cob::kSdoRequest, kFunctionMask);
     let(cob::kHeartbeat + kMasterNodeId, cob::kIdMask);
-  } else {
+  } else if (side == SocketSide::kWitness) {
     all.push_back({.can_id = 0, .can_mask = 0});
   }
   return all;
@@ -156,7 +156,7 @@ std::vector<can_filter> filters(SocketSide side) {
 
 Status configure(const SocketCanOptions& options, std::span<const can_filter> filter, int socket) {
   if (auto sized = size_queues(options, socket); !sized) return sized;
-  const can_err_mask_t every_error = CAN_ERR_MASK;
+  const can_err_mask_t every_error = options.side == SocketSide::kSender ? 0 : CAN_ERR_MASK;
   const int on = 1;
   const bool done = set(socket, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, on) &&
                     set(socket, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, every_error) &&

@@ -27,9 +27,9 @@ TEST_F(Stops, AreConfirmedByTheLoopWithItsCycle) {
   EXPECT_EQ(end(), 1);
 }
 
-// It had printed "emergency stop, category0" and returned 0.
-TEST_F(Stops, AreNotConfirmedByALoopThatHangs) {
-  hang("0.0");
+// It had printed "emergency stop, category0" and returned 0, and the run had hung for ever.
+TEST_F(Stops, AreNotConfirmedByALoopThatHangsWhichTheWatchdogEnds) {
+  hang("0.0", "[faults]\nwatchdog_s = 2.0\n");
   start("");
   until(R"("running_cycles": 99)");
   const Outcome stop = to_run("estop --category 0");
@@ -37,8 +37,56 @@ TEST_F(Stops, AreNotConfirmedByALoopThatHangs) {
   EXPECT_EQ(stop.out, "");
   EXPECT_NE(stop.err.find("not confirmed by the loop within 1.01 s"), std::string::npos)
       << stop.err;
-  signal("KILL");
-  EXPECT_NE(join(), 0);
+  EXPECT_EQ(join(), 1);
+  const std::string told = read_text(folder_ / "run.txt");
+  EXPECT_NE(told.find("fault: the loop hangs: no cycle for 2 s, it is in the controller 'lazy'. The "
+                      "emergency stop is latched; the process ends in 2 s"),
+            std::string::npos)
+      << told;
+  const std::string last = "the loop hung in the controller 'lazy' and did not come back";
+  EXPECT_NE(told.find("fault: " + last), std::string::npos) << told;
+  EXPECT_EQ(json("run.json")["ok"], false);
+  EXPECT_EQ(json("run.json")["errors"][0]["message"], last);
+  EXPECT_FALSE(std::filesystem::exists(socket_)) << "the next run finds its way clear";
+}
+
+TEST_F(Stops, OfALoopThatHangsLeaveALogThatCanBeRead) {
+  hang("0.0", "[faults]\nwatchdog_s = 0.2\n");
+  EXPECT_EQ(tandem("run hold.toml --no-socket -q").status, 1);
+  const Outcome info = tandem("log info runs/*.mcap");
+  EXPECT_EQ(info.status, 0) << info.err;
+  EXPECT_NE(info.out.find("/tandem/state"), std::string::npos) << info.out;
+  EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
+}
+
+TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
+  hang("1.0", "[faults]\nwatchdog_s = 0.2\n");
+  const Outcome run = tandem("run hold.toml --no-log --no-socket --json run.json");
+  EXPECT_EQ(run.status, 1);
+  for (const char* text :
+       {"the loop hangs: no cycle for 0.2 s, it is in the controller 'lazy'",
+        "note: the loop cycles again; the run ends in order",
+        "lazy: emergency stop by the watchdog: the loop hung"}) {
+    EXPECT_NE(run.err.find(text), std::string::npos) << text << "\nin: " << run.err;
+  }
+  EXPECT_EQ(json("run.json")["fault_log"][0]["joint"], "lazy");
+  EXPECT_LT(json("run.json")["running_cycles"], 200);
+}
+
+// Neither is a hang, whatever the watchdog's time.
+TEST_F(Stops, OfTheWatchdogAreNotForALoopThatWaits) {
+  edit("hold.toml", "[[controller]]", "[faults]\nwatchdog_s = 0.2\n[[controller]]");
+  start("--start-paused --duration 3");
+  until(R"("paused": true)");
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  (void)to_run("clock rate 2");
+  (void)to_run("clock resume");
+  until(R"("phase": "running")");
+  signal("STOP");
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  signal("CONT");
+  EXPECT_EQ(join(), 0);
+  EXPECT_EQ(read_text(folder_ / "run.txt"), "");
 }
 
 TEST_F(Stops, AreNotConfirmedByAProcessThatDoesNotAnswer) {

@@ -68,6 +68,29 @@ TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
   EXPECT_GT(syncs.back() - syncs.front(), 0.5 * kPeriodS * static_cast<double>(syncs.size()));
 }
 
+// The boards were safe by their own time-out, the process hung for ever and nobody was told.
+TEST_F(RealTime, ALoopThatHangsIsEndedAndEveryNodeIsStopped) {
+  write("hold.toml", text_of(folder_ / "hold.toml"), "plugin = \"hold\"",
+        "plugin = \"" TANDEM_BINARY_DIR "/tests/test_plugins/hangs.so\"");
+  Candump candump("can0", folder_ / "candump.log");
+  Process robot(emulate_words(), folder_ / "emulate.txt");
+  ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
+  Process master(run_words("100"), folder_ / "run.txt");
+  EXPECT_EQ(master.wait(), 1);
+  for (const char* text : {"fault: the loop hangs: no cycle for 0.5 s, it is in the controller "
+                           "'hangs'. The emergency stop is latched; NMT stop is sent on can0; ",
+                           "fault: the loop hung in the controller 'hangs' and did not come back"}) {
+    EXPECT_NE(master.output().find(text), std::string::npos) << text << "\nin: " << master.output();
+  }
+  EXPECT_EQ(robot.interrupt(), 0) << robot.output();
+  double stopped_s = 0.0, last_sync_s = 0.0;
+  for (const LoggedFrame& frame : candump.stop()) {
+    if (frame.text == "can0 000#0200") stopped_s = frame.time_s;
+    if (frame.id() == "080") last_sync_s = frame.time_s;
+  }
+  EXPECT_GT(stopped_s, last_sync_s) << "and no SYNC comes any more";
+}
+
 TEST_F(RealTime, TellsOfAnIllBusAndEndsWhenItsInterfaceIsTakenDown) {
   Process robot(emulate_words(), folder_ / "emulate.txt");
   ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();

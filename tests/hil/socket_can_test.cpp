@@ -130,6 +130,7 @@ TEST(SocketCan, KernelLetsThroughWhatTheOtherSideSends) {
   EXPECT_EQ(heard(SocketSide::kMaster), of_nodes);
   EXPECT_EQ(heard(SocketSide::kBoards), of_masters);
   EXPECT_EQ(heard(SocketSide::kWitness), all);
+  EXPECT_EQ(heard(SocketSide::kSender), std::set<std::uint32_t>{});
 }
 
 TEST(SocketCan, GivesNeitherRemoteRequestsNorLongIdentifiers) {

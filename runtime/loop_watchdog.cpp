@@ -1,0 +1,73 @@
+#include "runtime/loop_watchdog.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::runtime {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+using SteadyClock = std::chrono::steady_clock;
+
+/// Between two looks: a tenth of the limit, so that it is kept within that.
+nanoseconds tick_of(nanoseconds limit) {
+  return std::clamp<nanoseconds>(limit / 10, milliseconds(1), milliseconds(50));
+}
+
+}  // namespace
+
+LoopWatchdog::LoopWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks)
+    : heartbeat_(&heartbeat),
+      config_(config),
+      hooks_(std::move(hooks)),
+      tick_(tick_of(config.limit)),
+      thread_([this] { run(); }) {}
+
+LoopWatchdog::~LoopWatchdog() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  ended_.notify_all();
+  thread_.join();
+}
+
+/// @return false: the watchdog is to end
+bool LoopWatchdog::sleep() {
+  std::unique_lock lock(mutex_);
+  return !ended_.wait_for(lock, tick_, [this] { return ending_; });
+}
+
+void LoopWatchdog::run() {
+  std::uint64_t seen = 0;
+  nanoseconds silent{};
+  bool hung = false;
+  SteadyClock::time_point before = SteadyClock::now();
+  while (sleep()) {
+    const SteadyClock::time_point now = SteadyClock::now();
+    const nanoseconds awake = std::min<nanoseconds>(now - before, 2 * tick_);
+    before = now;
+    const std::uint64_t beats = heartbeat_->beats();
+    if (beats != seen) {
+      if (hung) hooks_.on_return();
+      hung = false;
+      silent = {};
+      seen = beats;
+      continue;
+    }
+    const bool at_work = Heartbeat::at_work(beats);
+    const nanoseconds limit = at_work ? config_.limit : config_.wait_limit;
+    if (beats == 0 || limit == nanoseconds{}) continue;
+    silent += awake;
+    if (!hung && silent > limit) {
+      hung = true;
+      hooks_.on_hang(at_work);
+    } else if (hung && silent > limit + config_.grace) {
+      hooks_.on_given_up();
+      return;
+    }
+  }
+}
+
+}  // namespace tandem::runtime

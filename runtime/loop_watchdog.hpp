@@ -1,0 +1,55 @@
+// Finds a loop that no longer cycles, from a thread of its own.
+// Layer: runtime.  Thread: made and destroyed by main; the hooks run on its own thread.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+#include "runtime/heartbeat.hpp"
+
+namespace tandem::runtime {
+
+struct WatchdogConfig {
+  std::chrono::nanoseconds limit{};  ///< that one stay at work may take
+  /// That the loop may wait between two of them; zero: as long as it likes (simulated time is
+  /// paused, waits for the disk, for emulated boards, for an owner).
+  std::chrono::nanoseconds wait_limit{};
+  std::chrono::nanoseconds grace{};  ///< from on_hang to on_given_up
+};
+
+/// Counts the time that it has itself been awake for: a process that was stopped and goes on, or a
+/// machine that slept, has not hung.
+class LoopWatchdog {
+ public:
+  struct Hooks {
+    /// The loop hangs. @param at_work  in its cycle, not in a wait
+    std::function<void(bool at_work)> on_hang;
+    std::function<void()> on_return;    ///< it cycles again
+    std::function<void()> on_given_up;  ///< it did not come back; the watchdog has ended
+  };
+
+  /// The heartbeat outlives it. Nothing happens before the first beat.
+  LoopWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks);
+  /// Waits for a hook that is at work.
+  ~LoopWatchdog();
+  LoopWatchdog(const LoopWatchdog&) = delete;
+  LoopWatchdog& operator=(const LoopWatchdog&) = delete;
+
+ private:
+  void run();
+  [[nodiscard]] bool sleep();
+
+  const Heartbeat* heartbeat_;
+  const WatchdogConfig config_;
+  const Hooks hooks_;
+  const std::chrono::nanoseconds tick_;
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  bool ending_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace tandem::runtime

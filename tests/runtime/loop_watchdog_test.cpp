@@ -1,0 +1,78 @@
+// The watchdog by itself: what is a hang, what is a wait, and what follows.
+#include "runtime/loop_watchdog.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "tests/support/eventually.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using std::chrono::milliseconds;
+
+struct Watched : ::testing::Test {
+  LoopWatchdog::Hooks hooks() {
+    return {.on_hang =
+                [this](bool at_work) {
+                  (at_work ? hangs : waits) += 1;
+                },
+            .on_return = [this] { returns += 1; },
+            .on_given_up = [this] { given_up += 1; }};
+  }
+  void cycles(int count) {
+    for (int i = 0; i < count; ++i) {
+      heartbeat.enter();
+      heartbeat.leave();
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+  }
+
+  Heartbeat heartbeat;
+  std::atomic<int> hangs = 0, waits = 0, returns = 0, given_up = 0;
+};
+
+TEST_F(Watched, ALoopThatDoesNotLeaveItsCycleHangsAndIsGivenUpOnce) {
+  const LoopWatchdog watchdog(heartbeat, {.limit = milliseconds(50), .grace = milliseconds(50)},
+                              hooks());
+  cycles(3);
+  heartbeat.enter();
+  EXPECT_TRUE(test::eventually([&] { return given_up == 1; }));
+  EXPECT_EQ(hangs, 1);
+  EXPECT_EQ(waits, 0);
+  EXPECT_EQ(returns, 0);
+}
+
+TEST_F(Watched, ALoopThatComesBackIsToldAndWatchedOn) {
+  const LoopWatchdog watchdog(heartbeat, {.limit = milliseconds(30), .grace = std::chrono::hours(1)},
+                              hooks());
+  for (int i = 1; i <= 2; ++i) {
+    heartbeat.enter();
+    EXPECT_TRUE(test::eventually([&] { return hangs == i; }));
+    heartbeat.leave();
+    EXPECT_TRUE(test::eventually([&] { return returns == i; }));
+  }
+  EXPECT_EQ(given_up, 0);
+}
+
+TEST_F(Watched, AWaitIsAHangOnlyWhereItHasALimit) {
+  {
+    const LoopWatchdog simulated(heartbeat, {.limit = milliseconds(20), .grace = milliseconds(20)},
+                                 hooks());
+    std::this_thread::sleep_for(milliseconds(100));  // the first cycle has not begun
+    cycles(1);
+    std::this_thread::sleep_for(milliseconds(200));
+    EXPECT_EQ(hangs + waits, 0);
+  }
+  const LoopWatchdog on_robot(
+      heartbeat,
+      {.limit = milliseconds(20), .wait_limit = milliseconds(40), .grace = std::chrono::hours(1)},
+      hooks());
+  EXPECT_TRUE(test::eventually([&] { return waits == 1; }));
+  EXPECT_EQ(hangs, 0);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
