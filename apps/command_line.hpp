@@ -71,7 +71,7 @@ struct EstopOptions {
 
 /// tandem controller list|load|unload|start|stop|switch
 struct ControllerOptions {
-  enum class Action : std::uint8_t { kList, kLoad, kUnload, kSwitch } action = Action::kList;
+  enum class Action : std::uint8_t { kList, kLoad, kUnload, kStart, kSwitch } action = Action::kList;
   std::string plugin;              ///< load: name or path
   std::string name;                ///< load, unload; empty: the plugin's
   std::string parameters;          ///< load: TOML file; empty: none

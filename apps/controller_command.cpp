@@ -78,6 +78,9 @@ Result<Json> question_of(const ControllerOptions& options) {
     case ControllerOptions::Action::kLoad: return load_question(options);
     case ControllerOptions::Action::kUnload:
       return Json{{"do", "controller.unload"}, {"name", options.name}};
+    case ControllerOptions::Action::kStart:
+      if (options.start.empty()) return Json{{"do", "controller.start"}};
+      break;
     case ControllerOptions::Action::kSwitch: break;
   }
   return Json{{"do", "controller.switch"}, {"stop", options.stop}, {"start", options.start}};

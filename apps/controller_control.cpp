@@ -114,8 +114,12 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
                {kName}, [&services](const Json& request) {
                  return tell(services, services.unload(request["name"].get<std::string>()));
                });
-  registry.add("controller.start", ControlEffect::kChanges, "starts a controller", {kName},
+  registry.add("controller.start", ControlEffect::kChanges,
+               "starts a controller, or all that a reset holds back",
+               {{.name = "name", .doc = "of a loaded controller; else those that were active before "
+                                        "the reset"}},
                [&services](const Json& request) {
+                 if (!request.contains("name")) return tell(services, services.go_on());
                  const Names names{request["name"].get<std::string>()};
                  return switch_by_hand(services, {}, names);
                });

@@ -10,6 +10,7 @@ const char kControllerExamples[] = R"(Examples:
   tandem controller list                             what is loaded, who is active, who has what
   tandem controller load hold --name rest --set 'duration_s = 2.0'
   tandem controller switch --stop squat --start rest in one cycle, or not at all
+  tandem controller start                            after `fault reset`: those that were active go on
   tandem controller stop rest                        its joints are held where they are
   tandem controller unload rest                      and its library is closed
 Without --socket or --dds it is the only `tandem run` of this user.)";
@@ -66,9 +67,9 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   add("unload", "Free an inactive controller", Action::kUnload)
       ->add_option("name", o.name, "Its name")
       ->required();
-  add("start", "Start controllers, all in one cycle", Action::kSwitch)
-      ->add_option("names", o.start, "Their names")
-      ->required();
+  add("start", "Start controllers, all in one cycle; after a reset let them go on",
+      Action::kStart)
+      ->add_option("names", o.start, "Their names; none: those that were active before the reset");
   add("stop", "Stop controllers; what nobody has then is held", Action::kSwitch)
       ->add_option("names", o.stop, "Their names")
       ->required();

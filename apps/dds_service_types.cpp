@@ -73,6 +73,11 @@ Json clear_faults_question(const dds::std_srvs::Trigger_Request&) {
   return {{"do", "fault.reset"}};
 }
 
+/// Those that a reset holds back.
+Json start_controllers_question(const dds::std_srvs::Trigger_Request&) {
+  return {{"do", "controller.start"}};
+}
+
 Json list_controllers_question(const ListControllers_Request&) {
   return {{"do", "controller.list"}};
 }
@@ -140,8 +145,20 @@ void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& repl
       !reply.success ? message_of(answer)
       : latched == 0 ? "nothing is latched"
                      : fmt::format("the reset of {} is asked for{}; tandem/faults shows when it is "
-                                   "through, which takes seconds",
+                                   "through, which takes seconds. Controllers that are held back "
+                                   "then go on with tandem/start_controllers",
                                    latched, when(answer)));
+}
+
+void fill_start_controllers(const Json& answer, dds::std_srvs::Trigger_Response& reply,
+                            ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  std::string names;
+  for (const Json& name : list_of(answer, "active")) {
+    names += (names.empty() ? "active: " : ", ") + name.get<std::string>();
+  }
+  const std::string note = message_of(answer);
+  reply.message = memory.text(note.empty() ? names : note);
 }
 
 void fill_controllers(const Json& answer, ListControllers_Response& reply, ReplyMemory& memory) {

@@ -12,6 +12,7 @@ namespace tandem::apps {
 
 [[nodiscard]] Json emergency_stop_question(const dds::std_srvs::Trigger_Request& request);
 [[nodiscard]] Json clear_faults_question(const dds::std_srvs::Trigger_Request& request);
+[[nodiscard]] Json start_controllers_question(const dds::std_srvs::Trigger_Request& request);
 [[nodiscard]] Json list_controllers_question(
     const dds::tandem_msgs::ListControllers_Request& request);
 [[nodiscard]] Json load_controller_question(
@@ -31,6 +32,8 @@ void fill_emergency_stop(const Json& answer, dds::std_srvs::Trigger_Response& re
                          dds::ReplyMemory& memory);
 void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& reply,
                        dds::ReplyMemory& memory);
+void fill_start_controllers(const Json& answer, dds::std_srvs::Trigger_Response& reply,
+                            dds::ReplyMemory& memory);
 void fill_controllers(const Json& answer, dds::tandem_msgs::ListControllers_Response& reply,
                       dds::ReplyMemory& memory);
 void fill_clock(const Json& answer, dds::tandem_msgs::Clock_Response& reply,

@@ -23,6 +23,8 @@ Status DdsServices::add_all() {
       add_ask(),
       add("tandem/emergency_stop", "estop", &emergency_stop_question, &fill_emergency_stop),
       add("tandem/clear_faults", "fault.reset", &clear_faults_question, &fill_clear_faults),
+      add("tandem/start_controllers", "controller.start", &start_controllers_question,
+          &fill_start_controllers),
       add("tandem/list_controllers", "controller.list", &list_controllers_question,
           &fill_controllers),
       add("tandem/load_controller", "controller.load", &load_controller_question,

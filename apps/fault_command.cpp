@@ -37,14 +37,34 @@ Exit show(const FaultOptions& options) {
   return Exit::kDone;
 }
 
+/// Why a reset did not succeed, with the joints whose faults are latched.
+Error failed_reset(const Json& answer, bool through) {
+  std::string causes;
+  for (const Json& fault : answer.value("faults", Json::array())) {
+    if (!fault.value("latched", false)) continue;
+    const std::string joint = fault.value("joint", "");
+    causes += (causes.empty() ? "" : "; ") + (joint.empty() ? "" : joint + ": ") +
+              fault.value("cause", "?");
+  }
+  const std::string why =
+      through ? "a cause is still there"
+              : fmt::format("not through after {} s, in the phase {}", kResetTime.count(),
+                            answer.value("phase", "?"));
+  return {.message = fmt::format("the reset failed, {} ({}): nothing moves", why, causes),
+          .hint = "remove the cause, then `tandem fault reset` again",
+          .file = {},
+          .key = {}};
+}
+
 /// The run's answer once a reset is through; the last one when it takes too long.
 Result<Json> wait_for_reset(ControlClient& run, const Json& before) {
   const auto deadline = SteadyClock::now() + kResetTime;
   for (;;) {
     Result<Json> now = run.ask({{"do", "fault.show"}});
     if (!now) return now;
-    const bool through = now->value("resets", 0) > before.value("resets", 0) ||
+    const bool counted = now->value("resets", 0) > before.value("resets", 0) ||
                          now->value("failed_resets", 0) > before.value("failed_resets", 0);
+    const bool through = counted && now->value("phase", "") != "resetting";
     if (through || SteadyClock::now() > deadline) return now;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
@@ -64,12 +84,17 @@ Exit reset(const FaultOptions& options) {
     answer = *through;
   }
   const bool done = answer.value("resets", 0) > asked->value("resets", 0);
+  const bool held = answer.value("phase", "") == "held";
   if (options.json != "-") {
-    fmt::print("{}\n", nothing ? "nothing is latched"
-                       : kept  ? kKept
-                       : done  ? "reset: every joint is enabled where it is"
-                               : "not reset: a cause is still there");
+    if (nothing) fmt::print("nothing is latched\n");
+    if (kept) fmt::print("{}\n", kKept);
+    if (done) fmt::print("reset: every joint is enabled where it is\n");
     if (!nothing) print_answer(answer);
+    if (done && held) fmt::print("held: `tandem controller start` lets the controllers go on\n");
+  }
+  if (!nothing && !kept && !done) {
+    const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
+    print_errors({failed_reset(answer, through)});
   }
   if (Status written = write_json(options.json, answer); !written) return refused(written.error());
   return nothing || kept || done ? Exit::kDone : Exit::kFault;

@@ -63,6 +63,7 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   if (e.after_stop) config.after_stop = *e.after_stop;
   if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
+  config.after_reset = e.after_reset;
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
 }

@@ -12,6 +12,7 @@ enum class RunPhase : std::uint8_t {
   kRunning,    ///< controllers run
   kFaulted,    ///< a stop of category "hold", 1 or 0 is latched
   kResetting,  ///< faults are cleared, and every joint enabled where it is
+  kHeld,       ///< after a reset: every joint is held until controllers are started
   kShutDown,   ///< the drives stop and are disabled
   kDone,
 };
@@ -23,6 +24,7 @@ enum class RunPhase : std::uint8_t {
     case RunPhase::kRunning: return "running";
     case RunPhase::kFaulted: return "faulted";
     case RunPhase::kResetting: return "resetting";
+    case RunPhase::kHeld: return "held";
     case RunPhase::kShutDown: return "shut-down";
     case RunPhase::kDone: return "done";
   }

@@ -1,4 +1,4 @@
-// What a run does once a stop was carried out.
+// What a run does once a stop was carried out, and once it was reset.
 // Layer: runtime.  Thread: any.
 #pragma once
 
@@ -10,6 +10,12 @@ namespace tandem::runtime {
 enum class AfterStop : std::uint8_t {
   kEnd,   ///< the run: the robot is shut down. After "hold" when the run's time is over.
   kWait,  ///< latched, for a reset or the request to end the run
+};
+
+/// What comes after a reset that has cleared every fault.
+enum class AfterReset : std::uint8_t {
+  kHold,      ///< every joint is held, until somebody starts controllers
+  kContinue,  ///< controllers start again by themselves: for runs that nobody watches
 };
 
 }  // namespace tandem::runtime

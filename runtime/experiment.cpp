@@ -102,6 +102,7 @@ void read_faults(TomlTable table, Experiment& e) {
     const bool ends = table.choice("after_stop", {"end", "wait"}) == "end";
     e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
   }
+  e.after_reset = read_choice(table, "after_reset", {"hold", "continue"}, e.after_reset);
   if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
   table.finish();
 }

@@ -101,6 +101,7 @@ struct Experiment {
   rt::LoopConfig loop;      ///< period, [overrun] and [clock]; the caller sets the pacing
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
+  AfterReset after_reset = AfterReset::kHold;  ///< [faults]
   std::optional<double> watchdog_s;     ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
   LogOptions log;

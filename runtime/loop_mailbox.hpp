@@ -31,6 +31,7 @@ struct LoopRequest {
     kInsert,  ///< `controller` into `slot`
     kRemove,  ///< what is in `slot`
     kSwitch,  ///< the controllers of `stop` and `start`
+    kGoOn,    ///< the controllers that a reset holds back
     kJoint,   ///< `wish` of `joint`
     kGains,   ///< `gains` of `joint` and `loop`
   };
@@ -55,6 +56,7 @@ enum class Refusal : std::uint32_t {
   kActive,      ///< `one` is active, or is not, as asked for already
   kClaimed,     ///< `joint` is `one`'s
   kIncapable,   ///< `joint` lacks the mode
+  kNotHeld,     ///< no reset holds controllers back
 };
 
 struct LoopAnswer {

@@ -120,7 +120,8 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
 
 /// A robot that holds its joints until the end has its time go on.
 bool RobotCycle::time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT {
-  const bool holds = phase_ == RunPhase::kFaulted && config_.after_stop == AfterStop::kEnd;
+  const bool holds = (phase_ == RunPhase::kFaulted || phase_ == RunPhase::kHeld) &&
+                     config_.after_stop == AfterStop::kEnd;
   if (config_.running_cycles == 0 || (phase_ != RunPhase::kRunning && !holds)) return false;
   return spent_ + in_phase >= config_.running_cycles;
 }
@@ -135,7 +136,8 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       controllers_->hold(state_, command_);
       (void)go_on_from_robot();
       break;
-    case RunPhase::kSettling: controllers_->hold(state_, command_); break;
+    case RunPhase::kSettling:
+    case RunPhase::kHeld: controllers_->hold(state_, command_); break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;

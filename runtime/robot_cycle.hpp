@@ -36,6 +36,7 @@ struct CycleConfig {
   std::uint64_t settle_cycles = 0;         ///< every joint is held, from enabled to kRunning
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   AfterStop after_stop = AfterStop::kEnd;
+  AfterReset after_reset = AfterReset::kHold;
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
   std::uint32_t delay_cycles = 0;        ///< between the controllers and the limits
   std::size_t trace_cycles = 0;          ///< the last that trace() keeps: 6 clock reads each
@@ -63,7 +64,9 @@ struct CycleParts {
 ///   any        -> kFaulted    in a fault of category "hold", 0 or 1: the stop is carried out and
 ///                             latched. Bring-up and shut-down excepted.
 ///   kFaulted   -> kResetting  when a reset is requested: every joint is enabled where it is
-///   kResetting -> kSettling   when they follow; back to kFaulted when a cause is still there
+///   kResetting -> kHeld       when they follow; back to kFaulted when a cause is still there.
+///                             kSettling with AfterReset::kContinue, or when no controller was active
+///   kHeld      -> kRunning    when a controller is started, or all that were active, none jumps
 ///   kShutDown  -> kDone       when the drives are disabled
 class RobotCycle {
  public:
@@ -145,6 +148,8 @@ class RobotCycle {
 
   // robot_cycle_services.cpp
   void take_services() noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer go_on() noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer carry_out(const LoopRequest& request) noexcept TANDEM_RT;
   void note_service(const LoopRequest& request) noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
@@ -160,6 +165,7 @@ class RobotCycle {
   void begin_reset() noexcept TANDEM_RT;
   void watch_reset() noexcept TANDEM_RT;
   void reset_done() noexcept TANDEM_RT;
+  void hold_back() noexcept TANDEM_RT;
   void reset_failed() noexcept TANDEM_RT;
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
@@ -207,6 +213,7 @@ class RobotCycle {
   RunPhase phase_ = RunPhase::kBringUp;
   bool started_ = false;                                   // the first cycle was
   bool controlling_ = false;                               // controllers are started
+  ControllerSet held_back_ = 0;                            // active before the reset
   bool joint_fault_ = false;                               // of some joint one is latched
   hal::StopCategory reaction_ = hal::StopCategory::kWarn;  // the hardest that is latched
   Code read_code_ = Code::kOk;

@@ -146,7 +146,10 @@ void RobotCycle::watch_reset() noexcept TANDEM_RT {
   const bool late = time_.cycle - phase_began_ >= config_.bring_up_cycles;
   if (at == hal::Phase::kOperational) {
     reset_done();
-    go(config_.settle_cycles > 0 ? RunPhase::kSettling : RunPhase::kRunning);
+    hold_back();
+    go(held_back_ != 0                ? RunPhase::kHeld
+       : config_.settle_cycles > 0 ? RunPhase::kSettling
+                                   : RunPhase::kRunning);
   } else if (at == hal::Phase::kFault || late) {
     reset_failed();
     const StopCategory again = std::min(reaction_, StopCategory::kHold);
@@ -170,6 +173,17 @@ void RobotCycle::reset_done() noexcept TANDEM_RT {
   loop_.forget_late();
   event(EventKind::kResetDone);
   progress_.resets.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// A reset is no start: who was active waits for a second, deliberate act. Not an owner in another
+/// process, which comes and goes by itself, and holds its own controllers back.
+void RobotCycle::hold_back() noexcept TANDEM_RT {
+  if (config_.after_reset == AfterReset::kContinue) return;
+  const ControllerSet active = controllers_->shown().active;
+  if (active == 0) return;
+  if (go_on_from_robot()) limits_.follow(command_);
+  (void)controllers_->switch_over(active, 0, false, time_, state_, controlled());
+  held_back_ |= seat_.port != nullptr ? active & ~only(seat_.slot) : active;
 }
 
 bool RobotCycle::is_there(const FaultRecord& record) const noexcept TANDEM_RT {

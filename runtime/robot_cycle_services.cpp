@@ -21,8 +21,14 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
   using Kind = LoopRequest::Kind;
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
-    case Kind::kRemove: return controllers_->remove(request.slot);
+    case Kind::kRemove: {
+      const LoopAnswer answer = controllers_->remove(request.slot);
+      if (answer.refusal == Refusal::kNone) held_back_ &= ~only(request.slot);
+      return answer;
+    }
+    case Kind::kGoOn: return go_on();
     case Kind::kSwitch:
+      if (phase_ == RunPhase::kHeld) return leave_hold(request.stop, request.start);
       return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
                                        controlled());
     case Kind::kJoint:
@@ -34,11 +40,33 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
   return {};
 }
 
+/// From held joints to controllers: each joint that changes hands is led over.
+LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
+  if (delay_.on()) {
+    delay_.fill(command_);
+    wanted_.assign(command_);
+  }
+  const LoopAnswer answer =
+      controllers_->switch_over(stop, start, true, time_, state_, controlled());
+  if (answer.refusal != Refusal::kNone) return answer;
+  held_back_ = 0;
+  go(RunPhase::kRunning);
+  controlling_ = true;  // they are started
+  return answer;
+}
+
+/// Starts who was active before the reset.
+LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
+  if (phase_ != RunPhase::kHeld) return {.refusal = Refusal::kNotHeld};
+  if (held_back_ == 0) return {.refusal = Refusal::kGone};
+  return leave_hold(0, held_back_);
+}
+
 /// In the log; what comes and goes without moving anything is not.
 void RobotCycle::note_service(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
   const auto joint = static_cast<std::int32_t>(request.joint);
-  if (request.kind == Kind::kSwitch) event(log::EventKind::kControllersSwitched);
+  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) event(log::EventKind::kControllersSwitched);
   if (request.kind == Kind::kJoint) event(log::EventKind::kJointSet, joint);
   if (request.kind == Kind::kGains) event(log::EventKind::kGainsSet, joint);
 }

@@ -54,7 +54,7 @@ void RobotCycle::archive(Archive& ar) {
   limits_.archive(ar);
   statistics_.archive(ar);
   controllers_->archive(ar);
-  ar(time_, phase_, started_, controlling_, joint_fault_, reaction_, read_code_, phase_began_,
+  ar(time_, phase_, started_, controlling_, held_back_, joint_fault_, reaction_, read_code_, phase_began_,
      spent_, ran_);
   ar(joint_faulted_, sensor_lost_, joint_limited_, faults_);
 }

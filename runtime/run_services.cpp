@@ -142,6 +142,10 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.message = "is claimed by the controller '" + one + "', which sets its mode";
       error.hint = "stop it first: tandem controller stop " + one;
       break;
+    case Refusal::kNotHeld:
+      error.message = "no controllers are held back by a reset";
+      error.hint = "name those to start; while a fault is latched: tandem fault reset first";
+      break;
     case Refusal::kIncapable:
       error.message = "cannot be put into this mode";
       error.hint = "its [gains] table lacks the loop";
@@ -310,6 +314,13 @@ Result<Asked> RunServices::switch_controllers(const std::vector<std::string>& st
   if (Status able = check_switch(*leaving, *coming); !able) return std::unexpected(able.error());
   return ask(lock, {.kind = LoopRequest::Kind::kSwitch, .start = *coming, .stop = *leaving},
              patience);
+}
+
+Result<Asked> RunServices::go_on(Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  return ask(lock, {.kind = LoopRequest::Kind::kGoOn}, patience);
 }
 
 }  // namespace tandem::runtime

@@ -101,12 +101,16 @@ class RunServices {
   [[nodiscard]] Result<Asked> unload(const std::string& name, Patience patience = kPatience);
 
   /// Stops some controllers and starts others in one cycle, all or none. Before the controllers
-  /// have started, and after a stop, it sets who will start.
+  /// have started, and after a stop, it sets who will start; after a reset, in the phase held, it
+  /// starts them at once.
   /// Errors: unknown; named twice; stopped and not active; started and active; a joint that two
   /// would claim (both and the joint are named).
   [[nodiscard]] Result<Asked> switch_controllers(const std::vector<std::string>& stop,
                                                  const std::vector<std::string>& start,
                                                  Patience patience = kPatience);
+  /// Starts, in one cycle and without a bump, the controllers that were active before a reset.
+  /// Errors: nothing is held back; all of them were unloaded; a joint that two would claim.
+  [[nodiscard]] Result<Asked> go_on(Patience patience = kPatience);
 
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();

@@ -81,7 +81,8 @@ hal::Phase RemoteBackend::phase() const noexcept {
       return seen.owner == client_ ? hal::Phase::kOperational : hal::Phase::kBringUp;
     case RunPhase::kBringUp:
     case RunPhase::kSettling:
-    case RunPhase::kResetting: return hal::Phase::kBringUp;
+    case RunPhase::kResetting:
+    case RunPhase::kHeld: return hal::Phase::kBringUp;
     case RunPhase::kFaulted:
     case RunPhase::kShutDown:
     case RunPhase::kDone: break;

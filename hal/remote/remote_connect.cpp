@@ -244,6 +244,9 @@ std::string RemoteBackend::status_text() const {
   if (phase_ == static_cast<std::uint8_t>(hal::RunPhase::kFaulted)) {
     return "the server has stopped the robot";
   }
+  if (phase_ == static_cast<std::uint8_t>(hal::RunPhase::kHeld)) {
+    return "the server holds the robot after a reset: tandem controller start there";
+  }
   return "the server brings the robot up";
 }
 

@@ -260,6 +260,11 @@ TEST_F(RunOverDds, StopTheRobotAndClearItsFaults) {
   until(R"("phase": "faulted")");
   EXPECT_NE(trigger("clear_faults").find("yes: the reset of 1 is asked for"), std::string::npos);
   EXPECT_TRUE(eventually([&] { return ask(R"({"do": "status"})").value("resets", 0) == 1; }));
+  until(R"("phase": "held")");
+  EXPECT_EQ(trigger("start_controllers"), "yes: active: hold");
+  until(R"("phase": "running")");
+  EXPECT_NE(trigger("start_controllers").find("no: no controllers are held back"),
+            std::string::npos);
   EXPECT_EQ(end(), 0);
 }
 

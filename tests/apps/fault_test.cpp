@@ -19,12 +19,52 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   EXPECT_EQ(reset.status, 0) << reset.err;
   EXPECT_NE(reset.out.find("every joint is enabled where it is"), std::string::npos) << reset.out;
   EXPECT_NE(reset.out.find("cleared at"), std::string::npos) << reset.out;
+  EXPECT_NE(reset.out.find("phase held, 0 latched"), std::string::npos) << reset.out;
+  EXPECT_NE(reset.out.find("held: `tandem controller start` lets the controllers go on"),
+            std::string::npos)
+      << reset.out;
+  const auto ran = [this] {
+    const Outcome status = to_run("ask '{\"do\": \"status\"}'");
+    return nlohmann::json::parse(status.out, nullptr, false)["running_cycles"].get<int>();
+  };
+  const int before = ran();
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(ran(), before) << "a reset is no start";
+  const Outcome go_on = to_run("controller start");
+  EXPECT_EQ(go_on.status, 0) << go_on.err;
+  EXPECT_NE(go_on.out.find("active: hold"), std::string::npos) << go_on.out;
+  until(R"("phase": "running")");
+  EXPECT_EQ(to_run("controller start").status, 2) << "nothing is held back";
   EXPECT_EQ(end(), 0) << "what was reset is no failure of the run";
   const auto result = json("run.json");
   EXPECT_TRUE(result["faults"].empty());
   ASSERT_EQ(result["fault_log"].size(), 1U);
   EXPECT_EQ(result["fault_log"][0]["category"], "category0");
   EXPECT_EQ(result["fault_log"][0]["latched"], false);
+}
+
+TEST_F(Faults, AreResetWithoutAnybodyByAnExperimentThatSaysSo) {
+  edit("hold.toml", "[[controller]]", "[faults]\nafter_reset = \"continue\"\n[[controller]]");
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("estop").status, 0);
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  until(R"("phase": "running")");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Faults, ThatAreStillThereFailTheResetWithTheirJoints) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("inject kind=encoder_unplug joint=joint2").status, 0);
+  until(R"("phase": "faulted")");
+  const Outcome reset = to_run("fault reset");
+  EXPECT_EQ(reset.status, 1);
+  EXPECT_NE(reset.err.find("error: the reset failed, a cause is still there (joint2: "),
+            std::string::npos)
+      << reset.err;
+  EXPECT_NE(reset.out.find("phase faulted, 1 latched"), std::string::npos) << reset.out;
+  EXPECT_EQ(to_run("controller start").status, 2) << "a fault is latched";
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1);
 }
 
 TEST_F(Faults, BySignalAreOfTheRobotsCategory) {

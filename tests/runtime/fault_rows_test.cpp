@@ -82,6 +82,28 @@ TEST(FaultRow, EmergencyStopByRequest) {
   EXPECT_NE(rig.causes().find("emergency stop on request"), std::string::npos) << rig.causes();
 }
 
+TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
+  ArmRig rig({}, hal::StopCategory::kHold);
+  rig.run();
+  Fault unplugged = of(FaultKind::kEncoderUnplug);
+  unplugged.duration_ns = 5'000'000;
+  rig.inject(unplugged);
+  for (int i = 0; i < 100; ++i) rig.step();
+  ASSERT_EQ(rig.cycle->phase(), RunPhase::kFaulted);
+  rig.cycle->requests().reset_faults();
+  for (int i = 0; i < 5000 && rig.cycle->phase() != RunPhase::kHeld; ++i) rig.step();
+  ASSERT_EQ(rig.cycle->phase(), RunPhase::kHeld) << rig.causes();
+  for (std::size_t b = 0; b < 3; ++b) {
+    EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kFollow) << "enabled, and at rest";
+  }
+  const std::uint64_t ran = rig.cycle->running_cycles();
+  for (int i = 0; i < 500; ++i) rig.step();
+  EXPECT_EQ(rig.cycle->running_cycles(), ran) << "a reset is no start";
+  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  expect_row(rig.watch());
+  EXPECT_EQ(rig.cycle->faults().at(1).text, "emergency stop on request");
+}
+
 TEST(FaultRow, EmergencyStopOfCategory0) {
   ArmRig rig;
   rig.run();

@@ -194,6 +194,10 @@ TEST_F(JointServices, HoldJointsAgainAfterAReset) {
   EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "joints are held";
   cycle->requests().reset_faults();
   steps(60);
+  ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
+  EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "and so they are after the reset";
+  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  steps(1);
   ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
   EXPECT_TRUE(mode("elbow", ControlMode::kTorque));

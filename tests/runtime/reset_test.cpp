@@ -19,7 +19,8 @@ using hal::StopCategory;
 
 /// Past bring-up, with faults that wait for a reset.
 struct Waiting : ::testing::Test {
-  Waiting() { start({.settle_cycles = 10, .after_stop = AfterStop::kWait}); }
+  Waiting() { start({.settle_cycles = 10, .after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue}); }
   ~Waiting() override { (void)rt::take_emergency_stop(); }
 
   void start(CycleConfig config, StopCategory category = StopCategory::kCategory1,
@@ -74,6 +75,129 @@ TEST_F(Waiting, AFaultLatchesAndTheLoopGoesOn) {
   cycle->requests().end_run();
   until(RunPhase::kDone);
   EXPECT_TRUE(cycle->faults().at(0).latched);
+}
+
+/// The same, where controllers wait for somebody to start them.
+struct Held : Waiting {
+  Held() {
+    start({.settle_cycles = 10, .after_stop = AfterStop::kWait});
+    auto other = std::make_unique<test::Sine>(std::vector<std::size_t>{1});
+    second = other.get();
+    EXPECT_TRUE(cycle->services().load("second", std::move(other), *TomlDocument::parse("", "x.toml"), kNoWait));
+    steps(1);
+  }
+  void stop_and_reset() {
+    backend->faulted_joint = 1;
+    steps(50);
+    cycle->requests().reset_faults();
+    steps(1);
+    until(RunPhase::kHeld);
+  }
+  /// Whether the first controller runs within the next 100 cycles.
+  [[nodiscard]] bool runs() {
+    const int updates = controller->updates;
+    steps(100);
+    return controller->updates > updates;
+  }
+
+  static constexpr RunServices::Patience kNoWait{0};
+  test::Sine* second = nullptr;
+};
+
+TEST_F(Held, AResetClearsAndHoldsAndNoMoreUntilControllersAreStarted) {
+  const std::uint64_t ran = cycle->running_cycles();
+  stop_and_reset();
+  EXPECT_FALSE(cycle->faults().at(0).latched);
+  EXPECT_EQ(host->shown().active, 0U);
+  const std::vector<double> held(cycle->state().position_rad().begin(),
+                                 cycle->state().position_rad().end());
+  EXPECT_FALSE(runs());
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  for (std::size_t j = 0; j < held.size(); ++j) {
+    EXPECT_DOUBLE_EQ(cycle->command().position_rad()[j], held[j]) << j;
+  }
+  EXPECT_EQ(cycle->running_cycles(), ran) << "the time in which it is held is not the run's";
+  cycle->requests().reset_faults();  // nothing is latched: no second way to go on
+  EXPECT_FALSE(runs());
+
+  ASSERT_TRUE(cycle->services().go_on(kNoWait));
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(controller->starts, 2);
+  EXPECT_EQ(second->starts, 0) << "it was not active before";
+  until(RunPhase::kDone, 2000);
+  EXPECT_EQ(cycle->running_cycles(), 1000U);
+}
+
+TEST_F(Held, AStartByNameStartsThatOneAlone) {
+  stop_and_reset();
+  ASSERT_TRUE(cycle->services().switch_controllers({}, {"second"}, kNoWait));
+  EXPECT_FALSE(runs());
+  EXPECT_EQ(second->starts, 1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  ASSERT_TRUE(cycle->services().switch_controllers({}, {"sine"}, kNoWait));
+  EXPECT_EQ(controller->starts, 1);
+  steps(1);
+  EXPECT_EQ(controller->starts, 2);
+}
+
+TEST_F(Held, NobodyGoesOnWhileAFaultIsLatchedOrControllersRun) {
+  const auto refused = [&] {
+    ASSERT_TRUE(cycle->services().go_on(kNoWait)) << "the loop refuses it later";
+    const int starts = controller->starts;
+    steps(10);
+    EXPECT_EQ(controller->starts, starts);
+  };
+  refused();
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  backend->faulted_joint = 1;
+  steps(50);
+  refused();
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+}
+
+TEST_F(Held, ASecondFaultKeepsWhoIsHeldBack) {
+  stop_and_reset();
+  stop_and_reset();
+  ASSERT_TRUE(cycle->services().go_on(kNoWait));
+  EXPECT_TRUE(runs());
+}
+
+TEST_F(Held, AnUnloadedControllerDoesNotGoOnAndNeitherDoesTheNextInItsPlace) {
+  stop_and_reset();
+  ASSERT_TRUE(cycle->services().unload("sine", kNoWait));
+  steps(1);
+  auto another = std::make_unique<test::Sine>(std::vector<std::size_t>{0});
+  const test::Sine* third = another.get();
+  ASSERT_TRUE(
+      cycle->services().load("third", std::move(another), *TomlDocument::parse("", "x.toml"), kNoWait));
+  steps(1);
+  ASSERT_TRUE(cycle->services().go_on(kNoWait));
+  steps(10);
+  EXPECT_EQ(third->starts, 0);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+}
+
+TEST_F(Held, AJointThatOnlyWarnedIsNoReasonToMoveEither) {
+  start({.settle_cycles = 10, .after_stop = AfterStop::kWait}, StopCategory::kWarn);
+  backend->faulted_joint = 1;
+  steps(10);
+  cycle->requests().reset_faults();
+  steps(1);
+  until(RunPhase::kHeld);
+  EXPECT_EQ(controller->starts, 1);
+}
+
+TEST_F(Held, ASnapshotKnowsWhoIsHeldBack) {
+  stop_and_reset();
+  const auto saved = cycle->save();
+  ASSERT_TRUE(saved) << saved.error().to_string();
+  ASSERT_TRUE(cycle->services().go_on(kNoWait));
+  EXPECT_TRUE(runs());
+  ASSERT_TRUE(cycle->restore(*saved));
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  ASSERT_TRUE(cycle->services().go_on(kNoWait));
+  EXPECT_TRUE(runs());
 }
 
 TEST_F(Waiting, AResetHoldsEveryJointThenStartsTheControllersAgain) {
@@ -133,7 +257,8 @@ TEST_F(Waiting, ASecondFaultIsNotedToo) {
 }
 
 TEST_F(Waiting, AJointThatOnlyWarnsIsResetToo) {
-  start({.settle_cycles = 10, .after_stop = AfterStop::kWait}, StopCategory::kWarn);
+  start({.settle_cycles = 10, .after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue}, StopCategory::kWarn);
   backend->faulted_joint = 1;
   steps(10);
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
@@ -188,7 +313,8 @@ TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
                   .on_overrun = rt::OverrunPolicy::kStop,
                   .stop_late = 2,
                   .stop_window = 64},
-         .after_stop = AfterStop::kWait},
+         .after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue},
         StopCategory::kCategory1, &slow);
   for (int i = 0; i < 2; ++i) {
     slow.now += 1'500'000;
@@ -204,7 +330,8 @@ TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
 
 TEST_F(Waiting, AnEmergencyStopOnRequestStopsInTheNextCycle) {
   for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1}) {
-    start({.after_stop = AfterStop::kWait});
+    start({.after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue});
     cycle->requests().emergency_stop(category);
     steps(1);
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
@@ -242,7 +369,8 @@ TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
 TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
   backend = std::make_unique<test::FirstOrderRobot>(robot);
   cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, *host, clock},
-                                       CycleConfig{.after_stop = AfterStop::kWait});
+                                       CycleConfig{.after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue});
   steps(5);
   cycle->requests().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kDone);
@@ -253,7 +381,8 @@ TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
   const log::ScratchFolder folder;
   auto recorder = log::Recorder::open(folder / "a.mcap", {}, {});
   ASSERT_TRUE(recorder);
-  start({.after_stop = AfterStop::kWait}, StopCategory::kCategory1, nullptr, recorder->get());
+  start({.after_stop = AfterStop::kWait,
+         .after_reset = AfterReset::kContinue}, StopCategory::kCategory1, nullptr, recorder->get());
   cycle->requests().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kFaulted);
   backend->reset_clears = false;

@@ -13,7 +13,7 @@ using hal::StopCategory;
 
 /// The swing on a sine of 0.5 rad, whose faults wait for a reset.
 struct Swing : ::testing::Test {
-  void begin(StopCategory on_fault) {
+  void begin(StopCategory on_fault, AfterReset after_reset = AfterReset::kContinue) {
     robot = tandem::test::swing_robot();
     robot.joints[0].on_fault = on_fault;
     robot.emergency_stop = on_fault == StopCategory::kCategory0 ? on_fault
@@ -27,7 +27,8 @@ struct Swing : ::testing::Test {
                           test::parameters("amplitude_rad = 0.2")));
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, *backend, *host, clock},
-        CycleConfig{.settle_cycles = 200, .after_stop = AfterStop::kWait});
+        CycleConfig{.settle_cycles = 200, .after_stop = AfterStop::kWait,
+                    .after_reset = after_reset});
     until(RunPhase::kRunning);
     first_start_Nm = torque_step(50);
     steps(980);  // in full motion
@@ -103,6 +104,25 @@ TEST_F(Swing, GoesOnWithoutABumpAfterTheResetOfAFaultOfAnyCategory) {
     EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
     EXPECT_EQ(cycle->fault_log().latched(), 0U);
   }
+}
+
+TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted) {
+  constexpr double kBump_Nm = 0.11;
+  begin(StopCategory::kCategory1, AfterReset::kHold);
+  inject(FaultKind::kEncoderUnplug, 5);
+  come_to_rest();
+  const double rest = cycle->state().position_rad()[0];
+  cycle->requests().reset_faults();
+  until(RunPhase::kHeld);
+  EXPECT_LT(torque_step(2000), kBump_Nm);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  EXPECT_NEAR(cycle->state().position_rad()[0], rest, 0.02) << "it moves by its weight only";
+  const double held = cycle->command().position_rad()[0];
+  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_NEAR(cycle->command().position_rad()[0], held, 1e-3) << "from where it was held";
+  EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
 }
 
 // A joint that swings when it is enabled again is caught where it is, not where it was.
