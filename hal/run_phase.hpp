@@ -6,16 +6,22 @@
 
 namespace tandem::hal {
 
+/// The numbers are those of the topics and the link between processes: new ones come behind.
 enum class RunPhase : std::uint8_t {
   kBringUp,    ///< the backend configures and enables its drives
   kSettling,   ///< every joint is held where it was enabled, until the robot has been let down
   kRunning,    ///< controllers run
   kFaulted,    ///< a stop of category "hold", 1 or 0 is latched
   kResetting,  ///< faults are cleared, and every joint enabled where it is
-  kHeld,       ///< after a reset: every joint is held until controllers are started
   kShutDown,   ///< the drives stop and are disabled
   kDone,
+  kHeld,  ///< after a reset: every joint is held until controllers are started
 };
+
+/// The run is over, or about to be.
+[[nodiscard]] constexpr bool ends(RunPhase phase) noexcept {
+  return phase == RunPhase::kShutDown || phase == RunPhase::kDone;
+}
 
 [[nodiscard]] constexpr const char* to_string(RunPhase phase) noexcept {
   switch (phase) {

@@ -129,7 +129,7 @@ void RemoteBackend::last_command(const hal::CommandImage& command) noexcept TAND
 
 bool RemoteBackend::shut_down() noexcept TANDEM_RT {
   const Seen& seen = newest_.front();
-  const bool ends = seen.is_one && static_cast<RunPhase>(seen.phase) >= RunPhase::kShutDown;
+  const bool ends = seen.is_one && hal::ends(static_cast<RunPhase>(seen.phase));
   if (is_gone() || ends || (done_ && seen.owner != client_)) return true;
   done_ = true;
   return false;

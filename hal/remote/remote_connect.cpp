@@ -236,7 +236,7 @@ std::string RemoteBackend::status_text() const {
   if (gone_) {
     return "the server has not been heard for " + seconds(config_.server_timeout_s);
   }
-  if (ending_ || phase_ >= static_cast<std::uint8_t>(hal::RunPhase::kShutDown)) {
+  if (ending_ || hal::ends(static_cast<hal::RunPhase>(phase_.load()))) {
     return "the server's run is over";
   }
   if (lost_) return "the server took the robot away: no command in time, or a stop there";
