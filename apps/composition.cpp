@@ -274,6 +274,9 @@ Diagnostics connect(Composition& c, const std::string& record_frames) {
   }
   auto sockets = CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep);
   if (!sockets) return sockets.error();
+  if (Diagnostics others = listen_for_masters(e.robot, e.loop.period_ns); !others.empty()) {
+    return others;
+  }
   c.sockets = std::move(*sockets);
   const auto ends = c.sockets->buses();
   std::vector<hal::can::Bus*> buses(ends.begin(), ends.end());

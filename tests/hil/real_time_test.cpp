@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "tests/hil/witness.hpp"
 
@@ -66,6 +68,36 @@ TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
   EXPECT_GT(answers, 200U);
   // A free run is fifty times faster.
   EXPECT_GT(syncs.back() - syncs.front(), 0.5 * kPeriodS * static_cast<double>(syncs.size()));
+}
+
+// It had been let in, had reset the nodes, and had taken the torque from the running robot.
+TEST_F(RealTime, ASecondMasterIsNotLetIn) {
+  Process robot(emulate_words(), folder_ / "emulate.txt");
+  ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
+  Process master(run_words("20"), folder_ / "run.txt");
+  EXPECT_TRUE(master.says(" 10 %")) << master.output();
+  Process second(run_words("1"), folder_ / "second.txt");
+  EXPECT_EQ(second.wait(), 2);
+  EXPECT_NE(second.output().find("can0 has its master already: process "), std::string::npos)
+      << second.output();
+  EXPECT_EQ(master.interrupt(), 0) << master.output();
+
+  std::atomic<bool> over{false};
+  std::thread foreign([&over] {  // of another computer: no lock tells of it
+    const RawCan other("can0");
+    while (!over) {
+      other.write(0x080, {});
+      ::usleep(10'000);
+    }
+  });
+  Process third(run_words("1"), folder_ / "third.txt");
+  EXPECT_EQ(third.wait(), 2);
+  EXPECT_NE(third.output().find("another master is at work on can0: it sends SYNC (080)"),
+            std::string::npos)
+      << third.output();
+  over = true;
+  foreign.join();
+  EXPECT_EQ(robot.interrupt(), 0) << robot.output();
 }
 
 // The boards were safe by their own time-out, the process hung for ever and nobody was told.

@@ -1,0 +1,47 @@
+#include "hal/ethercat-can/foreign_master.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "canopen/objects.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+
+namespace tandem::hal::can {
+
+namespace cob = canopen::cob;
+
+const char* sent_by_master(const canopen::Frame& frame) noexcept {
+  if (frame.id == cob::kNmt) return "NMT commands (000)";
+  if (frame.id == cob::kSync) return "SYNC (080)";
+  if (frame.id == cob::kHeartbeat + kMasterNodeId) return "a master's heartbeat (77F)";
+  return nullptr;
+}
+
+std::int64_t listening_ns(const RobotConfig& robot, std::int64_t period_ns) noexcept {
+  constexpr std::int64_t kLeast_ns = 100'000'000, kMost_ns = 2'000'000'000;
+  std::int64_t longest_ns = period_ns;
+  for (const BoardConfig& board : robot.boards) {
+    longest_ns = std::max(longest_ns, std::int64_t{board.heartbeat_ms} * 1'000'000);
+  }
+  return std::clamp(2 * longest_ns, kLeast_ns, kMost_ns);
+}
+
+Status expect_no_master(Bus& bus, const std::string& name) {
+  constexpr std::size_t kAtOnce = 256, kMost = 64;  // a bus that is flooded is left in the end
+  std::vector<canopen::Frame> frames(kAtOnce);
+  for (std::size_t i = 0; i < kMost; ++i) {
+    const std::size_t count = bus.receive(frames);
+    if (count == 0) break;
+    for (std::size_t f = 0; f < count; ++f) {
+      const char* what = sent_by_master(frames[f]);
+      if (what == nullptr) continue;
+      return fail(fmt::format("another master is at work on {}: it sends {}", name, what),
+                  "end it; two masters would take the nodes from each other");
+    }
+  }
+  return {};
+}
+
+}  // namespace tandem::hal::can
