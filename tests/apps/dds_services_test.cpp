@@ -268,6 +268,17 @@ TEST_F(RunOverDds, StopTheRobotAndClearItsFaults) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(RunOverDds, SayThatAStopIsNotConfirmedByALoopThatHangs) {
+  edit("hold.toml", "plugin = \"hold\"",
+       "plugin = \"" TANDEM_BINARY_DIR "/tests/test_plugins/hangs.so\"\n"
+       "[faults]\nwatchdog_s = 4.0");
+  start("--dds --domain " + std::to_string(dds::test::own_domain()));
+  until(R"("running_cycles": 99)");
+  EXPECT_EQ(trigger("emergency_stop").find("no: the emergency stop is latched, but not confirmed"),
+            0U);
+  EXPECT_EQ(join(), 1) << "the watchdog ends it";
+}
+
 /// The commands' other way to a run.
 class DdsCommands : public RunOverDds {
  protected:

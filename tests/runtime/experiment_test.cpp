@@ -143,6 +143,10 @@ policy = "rr"
 priority = 42
 cpu = 1
 lock_memory = false
+[faults]
+after_stop = "wait"
+after_reset = "continue"
+watchdog_s = 0.25
 [remote]
 command = "local"
 [log]
@@ -187,6 +191,9 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->thread.priority, 42);
   EXPECT_EQ(e->thread.cpu, 1);
   EXPECT_FALSE(e->thread.lock_memory);
+  EXPECT_EQ(e->after_stop, AfterStop::kWait);
+  EXPECT_EQ(e->after_reset, AfterReset::kContinue);
+  EXPECT_EQ(e->watchdog_s, 0.25);
   EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
   EXPECT_EQ(e->log.folder, "logs");
   EXPECT_EQ(e->log.compression, LogCompression::kZstd);
