@@ -113,7 +113,7 @@ Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out
 Diagnostics warnings_of(const RobotFiles& robot) {
   Diagnostics warnings = robot.warnings;
   for (const hal::PostureConfig& posture : robot.config.postures) {
-    if (auto error = start_in_ground(robot, posture.name)) warnings.push_back(std::move(*error));
+    if (auto error = wrong_start_height(robot, posture.name)) warnings.push_back(std::move(*error));
   }
   return warnings;
 }

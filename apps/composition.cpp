@@ -198,7 +198,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!robot) return std::unexpected(robot.error());
   c->tree = robot->tree;
   if (e.hal.backend == runtime::BackendKind::kSim) {
-    if (auto error = start_in_ground(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
+    if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
     errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
   }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));

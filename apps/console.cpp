@@ -92,11 +92,28 @@ void outlive_readers() {
   stderr = lasting(STDERR_FILENO, _IONBF);
 }
 
+Status check_overwrites(const std::string& file, std::string_view begins, const std::string& what) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return {};
+  std::string start(begins.size(), '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (in.gcount() == 0 || start == begins) return {};
+  return std::unexpected(Error{"this file is there, and it is no " + what + ": it would be lost",
+                               "name another file, or remove it first",
+                               file,
+                               0,
+                               {}});
+}
+
 Status check_writable(const std::string& file) {
   if (file.empty() || file == "-") return {};
   if (holds_something_else(file)) {
     return std::unexpected(Error{"this file is there, and it is no JSON: it would be lost",
-                                 "name another file, or remove it first", file, 0, {}});
+                                 "name another file, or remove it first",
+                                 file,
+                                 0,
+                                 {}});
   }
   errno = 0;
   const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there

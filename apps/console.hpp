@@ -39,6 +39,11 @@ void outlive_readers();
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 
+/// An error when a file is there that does not begin as what would be written over it.
+/// @param begins  of all that may be written over: "time_s,", "\x7F" "ELF"
+[[nodiscard]] Status check_overwrites(const std::string& file, std::string_view begins,
+                                      const std::string& what);
+
 /// p50, p99, p999, max; all [ns].
 [[nodiscard]] Json percentiles_json(const rt::Percentiles& p);
 

@@ -7,9 +7,9 @@
 #include "apps/errands.hpp"
 #include "apps/inject.hpp"
 #include "apps/kernel_supply.hpp"
+#include "apps/loop_facts.hpp"
 #include "apps/robot_files.hpp"
 #include "apps/run_control.hpp"
-#include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "apps/wrong_kind.hpp"
 #include "base/counted.hpp"
@@ -91,7 +91,7 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   }
   const auto description = with_description(robot);
   if (!description) return std::unexpected(description.error());
-  if (auto error = start_in_ground(*description, e->subject.sim.posture)) {
+  if (auto error = wrong_start_height(*description, e->subject.sim.posture)) {
     return std::unexpected(Diagnostics{std::move(*error)});
   }
   const std::string& posture = e->subject.sim.posture;
@@ -217,10 +217,9 @@ Exit emulate_command(const EmulateOptions& options) {
   const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
   if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
   if (!options.quiet) {
-    fmt::print(out, "{}: {} and {} on {}, {}; Ctrl-C ends it\n",
-               e.subject.robot.name, counted(e.subject.robot.boards.size(), "board"),
-               counted(e.subject.robot.sensors.size(), "sensor"),
-               interfaces_of(e.subject.robot),
+    fmt::print(out, "{}: {} and {} on {}, {}; Ctrl-C ends it\n", e.subject.robot.name,
+               counted(e.subject.robot.boards.size(), "board"),
+               counted(e.subject.robot.sensors.size(), "sensor"), interfaces_of(e.subject.robot),
                options.lockstep ? "a step per SYNC" : "in real time");
     std::fflush(out);
   }
@@ -238,8 +237,8 @@ Exit emulate_command(const EmulateOptions& options) {
     });
     return done ? Status() : Status(std::unexpected(done.error()));
   });
-  const auto socket = serve(
-      commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
+  const auto socket =
+      serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, errands, out, options.quiet);
   if (!options.quiet) print_summary(e, out);
   if (const Status written = write_json(options.json, summary_json(e, options.lockstep));

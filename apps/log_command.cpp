@@ -86,6 +86,9 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
     return std::unexpected(
         Error{"this is the log itself", "name another file with -o", options.output, 0, {}});
   }
+  if (Status lost = check_overwrites(options.output, "time_s", "table of Tandem's"); !lost) {
+    return lost;
+  }
   std::ofstream out(options.output, std::ios::binary);
   if (!out) {
     return std::unexpected(Error{
@@ -115,12 +118,12 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   for (const log::TopicComparison& topic : comparison.topics) {
     std::string where = topic.equal() ? "none" : "one log is shorter";
     if (topic.first) {
-      where = fmt::format("message {} at {:.6f} s: {} is {:.17g} and {:.17g}",
-                          topic.first->message, static_cast<double>(topic.first->time_ns) * 1e-9,
-                          topic.first->signal, topic.first->a, topic.first->b);
+      where = fmt::format("message {} at {:.6f} s: {} is {:.17g} and {:.17g}", topic.first->message,
+                          static_cast<double>(topic.first->time_ns) * 1e-9, topic.first->signal,
+                          topic.first->a, topic.first->b);
     }
-    table.add({topic.topic, std::to_string(topic.messages_a), std::to_string(topic.messages_b),
-               where});
+    table.add(
+        {topic.topic, std::to_string(topic.messages_a), std::to_string(topic.messages_b), where});
   }
   table.print(out);
   for (const std::string& topic : comparison.only_a) {

@@ -21,6 +21,12 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
     if (!path) return std::unexpected(path.error());
     build.library = std::move(*path);
   }
+  if (Status lost = check_overwrites(build.library,
+                                     "\x7F"
+                                     "ELF",
+                                     "library");
+      !lost)
+    return lost;
   build.force = options.force;
   const Result<model::BuildReport> report = build_shown(robot, build);
   if (!report) return std::unexpected(report.error());

@@ -11,10 +11,13 @@
 namespace tandem::apps {
 namespace {
 
-/// "runs/coman-squat-001.mcap" -> "runs/coman-squat-001"
-std::string default_folder(const std::string& log) {
+/// "runs/coman-squat-001.mcap" -> "runs/coman-squat-001"; with another log beside it
+/// "runs/coman-squat-001-and-coman-squat-002", so that the report of the first alone stays.
+std::string default_folder(const std::string& log, const std::string& other) {
   std::filesystem::path folder = log;
   folder.replace_extension();
+  if (!other.empty())
+    return folder.string() + "-and-" + std::filesystem::path(other).stem().string();
   return folder.string() == log ? log + ".report" : folder.string();
 }
 
@@ -28,7 +31,8 @@ Result<report::ReportFiles> draw_report(const ReportOptions& options) {
     kernels = std::move(*found);
     return kernels.get();
   };
-  const std::string folder = options.output.empty() ? default_folder(options.log) : options.output;
+  const std::string folder =
+      options.output.empty() ? default_folder(options.log, options.other) : options.output;
   return report::make_report(options.log, options.other, folder, find,
                              hal::can::DriveMaster::error_text);
 }

@@ -10,6 +10,7 @@
 namespace tandem::apps {
 namespace {
 
+constexpr double kHighest = 10.0;  // of the height at which it touches: more is a slip of units
 constexpr double kTolerated_m = 0.005;
 
 /// How far the robot's weight presses its soles into the ground.
@@ -25,7 +26,7 @@ double pressed_in(const RobotFiles& robot) {
 
 }  // namespace
 
-std::optional<Error> start_in_ground(const RobotFiles& robot, const std::string& posture) {
+std::optional<Error> wrong_start_height(const RobotFiles& robot, const std::string& posture) {
   const hal::PostureConfig zero{};
   const hal::PostureConfig* start = posture.empty() ? &zero : robot.config.posture(posture);
   if (start == nullptr) return {};  // has been said elsewhere
@@ -33,8 +34,18 @@ std::optional<Error> start_in_ground(const RobotFiles& robot, const std::string&
   if (!touching) return {};
   const bool floats = robot.tree.floating_base;
   const double depth_m = touching->base_height_m - (floats ? start->base_height_m : 0.0);
-  if (!(depth_m > std::max(kTolerated_m, 2.0 * pressed_in(robot)))) return {};
   Error error;
+  error.file = robot.config.file;
+  error.line = start->line;
+  error.key = posture.empty() ? "contact.height_m"
+                              : "posture." + posture + (floats ? ".base_height_m" : "");
+  if (floats && -depth_m > kHighest * std::max(touching->base_height_m, 0.1)) {
+    error.message =
+        fmt::format("the posture '{}' starts {:.1f} m above the ground", posture, -depth_m);
+    error.hint = fmt::format("base_height_m = {:.4f} lets it touch", touching->base_height_m);
+    return error;
+  }
+  if (!(depth_m > std::max(kTolerated_m, 2.0 * pressed_in(robot)))) return {};
   error.message = fmt::format(
       "{} starts {:.4f} m inside the ground, with the foot '{}'",
       posture.empty() ? "the robot with every joint at 0" : "the posture '" + posture + "'",
@@ -42,10 +53,6 @@ std::optional<Error> start_in_ground(const RobotFiles& robot, const std::string&
   error.hint = floats ? fmt::format("base_height_m = {:.4f} lets it touch; more lets it hang above",
                                     touching->base_height_m)
                       : "move its joints, or lower height_m of [contact]";
-  error.file = robot.config.file;
-  error.line = start->line;
-  error.key = posture.empty() ? "contact.height_m"
-                              : "posture." + posture + (floats ? ".base_height_m" : "");
   return error;
 }
 

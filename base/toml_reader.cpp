@@ -388,8 +388,8 @@ Result<TomlDocument> TomlDocument::load(const std::string& file) {
 Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::string& file) {
   if (const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
       first != std::string_view::npos && text[first] == '<') {
-    return std::unexpected(Error{"this is XML, not TOML",
-                                 "`tandem new FILE` makes a robot of a URDF", file, 1, {}});
+    return std::unexpected(
+        Error{"this is XML, not TOML", "`tandem new FILE` makes a robot of a URDF", file, 1, {}});
   }
   TomlDocument document;
   document.shared_ = std::make_shared<TomlTable::Shared>();
@@ -398,8 +398,10 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
     document.shared_->root = toml::parse(text, file);
   } catch (const toml::parse_error& e) {
     const bool encoding = e.description().find("utf-8") != std::string_view::npos;
+    const bool twice = e.description().find("redefine existing table") != std::string_view::npos;
     return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
                                  encoding ? "save the file as UTF-8"
+                                 : twice  ? "of several write each as [[NAME]], or remove one"
                                           : "correct the syntax at this line",
                                  file,
                                  static_cast<int>(e.source().begin.line),

@@ -22,6 +22,7 @@ class JointTrajectory : public Controller {
         parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic"}) == "quintic";
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
     joints_ = joints_parameter(setup);
+    joints_known_ = !setup.parameters.has_errors();
     for (const std::size_t joint : joints_) {
       const Status claimed = claim(setup, joint, hal::ControlMode::kPosition);
       if (!claimed) return claimed;
@@ -68,7 +69,7 @@ class JointTrajectory : public Controller {
   /// One number a joint; says which joints these are when there are more or fewer.
   std::vector<double> read_positions(const ControllerSetup& setup, TomlTable& table) {
     std::vector<double> positions = table.numbers("position_rad", 0);
-    if (table.has("position_rad") && positions.size() != joints_.size()) {
+    if (joints_known_ && table.has("position_rad") && positions.size() != joints_.size()) {
       std::string order;
       for (const std::size_t joint : joints_) {
         order += (order.empty() ? "" : ", ") + setup.robot.joints[joint].name;
@@ -150,6 +151,7 @@ class JointTrajectory : public Controller {
 
   bool through_ = false;
   bool stop_at_end_ = false;
+  bool joints_known_ = false;  // else their number says nothing of the way-points
   std::vector<std::size_t> joints_;
   std::vector<double> times_s_;  // of every point, the start at 0 first
   std::vector<Motion> points_;   // per time, per joint

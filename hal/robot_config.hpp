@@ -22,30 +22,30 @@ namespace tandem::hal {
 /// [[site]]: a named frame of the model.
 struct SiteConfig {
   std::string name;
-  std::string link;                     ///< URDF link the frame is fixed to
-  std::array<double, 3> xyz_m{};        ///< origin in the link's frame
-  std::array<double, 3> rpy_rad{};      ///< URDF convention
-  bool wrench = false;                  ///< an external wrench may act here (contact)
-  int line = 0;                         ///< in the TOML, for messages
+  std::string link;                 ///< URDF link the frame is fixed to
+  std::array<double, 3> xyz_m{};    ///< origin in the link's frame
+  std::array<double, 3> rpy_rad{};  ///< URDF convention
+  bool wrench = false;              ///< an external wrench may act here (contact)
+  int line = 0;                     ///< in the TOML, for messages
 };
 
 /// [model.link.NAME]: mass and inertia instead of the URDF's; what is not given stays the URDF's.
 struct LinkConfig {
-  std::string name;                     ///< of the URDF
-  std::optional<double> mass_kg;        ///< 0: no inertia either, unless the next but one gives it
+  std::string name;               ///< of the URDF
+  std::optional<double> mass_kg;  ///< 0: no inertia either, unless the next but one gives it
   std::optional<std::array<double, 3>> com_m;          ///< in the link's frame
   std::optional<std::array<double, 6>> inertia_kg_m2;  ///< ixx ixy ixz iyy iyz izz about the com,
                                                        ///< along the link's axes
-  int line = 0;                         ///< in the TOML, for messages
+  int line = 0;                                        ///< in the TOML, for messages
 };
 
 /// [model]
 struct ModelConfig {
-  std::string urdf;                     ///< path, resolved against the TOML's folder
+  std::string urdf;  ///< path, resolved against the TOML's folder
   bool floating_base = false;
-  bool mimic_independent = false;       ///< mimic = "independent"; the default is "follow"
-  bool repair_inertia = false;          ///< inertia = "repair"; the default "strict" is an error
-  bool exact_right_angles = false;      ///< right_angles = "exact"; the default is "as_written"
+  bool mimic_independent = false;   ///< mimic = "independent"; the default is "follow"
+  bool repair_inertia = false;      ///< inertia = "repair"; the default "strict" is an error
+  bool exact_right_angles = false;  ///< right_angles = "exact"; the default is "as_written"
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
   std::map<std::string, int> lock_lines;  ///< joint of it -> line in the TOML, for messages
   std::vector<LinkConfig> links;
@@ -56,10 +56,10 @@ struct ModelConfig {
 /// [actuator.NAME]: motor, gear and spring; reflected to the link side but for R, L, K.
 struct ActuatorConfig {
   std::string name;
-  int order = 2;                        ///< 0 rigid, 1 electrical, 2 mechanical (SEA), 3 both
+  int order = 2;  ///< 0 rigid, 1 electrical, 2 mechanical (SEA), 3 both
   double resistance_ohm = 0.0;
   double inductance_H = 0.0;
-  double torque_constant_Nm_A = 0.0;    ///< of the motor, before the gear
+  double torque_constant_Nm_A = 0.0;  ///< of the motor, before the gear
   double gear_ratio = 1.0;
   double inertia_kg_m2 = 0.0;           ///< J
   double damping_Nms_rad = 0.0;         ///< D, the back-EMF's share N^2 K^2 / R included
@@ -69,9 +69,9 @@ struct ActuatorConfig {
   double voltage_limit_V = 0.0;
   double thermal_resistance_K_W = 1.0;  ///< winding to ambient
   double thermal_time_constant_s = 60.0;
-  double continuous_current_A = 0.0;    ///< the drive's I2t limit; 0: not watched
-  double thermal_time_s = 30.0;         ///< time constant of that watch
-  double temperature_limit_C = 120.0;   ///< of the winding
+  double continuous_current_A = 0.0;   ///< the drive's I2t limit; 0: not watched
+  double thermal_time_s = 30.0;        ///< time constant of that watch
+  double temperature_limit_C = 120.0;  ///< of the winding
 };
 
 /// What its order lacks ("inductance_H must be positive"), or empty.
@@ -80,7 +80,7 @@ struct ActuatorConfig {
 /// One loop of the firmware.
 struct PidConfig {
   PidGains gains;
-  double output_limit = 0.0;            ///< 0: the joint's or the actuator's own limit
+  double output_limit = 0.0;  ///< 0: the joint's or the actuator's own limit
 };
 
 /// Which encoder the stiff position loop's proportional and derivative terms act on.
@@ -95,73 +95,74 @@ enum class PositionFeedback : std::uint8_t {
 /// makes it a motor voltage [V], with feed-forward of the motor's resistance and back-EMF.
 struct GainsConfig {
   std::string name;
-  PidConfig position;                   ///< [Nm/rad, Nm/(rad s), Nms/rad] on link position
-  PidConfig velocity;                   ///< [Nms/rad, Nm/rad, Nms^2/rad] on link velocity
-  PidConfig torque;                     ///< [V/Nm, V/(Nm s), Vs/Nm] on the spring's torque
-  PidConfig current;                    ///< [V/A, V/(A s), Vs/A]
+  int line = 0;
+  PidConfig position;  ///< [Nm/rad, Nm/(rad s), Nms/rad] on link position
+  PidConfig velocity;  ///< [Nms/rad, Nm/rad, Nms^2/rad] on link velocity
+  PidConfig torque;    ///< [V/Nm, V/(Nm s), Vs/Nm] on the spring's torque
+  PidConfig current;   ///< [V/A, V/(A s), Vs/A]
   PositionFeedback position_feedback = PositionFeedback::kLink;
-  double torque_feedforward = 1.0;      ///< share of R / (N K) tau_ref added to the voltage
-  double emf_compensation = 0.0;        ///< share of N K theta' added to the voltage, 0 to 1
-  double stiffness_Nm_rad = 0.0;        ///< impedance mode's defaults
+  double torque_feedforward = 1.0;  ///< share of R / (N K) tau_ref added to the voltage
+  double emf_compensation = 0.0;    ///< share of N K theta' added to the voltage, 0 to 1
+  double stiffness_Nm_rad = 0.0;    ///< impedance mode's defaults
   double damping_Nms_rad = 0.0;
 };
 
 /// [[joint]]
 struct JointConfig {
-  std::string name;                     ///< URDF joint
+  std::string name;  ///< URDF joint
   std::string board;
-  int axis = 0;                         ///< on its board, from 0
+  int axis = 0;  ///< on its board, from 0
   std::string actuator;
   std::string gains;
-  double min_position_rad = 0.0;        ///< this and the next three: NaN when the TOML leaves
-  double max_position_rad = 0.0;        ///< them to the URDF, until complete_from_description()
+  double min_position_rad = 0.0;  ///< this and the next three: NaN when the TOML leaves
+  double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
-  double max_torque_Nm = 0.0;           ///< the torque reference's limit
-  double rated_torque_Nm = 0.0;         ///< CiA 402 6076: torques travel as per mille of it;
-                                        ///< default: max_torque_Nm
-  double encoder_counts_per_rev = 0.0;  ///< link encoder
+  double max_torque_Nm = 0.0;                 ///< the torque reference's limit
+  double rated_torque_Nm = 0.0;               ///< CiA 402 6076: torques travel as per mille of it;
+                                              ///< default: max_torque_Nm
+  double encoder_counts_per_rev = 0.0;        ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
-  double torque_noise_Nm = 0.0;         ///< standard deviation of the spring torque's measurement
-  double following_error_rad = 0.5;     ///< in CSP, beyond it for longer than the next: a fault;
-  double following_timeout_s = 0.1;     ///< 0 rad: not watched
+  double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
+  double following_error_rad = 0.5;  ///< in CSP, beyond it for longer than the next: a fault;
+  double following_timeout_s = 0.1;  ///< 0 rad: not watched
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
-  int line = 0;                         ///< in the TOML, for messages
+  int line = 0;                                      ///< in the TOML, for messages
 };
 
 /// [[passive]]: a joint that moves but has no motor and no encoder. It is in the dynamics and
 /// nowhere else: not in the process image, not on a board.
 struct PassiveConfig {
-  std::string name;                     ///< URDF joint
-  double position_rad = 0.0;            ///< at the start; where loops close, from near here
+  std::string name;           ///< URDF joint
+  double position_rad = 0.0;  ///< at the start; where loops close, from near here
   double damping_Nms_rad = 0.0;
-  int line = 0;                         ///< in the TOML, for messages
+  int line = 0;  ///< in the TOML, for messages
 };
 
 /// [[loop]]
 struct LoopConfig : model::LoopSpec {
-  int line = 0;                         ///< in the TOML, for messages
+  int line = 0;  ///< in the TOML, for messages
 };
 
 /// [[bus]]
 struct BusConfig {
   std::string name;
-  std::string interface;                ///< "can0": the SocketCAN name; unused in process
+  std::string interface;  ///< "can0": the SocketCAN name; unused in process
   bool fd = true;
   std::int64_t bitrate = 1'000'000;
   std::int64_t data_bitrate = 8'000'000;
-  double max_load = 0.9;                ///< mean share of the wire's time that may be used
-  int line = 0;                         ///< in the TOML, for messages
+  double max_load = 0.9;  ///< mean share of the wire's time that may be used
+  int line = 0;           ///< in the TOML, for messages
 };
 
 /// [[board]]
 struct BoardConfig {
   std::string name;
   std::string bus;
-  int node_id = 0;                      ///< 1 to 127
+  int node_id = 0;                             ///< 1 to 127
   std::int64_t control_period_ns = 1'000'000;  ///< of its joint controllers
-  int heartbeat_ms = 50;                ///< both ways; time-out is three of them
-  int command_timeout_cycles = 10;      ///< SYNCs without a command until the safe state
-  int slow_pdo_every = 1;               ///< motor velocity, current, … every n-th SYNC
+  int heartbeat_ms = 50;                       ///< both ways; time-out is three of them
+  int command_timeout_cycles = 10;             ///< SYNCs without a command until the safe state
+  int slow_pdo_every = 1;                      ///< motor velocity, current, … every n-th SYNC
   // 1018, as the board has to tell it; without a value that of the emulated boards, or any serial
   std::optional<std::uint32_t> vendor_id, product_code;
   std::optional<std::uint32_t> revision;  ///< major << 16 | minor: that major, at least that minor
@@ -179,20 +180,18 @@ struct SensorConfig {
   SensorType type = SensorType::kForceTorque;
   std::string bus;
   int node_id = 0;
-  std::string joint;                    ///< force_torque: measures the wrench through this joint
-  std::string link;                     ///< the frame it is expressed in
-  std::vector<double> noise;            ///< standard deviation per channel; empty: none
-  std::vector<double> bias;             ///< per channel; empty: none
-  int line = 0;                         ///< in the TOML, for messages
+  std::string joint;          ///< force_torque: measures the wrench through this joint
+  std::string link;           ///< the frame it is expressed in
+  std::vector<double> noise;  ///< standard deviation per channel; empty: none
+  std::vector<double> bias;   ///< per channel; empty: none
+  int line = 0;               ///< in the TOML, for messages
 
-  [[nodiscard]] std::size_t channels() const {
-    return type == SensorType::kForceTorque ? 6 : 10;
-  }
+  [[nodiscard]] std::size_t channels() const { return type == SensorType::kForceTorque ? 6 : 10; }
 };
 
 /// [[contact.foot]]: points of a sole that may touch the ground.
 struct FootConfig {
-  std::string site;                     ///< a site with wrench = true
+  std::string site;                             ///< a site with wrench = true
   std::vector<std::array<double, 3>> points_m;  ///< in the site's frame
 };
 
@@ -200,37 +199,37 @@ struct FootConfig {
 struct ContactConfig {
   double height_m = 0.0;
   double stiffness_N_m = 0.0;
-  double damping_s_m = 0.0;             ///< Fz = k d (1 + damping * d'), never below zero
+  double damping_s_m = 0.0;  ///< Fz = k d (1 + damping * d'), never below zero
   double tangential_stiffness_N_m = 0.0;
   double tangential_damping_Ns_m = 0.0;
   double static_friction = 0.0;
   double sliding_friction = 0.0;
-  double stick_velocity_m_s = 0.01;     ///< regularisation between static and sliding
+  double stick_velocity_m_s = 0.01;  ///< regularisation between static and sliding
   std::vector<FootConfig> feet;
 };
 
 /// [posture.NAME]: positions by joint, in the image's order; joints not named are 0.
 struct PostureConfig {
   std::string name;
-  double base_height_m = 0.0;           ///< of the base's origin above W's; floating base only. NaN:
-                                        ///< "auto", until it is computed from the description
+  double base_height_m = 0.0;  ///< of the base's origin above W's; floating base only. NaN:
+                               ///< "auto", until it is computed from the description
   std::vector<double> position_rad;
-  int line = 0;                         ///< in the TOML, for messages
+  int line = 0;  ///< in the TOML, for messages
 };
 
 /// The whole robot.toml.
 struct RobotConfig {
-  std::string file;                     ///< the TOML's path
+  std::string file;  ///< the TOML's path
   std::string name;
   ModelConfig model;
   std::vector<ActuatorConfig> actuators;
   std::vector<GainsConfig> gains;
   std::vector<BusConfig> buses;
   std::vector<BoardConfig> boards;
-  std::vector<JointConfig> joints;      ///< the process image's order
+  std::vector<JointConfig> joints;  ///< the process image's order
   std::vector<PassiveConfig> passive;
   std::vector<LoopConfig> loops;
-  std::vector<SensorConfig> sensors;    ///< the process image's order
+  std::vector<SensorConfig> sensors;  ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
   StopCategory emergency_stop = StopCategory::kCategory1;  ///< [safety]; 0 or 1
@@ -320,9 +319,9 @@ struct RobotDescription {
 /// Checks the configuration against its URDF and fills the limits that the TOML left to it.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
 /// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested) or
-/// follows another, a moving joint without [[joint]], [[passive]] or lock, a site or sensor on an unknown link
-/// or joint, a limit that neither gives, a limit beyond the wire's range or beyond what a follower
-/// allows, a posture beyond the limits.
+/// follows another, a moving joint without [[joint]], [[passive]] or lock, a site or sensor on an
+/// unknown link or joint, a limit that neither gives, a limit beyond the wire's range or beyond
+/// what a follower allows, a posture beyond the limits.
 [[nodiscard]] Diagnostics complete_from_description(RobotConfig& robot,
                                                     const RobotDescription& description);
 

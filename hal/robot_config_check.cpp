@@ -238,10 +238,11 @@ class Completion : private Check {
             "max_torque_Nm is more than 32 times the rated torque, the most the wire can say",
             "raise rated_torque_Nm");
     }
-    check_gains(joint, key);
+    check_gains(joint);
   }
 
-  void check_gains(const JointConfig& joint, const std::string& key) {
+  /// One message for each loop of a table, however many joints have it.
+  void check_gains(const JointConfig& joint) {
     if (!(joint.max_torque_Nm > 0.0)) return;
     const GainsConfig& gains = robot_.gains_of(joint);
     const JointCapabilities can = capabilities_of(robot_, joint);
@@ -250,10 +251,9 @@ class Completion : private Check {
                                        {PidLoop::kTorque, &gains.torque},
                                        {PidLoop::kCurrent, &gains.current}}) {
       const std::string problem = gains_problem(can, loop, config->gains);
-      if (problem.empty()) continue;
-      error(joint.line, key + ".gains",
-            "of [gains." + gains.name + "] the " + to_string(loop) + " loop's " + problem,
-            "correct the gain, or the joint's limits");
+      const std::string where = "gains." + gains.name + "." + to_string(loop);
+      if (problem.empty() || std::ranges::count(errors_, where, &Error::key) > 0) continue;
+      error(gains.line, where, problem, "correct the gain, or the limits of " + joint.name);
     }
   }
 

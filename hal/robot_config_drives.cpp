@@ -101,6 +101,7 @@ void read_drive_tables(TomlTable& root, RobotConfig& robot) {
     table.inherit(gains_defaults);
     robot.gains.push_back(read_gains(table));
     robot.gains.back().name = name;
+    robot.gains.back().line = table.line();
     table.finish();
   }
   gains.finish();

@@ -5,6 +5,8 @@
 namespace tandem::hal {
 namespace {
 
+constexpr Range kCounts{100.0, 1e12};  // per revolution; bits (20) would be far below
+
 constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
 
 StopCategory read_stop_category(TomlTable& table) {
@@ -28,8 +30,8 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
   joint.gains = table.text_or("gains", joint.actuator);
   read_limits(table, joint);
-  joint.encoder_counts_per_rev = table.number("encoder_counts_per_rev", kPositive);
-  joint.motor_encoder_counts_per_rev = table.number("motor_encoder_counts_per_rev", kPositive);
+  joint.encoder_counts_per_rev = table.number("encoder_counts_per_rev", kCounts);
+  joint.motor_encoder_counts_per_rev = table.number("motor_encoder_counts_per_rev", kCounts);
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
   joint.following_error_rad =
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);

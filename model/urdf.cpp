@@ -23,6 +23,8 @@
 namespace tandem::model {
 namespace {
 
+constexpr double kFarthest_m = 100.0;  // of one joint from the one before
+
 /// Collects what urdfdom would print. The hook is global, hence the mutex.
 class ConsoleCapture : public console_bridge::OutputHandler {
  public:
@@ -244,7 +246,14 @@ class Builder {
       const urdf::Joint& joint = *source.parent_joint;
       const Link& above = tree.links[static_cast<std::size_t>(parent)];
       link.joint = joint.name;
-      const Placement seat = above.in_body * placement(joint.parent_to_joint_origin_transform);
+      const Placement origin = placement(joint.parent_to_joint_origin_transform);
+      if (origin.p.norm() > kFarthest_m) {
+        errors_.push_back({"its origin is " + std::to_string(std::lround(origin.p.norm())) +
+                               " m from its parent's frame, farther than any robot reaches",
+                           "lengths are in metres", tree.file, outline_.joint_lines.at(joint.name),
+                           "joint " + joint.name});
+      }
+      const Placement seat = above.in_body * origin;
       if (const double* position = lock_of(joint.name)) {
         link.body = above.body;
         link.in_body = seat * displacement(joint, *position);
@@ -321,8 +330,9 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
 std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,
                                                 const UrdfOptions& options) {
   std::error_code ignored;
-  const std::string named =
-      options.overrides_file.empty() ? "" : "; it is the urdf of [model] in " + options.overrides_file;
+  const std::string named = options.overrides_file.empty()
+                                ? ""
+                                : "; it is the urdf of [model] in " + options.overrides_file;
   if (std::filesystem::is_directory(file, ignored)) {
     return std::unexpected(one_error("this is a folder", "name a .urdf file" + named, file));
   }

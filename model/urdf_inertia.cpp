@@ -9,6 +9,7 @@ namespace tandem::model {
 namespace {
 
 constexpr double kDefiniteTolerance = 1e-12;  // of the largest principal moment
+constexpr double kMostGyration_m = 10.0;      // radius of gyration: likewise
 constexpr double kMostMass_kg = 1e6;          // a slip of units or digits
 constexpr double kTriangleTolerance = 1e-6;   // rounding of the description's own digits
 
@@ -128,6 +129,12 @@ std::string inertia_problem(const Inertia& inertia) {
   if (inertia.mass_kg < 0.0) return "the mass is negative, " + mass_text(inertia);
   if (inertia.mass_kg > kMostMass_kg) {
     return "the mass is " + mass_text(inertia) + ", more than any robot has";
+  }
+  if (inertia.mass_kg > 0.0 &&
+      I.trace() > 2.0 * kMostGyration_m * kMostGyration_m * inertia.mass_kg) {
+    return "the inertia, of principal moments " + moments_text(inertia) +
+           ", is that of a body of " + "more than " +
+           std::to_string(static_cast<int>(kMostGyration_m)) + " m";
   }
   if (inertia.mass_kg == 0.0) return I.isZero(0.0) ? "" : "there is an inertia without mass";
   const Eigen::Vector3d moments = principal_moments(I);

@@ -40,7 +40,7 @@ std::string held_back(const Move& move) {
   for (const auto& [joint, swing] : move.held_back) {
     names.push_back(swing > 0.0 ? fmt::format("{} {:.3f}", joint, swing) : joint + " not at all");
   }
-  return fmt::format("# Weak drives, the floor or limits hold back [rad or m]: {}.\n",
+  return fmt::format("# Weak drives, the floor or the legs hold back [rad or m]: {}.\n",
                      fmt::join(names, ", "));
 }
 

@@ -49,7 +49,7 @@ struct Move {
     double swing = 0.0;  ///< what is left to either side [rad or m]
   };
   std::vector<WayPoint> points;
-  std::vector<HeldBack> held_back;  ///< by weak drives, the floor, or the legs' limits
+  std::vector<HeldBack> held_back;  ///< by weak drives, the floor, or what the legs can balance
   double squat_m = 0.0;             ///< the root goes down so far; 0: it stays
   bool swings = false;              ///< joints that are in no leg move
 };

@@ -52,6 +52,16 @@ TEST_F(LogAndReport, CsvDoesNotWriteOverTheLog) {
   EXPECT_EQ(outcome.status, 2);
   EXPECT_NE(outcome.err.find("this is the log itself"), std::string::npos) << outcome.err;
   EXPECT_EQ(tandem("log info " + log_).status, 0);
+  const std::string robot = read_text(folder_ / "robot.toml");
+  for (const std::string command :
+       {"log csv " + log_ + " -o robot.toml", std::string("model build robot.toml -o robot.toml"),
+        "report " + log_ + " --json robot.toml"}) {
+    const Outcome over = tandem(command);
+    EXPECT_EQ(over.status, 2) << command;
+    EXPECT_NE(over.err.find("it would be lost"), std::string::npos) << over.err;
+    EXPECT_EQ(over.out, "") << command;
+  }
+  EXPECT_EQ(read_text(folder_ / "robot.toml"), robot);
 }
 
 TEST_F(LogAndReport, CsvSuggestsTheNearestTopic) {

@@ -89,6 +89,24 @@ TEST_F(Run, GivesTheSameDataTwiceAndAtAnotherRate) {
   EXPECT_EQ(first["joints"], paced["joints"]);
 }
 
+/// It had sunk into ground as soft as a slip of units makes it, with status 0.
+TEST_F(Run, OfARobotThatFallsIsNoSuccess) {
+  std::filesystem::copy(TANDEM_SOURCE_DIR "/config/anymal_c", folder_ / "anymal");
+  edit("anymal/robot.toml", "\nstiffness_N_m = ", "\nstiffness_N_m = 10  # was ");
+  edit("anymal/robot.toml", "\ndamping_s_m = ", "\ndamping_s_m = 1  # was ");
+  const Outcome outcome = tandem("run anymal/hold.toml --no-log --quiet");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.err.find("fault: the robot fell: "), std::string::npos) << outcome.err;
+}
+
+TEST_F(Run, OfARobotThatStartsFarAboveTheGroundIsRefused) {
+  std::filesystem::copy(TANDEM_SOURCE_DIR "/config/anymal_c", folder_ / "anymal");
+  edit("anymal/robot.toml", "\nbase_height_m = ", "\nbase_height_m = 597.0  # was ");
+  const Outcome outcome = tandem("run anymal/hold.toml --no-log --quiet");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("m above the ground"), std::string::npos) << outcome.err;
+}
+
 /// Twenty runs that began at once had left nineteen logs.
 TEST_F(Run, EachOfManyThatBeginAtOnceHasALogOfItsOwn) {
   constexpr int kRuns = 8;

@@ -176,9 +176,9 @@ TEST(RobotConfig, RefusesReversedLimits) {
 }
 
 TEST(RobotConfig, RefusesEncodersWithoutCounts) {
-  expect_error(with("\nencoder_counts_per_rev = 65536", "\nencoder_counts_per_rev = 0"),
-               "robots/leg.toml:35: joint_defaults.encoder_counts_per_rev: 0 is out of range "
-               "(must be greater than 0)");
+  expect_error(with("\nencoder_counts_per_rev = 65536", "\nencoder_counts_per_rev = 20"),
+               "robots/leg.toml:35: joint_defaults.encoder_counts_per_rev: 20 is out of range "
+               "(must be at least 100 and at most 1e+12)");
   expect_error(with("\nencoder_counts_per_rev = 65536", ""),
                "robots/leg.toml:36: joint[0].encoder_counts_per_rev: this key is missing "
                "(add it to the table, or to [joint_defaults] for all)\n"

@@ -20,6 +20,12 @@ TEST(UrdfInertia, RefusesAMassThatNoRobotHas) {
       "in kilograms)");
 }
 
+TEST(UrdfInertia, RefusesAnInertiaInOtherUnits) {
+  EXPECT_NE(
+      errors_of(with("ixx=\"0.03\"", "ixx=\"30000\"")).find("is that of a body of more than 10 m"),
+      std::string::npos);
+}
+
 TEST(UrdfInertia, RefusesAnInertiaThatIsNotPositiveDefinite) {
   EXPECT_EQ(errors_of(with("ixx=\"0.03\" ixy=\"0\"", "ixx=\"0.03\" ixy=\"0.05\"")),
             std::string("arm.urdf:16: link weight: the inertia is not positive definite: "
