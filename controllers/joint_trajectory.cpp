@@ -90,14 +90,24 @@ class JointTrajectory : public Controller {
     if (time_s <= times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
+    std::vector<const hal::JointConfig*> beyond;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
       if (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad) {
-        table.error("position_rad", "joint '" + joint.name + "' leaves its limits",
-                    "stay within " + std::to_string(joint.min_position_rad) + " and " +
-                        std::to_string(joint.max_position_rad));
+        beyond.push_back(&joint);
       }
       points_.push_back({positions[k], 0.0, 0.0});
+    }
+    if (!beyond.empty()) {
+      const hal::JointConfig& first = *beyond.front();
+      const std::string others = beyond.size() == 1 ? " leaves its limits"
+                                                    : " and " + std::to_string(beyond.size() - 1) +
+                                                          " more leave their limits";
+      table.error("position_rad", "joint '" + first.name + "'" + others,
+                  "stay within " + std::to_string(first.min_position_rad) + " and " +
+                      std::to_string(first.max_position_rad) +
+                      (beyond.size() > 1 ? "; in radians, or metres of a slide" : ""));
+      beyond_ = true;
     }
     times_s_.push_back(time_s);
   }
@@ -117,7 +127,7 @@ class JointTrajectory : public Controller {
 
   void check_segment(ControllerSetup& setup, TomlTable& end, std::size_t segment) {
     const double duration = times_s_[segment + 1] - times_s_[segment];
-    if (!(duration > 0.0)) return;  // reported already
+    if (!(duration > 0.0) || beyond_) return;  // reported already
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
       double fastest = 0.0;
@@ -151,6 +161,7 @@ class JointTrajectory : public Controller {
 
   bool through_ = false;
   bool stop_at_end_ = false;
+  bool beyond_ = false;        // a way-point is: what is between them follows from that
   bool joints_known_ = false;  // else their number says nothing of the way-points
   std::vector<std::size_t> joints_;
   std::vector<double> times_s_;  // of every point, the start at 0 first

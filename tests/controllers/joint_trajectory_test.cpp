@@ -96,6 +96,11 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1.7]\n"),
             "experiment.toml:4: waypoint[0].position_rad: joint 'wrist' leaves its limits (stay "
             "within -1.500000 and 1.500000)");
+  EXPECT_EQ(problem_of("[[waypoint]]\ntime_s = 1\nposition_rad = [60, 90, 45]\n[[waypoint]]\n"
+                       "time_s = 2\nposition_rad = [0, 0, 0]\n"),
+            "experiment.toml:3: waypoint[0].position_rad: joint 'shoulder' and 2 more leave their "
+            "limits (stay within -1.500000 and 1.500000; in radians, or metres of a slide)")
+      << "one message for a way-point in degrees";
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1, 2]\n"),
             "experiment.toml:4: waypoint[0].position_rad: has 2 numbers for 1 joints "
             "(give one each for wrist; or name those that move in `joints`)");
