@@ -27,9 +27,11 @@ struct Overloaded : F... {
 int main(int argc, char** argv) {
   using namespace tandem::apps;
   const Command command = parse_command_line(argc, argv);
-  if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {
-    if (!std::holds_alternative<Exit>(command)) print_errors({kept.error()});
-    return static_cast<int>(Exit::kUsage);
+  if (!std::holds_alternative<Exit>(command)) {  // before it does anything
+    if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {
+      print_errors({kept.error()});
+      return static_cast<int>(Exit::kUsage);
+    }
   }
   const Exit exit =
       std::visit(Overloaded{

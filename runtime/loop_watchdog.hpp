@@ -13,7 +13,7 @@
 namespace tandem::runtime {
 
 struct WatchdogConfig {
-  std::chrono::nanoseconds limit{};  ///< that one stay at work may take
+  std::chrono::nanoseconds limit{};  ///< the longest that the work of a cycle may take
   /// That the loop may wait between two of them; zero: as long as it likes (simulated time is
   /// paused, waits for the disk, for emulated boards, for an owner).
   std::chrono::nanoseconds wait_limit{};
@@ -33,7 +33,7 @@ class LoopWatchdog {
 
   /// The heartbeat outlives it. Nothing happens before the first beat.
   LoopWatchdog(const Heartbeat& heartbeat, const WatchdogConfig& config, Hooks hooks);
-  /// Waits for a hook that is at work.
+  /// Waits for a hook that is running.
   ~LoopWatchdog();
   LoopWatchdog(const LoopWatchdog&) = delete;
   LoopWatchdog& operator=(const LoopWatchdog&) = delete;

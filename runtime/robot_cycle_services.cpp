@@ -40,7 +40,7 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
   return {};
 }
 
-/// From held joints to controllers: each joint that changes hands is led over.
+/// From held joints to controllers: no joint jumps.
 LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
   if (delay_.on()) {
     delay_.fill(command_);

@@ -1,4 +1,4 @@
-// Whether another master is at work on a bus, found by listening before anything is sent.
+// Whether another master is active on a bus, found by listening before anything is sent.
 // Layer: hal/ethercat-can.  Thread: non-RT.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace tandem::hal::can {
 /// null for every other frame.
 [[nodiscard]] const char* sent_by_master(const canopen::Frame& frame) noexcept;
 
-/// How long to listen so that a master at work is heard: two of its periods and two of its
+/// How long to listen so that an active master is heard: two of its periods and two of its
 /// heartbeats, when it drives this robot too; 0.1 s to 2 s.
 [[nodiscard]] std::int64_t listening_ns(const RobotConfig& robot, std::int64_t period_ns) noexcept;
 
