@@ -9,15 +9,9 @@ namespace tandem::apps {
 
 Exit ask_command(const AskOptions& options) {
   const Result<Json> question = read_json_object(options.question);
-  if (!question) {
-    print_errors({question.error()});
-    return Exit::kUsage;
-  }
+  if (!question) return refuse(question.error());
   const Result<Json> answer = ask(options.target, "", *question);
-  if (!answer) {
-    print_errors({answer.error()});
-    return Exit::kUsage;
-  }
+  if (!answer) return refuse(answer.error());
   fmt::print("{}\n", json_text(*answer, 2));
   return Exit::kDone;
 }

@@ -169,10 +169,8 @@ Exit check_command(const CheckOptions& options) {
   json["ok"] = errors.empty();
   json["errors"] = errors_json(errors);
   json["warnings"] = errors_json(warnings);
-  if (const Status written = write_json(options.json, json); !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (const Status written = write_json(options.json, json); !written)
+    return refuse(written.error());
   return errors.empty() ? Exit::kDone : Exit::kUsage;
 }
 

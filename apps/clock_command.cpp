@@ -12,15 +12,13 @@
 namespace tandem::apps {
 namespace {
 
-using Action = ClockOptions::Action;
-
 Json question_of(const ClockOptions& options) {
   switch (options.action) {
-    case Action::kShow: return {{"do", "clock.show"}};
-    case Action::kPause: return {{"do", "clock.pause"}};
-    case Action::kResume: return {{"do", "clock.resume"}};
-    case Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
-    case Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
+    case ClockOptions::Action::kShow: return {{"do", "clock.show"}};
+    case ClockOptions::Action::kPause: return {{"do", "clock.pause"}};
+    case ClockOptions::Action::kResume: return {{"do", "clock.resume"}};
+    case ClockOptions::Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
+    case ClockOptions::Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
   }
   return {};
 }
@@ -72,7 +70,8 @@ Result<Json> carry_out(const ClockOptions& options) {
   const auto run = ControlClient::open(options.target, "run");
   if (!run) return std::unexpected(run.error());
   Result<Json> answer = (*run)->ask(question_of(options));
-  const bool waits = options.action == Action::kPause || options.action == Action::kStep;
+  const bool waits = options.action == ClockOptions::Action::kPause ||
+                     options.action == ClockOptions::Action::kStep;
   if (!answer || !waits) return answer;
   Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
   if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
@@ -84,15 +83,9 @@ Result<Json> carry_out(const ClockOptions& options) {
 
 Exit clock_command(const ClockOptions& options) {
   const Result<Json> answer = carry_out(options);
-  if (!answer) {
-    print_errors({answer.error()});
-    return Exit::kUsage;
-  }
+  if (!answer) return refuse(answer.error());
   if (options.json != "-") print_answer(*answer);
-  if (Status written = write_json(options.json, *answer); !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
 

@@ -8,17 +8,11 @@
 #include <variant>
 #include <vector>
 
+#include "apps/console.hpp"
 #include "apps/control_target.hpp"
 #include "apps/dds_place.hpp"
 
 namespace tandem::apps {
-
-/// Exit status of every command.
-enum class Exit : int {
-  kDone = 0,   ///< did what was asked
-  kFault = 1,  ///< the run ended in a fault; the logs that were compared differ
-  kUsage = 2,  ///< wrong input or usage; nothing was run
-};
 
 /// tandem run EXPERIMENT
 struct RunOptions {
@@ -71,7 +65,13 @@ struct EstopOptions {
 
 /// tandem controller list|load|unload|start|stop|switch
 struct ControllerOptions {
-  enum class Action : std::uint8_t { kList, kLoad, kUnload, kStart, kSwitch } action = Action::kList;
+  enum class Action : std::uint8_t {
+    kList,
+    kLoad,
+    kUnload,
+    kStart,
+    kSwitch
+  } action = Action::kList;
   std::string plugin;              ///< load: name or path
   std::string name;                ///< load, unload; empty: the plugin's
   std::string parameters;          ///< load: TOML file; empty: none

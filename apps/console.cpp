@@ -92,6 +92,15 @@ void outlive_readers() {
   stderr = lasting(STDERR_FILENO, _IONBF);
 }
 
+Status write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) return {};
+  return std::unexpected(
+      Error{"the file cannot be written", "choose another folder with -o", file.string(), 0, {}});
+}
+
 Status check_overwrites(const std::string& file, std::string_view begins, const std::string& what) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) return {};
@@ -167,6 +176,13 @@ void print_errors(const Diagnostics& errors) {
   reported.insert(reported.end(), errors.begin(), errors.end());
   for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
 }
+
+Exit refuse(const Diagnostics& errors) {
+  print_errors(errors);
+  return Exit::kUsage;
+}
+
+Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
 
 void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -14,6 +15,13 @@
 #include "rt/histogram.hpp"
 
 namespace tandem::apps {
+
+/// Exit status of every command.
+enum class Exit : int {
+  kDone = 0,   ///< did what was asked
+  kFault = 1,  ///< the run ended in a fault; the logs that were compared differ
+  kUsage = 2,  ///< wrong input or usage; nothing was run
+};
 
 /// Keys in the order in which they are written.
 using Json = nlohmann::ordered_json;
@@ -39,6 +47,9 @@ void outlive_readers();
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 
+/// @pre the folder of `file`, which is one of those given by -o, is there
+[[nodiscard]] Status write_text(const std::filesystem::path& file, const std::string& text);
+
 /// An error when a file is there that does not begin as what would be written over it.
 /// @param begins  of all that may be written over: "time_s,", "\x7F" "ELF"
 [[nodiscard]] Status check_overwrites(const std::string& file, std::string_view begins,
@@ -49,6 +60,10 @@ void outlive_readers();
 
 /// Every error on a line of its own, on standard error.
 void print_errors(const Diagnostics& errors);
+
+/// The same; what a command returns whose input is wrong.
+Exit refuse(const Diagnostics& errors);
+Exit refuse(const Error& error);
 
 /// The same of warnings; write_failure() has no part in them.
 void print_warnings(const Diagnostics& warnings);

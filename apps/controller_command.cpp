@@ -13,11 +13,6 @@
 namespace tandem::apps {
 namespace {
 
-Exit refused(const Error& error) {
-  print_errors({error});
-  return Exit::kUsage;
-}
-
 void print_list(const Json& controllers) {
   Table table({"controller", "state", "joints", "plugin"});
   table.align_left();
@@ -90,14 +85,14 @@ Result<Json> question_of(const ControllerOptions& options) {
 
 Exit controller_command(const ControllerOptions& options) {
   const auto run = ControlClient::open(options.target, "run");
-  if (!run) return refused(run.error());
+  if (!run) return refuse(run.error());
   const Result<Json> question = question_of(options);
-  if (!question) return refused(question.error());
+  if (!question) return refuse(question.error());
   Result<Json> answer = (*run)->ask(*question);
   if (answer && options.start_it) {
     answer = (*run)->ask({{"do", "controller.start"}, {"name", answer->value("name", "")}});
   }
-  if (!answer) return refused(answer.error());
+  if (!answer) return refuse(answer.error());
   if (options.json != "-") {
     if (options.action == ControllerOptions::Action::kList) {
       print_list((*answer)["controllers"]);
@@ -105,7 +100,7 @@ Exit controller_command(const ControllerOptions& options) {
       print_done(*answer);
     }
   }
-  if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
 

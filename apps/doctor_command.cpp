@@ -48,18 +48,12 @@ void print_verdict(const std::vector<Finding>& findings, std::FILE* out) {
 }  // namespace
 
 Exit doctor_command(const DoctorOptions& options) {
-  if (const Status s = check_writable(options.json); !s) {
-    print_errors({s.error()});
-    return Exit::kUsage;
-  }
+  if (const Status s = check_writable(options.json); !s) return refuse(s.error());
   const Machine machine(options.root);
   std::vector<Finding> findings = examine_machine(machine);
   if (!options.robot.empty()) {
     const auto robot = read_robot(options.robot);
-    if (!robot) {
-      print_errors(robot.error());
-      return Exit::kUsage;
-    }
+    if (!robot) return refuse(robot.error());
     const std::vector<Finding> more = examine_interfaces(machine, robot->config);
     findings.insert(findings.end(), more.begin(), more.end());
   }
@@ -67,10 +61,7 @@ Exit doctor_command(const DoctorOptions& options) {
   print_findings(findings, out);
   print_verdict(findings, out);
   const Json json{{"findings", findings_json(findings)}};
-  if (const Status s = write_json(options.json, json); !s) {
-    print_errors({s.error()});
-    return Exit::kUsage;
-  }
+  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
   return Exit::kDone;
 }
 

@@ -12,19 +12,6 @@
 namespace tandem::apps {
 namespace {
 
-Status write_file(const std::filesystem::path& file, const std::string& text) {
-  std::error_code problem;
-  std::filesystem::create_directories(file.parent_path(), problem);
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) return {};
-  return std::unexpected(Error{.message = "the file cannot be written",
-                               .hint = "choose another folder with --output",
-                               .file = file.string(),
-                               .key = {}});
-}
-
 Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files) {
   if (auto wrong = wrong_kind(options.robot, Takes::kRobot, "tandem eds")) {
     return {std::move(*wrong)};
@@ -37,8 +24,10 @@ Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files)
     return {made.error()};
   }
   files = std::move(*made);
+  std::error_code problem;  // which the first file meets too
+  std::filesystem::create_directories(options.output, problem);
   for (const EdsFile& file : files) {
-    const Status written = write_file(std::filesystem::path(options.output) / file.name, file.text);
+    const Status written = write_text(std::filesystem::path(options.output) / file.name, file.text);
     if (!written) return {written.error()};
   }
   return {};

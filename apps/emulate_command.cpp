@@ -203,15 +203,10 @@ void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
 Exit emulate_command(const EmulateOptions& options) {
   outlive_readers();
   std::FILE* out = human_output(options.json);
-  if (const Status writable = check_writable(options.json); !writable) {
-    print_errors({writable.error()});
-    return Exit::kUsage;
-  }
+  if (const Status writable = check_writable(options.json); !writable)
+    return refuse(writable.error());
   const auto composed = compose_emulation(options);
-  if (!composed) {
-    print_errors(composed.error());
-    return Exit::kUsage;
-  }
+  if (!composed) return refuse(composed.error());
   Emulation& e = **composed;
   rt::install_stop_signals();
   const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
@@ -241,11 +236,8 @@ Exit emulate_command(const EmulateOptions& options) {
       serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
   emulate(e, errands, out, options.quiet);
   if (!options.quiet) print_summary(e, out);
-  if (const Status written = write_json(options.json, summary_json(e, options.lockstep));
-      !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (const Status written = write_json(options.json, summary_json(e, options.lockstep)); !written)
+    return refuse(written.error());
   return e.robot->plant().diverged() ? Exit::kFault : Exit::kDone;
 }
 

@@ -19,11 +19,6 @@ constexpr std::chrono::seconds kResetTime{30};
 
 const char kKept[] = "simulated time stands: it is done in the next cycle (tandem clock resume)";
 
-Exit refused(const Error& error) {
-  print_errors({error});
-  return Exit::kUsage;
-}
-
 void print_answer(const Json& answer) {
   fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
   print_faults(answer.value("faults", Json::array()), stdout);
@@ -31,9 +26,9 @@ void print_answer(const Json& answer) {
 
 Exit show(const FaultOptions& options) {
   const Result<Json> answer = ask(options.target, "run", {{"do", "fault.show"}});
-  if (!answer) return refused(answer.error());
+  if (!answer) return refuse(answer.error());
   if (options.json != "-") print_answer(*answer);
-  if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
 
@@ -46,10 +41,9 @@ Error failed_reset(const Json& answer, bool through) {
     causes += (causes.empty() ? "" : "; ") + (joint.empty() ? "" : joint + ": ") +
               fault.value("cause", "?");
   }
-  const std::string why =
-      through ? "a cause is still there"
-              : fmt::format("not through after {} s, in the phase {}", kResetTime.count(),
-                            answer.value("phase", "?"));
+  const std::string why = through ? "a cause is still there"
+                                  : fmt::format("not through after {} s, in the phase {}",
+                                                kResetTime.count(), answer.value("phase", "?"));
   return {.message = fmt::format("the reset failed, {} ({}): nothing moves", why, causes),
           .hint = "remove the cause, then `tandem fault reset` again",
           .file = {},
@@ -72,15 +66,15 @@ Result<Json> wait_for_reset(ControlClient& run, const Json& before) {
 
 Exit reset(const FaultOptions& options) {
   const auto run = ControlClient::open(options.target, "run");
-  if (!run) return refused(run.error());
+  if (!run) return refuse(run.error());
   const Result<Json> asked = (*run)->ask({{"do", "fault.reset"}});
-  if (!asked) return refused(asked.error());
+  if (!asked) return refuse(asked.error());
   Json answer = *asked;
   const bool nothing = asked->value("latched", 0) == 0;
   const bool kept = !nothing && asked->value("paused", false);
   if (!nothing && !kept) {
     const Result<Json> through = wait_for_reset(**run, *asked);
-    if (!through) return refused(through.error());
+    if (!through) return refuse(through.error());
     answer = *through;
   }
   const bool done = answer.value("resets", 0) > asked->value("resets", 0);
@@ -96,7 +90,7 @@ Exit reset(const FaultOptions& options) {
     const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
     print_errors({failed_reset(answer, through)});
   }
-  if (Status written = write_json(options.json, answer); !written) return refused(written.error());
+  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
   return nothing || kept || done ? Exit::kDone : Exit::kFault;
 }
 

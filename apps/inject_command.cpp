@@ -37,10 +37,7 @@ Status injected(Code code) {
 Exit inject_command(const InjectOptions& options) {
   const Json question{{"do", "inject"}, {"scenario", sim::scenario_of_words(options.fault)}};
   const Result<Json> answer = ask(options.target, "", question);
-  if (!answer) {
-    print_errors({answer.error()});
-    return Exit::kUsage;
-  }
+  if (!answer) return refuse(answer.error());
   fmt::print("{} injected\n",
              answer->value("injected", 0) == 1 ? "the fault is" : "the faults are");
   return Exit::kDone;

@@ -11,11 +11,6 @@
 namespace tandem::apps {
 namespace {
 
-Exit refused(const Error& error) {
-  print_errors({error});
-  return Exit::kUsage;
-}
-
 std::string number(const Json& joint, const char* key) {
   return joint[key].is_number() ? fmt::format("{:.4g}", joint[key].get<double>()) : "-";
 }
@@ -108,14 +103,14 @@ void print_answer(const JointOptions& options, const Json& answer) {
 
 Exit joint_command(const JointOptions& options) {
   Result<Json> answer = ask(options.target, "run", question_of(options));
-  if (!answer) return refused(answer.error());
+  if (!answer) return refuse(answer.error());
   if (answer->contains("joints")) {
     const Result<Json> some = only((*answer)["joints"], options.joints);
-    if (!some) return refused(some.error());
+    if (!some) return refuse(some.error());
     (*answer)["joints"] = *some;
   }
   if (options.json != "-") print_answer(options, *answer);
-  if (Status written = write_json(options.json, *answer); !written) return refused(written.error());
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
 

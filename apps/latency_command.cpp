@@ -21,11 +21,6 @@ namespace {
 
 void note(const std::string& text) { fmt::print(stderr, "note: {}\n", text); }
 
-Exit refuse(const Error& error) {
-  print_errors({error});
-  return Exit::kUsage;
-}
-
 /// What the thread set-up says on a thread of its own: asked before anything is measured.
 rt::ThreadReport granted(const LatencyPlan& plan, int cpu) {
   rt::ThreadReport report;

@@ -165,8 +165,7 @@ Exit log_command(const LogOptions& options) {
     done = write_json(options.json, info_json(*file));
   }
   if (done) return exit;
-  print_errors({done.error()});
-  return Exit::kUsage;
+  return refuse(done.error());
 }
 
 }  // namespace tandem::apps

@@ -88,19 +88,12 @@ Status info(const RobotFiles& robot, const ModelOptions& options) {
 Exit model_command(const ModelOptions& options) {
   const bool builds = options.action == ModelOptions::Action::kBuild;
   const char* command = builds ? "tandem model build" : "tandem model info";
-  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) {
-    print_errors({*wrong});
-    return Exit::kUsage;
-  }
+  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) return refuse(*wrong);
   const auto robot = read_robot(options.robot);
-  if (!robot) {
-    print_errors(robot.error());
-    return Exit::kUsage;
-  }
+  if (!robot) return refuse(robot.error());
   const Status done = builds ? build(*robot, options) : info(*robot, options);
   if (done) return Exit::kDone;
-  print_errors({done.error()});
-  return Exit::kUsage;
+  return refuse(done.error());
 }
 
 }  // namespace tandem::apps

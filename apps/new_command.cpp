@@ -58,15 +58,6 @@ std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
   return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
 }
 
-Status write_file(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) return {};
-  return std::unexpected(
-      Error{"the file cannot be written", "choose another folder with -o", file.string(), 0, {}});
-}
-
 /// Writes everything into a folder beside the one that is asked for, reads it back as `tandem
 /// run` would, and puts it in place: what is wrong leaves nothing behind.
 class Folder {
@@ -94,7 +85,7 @@ class Folder {
           {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
           {std::string("hold.toml"), scaffold::hold_text(robot)},
           {std::string("move.toml"), scaffold::move_text(robot)}}) {
-      if (Status written = write_file(draft_ / name, text); !written) {
+      if (Status written = write_text(draft_ / name, text); !written) {
         return in_place({written.error()});
       }
     }

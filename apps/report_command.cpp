@@ -39,10 +39,7 @@ Result<report::ReportFiles> draw_report(const ReportOptions& options) {
 
 Exit report_command(const ReportOptions& options) {
   const auto files = draw_report(options);
-  if (!files) {
-    print_errors({files.error()});
-    return Exit::kUsage;
-  }
+  if (!files) return refuse(files.error());
   std::FILE* out = human_output(options.json);
   for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
   Facts facts;
@@ -50,10 +47,8 @@ Exit report_command(const ReportOptions& options) {
   for (const std::string& image : files->images) facts.add("image", image);
   facts.print(out);
   const Json json{{"report", files->page}, {"images", files->images}};
-  if (const Status written = write_json(options.json, json); !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (const Status written = write_json(options.json, json); !written)
+    return refuse(written.error());
   return Exit::kDone;
 }
 

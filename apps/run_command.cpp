@@ -191,24 +191,15 @@ Exit run(Composition& c, const RunOptions& options) {
   const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
   const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
   const auto dds = DdsRun::open(c, options.serves ? "tandem_serve" : "tandem_run", truth);
-  if (!dds) {
-    print_errors({dds.error()});
-    return Exit::kUsage;
-  }
+  if (!dds) return refuse(dds.error());
   std::unique_ptr<log::Recorder> recorder;
   if (!options.no_log) {
     auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
-    if (!opened) {
-      print_errors({opened.error()});
-      return Exit::kUsage;
-    }
+    if (!opened) return refuse(opened.error());
     recorder = std::move(*opened);
   }
   const auto server = open_server(c, dds->get(), options.once);
-  if (!server) {
-    print_errors({server.error()});
-    return Exit::kUsage;
-  }
+  if (!server) return refuse(server.error());
   rt::WallClock clock;
   runtime::RobotCycle cycle({.robot = e.robot,
                              .backend = *c.backend,
@@ -238,25 +229,16 @@ Exit run(Composition& c, const RunOptions& options) {
   auto socket = serve(
       commands,
       {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
-  if (!socket) {
-    print_errors({socket.error()});
-    return Exit::kUsage;
-  }
+  if (!socket) return refuse(socket.error());
   const auto services = open_services(dds->get(), commands, e.remote, server->get());
-  if (!services) {
-    print_errors({services.error()});
-    return Exit::kUsage;
-  }
+  if (!services) return refuse(services.error());
   rt::install_stop_signals();
   rt::install_emergency_signal();
   std::optional<rt::NoCpuSleep> awake;
   if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
   if (*dds != nullptr) (*dds)->start(cycle);
   auto guard = LoopGuard::open(c, cycle);
-  if (!guard) {
-    print_errors({guard.error()});
-    return Exit::kUsage;
-  }
+  if (!guard) return refuse(guard.error());
   LoopThread loop(cycle, e.thread);
   watch(cycle, loop, c, **guard, out, options.quiet);
   if ((*guard)->gave_up()) end_without_loop(**guard, options, c, recorder.get(), *socket);
@@ -286,14 +268,10 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
   add_report(options, summary, out);
-  if (const Status traced = add_trace(options, summary, out); !traced) {
-    print_errors({traced.error()});
-    return Exit::kUsage;
-  }
-  if (const Status written = write_json(options.json, summary.json()); !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (const Status traced = add_trace(options, summary, out); !traced)
+    return refuse(traced.error());
+  if (const Status written = write_json(options.json, summary.json()); !written)
+    return refuse(written.error());
   return summary.faults.empty() ? Exit::kDone : Exit::kFault;
 }
 
@@ -312,18 +290,12 @@ void warn_of_inertias(const runtime::Experiment& e) {
 
 Exit run_command(const RunOptions& options) {
   for (const std::string& file : {options.json, options.trace}) {
-    if (const Status writable = check_writable(file); !writable) {
-      print_errors({writable.error()});
-      return Exit::kUsage;
-    }
+    if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
   }
   const auto wrong = options.serves
                          ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
                          : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
-  if (wrong) {
-    print_errors({*wrong});
-    return Exit::kUsage;
-  }
+  if (wrong) return refuse(*wrong);
   Overrides overrides{.seed = options.seed,
                       .duration_s = options.duration_s,
                       .kernel_variant = options.kernel_variant,
@@ -339,21 +311,13 @@ Exit run_command(const RunOptions& options) {
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
   if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
   const auto composition = compose(options.experiment, overrides);
-  if (!composition) {
-    print_errors(composition.error());
-    return Exit::kUsage;
-  }
+  if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   outlive_readers();
-  if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty()) {
-    print_errors(errors);
-    return Exit::kUsage;
-  }
-  if (const Status paced = check_pace(**composition, options); !paced) {
-    print_errors({paced.error()});
-    return Exit::kUsage;
-  }
+  if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
+    return refuse(errors);
+  if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
   return run(**composition, options);
 }
 

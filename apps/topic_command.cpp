@@ -18,7 +18,6 @@ namespace tandem::apps {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
-using Action = TopicOptions::Action;
 
 constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr std::int32_t kDepth = 1000;  // samples that may wait for this process
@@ -91,10 +90,8 @@ Exit print_list(const TopicOptions& options, const Part& part) {
   } else {
     fmt::print(out, "no topic {}: {}\n", where(part), kSilence);
   }
-  if (const Status written = write_json(options.json, json); !written) {
-    print_errors({written.error()});
-    return Exit::kUsage;
-  }
+  if (const Status written = write_json(options.json, json); !written)
+    return refuse(written.error());
   return Exit::kDone;
 }
 
@@ -215,22 +212,13 @@ Status rate(const TopicOptions& options, Subscription& subscription) {
 Exit topic_command(const TopicOptions& options) {
   rt::install_stop_signals();
   auto part = take_part(options);
-  if (!part) {
-    print_errors({part.error()});
-    return Exit::kUsage;
-  }
-  if (options.action == Action::kList) return print_list(options, *part);
+  if (!part) return refuse(part.error());
+  if (options.action == TopicOptions::Action::kList) return print_list(options, *part);
   auto subscription = subscribe(options, *part);
-  if (!subscription) {
-    print_errors({subscription.error()});
-    return Exit::kUsage;
-  }
-  const Status done =
-      options.action == Action::kEcho ? echo(options, *subscription) : rate(options, *subscription);
-  if (!done) {
-    print_errors({done.error()});
-    return Exit::kUsage;
-  }
+  if (!subscription) return refuse(subscription.error());
+  const Status done = options.action == TopicOptions::Action::kEcho ? echo(options, *subscription)
+                                                                    : rate(options, *subscription);
+  if (!done) return refuse(done.error());
   return Exit::kDone;
 }
 

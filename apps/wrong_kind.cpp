@@ -41,13 +41,15 @@ std::vector<std::string> files_in(const std::string& folder, Takes takes) {
 }
 
 /// As a shell takes it.
-std::string quoted(const std::string& file) { return file.contains(' ') ? "'" + file + "'" : file; }
+std::string as_typed(const std::string& file) {
+  return file.contains(' ') ? "'" + file + "'" : file;
+}
 
 std::string to_type(const std::vector<std::string>& files, const std::string& command) {
   std::string text = "type: ";
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (i > 0) text += i + 1 == files.size() ? ", or: " : ", ";
-    text += command + " " + quoted(files[i]);
+    text += command + " " + as_typed(files[i]);
   }
   return text;
 }

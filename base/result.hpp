@@ -41,4 +41,11 @@ void sort_by_line(Diagnostics& errors);
       Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = {}});
 }
 
+/// The same of what stands under `key`.
+[[nodiscard]] inline std::unexpected<Error> fail_at(std::string key, std::string message,
+                                                    std::string hint) {
+  return std::unexpected(Error{
+      .message = std::move(message), .hint = std::move(hint), .file = {}, .key = std::move(key)});
+}
+
 }  // namespace tandem

@@ -9,7 +9,6 @@ namespace tandem::canopen {
 
 namespace {
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::uint32_t kFunctionMask = 0x780;
 
 }  // namespace
@@ -101,8 +100,8 @@ NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
     case NmtCommand::kResetCommunication: {
       NodeEvents events = enter(NmtState::kBootUp);
       reset_communication();
-      events |= message->command == NmtCommand::kResetNode ? kEventResetNode
-                                                           : kEventResetCommunication;
+      events |=
+          message->command == NmtCommand::kResetNode ? kEventResetNode : kEventResetCommunication;
       return events | process(0, out);
     }
   }

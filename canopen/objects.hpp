@@ -28,6 +28,8 @@ inline constexpr std::uint32_t kIdMask = 0x7FF;
 }
 }  // namespace cob
 
+inline constexpr std::int64_t kNsPerMs = 1'000'000;  ///< heartbeats' and timers' objects are in ms
+
 inline constexpr int kMaxNodeId = 127;
 inline constexpr int kMaxAxes = 8;      ///< of one board: CiA 402's index space
 inline constexpr int kPdosPerNode = 4;  ///< each way, of the pre-defined connection set
@@ -139,9 +141,9 @@ enum FeedForwardSub : std::uint8_t {
 };
 /// Sub-indices of object::kMotorData.
 enum MotorDataSub : std::uint8_t {
-  kMotorResistance = 1,    ///< [ohm]
-  kMotorTorqueConstant,    ///< N K [Nm/A] at the link, also [Vs/rad]
-  kMotorSpring,            ///< [Nm/rad]; 0: rigid
+  kMotorResistance = 1,  ///< [ohm]
+  kMotorTorqueConstant,  ///< N K [Nm/A] at the link, also [Vs/rad]
+  kMotorSpring,          ///< [Nm/rad]; 0: rigid
 };
 /// Sub-indices of object::kLimits.
 enum LimitSub : std::uint8_t {
@@ -162,7 +164,7 @@ enum IdentitySub : std::uint8_t { kVendor = 1, kProduct, kRevision, kSerial };
 inline constexpr std::uint32_t kTandemVendor = 0x7A4D;
 inline constexpr std::uint32_t kBoardProduct = 0x0402;
 inline constexpr std::uint32_t kSensorProduct = 0x0404;
-inline constexpr std::uint32_t kTandemRevision = 0x00010000;  ///< major 1, minor 0
+inline constexpr std::uint32_t kTandemRevision = 0x00010000;    ///< major 1, minor 0
 inline constexpr std::uint32_t kDriveDeviceType = 0x00020192;   ///< servo drive, profile 402
 inline constexpr std::uint32_t kSensorDeviceType = 0x00020194;  ///< analogue inputs, profile 404
 
@@ -170,12 +172,12 @@ inline constexpr std::uint32_t kSensorDeviceType = 0x00020194;  ///< analogue in
 enum class Mode : std::int8_t {
   kVelocityImpedance = -4,  ///< spring and damper about the integrated velocity reference
   kCurrent = -3,
-  kOpenLoop = -2,           ///< motor voltage
-  kImpedance = -1,          ///< spring and damper about the position reference
+  kOpenLoop = -2,   ///< motor voltage
+  kImpedance = -1,  ///< spring and damper about the position reference
   kNone = 0,
-  kCsp = 8,                 ///< cyclic synchronous position
-  kCsv = 9,                 ///< cyclic synchronous velocity
-  kCst = 10,                ///< cyclic synchronous torque
+  kCsp = 8,   ///< cyclic synchronous position
+  kCsv = 9,   ///< cyclic synchronous velocity
+  kCst = 10,  ///< cyclic synchronous torque
 };
 
 /// Bits of the controlword (6040).
@@ -222,25 +224,25 @@ inline constexpr std::uint32_t kInterlock = 1u << 3;  ///< the emergency stop's
 enum class ErrorCode : std::uint16_t {
   kNone = 0x0000,
   kGeneric = 0x1000,
-  kOverCurrent = 0x2310,          ///< continuous over-current
-  kI2t = 0x2350,                  ///< load level fault: I2t, thermal state
+  kOverCurrent = 0x2310,  ///< continuous over-current
+  kI2t = 0x2350,          ///< load level fault: I2t, thermal state
   kVoltage = 0x3100,
   kDriveTemperature = 0x4310,
   kSoftware = 0x6000,
   kParameter = 0x6320,
   kPositionSensor = 0x7300,
-  kSensorMismatch = 0x7320,       ///< position: two sensors contradict each other
+  kSensorMismatch = 0x7320,  ///< position: two sensors contradict each other
   kCommunicationOverrun = 0x8110,
-  kHeartbeatLost = 0x8130,        ///< life guard or heartbeat error
+  kHeartbeatLost = 0x8130,  ///< life guard or heartbeat error
   kBusOffRecovered = 0x8140,
-  kPdoTooShort = 0x8210,          ///< PDO not processed due to length error
+  kPdoTooShort = 0x8210,  ///< PDO not processed due to length error
   kPdoTooLong = 0x8220,
-  kSyncLost = 0x8700,             ///< sync controller
-  kCommandTimeout = 0xFF01,       ///< ours: SYNCs came without commands
-  kEmergencyInput = 0xFF02,       ///< ours: the interlock input (60FD bit 3) is active
-  kVelocityControl = 0x8400,      ///< velocity (limit) exceeded
+  kSyncLost = 0x8700,         ///< sync controller
+  kCommandTimeout = 0xFF01,   ///< ours: SYNCs came without commands
+  kEmergencyInput = 0xFF02,   ///< ours: the interlock input (60FD bit 3) is active
+  kVelocityControl = 0x8400,  ///< velocity (limit) exceeded
   kFollowingError = 0x8611,
-  kPositionLimit = 0x8612,        ///< reference or position limit
+  kPositionLimit = 0x8612,  ///< reference or position limit
 };
 
 /// In words ("following error"), for messages; "error" for an unknown code.

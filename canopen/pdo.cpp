@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::uint32_t kNoRtr = 0x40000000;       // bit 30 of a TPDO's COB-ID
 constexpr std::uint32_t kExtendedId = 0x20000000;  // bit 29: 29-bit identifiers, which we lack
-constexpr std::int64_t kNsPerMs = 1'000'000;
 
 enum ParameterSub : std::uint8_t { kCobId = 1, kType = 2, kInhibit = 3, kEvent = 5 };
 
@@ -23,10 +22,10 @@ bool Pdo::add_to(ObjectDictionary& od, PdoDirection direction, int number, int n
   const auto offset = static_cast<std::uint16_t>(number - 1);
   od_ = &od;
   direction_ = direction;
-  parameter_index_ = static_cast<std::uint16_t>((receive ? kRpdoParameter : kTpdoParameter) +
-                                                offset);
-  default_cob_id_ = cob::kInvalid |
-                    (receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id) | kNoRtr);
+  parameter_index_ =
+      static_cast<std::uint16_t>((receive ? kRpdoParameter : kTpdoParameter) + offset);
+  default_cob_id_ =
+      cob::kInvalid | (receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id) | kNoRtr);
   reset();
   const std::uint16_t p = parameter_index_;
   bool ok = od.add_value<std::uint8_t>(p, 0, receive ? kType : kEvent);
@@ -73,8 +72,7 @@ AbortCode Pdo::check_parameter(std::uint8_t sub,
   return AbortCode::kNone;
 }
 
-AbortCode Pdo::check_mapping(std::uint8_t sub,
-                             const std::uint8_t* bytes) const noexcept TANDEM_RT {
+AbortCode Pdo::check_mapping(std::uint8_t sub, const std::uint8_t* bytes) const noexcept TANDEM_RT {
   if (in_use()) return AbortCode::kUnsupportedAccess;
   if (sub != 0) {
     return count_ != 0 ? AbortCode::kUnsupportedAccess : check_mapped(get<std::uint32_t>(bytes));

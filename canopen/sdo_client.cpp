@@ -3,6 +3,7 @@
 #include "base/archive.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/sdo.hpp"
+#include "canopen/sdo_bytes.hpp"
 
 namespace tandem::canopen {
 
@@ -12,13 +13,6 @@ constexpr std::uint8_t kUploadSegmentAnswer = 0;
 constexpr std::uint8_t kDownloadSegmentAnswer = 1;
 constexpr std::uint8_t kInitiateUploadAnswer = 2;
 constexpr std::uint8_t kInitiateDownloadAnswer = 3;
-constexpr std::uint8_t kAbort = 4;
-
-constexpr std::uint8_t kExpedited = 0x02;
-constexpr std::uint8_t kSizeGiven = 0x01;
-constexpr std::uint8_t kToggleBit = 0x10;
-constexpr std::uint8_t kLast = 0x01;
-constexpr std::size_t kSegmentBytes = 7;
 constexpr std::size_t kExpeditedBytes = 4;
 
 }  // namespace
@@ -37,8 +31,8 @@ void SdoClient::start(std::uint16_t index, std::uint8_t sub, bool uploading) noe
   idle_ns_ = 0;
 }
 
-void SdoClient::download(std::uint16_t index, std::uint8_t sub,
-                         std::span<const std::uint8_t> value, FrameSink& out) noexcept TANDEM_RT {
+void SdoClient::download(std::uint16_t index, std::uint8_t sub, std::span<const std::uint8_t> value,
+                         FrameSink& out) noexcept TANDEM_RT {
   start(index, sub, false);
   length_ = std::min(value.size(), kMaxSdoBytes);
   std::copy_n(value.data(), length_, buffer_.data());
@@ -63,8 +57,8 @@ bool SdoClient::answers(const Frame& frame) const noexcept {
   const auto mine = cob::kSdoResponse + static_cast<std::uint32_t>(node_);
   if (frame.id != mine || frame.length != kClassicFrameBytes) return false;
   const std::uint8_t answer = frame.data[0] >> 5;
-  const bool names_object = answer == kInitiateUploadAnswer ||
-                            answer == kInitiateDownloadAnswer || answer == kAbort;
+  const bool names_object =
+      answer == kInitiateUploadAnswer || answer == kInitiateDownloadAnswer || answer == kAbort;
   return !names_object || (get<std::uint16_t>(&frame.data[1]) == index_ && frame.data[3] == sub_);
 }
 
@@ -105,9 +99,8 @@ void SdoClient::on_download(const Frame& frame, FrameSink& out) noexcept {
 void SdoClient::send_download_segment(FrameSink& out) noexcept {
   const std::size_t size = std::min(kSegmentBytes, length_ - position_);
   const bool last = position_ + size == length_;
-  Frame frame = request(static_cast<std::uint8_t>((toggle_ ? kToggleBit : 0) |
-                                                  ((kSegmentBytes - size) << 1) |
-                                                  (last ? kLast : 0)));
+  Frame frame = request(static_cast<std::uint8_t>(
+      (toggle_ ? kToggleBit : 0) | ((kSegmentBytes - size) << 1) | (last ? kLast : 0)));
   std::copy_n(&buffer_[position_], size, &frame.data[1]);
   position_ += size;
   out.push(frame);
@@ -118,8 +111,8 @@ void SdoClient::on_upload(const Frame& frame, FrameSink& out) noexcept {
   const std::uint8_t command = frame.data[0];
   if (command >> 5 != kInitiateUploadAnswer) return fail(AbortCode::kBadCommand, out);
   if ((command & kExpedited) != 0) {
-    length_ = (command & kSizeGiven) != 0 ? kExpeditedBytes - ((command >> 2) & 3u)
-                                          : kExpeditedBytes;
+    length_ =
+        (command & kSizeGiven) != 0 ? kExpeditedBytes - ((command >> 2) & 3u) : kExpeditedBytes;
     std::copy_n(&frame.data[4], length_, buffer_.data());
     status_ = Status::kDone;
     return;

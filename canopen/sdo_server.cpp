@@ -3,10 +3,7 @@
 #include "base/archive.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/sdo.hpp"
-
-// Layouts (CiA 301): byte 0 is the command, bits 7 to 5 the command specifier.
-//   initiate:  command, index (2), sub (1), data or size (4)
-//   segment:   command, up to 7 bytes of data; bit 4 toggle, bits 3-1 unused bytes, bit 0 last
+#include "canopen/sdo_bytes.hpp"
 
 namespace tandem::canopen {
 
@@ -16,13 +13,6 @@ constexpr std::uint8_t kDownloadSegment = 0;
 constexpr std::uint8_t kInitiateDownload = 1;
 constexpr std::uint8_t kInitiateUpload = 2;
 constexpr std::uint8_t kUploadSegment = 3;
-constexpr std::uint8_t kAbort = 4;
-
-constexpr std::uint8_t kExpedited = 0x02;
-constexpr std::uint8_t kSizeGiven = 0x01;
-constexpr std::uint8_t kToggleBit = 0x10;
-constexpr std::uint8_t kLast = 0x01;
-constexpr std::size_t kSegmentBytes = 7;
 
 }  // namespace
 
@@ -96,8 +86,8 @@ void SdoServer::begin_upload(const Frame& request, FrameSink& out) noexcept {
   const AbortCode code = od_->read(index_, sub_, buffer_, length_);
   if (code != AbortCode::kNone) return abort(code, out);
   if (length_ >= 1 && length_ <= 4) {
-    Frame frame = initiate_response(static_cast<std::uint8_t>(
-        0x40 | ((4 - length_) << 2) | kExpedited | kSizeGiven));
+    Frame frame = initiate_response(
+        static_cast<std::uint8_t>(0x40 | ((4 - length_) << 2) | kExpedited | kSizeGiven));
     std::copy_n(buffer_.data(), length_, &frame.data[4]);
     out.push(frame);
     return;
@@ -115,9 +105,8 @@ void SdoServer::upload_segment(const Frame& request, FrameSink& out) noexcept {
   if (((request.data[0] & kToggleBit) != 0) != toggle_) return abort(AbortCode::kToggle, out);
   const std::size_t size = std::min(kSegmentBytes, length_ - position_);
   const bool last = position_ + size == length_;
-  Frame frame = response(static_cast<std::uint8_t>((toggle_ ? kToggleBit : 0) |
-                                                   ((kSegmentBytes - size) << 1) |
-                                                   (last ? kLast : 0)));
+  Frame frame = response(static_cast<std::uint8_t>(
+      (toggle_ ? kToggleBit : 0) | ((kSegmentBytes - size) << 1) | (last ? kLast : 0)));
   std::copy_n(&buffer_[position_], size, &frame.data[1]);
   position_ += size;
   toggle_ = !toggle_;

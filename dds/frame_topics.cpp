@@ -16,10 +16,6 @@ geometry_msgs_msg_dds__Transform_ transform(const model::Placement& at) {
   return {{at.p.x(), at.p.y(), at.p.z()}, {q.x(), q.y(), q.z(), q.w()}};
 }
 
-bool finite(std::span<const double> values) {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
-
 }  // namespace
 
 FrameTree frame_tree(const model::Tree& tree, const hal::RobotConfig& robot) {

@@ -2,6 +2,8 @@
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -10,6 +12,11 @@
 #include "dds/types.hpp"
 
 namespace tandem::dds {
+
+/// A message with anything else is not sent.
+[[nodiscard]] inline bool finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
 
 /// `sequence` refers to `data`. Cyclone DDS only reads what it is given to write.
 template <class Sequence, class Element>

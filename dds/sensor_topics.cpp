@@ -1,16 +1,8 @@
 #include "dds/sensor_topics.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include "dds/message_parts.hpp"
 
 namespace tandem::dds {
-namespace {
-
-bool finite(std::span<const double> values) {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
-
-}  // namespace
 
 SensorTopics::SensorTopics(OutputMaker& maker, const RunDescription& run)
     : imu_every_(maker.every(Topic::kImu)), wrench_every_(maker.every(Topic::kWrench)) {

@@ -16,7 +16,7 @@ using SteadyClock = std::chrono::steady_clock;
 /// Requests and replies that DDS keeps: more than ROS 2's 10, since all clients share them.
 constexpr std::int32_t kDepth = 64;
 /// How often the reader of a client that has just come is looked for.
-constexpr dds_duration_t kLookAgain = DDS_MSECS(5);
+constexpr dds_duration_t kTryAgain = DDS_MSECS(5);
 
 }  // namespace
 
@@ -89,7 +89,7 @@ ServiceServer::Counts ServiceServer::counts() const {
 void ServiceServer::receive() {
   bool holding = false;
   for (;;) {
-    dds_waitset_wait(waitset_.get(), nullptr, 0, holding ? kLookAgain : DDS_INFINITY);
+    dds_waitset_wait(waitset_.get(), nullptr, 0, holding ? kTryAgain : DDS_INFINITY);
     bool woken = false;
     dds_take_guardcondition(wake_.get(), &woken);
     for (const auto& service : services_) take(*service);

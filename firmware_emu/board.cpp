@@ -32,10 +32,7 @@ std::uint8_t register_bits(ErrorCode code) noexcept {
 }
 
 Status bad(std::string key, std::string message) {
-  return std::unexpected(Error{.message = std::move(message),
-                               .hint = "correct the board's setup",
-                               .file = {},
-                               .key = std::move(key)});
+  return fail_at(std::move(key), std::move(message), "correct the board's setup");
 }
 
 bool not_negative(const Pid::Config& pid) {

@@ -11,14 +11,11 @@ namespace {
 
 using namespace canopen;
 
-constexpr std::string_view kSoftwareVersion = "tandem sensor firmware 1.0";
+constexpr std::string_view kSensorSoftware = "tandem sensor firmware 1.0";
 constexpr std::size_t kSensorEntries = 2;
 
-Status bad(std::string key, std::string message) {
-  return std::unexpected(Error{.message = std::move(message),
-                               .hint = "correct the sensor's setup",
-                               .file = {},
-                               .key = std::move(key)});
+Status bad_sensor(std::string key, std::string message) {
+  return fail_at(std::move(key), std::move(message), "correct the sensor's setup");
 }
 
 std::vector<NoisySensor> make_sensors(const SensorSetup& setup) {
@@ -35,7 +32,7 @@ std::vector<NoisySensor> make_sensors(const SensorSetup& setup) {
 /// Adds the channels before the node resolves anything.
 std::vector<NoisySensor> make_board(const SensorSetup& setup, ObjectDictionary& od,
                                     std::vector<float>& values) {
-  od.add_string(canopen::object::kSoftwareVersion, 0, kSoftwareVersion);
+  od.add_string(canopen::object::kSoftwareVersion, 0, kSensorSoftware);
   od.add_value(canopen::object::kSensorChannels, 0, static_cast<std::uint8_t>(values.size()));
   for (std::size_t i = 0; i < values.size(); ++i) {
     od.add(canopen::object::kSensorChannels, static_cast<std::uint8_t>(i + 1), values[i],
@@ -47,20 +44,22 @@ std::vector<NoisySensor> make_board(const SensorSetup& setup, ObjectDictionary& 
 }  // namespace
 
 Status check(const SensorSetup& setup) {
-  if (setup.node_id < 1 || setup.node_id > kMaxNodeId) return bad("node_id", "is not 1 to 127");
+  if (setup.node_id < 1 || setup.node_id > kMaxNodeId)
+    return bad_sensor("node_id", "is not 1 to 127");
   if (setup.channels < 1 || setup.channels > kMaxChannels) {
-    return bad("channels", "a sensor has 1 to " + std::to_string(kMaxChannels) + " channels");
+    return bad_sensor("channels",
+                      "a sensor has 1 to " + std::to_string(kMaxChannels) + " channels");
   }
   for (const auto& [key, values] : {std::pair{"noise", &setup.noise}, {"bias", &setup.bias}}) {
     if (!values->empty() && values->size() != setup.channels) {
-      return bad(key, "needs one number per channel, or none");
+      return bad_sensor(key, "needs one number per channel, or none");
     }
     for (const double value : *values) {
-      if (!std::isfinite(value)) return bad(key, "is not finite");
+      if (!std::isfinite(value)) return bad_sensor(key, "is not finite");
     }
   }
   for (const double value : setup.noise) {
-    if (value < 0.0) return bad("noise", "is negative");
+    if (value < 0.0) return bad_sensor("noise", "is negative");
   }
   return {};
 }

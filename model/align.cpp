@@ -14,7 +14,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kExact = 1e-14;    // below this a constant is rounding noise
+constexpr double kNoise = 1e-14;    // below this a constant is rounding noise
 constexpr double kParallel = 1e-9;  // candidates only: nothing depends on it but their quality
 constexpr double kFarthest = 2.0;   // shift of a frame along its axis, in reaches of its body
 
@@ -127,7 +127,7 @@ double edge_cost(const Tree& tree, std::size_t joint, const Placement& parent,
   if (frame.cos_offset != 0.0 && frame.sin_offset != 0.0) cost += kOffsetCost;
   const Body& body = tree.bodies[joint + 1];
   const Vector3d com = own.R.transpose() * (body.inertia.com_m - own.p);
-  for (int k = 0; k < 2; ++k) cost += std::abs(com[k]) > kExact ? kMomentCost : 0.0;
+  for (int k = 0; k < 2; ++k) cost += std::abs(com[k]) > kNoise ? kMomentCost : 0.0;
   return cost;
 }
 

@@ -4,10 +4,13 @@
 
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
 namespace tandem::report {
+
+inline constexpr double kDegrees = 180.0 / std::numbers::pi;  ///< of a radian
 
 /// What a curve is, which decides how it looks.
 enum class CurveStyle : std::uint8_t {

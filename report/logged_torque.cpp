@@ -11,11 +11,11 @@ namespace {
 
 constexpr double kMotionStep_s = 0.005;
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
+std::size_t index_of(int index) { return static_cast<std::size_t>(index); }
 
 /// Where joint `name` stands in run.positions(); none: neither driven nor known to the truth.
 std::optional<std::size_t> position_index(const RunData& run, const std::string& name) {
-  if (const int driven = run.robot.joint_index(name); driven >= 0) return at(driven);
+  if (const int driven = run.robot.joint_index(name); driven >= 0) return index_of(driven);
   const auto passive = std::ranges::find(run.robot.passive, name, &hal::PassiveConfig::name);
   const auto index = static_cast<std::size_t>(passive - run.robot.passive.begin());
   if (index >= run.passive_rad.size()) return std::nullopt;
@@ -39,8 +39,8 @@ std::vector<double> ground_wrenches(const RunData& run, const std::vector<int>& 
   std::vector<double> wrenches(6 * feet.size(), 0.0);
   for (std::size_t w = 0; w < feet.size(); ++w) {
     for (std::size_t k = 0; feet[w] >= 0 && k < 3; ++k) {
-      wrenches[6 * w + k] = run.foot_force_N[3 * at(feet[w]) + k][row];
-      wrenches[6 * w + 3 + k] = run.foot_moment_Nm[3 * at(feet[w]) + k][row];
+      wrenches[6 * w + k] = run.foot_force_N[3 * index_of(feet[w]) + k][row];
+      wrenches[6 * w + 3 + k] = run.foot_moment_Nm[3 * index_of(feet[w]) + k][row];
     }
   }
   return wrenches;
@@ -84,7 +84,7 @@ void add_row(const RunData& run, std::size_t row, const tandem_kernels& kernels,
   loops.close_rates(v.data());
   for (std::size_t s = 0; s < kernels.sensors; ++s) {
     const int index = run.robot.sensor_index(kernels.sensor_names[s]);
-    const std::size_t first = run.first_channel(at(std::max(index, 0)));
+    const std::size_t first = run.first_channel(index_of(std::max(index, 0)));
     for (std::size_t i = 0; i < 6; ++i) sensors.push_back(run.sensor[first + i][row]);
   }
   motion.q.push_back(std::move(q));
@@ -112,7 +112,7 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
     curve.x.push_back(run.time_s[row]);
   }
   if (!wrenches_known(kernels, motion)) return fail("the log lacks the ground's forces");
-  const auto place = std::ranges::find(*order, at(joint)) - order->begin();
+  const auto place = std::ranges::find(*order, index_of(joint)) - order->begin();
   const std::size_t wanted =
       (kernels.floating_base != 0 ? 6U : 0U) + static_cast<std::size_t>(place);
   std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);

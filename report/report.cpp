@@ -16,8 +16,6 @@
 namespace tandem::report {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-
 /// What, which joint, when: of the first few, which the others mostly follow from.
 void add_faults(const RunData& run, const std::string& side, Facts& facts) {
   constexpr std::size_t kMost = 5;

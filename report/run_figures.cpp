@@ -13,7 +13,6 @@
 namespace tandem::report {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kMillimetres = 1e3;
 constexpr double kMoves = 0.01;  // [rad, m]: less between two postures is none that one can see
 

@@ -7,11 +7,6 @@
 #include "rt/stop_signal.hpp"
 
 namespace tandem::rt {
-namespace {
-
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
-
-}  // namespace
 
 void Clock::sleep_until_rung(std::int64_t deadline_ns, const Doorbell&, std::uint32_t) noexcept {
   sleep_until(deadline_ns);

@@ -10,6 +10,8 @@ namespace tandem::rt {
 
 class Doorbell;
 
+inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
 /// A monotonic clock in nanoseconds since an arbitrary origin.
 class Clock {
  public:

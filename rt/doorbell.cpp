@@ -8,10 +8,11 @@
 #include <climits>
 #include <ctime>
 
+#include "rt/clock.hpp"
+
 namespace tandem::rt {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 /// A signal only sets a flag, and mostly on another thread: it wakes nobody.
 constexpr std::int64_t kPatience_ns = 20'000'000;
 

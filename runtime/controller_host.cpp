@@ -7,14 +7,6 @@
 #include "controllers/hosted_call.hpp"
 
 namespace tandem::runtime {
-namespace {
-
-Error about(const std::string& key, std::string message, std::string hint) {
-  return {.message = std::move(message), .hint = std::move(hint), .file = {}, .key = key};
-}
-
-}  // namespace
-
 ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kernels* kernels,
                                std::int64_t period_ns)
     : robot_(&robot),
@@ -43,8 +35,8 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
                            TomlTable parameters, bool active) {
   const std::size_t slot = size();
   if (slot == kMostControllers) {
-    return std::unexpected(about(name, "is one controller more than there can be",
-                                 "at most " + std::to_string(kMostControllers)));
+    return fail_at(name, "is one controller more than there can be",
+                   "at most " + std::to_string(kMostControllers));
   }
   auto made = configure(name, std::move(controller), std::move(parameters));
   if (!made) return std::unexpected(made.error());
@@ -52,11 +44,11 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
   const ControllerSet after = active_ | only(slot);
   if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
     table_[slot] = nullptr;
-    return std::unexpected(about(
+    return fail_at(
         robot_->joints[conflict->joint].name,
         "is claimed by the controllers '" + owned_[conflict->one]->name + "' and '" + name + "'",
         "let one controller have the joint, or give one of them "
-        "active = false"));
+        "active = false");
   }
   owned_[slot] = std::move(*made);
   if (active) set_active(after);
@@ -95,15 +87,14 @@ Status ControllerHost::check_claims(const std::string& name,
   std::vector<std::uint8_t> claimed(robot_->joints.size());
   for (const auto& claim : claims) {
     if (claim.joint >= claimed.size()) {
-      return std::unexpected(about(name,
-                                   "claims joint number " + std::to_string(claim.joint) + " of " +
-                                       std::to_string(claimed.size()),
-                                   "joints are numbered from 0 in the robot.toml's order"));
+      return fail_at(name,
+                     "claims joint number " + std::to_string(claim.joint) + " of " +
+                         std::to_string(claimed.size()),
+                     "joints are numbered from 0 in the robot.toml's order");
     }
     if (claimed[claim.joint] != 0) {
-      return std::unexpected(about(robot_->joints[claim.joint].name,
-                                   "is claimed twice by the controller '" + name + "'",
-                                   "claim each joint once"));
+      return fail_at(robot_->joints[claim.joint].name,
+                     "is claimed twice by the controller '" + name + "'", "claim each joint once");
     }
     claimed[claim.joint] = 1;
     if (Status able = hal::check_capability(*robot_, claim.joint, claim.mode, claim.interaction);

@@ -14,11 +14,6 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::microseconds kLook{200};  // between two looks for an answer
 
-std::unexpected<Error> about(const std::string& key, std::string message, std::string hint) {
-  return std::unexpected(
-      Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = key});
-}
-
 /// Every error of a document in one.
 Status errors_of(const TomlDocument& document) {
   std::string all;
@@ -189,7 +184,7 @@ Result<std::size_t> RunServices::slot_of(const std::string& name) const {
     if (one->name == name) return slot;
     names.push_back(one->name);
   }
-  return about(name, "no controller '" + name + "' is loaded", suggest(name, names));
+  return fail_at(name, "no controller '" + name + "' is loaded", suggest(name, names));
 }
 
 /// Who is active once the loop has done all that it was asked for.
@@ -203,9 +198,10 @@ ControllerSet RunServices::planned() const {
 }
 
 Status RunServices::check_name(const std::string& name) {
-  if (name.empty()) return about("name", "the controller's name is empty", "give it one");
+  if (name.empty()) return fail_at("name", "the controller's name is empty", "give it one");
   if (slot_of(name)) {
-    return about(name, "a controller of this name is loaded already", "give this one another name");
+    return fail_at(name, "a controller of this name is loaded already",
+                   "give this one another name");
   }
   return {};
 }
@@ -234,7 +230,7 @@ Result<Asked> RunServices::load(std::unique_ptr<HostedController> controller, Pa
   ControllerHost::Owned& owned = host_->owned();
   const auto free = std::ranges::find_if(owned, [](const auto& one) { return one == nullptr; });
   if (free == owned.end()) {
-    return about(
+    return fail_at(
         controller->name,
         std::to_string(kMostControllers) + " controllers are loaded, the most there can be",
         "unload one first");
@@ -254,7 +250,8 @@ Result<Asked> RunServices::unload(const std::string& name, Patience patience) {
   const Result<std::size_t> slot = slot_of(name);
   if (!slot) return std::unexpected(slot.error());
   if ((planned() & only(*slot)) != 0) {
-    return about(name, "the controller is active", "stop it first: tandem controller stop " + name);
+    return fail_at(name, "the controller is active",
+                   "stop it first: tandem controller stop " + name);
   }
   host_->owned()[*slot]->leaves = true;
   return ask(lock, {.kind = LoopRequest::Kind::kRemove, .slot = static_cast<std::uint32_t>(*slot)},
@@ -266,7 +263,7 @@ Result<ControllerSet> RunServices::set_of(const std::vector<std::string>& names)
   for (const std::string& name : names) {
     const Result<std::size_t> slot = slot_of(name);
     if (!slot) return std::unexpected(slot.error());
-    if ((set & only(*slot)) != 0) return about(name, "is named twice", "name each once");
+    if ((set & only(*slot)) != 0) return fail_at(name, "is named twice", "name each once");
     set |= only(*slot);
   }
   return set;
@@ -280,13 +277,13 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
     const std::string name = table[slot] == nullptr ? "" : table[slot]->name;
     const ControllerSet bit = only(slot);
     if ((stop & start & bit) != 0) {
-      return about(name, "is to be stopped and started", "name it once");
+      return fail_at(name, "is to be stopped and started", "name it once");
     }
     if ((stop & ~active & bit) != 0) {
-      return about(name, "is not active", "tandem controller list shows which are");
+      return fail_at(name, "is not active", "tandem controller list shows which are");
     }
     if ((start & active & bit) != 0) {
-      return about(name, "is active already", "tandem controller list shows which are");
+      return fail_at(name, "is active already", "tandem controller list shows which are");
     }
   }
   if (const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start)) {

@@ -11,11 +11,6 @@
 namespace tandem::runtime {
 namespace {
 
-std::unexpected<Error> about(const std::string& joint, std::string message, std::string hint) {
-  return std::unexpected(
-      Error{.message = std::move(message), .hint = std::move(hint), .file = {}, .key = joint});
-}
-
 hal::Capability needed_by(hal::PidLoop loop) {
   switch (loop) {
     case hal::PidLoop::kPosition: return hal::Capability::kPosition;
@@ -34,8 +29,8 @@ std::string number(double value) {
 
 Status check_range(const std::string& joint, const std::string& what, double value, double max) {
   if (value >= 0.0 && value <= max) return {};
-  return about(joint, what + " " + number(value) + " is beyond the joint's limit",
-               "give 0 to " + number(max));
+  return fail_at(joint, what + " " + number(value) + " is beyond the joint's limit",
+                 "give 0 to " + number(max));
 }
 
 }  // namespace
@@ -45,7 +40,7 @@ Result<std::size_t> RunServices::joint_of(const std::string& name) const {
   if (index >= 0) return static_cast<std::size_t>(index);
   std::vector<std::string> names;
   for (const hal::JointConfig& joint : robot_->joints) names.push_back(joint.name);
-  return about(name, "the robot has no joint '" + name + "'", suggest(name, names));
+  return fail_at(name, "the robot has no joint '" + name + "'", suggest(name, names));
 }
 
 std::vector<JointLook> RunServices::looks() const {
@@ -106,7 +101,7 @@ Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& 
   }
   const bool yields = !std::isnan(wish.stiffness_Nm_rad) || !std::isnan(wish.damping_Nms_rad);
   if (yields && !limit.can(hal::Capability::kCompliant)) {
-    return about(joint, "this joint cannot be compliant", "it has no torque control");
+    return fail_at(joint, "this joint cannot be compliant", "it has no torque control");
   }
   if (!std::isnan(wish.stiffness_Nm_rad)) {
     const Status in_range =
@@ -133,8 +128,8 @@ Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop
   const Result<std::size_t> index = joint_of(joint);
   if (!index) return std::unexpected(index.error());
   if (!host_->capabilities()[*index].can(needed_by(loop))) {
-    return about(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",
-                 "give [gains." + robot_->joints[*index].gains + "] one");
+    return fail_at(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",
+                   "give [gains." + robot_->joints[*index].gains + "] one");
   }
   const hal::PidGains& most =
       host_->capabilities()[*index].most_gains[static_cast<std::size_t>(loop)];

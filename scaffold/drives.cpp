@@ -15,8 +15,8 @@ constexpr double kEmfShare = 0.6;        // of the voltage, at the largest speed
 constexpr double kDropShare = 0.3;       // of the voltage, in the winding at the largest effort
 constexpr double kCurrentMargin = 1.25;  // of the current limit
 constexpr double kMostCurrent_A = 60.0;  // before a higher voltage is taken
-constexpr double kAcceleration = 300.0;  // [rad/s^2]: of the rotor alone at the largest effort
-constexpr double kFriction = 0.02;       // of the back-EMF's damping
+constexpr double kRotorAcceleration = 300.0;  // [rad/s^2]: of the rotor alone at the largest effort
+constexpr double kFriction = 0.02;            // of the back-EMF's damping
 constexpr double kGear = 100.0;
 constexpr double kGearPerMetre = 1000.0;  // [rad/m] of a slide
 constexpr double kInductanceTime_s = 0.5e-3;
@@ -103,7 +103,7 @@ hal::ActuatorConfig motor(double effort, double velocity, bool slides) {
   current = effort / motor_constant;
   m.resistance_ohm = rounded(kDropShare * m.voltage_limit_V / current);
   m.inductance_H = rounded(kInductanceTime_s * m.resistance_ohm);
-  m.inertia_kg_m2 = rounded(effort / kAcceleration);
+  m.inertia_kg_m2 = rounded(effort / kRotorAcceleration);
   m.damping_Nms_rad =
       rounded((1.0 + kFriction) * motor_constant * motor_constant / m.resistance_ohm);
   m.current_limit_A = rounded(kCurrentMargin * current);

@@ -13,14 +13,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using model::Tree;
 
-constexpr double kRoom = 0.05;      // of the range, kept to a limit
-constexpr double kMostRoom = 0.1;   // [rad or m]
-constexpr double kBelow = 10.0;     // more than all else that a posture is judged by
-constexpr double kFarthest = 1.25;  // [rad]: from the middle of the limits, of a waiting posture
-constexpr double kMostLoad = 0.5;   // of a joint's effort, by gravity alone
+constexpr double kRoom = 0.05;        // of the range, kept to a limit
+constexpr double kMostRoom = 0.1;     // [rad or m]
+constexpr double kBelow = 10.0;       // more than all else that a posture is judged by
+constexpr double kFarthest = 1.25;    // [rad]: from the middle of the limits, of a waiting posture
+constexpr double kMostGravity = 0.5;  // of a joint's effort, by gravity alone
 constexpr double kSparedLoad = 0.33;
-constexpr double kStep = 0.02;     // [rad]: in the search for less load
-constexpr double kClear_m = 0.05;  // over the base's plane, of a waiting posture
+constexpr double kSearchStep = 0.02;  // [rad]: in the search for less load
+constexpr double kClear_m = 0.05;     // over the base's plane, of a waiting posture
 
 /// The least velocity that a body's frame gets in its worst direction, per unit of joint speed
 /// and reach; with fewer than three joints, in the directions that there are.
@@ -100,12 +100,12 @@ VectorXd spared_posture(const Tree& tree) {
   VectorXd q = neutral_posture(tree);
   for (int joint = static_cast<int>(tree.joints.size()) - 1; joint >= 0; --joint) {
     if (tree.joints[joint].follows()) continue;
-    if (loaded(tree, Posed(tree, q), joint) <= kMostLoad) continue;
+    if (loaded(tree, Posed(tree, q), joint) <= kMostGravity) continue;
     double least = loaded(tree, Posed(tree, q), joint);
     double best = q[joint];
     for (int i = 2; least > kSparedLoad; ++i) {  // to either side, ever farther
-      const double at = q[joint] + kStep * (i % 2 == 0 ? i / 2 : -(i / 2));
-      if (kStep * (i / 2) > bounds.upper[joint] - bounds.lower[joint]) break;
+      const double at = q[joint] + kSearchStep * (i % 2 == 0 ? i / 2 : -(i / 2));
+      if (kSearchStep * (i / 2) > bounds.upper[joint] - bounds.lower[joint]) break;
       if (at < bounds.lower[joint] || at > bounds.upper[joint]) continue;
       VectorXd moved = q;
       moved[joint] = at;
@@ -152,7 +152,7 @@ VectorXd waiting_posture(const Tree& tree) {
     }
     for (std::size_t j = 0; j < tree.joints.size(); ++j) {
       if (tree.joints[j].follows()) continue;
-      score -= std::max(0.0, loaded(tree, posed, static_cast<int>(j)) - kMostLoad);
+      score -= std::max(0.0, loaded(tree, posed, static_cast<int>(j)) - kMostGravity);
     }
     const double below_m = floor ? kClear_m - posed.lowest_m() : 0.0;
     if (below_m > 0.0) score -= kBelow * (1.0 + below_m);

@@ -19,7 +19,7 @@ constexpr double kBend_rad = 0.7;      // of the knees, where the search begins
 constexpr std::array kHeightShares{0.94, 0.96, 0.98};  // of the greatest height, by preference
 constexpr double kMiddleHalf = 0.5;                    // of a sole: where the centre of mass may be
 constexpr std::size_t kMostLegs = 4;                   // whose knees are tried every way
-constexpr double kStep = 1.02;  // ratio of heights in the search for the greatest
+constexpr double kHeightRatio = 1.02;  // ratio of heights in the search for the greatest
 constexpr double kConverged_m = 1e-6;
 constexpr double kLongestStep = 0.3;  // [rad or m]
 constexpr int kIterations = 60;
@@ -226,14 +226,15 @@ bool Standing::settle(VectorXd q) {
     if (i == kHeights) return false;
     const int steps = i % 2 == 0 ? -i / 2 : (i + 1) / 2;
     q = bent;
-    if (!solve(height * std::pow(kStep, steps), q)) continue;
-    height *= std::pow(kStep, steps);
+    if (!solve(height * std::pow(kHeightRatio, steps), q)) continue;
+    height *= std::pow(kHeightRatio, steps);
     break;
   }
   VectorXd high = q;
   greatest_m_ = height_m_ = height;
   q_ = q;
-  for (int i = 0; i < 100 && solve(greatest_m_ * kStep, high); ++i) greatest_m_ *= kStep;
+  for (int i = 0; i < 100 && solve(greatest_m_ * kHeightRatio, high); ++i)
+    greatest_m_ *= kHeightRatio;
   for (const double share : kHeightShares) {
     VectorXd found = q;
     if (!solve(share * greatest_m_, found)) continue;

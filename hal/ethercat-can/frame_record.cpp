@@ -7,6 +7,8 @@
 #include <cstring>
 #include <ctime>
 
+#include "hal/ethercat-can/frame_time.hpp"
+
 namespace tandem::hal::can {
 
 using canopen::Frame;
@@ -14,7 +16,6 @@ using canopen::Frame;
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(1);
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 
 std::int64_t now_ns(clockid_t clock) noexcept {
   timespec now{};

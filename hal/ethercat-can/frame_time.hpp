@@ -10,6 +10,8 @@
 
 namespace tandem::hal::can {
 
+inline constexpr std::int64_t kSecondNs = 1'000'000'000;
+
 /// Of one bus [bit/s].
 struct BitRates {
   std::int64_t nominal = 1'000'000;  ///< arbitration; the whole of a classic frame
@@ -33,9 +35,8 @@ struct FrameBits {
 /// [ns], rounded up.
 [[nodiscard]] constexpr std::int64_t duration_ns(const FrameBits& bits,
                                                  const BitRates& rates) noexcept {
-  constexpr std::int64_t kNsPerS = 1'000'000'000;
   const auto up = [](std::int64_t count, std::int64_t rate) {
-    return (count * kNsPerS + rate - 1) / rate;
+    return (count * kSecondNs + rate - 1) / rate;
   };
   return up(bits.nominal, rates.nominal) + up(bits.data, rates.data);
 }

@@ -15,7 +15,7 @@ using namespace canopen;
 namespace object = canopen::object;
 using Steps = std::vector<SdoStep>;
 
-float real32(double value) { return static_cast<float>(value); }
+float to_float(double value) { return static_cast<float>(value); }
 
 void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
                SdoUse use = SdoUse::kCheck) {
@@ -44,14 +44,14 @@ void add_pdo(Steps& steps, const PdoPlan& pdo) {
   const auto offset = static_cast<std::uint16_t>(pdo.number - 1);
   const auto parameter = static_cast<std::uint16_t>(
       (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
-  const auto mapping = static_cast<std::uint16_t>(
-      (receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
+  const auto mapping =
+      static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
   steps.push_back(write_step(parameter, 1, pdo.cob_id | cob::kInvalid));
   steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
   std::uint8_t count = 0;
   for (const MappedField& field : pdo.fields) {
-    steps.push_back(write_step(mapping, ++count, mapping_entry(field.index, field.sub,
-                                                               field.size)));
+    steps.push_back(
+        write_step(mapping, ++count, mapping_entry(field.index, field.sub, field.size)));
   }
   steps.push_back(write_step(mapping, 0, count));
   steps.push_back(write_step(parameter, 2, pdo.transmission));
@@ -76,8 +76,7 @@ void add_scales(AxisSteps& add, const JointConfig& joint) {
   const AxisScale scale = AxisScale::of(joint);
   const double rated_Nm = joint.rated_torque_Nm;
   add(object::kEncoderResolution, 1, clamp_round<std::uint32_t>(joint.encoder_counts_per_rev));
-  add(object::kMotorResolution, 0,
-      clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
+  add(object::kMotorResolution, 0, clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
   add(object::kRatedTorque, 0, clamp_round<std::uint32_t>(1000.0 * rated_Nm));
   add(object::kMaxTorque, 0, clamp_round<std::uint16_t>(1000.0 * joint.max_torque_Nm / rated_Nm));
   // By way of "no upper limit", so that no order of old and new limits is refused.
@@ -91,10 +90,10 @@ void add_scales(AxisSteps& add, const JointConfig& joint) {
 void add_loops(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor,
                const GainsConfig& gains) {
   const auto loop = [&](std::uint16_t index, const PidConfig& pid, double own_limit) {
-    add(index, kPidKp, real32(pid.gains.kp));
-    add(index, kPidKi, real32(pid.gains.ki));
-    add(index, kPidKd, real32(pid.gains.kd));
-    add(index, kPidOutputLimit, real32(pid.output_limit > 0.0 ? pid.output_limit : own_limit));
+    add(index, kPidKp, to_float(pid.gains.kp));
+    add(index, kPidKi, to_float(pid.gains.ki));
+    add(index, kPidKd, to_float(pid.gains.kd));
+    add(index, kPidOutputLimit, to_float(pid.output_limit > 0.0 ? pid.output_limit : own_limit));
   };
   loop(object::kPositionGains, gains.position, joint.max_torque_Nm);
   loop(object::kVelocityGains, gains.velocity, joint.max_torque_Nm);
@@ -102,20 +101,20 @@ void add_loops(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& m
   loop(object::kCurrentGains, gains.current, motor.voltage_limit_V);
   const double constant_Nm_A = motor.gear_ratio * motor.torque_constant_Nm_A;
   const double voltage_per_Nm = constant_Nm_A > 0.0 ? motor.resistance_ohm / constant_Nm_A : 0.0;
-  add(object::kFeedForward, kTorqueToVoltage, real32(gains.torque_feedforward * voltage_per_Nm));
-  add(object::kFeedForward, kEmfCompensation, real32(gains.emf_compensation * constant_Nm_A));
+  add(object::kFeedForward, kTorqueToVoltage, to_float(gains.torque_feedforward * voltage_per_Nm));
+  add(object::kFeedForward, kEmfCompensation, to_float(gains.emf_compensation * constant_Nm_A));
   add(object::kPositionFeedback, 0, static_cast<std::uint8_t>(gains.position_feedback));
-  add(object::kMotorData, kMotorResistance, real32(motor.resistance_ohm));
-  add(object::kMotorData, kMotorTorqueConstant, real32(constant_Nm_A));
+  add(object::kMotorData, kMotorResistance, to_float(motor.resistance_ohm));
+  add(object::kMotorData, kMotorTorqueConstant, to_float(constant_Nm_A));
   const bool elastic = motor.order >= 2;
-  add(object::kMotorData, kMotorSpring, real32(elastic ? motor.spring_Nm_rad : 0.0));
-  add(object::kStiffness, 0, real32(gains.stiffness_Nm_rad));
-  add(object::kDamping, 0, real32(gains.damping_Nms_rad));
+  add(object::kMotorData, kMotorSpring, to_float(elastic ? motor.spring_Nm_rad : 0.0));
+  add(object::kStiffness, 0, to_float(gains.stiffness_Nm_rad));
+  add(object::kDamping, 0, to_float(gains.damping_Nms_rad));
 }
 
 void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorConfig& motor) {
-  add(object::kI2t, kContinuousCurrent, real32(motor.continuous_current_A));
-  add(object::kI2t, kThermalTime, real32(motor.thermal_time_s));
+  add(object::kI2t, kContinuousCurrent, to_float(motor.continuous_current_A));
+  add(object::kI2t, kThermalTime, to_float(motor.thermal_time_s));
   add(object::kTemperatureLimit, 0,
       clamp_round<std::int16_t>(motor.temperature_limit_C / kKelvinPerUnit));
   add(object::kFollowingErrorWindow, 0,
@@ -131,10 +130,10 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
   add_scales(add, joint);
   add_loops(add, joint, motor, robot.gains_of(joint));
-  add(object::kLimits, kVoltageLimit, real32(motor.voltage_limit_V));
-  add(object::kLimits, kCurrentLimit, real32(motor.current_limit_A));
-  add(object::kLimits, kTorqueLimit, real32(joint.max_torque_Nm));
-  add(object::kLimits, kVelocityLimit, real32(joint.max_velocity_rad_s));
+  add(object::kLimits, kVoltageLimit, to_float(motor.voltage_limit_V));
+  add(object::kLimits, kCurrentLimit, to_float(motor.current_limit_A));
+  add(object::kLimits, kTorqueLimit, to_float(joint.max_torque_Nm));
+  add(object::kLimits, kVelocityLimit, to_float(joint.max_velocity_rad_s));
   add_protections(add, joint, motor);
   const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
   add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
@@ -163,8 +162,8 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
   steps.push_back(write_step(object::kHeartbeatConsumer, 1,
                              static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));
-  steps.push_back(write_step(object::kHeartbeatProducer, 0,
-                             clamp_round<std::uint16_t>(node.heartbeat_ms)));
+  steps.push_back(
+      write_step(object::kHeartbeatProducer, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
   return steps;
 }
 

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "hal/ethercat-can/frame_time.hpp"
 #include "hal/ethercat-can/socket_can_impl.hpp"
 #include "hal/ethercat-can/socket_frame.hpp"
 
@@ -19,7 +20,6 @@ using canopen::Frame;
 
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 /// How long a loss is told of by state().
 constexpr std::int64_t kLossyNs = kSecondNs;
 /// Messages that one receive() takes beyond the frames asked for: error frames and the like.

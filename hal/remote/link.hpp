@@ -17,6 +17,9 @@ namespace tandem::remote {
 
 namespace tandem_msgs = dds::tandem_msgs;
 
+/// kp, ki and kd of every loop, as the link's samples list them joint by joint.
+inline constexpr std::size_t kGainsPerJoint = 3 * hal::kPidLoops;
+
 /// What two processes must agree on before one drives the other's robot.
 struct Identity {
   std::string robot;

@@ -15,7 +15,6 @@ using hal::StopCategory;
 namespace {
 
 constexpr auto kSlice = std::chrono::milliseconds(20);  // exchange() looks around so often
-constexpr std::size_t kGains = 3 * hal::kPidLoops;
 
 }  // namespace
 
@@ -114,7 +113,7 @@ Code RemoteBackend::write(const hal::CommandImage& command,
   if (!gains_pending_) return Code::kOk;
   for (std::size_t i = 0; i < gains_.size(); i += 3) {
     const hal::PidGains& gains =
-        parameters.gains(i / kGains, static_cast<hal::PidLoop>(i % kGains / 3));
+        parameters.gains(i / kGainsPerJoint, static_cast<hal::PidLoop>(i % kGainsPerJoint / 3));
     gains_[i] = gains.kp;
     gains_[i + 1] = gains.ki;
     gains_[i + 2] = gains.kd;

@@ -14,7 +14,6 @@ using hal::StopCategory;
 namespace {
 
 constexpr std::int64_t kLook_ns = 50'000'000;  // a waiting cycle looks around so often
-constexpr std::size_t kGains = 3 * hal::kPidLoops;
 constexpr std::size_t kRingCycles = 64;
 
 std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
@@ -143,7 +142,7 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   Taken& to = newest_.back();
   if (sample.command._length != to.command.bytes().size()) return false;
   const std::uint32_t gains = sample.gains._length;
-  if (gains != 0 && gains != joints_ * kGains) return false;
+  if (gains != 0 && gains != joints_ * kGainsPerJoint) return false;
   std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
   if (!is_sound(to.command)) return false;
   const double* value = sample.gains._buffer;
@@ -152,13 +151,13 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   }
   hal::ParameterImage wanted = gains_;
   for (std::size_t i = 0; i < gains; i += 3) {
-    const auto loop = static_cast<hal::PidLoop>(i % kGains / 3);
+    const auto loop = static_cast<hal::PidLoop>(i % kGainsPerJoint / 3);
     const hal::PidGains one{.kp = value[i], .ki = value[i + 1], .kd = value[i + 2]};
-    if (one != gains_.gains(i / kGains, loop) &&
-        !hal::gains_problem(capabilities_[i / kGains], loop, one).empty()) {
+    if (one != gains_.gains(i / kGainsPerJoint, loop) &&
+        !hal::gains_problem(capabilities_[i / kGainsPerJoint], loop, one).empty()) {
       return false;
     }
-    wanted.set_gains(i / kGains, loop, one);
+    wanted.set_gains(i / kGainsPerJoint, loop, one);
   }
   gains_ = std::move(wanted);
   if (gains != 0) ++gains_number_;

@@ -5,8 +5,6 @@
 namespace tandem::canopen {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-
 /// Node 3 with one demand and one actual value.
 struct NodeTest : testing::Test {
   std::int32_t target = 0;
@@ -26,7 +24,7 @@ struct NodeTest : testing::Test {
                                   od);
   }
   NodeEvents on(const Frame& frame) { return node->receive(frame, out.sink()); }
-  NodeEvents wait(std::int64_t ms) { return node->process(ms * kMs, out.sink()); }
+  NodeEvents wait(std::int64_t ms) { return node->process(ms * canopen::kNsPerMs, out.sink()); }
   /// SDO download; the answer must be a confirmation.
   void configure(std::initializer_list<int> request) {
     on(wire(0x603, request));
@@ -42,7 +40,7 @@ struct NodeTest : testing::Test {
     configure({0x23, 0x00, 0x16, 1, 0x20, 0x00, 0x7A, 0x60});  // 1600:1 = 607A0020
     configure({0x2F, 0x00, 0x16, 0, 1, 0, 0, 0});
     configure({0x2F, 0x00, 0x14, 2, 1, 0, 0, 0});
-    configure({0x23, 0x00, 0x14, 1, 0x03, 0x02, 0, 0});        // 1400:1 = 203
+    configure({0x23, 0x00, 0x14, 1, 0x03, 0x02, 0, 0});  // 1400:1 = 203
     EXPECT_EQ(on(wire(0x000, {0x01, 0x03})), kEventOperational);
   }
 };

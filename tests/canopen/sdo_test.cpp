@@ -5,8 +5,6 @@
 namespace tandem::canopen {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-
 /// Node 5 with a u32, a u16, an i8, and a 17-character string.
 struct ServerTest : testing::Test {
   std::uint32_t kp = 0;
@@ -98,11 +96,11 @@ TEST_F(ServerTest, AWrongToggleAborts) {
 
 TEST_F(ServerTest, ASegmentedTransferTimesOut) {
   (void)answer({0x21, 0x20, 0x20, 0x01, 4, 0, 0, 0});
-  server.process(499 * kMs, out.sink());
+  server.process(499 * canopen::kNsPerMs, out.sink());
   EXPECT_TRUE(out.take().empty());
-  server.process(1 * kMs, out.sink());
+  server.process(1 * canopen::kNsPerMs, out.sink());
   EXPECT_EQ(out.take(), reply({0x80, 0x20, 0x20, 0x01, 0x00, 0x00, 0x04, 0x05}));
-  server.process(1000 * kMs, out.sink());
+  server.process(1000 * canopen::kNsPerMs, out.sink());
   EXPECT_TRUE(out.take().empty());
 }
 
@@ -178,9 +176,9 @@ TEST_F(ClientTest, TellsTheServersAbort) {
 TEST_F(ClientTest, AbortsWhenNoAnswerComes) {
   client.upload(0x1018, 1, out.sink());
   (void)out.take();
-  client.process(99 * kMs, 100 * kMs, out.sink());
+  client.process(99 * canopen::kNsPerMs, 100 * canopen::kNsPerMs, out.sink());
   EXPECT_EQ(client.status(), SdoClient::Status::kBusy);
-  client.process(1 * kMs, 100 * kMs, out.sink());
+  client.process(1 * canopen::kNsPerMs, 100 * canopen::kNsPerMs, out.sink());
   EXPECT_EQ(client.status(), SdoClient::Status::kAborted);
   EXPECT_EQ(client.abort_code(), AbortCode::kTimeout);
   EXPECT_EQ(out.take(), request({0x80, 0x18, 0x10, 0x01, 0x00, 0x00, 0x04, 0x05}));

@@ -21,7 +21,7 @@ struct Published {
 
 /// Of public copies of what ROS 2's own generator wrote (…__description.c, …__struct.h), and of
 /// tables that others keep, by GitHub repository.
-constexpr Published kPublished[] = {
+constexpr Published kDefinitions[] = {
     // kuenem/Group-12_MotionPlanning-New: build/tf2_msgs/…/tf_message__description.c
     {"tf2_msgs/msg/TFMessage", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},
     {"builtin_interfaces/msg/Time",
@@ -79,7 +79,7 @@ constexpr Published kPublished[] = {
 };
 
 TEST(MessageDefinition, HasThePublishedHash) {
-  for (const Published& one : kPublished) {
+  for (const Published& one : kDefinitions) {
     const MessageDefinition* definition = find_definition(one.type);
     ASSERT_NE(definition, nullptr) << one.type;
     EXPECT_EQ(type_hash(*definition), std::string("RIHS01_") + one.hash) << one.type;
@@ -89,7 +89,7 @@ TEST(MessageDefinition, HasThePublishedHash) {
 TEST(MessageDefinition, OfEveryStandardTypeIsAmongThePublished) {
   for (const Type& type : types()) {
     if (type.ros_name.starts_with("tandem_msgs/")) continue;
-    EXPECT_TRUE(std::ranges::any_of(kPublished, [&](const Published& one) {
+    EXPECT_TRUE(std::ranges::any_of(kDefinitions, [&](const Published& one) {
       return type.ros_name == one.type;
     })) << type.ros_name;
   }

@@ -18,8 +18,8 @@ namespace {
 
 using std::chrono::milliseconds;
 using tandem::test::eventually;
-using Request = std_srvs_srv_dds__Trigger_Request_;
-using Response = std_srvs_srv_dds__Trigger_Response_;
+using RawRequest = std_srvs_srv_dds__Trigger_Request_;
+using RawResponse = std_srvs_srv_dds__Trigger_Response_;
 using Bytes = std::vector<std::uint8_t>;
 
 /// A client or a server of "reset" that knows nothing of our wrapper.
@@ -109,7 +109,7 @@ TEST_F(RawService, AnswersWithTheHeaderOfTheRequestByteForByte) {
   serve();
   const auto raw = client();
   ASSERT_TRUE(eventually([&] { return raw->connected(); }));
-  const Request request{0x1122334455667788, 7, 0};
+  const RawRequest request{0x1122334455667788, 7, 0};
   ASSERT_EQ(dds_write(raw->writer, &request), DDS_RETCODE_OK);
   Bytes reply;
   ASSERT_TRUE(eventually([&] { return !(reply = raw->take_bytes()).empty(); }));
@@ -130,7 +130,7 @@ TEST_F(RawService, AnswersAClientThatAsksBeforeItCanHear) {
   dds_delete(raw->reader);
   ASSERT_TRUE(
       eventually([&] { return dds_get_matched_subscriptions(raw->writer, nullptr, 0) > 0; }));
-  const Request request{1, 1, 0};
+  const RawRequest request{1, 1, 0};
   ASSERT_EQ(dds_write(raw->writer, &request), DDS_RETCODE_OK);
   ASSERT_TRUE(eventually([&] { return server->counts().requests == 1; }));
   raw->reader = dds_create_reader(
@@ -165,7 +165,7 @@ TEST_F(RawService, IsNotHeldUpByAClientThatFloods) {
   ASSERT_TRUE(eventually([&] { return raw->connected(); }));
   hold = true;
   for (std::int64_t i = 0; i < 5000; ++i) {
-    const Request request{1, i, 0};
+    const RawRequest request{1, i, 0};
     dds_write(raw->writer, &request);
   }
   ASSERT_TRUE(eventually([&] { return server->counts().dropped > 0; }));
@@ -192,11 +192,11 @@ TEST_F(RawService, RepliesThatAreNotForItAreIgnoredByAClient) {
     std::memcpy(&guid, &request[4], sizeof guid);
     std::memcpy(&sequence, &request[12], sizeof sequence);
     std::string wrong = "wrong", right = "right";
-    const std::array<Response, 4> replies{Response{guid + 1, sequence, true, wrong.data()},
-                                          Response{guid, sequence + 1, true, wrong.data()},
-                                          Response{guid, sequence - 1, true, wrong.data()},
-                                          Response{guid, sequence, true, right.data()}};
-    for (const Response& reply : replies) dds_write(raw.writer, &reply);
+    const std::array<RawResponse, 4> replies{RawResponse{guid + 1, sequence, true, wrong.data()},
+                                             RawResponse{guid, sequence + 1, true, wrong.data()},
+                                             RawResponse{guid, sequence - 1, true, wrong.data()},
+                                             RawResponse{guid, sequence, true, right.data()}};
+    for (const RawResponse& reply : replies) dds_write(raw.writer, &reply);
   });
   EXPECT_EQ(ask(*polite), "right");
   EXPECT_EQ(polite->ignored(), 3U);

@@ -3,11 +3,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace tandem::hal::can {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// 100 counts a degree, 1000 motor counts a degree, 50 Nm rated.
 AxisScale scale() {
@@ -23,14 +22,12 @@ struct Codec : ::testing::Test {
   StateImage state{ImageShape{.joints = 1, .sensor_channels = {}}};
   RawCommand raw;
 
-  void SetUp() override {
-    command.mode()[0] = static_cast<std::int8_t>(ControlMode::kPosition);
-  }
+  void SetUp() override { command.mode()[0] = static_cast<std::int8_t>(ControlMode::kPosition); }
 };
 
 TEST_F(Codec, CommandsBecomeCountsAndPerMille) {
-  command.position_rad()[0] = -kPi / 2;
-  command.velocity_rad_s()[0] = kPi / 180.0;
+  command.position_rad()[0] = -std::numbers::pi / 2;
+  command.velocity_rad_s()[0] = std::numbers::pi / 180.0;
   command.torque_Nm()[0] = -12.5;
   command.voltage_V()[0] = 24.0;
   command.current_A()[0] = -0.014;
@@ -87,10 +84,10 @@ TEST_F(Codec, FeedbackFromLiteralBytes) {
   feedback.take(WireField::kTemperature, temperature.data());
   feedback.take(WireField::kModeDisplay, mode.data());
   decode_feedback(scale(), feedback, 0, state);
-  EXPECT_DOUBLE_EQ(state.position_rad()[0], -kPi / 2);
-  EXPECT_DOUBLE_EQ(state.velocity_rad_s()[0], kPi / 180.0);
+  EXPECT_DOUBLE_EQ(state.position_rad()[0], -std::numbers::pi / 2);
+  EXPECT_DOUBLE_EQ(state.velocity_rad_s()[0], std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(state.torque_Nm()[0], -12.5);
-  EXPECT_DOUBLE_EQ(state.motor_position_rad()[0], 10.0 * kPi / 180.0);
+  EXPECT_DOUBLE_EQ(state.motor_position_rad()[0], 10.0 * std::numbers::pi / 180.0);
   EXPECT_DOUBLE_EQ(state.current_A()[0], -1.0);
   EXPECT_DOUBLE_EQ(state.voltage_V()[0], 24.0);
   EXPECT_DOUBLE_EQ(state.temperature_C()[0], 36.6);

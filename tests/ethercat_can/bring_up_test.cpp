@@ -4,8 +4,8 @@
 namespace tandem::hal::can {
 namespace {
 
-using testing::Rig;
-using testing::robot_config;
+using test::Rig;
+using test::robot_config;
 
 TEST(BringUp, EnablesThreeBoardsOfTwoAxesWithoutMovingAJoint) {
   Rig rig;
@@ -112,13 +112,15 @@ TEST(BringUp, TakesALaterMinorRevisionButNoOtherMajor) {
   EXPECT_EQ(with_identity(0x00010000, 0, {}), "") << "the emulated boards' own";
   EXPECT_EQ(with_identity(0x00010007, 0, {}), "");
   EXPECT_EQ(with_identity(0x00020000, 0, {}),
-            who + "wrong revision: object 1018:03 is 0x20000 instead of 0x10000 or a later minor "
-                  "of it");
+            who +
+                "wrong revision: object 1018:03 is 0x20000 instead of 0x10000 or a later minor "
+                "of it");
   BoardConfig later;
   later.revision = 0x00010002;
   EXPECT_EQ(with_identity(0x00010001, 0, later),
-            who + "wrong revision: object 1018:03 is 0x10001 instead of 0x10002 or a later minor "
-                  "of it");
+            who +
+                "wrong revision: object 1018:03 is 0x10001 instead of 0x10002 or a later minor "
+                "of it");
 }
 
 TEST(BringUp, ChecksVendorAndSerialAsConfigured) {
@@ -154,7 +156,9 @@ TEST(BringUp, NamesTheDriveThatIsNotEnabled) {
   EXPECT_EQ(rig.master->phase(), Phase::kFault);
   const std::string text = rig.master->status_text();
   EXPECT_EQ(text.find("joint Joint4 (board board_2, node 12, axis 0): position sensor "
-                      "(error code 0x7300)"), 0u) << text;
+                      "(error code 0x7300)"),
+            0u)
+      << text;
 }
 
 TEST(BringUp, StartsANodeAgainThatRebootsDuringConfiguration) {

@@ -5,9 +5,9 @@
 namespace tandem::hal::can {
 namespace {
 
-using testing::classic_config;
-using testing::robot_config;
-using testing::Rig;
+using test::classic_config;
+using test::Rig;
+using test::robot_config;
 
 constexpr std::int64_t kMs = 1'000'000;
 

@@ -7,12 +7,12 @@ namespace tandem::hal::can {
 namespace {
 
 using canopen::Frame;
-using testing::classic_config;
-using testing::kPi;
-using testing::Rig;
+using test::classic_config;
+using test::kPi;
+using test::Rig;
 using Bytes = std::vector<int>;
 
-Bytes on_the_bus(Rig& rig, std::uint32_t id) {
+Bytes sent_bytes(Rig& rig, std::uint32_t id) {
   for (const Frame& frame : rig.legs.to_boards()) {
     if (frame.id == id) return {frame.payload().begin(), frame.payload().end()};
   }
@@ -46,11 +46,11 @@ TEST(Classic, CommandsAreTheDocumentsBytes) {
   rig.command.torque_Nm()[0] = -12.5;
   rig.command.stiffness_Nm_rad()[0] = 300.0;
   (void)rig.write();
-  EXPECT_EQ(on_the_bus(rig, 0x20A), (Bytes{0x0F, 0x00, 0xD8, 0xDC, 0xFF, 0xFF, 0x06, 0xFF}));
-  const Bytes second = on_the_bus(rig, 0x30A);
+  EXPECT_EQ(sent_bytes(rig, 0x20A), (Bytes{0x0F, 0x00, 0xD8, 0xDC, 0xFF, 0xFF, 0x06, 0xFF}));
+  const Bytes second = sent_bytes(rig, 0x30A);
   ASSERT_EQ(second.size(), 6u);
   EXPECT_EQ(Bytes(second.begin(), second.begin() + 5), (Bytes{0x64, 0x00, 0x00, 0x00, 0x08}));
-  EXPECT_EQ(on_the_bus(rig, 0x40A), (Bytes{0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x96, 0x43}));
+  EXPECT_EQ(sent_bytes(rig, 0x40A), (Bytes{0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x96, 0x43}));
 }
 
 TEST(Classic, FeedbackIsTheDocumentsBytes) {
@@ -119,7 +119,7 @@ TEST(RoundTrip, OfABoardThatHearsLessIsLonger) {
   const auto before = rig.master->round_trips()[0].cycles;
   // It answers with the counter of three SYNCs ago.
   (void)rig.write();
-  const Bytes command = on_the_bus(rig, 0x30A);
+  const Bytes command = sent_bytes(rig, 0x30A);
   ASSERT_EQ(command.size(), 6u);
   (void)rig.step();
   (void)rig.step();

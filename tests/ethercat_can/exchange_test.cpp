@@ -5,8 +5,8 @@
 namespace tandem::hal::can {
 namespace {
 
-using testing::kPi;
-using testing::Rig;
+using test::kPi;
+using test::Rig;
 
 void set_mode(Rig& rig, std::size_t joint, ControlMode mode,
               InteractionMode interaction = InteractionMode::kStiff) {
@@ -45,13 +45,11 @@ TEST(Exchange, EveryModeIsToldAndSaidBack) {
     int wire;
   };
   using enum ControlMode;
-  const Case cases[] = {{kPosition, InteractionMode::kStiff, 8},
-                        {kVelocity, InteractionMode::kStiff, 9},
-                        {kTorque, InteractionMode::kStiff, 10},
-                        {kPosition, InteractionMode::kCompliant, -1},
-                        {kOpenLoop, InteractionMode::kStiff, -2},
-                        {kCurrent, InteractionMode::kStiff, -3},
-                        {kVelocity, InteractionMode::kCompliant, -4}};
+  const Case cases[] = {
+      {kPosition, InteractionMode::kStiff, 8},     {kVelocity, InteractionMode::kStiff, 9},
+      {kTorque, InteractionMode::kStiff, 10},      {kPosition, InteractionMode::kCompliant, -1},
+      {kOpenLoop, InteractionMode::kStiff, -2},    {kCurrent, InteractionMode::kStiff, -3},
+      {kVelocity, InteractionMode::kCompliant, -4}};
   for (const Case& c : cases) {
     set_mode(rig, 1, c.mode, c.interaction);
     rig.steps(8);
@@ -102,8 +100,8 @@ TEST(Exchange, AccelerationIsTheDifferenceOfVelocities) {
     (void)rig.step();
   }
   EXPECT_NE(rig.state.acceleration_rad_s2()[0], 0.0);
-  EXPECT_NEAR(rig.state.acceleration_rad_s2()[0],
-              (rig.state.velocity_rad_s()[0] - before) * 1000.0, 1e-9);
+  EXPECT_NEAR(rig.state.acceleration_rad_s2()[0], (rig.state.velocity_rad_s()[0] - before) * 1000.0,
+              1e-9);
 }
 
 TEST(Exchange, SensorChannelsArriveInSi) {

@@ -3,8 +3,8 @@
 namespace tandem::hal::can {
 namespace {
 
-using testing::Rig;
-using testing::robot_config;
+using test::Rig;
+using test::robot_config;
 
 /// Makes joint `j`'s drive fault: its encoder says nothing any more for a moment.
 void break_encoder(Rig& rig, std::size_t j) {
@@ -39,7 +39,9 @@ TEST(Fault, LatchesWithCauseJointAndTime) {
   char when[32];
   std::snprintf(when, sizeof when, "at 0.%03ld s", at_ms);
   EXPECT_EQ(text.find("joint Joint1 (board board_0, node 10, axis 1): position sensor "
-                      "(error code 0x7300)"), 0u) << text;
+                      "(error code 0x7300)"),
+            0u)
+      << text;
   EXPECT_NE(text.find(when), std::string::npos) << text;
   EXPECT_EQ(rig.step(), Code::kFault) << "stays, though the cause is gone";
 }
@@ -165,7 +167,7 @@ TEST(Fault, ABoardThatRebootsIsConfiguredAnewByTheReset) {
   rig.bring_up();
   rig.parameters.set_gains(5, PidLoop::kPosition, {.kp = 500.0, .ki = 10.0, .kd = 40.0});
   rig.steps(10);
-  rig.boards[2] = std::make_unique<firmware::Board>(testing::board_setup(rig.robot, 2));
+  rig.boards[2] = std::make_unique<firmware::Board>(test::board_setup(rig.robot, 2));
   rig.steps(5);
   EXPECT_EQ(rig.master->phase(), Phase::kFault);
   EXPECT_NE(rig.master->status_text().find("booted again by itself"), std::string::npos)
@@ -252,7 +254,7 @@ TEST(Stop, IsResetTogetherWithTheFaultsOfDrivesAndBoards) {
   Rig rig;
   rig.bring_up();
   break_encoder(rig, 1);
-  rig.boards[2] = std::make_unique<firmware::Board>(testing::board_setup(rig.robot, 2));
+  rig.boards[2] = std::make_unique<firmware::Board>(test::board_setup(rig.robot, 2));
   rig.steps(5);
   rig.master->stop(StopCategory::kCategory1);
   rig.steps(1500);

@@ -47,7 +47,7 @@ TEST(ForeignMaster, IsHeardAmongManyFrames) {
 }
 
 TEST(ForeignMaster, IsListenedForByItsPeriodAndHeartbeat) {
-  RobotConfig robot = test::fake_robot();
+  RobotConfig robot = hal::test::fake_robot();
   robot.boards.assign(2, {});
   EXPECT_EQ(listening_ns(robot, 1'000'000), 100'000'000);
   EXPECT_EQ(listening_ns(robot, 200'000'000), 400'000'000);

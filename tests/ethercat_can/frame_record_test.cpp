@@ -37,8 +37,8 @@ TEST(FrameRecord, WritesCandumpsLines) {
 
 class FrameRecordFile : public testing::Test {
  protected:
-  std::string path_ = testing::TempDir() +
-                      testing::UnitTest::GetInstance()->current_test_info()->name() + ".log";
+  std::string path_ =
+      testing::TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".log";
   void TearDown() override { std::filesystem::remove(path_); }
 };
 

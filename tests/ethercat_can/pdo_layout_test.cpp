@@ -5,7 +5,7 @@
 namespace tandem::hal::can {
 namespace {
 
-using testing::robot_config;
+using test::robot_config;
 
 /// One board with `axes` axes.
 RobotConfig wide_board(int axes) {
@@ -79,15 +79,14 @@ TEST(PdoLayout, ASensorSendsItsChannelsEverySync) {
   const NodePlan& node = layout->nodes[3];
   EXPECT_EQ(node.sensor, 0);
   EXPECT_EQ(node.bus, 1u);
-  EXPECT_EQ(ids_and_bytes(node),
-            (std::vector<std::pair<std::uint32_t, int>>{{0x1A8, 24}}));
+  EXPECT_EQ(ids_and_bytes(node), (std::vector<std::pair<std::uint32_t, int>>{{0x1A8, 24}}));
   EXPECT_EQ(node.pdos[0].fields[5].index, 0x2100);
   EXPECT_EQ(node.pdos[0].fields[5].sub, 6);
 }
 
 /// The same boards and sensor with one axis a board, in frames of 8 bytes.
 TEST(PdoLayout, OnClassicCanOneAxisTakesAllEightPdos) {
-  const auto layout = make_pdo_layout(testing::classic_config());
+  const auto layout = make_pdo_layout(test::classic_config());
   ASSERT_TRUE(layout) << layout.error().to_string();
   const NodePlan& node = layout->nodes[0];
   EXPECT_EQ(node.parts, 2);
@@ -115,7 +114,7 @@ TEST(PdoLayout, OnClassicCanOneAxisTakesAllEightPdos) {
 }
 
 TEST(PdoLayout, ASensorOnClassicCanSendsTwoChannelsATpdo) {
-  const auto layout = make_pdo_layout(testing::classic_config());
+  const auto layout = make_pdo_layout(test::classic_config());
   ASSERT_TRUE(layout);
   EXPECT_EQ(ids_and_bytes(layout->nodes[3]),
             (std::vector<std::pair<std::uint32_t, int>>{{0x1A8, 8}, {0x2A8, 8}, {0x3A8, 8}}));
@@ -123,7 +122,7 @@ TEST(PdoLayout, ASensorOnClassicCanSendsTwoChannelsATpdo) {
 }
 
 TEST(PdoLayout, RefusesWhatClassicFramesCannotCarryWithTheReason) {
-  RobotConfig robot = testing::classic_config();
+  RobotConfig robot = test::classic_config();
   robot.boards[1].bus = "legs";
   robot.joints[1].board = robot.boards[0].name;
   robot.joints[1].axis = 1;
@@ -132,13 +131,12 @@ TEST(PdoLayout, RefusesWhatClassicFramesCannotCarryWithTheReason) {
   EXPECT_EQ(two_axes.error().message,
             "has 2 axes, and its bus is classic CAN: in frames of 8 bytes one axis takes all "
             "eight PDOs of a node");
-  robot = testing::classic_config();
+  robot = test::classic_config();
   robot.sensors[0].type = SensorType::kImu;
   const auto imu = make_pdo_layout(robot);
   ASSERT_FALSE(imu);
   EXPECT_EQ(imu.error().key, "sensor 'foot'");
-  EXPECT_EQ(imu.error().message,
-            "has 10 channels, and four PDOs on a classic CAN bus carry 8");
+  EXPECT_EQ(imu.error().message, "has 10 channels, and four PDOs on a classic CAN bus carry 8");
 }
 
 TEST(PdoLayout, RefusesAxesWithAGapAndANinthAxis) {

@@ -16,7 +16,7 @@
 #include "hal/ethercat-can/loopback.hpp"
 #include "rt/scoped_realtime.hpp"
 
-namespace tandem::hal::can::testing {
+namespace tandem::hal::can::test {
 
 inline constexpr double kPi = 3.14159265358979323846;
 
@@ -247,4 +247,4 @@ class Rig {
   }
 };
 
-}  // namespace tandem::hal::can::testing
+}  // namespace tandem::hal::can::test

@@ -7,7 +7,7 @@ namespace tandem::hal::can {
 namespace {
 
 using canopen::Frame;
-using testing::robot_config;
+using test::robot_config;
 
 Frame wire(std::uint32_t id, std::initializer_list<int> bytes) {
   Frame frame;
@@ -57,7 +57,7 @@ TEST(SdoSequence, WritesTheProtections) {
   robot.actuators[0].continuous_current_A = 12.0;
   robot.actuators[0].thermal_time_s = 60.0;
   robot.actuators[0].temperature_limit_C = 110.0;
-  robot.joints[1].following_error_rad = 0.25 * testing::kPi;
+  robot.joints[1].following_error_rad = 0.25 * test::kPi;
   robot.joints[1].following_timeout_s = 0.05;
   const auto layout = make_pdo_layout(robot);
   ASSERT_TRUE(layout);

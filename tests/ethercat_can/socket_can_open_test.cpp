@@ -17,9 +17,9 @@ bool kernel_has_can() {
 TEST(SocketCanOpen, NamesTheInterfaceTheCauseAndTheNextStep) {
   const auto bus = SocketCanBus::open({.interface = "tandem_none"});
   ASSERT_FALSE(bus);
-  EXPECT_EQ(bus.error().message,
-            kernel_has_can() ? "CAN interface tandem_none: there is no such interface"
-                             : "CAN interface tandem_none: this kernel has no CAN");
+  EXPECT_EQ(bus.error().message, kernel_has_can()
+                                     ? "CAN interface tandem_none: there is no such interface"
+                                     : "CAN interface tandem_none: this kernel has no CAN");
   EXPECT_NE(bus.error().hint.find(kernel_has_can() ? "ip link add tandem_none type vcan"
                                                    : "sudo modprobe can_raw"),
             std::string::npos)

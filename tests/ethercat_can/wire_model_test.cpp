@@ -62,9 +62,8 @@ TEST(WireModel, FramesFollowOneAnotherWithTheIntermissionBetween) {
   wire.push(0, first, 10'000);
   wire.push(1, second, 10'000);
   const std::int64_t free_ns = 10'000 + takes_ns(first);
-  EXPECT_EQ(run(wire, 1'000'000),
-            (std::vector<Seen>{{0x181, free_ns - 3'000},
-                               {0x201, free_ns + takes_ns(second) - 3'000}}));
+  EXPECT_EQ(run(wire, 1'000'000), (std::vector<Seen>{{0x181, free_ns - 3'000},
+                                                     {0x201, free_ns + takes_ns(second) - 3'000}}));
 }
 
 TEST(WireModel, AClassicFrameTakesItsBitsAtItsRate) {
@@ -131,8 +130,7 @@ TEST(WireModel, LatencyIsBeforeTheArbitration) {
   WireModel wire(kClassic, 1, 20'000);
   const Frame frame = frame_of(0x181);
   wire.push(0, frame, 5'000);
-  EXPECT_EQ(run(wire, 1'000'000),
-            (std::vector<Seen>{{0x181, 25'000 + takes_ns(frame) - 3'000}}));
+  EXPECT_EQ(run(wire, 1'000'000), (std::vector<Seen>{{0x181, 25'000 + takes_ns(frame) - 3'000}}));
 }
 
 TEST(WireModel, DropsAndCountsWhatAQueueDoesNotHold) {

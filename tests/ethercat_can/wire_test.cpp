@@ -7,13 +7,11 @@ namespace tandem::hal::can {
 namespace {
 
 using canopen::Frame;
-using testing::kPi;
-using testing::Rig;
+using test::kPi;
+using test::Rig;
 using Bytes = std::vector<int>;
 
-Bytes bytes_of(const Frame& frame) {
-  return {frame.payload().begin(), frame.payload().end()};
-}
+Bytes bytes_of(const Frame& frame) { return {frame.payload().begin(), frame.payload().end()}; }
 
 /// Data of the first frame with this COB-ID among those that wait for the boards; empty: none.
 Bytes on_the_bus(Rig& rig, std::uint32_t id) {

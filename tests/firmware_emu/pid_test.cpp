@@ -5,15 +5,15 @@
 namespace tandem::firmware {
 namespace {
 
-constexpr double kDt = 1.0e-3;
+constexpr double kPidStep_s = 1.0e-3;
 
 TEST(Pid, AnswersAStepAsItsClosedFormSays) {
   const Pid::Config config{.kp = 3.0, .ki = 20.0, .kd = 0.5};
   Pid pid;
   for (int k = 0; k < 1000; ++k) {
     const double output = pid.apply(config, 0.7, -2.0);
-    EXPECT_NEAR(output, 3.0 * 0.7 + 20.0 * 0.7 * k * kDt - 0.5 * 2.0, 1.0e-12) << k;
-    pid.integrate(config, 0.7, kDt, Saturation::kNone);
+    EXPECT_NEAR(output, 3.0 * 0.7 + 20.0 * 0.7 * k * kPidStep_s - 0.5 * 2.0, 1.0e-12) << k;
+    pid.integrate(config, 0.7, kPidStep_s, Saturation::kNone);
   }
 }
 
@@ -23,8 +23,8 @@ TEST(Pid, AnswersARampAsItsClosedFormSays) {
   for (int k = 0; k < 500; ++k) {  // the sum of the first k ramp values is k (k - 1) / 2
     const double error = 0.01 * k;
     EXPECT_NEAR(pid.apply(config, error, 0.0),
-                2.0 * error + 5.0 * kDt * 0.01 * k * (k - 1) / 2.0, 1.0e-12);
-    pid.integrate(config, error, kDt, Saturation::kNone);
+                2.0 * error + 5.0 * kPidStep_s * 0.01 * k * (k - 1) / 2.0, 1.0e-12);
+    pid.integrate(config, error, kPidStep_s, Saturation::kNone);
   }
 }
 
@@ -32,7 +32,7 @@ TEST(Pid, KeepsItsTermsForTelemetry) {
   const Pid::Config config{.kp = 2.0, .ki = 10.0, .kd = 0.1};
   Pid pid;
   pid.apply(config, 1.0, 3.0);
-  pid.integrate(config, 1.0, kDt, Saturation::kNone);
+  pid.integrate(config, 1.0, kPidStep_s, Saturation::kNone);
   EXPECT_DOUBLE_EQ(pid.state.p, 2.0);
   EXPECT_DOUBLE_EQ(pid.state.i, 0.01);
   EXPECT_DOUBLE_EQ(pid.state.d, 0.3);
@@ -43,10 +43,10 @@ TEST(Pid, DoesNotWindUpAgainstItsOwnLimit) {
   Pid pid;
   for (int k = 0; k < 10000; ++k) {
     EXPECT_LE(pid.apply(config, 1.5, 0.0), 2.0);
-    pid.integrate(config, 1.5, kDt, Saturation::kNone);
+    pid.integrate(config, 1.5, kPidStep_s, Saturation::kNone);
   }
-  EXPECT_LE(pid.state.i, 0.5 + 100.0 * 1.5 * kDt);  // one step beyond what reached the limit
-  EXPECT_LT(pid.apply(config, -1.5, 0.0), 0.0);     // comes off the limit at once
+  EXPECT_LE(pid.state.i, 0.5 + 100.0 * 1.5 * kPidStep_s);  // one step beyond what reached the limit
+  EXPECT_LT(pid.apply(config, -1.5, 0.0), 0.0);            // comes off the limit at once
 }
 
 TEST(Pid, DoesNotWindUpAgainstADownstreamLimitButUnwindsFromIt) {
@@ -54,13 +54,13 @@ TEST(Pid, DoesNotWindUpAgainstADownstreamLimitButUnwindsFromIt) {
   Pid pid;
   pid.state.i = 1.0;
   pid.apply(config, 1.0, 0.0);
-  pid.integrate(config, 1.0, kDt, Saturation::kHigh);
+  pid.integrate(config, 1.0, kPidStep_s, Saturation::kHigh);
   EXPECT_DOUBLE_EQ(pid.state.i, 1.0);
-  pid.integrate(config, -1.0, kDt, Saturation::kHigh);
+  pid.integrate(config, -1.0, kPidStep_s, Saturation::kHigh);
   EXPECT_DOUBLE_EQ(pid.state.i, 0.99);
-  pid.integrate(config, -1.0, kDt, Saturation::kLow);
+  pid.integrate(config, -1.0, kPidStep_s, Saturation::kLow);
   EXPECT_DOUBLE_EQ(pid.state.i, 0.99);
-  pid.integrate(config, 1.0, kDt, Saturation::kLow);
+  pid.integrate(config, 1.0, kPidStep_s, Saturation::kLow);
   EXPECT_DOUBLE_EQ(pid.state.i, 1.0);
 }
 

@@ -9,7 +9,7 @@
 namespace tandem::hal {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Trapezoid, RestsExactlyAtItsTargetAfterTheClosedFormsTime) {
   Trapezoid reference;
@@ -57,15 +57,15 @@ class DevicesTest : public testing::Test {
 TEST_F(DevicesTest, RefuseWhatIsNotFiniteOrBeyondALimitAndChangeNothing) {
   mode(ControlMode::kPosition);
   const CommandImage before = command;
-  EXPECT_EQ(devices.position.position_move(0, kNan), Code::kNotFinite);
+  EXPECT_EQ(devices.position.position_move(0, kNoNumber), Code::kNotFinite);
   EXPECT_EQ(devices.position.position_move(0, 1.6), Code::kOutOfRange);
   EXPECT_EQ(devices.position.relative_move(0, -2.0), Code::kOutOfRange);
   EXPECT_EQ(devices.position.set_ref_speed(0, 2.1), Code::kOutOfRange);
   EXPECT_EQ(devices.position.set_ref_speed(0, 0.0), Code::kOutOfRange);
-  EXPECT_EQ(devices.position.set_ref_acceleration(0, kNan), Code::kNotFinite);
+  EXPECT_EQ(devices.position.set_ref_acceleration(0, kNoNumber), Code::kNotFinite);
   EXPECT_EQ(devices.position_direct.set_position(0, -1.6), Code::kOutOfRange);
   EXPECT_EQ(devices.impedance.set_impedance(0, {-1.0, 0.0}), Code::kOutOfRange);
-  EXPECT_EQ(devices.impedance.set_impedance(0, {10.0, kNan}), Code::kNotFinite);
+  EXPECT_EQ(devices.impedance.set_impedance(0, {10.0, kNoNumber}), Code::kNotFinite);
   EXPECT_EQ(devices.impedance.set_impedance_offset(0, 21.0), Code::kOutOfRange);
   EXPECT_EQ(devices.pid.set_pid(0, PidLoop::kPosition, {1.0, -1.0, 0.0}), Code::kOutOfRange);
   devices.advance();

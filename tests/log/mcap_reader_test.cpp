@@ -9,16 +9,9 @@
 namespace tandem::log {
 namespace {
 
-std::string content(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 void overwrite(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }
-
-std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 /// 100 messages of 12 bytes, a chunk every 10 ms.
 void write_sample(const std::string& path, Compression compression = Compression::kLz4) {

@@ -9,14 +9,7 @@
 namespace tandem::log {
 namespace {
 
-std::string content(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::string ascii(std::string_view text) { return std::string(text); }
-
-std::span<const std::byte> bytes(std::string_view text) { return std::as_bytes(std::span(text)); }
 
 void write_sample(const std::string& path, const WriterOptions& options, int messages) {
   McapWriter writer;

@@ -1,8 +1,13 @@
-// A folder of one test, removed with it.
+// A folder of one test, removed with it, and what its files hold.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace tandem::log {
 
@@ -22,5 +27,14 @@ class ScratchFolder {
  private:
   std::string path_;
 };
+
+inline std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+inline std::span<const std::byte> bytes(std::string_view text) {
+  return std::as_bytes(std::span(text));
+}
 
 }  // namespace tandem::log

@@ -7,7 +7,7 @@
 namespace tandem::model {
 namespace {
 
-constexpr double kTolerance = 1e-10;
+constexpr double kReferenceTolerance = 1e-10;
 
 class Reference : public testing::TestWithParam<ReferenceRobot> {};
 
@@ -19,7 +19,7 @@ TEST_P(Reference, AgreesWithPinocchioInEveryQuantity) {
   int checks = 0;
   against_reference(GetParam(), m, run,
                     [&](const char* quantity, const Array& actual, const Array& expected) {
-                      EXPECT_LE(relative_error(actual, expected), kTolerance) << quantity;
+                      EXPECT_LE(relative_error(actual, expected), kReferenceTolerance) << quantity;
                       ++checks;
                     });
   EXPECT_GE(checks, 20 * 14);
@@ -104,7 +104,8 @@ TEST(Robotran, ItsMassMatrixBiasAndTorquesOfWalkmanAreOurs) {
     const Eigen::MatrixXd M =
         s.B.transpose() * Eigen::Map<const Eigen::MatrixXd>(M_ours.data(), m.nv(), m.nv()) * s.B;
     const Array expected_M = full_from_lower(state["M_lower"]);
-    EXPECT_LE(relative_error(Array(M.data(), M.data() + M.size()), expected_M), kTolerance);
+    EXPECT_LE(relative_error(Array(M.data(), M.data() + M.size()), expected_M),
+              kReferenceTolerance);
 
     const auto torques = [&](const Array& accelerations) {
       const Array ours =
@@ -113,12 +114,12 @@ TEST(Robotran, ItsMassMatrixBiasAndTorquesOfWalkmanAreOurs) {
           s.B.transpose() * Eigen::Map<const Eigen::VectorXd>(ours.data(), m.nv());
       return Array(theirs.begin(), theirs.end());
     };
-    EXPECT_LE(relative_error(torques(s.bdot), flat(state["c"])), kTolerance);
+    EXPECT_LE(relative_error(torques(s.bdot), flat(state["c"])), kReferenceTolerance);
     const Array qdd = flat(state["qdd"]);
     Array vdot = s.bdot;
     const Eigen::VectorXd B_qdd = s.B * Eigen::Map<const Eigen::VectorXd>(qdd.data(), m.nv());
     for (int i = 0; i < m.nv(); ++i) vdot[i] += B_qdd[i];
-    EXPECT_LE(relative_error(torques(vdot), flat(state["tau"])), kTolerance);
+    EXPECT_LE(relative_error(torques(vdot), flat(state["tau"])), kReferenceTolerance);
   }
 }
 

@@ -7,11 +7,11 @@
 namespace tandem::rt {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kMs_ns = 1'000'000;
 constexpr std::int64_t kStart = 1'000'000'000;
 
 LoopConfig wall(OverrunPolicy policy = OverrunPolicy::kSkip) {
-  return {.period_ns = kMs, .pacing = Pacing::kWallClock, .on_overrun = policy};
+  return {.period_ns = kMs_ns, .pacing = Pacing::kWallClock, .on_overrun = policy};
 }
 
 /// One cycle whose work takes `work_ns`.
@@ -28,7 +28,7 @@ TEST(CyclicLoop, StartsEachCycleAtAnAbsoluteGridPoint) {
   CyclicLoop loop(wall(), clock);
   for (int i = 0; i < 4; ++i) cycle(loop, clock, 200'000);
   EXPECT_EQ(clock.sleeps,
-            (std::vector<std::int64_t>{kStart + kMs, kStart + 2 * kMs, kStart + 3 * kMs}));
+            (std::vector<std::int64_t>{kStart + kMs_ns, kStart + 2 * kMs_ns, kStart + 3 * kMs_ns}));
   EXPECT_EQ(loop.statistics().wakeup.max_ns(), 40'000);
   EXPECT_EQ(loop.statistics().wakeup.count(), 3U);
   EXPECT_EQ(loop.statistics().work.max_ns(), 200'000);
@@ -44,12 +44,12 @@ TEST(CyclicLoop, SkipsToTheNextGridPointAfterAnOverrunAndKeepsItsPhase) {
   EXPECT_FALSE(tick.hold);
   EXPECT_EQ(tick.skipped, 2U);
   EXPECT_EQ(tick.cycle, 3U);
-  EXPECT_EQ(tick.time_ns, 3 * kMs);
-  EXPECT_EQ(clock.sleeps.back(), kStart + 3 * kMs);
+  EXPECT_EQ(tick.time_ns, 3 * kMs_ns);
+  EXPECT_EQ(clock.sleeps.back(), kStart + 3 * kMs_ns);
   const Tick after = cycle(loop, clock, 100'000);
   EXPECT_FALSE(after.late);
   EXPECT_EQ(after.cycle, 4U);
-  EXPECT_EQ(clock.sleeps.back(), kStart + 4 * kMs);
+  EXPECT_EQ(clock.sleeps.back(), kStart + 4 * kMs_ns);
   EXPECT_EQ(loop.statistics().overruns, 1U);
   EXPECT_EQ(loop.statistics().skipped, 2U);
   EXPECT_EQ(loop.statistics().cycles, 3U);
@@ -92,11 +92,11 @@ TEST(CyclicLoop, ForgetsLateCyclesThatLeftTheWindow) {
 
 TEST(CyclicLoop, NeverSleepsWhenSimulatedTimeRunsFree) {
   FakeClock clock;
-  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kSimulated, .rate = 0.0}, clock);
+  CyclicLoop loop({.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 0.0}, clock);
   for (std::uint64_t k = 0; k < 1000; ++k) {
-    const Tick tick = cycle(loop, clock, 5 * kMs);
+    const Tick tick = cycle(loop, clock, 5 * kMs_ns);
     EXPECT_EQ(tick.cycle, k);
-    EXPECT_EQ(tick.time_ns, static_cast<std::int64_t>(k) * kMs);
+    EXPECT_EQ(tick.time_ns, static_cast<std::int64_t>(k) * kMs_ns);
     EXPECT_FALSE(tick.late);
   }
   EXPECT_TRUE(clock.sleeps.empty());
@@ -105,14 +105,14 @@ TEST(CyclicLoop, NeverSleepsWhenSimulatedTimeRunsFree) {
 
 TEST(CyclicLoop, ScalesSimulatedTimeByTheRate) {
   FakeClock clock;
-  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kSimulated, .rate = 5.0}, clock);
+  CyclicLoop loop({.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 5.0}, clock);
   for (int i = 0; i < 3; ++i) cycle(loop, clock, 50'000);
   EXPECT_EQ(clock.sleeps, (std::vector<std::int64_t>{kStart + 200'000, kStart + 400'000}));
 }
 
 TEST(CyclicLoop, NeverMissesACycleOfSimulatedTimeHoweverLate) {
   FakeClock clock;
-  LoopConfig config{.period_ns = kMs, .pacing = Pacing::kSimulated, .rate = 1.0};
+  LoopConfig config{.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 1.0};
   config.on_overrun = OverrunPolicy::kStop;
   config.stop_late = 1;
   CyclicLoop loop(config, clock);
@@ -129,28 +129,28 @@ TEST(CyclicLoop, NeverMissesACycleOfSimulatedTimeHoweverLate) {
 
 TEST(CyclicLoop, MakesGoodAMillisecondOfSimulatedTimeAndNoMore) {
   FakeClock clock;
-  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kSimulated, .rate = 1.0}, clock);
-  cycle(loop, clock, kMs + 900'000);
-  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + kMs + 900'000);
-  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 2 * kMs) << "on its grid again";
-  EXPECT_EQ(cycle(loop, clock, 12 * kMs).begin_ns, kStart + 3 * kMs);
-  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs);
-  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs) << "the millisecond";
-  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 16 * kMs);
+  CyclicLoop loop({.period_ns = kMs_ns, .pacing = Pacing::kSimulated, .rate = 1.0}, clock);
+  cycle(loop, clock, kMs_ns + 900'000);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + kMs_ns + 900'000);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 2 * kMs_ns) << "on its grid again";
+  EXPECT_EQ(cycle(loop, clock, 12 * kMs_ns).begin_ns, kStart + 3 * kMs_ns);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs_ns);
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 15 * kMs_ns) << "the millisecond";
+  EXPECT_EQ(cycle(loop, clock, 0).begin_ns, kStart + 16 * kMs_ns);
   EXPECT_EQ(loop.statistics().overruns, 2U);
 }
 
 TEST(CyclicLoop, LeavesThePaceToABus) {
   FakeClock clock;
-  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kExternal}, clock);
-  for (int i = 0; i < 5; ++i) cycle(loop, clock, 3 * kMs);
+  CyclicLoop loop({.period_ns = kMs_ns, .pacing = Pacing::kExternal}, clock);
+  for (int i = 0; i < 5; ++i) cycle(loop, clock, 3 * kMs_ns);
   EXPECT_TRUE(clock.sleeps.empty());
   EXPECT_EQ(loop.next_cycle(), 5U);
 }
 
 TEST(CyclicLoop, GoesOnAtTheArchivedCycle) {
   FakeClock clock;
-  CyclicLoop loop({.period_ns = kMs, .pacing = Pacing::kSimulated}, clock);
+  CyclicLoop loop({.period_ns = kMs_ns, .pacing = Pacing::kSimulated}, clock);
   for (int i = 0; i < 7; ++i) cycle(loop, clock, 0);
   Archive saved;
   loop.archive(saved);
@@ -158,7 +158,7 @@ TEST(CyclicLoop, GoesOnAtTheArchivedCycle) {
   Archive again(saved.bytes());
   loop.archive(again);
   EXPECT_TRUE(again.ok() && again.at_end());
-  EXPECT_EQ(cycle(loop, clock, 0).time_ns, 7 * kMs);
+  EXPECT_EQ(cycle(loop, clock, 0).time_ns, 7 * kMs_ns);
 }
 
 TEST(CyclicLoop, RunsOnTheWallClockWithoutLosingCycles) {
@@ -174,7 +174,7 @@ TEST(CyclicLoop, RunsOnTheWallClockWithoutLosingCycles) {
   }
   // Each cycle is either run or counted as skipped, and none starts before its time.
   EXPECT_EQ(last + 1, 50U + loop.statistics().skipped);
-  EXPECT_GE(clock.now_ns() - begin, static_cast<std::int64_t>(last) * kMs);
+  EXPECT_GE(clock.now_ns() - begin, static_cast<std::int64_t>(last) * kMs_ns);
 }
 
 }  // namespace
