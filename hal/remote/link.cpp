@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "dds/service.hpp"
+
 namespace tandem::remote {
 namespace {
 
@@ -93,6 +95,16 @@ bool is_sound(const hal::CommandImage& command) noexcept {
   return std::ranges::all_of(command.mode(),
                              [](std::int8_t mode) { return kFirst <= mode && mode <= kLast; }) &&
          std::ranges::all_of(command.interaction(), [](std::uint8_t one) { return one <= 1; });
+}
+
+const std::optional<Sender>& Senders::of(const dds_sample_info_t& sample) {
+  if (sample.publication_handle == writer_ && sender_) return sender_;
+  writer_ = sample.publication_handle;
+  sender_.reset();
+  if (const auto writer = dds::matched_writer(reader_, writer_)) {
+    std::ranges::copy(writer->participant.v, sender_.emplace().begin());
+  }
+  return sender_;
 }
 
 OnData::OnData(dds_entity_t reader, std::function<void()> call)

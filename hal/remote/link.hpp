@@ -2,8 +2,10 @@
 // Layer: hal/remote.  Thread: any.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +55,23 @@ enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
 
 /// Every value of a command is finite, every mode one that there is.
 [[nodiscard]] bool is_sound(const hal::CommandImage& command) noexcept;
+
+/// The participant that writes a sample, by which the two ends know each other once they have met:
+/// the numbers in the samples are on topics that everybody in the domain can read.
+using Sender = std::array<std::uint8_t, sizeof(dds_guid_t)>;
+
+/// Finds it for the samples of one reader, on the thread that takes them.
+class Senders {
+ public:
+  explicit Senders(dds_entity_t reader) noexcept : reader_(reader) {}
+  /// Empty: its writer is gone. A writer is looked up once as long as no other writes.
+  [[nodiscard]] const std::optional<Sender>& of(const dds_sample_info_t& sample);
+
+ private:
+  dds_entity_t reader_;
+  dds_instance_handle_t writer_ = 0;
+  std::optional<Sender> sender_;
+};
 
 /// Calls a function on a thread of Cyclone DDS whenever a reader has samples, until this goes.
 class OnData {

@@ -88,6 +88,7 @@ class RemoteBackend final : public hal::Backend {
   struct Told {
     Identity identity;
     std::uint64_t run = 0, owner = 0;
+    std::optional<Sender> sender;
     std::string owner_name, status;
     double lease_timeout_s = 1.0;
     bool lockstep = false, ending = false;
@@ -119,6 +120,8 @@ class RemoteBackend final : public hal::Backend {
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable news_, closes_;
+  Senders server_senders_, state_senders_;
+  std::optional<Sender> server_;  // once it is chosen
   std::optional<Told> told_;
   std::uint64_t told_count_ = 0;
   bool several_ = false;  // servers were heard before one was chosen

@@ -68,6 +68,8 @@ RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::RobotConfig& robot,
     : endpoints_(std::move(endpoints)),
       config_(std::move(config)),
       joints_(robot.joints.size()),
+      server_senders_(endpoints_.server.endpoint().get()),
+      state_senders_(endpoints_.state.endpoint().get()),
       newest_(Seen{hal::StateImage(robot.shape()), hal::CommandImage(robot.shape()),
                    std::vector<std::uint8_t>(robot.joints.size())}),
       command_(robot.shape()),
@@ -119,6 +121,7 @@ Status RemoteBackend::find_server(const Identity& identity) {
                                   "leave --lockstep out here, or start `tandem serve --lockstep`");
   }
   run_ = told_->run;
+  server_ = told_->sender;
   return {};
 }
 
@@ -170,9 +173,12 @@ void RemoteBackend::renew() {
 void RemoteBackend::take_told() {
   {
     const std::lock_guard lock(mutex_);
-    endpoints_.server.take([this](const tandem_msgs::LinkServer& sample, const auto&) {
-      if (run_ != 0 && sample.run != run_) return;  // another server
-      if (told_ && !told_->ending && !sample.ending && sample.run != told_->run) several_ = true;
+    endpoints_.server.take([this](const tandem_msgs::LinkServer& sample, const auto& info) {
+      const std::optional<Sender>& sender = server_senders_.of(info);
+      if (!sender || (run_ != 0 && sample.run != run_)) return;  // another server
+      if (server_ && sender != server_) return;                  // somebody who says he is this one
+      const bool other = told_ && (sample.run != told_->run || sender != told_->sender);
+      if (other && !told_->ending && !sample.ending) several_ = true;
       told_ = Told{.identity = {.robot = text(sample.robot),
                                 .description_hash = text(sample.description_hash),
                                 .period_ns = sample.period_ns,
@@ -182,6 +188,7 @@ void RemoteBackend::take_told() {
                                 .command_bytes = sample.command_bytes},
                    .run = sample.run,
                    .owner = sample.owner,
+                   .sender = sender,
                    .owner_name = text(sample.owner_name),
                    .status = text(sample.status),
                    .lease_timeout_s = sample.lease_timeout_s,
@@ -200,8 +207,9 @@ void RemoteBackend::take_told() {
 void RemoteBackend::take_states() {
   {
     const std::lock_guard lock(mutex_);
-    endpoints_.state.take([this](const tandem_msgs::LinkState& sample, const auto&) {
-      if (sample.run == run_ && unpack(sample)) newest_.publish();
+    endpoints_.state.take([this](const tandem_msgs::LinkState& sample, const auto& info) {
+      const bool from_it = sample.run == run_ && server_ && state_senders_.of(info) == server_;
+      if (from_it && unpack(sample)) newest_.publish();
     });
   }
   news_.notify_all();

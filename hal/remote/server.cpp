@@ -46,6 +46,8 @@ Server::Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity iden
     : endpoints_(std::move(endpoints)),
       identity_(std::move(identity)),
       config_(config),
+      request_senders_(endpoints_.requests.endpoint().get()),
+      command_senders_(endpoints_.commands.endpoint().get()),
       gains_(hal::initial_parameters(robot)),
       newest_(Taken{hal::CommandImage(robot.shape()), gains_}),
       stop_(static_cast<std::uint8_t>(StopCategory::kWarn)),
@@ -69,16 +71,17 @@ void Server::ring() {
 }
 
 void Server::take_requests() {
-  endpoints_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto&) {
+  endpoints_.requests.take([this](const tandem_msgs::LinkRequest& sample, const auto& info) {
     if (sample.run != run_ || sample.client == 0) return;
+    const std::optional<Sender>& sender = request_senders_.of(info);
     switch (static_cast<Action>(sample.action)) {
-      case Action::kAcquire:
-        (void)lease_.acquire(sample.client, sample.name == nullptr ? "" : sample.name, now_ns());
-        break;
+      case Action::kAcquire: acquire(sample, sender); break;
       case Action::kRenew:
-        if (lease_.owner() == sample.client) lease_.heard(now_ns());
+        if (is_owner(sample.client, sender)) lease_.heard(now_ns());
         return;
-      case Action::kRelease: (void)lease_.release(sample.client); break;
+      case Action::kRelease:
+        if (is_owner(sample.client, sender)) (void)lease_.release(sample.client);
+        break;
       default: return;
     }
     {
@@ -90,11 +93,24 @@ void Server::take_requests() {
   ring();
 }
 
+void Server::acquire(const tandem_msgs::LinkRequest& sample, const std::optional<Sender>& sender) {
+  if (!sender) return;
+  const std::lock_guard lock(owner_mutex_);
+  if (lease_.owner() == sample.client && sender != owner_sender_) return;  // another one's number
+  const char* name = sample.name == nullptr ? "" : sample.name;
+  if (lease_.acquire(sample.client, name, now_ns())) owner_sender_ = sender;
+}
+
+bool Server::is_owner(std::uint64_t client, const std::optional<Sender>& sender) {
+  const std::lock_guard lock(owner_mutex_);
+  return client != 0 && client == lease_.owner() && sender && sender == owner_sender_;
+}
+
 void Server::take_commands() {
   {
     const std::lock_guard lock(in_mutex_);
-    endpoints_.commands.take([this](const tandem_msgs::LinkCommand& sample, const auto&) {
-      const Verdict verdict = judge(sample);
+    endpoints_.commands.take([this](const tandem_msgs::LinkCommand& sample, const auto& info) {
+      const Verdict verdict = judge(sample, command_senders_.of(info));
       counts_[static_cast<std::size_t>(verdict)].fetch_add(1, std::memory_order_relaxed);
     });
   }
@@ -102,10 +118,8 @@ void Server::take_commands() {
 }
 
 /// Whether a sample may reach the loop; hands it over then.
-Verdict Server::judge(const tandem_msgs::LinkCommand& sample) {
-  if (sample.run != run_ || sample.client == 0 || sample.client != lease_.owner()) {
-    return Verdict::kNoLease;
-  }
+Verdict Server::judge(const tandem_msgs::LinkCommand& sample, const std::optional<Sender>& sender) {
+  if (sample.run != run_ || !is_owner(sample.client, sender)) return Verdict::kNoLease;
   if (sample.client != gate_client_) {
     gate_client_ = sample.client;
     gate_sequence_ = 0;

@@ -106,7 +106,10 @@ class Server final : public hal::CommandPort {
   void ring();
   void take_requests();
   void take_commands();
-  [[nodiscard]] Verdict judge(const tandem_msgs::LinkCommand& sample);
+  void acquire(const tandem_msgs::LinkRequest& sample, const std::optional<Sender>& sender);
+  [[nodiscard]] bool is_owner(std::uint64_t client, const std::optional<Sender>& sender);
+  [[nodiscard]] Verdict judge(const tandem_msgs::LinkCommand& sample,
+                              const std::optional<Sender>& sender);
   [[nodiscard]] bool unpack(const tandem_msgs::LinkCommand& sample);
   void note_stops(const tandem_msgs::LinkCommand& sample);
   [[nodiscard]] hal::OwnerLoss loss_of(const hal::PortView& view,
@@ -122,6 +125,9 @@ class Server final : public hal::CommandPort {
   std::atomic<std::uint64_t> losses_{0};
 
   // From DDS' threads to the loop.
+  Senders request_senders_, command_senders_;
+  std::mutex owner_mutex_;  // of owner_sender_, and of who becomes the owner
+  std::optional<Sender> owner_sender_;
   std::mutex in_mutex_;  // of what follows
   std::uint64_t gate_client_ = 0, gate_sequence_ = 0;
   std::uint32_t gate_stops_ = 0, gate_resets_ = 0;

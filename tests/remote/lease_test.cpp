@@ -130,6 +130,38 @@ TEST_F(LinkChecks, ACommandOfItsOwnerIsTakenAndNobodyElses) {
   expect(Verdict::kNoLease, earlier);
 }
 
+/// Everything that the owner writes can be read by everybody in the domain, his number, too.
+TEST_F(LinkChecks, WhoKnowsTheOwnersNumberIsNotTheOwner) {
+  expect(Verdict::kTaken, sample());
+  const auto impostor = participant("impostor");
+  const auto name = [&](const char* topic) { return impostor->topic_name(topic); };
+  auto commands =
+      *dds::Writer<tandem_msgs::LinkCommand>::create(*impostor, name(kCommandTopic), link_qos());
+  auto requests =
+      *dds::Writer<tandem_msgs::LinkRequest>::create(*impostor, name(kRequestTopic), link_qos());
+  ASSERT_TRUE(eventually(
+      [&] { return commands.endpoint().matched() == 1 && requests.endpoint().matched() == 1; }));
+  const std::uint64_t refused = served.server->count(Verdict::kNoLease);
+  const auto command = sample();
+  ASSERT_TRUE(commands.write(command));
+  EXPECT_TRUE(eventually([&] { return served.server->count(Verdict::kNoLease) == refused + 1; }));
+  std::string text = "impostor";
+  tandem_msgs::LinkRequest request{};
+  request.run = run_;
+  request.client = kClient;
+  request.name = text.data();
+  for (const Action action : {Action::kAcquire, Action::kRelease}) {
+    request.action = static_cast<std::uint8_t>(action);
+    ASSERT_TRUE(requests.write(request));
+  }
+  dds_wait_for_acks(requests.endpoint().get(), DDS_SECS(5));
+  ASSERT_TRUE(commands.write(sample()));
+  EXPECT_TRUE(eventually([&] { return served.server->count(Verdict::kNoLease) == refused + 2; }));
+  EXPECT_EQ(served.server->lease().owner(), kClient);
+  EXPECT_EQ(served.server->lease().name(), "talker");
+  expect(Verdict::kTaken, sample());  // and its sequence number was not used up
+}
+
 TEST_F(LinkChecks, ADuplicateAndOneThatWasOvertakenAreNotTaken) {
   const auto first = sample();
   const auto second = sample();
