@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/dds_admission.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
 #include "controllers/plugin_loader.hpp"
@@ -251,6 +252,7 @@ Diagnostics connect_remote(Composition& c) {
       {.name = fmt::format("tandem run {}, process {}",
                            std::filesystem::path(e.file).filename().string(), ::getpid()),
        .lockstep = e.hal.lockstep,
+       .before_asking = [&c] { have_admitted(*c.participant); },
        .interrupted = [] { return rt::stop_requested(); },
        .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});
   if (!backend) return {backend.error()};

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/dds_admission.hpp"
 #include "apps/dds_config.hpp"
 #include "dds/service_client.hpp"
 
@@ -99,6 +100,7 @@ Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& aske
   const std::vector<dds::FoundService> found = look(*finder, target);
   if (found.empty()) return std::unexpected(nobody(target, *config));
   if (found.size() > 1) return std::unexpected(several(found, *config));
+  have_admitted(**participant);
   const std::string& name_space = found.front().name_space;
   auto client = AskClient::create(**participant,
                                   (name_space.empty() ? "/" : "/" + name_space + "/") + kService);

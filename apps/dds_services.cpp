@@ -5,8 +5,9 @@
 namespace tandem::apps {
 Result<std::unique_ptr<DdsServices>> DdsServices::open(dds::Participant& participant,
                                                        const ControlRegistry& registry,
-                                                       ControlRegistry::Gate gate) {
-  std::unique_ptr<DdsServices> services(new DdsServices(registry, std::move(gate)));
+                                                       ControlRegistry::Gate gate,
+                                                       const DdsAdmission& admission) {
+  std::unique_ptr<DdsServices> services(new DdsServices(registry, std::move(gate), admission));
   auto server = dds::ServiceServer::open(participant);
   if (!server) return std::unexpected(server.error());
   services->server_ = std::move(*server);
@@ -43,35 +44,48 @@ Status DdsServices::add_all() {
   return {};
 }
 
-Json DdsServices::ask(const std::string& question) const {
-  return registry_->answer(question, gate_);
+Json DdsServices::ask(const std::string& question, const dds::Asker& asker) const {
+  const auto gate = [&](const std::string& name, ControlEffect effect,
+                        const Json& request) -> Status {
+    if (gate_) {
+      if (const Status open = gate_(name, effect, request); !open) return open;
+    }
+    if (effect != ControlEffect::kChanges || admission_->admits(asker)) return {};
+    return fail(name + ": this process takes no commands from a stranger",
+                "start both as one user on one machine; or have the participant admitted: tandem "
+                "ask '{\"do\": \"dds.admit\", \"participant\": \"" +
+                    (asker ? dds::to_text(*asker) : "…") + "\"}' (docs/security.md)");
+  };
+  return registry_->answer(question, gate);
 }
 
 Status DdsServices::add_ask() {
   using Request = dds::tandem_msgs::Ask_Request;
   using Response = dds::tandem_msgs::Ask_Response;
-  return server_->add<Request, Response>("tandem/ask", [this](const Request& request) {
-    const std::string question = request.request;
-    return dds::ServiceWork<Response>{
-        .at_once = registry_->stops(question),
-        .answer = [this, question](Response& reply, dds::ReplyMemory& memory) {
-          reply.answer = memory.text(json_text(ask(question)));
-        }};
-  });
+  return server_->add<Request, Response>(
+      "tandem/ask", [this](const Request& request, const dds::Asker& asker) {
+        const std::string question = request.request;
+        return dds::ServiceWork<Response>{
+            .at_once = registry_->stops(question),
+            .answer = [this, question, asker](Response& reply, dds::ReplyMemory& memory) {
+              reply.answer = memory.text(json_text(ask(question, asker)));
+            }};
+      });
 }
 
 template <class Request, class Response>
 Status DdsServices::add(const char* name, const char* needs, Json (*question)(const Request&),
                         void (*fill)(const Json&, Response&, dds::ReplyMemory&)) {
   if (!registry_->effect(needs)) return {};
-  return server_->add<Request, Response>(name, [this, question, fill](const Request& request) {
-    const std::string text = json_text(question(request));
-    return dds::ServiceWork<Response>{
-        .at_once = registry_->stops(text),
-        .answer = [this, text, fill](Response& reply, dds::ReplyMemory& memory) {
-          fill(ask(text), reply, memory);
-        }};
-  });
+  return server_->add<Request, Response>(
+      name, [this, question, fill](const Request& request, const dds::Asker& asker) {
+        const std::string text = json_text(question(request));
+        return dds::ServiceWork<Response>{
+            .at_once = registry_->stops(text),
+            .answer = [this, text, fill, asker](Response& reply, dds::ReplyMemory& memory) {
+              fill(ask(text, asker), reply, memory);
+            }};
+      });
 }
 
 }  // namespace tandem::apps

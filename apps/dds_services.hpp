@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "apps/control_registry.hpp"
+#include "apps/dds_admission.hpp"
 #include "base/result.hpp"
 #include "dds/service_server.hpp"
 
@@ -14,27 +15,30 @@ namespace tandem::apps {
 /// "tandem/list_controllers" and so on. Every typed request becomes a question to the registry.
 class DdsServices {
  public:
-  /// Participant and registry outlive it; the registry is complete.
+  /// Participant, registry and admission outlive it; the registry is complete.
   /// Errors: Endpoint::create()'s.
   [[nodiscard]] static Result<std::unique_ptr<DdsServices>> open(dds::Participant& participant,
                                                                  const ControlRegistry& registry,
-                                                                 ControlRegistry::Gate gate);
+                                                                 ControlRegistry::Gate gate,
+                                                                 const DdsAdmission& admission);
 
   [[nodiscard]] dds::ServiceServer::Counts counts() const { return server_->counts(); }
 
  private:
-  DdsServices(const ControlRegistry& registry, ControlRegistry::Gate gate)
-      : registry_(&registry), gate_(std::move(gate)) {}
+  DdsServices(const ControlRegistry& registry, ControlRegistry::Gate gate,
+              const DdsAdmission& admission)
+      : registry_(&registry), gate_(std::move(gate)), admission_(&admission) {}
   Status add_all();
   Status add_ask();
   /// Adds a service that asks for a command, when the registry has `needs`.
   template <class Request, class Response>
   Status add(const char* name, const char* needs, Json (*question)(const Request&),
              void (*fill)(const Json& answer, Response& reply, dds::ReplyMemory& memory));
-  [[nodiscard]] Json ask(const std::string& question) const;
+  [[nodiscard]] Json ask(const std::string& question, const dds::Asker& asker) const;
 
   const ControlRegistry* registry_;
   ControlRegistry::Gate gate_;
+  const DdsAdmission* admission_;
   std::unique_ptr<dds::ServiceServer> server_;  // last: its threads use the others
 };
 

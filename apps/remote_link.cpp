@@ -29,7 +29,8 @@ std::string counts(const remote::Server& server) {
 
 }  // namespace
 
-Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun* dds, bool once) {
+Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun* dds, bool once,
+                                                    const DdsAdmission& admission) {
   if (c.owner == nullptr || dds == nullptr) return nullptr;
   const runtime::Experiment& e = c.experiment;
   if (e.remote.lockstep && c.backend->pace() != hal::Pace::kSimulatedClock) {
@@ -44,7 +45,8 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
        .lease_timeout_s = e.remote.lease_timeout_s,
        .max_age_cycles = e.remote.max_age_cycles,
        .lockstep_timeout_s = e.remote.lockstep_timeout_s,
-       .on_lost = e.remote.on_lost});
+       .on_lost = e.remote.on_lost,
+       .admits = [&admission](const remote::Sender& who) { return admission.admits(who); }});
 }
 
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle) {

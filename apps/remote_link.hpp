@@ -7,6 +7,7 @@
 
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/dds_admission.hpp"
 #include "apps/dds_run.hpp"
 #include "hal/remote/server.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -14,10 +15,12 @@
 namespace tandem::apps {
 
 /// The end at which owners ask; null when [remote] allows none.
-/// @param once  the run ends when an owner gives the robot back
+/// @param once       the run ends when an owner gives the robot back
+/// @param admission  of owners; outlives the server
 /// Errors: Server::open()'s; lockstep in real time.
 [[nodiscard]] Result<std::unique_ptr<remote::Server>> open_server(const Composition& composition,
-                                                                  DdsRun* dds, bool once);
+                                                                  DdsRun* dds, bool once,
+                                                                  const DdsAdmission& admission);
 
 /// What the server tells of the run's faults.
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle);

@@ -8,6 +8,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/dds_admission.hpp"
 #include "apps/dds_run.hpp"
 #include "apps/dds_services.hpp"
 #include "apps/inject.hpp"
@@ -139,13 +140,14 @@ Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE
 /// Null without DDS.
 Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
                                                    const runtime::RemoteOptions& remote,
-                                                   const remote::Server* server) {
+                                                   const remote::Server* server,
+                                                   const DdsAdmission& admission) {
   if (run == nullptr) return nullptr;
   const auto owner = [server] {
     const bool owned = server != nullptr && server->lease().owner() != 0;
     return owned ? server->lease().name() : std::string();
   };
-  return DdsServices::open(run->participant(), commands, remote_gate(remote, owner));
+  return DdsServices::open(run->participant(), commands, remote_gate(remote, owner), admission);
 }
 
 /// A robot with feet that lies, sank or flew away at the end of the run; by the plant's truth.
@@ -198,7 +200,8 @@ Exit run(Composition& c, const RunOptions& options) {
     if (!opened) return refuse(opened.error());
     recorder = std::move(*opened);
   }
-  const auto server = open_server(c, dds->get(), options.once);
+  DdsAdmission admission(e.remote.trust == runtime::RemoteTrust::kDomain);
+  const auto server = open_server(c, dds->get(), options.once, admission);
   if (!server) return refuse(server.error());
   rt::WallClock clock;
   runtime::RobotCycle cycle({.robot = e.robot,
@@ -219,6 +222,7 @@ Exit run(Composition& c, const RunOptions& options) {
   }
   ControlRegistry commands;
   add_run_commands(commands, cycle, e.robot);
+  if (*dds != nullptr) admission.add_to(commands);
   if (c.sim != nullptr) {
     add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
       if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
@@ -230,7 +234,12 @@ Exit run(Composition& c, const RunOptions& options) {
       commands,
       {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
   if (!socket) return refuse(socket.error());
-  const auto services = open_services(dds->get(), commands, e.remote, server->get());
+  if (*server != nullptr && *socket == nullptr && e.remote.trust != runtime::RemoteTrust::kDomain) {
+    return refuse(fail("without a control socket nobody can be admitted to this robot",
+                       "leave out --no-socket; or [remote] trust = \"domain\" admits everybody")
+                      .error());
+  }
+  const auto services = open_services(dds->get(), commands, e.remote, server->get(), admission);
   if (!services) return refuse(services.error());
   rt::install_stop_signals();
   rt::install_emergency_signal();

@@ -1,9 +1,11 @@
 #include "dds/service.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <cstring>
 #include <memory>
 
@@ -65,11 +67,41 @@ Qos service_qos(std::int32_t depth, std::string user_data) {
 
 std::string new_service_id(const Participant& participant) {
   static std::atomic<std::uint32_t> last{0};  // no result depends on it
+  return fmt::format("{:02x}.{:08x}", fmt::join(id_of(participant), "."), ++last);
+}
+
+ParticipantId id_of(const Participant& participant) {
   dds_guid_t guid{};
   dds_get_guid(participant.get(), &guid);
-  std::string text;
-  for (std::size_t i = 0; i < 12; ++i) text += fmt::format("{:02x}.", guid.v[i]);
-  return text + fmt::format("{:08x}", ++last);
+  ParticipantId id{};
+  std::copy_n(guid.v, id.size(), id.begin());
+  return id;
+}
+
+std::string to_text(const ParticipantId& participant) {
+  return fmt::format("{:02x}", fmt::join(participant, ""));
+}
+
+std::optional<ParticipantId> parse_participant(std::string_view text) {
+  std::string digits;
+  for (const char c : text) {
+    if (c != '.') digits += c;
+  }
+  ParticipantId id{};
+  if (digits.size() < 2 * id.size()) return {};
+  for (std::size_t i = 0; i < id.size(); ++i) {
+    const char* first = digits.data() + 2 * i;
+    if (std::from_chars(first, first + 2, id[i], 16).ptr != first + 2) return {};
+  }
+  return id;
+}
+
+std::optional<ParticipantId> participant_of(dds_entity_t reader, dds_instance_handle_t writer) {
+  const std::optional<Peer> peer = matched_writer(reader, writer);
+  if (!peer) return {};
+  ParticipantId id{};
+  std::copy_n(peer->participant.v, id.size(), id.begin());
+  return id;
 }
 
 std::optional<Peer> matched_reader(dds_entity_t writer, dds_instance_handle_t handle) {

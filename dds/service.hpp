@@ -3,6 +3,7 @@
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -48,6 +49,17 @@ concept ServiceSample = requires(T sample) {
 
 /// A new identity among all services and clients of `participant`, as text.
 [[nodiscard]] std::string new_service_id(const Participant& participant);
+
+/// The part of a GUID that all endpoints of a participant have in common.
+using ParticipantId = std::array<std::uint8_t, 12>;
+[[nodiscard]] ParticipantId id_of(const Participant& participant);
+/// "010f5a…": 24 hexadecimal digits.
+[[nodiscard]] std::string to_text(const ParticipantId& participant);
+/// Of these digits, between which dots may stand; what follows them is left out. Empty: of others.
+[[nodiscard]] std::optional<ParticipantId> parse_participant(std::string_view text);
+/// Who wrote what this reader got by this handle; empty when the writer is gone.
+[[nodiscard]] std::optional<ParticipantId> participant_of(dds_entity_t reader,
+                                                          dds_instance_handle_t writer);
 
 /// An endpoint of somebody else, or of this process.
 struct Peer {

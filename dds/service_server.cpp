@@ -111,7 +111,8 @@ void ServiceServer::take(Service& service) {
     if (!infos[i].valid_data) continue;
     Job job{.service = &service, .header = {}, .asker = infos[i].publication_handle, .answer = {}};
     std::memcpy(&job.header, samples[i], sizeof job.header);
-    Work work = service.read(samples[i]);
+    const Asker asker = participant_of(service.requests.get(), infos[i].publication_handle);
+    Work work = service.read(samples[i], asker);
     job.answer = std::move(work.answer);
     accept(std::move(job), work.at_once);
   }

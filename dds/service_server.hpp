@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -35,6 +36,9 @@ class ReplyMemory {
  private:
   std::vector<std::unique_ptr<std::max_align_t[]>> blocks_;
 };
+
+/// Who wrote a request; empty: he is gone already.
+using Asker = std::optional<ParticipantId>;
 
 /// What one request asks for, taken out of its sample.
 template <class Response>
@@ -75,11 +79,12 @@ class ServiceServer {
   /// @param name  ROS 2's, without the namespace: "tandem/ask"
   /// @param read  called on the taking thread; the request is gone when it returns
   template <ServiceSample Request, ServiceSample Response>
-  [[nodiscard]] Status add(const std::string& name,
-                           std::function<ServiceWork<Response>(const Request&)> read) {
+  [[nodiscard]] Status add(
+      const std::string& name,
+      std::function<ServiceWork<Response>(const Request&, const Asker&)> read) {
     return add(name, type<Request>(), type<Response>(), sizeof(Response),
-               [read = std::move(read)](const void* request) -> Work {
-                 ServiceWork<Response> work = read(*static_cast<const Request*>(request));
+               [read = std::move(read)](const void* request, const Asker& asker) -> Work {
+                 ServiceWork<Response> work = read(*static_cast<const Request*>(request), asker);
                  return {work.at_once,
                          [answer = std::move(work.answer)](void* reply, ReplyMemory& memory) {
                            answer(*static_cast<Response*>(reply), memory);
@@ -95,7 +100,7 @@ class ServiceServer {
     bool at_once = false;
     std::function<void(void* reply, ReplyMemory& memory)> answer;
   };
-  using Read = std::function<Work(const void* request)>;
+  using Read = std::function<Work(const void* request, const Asker& asker)>;
   struct Service {
     std::string id;
     Endpoint requests, replies;

@@ -113,6 +113,9 @@ RemoteOptions read_remote(TomlTable table) {
     remote.command =
         read_choice(table, "command", {"off", "local", "network"}, RemoteCommand::kOff);
   }
+  if (table.has("trust")) {
+    remote.trust = read_choice(table, "trust", {"admitted", "domain"}, RemoteTrust::kAdmitted);
+  }
   remote.load = table.boolean_or("load", remote.load);
   remote.lockstep = table.boolean_or("lockstep", remote.lockstep);
   remote.lease_timeout_s = table.number_or("lease_timeout_s", remote.lease_timeout_s, {0.05, 60.0});
@@ -129,7 +132,14 @@ RemoteOptions read_remote(TomlTable table) {
 }
 
 /// @param remote  its table
-void check_remote(const Experiment& e, TomlTable remote) {
+void check_remote(Experiment& e, TomlTable remote) {
+  const bool secured = e.dds.security.on();
+  if (!e.remote.trust && secured) e.remote.trust = RemoteTrust::kDomain;
+  if (e.remote.command == RemoteCommand::kNetwork && !e.remote.trust) {
+    remote.error("command", "\"network\", but nothing says whose commands these would be",
+                 "give [dds.security] keys; or trust = \"domain\" for everybody who reaches the "
+                 "domain, \"admitted\" for participants admitted on this machine");
+  }
   if (e.remote.command != RemoteCommand::kLocal || e.dds.loopback_only()) return;
   remote.error("command", "\"local\", but [dds] reaches beyond this machine",
                "set interfaces = [\"lo\"] in [dds], or command = \"network\" to let every machine "

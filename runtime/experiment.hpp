@@ -53,8 +53,14 @@ enum class RemoteCommand : std::uint8_t {
   kLocal,    ///< everything; nobody on another machine can reach it, or the files are refused
   kNetwork,  ///< everything, from wherever [dds] reaches
 };
+/// Whose commands those are. DDS knows no users; DDS Security, and the control socket, do.
+enum class RemoteTrust : std::uint8_t {
+  kAdmitted,  ///< participants that this user, or root, has admitted over the control socket
+  kDomain,    ///< everybody in the domain
+};
 struct RemoteOptions {
   std::optional<RemoteCommand> command;  ///< empty: off in `run`, local in `serve`
+  std::optional<RemoteTrust> trust;      ///< empty: the domain where DDS Security keeps it
   bool load = false;                     ///< controllers may be loaded over DDS, by name
   // Of an owner (docs/remote.md).
   bool lockstep = false;               ///< each cycle waits for its command
@@ -102,7 +108,7 @@ struct Experiment {
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   AfterReset after_reset = AfterReset::kHold;  ///< [faults]
-  std::optional<double> watchdog_s;     ///< [faults]; empty: 0.5 on the wall clock, else 5
+  std::optional<double> watchdog_s;            ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
   LogOptions log;
   ReportOptions report;

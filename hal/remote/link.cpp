@@ -5,8 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "dds/service.hpp"
-
 namespace tandem::remote {
 namespace {
 
@@ -100,10 +98,7 @@ bool is_sound(const hal::CommandImage& command) noexcept {
 const std::optional<Sender>& Senders::of(const dds_sample_info_t& sample) {
   if (sample.publication_handle == writer_ && sender_) return sender_;
   writer_ = sample.publication_handle;
-  sender_.reset();
-  if (const auto writer = dds::matched_writer(reader_, writer_)) {
-    std::ranges::copy(writer->participant.v, sender_.emplace().begin());
-  }
+  sender_ = dds::participant_of(reader_, writer_);
   return sender_;
 }
 

@@ -2,7 +2,6 @@
 // Layer: hal/remote.  Thread: any.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -12,6 +11,7 @@
 
 #include "base/realtime.hpp"
 #include "dds/endpoint.hpp"
+#include "dds/service.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
 
@@ -56,9 +56,9 @@ enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
 /// Every value of a command is finite, every mode one that there is.
 [[nodiscard]] bool is_sound(const hal::CommandImage& command) noexcept;
 
-/// The participant that writes a sample, by which the two ends know each other once they have met:
-/// the numbers in the samples are on topics that everybody in the domain can read.
-using Sender = std::array<std::uint8_t, sizeof(dds_guid_t)>;
+/// By the participant that writes a sample the two ends know each other once they have met: the
+/// numbers in the samples are on topics that everybody in the domain can read.
+using Sender = dds::ParticipantId;
 
 /// Finds it for the samples of one reader, on the thread that takes them.
 class Senders {

@@ -21,12 +21,13 @@
 namespace tandem::remote {
 
 struct ClientConfig {
-  std::string name;                        ///< for people: "tandem run squat.toml, process 312"
-  bool lockstep = false;                   ///< must be the server's
-  std::uint64_t server = 0;                ///< Server::number(); 0: the only one there is
-  double connect_timeout_s = 10;           ///< for a server to be found, and to give the lease
-  double server_timeout_s = 3;             ///< a server that is not heard for so long is gone
-  std::function<bool()> interrupted = {};  ///< true: exchange() waits no longer
+  std::string name;                          ///< for people: "tandem run squat.toml, process 312"
+  bool lockstep = false;                     ///< must be the server's
+  std::uint64_t server = 0;                  ///< Server::number(); 0: the only one there is
+  double connect_timeout_s = 10;             ///< for a server to be found, and to give the lease
+  double server_timeout_s = 3;               ///< a server that is not heard for so long is gone
+  std::function<void()> before_asking = {};  ///< for the lease; called before each attempt
+  std::function<bool()> interrupted = {};    ///< true: exchange() waits no longer
   /// A drive's error code in words; empty: as Backend::fault_text() has it.
   std::function<std::string(std::uint32_t)> error_text = {};
 };

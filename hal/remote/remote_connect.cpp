@@ -137,10 +137,12 @@ Status RemoteBackend::take_lease() {
     if (config_.interrupted && config_.interrupted()) return interrupted();
     if (SteadyClock::now() > deadline) {
       return fail("the server gave no lease within " + seconds(config_.connect_timeout_s),
-                  "is it still running?");
+                  "is it still running? Is this its user, on its machine? [remote] trust "
+                  "(docs/security.md)");
     }
     const std::uint64_t before = told_count_;
     lock.unlock();
+    if (config_.before_asking) config_.before_asking();
     ask(Action::kAcquire);
     lock.lock();
     news_.wait_for(lock, kAgain, [&] { return told_count_ != before; });

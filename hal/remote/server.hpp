@@ -30,6 +30,8 @@ struct ServerConfig {
   std::uint64_t max_age_cycles = 100;  ///< of the state that a command answers
   double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a living owner's command
   hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
+  /// Whether this participant may own the robot; called on DDS' threads. Empty: everybody may.
+  std::function<bool(const Sender&)> admits = {};
 };
 
 class Server final : public hal::CommandPort {

@@ -30,7 +30,9 @@ class RunOverDds : public Running {
   void begin_with(const std::string& remote, const std::string& more = "") {
     if (!remote.empty()) {
       write_text(folder_ / "hold.toml",
-                 read_text(folder_ / "hold.toml") + "[remote]\ncommand = \"" + remote + "\"\n" + more);
+                 read_text(folder_ / "hold.toml") + "[remote]\ncommand = \"" + remote + "\"\n" +
+                     more +
+                     (more.find("trust") == std::string::npos ? "trust = \"domain\"\n" : ""));
     }
     begin("--on-fault wait --dds --domain " + std::to_string(dds::test::own_domain()));
   }
@@ -116,6 +118,28 @@ TEST_F(RunOverDds, ChangeNothingUnlessTheExperimentAllowsIt) {
             std::string::npos);
   EXPECT_NE(active_after({"hold"}, {})[0].find("takes no commands"), std::string::npos);
   EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], true);
+  EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category1");
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1) << "it is latched";
+}
+
+/// "local" is every user of this machine: a participant is a stranger until somebody who may use
+/// the control socket has named it.
+TEST_F(RunOverDds, ChangesForAStrangerWaitUntilHeIsAdmitted) {
+  begin_with("local", "trust = \"admitted\"\n");
+  const auto refused = ask(R"({"do": "controller.stop", "name": "hold"})");
+  EXPECT_EQ(refused["ok"], false);
+  EXPECT_NE(refused["error"].dump().find("takes no commands from a stranger"), std::string::npos);
+  const std::string self = dds::to_text(dds::id_of(*participant_));
+  EXPECT_NE(refused["hint"].dump().find(self), std::string::npos) << refused["hint"];
+  EXPECT_NE(active_after({"hold"}, {})[0].find("from a stranger"), std::string::npos);
+  const std::string admit = R"({"do": "dds.admit", "participant": ")" + self + "\"}";
+  EXPECT_EQ(ask(admit)["ok"], false) << "nor does he admit himself";
+  EXPECT_EQ(ask(R"({"do": "status"})")["ok"], true);
+  EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], true);
+  EXPECT_EQ(ask_local(admit)["ok"], true);
+  EXPECT_EQ(ask(R"({"do": "controller.stop", "name": "hold"})")["ok"], true);
+  EXPECT_EQ(ask_local(R"({"do": "controller.list"})")["controllers"][0]["active"], false);
   EXPECT_EQ(trigger("emergency_stop"), "yes: emergency stop, category1");
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1) << "it is latched";
@@ -270,7 +294,8 @@ TEST_F(RunOverDds, StopTheRobotAndClearItsFaults) {
 
 TEST_F(RunOverDds, SayThatAStopIsNotConfirmedByALoopThatHangs) {
   edit("hold.toml", "plugin = \"hold\"",
-       "plugin = \"" TANDEM_BINARY_DIR "/tests/test_plugins/hangs.so\"\n"
+       "plugin = \"" TANDEM_BINARY_DIR
+       "/tests/test_plugins/hangs.so\"\n"
        "[faults]\nwatchdog_s = 4.0");
   start("--dds --domain " + std::to_string(dds::test::own_domain()));
   until(R"("running_cycles": 99)");
@@ -347,7 +372,8 @@ TEST_F(DdsCommands, AreForOneOfSeveralRuns) {
   EXPECT_EQ(over_dds("controller list").status, 0) << "the only one, whatever its namespace";
   // A second one: the services of a registry in this process.
   ControlRegistry registry;
-  const auto second = apps::DdsServices::open(*participant_, registry, {});
+  const DdsAdmission admission(true);
+  const auto second = apps::DdsServices::open(*participant_, registry, {}, admission);
   ASSERT_TRUE(second) << second.error().to_string();
   const Outcome several = over_dds("controller list");
   EXPECT_EQ(several.status, 2);

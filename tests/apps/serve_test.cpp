@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/control_socket.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/support/dds_domain.hpp"
 
@@ -47,9 +48,9 @@ class Serve : public Program {
   void compare(const std::string& experiment, const std::string& arguments) const {
     const Outcome alone = tandem("run " + experiment + arguments + " --quiet --json alone.json");
     ASSERT_EQ(alone.status, 0) << alone.err;
-    const pid_t server = begin("serve " + experiment + domain() +
-                                   " --lockstep --once --no-socket --quiet --json served.json",
-                               "serve");
+    const pid_t server =
+        begin("serve " + experiment + domain() + " --lockstep --once --quiet --json served.json",
+              "serve");
     const Outcome owner = tandem("run " + experiment + domain() + arguments +
                                  " --hal dds --lockstep --no-log --no-socket --quiet");
     EXPECT_EQ(owner.status, 0) << owner.err;
@@ -70,13 +71,20 @@ TEST_F(Serve, InLockstepWithADelayGivesTheBitsOfOneDelayedProcess) {
 
 TEST_F(Serve, OfASquatInLockstepGivesTheBitsOfOneProcess) { compare(coman(), " --duration 0.5"); }
 
+TEST_F(Serve, WithoutASocketNobodyCouldBeAdmitted) {
+  const Outcome outcome = tandem("serve trajectory.toml --no-socket --no-log");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("nobody can be admitted to this robot (leave out --no-socket"),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(Serve, AnOwnerThatIsKilledLeavesTheDeclaredReaction) {
   std::ofstream(folder_ / "trajectory.toml", std::ios::app)
       << "\n[remote]\ncommand = \"local\"\non_lost = \"category1\"\nmax_age_cycles = 200\n";
-  const std::string socket = (folder_ / "s.sock").string();
   const pid_t server =
-      begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet --socket " + socket,
-            "serve");
+      begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet", "serve");
+  const std::string socket = control_folder() + "/run-" + std::to_string(server) + ".sock";
   const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
                                 "--duration 600 --socket " + (folder_ / "o.sock").string(),
                             "owner");
@@ -97,8 +105,8 @@ TEST_F(Serve, AnOwnerThatIsKilledLeavesTheDeclaredReaction) {
 }
 
 TEST_F(Serve, AServerThatIsKilledEndsItsOwnerInAFault) {
-  const pid_t server = begin(
-      "serve trajectory.toml" + domain() + " --realtime --no-log --no-socket --quiet", "serve");
+  const pid_t server =
+      begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet", "serve");
   const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
                                 "--duration 600 --socket " + (folder_ / "o.sock").string(),
                             "owner");

@@ -150,7 +150,7 @@ TEST_F(FastDds, CallsAService) {
   using Response = std_srvs::Trigger_Response;
   const auto server = std::move(*ServiceServer::open(*participant_));
   const auto added = server->add<std_srvs::Trigger_Request, Response>(
-      "reset", [](const std_srvs::Trigger_Request&) {
+      "reset", [](const std_srvs::Trigger_Request&, const Asker&) {
         return ServiceWork<Response>{.at_once = false,
                                      .answer = [](Response& reply, ReplyMemory& memory) {
                                        reply.success = true;

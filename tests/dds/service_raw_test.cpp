@@ -72,7 +72,7 @@ struct RawService : ::testing::Test {
     using Work = ServiceWork<std_srvs::Trigger_Response>;
     for (const char* name : {"reset", "stop"}) {
       const auto added = server->add<std_srvs::Trigger_Request, std_srvs::Trigger_Response>(
-          name, [this](const std_srvs::Trigger_Request&) {
+          name, [this](const std_srvs::Trigger_Request&, const Asker&) {
             return Work{.at_once = false,
                         .answer = [this](std_srvs::Trigger_Response& reply, ReplyMemory& memory) {
                           while (hold) std::this_thread::sleep_for(milliseconds(1));

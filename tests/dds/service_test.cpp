@@ -39,7 +39,8 @@ struct Services : ::testing::Test {
     auto opened = ServiceServer::open(*server_side);
     ASSERT_TRUE(opened) << opened.error().to_string();
     server = std::move(*opened);
-    const auto echo = server->add<Request, Response>("echo", [this](const Request& request) {
+    const auto echo = server->add<Request, Response>("echo", [this](const Request& request,
+                                                                    const Asker&) {
       const auto number = request.request_sequence;
       return Work{.at_once = false, .answer = [this, number](Response& reply, ReplyMemory& memory) {
                     while (hold) std::this_thread::sleep_for(milliseconds(1));
@@ -48,7 +49,7 @@ struct Services : ::testing::Test {
                     reply.message = memory.text(std::to_string(number));
                   }};
     });
-    const auto stop = server->add<Request, Response>("stop", [this](const Request&) {
+    const auto stop = server->add<Request, Response>("stop", [this](const Request&, const Asker&) {
       return Work{.at_once = true, .answer = [this](Response& reply, ReplyMemory& memory) {
                     ++stopped;
                     reply.success = true;
@@ -156,7 +157,8 @@ TEST_F(Services, OfTwoProcessesAreNotAsked) {
   const auto participant = join("second");
   auto second = ServiceServer::open(*participant);
   ASSERT_TRUE(second);
-  ASSERT_TRUE(((*second)->add<Request, Response>("stop", [](const Request&) { return Work{}; })));
+  ASSERT_TRUE(((*second)->add<Request, Response>(
+      "stop", [](const Request&, const Asker&) { return Work{}; })));
   Client client = client_of(*client_side, "stop");
   ASSERT_TRUE(eventually([&] { return client.servers() == 2; }));
   const std::string error = call(client);

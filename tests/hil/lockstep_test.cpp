@@ -92,8 +92,8 @@ TEST_F(HilServe, ARobotOnCanDrivenOverDdsIsTheInProcessRunBitForBit) {
 
   Process robot(emulate_words(trajectory), file("robot.txt"));
   ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
-  Process server(tandem({"serve", trajectory, "--hal", "can", "--lockstep", "--once", "--no-socket",
-                         "--domain", domain, "--log", over_can_, "--json", file("serve.json")}),
+  Process server(tandem({"serve", trajectory, "--hal", "can", "--lockstep", "--once", "--domain",
+                         domain, "--log", over_can_, "--json", file("serve.json")}),
                  file("serve.txt"));
   ASSERT_TRUE(server.says("served in DDS domain " + domain)) << server.output();
   Process owner(tandem({"run", trajectory, "--hal", "dds", "--lockstep", "--no-log", "--no-socket",

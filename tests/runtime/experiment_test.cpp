@@ -282,7 +282,12 @@ TEST(Experiment, RefusesLocalCommandsOverANetwork) {
   EXPECT_NE(errors_of(with(dds + "'local'"))
                 .find("remote.command: \"local\", but [dds] reaches beyond this machine"),
             std::string::npos);
-  for (const char* fine : {"'off'", "'network'"}) EXPECT_EQ(errors_of(with(dds + fine)), "");
+  for (const char* fine :
+       {"'off'", "'network'\ntrust = 'domain'", "'network'\ntrust = 'admitted'"}) {
+    EXPECT_EQ(errors_of(with(dds + fine)), "");
+  }
+  EXPECT_NE(errors_of(with(dds + "'network'")).find("nothing says whose commands these would be"),
+            std::string::npos);
   EXPECT_EQ(errors_of(with("[dds]\n[remote]\ncommand = 'local'")), "");
   EXPECT_NE(errors_of(with("[remote]\ncommand = 'all'")).find("remote.command"), std::string::npos);
 }
