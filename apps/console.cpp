@@ -92,7 +92,7 @@ void outlive_readers() {
   stderr = lasting(STDERR_FILENO, _IONBF);
 }
 
-Status write_text(const std::filesystem::path& file, const std::string& text) {
+Status write_file(const std::filesystem::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
   out << text;
   out.close();

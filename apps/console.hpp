@@ -48,7 +48,7 @@ void outlive_readers();
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 
 /// @pre the folder of `file`, which is one of those given by -o, is there
-[[nodiscard]] Status write_text(const std::filesystem::path& file, const std::string& text);
+[[nodiscard]] Status write_file(const std::filesystem::path& file, const std::string& text);
 
 /// An error when a file is there that does not begin as what would be written over it.
 /// @param begins  of all that may be written over: "time_s,", "\x7F" "ELF"

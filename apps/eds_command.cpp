@@ -27,7 +27,7 @@ Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files)
   std::error_code problem;  // which the first file meets too
   std::filesystem::create_directories(options.output, problem);
   for (const EdsFile& file : files) {
-    const Status written = write_text(std::filesystem::path(options.output) / file.name, file.text);
+    const Status written = write_file(std::filesystem::path(options.output) / file.name, file.text);
     if (!written) return {written.error()};
   }
   return {};

@@ -85,7 +85,7 @@ class Folder {
           {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
           {std::string("hold.toml"), scaffold::hold_text(robot)},
           {std::string("move.toml"), scaffold::move_text(robot)}}) {
-      if (Status written = write_text(draft_ / name, text); !written) {
+      if (Status written = write_file(draft_ / name, text); !written) {
         return in_place({written.error()});
       }
     }

@@ -71,6 +71,34 @@ TEST_F(Serve, InLockstepWithADelayGivesTheBitsOfOneDelayedProcess) {
 
 TEST_F(Serve, OfASquatInLockstepGivesTheBitsOfOneProcess) { compare(coman(), " --duration 0.5"); }
 
+/// The domain is every user's of this machine; the robot is not.
+TEST_F(Serve, AnotherUserOfTheMachineMovesNothing) {
+  const std::string other = "setpriv --reuid 65534 --regid 65534 --clear-groups";
+  if (::geteuid() != 0 || tandem("--version", other).status != 0) {
+    GTEST_SKIP() << "needs root, setpriv, and a folder that others may read";
+  }
+  const pid_t server = begin("serve trajectory.toml" + domain() + " --no-log --quiet", "serve");
+  const std::string socket = control_folder() + "/run-" + std::to_string(server) + ".sock";
+  ASSERT_TRUE(eventually([&] { return ask(socket, "status").is_object(); }));
+  const Outcome owner =
+      tandem("run trajectory.toml" + domain() + " --hal dds --no-log --quiet --no-socket", other);
+  EXPECT_EQ(owner.status, 2) << owner.out;
+  EXPECT_NE(owner.err.find("the server gave no lease"), std::string::npos) << owner.err;
+  for (const char* command :
+       {"joint set joint1 --mode idle", "fault reset", "ask '{\"do\": \"run.stop\"}'"}) {
+    const Outcome refused = tandem(std::string(command) + " --dds" + domain(), other);
+    EXPECT_EQ(refused.status, 2) << command << refused.out;
+    EXPECT_NE(refused.err.find("takes no commands from a stranger"), std::string::npos)
+        << command << ": " << refused.err;
+  }
+  const Outcome socket_of_ours = tandem("estop --socket " + socket, other);
+  EXPECT_NE(socket_of_ours.status, 0) << "the folder is closed to others";
+  EXPECT_EQ(ask(socket, "status").value("phase", ""), "running");
+  EXPECT_EQ(tandem("estop --dds" + domain(), other).status, 0) << "everybody may stop a robot";
+  ASSERT_EQ(::kill(server, SIGTERM), 0);
+  EXPECT_TRUE(ended(server));
+}
+
 TEST_F(Serve, WithoutASocketNobodyCouldBeAdmitted) {
   const Outcome outcome = tandem("serve trajectory.toml --no-socket --no-log");
   EXPECT_EQ(outcome.status, 2);
