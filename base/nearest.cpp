@@ -32,7 +32,8 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
   std::string best;
   std::size_t best_distance = std::max<std::size_t>(2, name.size() / 2) + 1;
   for (const std::string& candidate : candidates) {
-    const std::size_t d = distance(name, candidate);
+    const bool lacks_unit = !name.empty() && candidate.starts_with(std::string(name) + "_");
+    const std::size_t d = std::min(distance(name, candidate), lacks_unit ? 2 : best_distance);
     if (d < best_distance) {
       best_distance = d;
       best = candidate;

@@ -9,7 +9,8 @@
 namespace tandem {
 
 /// The candidate with the smallest edit distance to `name` (case-insensitive, transpositions
-/// count once), or empty when none is near enough to be a slip of the finger.
+/// count once), or empty when none is near enough to be a slip of the finger. A name
+/// without its unit (`mass` for `mass_kg`) is near enough.
 [[nodiscard]] std::string nearest(std::string_view name, std::span<const std::string> candidates);
 
 /// "did you mean 'x'?" or, when nothing is near, "known: a, b, c" (at most `most` names).

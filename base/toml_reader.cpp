@@ -81,7 +81,8 @@ const toml::node* TomlTable::find(std::string_view key) {
 
 const toml::node* TomlTable::require(std::string_view key) {
   const toml::node* node = find(key);
-  const bool misspelt = shared_->meant.contains(defaults_path_ + "." + std::string(key));
+  const bool misspelt = shared_->meant.contains(dotted(key)) ||
+                        shared_->meant.contains(defaults_path_ + "." + std::string(key));
   if (node == nullptr && !misspelt && !partial_ && table_ != &kBroken && defaults_ != &kBroken) {
     error(key, kMissing,
           "add it to the table" +
@@ -127,17 +128,53 @@ bool TomlTable::has_errors() const {
   });
 }
 
+bool TomlTable::has_errors(std::string_view key) const {
+  return std::ranges::any_of(shared_->diagnostics, [&](const Error& error) {
+    return error.key == dotted(key) && error.line == line(key);
+  });
+}
+
+void TomlTable::report_unknown(std::string_view key, const std::vector<std::string>& known) {
+  error(key, "unknown key", suggest(key, known));
+  const std::string meant = nearest(key, known);
+  if (meant.empty()) return;
+  shared_->meant.insert(dotted(meant));
+  std::erase_if(shared_->diagnostics, [&](const Error& other) {
+    return other.message == kMissing && other.key == dotted(meant) && other.line == line();
+  });
+}
+
 void TomlTable::finish() {
   const std::vector<std::string> known(asked_.begin(), asked_.end());
   for (const auto& [key, node] : *table_) {
-    if (asked_.contains(key.str())) continue;
-    error(key.str(), "unknown key", suggest(key.str(), known));
-    const std::string meant = nearest(key.str(), known);
-    shared_->meant.insert(dotted(meant));
-    std::erase_if(shared_->diagnostics, [&](const Error& other) {
-      return other.message == kMissing && other.key == dotted(meant) && other.line == line();
-    });
+    if (!asked_.contains(key.str()) && !has_errors(key.str())) report_unknown(key.str(), known);
   }
+}
+
+bool TomlTable::holds_only(const std::vector<std::string>& known) {
+  bool no_table = true;
+  for (const auto& [key, node] : *table_) {
+    if (std::ranges::find(known, key.str()) != known.end()) continue;
+    report_unknown(key.str(), known);
+    no_table = no_table && !node.is_table() && !node.is_array_of_tables();
+  }
+  return no_table;
+}
+
+bool TomlTable::holds_tables() {
+  const toml::node* first = nullptr;
+  std::string_view outside;
+  for (const auto& [key, node] : *table_) {
+    if (node.is_table()) continue;
+    if (first != nullptr && first->source().begin.line < node.source().begin.line) continue;
+    first = &node;
+    outside = key.str();
+  }
+  if (first != nullptr) {
+    error(outside, "belongs in a table with a name",
+          "write [" + header_of(path_) + ".NAME] above it");
+  }
+  return first == nullptr && table_ != &kBroken;
 }
 
 bool TomlTable::check_number(std::string_view key, const toml::node& node, Range range,
@@ -249,22 +286,21 @@ std::string TomlTable::choice_or(std::string_view key, std::string value,
 
 std::vector<double> TomlTable::numbers(std::string_view key, std::size_t size, Range range) {
   if (require(key) == nullptr) return std::vector<double>(size, 0.0);
-  std::vector<double> found = numbers_or(key, {}, range);
-  if (size != 0 && found.size() != size) {
-    error(key, "has " + std::to_string(found.size()) + " numbers",
-          "give exactly " + std::to_string(size));
-    found.resize(size, 0.0);
-  }
-  return found;
+  return numbers_or(key, std::vector<double>(size, 0.0), range, size);
 }
 
 std::vector<double> TomlTable::numbers_or(std::string_view key, std::vector<double> value,
-                                          Range range) {
+                                          Range range, std::size_t size) {
   const toml::node* node = find(key);
   if (node == nullptr) return value;
   const toml::array* array = node->as_array();
+  const std::string exactly = size == 0 ? "" : "give exactly " + std::to_string(size);
   if (array == nullptr) {
-    error(key, "must be a list of numbers, not " + kind(*node));
+    error(key, "must be a list of numbers in brackets, not " + kind(*node), exactly);
+    return value;
+  }
+  if (size != 0 && array->size() != size) {
+    error(key, "has " + std::to_string(array->size()) + " numbers", exactly);
     return value;
   }
   std::vector<double> found;

@@ -36,7 +36,7 @@ inline constexpr Range kNotNegative{0.0, std::numeric_limits<double>::max(), fal
 /// A getter that meets a missing key without default, a wrong type, a number that is not finite
 /// or out of range, appends an Error (file, line, dotted key, hint) to the document's
 /// diagnostics and returns the default, or an empty value. `finish()` reports the keys that
-/// nobody asked for, with the nearest known one. So one reading finds every error.
+/// nobody asked for, with the nearest known one. So one reading finds every error, each once.
 class TomlTable {
  public:
   [[nodiscard]] double number(std::string_view key, Range range = kAnyNumber);
@@ -54,8 +54,9 @@ class TomlTable {
   /// Exactly `size` numbers (any count when `size` is 0).
   [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t size,
                                             Range range = kAnyNumber);
+  /// @param size  how many they must be; 0: any count
   [[nodiscard]] std::vector<double> numbers_or(std::string_view key, std::vector<double> value,
-                                               Range range = kAnyNumber);
+                                               Range range = kAnyNumber, std::size_t size = 0);
   [[nodiscard]] std::vector<std::string> texts_or(std::string_view key,
                                                   std::vector<std::string> value);
   /// A list of equal-length rows: [[x, y, z], …].
@@ -86,12 +87,20 @@ class TomlTable {
   void error(std::string_view key, std::string message, std::string hint = {});
   /// Whether an error of one of its keys has been reported, its defaults' included.
   [[nodiscard]] bool has_errors() const;
+  /// Whether one has been reported of this key.
+  [[nodiscard]] bool has_errors(std::string_view key) const;
   /// The same error without reporting it.
   [[nodiscard]] Error error_at(std::string_view key, std::string message,
                                std::string hint = {}) const;
   /// Reports every key that no getter asked for; where one of them looks like a required key that
   /// is missing, that is not reported beside it.
   void finish();
+  /// In its place, before reading: `known` are the keys that may be there.
+  /// @return false: one of those reported is a table. What it holds is not where it is looked for.
+  [[nodiscard]] bool holds_only(const std::vector<std::string>& known);
+  /// Whether it holds tables and nothing else, as [gains] does: they are [gains.NAME]. The first
+  /// key that stands outside one is an error, for all of them.
+  [[nodiscard]] bool holds_tables();
 
   [[nodiscard]] const std::string& path() const { return path_; }  ///< dotted, "" for the root
   [[nodiscard]] int line() const;
@@ -104,6 +113,7 @@ class TomlTable {
   const toml::node* get(std::string_view key) const;
   const toml::node* find(std::string_view key);
   const toml::node* require(std::string_view key);
+  void report_unknown(std::string_view key, const std::vector<std::string>& known);
   bool check_number(std::string_view key, const toml::node& node, Range range, double& out);
   [[nodiscard]] std::string dotted(std::string_view key) const;
 

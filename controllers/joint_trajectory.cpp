@@ -69,7 +69,8 @@ class JointTrajectory : public Controller {
   /// One number a joint; says which joints these are when there are more or fewer.
   std::vector<double> read_positions(const ControllerSetup& setup, TomlTable& table) {
     std::vector<double> positions = table.numbers("position_rad", 0);
-    if (joints_known_ && table.has("position_rad") && positions.size() != joints_.size()) {
+    if (joints_known_ && table.has("position_rad") && !table.has_errors("position_rad") &&
+        positions.size() != joints_.size()) {
       std::string order;
       for (const std::size_t joint : joints_) {
         order += (order.empty() ? "" : ", ") + setup.robot.joints[joint].name;

@@ -25,16 +25,20 @@ LinkConfig read_link(TomlTable table, const std::string& name) {
   LinkConfig link;
   link.name = name;
   link.line = table.line();
-  if (table.has("mass_kg")) link.mass_kg = table.number("mass_kg", kNotNegative);
-  if (table.has("com_m")) link.com_m = vector3(table, "com_m", {});
-  if (table.has("inertia_kg_m2")) {
-    link.inertia_kg_m2.emplace();
-    std::ranges::copy(table.numbers("inertia_kg_m2", 6), link.inertia_kg_m2->begin());
-  }
-  if (!link.mass_kg && !link.com_m && !link.inertia_kg_m2 && !table.has_errors()) {
+  const double mass_kg = table.number_or("mass_kg", 0.0, kNotNegative);
+  const std::array<double, 3> com_m = vector3(table, "com_m", {});
+  const std::vector<double> inertia =
+      table.numbers_or("inertia_kg_m2", std::vector<double>(6, 0.0), kAnyNumber, 6);
+  if (table.keys().empty()) {
     table.error("", "gives nothing", "give mass_kg, com_m or inertia_kg_m2, or remove it");
   }
   table.finish();
+  if (table.has_errors()) return link;  // what the link then is follows from them
+  if (table.has("mass_kg")) link.mass_kg = mass_kg;
+  if (table.has("com_m")) link.com_m = com_m;
+  if (table.has("inertia_kg_m2")) {
+    std::ranges::copy(inertia, link.inertia_kg_m2.emplace().begin());
+  }
   return link;
 }
 
@@ -60,10 +64,11 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   }
   lock.finish();
   TomlTable links = table.table_or_empty("link");
-  for (const std::string& name : links.keys()) {
-    model.links.push_back(read_link(links.table(name), name));
+  if (links.holds_tables()) {
+    for (const std::string& name : links.keys()) {
+      model.links.push_back(read_link(links.table(name), name));
+    }
   }
-  links.finish();
   table.finish();
   for (TomlTable& site : root.tables("site")) read_site(site, model);
   return model;
@@ -121,7 +126,7 @@ FootConfig read_foot(TomlTable table, const RobotConfig& robot) {
   for (const auto& row : table.rows("points_m", 3)) {
     foot.points_m.push_back({row[0], row[1], row[2]});
   }
-  if (table.has("points_m") && foot.points_m.empty()) {
+  if (table.has("points_m") && foot.points_m.empty() && !table.has_errors("points_m")) {
     table.error("points_m", "the sole has no point", "give at least one [x, y, z]");
   }
   table.finish();
@@ -221,26 +226,42 @@ std::string read_name(TomlTable& root) {
   return name;
 }
 
+const std::vector<std::string> kSections{
+    "name",         "model",          "site",    "actuator",       "actuator_defaults",
+    "gains",        "gains_defaults", "bus",     "board",          "sensor",
+    "bus_defaults", "board_defaults", "joint",   "joint_defaults", "loop",
+    "passive",      "contact",        "posture", "safety"};
+
+/// Whether every section is where what names its content looks for it; else that is reported.
+bool sections_are_right(TomlTable& root) {
+  bool right = root.holds_only(kSections);
+  for (const char* key : {"actuator", "gains", "posture"}) {
+    right = root.table_or_empty(key).holds_tables() && right;
+  }
+  return right;
+}
+
 /// Reads in the order of the references: what is named before what names it.
 RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loose) {
   RobotConfig robot;
   robot.file = document.file();
   TomlTable root = document.root();
   robot.name = read_name(root);
+  const bool right = sections_are_right(root);
   robot.model = read_model(root, document.folder());
+  if (!right) return robot;
   read_drive_tables(root, robot);
   NodeIds ids;
   std::vector<SensorTable> sensors;
   std::vector<BoardTable> boards = read_buses(root, ids, robot, sensors);
   const auto of_lists = [](const Error& error) {
-    return error.key == "bus" || error.key == "board";
+    return error.key == "bus" || error.key == "board" || error.key == "site";
   };
   if (std::ranges::any_of(document.diagnostics(), of_lists))
     return robot;  // what follows names them
   read_joints(root, seats_of(boards), robot, loose);
   const auto wrong = [](const BoardTable& board) { return board.table.has_errors(); };
   if (std::ranges::any_of(boards, wrong)) loose.clear();  // a list that could not be read
-  check_boards(boards, robot, loose);
   for (const SensorTable& sensor : sensors) read_sensor(sensor.table, sensor.bus, ids, robot);
   for (TomlTable& sensor : root.tables("sensor")) read_sensor(sensor, {}, ids, robot);
   read_contact(root, robot);
@@ -252,13 +273,13 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
     read_posture(postures.table(name), name, fixed_base, robot, loose);
   }
   postures.finish();
+  check_boards(boards, robot, loose);
   const auto of_list = [](const Error& error) { return error.key.ends_with(".names"); };
   if (std::ranges::any_of(document.diagnostics(), of_list) ||
       (robot.joints.empty() && !document.diagnostics().empty())) {
     loose.clear();  // which joints there are is not known
   }
   read_safety(root.table_or_empty("safety"), robot);
-  root.finish();
   return robot;
 }
 

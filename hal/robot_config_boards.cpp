@@ -122,12 +122,14 @@ std::vector<Seat> seats_of(std::span<const BoardTable> boards) {
 
 void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,
                   std::vector<JointReference>& loose) {
-  for (BoardTable& board : boards) {
+  for (const BoardTable& board : boards) {
     for (const std::string& joint : board.joints) {
       if (robot.joint_index(joint) >= 0) continue;
       loose.push_back(
           {joint, board.table.error_at("joints", "there is no [[joint]] '" + joint + "'")});
     }
+  }
+  for (BoardTable& board : boards) {
     std::set<int> axes;
     for (std::size_t axis = 0; axis < board.joints.size(); ++axis) {
       axes.insert(static_cast<int>(axis));
@@ -135,7 +137,8 @@ void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,
     for (const JointConfig& joint : robot.joints) {
       if (joint.board == board.board) axes.insert(joint.axis);
     }
-    if (axes.empty() && board.table.has_errors()) continue;
+    if (axes.empty() && (board.table.has_errors() || !loose.empty()))
+      continue;  // its joint is lost
     if (axes.empty()) {
       board.table.error("name", "no joint is on board '" + board.board + "'",
                         "list its joints, or remove the board");

@@ -56,6 +56,18 @@ const GainsConfig& RobotConfig::gains_of(const JointConfig& joint) const {
 
 namespace {
 
+/// "'a'", "'a' and 'b'", "'a', 'b' and 27 more".
+std::string quoted(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 4;
+  std::string text = "'" + names.front() + "'";
+  const std::size_t shown = names.size() <= kMost ? names.size() : 2;
+  for (std::size_t i = 1; i < shown; ++i) {
+    text += (i + 1 == names.size() ? " and '" : ", '") + names[i] + "'";
+  }
+  if (shown < names.size()) text += " and " + std::to_string(names.size() - shown) + " more";
+  return text;
+}
+
 /// Collects the errors of one robot against its description.
 class Check {
  public:
@@ -79,6 +91,7 @@ class NameCheck : private Check {
   Diagnostics run(const std::vector<JointReference>& loose) {
     const std::vector<std::string> moving = names_of(description_.moving_joints);
     for (const JointReference& one : loose) judge(one, moving);
+    report_without_table();
     for (const JointConfig& one : robot_.joints) check_moving(one.line, "joint", one.name, moving);
     for (const PassiveConfig& one : robot_.passive)
       check_moving(one.line, "passive", one.name, moving);
@@ -124,7 +137,7 @@ class NameCheck : private Check {
     } else if (!one.error.hint.empty()) {
       // says already what to do
     } else if (find(description_.moving_joints, one.joint) != nullptr) {
-      one.error.hint = "add one with its actuator";
+      return without_table_.push_back(std::move(one));
     } else if (is_described(one.joint)) {
       one.error.message = "the joint '" + one.joint + "' does not move in the description";
       one.error.hint = "remove it here";
@@ -133,6 +146,23 @@ class NameCheck : private Check {
       one.error.hint = suggest(one.joint, moving);
     }
     errors_.push_back(std::move(one.error));
+  }
+
+  /// Joints whose [[joint]] is not there: one message, where the first of them is named.
+  void report_without_table() {
+    if (without_table_.empty()) return;
+    Error error = std::ranges::min(without_table_, {}, [](const JointReference& one) {
+                    return one.error.line;
+                  }).error;
+    std::vector<std::string> joints;
+    for (const JointDescription& joint : description_.moving_joints) {
+      if (std::ranges::count(without_table_, joint.name, &JointReference::joint) > 0) {
+        joints.push_back(joint.name);
+      }
+    }
+    error.message = "there is no [[joint]] " + quoted(joints);
+    error.hint = "add one with its actuator";
+    errors_.push_back(std::move(error));
   }
 
   /// A [[joint]] or [[passive]] is a joint of its own.
@@ -159,6 +189,8 @@ class NameCheck : private Check {
     if (name.empty() || std::ranges::find(known, name) != known.end()) return;
     error(line, key, "the description has no " + kind + " '" + name + "'", suggest(name, known));
   }
+
+  std::vector<JointReference> without_table_;
 };
 
 /// Fills limits, and checks them and what depends on them.
@@ -185,12 +217,17 @@ class Completion : private Check {
  private:
   /// Only once every [[joint]] and [[passive]] is known: a misspelt one would be reported twice.
   void check_driven() {
+    if (robot_.joints.empty()) return;
+    std::vector<std::string> others;
     for (const JointDescription& joint : description_.moving_joints) {
-      if (robot_.joint_index(joint.name) >= 0 || robot_.joints.empty()) continue;
-      if (robot_.is_passive(joint.name)) continue;
-      error(0, "joint", "the description's joint '" + joint.name + "' has no [[joint]]",
-            "add one or a [[passive]], or fix it with [model.lock] " + joint.name + " = 0.0");
+      if (robot_.joint_index(joint.name) >= 0 || robot_.is_passive(joint.name)) continue;
+      others.push_back(joint.name);
     }
+    if (others.empty()) return;
+    error(0, "joint",
+          others.size() == 1 ? "the description's joint " + quoted(others) + " has no [[joint]]"
+                             : "the description's joints " + quoted(others) + " have no [[joint]]",
+          "add one or a [[passive]], or fix it with [model.lock] " + others.front() + " = 0.0");
   }
 
   /// Positions travel as 32-bit counts: this is the largest one, with a margin for overshoot.
@@ -200,38 +237,42 @@ class Completion : private Check {
     return 0.9 * 2147483647.0 / counts * 2.0 * std::numbers::pi;
   }
 
-  void no_limit(const JointConfig& joint, const JointDescription& found, const std::string& key) {
+  /// One message for all that a joint lacks: often its <limit>.
+  void report_unlimited(const JointConfig& joint, const JointDescription& found) {
+    if (unlimited_.empty()) return;
     const std::string note = found.limits_note.empty() ? "" : " (" + found.limits_note + ")";
-    error(joint.line, "joint." + joint.name + "." + key,
-          "neither this file nor the description gives a limit" + note, "set " + key);
+    std::string keys = unlimited_.front();
+    for (std::size_t i = 1; i < unlimited_.size(); ++i) {
+      keys += (i + 1 == unlimited_.size() ? " and " : ", ") + unlimited_[i];
+    }
+    error(joint.line, "joint." + joint.name + (unlimited_.size() == 1 ? "." + keys : ""),
+          "neither this file nor the description gives a limit" + note, "set " + keys);
+    unlimited_.clear();
   }
 
-  void fill(double& value, double described, const JointConfig& joint,
-            const JointDescription& found, const std::string& key) {
+  void fill(double& value, double described, const std::string& key) {
     if (!std::isnan(value)) return;
     value = described;
-    if (!std::isfinite(described) || described <= 0.0) no_limit(joint, found, key);
+    if (!std::isfinite(described) || described <= 0.0) unlimited_.push_back(key);
   }
 
   /// @param countable  the most that a joint may turn, whatever is described
-  void fill_position(double& value, double described, double countable, const JointConfig& joint,
-                     const JointDescription& found, const std::string& key) {
+  void fill_position(double& value, double described, double countable, const std::string& key) {
     if (!std::isnan(value)) return;
-    if (std::isnan(described)) return no_limit(joint, found, key);
+    if (std::isnan(described)) return unlimited_.push_back(key);
     value = std::clamp(described, -countable, countable);
   }
 
   void complete(JointConfig& joint, const JointDescription& found) {
     const std::string key = "joint." + joint.name;
     const double countable = countable_rad(joint);
-    fill_position(joint.min_position_rad, found.min_position_rad, countable, joint, found,
-                  "min_position_rad");
-    fill_position(joint.max_position_rad, found.max_position_rad, countable, joint, found,
-                  "max_position_rad");
+    fill_position(joint.min_position_rad, found.min_position_rad, countable, "min_position_rad");
+    fill_position(joint.max_position_rad, found.max_position_rad, countable, "max_position_rad");
     check_limits(joint, key, countable);
     check_followers(joint, key);
-    fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, joint, found, "max_velocity_rad_s");
-    fill(joint.max_torque_Nm, found.max_torque_Nm, joint, found, "max_torque_Nm");
+    fill(joint.max_velocity_rad_s, found.max_velocity_rad_s, "max_velocity_rad_s");
+    fill(joint.max_torque_Nm, found.max_torque_Nm, "max_torque_Nm");
+    report_unlimited(joint, found);
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
@@ -295,6 +336,7 @@ class Completion : private Check {
   }
 
   RobotConfig& completed_;
+  std::vector<std::string> unlimited_;  // keys of the joint that is being completed
 };
 
 }  // namespace

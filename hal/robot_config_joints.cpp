@@ -105,7 +105,8 @@ void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& 
                       : "the joint '" + joint.name + "' is on two boards, '" + other.board +
                             "' and '" + joint.board + "'",
                   "remove one of the two");
-    } else if (!joint.board.empty() && other.board == joint.board && other.axis == joint.axis) {
+    } else if (std::ranges::count(robot.boards, joint.board, &BoardConfig::name) == 1 &&
+               other.board == joint.board && other.axis == joint.axis) {
       table.error("axis",
                   "axis " + std::to_string(joint.axis) + " of board '" + joint.board +
                       "' already drives joint '" + other.name + "'",

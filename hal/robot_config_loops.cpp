@@ -45,7 +45,9 @@ void read_loop(TomlTable table, RobotConfig& robot) {
               : type == "rod"    ? model::LoopType::kRod
                                  : model::LoopType::kBall;
   const std::vector<std::string> sites = table.texts_or("sites", {});
-  if (sites.size() == 2) {
+  if (table.has_errors("sites")) {
+    // what it holds is no list of texts
+  } else if (sites.size() == 2) {
     loop.sites = {sites[0], sites[1]};
     for (const std::string& site : sites) {
       check_reference(table, "sites", site, robot.model.sites, "[[site]]");

@@ -79,8 +79,8 @@ inline void check_not_locked(TomlTable& table, std::string_view key, const std::
 
 inline std::array<double, 3> vector3(TomlTable& table, std::string_view key,
                                      std::array<double, 3> value) {
-  if (!table.has(key)) return value;
-  const std::vector<double> found = table.numbers(key, 3);
+  const std::vector<double> found =
+      table.numbers_or(key, {value.begin(), value.end()}, kAnyNumber, value.size());
   return {found[0], found[1], found[2]};
 }
 

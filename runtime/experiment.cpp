@@ -181,11 +181,16 @@ ReportOptions read_report(TomlTable table) {
   return report;
 }
 
+const Names kSections{"robot",  "duration_s", "seed",    "posture", "kernel_variant", "period_ns",
+                      "sim",    "hal",        "overrun", "clock",   "realtime",       "faults",
+                      "remote", "log",        "report",  "dds",     "controller"};
+
 /// What of the experiment can be read without its robot.
 Experiment read(const TomlDocument& document, TomlTable& root) {
   Experiment e{};
   e.document = document;
   e.file = document.file();
+  const bool right = root.holds_only(kSections);
   const std::filesystem::path robot = root.text("robot");
   if (!robot.empty()) {
     e.robot_file = (std::filesystem::path(document.folder()) / robot).lexically_normal().string();
@@ -207,8 +212,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.report = read_report(root.table_or_empty("report"));
   if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());
   check_remote(e, root.table_or_empty("remote"));
-  read_controllers(root, e.controllers);
-  root.finish();
+  if (right) read_controllers(root, e.controllers);  // else they may be in a table of another name
   return e;
 }
 

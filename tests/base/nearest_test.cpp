@@ -10,6 +10,14 @@ TEST(Nearest, FindsASlipOfTheFinger) {
   EXPECT_EQ(nearest("Robot", kNames), "robot");
 }
 
+TEST(Nearest, FindsANameThatLacksItsUnit) {
+  const std::vector<std::string> keys{"com_m", "inertia_kg_m2", "mass_kg"};
+  EXPECT_EQ(nearest("mass", keys), "mass_kg");
+  EXPECT_EQ(nearest("inertia", keys), "inertia_kg_m2");
+  EXPECT_EQ(nearest("mas_kg", std::vector<std::string>{"mas_kg_2", "mass_kg"}), "mass_kg")
+      << "a slip is nearer";
+}
+
 TEST(Nearest, IsEmptyWhenNothingIsNear) { EXPECT_EQ(nearest("zzzzzzzz", kNames), ""); }
 
 TEST(Suggest, ListsTheKnownNamesWhenNothingIsNear) {

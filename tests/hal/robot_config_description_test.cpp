@@ -79,6 +79,19 @@ TEST(RobotConfigNames, ReportAMisspeltJointOnceWhereItIsMisspelt) {
             "'knee'?)\n");
 }
 
+TEST(RobotConfigNames, ReportAJointWithoutItsTableOnceWhateverNamesIt) {
+  std::string text = kRobot;
+  const std::size_t knee = text.find("[[joint]]\nname = \"knee\"");
+  text.erase(knee, text.find("[[sensor]]") - knee);
+  EXPECT_EQ(names_wrong(text),
+            ":64: posture.home.knee: there is no [[joint]] 'knee' (add one with its actuator)\n");
+  const std::size_t axis = text.find("node_id = 3\n");
+  text.insert(axis, "joints = [\"hip\", \"knee\"]\n");
+  text.erase(text.find("board = \"hip_board\"\n"), 20);
+  EXPECT_EQ(names_wrong(text),
+            ":33: board[0].joints: there is no [[joint]] 'knee' (add one with its actuator)\n");
+}
+
 TEST(RobotConfigNames, SayWhyAPostureCannotPlaceAJoint) {
   RobotDescription d = description();
   d.followers.push_back({"finger", "knee", -1.0, 1.0});
@@ -96,6 +109,16 @@ TEST_F(Completed, RefusesAMovingJointThatNothingDrives) {
   EXPECT_EQ(errors,
             "leg.toml: joint: the description's joint 'wrist' has no [[joint]] "
             "(add one or a [[passive]], or fix it with [model.lock] wrist = 0.0)\n");
+}
+
+TEST_F(Completed, RefusesManyMovingJointsThatNothingDrivesInOneMessage) {
+  for (const char* name : {"a", "b", "c", "d", "e"}) {
+    description_.moving_joints.push_back({name, -1, 1, 1, 1});
+  }
+  read(kRobot);
+  EXPECT_EQ(errors,
+            "leg.toml: joint: the description's joints 'a', 'b' and 3 more have no [[joint]] "
+            "(add one or a [[passive]], or fix it with [model.lock] a = 0.0)\n");
 }
 
 TEST_F(Completed, RefusesAJointThatDoesNotMove) {
@@ -158,9 +181,10 @@ TEST_F(Completed, AsksForALimitThatNobodyGives) {
 /// A thousand times COMAN's gains gave torque steps of 183 Nm from one millisecond to the next.
 TEST_F(Completed, RefusesGainsThatNoJointCanUse) {
   read(with("kp = 200, kd = 5", "kp = 2e6, kd = 5"));
-  EXPECT_EQ(errors,
-            "leg.toml:22: gains.big.position: kp = 2e+06 is beyond 1e+06, the most that the joint's "
-            "limits can use (correct the gain, or the limits of hip)\n")
+  EXPECT_EQ(
+      errors,
+      "leg.toml:22: gains.big.position: kp = 2e+06 is beyond 1e+06, the most that the joint's "
+      "limits can use (correct the gain, or the limits of hip)\n")
       << "one message for both joints, at the table";
   read(with("torque = {kp = 0.3}", "torque = {kp = 300}"));
   EXPECT_NE(errors.find("gains.big.torque: kp = 300 is beyond 40"), std::string::npos) << errors;
@@ -170,12 +194,10 @@ TEST_F(Completed, SaysWhyTheDescriptionGivesNoLimits) {
   const double none = std::nan("");
   description_.moving_joints[1] = {"knee", none, none, none, 200.0, "leg.urdf:12 has no <limit>"};
   read(kRobot);
-  const std::string why =
-      "neither this file nor the description gives a limit (leg.urdf:12 has no <limit>) ";
-  const std::string key = "leg.toml:44: joint.knee.";
-  EXPECT_EQ(errors, key + "min_position_rad: " + why + "(set min_position_rad)\n" + key +
-                        "max_position_rad: " + why + "(set max_position_rad)\n" + key +
-                        "max_velocity_rad_s: " + why + "(set max_velocity_rad_s)\n");
+  EXPECT_EQ(errors,
+            "leg.toml:44: joint.knee: neither this file nor the description gives a limit "
+            "(leg.urdf:12 has no <limit>) (set min_position_rad, max_position_rad and "
+            "max_velocity_rad_s)\n");
 }
 
 TEST_F(Completed, TakesEveryLimitFromTheRobotsFileWhenTheDescriptionHasNone) {

@@ -102,9 +102,59 @@ TEST(RobotConfig, RefusesALinkThatWeighsWrong) {
                "robots/leg.toml:6: model.link.foot.mas_kg: unknown key (did you mean 'mass_kg'?)");
   expect_error(link("inertia_kg_m2 = [1, 1, 1]"),
                "robots/leg.toml:6: model.link.foot.inertia_kg_m2: has 3 numbers (give exactly 6)");
+  expect_error(link("mass = 1"),
+               "robots/leg.toml:6: model.link.foot.mass: unknown key (did you mean 'mass_kg'?)");
+  expect_error(with("[model.lock]", "[model.link]\nmass_kg = 1\ncom_m = [0, 0, 1]\n[model.lock]"),
+               "robots/leg.toml:6: model.link.mass_kg: belongs in a table with a name "
+               "(write [model.link.NAME] above it)");
   expect_error(link(""),
                "robots/leg.toml:5: model.link.foot: gives nothing "
                "(give mass_kg, com_m or inertia_kg_m2, or remove it)");
+}
+
+TEST(RobotConfig, RefusesANumberInPlaceOfAVectorOnce) {
+  expect_error(with("[model.lock]", "gravity_m_s2 = 9.81\n[model.lock]"),
+               "robots/leg.toml:5: model.gravity_m_s2: must be a list of numbers in brackets, not "
+               "floating-point (give exactly 3)");
+  expect_error(with("points_m = [[0.1, 0.05, 0], [-0.1, 0.05, 0], [0, -0.05, 0]]", "points_m = 1"),
+               "robots/leg.toml:69: contact.foot[0].points_m: must be a list of lists of numbers, "
+               "not integer");
+}
+
+TEST(RobotConfig, RefusesATableOfAnotherNameOnceWhateverRefersToIt) {
+  const auto unknown = [](int line, const std::string& key, const std::string& meant) {
+    return "robots/leg.toml:" + std::to_string(line) + ": " + key +
+           ": unknown key (did you mean '" + meant + "'?)";
+  };
+  expect_error(with("[gains.big]", "[gain.big]"), unknown(22, "gain", "gains"));
+  expect_error(with("[actuator.big]", "[actuators.big]"), unknown(12, "actuators", "actuator"));
+  expect_error(with("[[bus]]", "[[buses]]"), unknown(27, "buses", "bus"));
+  expect_error(with("[joint_defaults]", "[joints_defaults]"),
+               unknown(34, "joints_defaults", "joint_defaults"));
+  expect_error("[modell]\n",
+               "robots/leg.toml:1: name: this key is missing (add it to the table)\n" +
+                   unknown(1, "modell", "model"));
+}
+
+TEST(RobotConfig, AsksForTheNameOfATableOnceWhateverRefersToIt) {
+  expect_error(with("[gains.big]", "[gains]"),
+               "robots/leg.toml:25: gains.position_feedback: belongs in a table with a name "
+               "(write [gains.NAME] above it)");
+  expect_error(with("[actuator.big]", "[actuator]"),
+               "robots/leg.toml:13: actuator.resistance_ohm: belongs in a table with a name "
+               "(write [actuator.NAME] above it)");
+  expect_error(with("[posture.home]", "[posture]"),
+               "robots/leg.toml:71: posture.base_height_m: belongs in a table with a name "
+               "(write [posture.NAME] above it)");
+}
+
+TEST(RobotConfig, RefusesABoardDescribedTwiceOnceWhateverIsOnIt) {
+  const std::string two =
+      with("[joint_defaults]",
+           "[[board]]\nname = \"hip_board\"\nbus = \"left\"\nnode_id = 4\n[joint_defaults]");
+  expect_error(two.substr(0, two.find("axis = 1")) + two.substr(two.find("axis = 1") + 9),
+               "robots/leg.toml:35: board[1].name: the board 'hip_board' is described twice "
+               "(remove or rename one of them)");
 }
 
 TEST(RobotConfig, RefusesAnActuatorWithoutInertia) {
@@ -290,7 +340,7 @@ TEST(RobotConfig, ReportsAnOrderThatIsNoneOnce) {
 TEST(RobotConfig, RefusesNumbersFarOutOfRange) {
   for (const std::string number : {"1e300", "-1e31", "1e-300"}) {
     const std::string errors = errors_of(with("gear_ratio = 100", "gear_ratio = " + number));
-    EXPECT_NE(errors.find("robots/leg.toml:15: actuator.big.gear_ratio: " ), std::string::npos);
+    EXPECT_NE(errors.find("robots/leg.toml:15: actuator.big.gear_ratio: "), std::string::npos);
     EXPECT_NE(errors.find("is far out of range (give 0, or a size of 1e-30 to 1e30)\n"),
               std::string::npos)
         << errors;
@@ -299,8 +349,8 @@ TEST(RobotConfig, RefusesNumbersFarOutOfRange) {
 
 TEST(RobotConfig, RefusesATableOfTheWrongKindWithTheHeaderToWrite) {
   expect_error(with("[posture.home]", "[posture]\nhome = 3\n[posture.other]"),
-               "robots/leg.toml:71: posture.home: must be a table, not integer "
-               "(write [posture.home])");
+               "robots/leg.toml:71: posture.home: belongs in a table with a name "
+               "(write [posture.NAME] above it)");
   expect_error(with("[[sensor]]", "[sensor]"),
                "robots/leg.toml:52: sensor: must be an array of tables (write [[sensor]])");
 }
@@ -314,15 +364,15 @@ TEST(RobotConfig, RefusesAnExperimentInItsPlace) {
 TEST(RobotConfig, RefusesNamesThatCannotStandInFilesOrTopics) {
   for (const std::string name : {"a/1", "a b", ".a", "\\u00e4"}) {
     const std::string quoted = '"' + name + '"';
-    for (const auto& [from, place] :
-         {std::pair("\"sole\"\nlink", ":8: site[0].name: '"),
-          std::pair("\"left\"\ninterface", ":28: bus[0].name: '"),
-          std::pair("\"hip_board\"\nbus", ":31: board[0].name: '"),
-          std::pair("\"foot_ft\"\ntype", ":53: sensor[0].name: '")}) {
+    for (const auto& [from, place] : {std::pair("\"sole\"\nlink", ":8: site[0].name: '"),
+                                      std::pair("\"left\"\ninterface", ":28: bus[0].name: '"),
+                                      std::pair("\"hip_board\"\nbus", ":31: board[0].name: '"),
+                                      std::pair("\"foot_ft\"\ntype", ":53: sensor[0].name: '")}) {
       const std::string old = from;
       const std::string text = with(old, quoted + old.substr(old.find('\n')));
       EXPECT_NE(errors_of(text).find("robots/leg.toml" + std::string(place)), std::string::npos)
-          << name << " " << place << "\n" << errors_of(text);
+          << name << " " << place << "\n"
+          << errors_of(text);
     }
   }
   expect_error(with("\"foot_ft\"", "\"foot-ft\""),

@@ -402,10 +402,12 @@ TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error()[0].to_string(),
             (folder_ / "robot.toml").string() +
-                ":22: joint.elbow.min_position_rad: neither this file nor the description gives a "
+                ":22: joint.elbow: neither this file nor the description gives a "
                 "limit (the joint at " +
-                (folder_ / "arm.urdf").string() + ":4 has no <limit>) (set min_position_rad)");
-  EXPECT_EQ(none.error().size(), 4u) << "each of the four limits";
+                (folder_ / "arm.urdf").string() +
+                ":4 has no <limit>) (set min_position_rad, "
+                "max_position_rad, max_velocity_rad_s and max_torque_Nm)");
+  EXPECT_EQ(none.error().size(), 1u) << "one <limit> is missing";
   const auto given =
       read_robot(write("robot.toml", replaced(kRobot, "board = \"board\"",
                                               "board = \"board\"\nmin_position_rad = -2\n"
@@ -413,6 +415,27 @@ TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
                                               "max_torque_Nm = 4")));
   ASSERT_TRUE(given.has_value()) << given.error()[0].to_string();
   EXPECT_EQ(given->config.joints[0].min_position_rad, -2.0);
+}
+
+TEST_F(ExperimentFiles, ReportAWrongMassOfALinkWithoutWhatFollowsForItsInertia) {
+  write("arm.urdf", kUrdf);
+  const auto robot = read_robot(
+      write("robot.toml", replaced(kRobot, "[actuator.motor]",
+                                   "[model.link.upper]\nmass_kg = -2\n"
+                                   "inertia_kg_m2 = [1, 0, 0, 1, 0, 1.5]\n[actuator.motor]")));
+  ASSERT_FALSE(robot.has_value());
+  ASSERT_EQ(robot.error().size(), 1u) << robot.error()[1].to_string();
+  EXPECT_EQ(robot.error()[0].key, "model.link.upper.mass_kg");
+}
+
+TEST_F(ExperimentFiles, ReportControllersInATableOfAnotherNameOnce) {
+  write("arm.urdf", kUrdf);
+  write("robot.toml", kRobot);
+  const auto e =
+      read_experiment(write("x.toml", replaced(kExperiment, "[[controller]]", "[[controllers]]")));
+  ASSERT_FALSE(e.has_value());
+  ASSERT_EQ(e.error().size(), 1u) << e.error()[1].to_string();
+  EXPECT_EQ(e.error()[0].hint, "did you mean 'controller'?");
 }
 
 TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
