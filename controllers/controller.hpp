@@ -26,16 +26,21 @@ namespace tandem {
 class ControllerSetup {
  public:
   ControllerSetup(const hal::RobotConfig& robot_in, const tandem_kernels* kernels_in,
-                  std::int64_t period_ns_in, TomlTable parameters_in)
+                  std::int64_t period_ns_in, TomlTable parameters_in,
+                  std::span<const double> start_position_rad_in = {})
       : robot(robot_in),
         kernels(kernels_in),
         period_ns(period_ns_in),
-        parameters(std::move(parameters_in)) {}
+        parameters(std::move(parameters_in)),
+        start_position_rad(start_position_rad_in) {}
 
   const hal::RobotConfig& robot;  ///< joints and sensors in the image's order, postures, limits
   const tandem_kernels* kernels;  ///< the robot's generated model; null when it has none
   std::int64_t period_ns;         ///< the cycle's nominal period
   TomlTable parameters;           ///< [controller.parameters]; unknown keys are reported for you
+  /// Where the joints stand when the controller starts, in the image's order, as the experiment
+  /// says; empty: not known, as while a run goes on. Valid during configure().
+  std::span<const double> start_position_rad;
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop.

@@ -36,7 +36,12 @@ class JointTrajectory : public Controller {
     points_.assign(joints_.size(), Motion{});  // the measured positions, at the start
     for (TomlTable& table : tables) read_waypoint(setup, table);
     set_velocities();
-    for (std::size_t i = 1; i + 1 < times_s_.size(); ++i) check_segment(setup, tables[i], i);
+    const bool known = !setup.start_position_rad.empty();  // else it is left to the limits
+    for (std::size_t k = 0; known && k < joints_.size(); ++k) {
+      points_[k].position = setup.start_position_rad[joints_[k]];
+    }
+    for (std::size_t i = known ? 0 : 1; i + 1 < times_s_.size(); ++i)
+      check_segment(setup, tables[i], i);
     return {};
   }
 
@@ -126,30 +131,63 @@ class JointTrajectory : public Controller {
     }
   }
 
+  /// The fastest that a joint is within a segment [rad/s or m/s], and whether it stays inside.
+  struct Way {
+    double fastest = 0.0;
+    bool inside = true;
+  };
+  Way way_of(const hal::JointConfig& joint, std::size_t segment, std::size_t k) {
+    const double duration = times_s_[segment + 1] - times_s_[segment];
+    Way way;
+    for (int i = 0; i <= kSamples; ++i) {
+      const Motion now = at(segment, k, duration * i / kSamples);
+      way.fastest = std::max(way.fastest, std::abs(now.velocity));
+      way.inside = way.inside && now.position >= joint.min_position_rad &&
+                   now.position <= joint.max_position_rad;
+    }
+    return way;
+  }
+
+  /// One message for all the joints that are too fast, with the time that the slowest needs.
   void check_segment(ControllerSetup& setup, TomlTable& end, std::size_t segment) {
     const double duration = times_s_[segment + 1] - times_s_[segment];
     if (!(duration > 0.0) || beyond_) return;  // reported already
+    std::size_t too_fast = 0;
+    double worst = 1.0;  // of the limit
+    std::string text;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
-      double fastest = 0.0;
-      bool inside = true;
-      for (int i = 0; i <= kSamples; ++i) {
-        const Motion now = at(segment, k, duration * i / kSamples);
-        fastest = std::max(fastest, std::abs(now.velocity));
-        inside = inside && now.position >= joint.min_position_rad &&
-                 now.position <= joint.max_position_rad;
+      const Way way = way_of(joint, segment, k);
+      const double share = way.fastest / joint.max_velocity_rad_s;
+      if (share > 1.0) ++too_fast;
+      if (share > worst) {
+        worst = share;
+        char needs[96];
+        std::snprintf(needs, sizeof needs, "would need %.3g rad/s on the way%s, its limit is %.3g",
+                      way.fastest, segment == 0 ? " from the start" : "", joint.max_velocity_rad_s);
+        text = "joint '" + joint.name + "' " + needs;
       }
-      if (fastest > joint.max_velocity_rad_s) {
-        char text[96];
-        std::snprintf(text, sizeof text, "would need %.3g rad/s on the way, its limit is %.3g",
-                      fastest, joint.max_velocity_rad_s);
-        end.error("time_s", "joint '" + joint.name + "' " + text, "give it more time");
-      }
-      if (!inside) {
+      if (!way.inside) {
         end.error("position_rad", "joint '" + joint.name + "' leaves its limits on the way",
                   "use interpolation = \"min_jerk\", or another way-point");
       }
     }
+    if (too_fast == 0) return;
+    if (too_fast > 1) text += ", and " + std::to_string(too_fast - 1) + " more are too fast";
+    end.error("time_s", text, more_time(segment, duration * worst));
+  }
+
+  /// From rest to rest the velocity goes with one over the time.
+  [[nodiscard]] std::string more_time(std::size_t segment, double least_s) const {
+    if (through_ && segment > 0) return "give it more time";
+    char text[96];
+    const double up_s = std::ceil(1e3 * least_s) * 1e-3;
+    if (segment == 0) {
+      std::snprintf(text, sizeof text, "time_s = %g or more; and move the later ones", up_s);
+    } else {
+      std::snprintf(text, sizeof text, "give it %g s or more after the way-point before", up_s);
+    }
+    return text;
   }
 
   [[nodiscard]] Motion& point(std::size_t i, std::size_t k) noexcept {

@@ -38,7 +38,8 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
     return fail_at(name, "is one controller more than there can be",
                    "at most " + std::to_string(kMostControllers));
   }
-  auto made = configure(name, std::move(controller), std::move(parameters));
+  auto made = configure(name, std::move(controller), std::move(parameters),
+                        active ? std::span<const double>(start_rad_) : std::span<const double>());
   if (!made) return std::unexpected(made.error());
   table_[slot] = made->get();
   const ControllerSet after = active_ | only(slot);
@@ -67,7 +68,13 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(const std::s
 
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters) {
-  ControllerSetup setup(*robot_, kernels_, period_ns_, std::move(parameters));
+  return configure(name, std::move(controller), std::move(parameters), {});
+}
+
+Result<std::unique_ptr<HostedController>> ControllerHost::configure(
+    const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
+    std::span<const double> start_rad) {
+  ControllerSetup setup(*robot_, kernels_, period_ns_, std::move(parameters), start_rad);
   Status configured = hosted_call(name, [&] { return controller->configure(setup); });
   setup.parameters.finish();
   if (configured) configured = check_claims(name, setup.claims());

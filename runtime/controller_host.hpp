@@ -63,6 +63,9 @@ class ControllerHost {
 
   // Before the run.
 
+  /// Where the joints will stand when the run starts, in the image's order, for those who are added
+  /// active from now on; empty: not known.
+  void start_from(std::vector<double> position_rad) { start_rad_ = std::move(position_rad); }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
@@ -157,6 +160,9 @@ class ControllerHost {
   void archive(Archive& ar);
 
  private:
+  [[nodiscard]] Result<std::unique_ptr<HostedController>> configure(
+      const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
+      std::span<const double> start_rad);
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
@@ -185,6 +191,7 @@ class ControllerHost {
   const hal::RobotConfig* robot_;
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
+  std::vector<double> start_rad_;  // of start_from()
   std::vector<hal::JointCapabilities> capabilities_;
 
   // The loop's.

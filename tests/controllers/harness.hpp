@@ -20,13 +20,13 @@ inline std::vector<std::string> bundled_folder() {
 class Harness {
  public:
   Harness(hal::RobotConfig config, const std::string& plugin, const std::string& parameters,
-          const tandem_kernels* kernels = nullptr)
+          const tandem_kernels* kernels = nullptr, std::span<const double> start_rad = {})
       : robot(std::move(config)),
         state(robot.shape()),
         command(robot.shape()),
         loaded_(load_controller(plugin, bundled_folder())),
         document(TomlDocument::parse(parameters, "experiment.toml").value()),
-        setup(robot, kernels, time.period_ns, document.root()) {
+        setup(robot, kernels, time.period_ns, document.root(), start_rad) {
     if (!loaded_) {
       ADD_FAILURE() << loaded_.error().to_string();
       return;

@@ -111,10 +111,28 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
                        "[[waypoint]]\ntime_s = 1.5\nposition_rad = [1.0]\n"),
             "experiment.toml:6: waypoint[1].time_s: joint 'wrist' would need 3.75 rad/s on the "
-            "way, its limit is 2 (give it more time)");
+            "way, its limit is 2 (give it 0.938 s or more after the way-point before)");
   EXPECT_EQ(problem_of("interpolation = 'qintic'\n"),
             "experiment.toml:1: interpolation: 'qintic' is not one of the choices (did you mean "
             "'quintic'?)");
+}
+
+TEST(JointTrajectory, RefusesAFirstWayPointTooFarFromAKnownStart) {
+  const std::vector<double> start{1.0, -1.0, 0.1};
+  const auto problem = [&](const std::string& time_s, std::span<const double> start_rad) {
+    return test::Harness(hal::test::fake_robot(), "joint_trajectory",
+                         "joints = ['wrist', 'shoulder']\n[[waypoint]]\ntime_s = " + time_s +
+                             "\nposition_rad = [0.0, 0.0]\n",
+                         nullptr, start_rad)
+        .problem();
+  };
+  EXPECT_EQ(problem("0.05", start),
+            "experiment.toml:3: waypoint[0].time_s: joint 'shoulder' would need 37.5 rad/s on the "
+            "way from the start, its limit is 2, and 1 more are too fast (time_s = 0.938 or more; "
+            "and move the later ones)");
+  EXPECT_EQ(problem("0.938", start), "") << "the time that was said is enough";
+  EXPECT_NE(problem("0.937", start), "");
+  EXPECT_EQ(problem("0.05", {}), "") << "of a start that is not known nothing is said";
 }
 
 TEST(JointTrajectory, GoesOnFromASnapshot) {
