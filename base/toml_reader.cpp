@@ -396,6 +396,27 @@ std::vector<std::string> TomlTable::keys() const {
   return names;
 }
 
+namespace {
+
+/// `KEY = "WORD"` for a line that reads `KEY = WORD`, else empty.
+std::string quoted_line(std::string_view text, std::size_t number) {
+  for (; number > 1 && text.contains('\n'); --number) text.remove_prefix(text.find('\n') + 1);
+  text = text.substr(0, text.find_first_of("\r\n#"));
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos) return {};
+  const auto trimmed = [](std::string_view part) {
+    const std::size_t from = part.find_first_not_of(" \t");
+    return from == std::string_view::npos
+               ? std::string()
+               : std::string(part.substr(from, part.find_last_not_of(" \t") + 1 - from));
+  };
+  const std::string word = trimmed(text.substr(equals + 1));
+  if (word.empty() || word.find_first_of("\"'[]{},") != std::string::npos) return {};
+  return trimmed(text.substr(0, equals)) + " = \"" + word + "\"";
+}
+
+}  // namespace
+
 Result<TomlDocument> TomlDocument::load(const std::string& file) {
   if (file.empty()) {
     return std::unexpected(Error{"the file's name is empty", "name a .toml file", {}, 0, {}});
@@ -435,10 +456,13 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   } catch (const toml::parse_error& e) {
     const bool encoding = e.description().find("utf-8") != std::string_view::npos;
     const bool twice = e.description().find("redefine existing table") != std::string_view::npos;
+    const std::string quoted = quoted_line(text, e.source().begin.line);
+    const bool value = e.description().find("parsing value") != std::string_view::npos;
     return std::unexpected(Error{"not valid TOML: " + std::string(e.description()),
                                  encoding ? "save the file as UTF-8"
                                  : twice  ? "of several write each as [[NAME]], or remove one"
-                                          : "correct the syntax at this line",
+                                 : value && !quoted.empty() ? "a text stands in quotes: " + quoted
+                                                            : "correct the syntax at this line",
                                  file,
                                  static_cast<int>(e.source().begin.line),
                                  {}});

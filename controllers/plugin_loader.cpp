@@ -137,8 +137,9 @@ Result<LoadedController> load_controller(const std::string& name,
 Status LoadedController::open(const std::string& name) {
   library_.reset(dlopen(path_.c_str(), RTLD_NOW | RTLD_LOCAL));
   if (!library_) {
-    return refuse(name, path_, "cannot be loaded: " + std::string(dlerror()),
-                  "build it again, and link what it uses");
+    std::string why = dlerror();
+    if (why.starts_with(path_ + ": ")) why.erase(0, path_.size() + 2);  // is said of the error
+    return refuse(name, path_, "cannot be loaded: " + why, "build it again, and link what it uses");
   }
   using Entry = const ControllerPlugin* (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(library_.get(), kEntry));

@@ -101,6 +101,16 @@ TEST(TomlReader, GivesTheLineOfASyntaxError) {
   EXPECT_EQ(document.error().line, 2);
 }
 
+TEST(TomlReader, QuotesAWordThatStandsWithoutQuotes) {
+  const auto word = TomlDocument::parse("a = 1\nplugin = hold  # stays\nb = 2\n", "x.toml");
+  ASSERT_FALSE(word.has_value());
+  EXPECT_EQ(word.error().line, 2);
+  EXPECT_EQ(word.error().hint, "a text stands in quotes: plugin = \"hold\"");
+  const auto list = TomlDocument::parse("joints = [a, b]\n", "x.toml");
+  ASSERT_FALSE(list.has_value());
+  EXPECT_EQ(list.error().hint, "correct the syntax at this line");
+}
+
 TEST(TomlReader, NamesAFileThatIsNotThere) {
   const auto document = TomlDocument::load("no/such/file.toml");
   ASSERT_FALSE(document.has_value());
