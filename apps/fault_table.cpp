@@ -8,7 +8,7 @@ namespace {
 const char* reaction(hal::StopCategory category) {
   switch (category) {
     case hal::StopCategory::kCategory0: return "torque off";
-    case hal::StopCategory::kCategory1: return "stop, then torque off";
+    case hal::StopCategory::kCategory1: return "stop, torque off";
     case hal::StopCategory::kHold: return "every joint held";
     case hal::StopCategory::kWarn: return "reported";
   }
@@ -35,16 +35,15 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
 
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
-  Table table(
-      {"faults, from the first SYNC", "joint", "board", "cause", "category", "reaction", "state"});
+  // Within 100 columns: the category is that of the reaction, and in the JSON.
+  Table table({"fault at", "joint", "board", "cause", "reaction", "state"});
   table.align_left();
   for (const Json& fault : faults) {
     const bool latched = fault.value("latched", true);
     table.add({fmt::format("{:.3f} s", fault.value("time_s", 0.0)), fault.value("joint", ""),
-               fault.value("board", ""), fault.value("cause", ""), fault.value("category", ""),
-               fault.value("reaction", ""),
+               fault.value("board", ""), fault.value("cause", ""), fault.value("reaction", ""),
                latched ? std::string("latched")
-                       : fmt::format("cleared at {:.3f} s", fault["cleared_s"].get<double>())});
+                       : fmt::format("clear {:.3f} s", fault["cleared_s"].get<double>())});
   }
   table.print(out);
 }

@@ -118,7 +118,7 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   for (const log::TopicComparison& topic : comparison.topics) {
     std::string where = topic.equal() ? "none" : "one log is shorter";
     if (topic.first) {
-      where = fmt::format("message {} at {:.6f} s: {} is {:.17g} and {:.17g}", topic.first->message,
+      where = fmt::format("message {} at {:.6f} s: {} is {} and {}", topic.first->message,
                           static_cast<double>(topic.first->time_ns) * 1e-9, topic.first->signal,
                           topic.first->a, topic.first->b);
     }

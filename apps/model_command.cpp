@@ -57,7 +57,8 @@ Status info(const RobotFiles& robot, const ModelOptions& options) {
             fmt::format("{}, {} base", k.robot, k.floating_base != 0 ? "floating" : "fixed"));
   facts.add("joints", fmt::format("{} (nv {}, nq {})", k.joints, k.nv, k.nq));
   facts.add("mass", fmt::format("{:.3f} kg", k.mass_kg));
-  facts.add("sites, sensors", fmt::format("{}, {}", k.sites, k.sensors));
+  facts.add("sites, sensors",
+            fmt::format("{}, {}", robot.config.model.sites.size(), robot.config.sensors.size()));
   facts.add("kernels", fmt::format("{} ({})", library->path(), k.variant));
   facts.add("made from", fmt::format("{:.16}…", k.description_hash));
   Json json{{"robot", k.robot},

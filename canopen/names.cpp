@@ -46,7 +46,7 @@ const char* to_string(ErrorCode code) noexcept {
     case ErrorCode::kSoftware: return "device software";
     case ErrorCode::kParameter: return "parameter error";
     case ErrorCode::kPositionSensor: return "position sensor";
-    case ErrorCode::kSensorMismatch: return "encoders and spring contradict each other";
+    case ErrorCode::kSensorMismatch: return "link and motor encoder contradict each other";
     case ErrorCode::kCommunicationOverrun: return "frames were lost";
     case ErrorCode::kHeartbeatLost: return "heartbeat lost";
     case ErrorCode::kBusOffRecovered: return "recovered from bus-off";

@@ -139,8 +139,7 @@ TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
       << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint2\"\nafter_enabled_s = 1.2\n";
   const Outcome outcome = tandem("run hold.toml --duration 1 --scenario faults.toml");
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.out.find("\n\n  faults, from the first SYNC "), std::string::npos)
-      << outcome.out;
+  EXPECT_NE(outcome.out.find("\n\n  fault at "), std::string::npos) << outcome.out;
   EXPECT_NE(outcome.out.find(" joint   board    cause"), std::string::npos) << outcome.out;
 }
 
