@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -13,6 +14,7 @@
 #include "base/counted.hpp"
 #include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
+#include "model/tree.hpp"
 #include "scaffold/new_robot.hpp"
 
 namespace tandem::apps {
@@ -176,6 +178,34 @@ Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
           {"warnings", errors_json(robot.warnings)}};
 }
 
+/// The limit that every joint of a kind has, when it is a round one (1, 20, 500): such figures come
+/// with exporters, and not from a data sheet. 0: there is none.
+double common_limit(const model::Tree& tree, double model::Joint::*limit) {
+  constexpr std::size_t kFewest = 4;
+  std::size_t count = 0;
+  double common = 0.0;
+  for (const model::Joint& joint : tree.joints) {
+    if (joint.follows() || joint.type == model::JointType::kPrismatic) continue;
+    if (count++ == 0) common = joint.*limit;
+    if (!(joint.*limit == common)) return 0.0;
+  }
+  if (count < kFewest || !(common > 0.0) || !std::isfinite(common)) return 0.0;
+  const double power = std::pow(10.0, std::floor(std::log10(common)));
+  const double digit = common / power;
+  return std::abs(digit - std::round(digit)) < 1e-9 ? common : 0.0;
+}
+
+void add_placeholders(const model::Tree& tree, Facts& facts) {
+  const double velocity = common_limit(tree, &model::Joint::velocity);
+  const double effort = common_limit(tree, &model::Joint::effort);
+  if (velocity == 0.0 && effort == 0.0) return;
+  std::string what = velocity == 0.0 ? "" : fmt::format("{:g} rad/s", velocity);
+  if (effort != 0.0) what += (what.empty() ? "" : " and ") + fmt::format("{:g} Nm", effort);
+  facts.add("limits", fmt::format("every joint has {}: likely a placeholder of the description; "
+                                  "give each [[joint]] its own",
+                                  what));
+}
+
 void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
   facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
                                  counted(robot.config.joints.size(), "joint"), robot.mass_kg));
@@ -193,6 +223,7 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
               (wrench ? "force/torque at " + sensor.config.joint : "IMU at " + sensor.config.link) +
                   (sensor.guess.empty() ? "" : " (guess)"));
   }
+  add_placeholders(robot.tree, facts);
   for (const scaffold::DriveSize& drive : robot.drives) {
     facts.add("drive " + drive.actuator.name,
               fmt::format("{}, {}", counted(drive.joints.size(), "joint"), drive.remark));

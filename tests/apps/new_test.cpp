@@ -244,6 +244,25 @@ TEST_F(New, LeavesNothingBehindOfWhatIsWrong) {
   }
 }
 
+TEST_F(New, SaysThatALimitWhichEveryJointHasIsLikelyAPlaceholder) {
+  const std::string arm = read_text(TANDEM_SOURCE_DIR "/config/ur5e/ur5e.urdf");
+  write_text(folder_ / "arm.urdf", arm);
+  const std::string said = "likely a placeholder";
+  const Outcome own = tandem("new arm.urdf -o own");
+  ASSERT_EQ(own.status, 0) << own.err;
+  EXPECT_EQ(own.out.find(said), std::string::npos) << own.out;
+  std::string same = arm;
+  const std::string from = "velocity=\"3.141592653589793\"";
+  for (std::size_t at = same.find(from); at != std::string::npos; at = same.find(from)) {
+    same.replace(at, from.size(), "velocity=\"20\"");
+  }
+  write_text(folder_ / "arm.urdf", same);
+  const Outcome placeholder = tandem("new arm.urdf -o same");
+  ASSERT_EQ(placeholder.status, 0) << placeholder.err;
+  EXPECT_NE(placeholder.out.find("every joint has 20 rad/s: " + said), std::string::npos)
+      << placeholder.out;
+}
+
 TEST_F(New, SaysWhatItChoseAsJson) {
   const Outcome outcome =
       tandem("new '" TANDEM_SOURCE_DIR "/config/coman/coman.urdf' -o c --like coman --json -");
