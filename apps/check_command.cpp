@@ -8,9 +8,11 @@
 #include "apps/console.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
+#include "apps/start_torque.hpp"
 #include "apps/wrong_kind.hpp"
 #include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -114,7 +116,9 @@ Diagnostics warnings_of(const RobotFiles& robot) {
   Diagnostics warnings = robot.warnings;
   for (const hal::PostureConfig& posture : robot.config.postures) {
     if (auto error = wrong_start_height(robot, posture.name)) warnings.push_back(std::move(*error));
+    if (auto error = too_weak_at(robot, posture.name)) warnings.push_back(std::move(*error));
   }
+  if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
   return warnings;
 }
 
@@ -122,6 +126,9 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
                         Json& json) {
   const auto robot = read_robot(options.file, options.repair);
   if (!robot) return robot.error();
+  if (const auto layout = hal::can::make_pdo_layout(robot->config); !layout) {
+    return {layout.error()};
+  }
   warnings = warnings_of(*robot);
   print_warnings(warnings);
   const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
@@ -139,6 +146,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
   if (!composition) return composition.error();
   warnings = (*composition)->experiment.warnings;
+  warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
   print_warnings(warnings);
   const runtime::Experiment& e = (*composition)->experiment;
   const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});

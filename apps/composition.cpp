@@ -10,6 +10,7 @@
 #include "apps/dds_admission.hpp"
 #include "apps/loop_facts.hpp"
 #include "apps/start_height.hpp"
+#include "apps/start_torque.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
@@ -78,6 +79,14 @@ void add_controllers(Composition& c, Collector& errors) {
   errors.add(c.experiment.document.diagnostics());
 }
 
+/// Where the joints stand when the run starts, as far as the experiment says.
+std::vector<double> start_of(const runtime::Experiment& e) {
+  if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
+  if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
+  if (e.hal.backend == runtime::BackendKind::kCan) return {};
+  return std::vector<double>(e.robot.joints.size(), 0.0);
+}
+
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
 /// @return false: there are errors, and no more to find
@@ -102,6 +111,7 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
   if (c.kernels.get() == nullptr) return true;
   c.controllers =
       std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
+  c.controllers->start_from(start_of(e));
   return true;
 }
 
@@ -202,6 +212,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
     if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
     errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
   }
+  if (!is_remote) c->warnings = start_warnings(*robot, e.posture);
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
@@ -227,7 +238,9 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   }
   auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), sim);
   if (!backend) {
-    errors.add(backend.error(), e.robot.file, 0);
+    const bool of_experiment = backend.error().key == "sim.substep_ns";
+    const int line = e.document.root().table_or_empty("sim").line("substep_ns");
+    errors.add(backend.error(), of_experiment ? e.file : e.robot.file, of_experiment ? line : 0);
     return errors.give();
   }
   c->sim = backend->get();

@@ -322,6 +322,7 @@ Exit run_command(const RunOptions& options) {
   const auto composition = compose(options.experiment, overrides);
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
+  print_warnings((*composition)->warnings);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   outlive_readers();
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())

@@ -113,11 +113,12 @@ Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode
                         InteractionMode interaction) {
   const JointConfig& config = robot.joints.at(joint);
   if (capabilities_of(robot, config).can(mode, interaction)) return {};
-  Error error{.message = "this joint has no " + std::string(to_string(mode)) + " control (" +
+  Error error{.message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
                          to_string(interaction) + ")",
               .hint = "give [gains." + config.gains + "] the loop, or ask for another mode",
               .file = robot.file,
-              .key = config.name};
+              .line = robot.gains_of(config).line,
+              .key = "gains." + config.gains};
   return std::unexpected(std::move(error));
 }
 

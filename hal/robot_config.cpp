@@ -57,6 +57,7 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   model.exact_right_angles =
       table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
   model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
+  model.gravity_line = table.line("gravity_m_s2");
   TomlTable lock = table.table_or_empty("lock");
   for (const std::string& joint : lock.keys()) {
     model.lock.emplace_back(joint, lock.number(joint));
@@ -137,6 +138,7 @@ void read_contact(TomlTable& root, RobotConfig& robot) {
   if (!root.has("contact")) return;
   ContactConfig& c = robot.contact;
   TomlTable table = root.table("contact");
+  for (const std::string& key : table.keys()) c.lines.emplace(key, table.line(key));
   c.height_m = table.number_or("height_m", 0.0);
   c.stiffness_N_m = table.number("stiffness_N_m", kPositive);
   c.damping_s_m = table.number("damping_s_m", kNotNegative);

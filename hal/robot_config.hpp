@@ -50,6 +50,7 @@ struct ModelConfig {
   std::map<std::string, int> lock_lines;  ///< joint of it -> line in the TOML, for messages
   std::vector<LinkConfig> links;
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
+  int gravity_line = 0;  ///< in the TOML, for messages
   std::vector<SiteConfig> sites;
 };
 
@@ -167,6 +168,7 @@ struct BoardConfig {
   std::optional<std::uint32_t> vendor_id, product_code;
   std::optional<std::uint32_t> revision;  ///< major << 16 | minor: that major, at least that minor
   std::optional<std::uint32_t> serial;
+  int line = 0;  ///< in the TOML, for messages
 };
 
 enum class SensorType : std::uint8_t { kForceTorque, kImu };
@@ -206,6 +208,7 @@ struct ContactConfig {
   double sliding_friction = 0.0;
   double stick_velocity_m_s = 0.01;  ///< regularisation between static and sliding
   std::vector<FootConfig> feet;
+  std::map<std::string, int> lines;  ///< key -> line in the TOML, for messages
 };
 
 /// [posture.NAME]: positions by joint, in the image's order; joints not named are 0.

@@ -73,6 +73,7 @@ std::vector<std::string> read_list(TomlTable& table, const std::string& board,
 void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
                std::vector<BoardTable>& boards, RobotConfig& robot) {
   BoardConfig board = read_board(table);
+  board.line = table.line();
   board.name = read_own_name(table);
   check_unique(table, robot.boards, board.name, "board");
   board.bus = read_bus_name(table, bus);

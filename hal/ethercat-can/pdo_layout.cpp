@@ -179,18 +179,21 @@ void add_counter(NodePlan& node, PdoGroup group, WireField field, bool fd) {
   }
 }
 
-Error node_error(const NodePlan& node, const char* kind, std::string message, std::string hint) {
+Error node_error(const RobotConfig& robot, const NodePlan& node, std::string message,
+                 std::string hint) {
+  const bool board = node.board >= 0;
   return {.message = std::move(message),
           .hint = std::move(hint),
-          .file = {},
-          .key = std::string(kind) + " '" + node.name + "'"};
+          .file = robot.file,
+          .line = board ? robot.boards[static_cast<std::size_t>(node.board)].line
+                        : robot.sensors[static_cast<std::size_t>(node.sensor)].line,
+          .key = (board ? "board '" : "sensor '") + node.name + "'"};
 }
 
-Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& name,
-                                const char* kind, NodePlan& node) {
+Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& name, NodePlan& node) {
   const BusConfig* bus = robot.bus(name);
   if (bus == nullptr) {
-    return std::unexpected(node_error(node, kind, "is on the unknown bus '" + name + "'",
+    return std::unexpected(node_error(robot, node, "is on the unknown bus '" + name + "'",
                                       "name one of the [[bus]] tables"));
   }
   node.bus = static_cast<std::size_t>(bus - robot.buses.data());
@@ -205,22 +208,23 @@ Status seat_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
   std::ranges::sort(axes);
   for (std::size_t a = 0; a < axes.size(); ++a) {
     if (axes[a].first != static_cast<int>(a)) {
-      return std::unexpected(node_error(node, "board",
-                                        "axis " + std::to_string(a) + " has no joint",
+      return std::unexpected(node_error(robot, node, "axis " + std::to_string(a) + " has no joint",
                                         "number a board's axes from 0 without gaps"));
     }
     node.joints.push_back(axes[a].second);
   }
   if (axes.size() > static_cast<std::size_t>(canopen::kMaxAxes)) {
-    return std::unexpected(node_error(node, "board", "has more than 8 axes",
-                                      "move joints to another board"));
+    return std::unexpected(
+        node_error(robot, node, "has more than 8 axes", "move joints to another board"));
   }
   if (!fd && axes.size() > 1) {
     return std::unexpected(node_error(
-        node, "board",
+        robot, node,
         "has " + std::to_string(axes.size()) + " axes, and its bus is classic CAN: in frames of " +
             "8 bytes one axis takes all eight PDOs of a node",
-        "give each axis a board of its own, or set fd = true for the bus"));
+        "give each axis a board of its own, or set fd = true for the bus '" +
+            robot.buses[node.bus].name + "' (line " + std::to_string(robot.buses[node.bus].line) +
+            ")"));
   }
   return {};
 }
@@ -231,7 +235,7 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
                 .id = board.node_id,
                 .heartbeat_ms = board.heartbeat_ms,
                 .board = static_cast<int>(index)};
-  const auto bus = attach(robot, board.bus, "board", node);
+  const auto bus = attach(robot, board.bus, node);
   if (!bus) return std::unexpected(bus.error());
   const bool fd = (*bus)->fd;
   if (auto seated = seat_axes(robot, fd, node); !seated) {
@@ -251,7 +255,7 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
 Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
   const SensorConfig& sensor = robot.sensors[index];
   NodePlan node{.name = sensor.name, .id = sensor.node_id, .sensor = static_cast<int>(index)};
-  const auto bus = attach(robot, sensor.bus, "sensor", node);
+  const auto bus = attach(robot, sensor.bus, node);
   if (!bus) return std::unexpected(bus.error());
   const bool fd = (*bus)->fd;
   Packer transmit(node, PdoDirection::kTransmit, fd);
@@ -266,11 +270,11 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
   }
   if (!transmit.ok()) {
     const std::size_t most = canopen::kPdosPerNode * most_bytes(fd) / 4;
-    return std::unexpected(node_error(
-        node, "sensor",
-        "has " + std::to_string(sensor.channels()) + " channels, and four PDOs on a " +
-            (fd ? "CAN FD" : "classic CAN") + " bus carry " + std::to_string(most),
-        fd ? "split the sensor" : "move it to a bus with fd = true"));
+    return std::unexpected(
+        node_error(robot, node,
+                   "has " + std::to_string(sensor.channels()) + " channels, and four PDOs on a " +
+                       (fd ? "CAN FD" : "classic CAN") + " bus carry " + std::to_string(most),
+                   fd ? "split the sensor" : "move it to a bus with fd = true"));
   }
   node.parts = static_cast<int>(node.pdos.size());
   for (PdoPlan& pdo : node.pdos) pdo.part = static_cast<std::uint8_t>(pdo.number - 1);

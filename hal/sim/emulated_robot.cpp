@@ -57,11 +57,36 @@ std::int64_t common_tick(const hal::RobotConfig& robot, std::int64_t period_ns) 
   return tick;
 }
 
+/// The key of [contact] without whose value the sub-step would be stable, or empty.
+std::string stiffest_of_ground(const PlantConfig& config, const Plant& plant, double step_s) {
+  for (const auto& [key, value] :
+       {std::pair{"stiffness_N_m", &hal::ContactConfig::stiffness_N_m},
+        std::pair{"damping_s_m", &hal::ContactConfig::damping_s_m},
+        std::pair{"tangential_stiffness_N_m", &hal::ContactConfig::tangential_stiffness_N_m},
+        std::pair{"tangential_damping_Ns_m", &hal::ContactConfig::tangential_damping_Ns_m}}) {
+    PlantConfig without = config;
+    without.contact.*value = 0.0;
+    if (step_s <= longest_step(without, plant).seconds) return key;
+  }
+  return {};
+}
+
 // A step that cannot be stable would show as a drive's fault, far from its cause.
-Status check_step(const PlantConfig& config, const Plant& plant) {
+Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, const Plant& plant) {
   const StepLimit limit = longest_step(config, plant);
-  if (static_cast<double>(config.substep_ns) * 1e-9 <= limit.seconds) return {};
+  const double step_s = static_cast<double>(config.substep_ns) * 1e-9;
+  if (step_s <= limit.seconds) return {};
   const auto at_most = static_cast<std::int64_t>(limit.seconds * 1e9);
+  if (const std::string key = stiffest_of_ground(config, plant, step_s); !key.empty()) {
+    return std::unexpected(
+        Error{.message = "makes a sub-step of " + std::to_string(config.substep_ns) +
+                         " ns unstable at " + limit.place,
+              .hint = "lower it, or sim.substep_ns to at most " + std::to_string(at_most) +
+                      " ns in this posture",
+              .file = robot.file,
+              .line = robot.contact.lines.contains(key) ? robot.contact.lines.at(key) : 0,
+              .key = "contact." + key});
+  }
   return std::unexpected(
       Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
             .hint = "at most " + std::to_string(at_most) + " ns in this posture",
@@ -95,7 +120,8 @@ Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotCon
   if (!plant) return std::unexpected(plant.error());
   Result<Plant> body = Plant::create(*plant);
   if (!body) return std::unexpected(placed(body.error(), robot));
-  if (Status status = check_step(*plant, *body); !status) return std::unexpected(status.error());
+  if (Status status = check_step(robot, *plant, *body); !status)
+    return std::unexpected(status.error());
   Result<Sensors> sensors = Sensors::create(robot, *kernels);
   if (!sensors) return std::unexpected(sensors.error());
 

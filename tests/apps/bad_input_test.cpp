@@ -283,6 +283,84 @@ TEST_F(BadInput, APluginThatDoesNotExistIsRefusedBeforeKernelsAreBuilt) {
   expect_refused({folder_.string() + "/hold.so", "no such controller library"});
 }
 
+TEST_F(BadInput, AFileThatIsNoLibraryIsNamedOnce) {
+  edit("hold.toml", "\"hold\"", "\"./robot.toml\"");
+  const std::string err = tandem("run hold.toml").err;
+  const std::string path = folder_.string() + "/robot.toml";
+  const std::size_t first = err.find(path);
+  ASSERT_NE(first, std::string::npos) << err;
+  EXPECT_EQ(err.find(path, first + 1), std::string::npos) << err;
+}
+
+TEST_F(BadInput, AFirstWayPointTooFarFromTheStartIsRefusedWithTheTimeItNeeds) {
+  edit("trajectory.toml", "time_s = 1.5", "time_s = 0.05");
+  for (const std::string command : {"check trajectory.toml", "run trajectory.toml"}) {
+    expect_refused({"trajectory.toml:11: ", "waypoint[0].time_s: joint 'joint1' would need ",
+                    "on the way from the start", "(time_s = "},
+                   command);
+  }
+}
+
+TEST_F(BadInput, ABoardOfTwoAxesOnClassicCanIsNamedWithItsLine) {
+  edit("robot.toml", "fd = true", "fd = false");
+  for (const std::string command : {"check robot.toml", "check hold.toml", "run hold.toml"}) {
+    expect_refused({"error: robot.toml:", "board 'board_1': has 2 axes",
+                    "or set fd = true for the bus 'arm' (line "},
+                   command);
+  }
+}
+
+TEST_F(BadInput, APositionLoopThatIsEmptyIsNamedAtItsGains) {
+  const std::string text = read_text(folder_ / "robot.toml");
+  const std::size_t loop = text.find("position = {");
+  ASSERT_NE(loop, std::string::npos);
+  edit("robot.toml", text.substr(loop, text.find('}', loop) + 1 - loop), "position = {}");
+  const std::string lines = text.substr(0, text.find("[gains.motor]"));
+  expect_refused({"error: robot.toml:" + std::to_string(std::ranges::count(lines, '\n') + 1) + ": ",
+                  "gains.motor: joint 'joint1' has no position control (stiff)"});
+}
+
+TEST_F(BadInput, AGroundTooStiffForTheSubStepIsNamedAtItsStiffness) {
+  std::filesystem::remove_all(folder_);
+  std::filesystem::copy(TANDEM_SOURCE_DIR "/config/coman", folder_,
+                        std::filesystem::copy_options::recursive);
+  const std::string text = read_text(folder_ / "robot.toml");
+  const std::size_t key = text.find("\nstiffness_N_m = ") + 1;
+  edit("robot.toml", text.substr(key, text.find('\n', key) - key), "stiffness_N_m = 1e12");
+  const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(key), '\n');
+  for (const std::string command : {"check squat.toml", "run squat.toml --duration 0.05"}) {
+    expect_refused({"error: robot.toml:" + std::to_string(line + 1) +
+                        ": contact.stiffness_N_m: makes a sub-step of ",
+                    "lower it, or sim.substep_ns to at most "},
+                   command);
+  }
+}
+
+TEST_F(BadInput, GravityThatPointsUpIsWarnedOf) {
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\ngravity_m_s2 = [0, 0, 9.81]");
+  for (const std::string command : {"check robot.toml", "check hold.toml"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("model.gravity_m_s2: gravity points up"), std::string::npos)
+        << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+  }
+}
+
+TEST_F(BadInput, AJointTooWeakForItsStartPostureIsWarnedOf) {
+  EXPECT_EQ(tandem("check hold.toml").err, "");
+  edit("robot.toml", "max_torque_Nm = 2.0", "max_torque_Nm = 0.1");
+  for (const std::string command :
+       {"check robot.toml", "check hold.toml", "run hold.toml --duration 0.01 --quiet"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_NE(outcome.err.find("joint.joint1.max_torque_Nm: gravity asks "), std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.err.find(" Nm of it in the posture 'ready', and it can give 0.1"),
+              std::string::npos)
+        << outcome.err;
+  }
+}
+
 TEST_F(BadInput, APluginWithoutItsEntryPointIsRefused) {
   edit("hold.toml", "\"hold\"", "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/no_entry.so\"");
   expect_refused({"no_entry.so", "tandem_controller_plugin"});

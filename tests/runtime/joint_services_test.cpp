@@ -158,7 +158,7 @@ TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
   const auto mode = cycle.services().set_joint(
       "elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)}, kNow);
   ASSERT_FALSE(mode);
-  EXPECT_EQ(mode.error().message, "this joint has no current control (stiff)");
+  EXPECT_EQ(mode.error().message, "joint 'elbow' has no current control (stiff)");
   const auto gains = cycle.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, kNow);
   ASSERT_FALSE(gains);
   EXPECT_EQ(gains.error().message, "this joint has no current loop");
