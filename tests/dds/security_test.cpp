@@ -19,9 +19,9 @@ namespace {
 using tandem::test::eventually;
 
 /// A participant with sockets of its own, as if it were another process.
-struct Peer {
+struct Member {
   /// @param number  of Cyclone DDS's domain in this process; on the wire it is own_domain()
-  Peer(dds_domainid_t number, const Config& config) {
+  Member(dds_domainid_t number, const Config& config) {
     std::string xml = to_xml(config);
     const std::string place = "<Discovery>";
     xml.insert(xml.find(place) + place.size(),
@@ -87,9 +87,9 @@ class Security : public testing::Test {
 };
 
 TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
-  Peer one(1, secured());
-  Peer two(2, secured());
-  Peer stranger(3, test::own_config());
+  Member one(1, secured());
+  Member two(2, secured());
+  Member stranger(3, test::own_config());
   ASSERT_TRUE(one.participant.ok() && two.participant.ok() && stranger.participant.ok());
   bool there = false, back = false;
   EXPECT_TRUE(eventually([&] {
@@ -101,7 +101,7 @@ TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
     return there && back;
   }));
   // The stranger has been there as long, saw them come, and had its chance.
-  Peer other_stranger(4, test::own_config());
+  Member other_stranger(4, test::own_config());
   EXPECT_TRUE(eventually([&] {
     stranger.say();
     return other_stranger.hears(3);
@@ -125,9 +125,9 @@ TEST_F(Security, WithACertificateOfAnotherAuthorityIsAStranger) {
                             &foreign.security.governance, &foreign.security.permissions}) {
     file->insert(own.size(), "/other");
   }
-  Peer one(1, secured());
-  Peer two(2, secured());
-  Peer stranger(3, foreign);
+  Member one(1, secured());
+  Member two(2, secured());
+  Member stranger(3, foreign);
   ASSERT_TRUE(one.participant.ok() && two.participant.ok() && stranger.participant.ok());
   EXPECT_TRUE(eventually([&] {
     one.say();

@@ -164,7 +164,7 @@ TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
       (*recorder)->push(channel, state.time_ns()[0], state.bytes());
     }
     (*recorder)->wait_for_space(2048);  // the writer has taken everything
-    (void)!write(pipes[1], "x", 1);
+    (void)!::write(pipes[1], "x", 1);
     pause();
   }
   char ready = 0;

@@ -17,8 +17,6 @@ using hal::ControlMode;
 using hal::InteractionMode;
 using hal::PidLoop;
 
-constexpr RunServices::Patience kNow{0};
-
 /// The shoulder is a controller's, elbow and wrist are nobody's.
 struct JointServices : testing::Test {
   void SetUp() override {
@@ -34,7 +32,8 @@ struct JointServices : testing::Test {
   }
   [[nodiscard]] RunServices& services() const { return cycle->services(); }
   [[nodiscard]] Result<Asked> mode(const std::string& joint, ControlMode mode) const {
-    return services().set_joint(joint, {.mode = static_cast<std::int32_t>(mode)}, kNow);
+    return services().set_joint(joint, {.mode = static_cast<std::int32_t>(mode)},
+                                RunServices::Patience{0});
   }
   [[nodiscard]] JointLook look(std::size_t joint) const { return services().joints()[joint].look; }
   [[nodiscard]] static std::string text(const Result<Asked>& refused) {
@@ -80,7 +79,7 @@ TEST_F(JointServices, SetInteractionAndImpedanceTogether) {
                            {.stiffness_Nm_rad = 20.0,
                             .damping_Nms_rad = 3.0,
                             .interaction = static_cast<std::int32_t>(InteractionMode::kCompliant)},
-                           kNow));
+                           RunServices::Patience{0}));
   steps(1);
   EXPECT_EQ(look(2).interaction, static_cast<std::uint8_t>(InteractionMode::kCompliant));
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
@@ -88,9 +87,10 @@ TEST_F(JointServices, SetInteractionAndImpedanceTogether) {
 }
 
 TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1}, kNow));
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1},
+                                   RunServices::Patience{0}));
   steps(200);
-  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0}, kNow));
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0}, RunServices::Patience{0}));
   steps(1);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0);
   double before = 20.0;
@@ -108,19 +108,20 @@ TEST_F(JointServices, RefuseTheModeOfAClaimedJointAndNameItsController) {
   const std::string refused = text(mode("shoulder", ControlMode::kTorque));
   EXPECT_NE(refused.find("shoulder: is claimed by the controller 'sine'"), std::string::npos)
       << refused;
-  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
   EXPECT_TRUE(mode("shoulder", ControlMode::kTorque)) << "nobody will have it";
   steps(1);
   EXPECT_EQ(look(0).mode, static_cast<std::int8_t>(ControlMode::kTorque));
 }
 
 TEST_F(JointServices, GiveAClaimedJointTheImpedanceThatItsControllerDoesNotWrite) {
-  ASSERT_TRUE(services().set_joint("shoulder", {.stiffness_Nm_rad = 30.0}, kNow));
+  ASSERT_TRUE(
+      services().set_joint("shoulder", {.stiffness_Nm_rad = 30.0}, RunServices::Patience{0}));
   steps(150);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0);
-  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, kNow));
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
   steps(1);
-  ASSERT_TRUE(services().switch_controllers({}, {"sine"}, kNow));
+  ASSERT_TRUE(services().switch_controllers({}, {"sine"}, RunServices::Patience{0}));
   steps(150);
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0) << "a start keeps it";
 }
@@ -129,7 +130,8 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_NE(text(mode("elbwo", ControlMode::kIdle)).find("did you mean 'elbow'?"),
             std::string::npos);
   const auto stiff = [&](double value) {
-    return text(services().set_joint("elbow", {.stiffness_Nm_rad = value}, kNow));
+    return text(
+        services().set_joint("elbow", {.stiffness_Nm_rad = value}, RunServices::Patience{0}));
   };
   EXPECT_NE(stiff(201.0).find("elbow: stiffness_Nm_rad 201 is beyond the joint's limit (give 0 "
                               "to 200)"),
@@ -138,7 +140,8 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_NE(stiff(-1.0).find("beyond"), std::string::npos);
   EXPECT_NE(stiff(std::numeric_limits<double>::infinity()).find("beyond"), std::string::npos);
   const auto gain = [&](double kp) {
-    return text(services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, kNow));
+    return text(
+        services().set_gains("elbow", PidLoop::kPosition, {.kp = kp}, RunServices::Patience{0}));
   };
   EXPECT_NE(gain(-1.0).find("elbow: kp -1 is beyond"), std::string::npos);
   EXPECT_NE(gain(1e30).find("beyond the joint's limit"), std::string::npos) << "taken live before";
@@ -156,10 +159,12 @@ TEST(JointServicesOf, AJointWithoutALoopRefuseItsModeAndItsGains) {
   RobotCycle cycle({robot, backend, host, clock}, {});
   for (int i = 0; i < 50; ++i) cycle.step();
   const auto mode = cycle.services().set_joint(
-      "elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)}, kNow);
+      "elbow", {.mode = static_cast<std::int32_t>(ControlMode::kCurrent)},
+      RunServices::Patience{0});
   ASSERT_FALSE(mode);
   EXPECT_EQ(mode.error().message, "joint 'elbow' has no current control (stiff)");
-  const auto gains = cycle.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, kNow);
+  const auto gains =
+      cycle.services().set_gains("elbow", PidLoop::kCurrent, {.kp = 1.0}, RunServices::Patience{0});
   ASSERT_FALSE(gains);
   EXPECT_EQ(gains.error().message, "this joint has no current loop");
 }
@@ -172,11 +177,13 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
   RobotCycle cycle({robot, backend, host, clock}, {.settle_cycles = 50});
   for (int i = 0; i < 30; ++i) cycle.step();
   ASSERT_EQ(cycle.phase(), RunPhase::kSettling);
-  const auto mode = cycle.services().set_joint("elbow", {.mode = 3}, kNow);
+  const auto mode = cycle.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0});
   ASSERT_FALSE(mode);
   EXPECT_EQ(mode.error().hint, "ask again in the phase running");
-  EXPECT_TRUE(cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, kNow));
-  EXPECT_TRUE(cycle.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0}, kNow));
+  EXPECT_TRUE(
+      cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, RunServices::Patience{0}));
+  EXPECT_TRUE(cycle.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0},
+                                         RunServices::Patience{0}));
   cycle.step();
   EXPECT_EQ(cycle.services().joints()[1].gains[0].kd, 9.0);
   EXPECT_EQ(cycle.services().joints()[1].gains[0].kp, 200.0) << "what is not named stays";
@@ -216,9 +223,10 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
   rt::WallClock clock;
   RobotCycle cycle({robot, backend, host, clock, recorder->get()}, {.running_cycles = 100});
   for (int i = 0; i < 50; ++i) cycle.step();
-  ASSERT_TRUE(cycle.services().switch_controllers({}, {"sine"}, kNow));
-  ASSERT_TRUE(cycle.services().set_joint("elbow", {.mode = 3}, kNow));
-  ASSERT_TRUE(cycle.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0}, kNow));
+  ASSERT_TRUE(cycle.services().switch_controllers({}, {"sine"}, RunServices::Patience{0}));
+  ASSERT_TRUE(cycle.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0}));
+  ASSERT_TRUE(cycle.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0},
+                                         RunServices::Patience{0}));
   cycle.run();
   (void)(*recorder)->close();
   std::vector<std::string> texts;

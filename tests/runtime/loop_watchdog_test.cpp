@@ -15,10 +15,7 @@ using std::chrono::milliseconds;
 
 struct Watched : ::testing::Test {
   LoopWatchdog::Hooks hooks() {
-    return {.on_hang =
-                [this](bool at_work) {
-                  (at_work ? hangs : waits) += 1;
-                },
+    return {.on_hang = [this](bool at_work) { (at_work ? hangs : waits) += 1; },
             .on_return = [this] { returns += 1; },
             .on_given_up = [this] { given_up += 1; }};
   }
@@ -39,20 +36,20 @@ TEST_F(Watched, ALoopThatDoesNotLeaveItsCycleHangsAndIsGivenUpOnce) {
                               hooks());
   cycles(3);
   heartbeat.enter();
-  EXPECT_TRUE(test::eventually([&] { return given_up == 1; }));
+  EXPECT_TRUE(tandem::test::eventually([&] { return given_up == 1; }));
   EXPECT_EQ(hangs, 1);
   EXPECT_EQ(waits, 0);
   EXPECT_EQ(returns, 0);
 }
 
 TEST_F(Watched, ALoopThatComesBackIsToldAndWatchedOn) {
-  const LoopWatchdog watchdog(heartbeat, {.limit = milliseconds(30), .grace = std::chrono::hours(1)},
-                              hooks());
+  const LoopWatchdog watchdog(heartbeat,
+                              {.limit = milliseconds(30), .grace = std::chrono::hours(1)}, hooks());
   for (int i = 1; i <= 2; ++i) {
     heartbeat.enter();
-    EXPECT_TRUE(test::eventually([&] { return hangs == i; }));
+    EXPECT_TRUE(tandem::test::eventually([&] { return hangs == i; }));
     heartbeat.leave();
-    EXPECT_TRUE(test::eventually([&] { return returns == i; }));
+    EXPECT_TRUE(tandem::test::eventually([&] { return returns == i; }));
   }
   EXPECT_EQ(given_up, 0);
 }
@@ -70,7 +67,7 @@ TEST_F(Watched, AWaitIsAHangOnlyWhereItHasALimit) {
       heartbeat,
       {.limit = milliseconds(20), .wait_limit = milliseconds(40), .grace = std::chrono::hours(1)},
       hooks());
-  EXPECT_TRUE(test::eventually([&] { return waits == 1; }));
+  EXPECT_TRUE(tandem::test::eventually([&] { return waits == 1; }));
   EXPECT_EQ(hangs, 0);
 }
 

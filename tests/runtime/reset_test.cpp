@@ -19,8 +19,11 @@ using hal::StopCategory;
 
 /// Past bring-up, with faults that wait for a reset.
 struct Waiting : ::testing::Test {
-  Waiting() { start({.settle_cycles = 10, .after_stop = AfterStop::kWait,
-         .after_reset = AfterReset::kContinue}); }
+  Waiting() {
+    start({.settle_cycles = 10,
+           .after_stop = AfterStop::kWait,
+           .after_reset = AfterReset::kContinue});
+  }
   ~Waiting() override { (void)rt::take_emergency_stop(); }
 
   void start(CycleConfig config, StopCategory category = StopCategory::kCategory1,
@@ -83,7 +86,8 @@ struct Held : Waiting {
     start({.settle_cycles = 10, .after_stop = AfterStop::kWait});
     auto other = std::make_unique<test::Sine>(std::vector<std::size_t>{1});
     second = other.get();
-    EXPECT_TRUE(cycle->services().load("second", std::move(other), *TomlDocument::parse("", "x.toml"), kNoWait));
+    EXPECT_TRUE(cycle->services().load("second", std::move(other),
+                                       *TomlDocument::parse("", "x.toml"), kNoWait));
     steps(1);
   }
   void stop_and_reset() {
@@ -169,8 +173,8 @@ TEST_F(Held, AnUnloadedControllerDoesNotGoOnAndNeitherDoesTheNextInItsPlace) {
   steps(1);
   auto another = std::make_unique<test::Sine>(std::vector<std::size_t>{0});
   const test::Sine* third = another.get();
-  ASSERT_TRUE(
-      cycle->services().load("third", std::move(another), *TomlDocument::parse("", "x.toml"), kNoWait));
+  ASSERT_TRUE(cycle->services().load("third", std::move(another),
+                                     *TomlDocument::parse("", "x.toml"), kNoWait));
   steps(1);
   ASSERT_TRUE(cycle->services().go_on(kNoWait));
   steps(10);
@@ -257,8 +261,8 @@ TEST_F(Waiting, ASecondFaultIsNotedToo) {
 }
 
 TEST_F(Waiting, AJointThatOnlyWarnsIsResetToo) {
-  start({.settle_cycles = 10, .after_stop = AfterStop::kWait,
-         .after_reset = AfterReset::kContinue}, StopCategory::kWarn);
+  start({.settle_cycles = 10, .after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue},
+        StopCategory::kWarn);
   backend->faulted_joint = 1;
   steps(10);
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
@@ -330,8 +334,7 @@ TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
 
 TEST_F(Waiting, AnEmergencyStopOnRequestStopsInTheNextCycle) {
   for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1}) {
-    start({.after_stop = AfterStop::kWait,
-         .after_reset = AfterReset::kContinue});
+    start({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
     cycle->requests().emergency_stop(category);
     steps(1);
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
@@ -368,9 +371,9 @@ TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
 
 TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
   backend = std::make_unique<test::FirstOrderRobot>(robot);
-  cycle = std::make_unique<RobotCycle>(CycleParts{robot, *backend, *host, clock},
-                                       CycleConfig{.after_stop = AfterStop::kWait,
-         .after_reset = AfterReset::kContinue});
+  cycle = std::make_unique<RobotCycle>(
+      CycleParts{robot, *backend, *host, clock},
+      CycleConfig{.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
   steps(5);
   cycle->requests().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kDone);
@@ -381,8 +384,8 @@ TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
   const log::ScratchFolder folder;
   auto recorder = log::Recorder::open(folder / "a.mcap", {}, {});
   ASSERT_TRUE(recorder);
-  start({.after_stop = AfterStop::kWait,
-         .after_reset = AfterReset::kContinue}, StopCategory::kCategory1, nullptr, recorder->get());
+  start({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue},
+        StopCategory::kCategory1, nullptr, recorder->get());
   cycle->requests().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kFaulted);
   backend->reset_clears = false;

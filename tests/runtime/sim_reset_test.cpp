@@ -16,8 +16,8 @@ struct Swing : ::testing::Test {
   void begin(StopCategory on_fault, AfterReset after_reset = AfterReset::kContinue) {
     robot = tandem::test::swing_robot();
     robot.joints[0].on_fault = on_fault;
-    robot.emergency_stop = on_fault == StopCategory::kCategory0 ? on_fault
-                                                                : StopCategory::kCategory1;
+    robot.emergency_stop =
+        on_fault == StopCategory::kCategory0 ? on_fault : StopCategory::kCategory1;
     auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
                                       {.posture = "up", .release_ns = 100'000'000});
     ASSERT_TRUE(made) << made.error().to_string();
@@ -27,8 +27,8 @@ struct Swing : ::testing::Test {
                           test::parameters("amplitude_rad = 0.2")));
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, *backend, *host, clock},
-        CycleConfig{.settle_cycles = 200, .after_stop = AfterStop::kWait,
-                    .after_reset = after_reset});
+        CycleConfig{
+            .settle_cycles = 200, .after_stop = AfterStop::kWait, .after_reset = after_reset});
     until(RunPhase::kRunning);
     first_start_Nm = torque_step(50);
     steps(980);  // in full motion
@@ -175,8 +175,7 @@ TEST_F(Swing, BrakesACycleAfterAnEmergencyStopOfCategory1) {
   begin(StopCategory::kCategory1);
   cycle->requests().emergency_stop(StopCategory::kCategory1);
   steps(2);
-  EXPECT_EQ(backend->robot().board(0).axis(0).machine().motion(),
-            canopen::DriveMotion::kQuickStop);
+  EXPECT_EQ(backend->robot().board(0).axis(0).machine().motion(), canopen::DriveMotion::kQuickStop);
   steps(1100);
   EXPECT_FALSE(powered());
 }
