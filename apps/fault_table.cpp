@@ -43,7 +43,7 @@ void print_faults(const Json& faults, std::FILE* out) {
     table.add({fmt::format("{:.3f} s", fault.value("time_s", 0.0)), fault.value("joint", ""),
                fault.value("board", ""), fault.value("cause", ""), fault.value("reaction", ""),
                latched ? std::string("latched")
-                       : fmt::format("clear {:.3f} s", fault["cleared_s"].get<double>())});
+                       : fmt::format("cleared at {:.3f} s", fault["cleared_s"].get<double>())});
   }
   table.print(out);
 }
