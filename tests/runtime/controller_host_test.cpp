@@ -55,7 +55,9 @@ TEST_F(ControllerHostOfFake, RefusesAModeThatTheJointLacks) {
   const Status added =
       host.add("left", std::make_unique<Sine>(joints, ControlMode::kCurrent), parameters());
   ASSERT_FALSE(added);
-  EXPECT_EQ(added.error().key, "elbow");
+  EXPECT_EQ(added.error().key, "gains.arm");
+  EXPECT_NE(added.error().message.find("joint 'elbow' has no current control"), std::string::npos)
+      << added.error().message;
 }
 
 TEST_F(ControllerHostOfFake, ReportsParametersThatTheControllerDoesNotKnow) {
