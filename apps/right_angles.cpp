@@ -6,7 +6,25 @@
 
 namespace tandem::apps {
 
+namespace {
+
+/// 1.57: perhaps meant as a right angle, and too far from it to be taken for one.
+void add_perhaps(const model::RightAngles& found, Facts& facts, Json& json) {
+  if (found.perhaps == 0) return;
+  json["perhaps_right_angles"] = {{"count", found.perhaps},
+                                  {"worst_rad", found.perhaps_worst_rad},
+                                  {"first", found.perhaps_first}};
+  facts.add("angles", fmt::format("{} in rpy, the first of {}, {} up to {:.1g} rad off a right "
+                                  "angle: taken as written",
+                                  found.perhaps, found.perhaps_first,
+                                  found.perhaps == 1 ? "is" : "are", found.perhaps_worst_rad));
+  facts.add("", "if right ones are meant, write them with all their digits");
+}
+
+}  // namespace
+
 Status add_right_angles(const RobotFiles& robot, Facts& facts, Json& json) {
+  add_perhaps(robot.right_angles, facts, json);
   if (robot.right_angles.count == 0) return {};
   hal::RobotConfig other = robot.config;
   other.model.exact_right_angles = !robot.config.model.exact_right_angles;

@@ -50,6 +50,19 @@ bool near(double off, RightAngles& found) {
   return true;
 }
 
+void note_perhaps(const tinyxml2::XMLElement& origin, double off, RightAngles& found) {
+  if (off <= kNearRightAngle_rad || off > kPerhapsRightAngle_rad) return;
+  for (const tinyxml2::XMLNode* of = origin.Parent(); found.perhaps == 0 && of != nullptr;
+       of = of->Parent()) {
+    const char* name = of->ToElement() == nullptr ? nullptr : of->ToElement()->Attribute("name");
+    if (name == nullptr) continue;
+    found.perhaps_first = name;
+    break;
+  }
+  ++found.perhaps;
+  found.perhaps_worst_rad = std::max(found.perhaps_worst_rad, off);
+}
+
 double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return (a - b).norm() / std::numbers::sqrt2;  // of small ones
 }
@@ -62,7 +75,9 @@ void look_at_rpy(tinyxml2::XMLElement* origin, bool make_exact, RightAngles& fou
   bool any = false;
   for (double& angle : *rpy) {
     const double right = 0.5 * std::numbers::pi * std::round(angle / (0.5 * std::numbers::pi));
-    if (!near(std::abs(angle - right), found)) continue;
+    const double off = std::abs(angle - right);
+    if (right != 0.0) note_perhaps(*origin, off, found);
+    if (!near(off, found)) continue;
     angle = right;
     any = true;
   }

@@ -15,11 +15,17 @@ namespace tandem::model {
 
 /// An angle is taken for a right one, written with few digits, within so much.
 inline constexpr double kNearRightAngle_rad = 1e-5;
+/// Within so much it may have been meant as one (1.57 is 8e-4 off), or measured: never changed.
+inline constexpr double kPerhapsRightAngle_rad = 2e-3;
 
 /// What a description has of them: multiples of 90 degrees in `rpy`, coordinate axes in `axis`.
 struct RightAngles {
   int count = 0;           ///< numbers or axes that are near one and not exact
   double worst_rad = 0.0;  ///< how far the furthest is off
+  // Of turns by about 90, 180 or 270 degrees that are further off.
+  int perhaps = 0;                 ///< numbers in `rpy`
+  double perhaps_worst_rad = 0.0;  ///< how far the furthest is off
+  std::string perhaps_first;       ///< the joint or link of the first
 };
 
 /// Looks at an <origin>'s rpy or an <axis>' xyz, counts what is near, and writes it exactly when

@@ -87,6 +87,19 @@ TEST(Urdf, TakesRightAnglesAsTheyAreWrittenAndExactlyOnRequest) {
   EXPECT_EQ(parse_urdf(kRobot, "arm.urdf", {})->right_angles.count, 0);
 }
 
+TEST(Urdf, CountsAnglesThatAreTooFarOffARightOneToBeTakenForIt) {
+  const std::string text = with("rpy=\"1.5707963267948966 0 0", "rpy=\"1.57 0 0.001");
+  for (const bool exact : {false, true}) {
+    const auto read = parse_urdf(text, "arm.urdf", {.exact_right_angles = exact});
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->right_angles.count, 0);
+    EXPECT_EQ(read->right_angles.perhaps, 1) << "a small turn is measured, not meant as none";
+    EXPECT_NEAR(read->right_angles.perhaps_worst_rad, 7.963e-4, 1e-7);
+    EXPECT_EQ(read->right_angles.perhaps_first, "slide");
+    EXPECT_NEAR(read->tree.joints[1].in_parent.R(1, 1), std::cos(1.57), 1e-6);
+  }
+}
+
 TEST(Urdf, GivesAContinuousJointNoLimits) {
   const auto model =
       parse_urdf(replaced(with("shoulder\" type=\"revolute", "shoulder\" type=\"continuous"),
@@ -319,9 +332,8 @@ TEST(Urdf, RefusesTwoRoots) {
 
 TEST(Urdf, RefusesALockThatCannotBe) {
   const auto lock = [](const std::string& joint, double position) {
-    return UrdfOptions{.lock = {{joint, position}},
-                       .lock_lines = {{joint, 7}},
-                       .overrides_file = "robot.toml"};
+    return UrdfOptions{
+        .lock = {{joint, position}}, .lock_lines = {{joint, 7}}, .overrides_file = "robot.toml"};
   };
   expect_error(kRobot,
                "robot.toml:7: model.lock.slid: the description has no joint 'slid' to lock "
