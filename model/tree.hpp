@@ -69,6 +69,15 @@ struct Joint {
   }
 };
 
+/// One <collision> of a link.
+struct Shape {
+  enum class Kind : std::uint8_t { kBox, kSphere, kCylinder, kCapsule, kMesh } kind = Kind::kMesh;
+  /// Box: edges. Sphere: radius in x. Cylinder: radius in x, length in z. Capsule: the same, its
+  /// two caps beyond the length. Mesh, and what has no usable figures: 0.
+  Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
+  Placement in_link;  ///< its own frame in the link's: a cylinder lies along z
+};
+
 /// What moves as one piece: a link and all that is fixed to it.
 struct Body {
   std::string name;  ///< of the link whose frame is the body's frame
@@ -84,6 +93,7 @@ struct Link {
   int parent = -1;    ///< link; smaller than its own index; -1: the root
   std::string joint;  ///< from the parent to it, moving or fixed; empty: the root
   int moving = -1;    ///< index in `joints` when that joint moves, else -1
+  std::vector<Shape> shapes{};  ///< of no weight in the dynamics
 };
 
 /// Joints, bodies and links stand in the model's order: depth first from the root, the children

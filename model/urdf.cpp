@@ -19,6 +19,7 @@
 #include "model/urdf_outline.hpp"
 #include "model/urdf_override.hpp"
 #include "model/urdf_repair.hpp"
+#include "model/urdf_shapes.hpp"
 
 namespace tandem::model {
 namespace {
@@ -324,7 +325,15 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
   }
   const auto model = parse_with_urdfdom(outline.text);
   if (!model) return std::unexpected(one_error(model.error().message, {}, file));
-  return Builder(outline, options, file).run(**model);
+  auto read = Builder(outline, options, file).run(**model);
+  if (!read) return read;
+  const auto shapes = collision_shapes(text);
+  for (Link& link : read->tree.links) {
+    if (const auto found = shapes.find(link.name); found != shapes.end()) {
+      link.shapes = found->second;
+    }
+  }
+  return read;
 }
 
 std::expected<UrdfModel, Diagnostics> read_urdf(const std::string& file,

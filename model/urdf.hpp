@@ -58,9 +58,10 @@ inline constexpr const char* kRepaired =
 
 /// Understands revolute, continuous, prismatic and fixed joints, and a floating one from a root
 /// without mass, which is left out: its child is then the floating base. A link without mass, or
-/// fixed to another, becomes part of that link's body. Visuals and collisions are not looked at,
-/// nor is the inertia of what is fixed to the world. A moving joint's limits are NaN where the
-/// description gives none or reversed, negative or zero ones.
+/// fixed to another, becomes part of that link's body. Visuals are not looked at, nor is the
+/// inertia of what is fixed to the world; collision shapes are taken as far as they can be read.
+/// A moving joint's limits are NaN where the description gives none or reversed, negative or zero
+/// ones.
 ///
 /// Errors, all of them at once as far as the text can be understood:
 ///   - the file is missing, unreadable, cut off, no XML, no <robot>;

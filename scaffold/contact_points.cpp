@@ -67,7 +67,8 @@ Candidate candidate(const Shape& shape, const model::Placement& link) {
   const model::Placement at = link * shape.in_link;
   switch (shape.kind) {
     case Shape::Kind::kBox: return box(shape, at);
-    case Shape::Kind::kCylinder: return cylinder(shape, at);
+    case Shape::Kind::kCylinder:
+    case Shape::Kind::kCapsule: return cylinder(shape, at);
     case Shape::Kind::kSphere: return {{at.p}, Vector3d::UnitZ(), shape.size_m.x()};
     case Shape::Kind::kMesh: break;
   }

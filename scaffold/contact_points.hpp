@@ -5,10 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "scaffold/outfit.hpp"
+#include "model/tree.hpp"
 #include "scaffold/posed.hpp"
 
 namespace tandem::scaffold {
+
+using model::Shape;
 
 /// In W. A lone ball has one point, its centre, and a radius.
 struct ContactPatch {

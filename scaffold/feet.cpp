@@ -76,7 +76,7 @@ double leg_length(const Tree& tree, const Posed& neutral, int body) {
 }
 
 /// Shapes of the links called foot, sole, toe or ankle; without any, of the whole body.
-ContactPatch patch_of(const Tree& tree, const Outfit& outfit, const Posed& neutral, int body,
+ContactPatch patch_of(const Tree& tree, const Posed& neutral, int body,
                       int& link) {
   for (const int least : {1, 0}) {
     std::vector<Shape> shapes;
@@ -84,10 +84,8 @@ ContactPatch patch_of(const Tree& tree, const Outfit& outfit, const Posed& neutr
     for (std::size_t i = 0; i < tree.links.size(); ++i) {
       const model::Link& one = tree.links[i];
       if (one.body != body || foot_word(one.name) < least) continue;
-      const auto found = outfit.shapes.find(one.name);
-      if (found == outfit.shapes.end()) continue;
-      if (shapes.empty()) link = static_cast<int>(i);
-      for (const Shape& shape : found->second) {
+      if (shapes.empty() && !one.shapes.empty()) link = static_cast<int>(i);
+      for (const Shape& shape : one.shapes) {
         shapes.push_back(shape);
         placements.push_back(neutral.link(static_cast<int>(i)));
       }
@@ -125,11 +123,11 @@ void use_sole_link(const Tree& tree, const Posed& neutral, Foot& foot, ContactPa
   }
 }
 
-Foot make_foot(const Tree& tree, const Outfit& outfit, const Posed& neutral, int body) {
+Foot make_foot(const Tree& tree, const Posed& neutral, int body) {
   Foot foot;
   foot.body = body;
   foot.link = best_link(tree, body);
-  ContactPatch patch = patch_of(tree, outfit, neutral, body, foot.link);
+  ContactPatch patch = patch_of(tree, neutral, body, foot.link);
   if (patch.points.empty()) {
     patch = equivalent_sole(neutral.body(body) * tree.bodies[body].inertia,
                             neutral.origin(body - 1), leg_length(tree, neutral, body));
@@ -154,11 +152,11 @@ Foot make_foot(const Tree& tree, const Outfit& outfit, const Posed& neutral, int
 
 }  // namespace
 
-std::vector<Foot> find_feet(const Tree& tree, const Outfit& outfit, const Posed& neutral,
+std::vector<Foot> find_feet(const Tree& tree, const Posed& neutral,
                             FeetBy by) {
   std::vector<Foot> feet;
   for (const int body : by == FeetBy::kName ? named_feet(tree) : lowest_ends(tree, neutral)) {
-    feet.push_back(make_foot(tree, outfit, neutral, body));
+    feet.push_back(make_foot(tree, neutral, body));
   }
   return feet;
 }

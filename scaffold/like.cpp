@@ -114,7 +114,7 @@ class Chooser {
   Chooser(const Like& like, const NewRobot& robot, double scale)
       : like_(like), scale_(scale), ours_(traits_of(robot.tree, robot.limbs, robot.ahead)) {
     const Posed neutral(like.tree, neutral_posture(like.tree));
-    std::vector<Foot> feet = find_feet(like.tree, {}, neutral, FeetBy::kName);
+    std::vector<Foot> feet = find_feet(like.tree, neutral, FeetBy::kName);
     const std::vector<Limb> limbs = split_limbs(like.tree, feet, neutral, Vector3d::UnitX());
     theirs_ = traits_of(like.tree, limbs, Vector3d::UnitX());
   }

@@ -143,9 +143,9 @@ Status Maker::choose_base() {
                 "leave --base out, or make that joint fixed");
   }
   if (request_.base != Base::kFixed && heavy) {
-    robot_.feet = find_feet(robot_.tree, outfit_, posed, FeetBy::kName);
+    robot_.feet = find_feet(robot_.tree, posed, FeetBy::kName);
     if (robot_.feet.empty() && asked) {
-      robot_.feet = find_feet(robot_.tree, outfit_, posed, FeetBy::kStructure);
+      robot_.feet = find_feet(robot_.tree, posed, FeetBy::kStructure);
       for (Foot& foot : robot_.feet) {
         const std::string chosen = "no link is called a foot: this is one of the lowest ends";
         foot.guess = foot.guess.empty() ? chosen : chosen + "; " + foot.guess;

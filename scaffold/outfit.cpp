@@ -2,53 +2,10 @@
 
 #include <tinyxml2.h>
 
-#include <Eigen/Geometry>
-#include <sstream>
-
 namespace tandem::scaffold {
 namespace {
 
-using Eigen::Vector3d;
 using tinyxml2::XMLElement;
-
-Vector3d vector(const XMLElement* e, const char* name) {
-  const char* text = e == nullptr ? nullptr : e->Attribute(name);
-  Vector3d v = Vector3d::Zero();
-  std::istringstream words(text == nullptr ? "" : text);
-  words >> v.x() >> v.y() >> v.z();
-  return words && v.allFinite() ? v : Vector3d::Zero().eval();
-}
-
-model::Placement origin(const XMLElement& e) {
-  const XMLElement* at = e.FirstChildElement("origin");
-  const Vector3d rpy = vector(at, "rpy");
-  return {(Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) *
-           Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-           Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
-              .toRotationMatrix(),
-          vector(at, "xyz")};
-}
-
-Shape shape(const XMLElement& collision) {
-  Shape shape;
-  shape.in_link = origin(collision);
-  const XMLElement* geometry = collision.FirstChildElement("geometry");
-  const XMLElement* form = geometry == nullptr ? nullptr : geometry->FirstChildElement();
-  if (form == nullptr) return shape;
-  const std::string_view name = form->Name();
-  if (name == "box") {
-    shape.kind = Shape::Kind::kBox;
-    shape.size_m = vector(form, "size");
-  } else if (name == "sphere") {
-    shape.kind = Shape::Kind::kSphere;
-    shape.size_m.x() = form->DoubleAttribute("radius");
-  } else if (name == "cylinder" || name == "capsule") {
-    shape.kind = Shape::Kind::kCylinder;
-    shape.size_m = {form->DoubleAttribute("radius"), 0.0, form->DoubleAttribute("length")};
-  }
-  if (!(shape.size_m.x() > 0.0)) shape.kind = Shape::Kind::kMesh;  // no usable figures
-  return shape;
-}
 
 std::string text_of(const XMLElement& e, const char* attribute) {
   const char* text = e.Attribute(attribute);
@@ -64,21 +21,13 @@ Outfit read_outfit(std::string_view text) {
                                 ? document.FirstChildElement("robot")
                                 : nullptr;
   if (robot == nullptr) return outfit;
-  for (const XMLElement* e = robot->FirstChildElement(); e != nullptr;
-       e = e->NextSiblingElement()) {
-    const std::string_view kind = e->Name();
-    if (kind == "link") {
-      for (const XMLElement* c = e->FirstChildElement("collision"); c != nullptr;
-           c = c->NextSiblingElement("collision")) {
-        outfit.shapes[text_of(*e, "name")].push_back(shape(*c));
-      }
-    } else if (kind == "sensor") {
-      const XMLElement* parent = e->FirstChildElement("parent");
-      if (parent == nullptr) continue;
-      const std::string joint = text_of(*parent, "joint");
-      outfit.sensors.push_back({text_of(*e, "name"), text_of(*e, "type"),
-                                joint.empty() ? text_of(*parent, "link") : joint});
-    }
+  for (const XMLElement* e = robot->FirstChildElement("sensor"); e != nullptr;
+       e = e->NextSiblingElement("sensor")) {
+    const XMLElement* parent = e->FirstChildElement("parent");
+    if (parent == nullptr) continue;
+    const std::string joint = text_of(*parent, "joint");
+    outfit.sensors.push_back({text_of(*e, "name"), text_of(*e, "type"),
+                              joint.empty() ? text_of(*parent, "link") : joint});
   }
   return outfit;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hal/robot_config.hpp"
+#include "model/tree.hpp"
 #include "scaffold/outfit.hpp"
 
 namespace tandem::scaffold {
