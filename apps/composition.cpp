@@ -208,6 +208,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
   c->tree = robot->tree;
+  e.tree = std::make_shared<const model::Tree>(robot->tree);
   if (e.hal.backend == runtime::BackendKind::kSim) {
     if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
     errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);

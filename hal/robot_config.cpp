@@ -151,7 +151,9 @@ void read_contact(TomlTable& root, RobotConfig& robot) {
   }
   c.stick_velocity_m_s = table.number_or("stick_velocity_m_s", 0.01, kPositive);
   for (TomlTable& foot : table.tables("foot")) c.feet.push_back(read_foot(foot, robot));
-  if (c.feet.empty()) table.error("", "has no foot", "add [[contact.foot]] or remove [contact]");
+  if (c.feet.empty() && robot.model.floating_base) {
+    table.error("", "has no foot", "add [[contact.foot]] or remove [contact]");
+  }
   table.finish();
 }
 

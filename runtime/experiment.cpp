@@ -322,7 +322,8 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
       .truth = sim.ground_truth,
       .bus_timing = sim.bus_timing,
       .bus_latency_ns = sim.bus_latency_ns,
-      .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns))};
+      .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns)),
+      .tree = tree};
 }
 
 namespace {
@@ -415,6 +416,7 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
     if (auto robot = read_robot(e.robot_file)) {
       e.robot = std::move(robot->config);
       e.warnings = std::move(robot->description.warnings);
+      e.tree = std::make_shared<const model::Tree>(std::move(robot->description.tree));
       combine(e, root);
     } else {
       robot_errors = robot.error();

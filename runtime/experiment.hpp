@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <expected>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -98,6 +99,7 @@ struct Experiment {
   std::string robot_file;   ///< resolved against the TOML's folder
   hal::RobotConfig robot;   ///< completed from its description
   Diagnostics warnings;     ///< what was tolerated in the description
+  std::shared_ptr<const model::Tree> tree;  ///< the description; null when none was read
   double duration_s = 0.0;  ///< that controllers run, after the bring-up
   std::uint64_t seed = 1;
   std::string posture;         ///< where the robot starts; empty: every joint at 0

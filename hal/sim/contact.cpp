@@ -1,22 +1,12 @@
 #include "hal/sim/contact.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include "hal/sim/ground_law.hpp"
 
 namespace tandem::sim {
 namespace {
 
 std::unexpected<Error> bad(const char* key, const char* message, const char* hint) {
   return std::unexpected(Error{.message = message, .hint = hint, .file = {}, .key = key});
-}
-
-// Shortens (x, y) to `length` when it is longer.
-void cut_to(double length, double& x, double& y) {
-  const double square = x * x + y * y;
-  if (square <= length * length) return;
-  const double scale = length / std::sqrt(square);
-  x *= scale;
-  y *= scale;
 }
 
 }  // namespace
@@ -59,42 +49,12 @@ Result<Contact> Contact::create(const hal::ContactConfig& config, std::vector<Fo
   return contact;
 }
 
-std::array<double, 3> Contact::force(std::size_t index, const Point& point,
-                                     bool move_anchor) noexcept {
-  const double depth = config_.height_m - point.pz;
-  if (!(depth > 0.0)) {
-    if (move_anchor) touching_[index] = 0;
-    return {};
-  }
-  const double elastic = config_.stiffness_N_m * depth;
-  const double normal = std::max(0.0, elastic * (1.0 - config_.damping_s_m * point.vz));
-  const double speed2 = point.vx * point.vx + point.vy * point.vy;
-  const double stick2 = config_.stick_velocity_m_s * config_.stick_velocity_m_s;
-  const double mu =
-      config_.sliding_friction +
-      (config_.static_friction - config_.sliding_friction) * stick2 / (stick2 + speed2);
-  const double cone = mu * normal;
-  // A point that came down since the last sub-step is anchored where it is now.
-  const bool anchored = touching_[index] != 0;
-  const double kt = config_.tangential_stiffness_N_m;
-  double fx = anchored ? -kt * (point.px - anchor_x_[index]) : 0.0;
-  double fy = anchored ? -kt * (point.py - anchor_y_[index]) : 0.0;
-  cut_to(cone, fx, fy);
-  const double stretch_x = -fx / kt, stretch_y = -fy / kt;
-  fx -= config_.tangential_damping_Ns_m * point.vx;
-  fy -= config_.tangential_damping_Ns_m * point.vy;
-  cut_to(cone, fx, fy);
-  if (move_anchor) {
-    touching_[index] = 1;
-    anchor_x_[index] = point.px - stretch_x;
-    anchor_y_[index] = point.py - stretch_y;
-  }
-  energy_J_ += 0.5 * (elastic * depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
-  return {fx, fy, normal};
-}
-
 void Contact::evaluate(const double* pose, const double* twist, bool move_anchors,
                        double* wrench) noexcept TANDEM_RT {
+  const PointGround ground{.stiffness_N_m = config_.stiffness_N_m,
+                           .damping_s_m = config_.damping_s_m,
+                           .tangential_stiffness_N_m = config_.tangential_stiffness_N_m,
+                           .tangential_damping_Ns_m = config_.tangential_damping_Ns_m};
   energy_J_ = 0.0;
   for (std::size_t f = 0; f < feet_.size(); ++f) {
     const Range& foot = feet_[f];
@@ -108,13 +68,15 @@ void Contact::evaluate(const double* pose, const double* twist, bool move_anchor
       const double x = R[0] * x_[i] + R[1] * y_[i] + R[2] * z_[i];
       const double y = R[3] * x_[i] + R[4] * y_[i] + R[5] * z_[i];
       const double z = R[6] * x_[i] + R[7] * y_[i] + R[8] * z_[i];
-      const Point point{p[0] + x,
-                        p[1] + y,
-                        p[2] + z,
-                        v[0] + w[1] * z - w[2] * y,
-                        v[1] + w[2] * x - w[0] * z,
-                        v[2] + w[0] * y - w[1] * x};
-      const std::array<double, 3> force_W = force(i, point, move_anchors);
+      const PointMotion point{p[0] + x,
+                              p[1] + y,
+                              p[2] + z,
+                              v[0] + w[1] * z - w[2] * y,
+                              v[1] + w[2] * x - w[0] * z,
+                              v[2] + w[0] * y - w[1] * x};
+      const std::array<double, 3> force_W =
+          ground_force(config_, ground, point, move_anchors,
+                       {&anchor_x_[i], &anchor_y_[i], &touching_[i]}, energy_J_);
       F[0] += force_W[0];
       F[1] += force_W[1];
       F[2] += force_W[2];

@@ -64,13 +64,9 @@ class Contact {
   void archive(Archive& ar) { ar(anchor_x_, anchor_y_, touching_, wrench_W_, energy_J_); }
 
  private:
-  struct Point {
-    double px, py, pz, vx, vy, vz;
-  };
   struct Range {
     std::size_t site, wrench, begin, end;
   };
-  std::array<double, 3> force(std::size_t index, const Point& point, bool move_anchor) noexcept;
 
   hal::ContactConfig config_;
   std::vector<Range> feet_;

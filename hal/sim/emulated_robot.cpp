@@ -46,6 +46,11 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
   }
   plant.passive = robot.passive;
   plant.loops = robot.loop_specs();
+  if (config.tree != nullptr) {
+    plant.ranges = mechanical_ranges(robot, *config.tree);
+    plant.robot = &robot;
+    plant.tree = config.tree.get();
+  }
   return plant;
 }
 

@@ -18,6 +18,7 @@
 #include "hal/sim/fault_injection.hpp"
 #include "hal/sim/plant.hpp"
 #include "hal/sim/sensors.hpp"
+#include "model/tree.hpp"
 
 namespace tandem::sim {
 
@@ -36,6 +37,8 @@ struct SimRobotConfig {
   std::int64_t bus_latency_ns = 0;          ///< with it: of every node's driver or firmware
   std::int64_t answer_window_ns = 500'000;  ///< with it: after SYNC, until the master goes on
   std::vector<Fault> faults = {};  ///< a scenario: read_scenario()
+  /// The description: end stops, and links that touch the ground. Null: there are neither.
+  std::shared_ptr<const model::Tree> tree = {};
 };
 
 /// The stages of a cycle of the simulated robot, from cycle k-1 to cycle k.

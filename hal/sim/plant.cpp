@@ -72,7 +72,7 @@ Plant::Plant(const PlantConfig& config)
   const std::size_t n = kernels_->joints;
   const std::size_t size = kernels_->nq + kernels_->nv + 3 * n;
   for (auto* block : {&x_, &stage_, &k1_, &k2_, &k3_, &k4_}) block->assign(size, 0.0);
-  for (auto* block : {&tau_, &applied_tau_, &vdot_}) block->assign(kernels_->nv, 0.0);
+  for (auto* block : {&tau_, &forces_, &applied_tau_, &vdot_}) block->assign(kernels_->nv, 0.0);
   wrench_.assign(6 * kernels_->wrenches, 0.0);
   motor_rate_.assign(3 * n, 0.0);
   pose_.assign(12 * kernels_->sites, 0.0);
@@ -181,6 +181,7 @@ Status Plant::start(const PlantConfig& config) {
     q[base_q_ + passive_[j]] = config.passive[j].position_rad;
   if (Status status = close_loops(q.data()); !status) return status;
   set_state(q, v);
+  place_surroundings(config);
 
   // Springs and hoist start with the load that keeps everything at rest.
   touch_ground(x_.data(), true);
@@ -200,6 +201,22 @@ Status Plant::start(const PlantConfig& config) {
   released_ = config.held ? 0 : 1;
   if (config.held && base_q_ != 0) hold(q.data(), load);
   return {};
+}
+
+void Plant::place_surroundings(const PlantConfig& config) {
+  const bool described = config.tree != nullptr && config.robot != nullptr;
+  if (config.ranges.empty() && !described) return;
+  std::vector<JointRange> ranges = config.ranges;
+  for (JointRange& range : ranges) {
+    const std::size_t joint = joint_of(*kernels_, range.joint);
+    if (joint == kernels_->joints) continue;
+    range.lower_rad = std::min(range.lower_rad, q()[base_q_ + joint]);
+    range.upper_rad = std::max(range.upper_rad, q()[base_q_ + joint]);
+  }
+  const auto postures = postures_within(*kernels_, {q(), kernels_->nq}, ranges);
+  stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
+  if (!described) return;
+  bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
 }
 
 void Plant::hold(const double* q, std::span<const double> load) {
@@ -227,6 +244,7 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
     motors.velocity_rad_s[i] = v[base_v_ + i];
   }
   loops_.changed();
+  bodies_.lost();
   contact_fresh_ = vdot_fresh_ = 0;
 }
 
@@ -271,7 +289,7 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, contact_, hoist_, loops_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_,
+  ar(actuators_, contact_, bodies_, hoist_, loops_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_,
      pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
      diverged_rate_);
 }

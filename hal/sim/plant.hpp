@@ -13,7 +13,9 @@
 #include "base/result.hpp"
 #include "hal/robot_config.hpp"
 #include "hal/sim/actuator.hpp"
+#include "hal/sim/body_contact.hpp"
 #include "hal/sim/contact.hpp"
+#include "hal/sim/end_stops.hpp"
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/loop_forces.hpp"
 #include "model/kernels.h"
@@ -45,7 +47,13 @@ struct PlantConfig {
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
   std::vector<hal::PassiveConfig> passive;  ///< the kernels' joints without an actuator
   std::vector<model::LoopSpec> loops;
-  double rate_limit = 1000.0;               ///< any |v| beyond it [rad/s or m/s] counts as diverged
+  /// Where joints end: of the kernels' joints, any of them. A passive joint whose loop starts it
+  /// beyond its end ends there.
+  std::vector<JointRange> ranges;
+  /// What links other than soles touch the ground with; nothing without the description.
+  const hal::RobotConfig* robot = nullptr;
+  const model::Tree* tree = nullptr;
+  double rate_limit = 1000.0;  ///< any |v| beyond it [rad/s or m/s] counts as diverged
 };
 
 /// What the encoders and the power stage of one joint see. Link side, about the joint's +axis.
@@ -121,6 +129,8 @@ class Plant {
   [[nodiscard]] const double* pose() const noexcept { return pose_.data(); }
   [[nodiscard]] const LoopForces& loops() const noexcept { return loops_; }
   [[nodiscard]] const Contact& contact() const noexcept { return contact_; }
+  [[nodiscard]] const BodyContact& bodies() const noexcept { return bodies_; }
+  [[nodiscard]] const EndStops& end_stops() const noexcept { return stops_; }
   [[nodiscard]] const Actuators& actuators() const noexcept { return actuators_; }
   /// Index of joint `joint` among the kernels' joints.
   [[nodiscard]] std::size_t model_index(std::size_t joint) const noexcept { return map_[joint]; }
@@ -143,12 +153,14 @@ class Plant {
   Status place_contact(const PlantConfig& config);
   Status make_loops(const PlantConfig& config);
   Status start(const PlantConfig& config);
+  void place_surroundings(const PlantConfig& config);
   Status close_loops(double* q);
   void hold(const double* q, std::span<const double> load);
 
   void touch_ground(const double* x, bool move_anchors) noexcept;
   void rates(const double* x, MotorState motor_rate) noexcept;
-  void accelerate(const double* q, const double* v) noexcept;
+  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const double* q, const double* v) noexcept;
+  void accelerate(const double* q, const double* v, const double* forces) noexcept;
   void step_semi_implicit(double h_s) noexcept;
   void step_runge_kutta(double h_s) noexcept;
   void state_rate(const double* x, double* rate) noexcept;
@@ -166,11 +178,15 @@ class Plant {
   std::vector<double> damping_;       // model order
   Actuators actuators_;
   Contact contact_;
+  BodyContact bodies_;
+  EndStops stops_;
   Hoist hoist_;
   LoopForces loops_;
 
   std::vector<double> x_;  // q, v, th, th', i
-  std::vector<double> tau_, applied_tau_, vdot_, wrench_, motor_rate_;
+  std::vector<double> tau_;     // of actuators, joint friction and hoist
+  std::vector<double> forces_;  // with what else acts, where anything does
+  std::vector<double> applied_tau_, vdot_, wrench_, motor_rate_;
   std::vector<double> pose_, twist_, acceleration_;  // scratch of the sites kernel
   std::vector<double> stage_, k1_, k2_, k3_, k4_;    // scratch of Runge-Kutta
   std::int64_t time_ns_ = 0;

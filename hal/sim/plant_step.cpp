@@ -9,6 +9,7 @@
 namespace tandem::sim {
 
 void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
+  bodies_.evaluate(x, x + kernels_->nq, move_anchors);
   if (contact_.feet() == 0) return;
   kernels_->site_motion(x, x + kernels_->nq, vdot_.data(), pose_.data(), twist_.data(),
                         acceleration_.data());
@@ -27,19 +28,30 @@ void Plant::rates(const double* x, MotorState motor_rate) noexcept {
     hoist_.add_wrench(q, v, tau_.data());
   }
   // The same state with the same torques (elastic joints between two cycles): nothing to do.
-  const std::size_t bytes = tau_.size() * sizeof(double);
-  if (vdot_fresh_ != 0 && std::memcmp(tau_.data(), applied_tau_.data(), bytes) == 0) return;
-  accelerate(q, v);
-  applied_tau_ = tau_;
+  const std::vector<double>& forces = with_ends_and_ground(q, v);
+  const std::size_t bytes = forces.size() * sizeof(double);
+  if (vdot_fresh_ != 0 && std::memcmp(forces.data(), applied_tau_.data(), bytes) == 0) return;
+  accelerate(q, v, forces.data());
+  applied_tau_ = forces;
+}
+
+/// tau_ itself, to the bit, while no joint is at an end and only soles touch the ground.
+const std::vector<double>& Plant::with_ends_and_ground(const double* q, const double* v) noexcept {
+  const bool ends = stops_.touched(q + base_q_);
+  if (!ends && !bodies_.touching()) return tau_;
+  forces_ = tau_;
+  if (ends) stops_.add_torques(q + base_q_, v + base_v_, forces_.data() + base_v_);
+  if (bodies_.touching()) bodies_.add_forces(forces_.data());
+  return forces_;
 }
 
 // The loops' forces stand in the wrenches for the sensors; without them here, the tree is open.
-void Plant::accelerate(const double* q, const double* v) noexcept {
+void Plant::accelerate(const double* q, const double* v, const double* forces) noexcept {
   if (loops_.none()) {
-    return kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+    return kernels_->forward_dynamics(q, v, forces, wrench_.data(), vdot_.data());
   }
   loops_.let_go(wrench_.data());
-  kernels_->forward_dynamics(q, v, tau_.data(), wrench_.data(), vdot_.data());
+  kernels_->forward_dynamics(q, v, forces, wrench_.data(), vdot_.data());
   loops_.constrain(q, v, vdot_.data(), wrench_.data());
 }
 
@@ -64,6 +76,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
       step_semi_implicit(h_s);
     }
     if (!loops_.none()) loops_.project(x_.data(), x_.data() + kernels_->nq);
+    bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
     actuators_.finish_step(h_s, q() + base_q_, v() + base_v_, motor(x_.data()));
     hoist_.advance(step_ns);

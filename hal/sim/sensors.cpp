@@ -61,10 +61,12 @@ void Sensors::sample(const Plant& plant, std::span<double> channels) noexcept TA
     kernels.site_motion(plant.q(), plant.v(), plant.vdot(), pose_.data(), twist_.data(),
                         acceleration_.data());
   }
-  for (const Slot& slot : slots_) {
+  for (std::size_t s = 0; s < slots_.size(); ++s) {
+    const Slot& slot = slots_[s];
     double* out = channels.data() + slot.offset;
     if (slot.type == hal::SensorType::kForceTorque) {
       std::copy_n(wrenches_.data() + 6 * slot.index, 6, out);
+      plant.bodies().add_beyond(s, out);
     } else {
       sample_imu(kernels, slot.index, out);
     }

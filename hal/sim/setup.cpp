@@ -1,6 +1,7 @@
 #include "hal/sim/setup.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/sensors.hpp"
@@ -96,6 +97,33 @@ model::ModelSpec model_spec(const hal::RobotConfig& robot) {
     if (inertia > 0.0) spec.armature.emplace_back(joint.name, inertia);
   }
   return spec;
+}
+
+std::vector<JointRange> mechanical_ranges(const hal::RobotConfig& robot, const model::Tree& tree) {
+  std::vector<JointRange> ranges;
+  for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+    const model::Joint& joint = tree.joints[j];
+    if (joint.follows()) continue;
+    JointRange range{.joint = joint.name};
+    if (!std::isnan(joint.lower)) range.lower_rad = joint.lower;
+    if (!std::isnan(joint.upper)) range.upper_rad = joint.upper;
+    if (const int at = robot.joint_index(joint.name); at >= 0) {
+      const hal::JointConfig& config = robot.joints[static_cast<std::size_t>(at)];
+      range.effort_Nm = config.max_torque_Nm;
+      const bool unknown = std::isnan(joint.lower);
+      range.lower_rad =
+          unknown ? config.min_position_rad : std::min(joint.lower, config.min_position_rad);
+      range.upper_rad =
+          unknown ? config.max_position_rad : std::max(joint.upper, config.max_position_rad);
+    }
+    for (const model::Joint& follower : tree.joints) {
+      if (follower.leader != static_cast<int>(j)) continue;
+      range.lower_rad = std::max(range.lower_rad, follower.leaders_range().lower);
+      range.upper_rad = std::min(range.upper_rad, follower.leaders_range().upper);
+    }
+    ranges.push_back(range);
+  }
+  return ranges;
 }
 
 std::vector<std::size_t> joints_of(const hal::RobotConfig& robot, const hal::BoardConfig& board) {

@@ -7,13 +7,21 @@
 
 #include "firmware_emu/setup.hpp"
 #include "hal/robot_config.hpp"
+#include "hal/sim/apparent_inertia.hpp"
 #include "model/model_spec.hpp"
+#include "model/tree.hpp"
 
 namespace tandem::sim {
 
 /// What the robot's kernels are generated from: its sites, its sensors (an IMU is a site, see
 /// imu_site; a loop's sites take wrenches), and the rotors of rigid actuators as armature.
 [[nodiscard]] model::ModelSpec model_spec(const hal::RobotConfig& robot);
+
+/// Where the joints end: at the description's limits, or at robot.toml's where these lie further
+/// out or the description has none; a leader earlier, where a joint that mimics it ends. A
+/// continuous joint has no end. With the effort of the joint's drive.
+[[nodiscard]] std::vector<JointRange> mechanical_ranges(const hal::RobotConfig& robot,
+                                                        const model::Tree& tree);
 
 /// Indices in `robot.joints` of a board's axes, by axis.
 [[nodiscard]] std::vector<std::size_t> joints_of(const hal::RobotConfig& robot,

@@ -19,9 +19,11 @@ inline constexpr std::uint64_t kRunning = 1500;  // cycles: into the first desce
 /// The experiment, composed and ready to run; for its own duration when `cycles` is 0.
 struct Squat {
   explicit Squat(const std::string& robot, std::uint64_t cycles = kRunning, double rate = 0.0,
-                 log::Recorder* recorder = nullptr, bool bus_timing = false) {
-    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot +
-                                "/squat.toml");
+                 log::Recorder* recorder = nullptr, bool bus_timing = false,
+                 const std::string& name = "squat", const CycleConfig& config = {})
+      : wanted(config) {
+    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/" + name +
+                                ".toml");
     if (!read) {
       ADD_FAILURE() << read.error().at(0).to_string();
       return;
@@ -48,9 +50,10 @@ struct Squat {
     auto made = sim::SimRobot::create(e.robot, kernels.get(), e.sim_robot_config());
     ASSERT_TRUE(made) << made.error().to_string();
     backend = std::move(*made);
-    const CycleConfig config{.loop = e.loop,
-                             .running_cycles = cycles == 0 ? e.cycles() : cycles,
-                             .settle_cycles = e.settle_cycles()};
+    CycleConfig config = wanted;
+    config.loop = e.loop;
+    config.running_cycles = cycles == 0 ? e.cycles() : cycles;
+    config.settle_cycles = e.settle_cycles();
     cycle = std::make_unique<RobotCycle>(
         CycleParts{e.robot, *backend, *host, clock, recorder, &backend->truth()}, config);
   }
@@ -60,6 +63,7 @@ struct Squat {
     ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
   }
 
+  CycleConfig wanted;  ///< but for what the experiment says
   std::unique_ptr<Experiment> experiment;
   model::KernelLibrary kernels;
   rt::WallClock clock;

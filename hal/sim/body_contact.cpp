@@ -1,0 +1,358 @@
+#include "hal/sim/body_contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tandem::sim {
+namespace {
+
+constexpr double kStiffShare = 0.4, kDampedShare = 0.3;  // of 1 / h and m / h
+constexpr double kTogether = 4.0;                        // points on the ground at once
+// What the bound on the way leaves out: projections onto closed loops, stages of Runge-Kutta.
+constexpr double kMargin_m = 0.001;
+
+Vec3 vec3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Mat3 mat3(const Eigen::Matrix3d& R) {
+  return {R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)};
+}
+Vec3 cross(const Vec3& a, const Vec3& b) noexcept {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vec3 sum(const Vec3& a, const Vec3& b) noexcept { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+double dot(const Vec3& a, const double* b) noexcept {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Mat3 product(const Mat3& A, const Mat3& B) noexcept {
+  Mat3 C{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 3; ++c)
+      C[3 * r + c] = A[3 * r] * B[c] + A[3 * r + 1] * B[3 + c] + A[3 * r + 2] * B[6 + c];
+  return C;
+}
+/// By `angle` about the unit vector `k` (Rodrigues).
+Mat3 turn(const Vec3& k, double angle) noexcept {
+  const double c = std::cos(angle), s = std::sin(angle), t = 1.0 - c;
+  return {t * k[0] * k[0] + c,        t * k[0] * k[1] - s * k[2], t * k[0] * k[2] + s * k[1],
+          t * k[0] * k[1] + s * k[2], t * k[1] * k[1] + c,        t * k[1] * k[2] - s * k[0],
+          t * k[0] * k[2] - s * k[1], t * k[1] * k[2] + s * k[0], t * k[2] * k[2] + c};
+}
+double length_1(const double* v) noexcept {
+  return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
+}
+
+}  // namespace
+
+BodyContact::BodyContact(const hal::RobotConfig& robot, const model::Tree& tree,
+                         const tandem_kernels& kernels, const double* q,
+                         std::span<const Posture> postures, std::int64_t substep_ns)
+    : config_(robot.contact), floating_(tree.floating_base) {
+  if (!(config_.stiffness_N_m > 0.0)) return;
+  add_joints(tree, kernels);
+  generalized_.assign(kernels.nv, 0.0);
+  const std::vector<double> rest(kernels.nv, 0.0);
+  place(q, rest.data());
+  add_groups(tree, link_points(robot, tree));
+  add_reach(tree);
+  add_sensors(robot, tree);
+  fit(kernels, postures, substep_ns);
+  anchor_x_.assign(points_.size(), 0.0);
+  anchor_y_.assign(points_.size(), 0.0);
+  anchored_.assign(points_.size(), 0);
+  groups_force_.assign(6 * groups_.size(), 0.0);
+}
+
+void BodyContact::add_joints(const model::Tree& tree, const tandem_kernels& kernels) {
+  for (const model::Joint& joint : tree.joints) {
+    const model::Joint& own =
+        joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
+    joints_.push_back({.parent = static_cast<std::size_t>(joint.parent),
+                       .coordinate = joint_of(kernels, own.name),
+                       .multiplier = joint.multiplier,
+                       .offset = joint.offset,
+                       .prismatic = joint.type == model::JointType::kPrismatic,
+                       .axis = vec3(joint.axis),
+                       .p = vec3(joint.in_parent.p),
+                       .R = mat3(joint.in_parent.R)});
+  }
+  bodies_.assign(joints_.size() + 1, {});
+  bodies_[0].R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  body_force_.assign(6 * bodies_.size(), 0.0);
+  for (const model::Link& link : tree.links) names_.push_back(link.name);
+}
+
+void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoints>& points) {
+  for (const LinkPoints& one : points) {
+    const model::Link& link = tree.links[one.link];
+    const auto body = static_cast<std::size_t>(link.body);
+    Group group{one.link, body, points_.size(), points_.size(), {}, 0.0};
+    BuriedLink buried{link.name, 0.0, one.guessed};
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& point : one.in_body_m) {
+      const Vec3 at = rotate(bodies_[body].R.data(), vec3(point).data());
+      const double depth = config_.height_m - bodies_[body].p[2] - at[2];
+      buried.depth_m = std::max(buried.depth_m, depth);
+      if (depth > 0.0) continue;
+      points_.push_back(vec3(point));
+      center += point;
+    }
+    if (buried.depth_m > 0.0) buried_.push_back(buried);
+    group.end = points_.size();
+    if (group.end == group.begin) continue;
+    center /= static_cast<double>(group.end - group.begin);
+    group.center = vec3(center);
+    for (std::size_t i = group.begin; i < group.end; ++i) {
+      const Eigen::Vector3d point(points_[i].data());
+      group.radius = std::max(group.radius, (point - center).norm());
+    }
+    groups_.push_back(group);
+  }
+}
+
+/// How far any point of a body, or beyond it, is from the body's origin, in any posture.
+void BodyContact::add_reach(const model::Tree& tree) {
+  std::vector<double> reach(bodies_.size(), 0.0);
+  for (const Group& group : groups_) {
+    const double at = Eigen::Vector3d(group.center.data()).norm() + group.radius;
+    reach[group.body] = std::max(reach[group.body], at);
+  }
+  reach_m_.assign(generalized_.size() - (floating_ ? 6 : 0), 0.0);
+  for (std::size_t j = joints_.size(); j-- > 0;) {
+    const Joint& joint = joints_[j];
+    const double beyond = reach[j + 1];
+    if (!(beyond > 0.0)) continue;
+    const model::Joint& described = tree.joints[j];
+    double to_parent = beyond + Eigen::Vector3d(joint.p.data()).norm();
+    if (joint.prismatic) {
+      to_parent += std::max(std::abs(described.lower), std::abs(described.upper));  // NaN, too
+    }
+    reach[joint.parent] = std::max(reach[joint.parent], to_parent);
+    reach_m_[joint.coordinate] += std::abs(joint.multiplier) * (joint.prismatic ? 1.0 : beyond);
+  }
+  base_reach_m_ = reach[0];
+}
+
+void BodyContact::add_sensors(const hal::RobotConfig& robot, const model::Tree& tree) {
+  sensors_.resize(robot.sensors.size());
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    const hal::SensorConfig& sensor = robot.sensors[s];
+    const int first = tree.child_link_index(sensor.joint), frame = tree.link_index(sensor.link);
+    if (sensor.type != hal::SensorType::kForceTorque || first < 0 || frame < 0) continue;
+    const model::Link& link = tree.links[static_cast<std::size_t>(frame)];
+    Beyond& beyond = sensors_[s];
+    beyond = {static_cast<std::size_t>(link.body), mat3(link.in_body.R), vec3(link.in_body.p), {}};
+    for (const Group& group : groups_) {
+      int at = static_cast<int>(group.link);
+      while (at >= 0 && at != first) at = tree.links[static_cast<std::size_t>(at)].parent;
+      beyond.group.push_back(at == first ? 1 : 0);
+    }
+  }
+}
+
+void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> postures,
+                      std::int64_t substep_ns) {
+  const double h_s = static_cast<double>(substep_ns) * 1e-9;
+  const std::size_t base = floating_ ? 6 : 0;
+  const std::vector<double> rest(kernels.nv, 0.0);
+  std::vector<double> mass(points_.size(), std::numeric_limits<double>::infinity());
+  for (const Posture& posture : postures) {
+    place(posture.q.data(), rest.data());
+    for (const Group& group : groups_) {
+      for (std::size_t i = group.begin; i < group.end; ++i) {
+        Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, kernels.nv);
+        const Vec3 lever = rotate(bodies_[group.body].R.data(), points_[i].data());
+        const Vec3 at = sum(bodies_[group.body].p, lever);
+        const auto to = [&at](const Body& body) -> Vec3 {
+          return {at[0] - body.p[0], at[1] - body.p[1], at[2] - body.p[2]};
+        };
+        for (std::size_t body = group.body; body > 0; body = joints_[body - 1].parent) {
+          const Joint& joint = joints_[body - 1];
+          const Vec3& axis = bodies_[body].axis;
+          const Vec3 way = joint.prismatic ? axis : cross(axis, to(bodies_[body]));
+          J.col(static_cast<Eigen::Index>(base + joint.coordinate)) +=
+              joint.multiplier * Eigen::Vector3d(way.data());
+        }
+        for (std::size_t axis = 0; axis < base / 2; ++axis) {
+          const Mat3& R = bodies_[0].R;
+          const Vec3 along{R[axis], R[3 + axis], R[6 + axis]};
+          J.col(static_cast<Eigen::Index>(axis)) = Eigen::Vector3d(along.data());
+          J.col(static_cast<Eigen::Index>(3 + axis)) =
+              Eigen::Vector3d(cross(along, to(bodies_[0])).data());
+        }
+        mass[i] = std::min(mass[i], point_mass(posture, J));
+      }
+    }
+  }
+  for (const double m : mass) {
+    const double stiffest = m * (kStiffShare / h_s) * (kStiffShare / h_s) / kTogether;
+    const double damped = kDampedShare * m / h_s / kTogether;
+    ground_.push_back(
+        {.stiffness_N_m = std::min(config_.stiffness_N_m, stiffest),
+         .damping_s_m = config_.damping_s_m,
+         .most_damping_Ns_m = damped,
+         .tangential_stiffness_N_m = std::min(config_.tangential_stiffness_N_m, stiffest),
+         .tangential_damping_Ns_m = std::min(config_.tangential_damping_Ns_m, damped)});
+  }
+}
+
+void BodyContact::place(const double* q, const double* v) noexcept {
+  const double* at = q;
+  const double* rate = v;
+  if (floating_) {
+    Body& base = bodies_[0];
+    base.R = rotation_of(q + 3);
+    base.p = {q[0], q[1], q[2]};
+    base.v = rotate(base.R.data(), v);
+    base.w = rotate(base.R.data(), v + 3);
+    at += 7;
+    rate += 6;
+  }
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const Joint& joint = joints_[j];
+    const Body& parent = bodies_[joint.parent];
+    Body& body = bodies_[j + 1];
+    const double position = joint.multiplier * at[joint.coordinate] + joint.offset;
+    const double speed = joint.multiplier * rate[joint.coordinate];
+    const Mat3 seat = product(parent.R, joint.R);
+    body.axis = rotate(seat.data(), joint.axis.data());
+    body.R = joint.prismatic ? seat : product(seat, turn(joint.axis, position));
+    Vec3 offset = rotate(parent.R.data(), joint.p.data());
+    body.w = parent.w;
+    Vec3 slide{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (joint.prismatic) {
+        offset[i] += position * body.axis[i];
+        slide[i] = speed * body.axis[i];
+      } else {
+        body.w[i] += speed * body.axis[i];
+      }
+    }
+    body.p = sum(parent.p, offset);
+    body.v = sum(sum(parent.v, cross(parent.w, offset)), slide);
+  }
+}
+
+void BodyContact::moved(const double* v, double h_s) noexcept TANDEM_RT {
+  if (groups_.empty()) return;
+  double speed = 0.0;
+  if (floating_) {
+    speed = length_1(v) + base_reach_m_ * length_1(v + 3);
+    v += 6;
+  }
+  for (std::size_t i = 0; i < reach_m_.size(); ++i) speed += reach_m_[i] * std::abs(v[i]);
+  step_m_ = h_s * speed;
+  clearance_m_ -= step_m_;
+}
+
+void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) noexcept TANDEM_RT {
+  touching_ = 0;
+  if (groups_.empty() || clearance_m_ > kMargin_m + 2.0 * step_m_) return;
+  place(q, v);
+  energy_J_ = 0.0;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const Group& group = groups_[g];
+    const Body& body = bodies_[group.body];
+    const double clearance = body.p[2] +
+                             dot({body.R[6], body.R[7], body.R[8]}, group.center.data()) -
+                             group.radius - config_.height_m;
+    nearest_m = std::min(nearest_m, clearance);
+    double* force = groups_force_.data() + 6 * g;
+    std::fill_n(force, 6, 0.0);
+    if (clearance < 0.0) {
+      touch(group, force, move_anchors);
+    } else if (move_anchors) {
+      std::fill(anchored_.begin() + static_cast<std::ptrdiff_t>(group.begin),
+                anchored_.begin() + static_cast<std::ptrdiff_t>(group.end), std::uint8_t{0});
+    }
+  }
+  if (move_anchors) clearance_m_ = nearest_m;
+  if (touching_ != 0) generalize();
+}
+
+void BodyContact::touch(const Group& group, double* force, bool move_anchors) noexcept {
+  const Body& body = bodies_[group.body];
+  for (std::size_t i = group.begin; i < group.end; ++i) {
+    const Vec3 lever = rotate(body.R.data(), points_[i].data());
+    const Vec3 at = sum(body.p, lever);
+    const Vec3 rate = sum(body.v, cross(body.w, lever));
+    if (at[2] < config_.height_m) ++touching_;
+    const std::array<double, 3> f =
+        ground_force(config_, ground_[i], {at[0], at[1], at[2], rate[0], rate[1], rate[2]},
+                     move_anchors, {&anchor_x_[i], &anchor_y_[i], &anchored_[i]}, energy_J_);
+    const Vec3 moment = cross(at, f);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      force[axis] += f[axis];
+      force[3 + axis] += moment[axis];
+    }
+  }
+}
+
+/// The groups' forces as generalized ones: from the tips to the base, moments about W's origin.
+void BodyContact::generalize() noexcept {
+  std::ranges::fill(generalized_, 0.0);
+  std::ranges::fill(body_force_, 0.0);
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    for (std::size_t i = 0; i < 6; ++i)
+      body_force_[6 * groups_[g].body + i] += groups_force_[6 * g + i];
+  const auto about = [](const double* force, const Vec3& p) -> Vec3 {
+    const Vec3 moved = cross(p, {force[0], force[1], force[2]});
+    return {force[3] - moved[0], force[4] - moved[1], force[5] - moved[2]};
+  };
+  double* joint_forces = generalized_.data() + (floating_ ? 6 : 0);
+  for (std::size_t j = joints_.size(); j-- > 0;) {
+    const Joint& joint = joints_[j];
+    const Body& body = bodies_[j + 1];
+    const double* force = body_force_.data() + 6 * (j + 1);
+    const Vec3 moment = about(force, body.p);
+    joint_forces[joint.coordinate] +=
+        joint.multiplier * dot(body.axis, joint.prismatic ? force : moment.data());
+    for (std::size_t i = 0; i < 6; ++i) body_force_[6 * joint.parent + i] += force[i];
+  }
+  if (!floating_) return;
+  const Vec3 force = rotate_back(bodies_[0].R.data(), body_force_.data());
+  const Vec3 moment =
+      rotate_back(bodies_[0].R.data(), about(body_force_.data(), bodies_[0].p).data());
+  std::copy(force.begin(), force.end(), generalized_.begin());
+  std::copy(moment.begin(), moment.end(), generalized_.begin() + 3);
+}
+
+void BodyContact::add_forces(double* forces) const noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < generalized_.size(); ++i) forces[i] += generalized_[i];
+}
+
+void BodyContact::add_beyond(std::size_t sensor, double* channels) const noexcept TANDEM_RT {
+  if (touching_ == 0 || sensors_[sensor].group.empty()) return;
+  const Beyond& beyond = sensors_[sensor];
+  Vec3 force{}, moment{};
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    if (beyond.group[g] == 0) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      force[i] += groups_force_[6 * g + i];
+      moment[i] += groups_force_[6 * g + 3 + i];
+    }
+  }
+  const Body& body = bodies_[beyond.body];
+  const Mat3 R = product(body.R, beyond.R);
+  const Vec3 moved = cross(sum(body.p, rotate(body.R.data(), beyond.p.data())), force);
+  for (std::size_t i = 0; i < 3; ++i) moment[i] -= moved[i];
+  const Vec3 f = rotate_back(R.data(), force.data()), m = rotate_back(R.data(), moment.data());
+  for (std::size_t i = 0; i < 3; ++i) {
+    channels[i] += f[i];
+    channels[3 + i] += m[i];
+  }
+}
+
+double BodyContact::vertical_force_N() const noexcept {
+  double force = 0.0;
+  for (std::size_t g = 0; g < groups_.size(); ++g) force += groups_force_[6 * g + 2];
+  return force;
+}
+
+bool BodyContact::touching(const std::string& link) const noexcept {
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    if (names_[groups_[g].link] == link && groups_force_[6 * g + 2] > 0.0) return true;
+  return false;
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,60 @@
+#include "hal/sim/end_stops.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::sim {
+namespace {
+
+constexpr double kGive_rad = 0.001;   // under the drive's whole effort; m of a prismatic joint
+constexpr double kStiffShare = 0.4;   // of 1 / h: the stop's frequency on the lightest link
+constexpr double kDampedShare = 0.3;  // of least / h
+
+}  // namespace
+
+EndStops::EndStops(const tandem_kernels& kernels, std::span<const JointRange> ranges,
+                   std::span<const JointInertia> inertias, std::int64_t substep_ns) {
+  const double h_s = static_cast<double>(substep_ns) * 1e-9;
+  for (const JointRange& range : ranges) {
+    const std::size_t joint = joint_of(kernels, range.joint);
+    const bool ends = std::isfinite(range.lower_rad) || std::isfinite(range.upper_rad);
+    if (joint == kernels.joints || !ends) continue;
+    const JointInertia& inertia = inertias[joint];
+    const double stiffest = inertia.least * (kStiffShare / h_s) * (kStiffShare / h_s);
+    const double stiffness = std::min(range.effort_Nm / kGive_rad, stiffest);
+    const double damping =
+        std::min(std::sqrt(stiffness * inertia.most), kDampedShare * inertia.least / h_s);
+    stops_.push_back({joint, range.lower_rad, range.upper_rad, stiffness, damping});
+  }
+}
+
+bool EndStops::touched(const double* q) const noexcept TANDEM_RT {
+  bool any = false;
+  for (const Stop& stop : stops_) any |= q[stop.joint] < stop.lower || q[stop.joint] > stop.upper;
+  return any;
+}
+
+void EndStops::add_torques(const double* q, const double* qd,
+                           double* torque_Nm) const noexcept TANDEM_RT {
+  for (const Stop& stop : stops_) {
+    const double at = q[stop.joint], rate = qd[stop.joint];
+    if (at > stop.upper) {
+      torque_Nm[stop.joint] -=
+          std::max(0.0, stop.stiffness * (at - stop.upper) + stop.damping * rate);
+    } else if (at < stop.lower) {
+      torque_Nm[stop.joint] +=
+          std::max(0.0, stop.stiffness * (stop.lower - at) - stop.damping * rate);
+    }
+  }
+}
+
+double EndStops::elastic_energy_J(const double* q) const noexcept {
+  double energy = 0.0;
+  for (const Stop& stop : stops_) {
+    const double over = std::max({0.0, q[stop.joint] - stop.upper, stop.lower - q[stop.joint]});
+    energy += 0.5 * stop.stiffness * over * over;
+  }
+  return energy;
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,85 @@
+// The force of the ground on one point. docs/simulation.md has the equations.
+// Layer: hal/sim.  Thread: any.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "hal/robot_config.hpp"
+
+namespace tandem::sim {
+
+/// What the ground is to one point, beside friction.
+struct PointGround {
+  double stiffness_N_m = 0.0;
+  double damping_s_m = 0.0;  ///< Fz = k d (1 + damping * d'), never below zero
+  double most_damping_Ns_m = std::numeric_limits<double>::infinity();  ///< of k d damping
+  double tangential_stiffness_N_m = 0.0;
+  double tangential_damping_Ns_m = 0.0;
+};
+
+/// Position and velocity of a point in W.
+struct PointMotion {
+  double px, py, pz, vx, vy, vz;
+};
+
+/// Where a point is tied to the ground.
+struct Anchor {
+  double* x;
+  double* y;
+  std::uint8_t* touching;
+};
+
+/// Shortens (x, y) to `length` when it is longer.
+inline void cut_to(double length, double& x, double& y) noexcept {
+  const double square = x * x + y * y;
+  if (square <= length * length) return;
+  const double scale = length / std::sqrt(square);
+  x *= scale;
+  y *= scale;
+}
+
+/// The ground's force on a point, in W; class Contact has the law.
+///
+/// @param move_anchor  true exactly once per sub-step, at its first evaluation
+/// @param energy_J     what the point's springs hold is added
+inline std::array<double, 3> ground_force(const hal::ContactConfig& config,
+                                          const PointGround& ground, const PointMotion& point,
+                                          bool move_anchor, const Anchor& anchor,
+                                          double& energy_J) noexcept {
+  const double depth = config.height_m - point.pz;
+  if (!(depth > 0.0)) {
+    if (move_anchor) *anchor.touching = 0;
+    return {};
+  }
+  const double elastic = ground.stiffness_N_m * depth;
+  const double damping = std::min(ground.damping_s_m, ground.most_damping_Ns_m / elastic);
+  const double normal = std::max(0.0, elastic * (1.0 - damping * point.vz));
+  const double speed2 = point.vx * point.vx + point.vy * point.vy;
+  const double stick2 = config.stick_velocity_m_s * config.stick_velocity_m_s;
+  const double mu = config.sliding_friction +
+                    (config.static_friction - config.sliding_friction) * stick2 / (stick2 + speed2);
+  const double cone = mu * normal;
+  // A point that came down since the last sub-step is anchored where it is now.
+  const bool anchored = *anchor.touching != 0;
+  const double kt = ground.tangential_stiffness_N_m;
+  double fx = anchored ? -kt * (point.px - *anchor.x) : 0.0;
+  double fy = anchored ? -kt * (point.py - *anchor.y) : 0.0;
+  cut_to(cone, fx, fy);
+  const double stretch_x = -fx / kt, stretch_y = -fy / kt;
+  fx -= ground.tangential_damping_Ns_m * point.vx;
+  fy -= ground.tangential_damping_Ns_m * point.vy;
+  cut_to(cone, fx, fy);
+  if (move_anchor) {
+    *anchor.touching = 1;
+    *anchor.x = point.px - stretch_x;
+    *anchor.y = point.py - stretch_y;
+  }
+  energy_J += 0.5 * (elastic * depth + kt * (stretch_x * stretch_x + stretch_y * stretch_y));
+  return {fx, fy, normal};
+}
+
+}  // namespace tandem::sim

@@ -1,0 +1,124 @@
+// After an emergency stop amid a motion: the robot falls as one does, ends where a robot ends,
+// and is recovered by the documented steps.
+#include <algorithm>
+#include <cmath>
+
+#include "hal/sim/setup.hpp"
+#include "tests/runtime/squat_run.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+constexpr double kPastTheEnd_rad = 0.05;  // that docs/simulation.md allows
+
+/// An experiment whose faults wait for a reset, and what is watched of it every cycle.
+struct Collapse : Squat {
+  explicit Collapse(const std::string& robot, const std::string& name)
+      : Squat(robot, 1'000'000, 0.0, nullptr, false, name, {.after_stop = AfterStop::kWait}) {
+    ranges = sim::mechanical_ranges(experiment->robot, *experiment->tree);
+  }
+  [[nodiscard]] const sim::Plant& plant() const { return backend->plant(); }
+
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) {
+      ASSERT_TRUE(cycle->step());
+      watch();
+    }
+  }
+  void watch() {
+    const tandem_kernels& k = plant().kernels();
+    const double* q = plant().q() + (k.nq - k.joints);
+    for (const sim::JointRange& range : ranges) {
+      const std::size_t joint = sim::joint_of(k, range.joint);
+      const double past = std::max(q[joint] - range.upper_rad, range.lower_rad - q[joint]);
+      if (past <= worst_rad) continue;
+      worst_rad = past;
+      worst = range.joint;
+    }
+    for (std::size_t i = 0; i < k.nq; ++i) finite = finite && std::isfinite(plant().q()[i]);
+  }
+  [[nodiscard]] double kinetic_J() const {
+    double energy[2];
+    plant().kernels().energy(plant().q(), plant().v(), energy);
+    return energy[0];
+  }
+  /// Of everything that moves or is stretched, but for the motors' own.
+  [[nodiscard]] double energy_J() const {
+    double energy[2];
+    plant().kernels().energy(plant().q(), plant().v(), energy);
+    const tandem_kernels& k = plant().kernels();
+    return energy[0] + energy[1] + plant().contact().elastic_energy_J() +
+           plant().bodies().elastic_energy_J() +
+           plant().end_stops().elastic_energy_J(plant().q() + (k.nq - k.joints));
+  }
+  void expect_no_fault_but_the_stop() {
+    for (const Fault& fault : cycle->faults()) {
+      EXPECT_EQ(fault.text, "emergency stop on request") << fault.joint << " at " << fault.time_s;
+    }
+  }
+  /// Reset, held, and what was active started again.
+  void recover() {
+    cycle->requests().reset_faults();
+    for (int i = 0; i < 3000 && cycle->phase() != RunPhase::kHeld; ++i) steps(1);
+    ASSERT_EQ(cycle->phase(), RunPhase::kHeld) << backend->status_text();
+    EXPECT_EQ(cycle->fault_log().latched(), 0U);
+    steps(3000);
+    EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+    EXPECT_EQ(cycle->fault_log().latched(), 0U);
+    expect_no_fault_but_the_stop();
+  }
+
+  std::vector<sim::JointRange> ranges;
+  double worst_rad = 0.0;
+  std::string worst;
+  bool finite = true;
+};
+
+void collapse(const std::string& robot, hal::StopCategory category) {
+  Collapse run(robot, "squat");
+  run.run_to(RunPhase::kRunning);
+  run.steps(4000);  // amid the first squat
+  const double standing_m = run.plant().q()[2], before_J = run.energy_J();
+  run.cycle->requests().emergency_stop(category);
+  run.steps(6000);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+  EXPECT_TRUE(run.finite);
+  EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;
+  EXPECT_LT(run.energy_J(), before_J - 0.3 * run.plant().kernels().mass_kg * 9.81 * standing_m);
+  EXPECT_LT(run.kinetic_J(), 0.05) << "it lies still";
+  EXPECT_GT(run.plant().q()[2], 0.02) << "on the ground, not in it";
+  EXPECT_LT(run.plant().q()[2], 0.7 * standing_m);
+  EXPECT_GT(run.plant().bodies().vertical_force_N(), 0.1 * run.plant().kernels().mass_kg * 9.81);
+  run.expect_no_fault_but_the_stop();
+  run.recover();
+  EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;
+  EXPECT_TRUE(run.finite);
+}
+
+TEST(Collapse, OfComanAfterAnEmergencyStopOfCategory0) {
+  collapse("coman", hal::StopCategory::kCategory0);
+}
+TEST(Collapse, OfComanAfterAnEmergencyStopOfCategory1) {
+  collapse("coman", hal::StopCategory::kCategory1);
+}
+TEST(Collapse, OfWalkmanAfterAnEmergencyStopOfCategory1) {
+  collapse("walkman", hal::StopCategory::kCategory1);
+}
+
+TEST(Collapse, OfPandaEndsAtItsEndStops) {
+  Collapse run("panda", "trajectory");
+  run.run_to(RunPhase::kRunning);
+  run.steps(2500);
+  const double before_J = run.energy_J();
+  run.cycle->requests().emergency_stop(hal::StopCategory::kCategory0);
+  run.steps(15000);
+  EXPECT_TRUE(run.finite);
+  EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;
+  EXPECT_LT(run.energy_J(), before_J);
+  run.expect_no_fault_but_the_stop();
+  run.recover();
+  EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;
+}
+
+}  // namespace
+}  // namespace tandem::runtime
