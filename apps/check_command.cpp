@@ -117,6 +117,8 @@ Diagnostics warnings_of(const RobotFiles& robot) {
   for (const hal::PostureConfig& posture : robot.config.postures) {
     if (auto error = wrong_start_height(robot, posture.name)) warnings.push_back(std::move(*error));
     if (auto error = too_weak_at(robot, posture.name)) warnings.push_back(std::move(*error));
+    const Diagnostics buried = buried_links(robot, posture.name);
+    warnings.insert(warnings.end(), buried.begin(), buried.end());
   }
   if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
   return warnings;

@@ -211,9 +211,12 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.tree = std::make_shared<const model::Tree>(robot->tree);
   if (e.hal.backend == runtime::BackendKind::kSim) {
     if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
+    c->warnings = buried_links(*robot, e.posture);
+    e.warnings.insert(e.warnings.end(), c->warnings.begin(), c->warnings.end());
     errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
   }
-  if (!is_remote) c->warnings = start_warnings(*robot, e.posture);
+  if (!is_remote)
+    std::ranges::move(start_warnings(*robot, e.posture), std::back_inserter(c->warnings));
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);

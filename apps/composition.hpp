@@ -64,7 +64,7 @@ struct Composition {
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
-  Diagnostics warnings;  ///< start_warnings()
+  Diagnostics warnings;  ///< start_warnings(), and links that start inside the ground
 
   /// Empty without a CAN backend.
   [[nodiscard]] std::span<hal::can::SocketCanBus* const> can_buses() const {

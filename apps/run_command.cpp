@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 
 #include "apps/commands.hpp"
@@ -66,6 +65,7 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
   config.after_reset = e.after_reset;
+  config.fall = e.fall_limits();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;
 }
@@ -148,26 +148,6 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
     return owned ? server->lease().name() : std::string();
   };
   return DdsServices::open(run->participant(), commands, remote_gate(remote, owner), admission);
-}
-
-/// A robot with feet that lies, sank or flew away at the end of the run; by the plant's truth.
-std::optional<std::string> fall_of(const runtime::Experiment& e,
-                                   const std::optional<runtime::BaseFigures>& base) {
-  constexpr double kTilt_deg = 60.0, kLow = 0.3, kHigh = 3.0;  // of the height it starts at
-  const hal::PostureConfig* start = e.robot.posture(e.posture);
-  if (!base || start == nullptr || e.robot.contact.feet.empty()) return {};
-  const double tilt_deg = base->final_tilt_rad * 180.0 / std::numbers::pi;
-  if (tilt_deg > kTilt_deg)
-    return fmt::format("the robot fell: tilted {:.0f} deg at the end", tilt_deg);
-  if (base->min_height_m < kLow * start->base_height_m) {
-    return fmt::format("the robot fell: its base was at {:.3f} m, of {:.3f} m at the start",
-                       base->min_height_m, start->base_height_m);
-  }
-  if (base->max_height_m > kHigh * start->base_height_m) {
-    return fmt::format("the robot flew away: its base was at {:.3f} m, of {:.3f} m at the start",
-                       base->max_height_m, start->base_height_m);
-  }
-  return {};
 }
 
 /// The loop was given up. Its thread is still there, and may go on at any time: what it uses stays.
@@ -263,9 +243,6 @@ Exit run(Composition& c, const RunOptions& options) {
   if (recorder != nullptr) summary.log = recorder->close();
   if (c.frames != nullptr) summary.frames = c.frames->close();
   summary.faults = fault_texts(cycle, summary.log);
-  if (summary.faults.empty()) {  // after a stop it may fall as it likes
-    if (auto fall = fall_of(e, cycle.statistics().base())) summary.faults.push_back(*fall);
-  }
   if (!options.quiet) {
     fmt::print(out, "\n");
     summary.print(out);

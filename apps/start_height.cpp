@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/sim/link_points.hpp"
 #include "runtime/standing_height.hpp"
 
 namespace tandem::apps {
@@ -54,6 +55,37 @@ std::optional<Error> wrong_start_height(const RobotFiles& robot, const std::stri
                                     touching->base_height_m)
                       : "move its joints, or lower height_m of [contact]";
   return error;
+}
+
+Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
+  Diagnostics warnings;
+  const hal::PostureConfig zero{};
+  const hal::PostureConfig* start = posture.empty() ? &zero : robot.config.posture(posture);
+  if (start == nullptr || !(robot.config.contact.stiffness_N_m > 0.0)) return warnings;
+  const auto bodies = runtime::bodies_in(robot.config, *start, robot.tree);
+  const double base_m = robot.tree.floating_base ? start->base_height_m : 0.0;
+  for (const sim::LinkPoints& points : sim::link_points(robot.config, robot.tree)) {
+    const model::Link& link = robot.tree.links[points.link];
+    const model::Placement& body = bodies[static_cast<std::size_t>(link.body)];
+    double depth_m = 0.0;
+    for (const Eigen::Vector3d& point : points.in_body_m) {
+      const double height_m = base_m + (body.R * point + body.p).z();
+      depth_m = std::max(depth_m, robot.config.contact.height_m - height_m);
+    }
+    if (!(depth_m > 0.0)) continue;
+    Error warning;
+    warning.file = robot.config.file;
+    warning.line = start->line;
+    warning.key = posture.empty() ? "contact.height_m" : "posture." + posture;
+    warning.message = fmt::format(
+        "the link '{}' starts {:.4f} m inside the ground{}: what is inside "
+        "does not touch it in this run",
+        link.name, depth_m, points.guessed ? " (its shape is guessed from its inertia)" : "");
+    warning.hint = points.guessed ? "give the link a <collision> of a simple shape in the URDF"
+                                  : "move its joints, raise the base, or correct its <collision>";
+    warnings.push_back(std::move(warning));
+  }
+  return warnings;
 }
 
 }  // namespace tandem::apps

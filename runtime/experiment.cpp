@@ -103,6 +103,7 @@ void read_faults(TomlTable table, Experiment& e) {
     e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
   }
   e.after_reset = read_choice(table, "after_reset", {"hold", "continue"}, e.after_reset);
+  if (table.has("fall")) e.falls_are_faults = table.choice("fall", {"stop", "allow"}) == "stop";
   if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
   table.finish();
 }
@@ -308,6 +309,21 @@ std::uint64_t Experiment::cycles() const {
 std::uint64_t Experiment::settle_cycles() const {
   return static_cast<std::uint64_t>(
       std::ceil(hal.settle_s * 1e9 / static_cast<double>(loop.period_ns)));
+}
+
+FallLimits Experiment::fall_limits() const {
+  const hal::PostureConfig* start = robot.posture(posture);
+  FallLimits limits;
+  if (start == nullptr || !robot.model.floating_base || robot.contact.feet.empty()) return limits;
+  limits.watched = falls_are_faults;
+  limits.ground_m = robot.contact.height_m;
+  limits.standing_m = limits.highest_m = start->base_height_m - limits.ground_m;
+  if (tree == nullptr) return limits;
+  if (const auto touching = standing(robot, *start, *tree)) {
+    limits.standing_m = touching->base_height_m - limits.ground_m;
+    limits.highest_m = std::max(limits.highest_m, limits.standing_m);
+  }
+  return limits;
 }
 
 sim::SimRobotConfig Experiment::sim_robot_config() const {

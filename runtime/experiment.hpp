@@ -20,6 +20,7 @@
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
+#include "runtime/fall_watch.hpp"
 
 namespace tandem::runtime {
 
@@ -95,12 +96,12 @@ struct ControllerSpec {
 
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
-  std::string file;         ///< the TOML's path
-  std::string robot_file;   ///< resolved against the TOML's folder
-  hal::RobotConfig robot;   ///< completed from its description
-  Diagnostics warnings;     ///< what was tolerated in the description
+  std::string file;                         ///< the TOML's path
+  std::string robot_file;                   ///< resolved against the TOML's folder
+  hal::RobotConfig robot;                   ///< completed from its description
+  Diagnostics warnings;                     ///< what was tolerated in the description
   std::shared_ptr<const model::Tree> tree;  ///< the description; null when none was read
-  double duration_s = 0.0;  ///< that controllers run, after the bring-up
+  double duration_s = 0.0;                  ///< that controllers run, after the bring-up
   std::uint64_t seed = 1;
   std::string posture;         ///< where the robot starts; empty: every joint at 0
   std::string kernel_variant;  ///< empty: the best that this CPU runs
@@ -110,6 +111,7 @@ struct Experiment {
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   AfterReset after_reset = AfterReset::kHold;  ///< [faults]
+  bool falls_are_faults = true;                ///< [faults] fall = "stop", or "allow"
   std::optional<double> watchdog_s;            ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
   LogOptions log;
@@ -122,6 +124,8 @@ struct Experiment {
   [[nodiscard]] std::uint64_t cycles() const;
   /// Cycles that every joint is held before they do: settle_s over period, rounded up.
   [[nodiscard]] std::uint64_t settle_cycles() const;
+  /// When its robot has fallen: of one with a floating base and feet, unless falls are allowed.
+  [[nodiscard]] FallLimits fall_limits() const;
   /// How to simulate it, with the seed and the period as they are now.
   [[nodiscard]] sim::SimRobotConfig sim_robot_config() const;
 };

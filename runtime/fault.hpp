@@ -25,6 +25,7 @@ enum class FaultSource : std::uint8_t {
   kBringUp,        ///< the drives were not enabled in time
   kEmergencyStop,  ///< asked for from outside; `code` is an EmergencyInput
   kOwner,          ///< the owner in another process; `code` is a hal::OwnerLoss, kNone: it asked
+  kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
 };
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.

@@ -94,6 +94,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
     check_joints();
     check_sensors();
   }
+  if (phase_ == RunPhase::kRunning) check_fall();
   check_backend(read_code_);
   advance_phase();
 }
@@ -154,7 +155,10 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
 }
 
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
-  if (!controlling_) start_controllers();
+  if (!controlling_) {
+    start_controllers();
+    fall_watch_.begin();
+  }
   controlling_ = true;
   ++ran_;
   const Code code = controllers_->update(time_, state_, controlled());

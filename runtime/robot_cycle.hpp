@@ -19,6 +19,7 @@
 #include "runtime/command_delay.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/cycle_trace.hpp"
+#include "runtime/fall_watch.hpp"
 #include "runtime/fault.hpp"
 #include "runtime/heartbeat.hpp"
 #include "runtime/owner_controller.hpp"
@@ -39,6 +40,7 @@ struct CycleConfig {
   AfterReset after_reset = AfterReset::kHold;
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
   std::uint32_t delay_cycles = 0;        ///< between the controllers and the limits
+  FallLimits fall = {};                  ///< watched where there is truth
   std::size_t trace_cycles = 0;          ///< the last that trace() keeps: 6 clock reads each
 };
 
@@ -136,6 +138,7 @@ class RobotCycle {
   void check_backend(Code code) noexcept TANDEM_RT;
   void check_joints() noexcept TANDEM_RT;
   void check_sensors() noexcept TANDEM_RT;
+  void check_fall() noexcept TANDEM_RT;
   [[nodiscard]] bool time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT;
 
   // robot_cycle_owner.cpp
@@ -206,6 +209,7 @@ class RobotCycle {
   hal::ParameterImage parameters_;
   hal::CommandLimits limits_;
   RunStatistics statistics_;
+  FallWatch fall_watch_;
 
   hal::CycleTime time_;
   std::int64_t begin_ns_ = 0;  // clock time

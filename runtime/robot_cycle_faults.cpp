@@ -99,6 +99,17 @@ void RobotCycle::check_sensors() noexcept TANDEM_RT {
   }
 }
 
+/// While controllers run: what has been stopped may lie as it likes.
+void RobotCycle::check_fall() noexcept TANDEM_RT {
+  if (truth_ == nullptr) return;
+  const Fall fall = fall_watch_.look(*truth_);
+  if (fall.kind == FallKind::kNone) return;
+  fault({.index = fall.thousandths,
+         .code = static_cast<std::uint32_t>(fall.kind),
+         .source = FaultSource::kFall,
+         .category = StopCategory::kCategory1});
+}
+
 /// Notes it, and carries out what its category says.
 void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint = record.source == FaultSource::kDrive ||

@@ -23,6 +23,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       limits_(parts.robot, config.loop.period_ns),
       statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet(),
                   parts.truth == nullptr ? 0 : parts.truth->loops()),
+      fall_watch_(config.fall),
       joint_faulted_(parts.robot.joints.size()),
       sensor_lost_(parts.robot.sensors.size()),
       joint_limited_(parts.robot.joints.size()),
@@ -53,6 +54,7 @@ void RobotCycle::archive(Archive& ar) {
   parameters_.archive(ar);
   limits_.archive(ar);
   statistics_.archive(ar);
+  fall_watch_.archive(ar);
   controllers_->archive(ar);
   ar(time_, phase_, started_, controlling_, held_back_, joint_fault_, reaction_, read_code_, phase_began_,
      spent_, ran_);
@@ -143,6 +145,10 @@ Fault RobotCycle::tell(std::size_t number) const {
           fault.text = "the remote owner gave no command for this cycle in time";
           break;
       }
+      break;
+    case FaultSource::kFall:
+      fault.text =
+          fall_text({static_cast<FallKind>(record.code), record.index}, fall_watch_.limits());
       break;
   }
   if (record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/fall_watch.hpp"
+
 namespace tandem::runtime {
 
 RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops)
@@ -47,13 +49,7 @@ void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT
   const double height_m = truth.base_position_m()[2];
   min_height_m_ = free_cycles_ == 0 ? height_m : std::min(min_height_m_, height_m);
   max_height_m_ = free_cycles_ == 0 ? height_m : std::max(max_height_m_, height_m);
-  // The angle of the base's z axis: its W components are the rotation matrix's last column.
-  const auto quaternion = truth.base_quaternion();
-  const double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
-  const double zx = 2.0 * (x * z + w * y);
-  const double zy = 2.0 * (y * z - w * x);
-  const double zz = 1.0 - 2.0 * (x * x + y * y);
-  tilt_rad_ = std::atan2(std::hypot(zx, zy), zz);
+  tilt_rad_ = tilt_of(truth.base_quaternion());
   ++free_cycles_;
 }
 

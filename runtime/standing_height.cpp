@@ -1,14 +1,12 @@
 #include "runtime/standing_height.hpp"
 
 #include <algorithm>
-#include <vector>
-
-#include "model/placements.hpp"
 
 namespace tandem::runtime {
 
-std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::PostureConfig& posture,
-                                 const model::Tree& tree) {
+std::vector<model::Placement> bodies_in(const hal::RobotConfig& robot,
+                                        const hal::PostureConfig& posture,
+                                        const model::Tree& tree) {
   std::vector<double> position(tree.joints.size(), 0.0);
   for (std::size_t i = 0; i < posture.position_rad.size(); ++i) {
     const int joint = tree.joint_index(robot.joints[i].name);
@@ -18,7 +16,12 @@ std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::Postu
     const int joint = tree.joint_index(passive.name);
     if (joint >= 0) position[static_cast<std::size_t>(joint)] = passive.position_rad;
   }
-  const std::vector<model::Placement> bodies = model::place_bodies(tree, position);
+  return model::place_bodies(tree, position);
+}
+
+std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::PostureConfig& posture,
+                                 const model::Tree& tree) {
+  const std::vector<model::Placement> bodies = bodies_in(robot, posture, tree);
   std::optional<Standing> highest;
   for (const hal::FootConfig& foot : robot.contact.feet) {
     const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);

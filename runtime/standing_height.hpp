@@ -4,8 +4,10 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hal/robot_config.hpp"
+#include "model/placements.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::runtime {
@@ -15,6 +17,11 @@ struct Standing {
   double base_height_m = 0.0;  ///< of the upright base's origin above W's
   std::string foot;            ///< the site of the foot that touches
 };
+
+/// Where the tree's bodies are in this posture, the base upright at W's origin.
+[[nodiscard]] std::vector<model::Placement> bodies_in(const hal::RobotConfig& robot,
+                                                      const hal::PostureConfig& posture,
+                                                      const model::Tree& tree);
 
 /// The height of an upright base at which the lowest point of the feet touches the ground in this
 /// posture. Feet on links that the description lacks are passed over; nothing without any.

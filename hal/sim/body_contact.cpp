@@ -86,17 +86,14 @@ void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoin
     const model::Link& link = tree.links[one.link];
     const auto body = static_cast<std::size_t>(link.body);
     Group group{one.link, body, points_.size(), points_.size(), {}, 0.0};
-    BuriedLink buried{link.name, 0.0, one.guessed};
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& point : one.in_body_m) {
       const Vec3 at = rotate(bodies_[body].R.data(), vec3(point).data());
       const double depth = config_.height_m - bodies_[body].p[2] - at[2];
-      buried.depth_m = std::max(buried.depth_m, depth);
       if (depth > 0.0) continue;
       points_.push_back(vec3(point));
       center += point;
     }
-    if (buried.depth_m > 0.0) buried_.push_back(buried);
     group.end = points_.size();
     if (group.end == group.begin) continue;
     center /= static_cast<double>(group.end - group.begin);

@@ -19,13 +19,6 @@
 
 namespace tandem::sim {
 
-/// A link that is inside the ground where the robot starts.
-struct BuriedLink {
-  std::string link;
-  double depth_m = 0.0;
-  bool guessed = false;  ///< its shape is a guess from mass and inertia
-};
-
 /// The same law as the soles' (class Contact), at points of links: class Contact's stiffness and
 /// dampers, bounded by what the lightest posture of the point's link lets the sub-step h integrate
 /// with four points on the ground, m the mass that the point shows (point_mass()):
@@ -38,12 +31,10 @@ struct BuriedLink {
 class BodyContact {
  public:
   BodyContact() = default;
-  /// Points that are inside the ground at `q` (nq) are left out, see buried().
+  /// Points that are inside the ground at `q` (nq) are left out: `tandem check` names their links.
   /// @param sensors  robot.toml's, for add_beyond()
   BodyContact(const hal::RobotConfig& robot, const model::Tree& tree, const tandem_kernels& kernels,
               const double* q, std::span<const Posture> postures, std::int64_t substep_ns);
-
-  [[nodiscard]] const std::vector<BuriedLink>& buried() const noexcept { return buried_; }
 
   /// Computes the ground's forces at this state. Cheap while nothing is near.
   /// @param move_anchors  true exactly once per sub-step, at its first evaluation
@@ -117,7 +108,6 @@ class BodyContact {
   std::vector<double> reach_m_;  // per kernels' joint: of the points beyond it; NaN: unknown
   double base_reach_m_ = 0.0;
   std::vector<Beyond> sensors_;
-  std::vector<BuriedLink> buried_;
 
   std::vector<double> anchor_x_, anchor_y_;
   std::vector<std::uint8_t> anchored_;

@@ -96,7 +96,7 @@ TEST_F(Run, OfARobotThatFallsIsNoSuccess) {
   edit("anymal/robot.toml", "\ndamping_s_m = ", "\ndamping_s_m = 1  # was ");
   const Outcome outcome = tandem("run anymal/hold.toml --no-log --quiet");
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_NE(outcome.err.find("fault: the robot fell: "), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find(" s: the robot sank: a foot is "), std::string::npos) << outcome.err;
 }
 
 TEST_F(Run, OfARobotThatStartsFarAboveTheGroundIsRefused) {

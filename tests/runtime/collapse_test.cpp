@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/sim/rotation.hpp"
 #include "hal/sim/setup.hpp"
 #include "tests/runtime/squat_run.hpp"
 
@@ -93,6 +94,73 @@ void collapse(const std::string& robot, hal::StopCategory category) {
   run.recover();
   EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;
   EXPECT_TRUE(run.finite);
+  EXPECT_LT(run.kinetic_J(), 0.05);
+}
+
+// Without dampers and friction the ground's forces are the slope of its springs' energy: an
+// independent way to every entry of J^T f.
+TEST(Collapse, LiesOnForcesThatAreTheSlopeOfTheGroundsEnergy) {
+  Squat squat("coman");
+  hal::RobotConfig robot = squat.experiment->robot;
+  robot.contact.damping_s_m = robot.contact.tangential_damping_Ns_m = 0.0;
+  robot.contact.static_friction = robot.contact.sliding_friction = 0.0;
+  const tandem_kernels& k = *squat.kernels.get();
+  const double* start = squat.backend->plant().q();
+  const auto postures = sim::postures_within(
+      k, {start, k.nq}, sim::mechanical_ranges(robot, *squat.experiment->tree));
+  sim::BodyContact bodies(robot, *squat.experiment->tree, k, start, postures, 250'000);
+  const std::vector<double> rest(k.nv, 0.0);
+  const auto energy_at = [&](const std::vector<double>& q) {
+    bodies.lost();
+    bodies.evaluate(q.data(), rest.data(), true);
+    return bodies.elastic_energy_J();
+  };
+  std::vector<double> q = postures[5].q;
+  q[2] = 0.05;  // deep, and turned
+  const double turn[4] = {0.3, -0.4, 0.2, std::sqrt(1.0 - 0.29)};
+  std::copy_n(turn, 4, q.begin() + 3);
+  ASSERT_GT(energy_at(q), 1.0);
+  std::vector<double> forces(k.nv, 0.0);
+  bodies.add_forces(forces.data());
+  constexpr double kStep = 1e-7;
+  for (std::size_t i = 0; i < k.nv; ++i) {
+    const auto moved = [&](double way) {
+      std::vector<double> to = q;
+      double v[6] = {};
+      if (i < 6) v[i] = way;
+      const sim::Vec3 shift = sim::rotate(sim::rotation_of(q.data() + 3).data(), v);
+      for (std::size_t axis = 0; axis < 3; ++axis) to[axis] += shift[axis];
+      sim::turn_quaternion(to.data() + 3, v + 3, 1.0);
+      if (i >= 6) to[i + 1] += way;
+      return energy_at(to);
+    };
+    const double slope = (moved(kStep) - moved(-kStep)) / (2.0 * kStep);
+    EXPECT_NEAR(forces[i], -slope, 1e-5 * (10.0 + std::abs(slope))) << i;
+  }
+}
+
+TEST(Collapse, OfARunningRobotIsAFaultWithItsTime) {
+  for (const bool allowed : {false, true}) {
+    Squat squat("coman", 4000);
+    squat.experiment->falls_are_faults = !allowed;
+    squat.wanted.fall = squat.experiment->fall_limits();
+    squat.experiment->robot.contact.stiffness_N_m *= 1e-4;  // it sank to -6.4 m, with status 0
+    squat.host.reset();
+    squat.cycle.reset();
+    squat.compose("coman", 4000, nullptr);
+    squat.cycle->run();
+    const auto faults = squat.cycle->faults();
+    if (allowed) {
+      for (const Fault& fault : faults)
+        EXPECT_FALSE(fault.text.starts_with("the robot")) << fault.text;
+      continue;
+    }
+    ASSERT_EQ(faults.size(), 1U);
+    EXPECT_TRUE(faults[0].text.starts_with("the robot sank: a foot is 0.")) << faults[0].text;
+    EXPECT_GT(faults[0].time_s, 1.0) << "after the hoist has let it down";
+    EXPECT_LT(faults[0].time_s, 2.5);
+    EXPECT_EQ(faults[0].category, hal::StopCategory::kCategory1);
+  }
 }
 
 TEST(Collapse, OfComanAfterAnEmergencyStopOfCategory0) {

@@ -1,0 +1,66 @@
+// Finds a robot with feet that fell, sank or flew away, in the cycle, from the plant's truth.
+// Layer: runtime.  Thread: made non-RT; look() RT.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "hal/truth.hpp"
+
+namespace tandem::runtime {
+
+/// When a robot with a floating base has fallen. Heights are of the base's origin above the ground.
+struct FallLimits {
+  bool watched = false;
+  double ground_m = 0.0;                           ///< the ground's height in W
+  double standing_m = 0.0;                         ///< where it stands in its first posture
+  double highest_m = 0.0;                          ///< it starts there, or lower
+  double tilt_rad = 1.0472;                        ///< of the base: 60 degrees
+  double lowest_share = 0.3, highest_share = 3.0;  ///< of standing_m, of highest_m
+  double sunk_share = 0.1;                         ///< a foot so deep, of standing_m
+  std::int64_t airborne_ns = 1'000'000'000;        ///< no foot touches for so long
+};
+
+enum class FallKind : std::uint32_t { kNone = 0, kTilted, kLow, kHigh, kAirborne, kSunk };
+
+/// What was found, in whole thousandths: of a degree, a metre, a second.
+struct Fall {
+  FallKind kind = FallKind::kNone;
+  std::int32_t thousandths = 0;
+};
+
+/// "the robot fell: its base is tilted by 61.3 degrees"
+[[nodiscard]] std::string fall_text(const Fall& fall, const FallLimits& limits);
+
+/// The angle between the z axis of a frame with orientation `quaternion` (x y z w) and W's [rad].
+[[nodiscard]] inline double tilt_of(std::span<const double> quaternion) noexcept {
+  // The frame's z axis in W is the rotation matrix's last column.
+  const double x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
+  const double zx = 2.0 * (x * z + w * y);
+  const double zy = 2.0 * (y * z - w * x);
+  const double zz = 1.0 - 2.0 * (x * x + y * y);
+  return std::atan2(std::hypot(zx, zy), zz);
+}
+
+class FallWatch {
+ public:
+  explicit FallWatch(const FallLimits& limits) : limits_(limits) {}
+
+  /// A cycle in which controllers run. While the hoist holds the base nothing is found.
+  [[nodiscard]] Fall look(const hal::TruthImage& truth) noexcept TANDEM_RT;
+  /// Controllers start: flight is counted from here.
+  void begin() noexcept TANDEM_RT { grounded_ns_ = -1; }
+  [[nodiscard]] const FallLimits& limits() const noexcept { return limits_; }
+
+  void archive(Archive& ar) { ar(grounded_ns_); }
+
+ private:
+  FallLimits limits_;
+  std::int64_t grounded_ns_ = -1;  // when a foot touched last; -1: count from now
+};
+
+}  // namespace tandem::runtime

@@ -1,0 +1,162 @@
+#include "hal/sim/body_contact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "hal/sim/plant.hpp"
+#include "tests/sim/hand_kernels.hpp"
+
+namespace tandem::sim {
+namespace {
+
+using model::Shape;
+
+model::Tree one_link(const std::vector<Shape>& shapes) {
+  model::Tree tree;
+  tree.floating_base = true;
+  tree.bodies = {{"base", {}}};
+  tree.links.emplace_back();
+  tree.links[0].name = "base";
+  tree.links[0].inertia = {test::kBlockMass, Eigen::Vector3d::Zero(),
+                           Eigen::Vector3d(0.1, 0.2, 0.25).asDiagonal()};
+  tree.links[0].shapes = shapes;
+  return tree;
+}
+
+hal::RobotConfig on_ground() {
+  hal::RobotConfig robot;
+  hal::ContactConfig& c = robot.contact;
+  c.stiffness_N_m = 20'000.0;
+  c.damping_s_m = 3.0;
+  c.tangential_stiffness_N_m = 20'000.0;
+  c.tangential_damping_Ns_m = 50.0;
+  c.static_friction = 0.9;
+  c.sliding_friction = 0.8;
+  return robot;
+}
+
+const Shape kBox{Shape::Kind::kBox, {0.4, 0.2, 0.1}, {}};
+
+/// The block without soles, its shape `shapes`, let go at a height and tilted.
+struct Dropped {
+  Dropped(const std::vector<Shape>& shapes, double height_m, double tilt_rad)
+      : tree(one_link(shapes)), robot(on_ground()) {
+    PlantConfig config;
+    config.kernels = test::block_kernels<0>();
+    config.contact = robot.contact;
+    config.robot = &robot;
+    config.tree = &tree;
+    config.base_height_m = height_m;
+    Result<Plant> made = Plant::create(config);
+    EXPECT_TRUE(made) << made.error().to_string();
+    plant = std::make_unique<Plant>(std::move(*made));
+    const double half = 0.5 * tilt_rad;
+    const double q[7] = {
+        0, 0, height_m, 0.6 * std::sin(half), 0.8 * std::sin(half), 0, std::cos(half)};
+    const double v[6] = {};
+    plant->set_state(q, v);
+  }
+  [[nodiscard]] double energy_J() const {
+    const double* v = plant->v();
+    double energy =
+        test::kBlockMass * test::kG * plant->q()[2] + plant->bodies().elastic_energy_J();
+    for (int i = 0; i < 3; ++i) {
+      energy += 0.5 * test::kBlockMass * v[i] * v[i];
+      energy += 0.5 * test::kBlockInertia[i] * v[3 + i] * v[3 + i];
+    }
+    return energy;
+  }
+  model::Tree tree;
+  hal::RobotConfig robot;
+  std::unique_ptr<Plant> plant;
+};
+
+TEST(BodyContact, OfABlockThatFallsOnItsEdgeEndsInRestOnAFace) {
+  Dropped block({kBox}, 0.5, 0.7);
+  const double first_J = block.energy_J();
+  double lowest_J = first_J;
+  for (int i = 0; i < 4000; ++i) {
+    ASSERT_EQ(block.plant->advance(1'000'000), Code::kOk);
+    block.plant->evaluate();
+    const double now_J = block.energy_J();
+    ASSERT_LE(now_J, lowest_J + 0.005 * first_J) << i;  // of the integrator, in the impact
+    lowest_J = std::min(lowest_J, now_J);
+  }
+  EXPECT_TRUE(block.plant->bodies().touching());
+  EXPECT_NEAR(block.plant->bodies().vertical_force_N(), test::kBlockMass * test::kG, 1e-3);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(block.plant->v()[i], 0.0, 1e-6);
+  const double sag = test::kBlockMass * test::kG / (4 * 20'000.0);
+  EXPECT_NEAR(block.plant->q()[2], 0.05 - sag, 1e-6) << "flat on its largest face";
+}
+
+// The clearance that saves the kinematics is a bound, not a guess: with it and without, one bit.
+TEST(BodyContact, IsFoundInTheSubStepInWhichItBegins) {
+  Dropped lazy({kBox}, 0.5, 0.3), eager({kBox}, 0.5, 0.3);
+  const double spin[6] = {0.5, 0.0, 0.0, 3.0, -8.0, 5.0};
+  lazy.plant->set_state({lazy.plant->q(), 7}, spin);
+  eager.plant->set_state({eager.plant->q(), 7}, spin);
+  for (int i = 0; i < 6000; ++i) {
+    ASSERT_EQ(lazy.plant->advance(250'000), Code::kOk);
+    const std::vector<double> q(eager.plant->q(), eager.plant->q() + 7);
+    const std::vector<double> v(eager.plant->v(), eager.plant->v() + 6);
+    if (!eager.plant->bodies().touching()) eager.plant->set_state(q, v);  // forgets the clearance
+    ASSERT_EQ(eager.plant->advance(250'000), Code::kOk);
+    for (int k = 0; k < 7; ++k) ASSERT_EQ(lazy.plant->q()[k], eager.plant->q()[k]) << i;
+  }
+  EXPECT_TRUE(lazy.plant->bodies().touching());
+}
+
+TEST(BodyContact, LeavesOutWhatStartsInsideTheGround) {
+  Dropped block({kBox}, 0.02, 0.0);
+  ASSERT_EQ(block.plant->advance(100'000'000), Code::kOk);
+  EXPECT_LT(block.plant->q()[2], -0.02) << "nothing pushes: the upper corners come next";
+  ASSERT_EQ(block.plant->advance(3'000'000'000), Code::kOk);
+  EXPECT_NEAR(block.plant->q()[2], -0.05, 0.002);
+}
+
+TEST(LinkPoints, OfALinkWithoutAShapeAreThoseOfTheBoxWithItsInertia) {
+  model::Tree tree = one_link({});
+  const double a = 0.5, b = 0.3, c = 0.2, m = test::kBlockMass;  // 333 kg/m^3
+  tree.links[0].inertia = {
+      m,
+      {0.0, 0.0, 0.1},
+      Eigen::Vector3d(b * b + c * c, a * a + c * c, a * a + b * b).asDiagonal() *
+          Eigen::Matrix3d::Identity() * (m / 12.0)};
+  const auto points = link_points(on_ground(), tree);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_TRUE(points[0].guessed);
+  ASSERT_EQ(points[0].in_body_m.size(), 8U);
+  for (const Eigen::Vector3d& p : points[0].in_body_m) {
+    EXPECT_NEAR(std::abs(p.x()), 0.5 * a, 1e-9);
+    EXPECT_NEAR(std::abs(p.y()), 0.5 * b, 1e-9);
+    EXPECT_NEAR(std::abs(p.z() - 0.1), 0.5 * c, 1e-9);
+  }
+  tree.links[0].inertia.mass_kg = 0.1;  // an inertia far too large for it
+  double volume = 8.0;
+  const auto shrunk = link_points(on_ground(), tree);
+  for (int i = 0; i < 3; ++i) {
+    volume *= std::abs(shrunk[0].in_body_m[0][i] - tree.links[0].inertia.com_m[i]);
+  }
+  EXPECT_NEAR(0.1 / volume, 200.0, 1e-6);
+}
+
+TEST(LinkPoints, LieOnTheirShapes) {
+  const model::Placement at{Eigen::Matrix3d::Identity(), {0.1, 0.2, 0.3}};
+  const auto points =
+      link_points(on_ground(), one_link({{Shape::Kind::kSphere, {0.1, 0, 0}, at},
+                                         {Shape::Kind::kCylinder, {0.1, 0, 0.4}, at},
+                                         {Shape::Kind::kCapsule, {0.1, 0, 0.4}, at},
+                                         {Shape::Kind::kMesh, {0, 0, 0}, at}}));
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_FALSE(points[0].guessed);
+  ASSERT_EQ(points[0].in_body_m.size(), 6U + 8U + 8U);
+  for (std::size_t i = 0; i < 22; ++i) {
+    const Eigen::Vector3d p = points[0].in_body_m[i] - at.p;
+    const double beyond = i < 6 ? 0.0 : 0.2;  // half the length
+    const double z = std::max(0.0, std::abs(p.z()) - beyond);
+    EXPECT_NEAR(Eigen::Vector3d(p.x(), p.y(), z).norm(), 0.1, 1e-12) << i;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::sim
