@@ -212,7 +212,6 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (e.hal.backend == runtime::BackendKind::kSim) {
     if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
     c->warnings = buried_links(*robot, e.posture);
-    e.warnings.insert(e.warnings.end(), c->warnings.begin(), c->warnings.end());
     errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
   }
   if (!is_remote)
