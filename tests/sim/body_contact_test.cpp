@@ -93,8 +93,9 @@ TEST(BodyContact, OfABlockThatFallsOnItsEdgeEndsInRestOnAFace) {
 TEST(BodyContact, IsFoundInTheSubStepInWhichItBegins) {
   Dropped lazy({kBox}, 0.5, 0.3), eager({kBox}, 0.5, 0.3);
   const double spin[6] = {0.5, 0.0, 0.0, 3.0, -8.0, 5.0};
-  lazy.plant->set_state({lazy.plant->q(), 7}, spin);
-  eager.plant->set_state({eager.plant->q(), 7}, spin);
+  const std::vector<double> start(lazy.plant->q(), lazy.plant->q() + 7);
+  lazy.plant->set_state(start, spin);
+  eager.plant->set_state(start, spin);
   for (int i = 0; i < 6000; ++i) {
     ASSERT_EQ(lazy.plant->advance(250'000), Code::kOk);
     const std::vector<double> q(eager.plant->q(), eager.plant->q() + 7);
