@@ -6,9 +6,9 @@
 namespace tandem::sim {
 namespace {
 
-constexpr double kGive_rad = 0.001;   // under the drive's whole effort; m of a prismatic joint
-constexpr double kStiffShare = 0.4;   // of 1 / h: the stop's frequency on the lightest link
-constexpr double kDampedShare = 0.3;  // of least / h
+constexpr double kGive_rad = 0.001;       // under the drive's whole effort; m of a prismatic joint
+constexpr double kStopStiffShare = 0.4;   // of 1 / h: the stop's frequency on the lightest link
+constexpr double kStopDampedShare = 0.3;  // of least / h
 
 }  // namespace
 
@@ -20,10 +20,10 @@ EndStops::EndStops(const tandem_kernels& kernels, std::span<const JointRange> ra
     const bool ends = std::isfinite(range.lower_rad) || std::isfinite(range.upper_rad);
     if (joint == kernels.joints || !ends) continue;
     const JointInertia& inertia = inertias[joint];
-    const double stiffest = inertia.least * (kStiffShare / h_s) * (kStiffShare / h_s);
+    const double stiffest = inertia.least * (kStopStiffShare / h_s) * (kStopStiffShare / h_s);
     const double stiffness = std::min(range.effort_Nm / kGive_rad, stiffest);
     const double damping =
-        std::min(std::sqrt(stiffness * inertia.most), kDampedShare * inertia.least / h_s);
+        std::min(std::sqrt(stiffness * inertia.most), kStopDampedShare * inertia.least / h_s);
     stops_.push_back({joint, range.lower_rad, range.upper_rad, stiffness, damping});
   }
 }
