@@ -2,7 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <tuple>
 
+#include "base/counted.hpp"
 #include "controllers/controller.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/segment.hpp"
@@ -35,6 +38,8 @@ class JointTrajectory : public Controller {
     times_s_.assign(1, 0.0);
     points_.assign(joints_.size(), Motion{});  // the measured positions, at the start
     for (TomlTable& table : tables) read_waypoint(setup, table);
+    wrong_number_.tell();
+    beyond_.tell();
     set_velocities();
     const bool known = !setup.start_position_rad.empty();  // else it is left to the limits
     for (std::size_t k = 0; known && k < joints_.size(); ++k) {
@@ -71,6 +76,26 @@ class JointTrajectory : public Controller {
   void archive(Archive& ar) override { ar(start_ns_, segment_, points_); }
 
  private:
+  /// What is mostly wrong with every way-point when it is with one: told of the first alone.
+  class Mistake {
+   public:
+    void add(const TomlTable& table, std::string message, std::string hint) {
+      if (!first_) first_.emplace(table, std::move(message), std::move(hint));
+      ++count_;
+    }
+    void tell() {
+      if (!first_) return;
+      auto& [table, message, hint] = *first_;
+      if (count_ > 1) message += ", here and in " + counted(count_ - 1, "later way-point");
+      table.error("position_rad", message, hint);
+    }
+    [[nodiscard]] explicit operator bool() const { return count_ > 0; }
+
+   private:
+    std::optional<std::tuple<TomlTable, std::string, std::string>> first_;
+    std::size_t count_ = 0;
+  };
+
   /// One number a joint; says which joints these are when there are more or fewer.
   std::vector<double> read_positions(const ControllerSetup& setup, TomlTable& table) {
     std::vector<double> positions = table.numbers("position_rad", 0);
@@ -80,18 +105,20 @@ class JointTrajectory : public Controller {
       for (const std::size_t joint : joints_) {
         order += (order.empty() ? "" : ", ") + setup.robot.joints[joint].name;
       }
-      table.error("position_rad",
-                  "has " + std::to_string(positions.size()) + " numbers for " +
-                      std::to_string(joints_.size()) + " joints",
-                  "give one each for " + order + "; or name those that move in `joints`");
+      wrong_number_.add(
+          table,
+          "has " + counted(positions.size(), "number") + " for " + counted(joints_.size(), "joint"),
+          "give one each for " + order + "; or name those that move in `joints`");
     }
-    positions.resize(joints_.size(), 0.0);
     return positions;
   }
 
   void read_waypoint(ControllerSetup& setup, TomlTable& table) {
     const double time_s = table.number("time_s", kPositive);
-    const std::vector<double> positions = read_positions(setup, table);
+    std::vector<double> positions = read_positions(setup, table);
+    const bool each_has_one = joints_known_ && positions.size() == joints_.size();
+    incomplete_ = incomplete_ || !each_has_one;
+    positions.resize(joints_.size(), 0.0);
     table.finish();
     if (time_s <= times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
@@ -99,7 +126,8 @@ class JointTrajectory : public Controller {
     std::vector<const hal::JointConfig*> beyond;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
-      if (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad) {
+      if (each_has_one &&
+          (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad)) {
         beyond.push_back(&joint);
       }
       points_.push_back({positions[k], 0.0, 0.0});
@@ -109,11 +137,10 @@ class JointTrajectory : public Controller {
       const std::string others = beyond.size() == 1 ? " leaves its limits"
                                                     : " and " + std::to_string(beyond.size() - 1) +
                                                           " more leave their limits";
-      table.error("position_rad", "joint '" + first.name + "'" + others,
+      beyond_.add(table, "joint '" + first.name + "'" + others,
                   "stay within " + std::to_string(first.min_position_rad) + " and " +
                       std::to_string(first.max_position_rad) +
-                      (beyond.size() > 1 ? "; in radians, or metres of a slide" : ""));
-      beyond_ = true;
+                      "; in radians, or metres of a slide");
     }
     times_s_.push_back(time_s);
   }
@@ -151,7 +178,7 @@ class JointTrajectory : public Controller {
   /// One message for all the joints that are too fast, with the time that the slowest needs.
   void check_segment(ControllerSetup& setup, TomlTable& end, std::size_t segment) {
     const double duration = times_s_[segment + 1] - times_s_[segment];
-    if (!(duration > 0.0) || beyond_) return;  // reported already
+    if (!(duration > 0.0) || incomplete_ || beyond_) return;  // reported already
     std::size_t too_fast = 0;
     double worst = 1.0;  // of the limit
     std::string text;
@@ -200,8 +227,10 @@ class JointTrajectory : public Controller {
 
   bool through_ = false;
   bool stop_at_end_ = false;
-  bool beyond_ = false;        // a way-point is: what is between them follows from that
   bool joints_known_ = false;  // else their number says nothing of the way-points
+  bool incomplete_ = false;    // some way-point is
+  // Of all way-points; what is between them follows from these.
+  Mistake wrong_number_, beyond_;
   std::vector<std::size_t> joints_;
   std::vector<double> times_s_;  // of every point, the start at 0 first
   std::vector<Motion> points_;   // per time, per joint

@@ -43,7 +43,8 @@ class Checker {
 
   void check_link(const Link& link) {
     const std::string found = inertia_problem(link.inertia);
-    if (found.empty() || fixed_to_world(link.body)) return;
+    if (found.empty()) return;
+    if (fixed_to_world(link.body) && link.inertia.mass_kg >= 0.0) return;  // it never counts
     const double whole = tree_.bodies[static_cast<std::size_t>(link.body)].inertia.mass_kg;
     Error report{found, {}, tree_.file, line_of(link.name), "link " + link.name};
     if (const LinkOverride* given = find_override(options_, link.name)) {

@@ -130,6 +130,12 @@ Diagnostics Maker::take(model::UrdfModel found) {
     robot_.remarks.push_back(fmt::format("{} follows {} and has no drive: <mimic>.", joint.name,
                                          robot_.tree.joints[joint.leader].name));
   }
+  if (!found.limits_notes.empty()) {
+    const auto& [joint, note] = *found.limits_notes.begin();
+    const std::size_t more = found.limits_notes.size() - 1;
+    robot_.remarks.push_back(fmt::format("Limits are guessed: {} (joint {}){}.", note, joint,
+                                         more == 0 ? "" : fmt::format(", and of {} more", more)));
+  }
   outfit_ = read_outfit(text_of(request_.urdf));
   return {};
 }

@@ -263,6 +263,17 @@ TEST_F(New, SaysThatALimitWhichEveryJointHasIsLikelyAPlaceholder) {
       << placeholder.out;
 }
 
+TEST_F(New, SaysWhichLimitsItHadToGuessAndWhy) {
+  std::string arm = read_text(TANDEM_SOURCE_DIR "/config/ur5e/ur5e.urdf");
+  arm.replace(arm.find("lower=\"-"), 8, "lower=\"9");
+  arm.replace(arm.find("effort=\""), 8, "effort=\"-");
+  write_text(folder_ / "arm.urdf", arm);
+  const Outcome outcome = tandem("new arm.urdf -o x");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("Limits are guessed: arm.urdf:"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("effort is not above 0"), std::string::npos) << outcome.out;
+}
+
 TEST_F(New, SaysWhatItChoseAsJson) {
   const Outcome outcome =
       tandem("new '" TANDEM_SOURCE_DIR "/config/coman/coman.urdf' -o c --like coman --json -");

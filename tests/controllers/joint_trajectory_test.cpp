@@ -95,14 +95,32 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
             "time_s and position_rad)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1.7]\n"),
             "experiment.toml:4: waypoint[0].position_rad: joint 'wrist' leaves its limits (stay "
-            "within -1.500000 and 1.500000)");
+            "within -1.500000 and 1.500000; in radians, or metres of a slide)");
+  EXPECT_EQ(
+      problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [60]\n"
+                 "[[waypoint]]\ntime_s = 2\nposition_rad = [90]\n[[waypoint]]\ntime_s = 3\n"
+                 "position_rad = [0]\n"),
+      "experiment.toml:4: waypoint[0].position_rad: joint 'wrist' leaves its limits, here and "
+      "in 1 later way-point (stay within -1.500000 and 1.500000; in radians, or metres of a "
+      "slide)")
+      << "one message for a column in degrees";
+  EXPECT_EQ(problem_of("joints = ['shoulder', 'wrst']\n[[waypoint]]\ntime_s = 1\n"
+                       "position_rad = [9, 9]\n[[waypoint]]\ntime_s = 2\nposition_rad = [9, 9]\n")
+                .find("\n"),
+            std::string::npos)
+      << "with a joint misspelt, who knows whose the numbers are";
+  EXPECT_EQ(
+      problem_of("joints = ['wrist', 'elbow']\n[[waypoint]]\ntime_s = 1\n"
+                 "position_rad = [9]\n[[waypoint]]\ntime_s = 2\nposition_rad = [9]\n"),
+      "experiment.toml:4: waypoint[0].position_rad: has 1 number for 2 joints, here and in 1 "
+      "later way-point (give one each for wrist, elbow; or name those that move in `joints`)");
   EXPECT_EQ(problem_of("[[waypoint]]\ntime_s = 1\nposition_rad = [60, 90, 45]\n[[waypoint]]\n"
                        "time_s = 2\nposition_rad = [0, 0, 0]\n"),
             "experiment.toml:3: waypoint[0].position_rad: joint 'shoulder' and 2 more leave their "
             "limits (stay within -1.500000 and 1.500000; in radians, or metres of a slide)")
       << "one message for a way-point in degrees";
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [1, 2]\n"),
-            "experiment.toml:4: waypoint[0].position_rad: has 2 numbers for 1 joints "
+            "experiment.toml:4: waypoint[0].position_rad: has 2 numbers for 1 joint "
             "(give one each for wrist; or name those that move in `joints`)");
   EXPECT_EQ(problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"
                        "[[waypoint]]\ntime_s = 1\nposition_rad = [0.0]\n"),

@@ -335,6 +335,9 @@ TEST(UrdfInertia, OfWhatIsFixedToTheWorldIsNotJudged) {
   ASSERT_TRUE(model.has_value());
   EXPECT_TRUE(model->warnings.empty()) << to_text(model->warnings);
   EXPECT_NE(errors_of(post, {.floating_base = true}), "");
+  const std::string light = with(
+      "<link name=\"post\"/>", "<link name=\"post\">" + inertial("-9", "1 0 0 1 0 1") + "</link>");
+  EXPECT_NE(errors_of(light).find("link post: the mass is negative, -9 kg"), std::string::npos);
 }
 
 // --- robots as they are published, in small ---
