@@ -5,7 +5,7 @@ FUZZ_SECONDS ?= 60
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
 help:
-	@echo "make demo   install what is missing, build, and let COMAN squat (about 5 minutes the first time)"
+	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
 	@echo "make clean  remove build/ and runs/"

@@ -174,7 +174,7 @@ TEST_P(ShippedKernels, KeepEnergyAndMomentumOverTenSecondsOfFreeMotion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, ShippedKernels,
-                         testing::Values("coman", "walkman", "anymal_c", "panda", "ur5e",
+                         testing::Values("coman", "walkman", "icub", "anymal_c", "panda", "ur5e",
                                          "double_pendulum", "four_bar", "parallel_ankle"),
                          [](const auto& test) { return std::string(test.param); });
 
