@@ -65,6 +65,7 @@ Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
   const auto bodies = runtime::bodies_in(robot.config, *start, robot.tree);
   const double base_m = robot.tree.floating_base ? start->base_height_m : 0.0;
   for (const sim::LinkPoints& points : sim::link_points(robot.config, robot.tree)) {
+    if (points.guessed) continue;  // nobody wrote it
     const model::Link& link = robot.tree.links[points.link];
     const model::Placement& body = bodies[static_cast<std::size_t>(link.body)];
     double depth_m = 0.0;
@@ -78,11 +79,10 @@ Diagnostics buried_links(const RobotFiles& robot, const std::string& posture) {
     warning.line = start->line;
     warning.key = posture.empty() ? "contact.height_m" : "posture." + posture;
     warning.message = fmt::format(
-        "the link '{}' starts {:.4f} m inside the ground{}: what is inside "
-        "does not touch it in this run",
-        link.name, depth_m, points.guessed ? " (its shape is guessed from its inertia)" : "");
-    warning.hint = points.guessed ? "give the link a <collision> of a simple shape in the URDF"
-                                  : "move its joints, raise the base, or correct its <collision>";
+        "the link '{}' starts {:.4f} m inside the ground: what is inside does not touch it in "
+        "this run",
+        link.name, depth_m);
+    warning.hint = "move its joints, raise the base, or correct its <collision>";
     warnings.push_back(std::move(warning));
   }
   return warnings;

@@ -20,8 +20,8 @@ namespace tandem::apps {
 [[nodiscard]] std::optional<Error> wrong_start_height(const RobotFiles& robot,
                                                       const std::string& posture);
 
-/// Links besides the soles' that are inside the ground in this posture, one warning each. Empty
-/// without [contact].
+/// Links besides the soles' whose collision shapes are inside the ground in this posture, one
+/// warning each; none of guessed shapes. Empty without [contact].
 [[nodiscard]] Diagnostics buried_links(const RobotFiles& robot, const std::string& posture);
 
 }  // namespace tandem::apps
