@@ -94,8 +94,7 @@ class CheckLoops : public Check {
     Check::SetUp();
     for (const char* file : {"robot.toml", "four_bar.urdf", "hold.toml"}) {
       std::filesystem::copy_file(TANDEM_SOURCE_DIR "/config/four_bar/" + std::string(file),
-                                 folder_ / file,
-                                 std::filesystem::copy_options::overwrite_existing);
+                                 folder_ / file, std::filesystem::copy_options::overwrite_existing);
     }
   }
 
@@ -272,6 +271,30 @@ void copy_coman(const std::filesystem::path& to, const std::string& height) {
   const std::string before = "base_height_m = 0.502";
   robot.replace(robot.find(before), before.size(), "base_height_m = " + height);
   write_text(to / "robot.toml", robot);
+}
+
+/// A shape that the URDF gives is somebody's word; one that is guessed of an inertia is not.
+TEST_F(Check, WarnsOfACollisionShapeThatStartsInsideTheGround) {
+  std::ofstream(folder_ / "robot.toml", std::ios::app)
+      << "\n[contact]\nheight_m = 0.4\nstiffness_N_m = 25000\ndamping_s_m = 3.3\n"
+         "tangential_stiffness_N_m = 25000\ntangential_damping_Ns_m = 90\nstatic_friction = 0.9\n"
+         "sliding_friction = 0.8\nstick_velocity_m_s = 0.01\n";
+  const std::string says = "the link 'link2' starts ";
+  const Outcome given = tandem("check robot.toml");
+  EXPECT_EQ(given.status, 0) << given.err;
+  EXPECT_NE(given.err.find("posture.ready: " + says), std::string::npos) << given.err;
+  EXPECT_NE(given.err.find("m inside the ground: what is inside does not touch it in this run"),
+            std::string::npos)
+      << given.err;
+  const std::string open = "<collision>", close = "</collision>";
+  std::string urdf = read_text(folder_ / "double_pendulum.urdf");
+  for (std::size_t at; (at = urdf.find(open)) != std::string::npos;) {
+    urdf.erase(at, urdf.find(close) + close.size() - at);
+  }
+  write_text(folder_ / "double_pendulum.urdf", urdf);
+  const Outcome guessed = tandem("check robot.toml");
+  EXPECT_EQ(guessed.status, 0) << guessed.err;
+  EXPECT_EQ(guessed.err.find(says), std::string::npos) << guessed.err;
 }
 
 TEST_F(Check, RefusesAStartInsideTheGroundAndSaysWhichHeightTouches) {
