@@ -25,6 +25,11 @@ class DdsClient : public ControlClient {
       : participant_(std::move(participant)), client_(std::move(client)) {}
 
   Result<Json> ask(const Json& question) override {
+    // A stop needs no admission, and waits for no other process' answer.
+    if (!admitted_ && question.value("do", "") != "estop") {
+      have_admitted(*participant_);
+      admitted_ = true;
+    }
     std::string text = json_text(question);
     std::string answer;
     dds::tandem_msgs::Ask_Request request{};
@@ -39,6 +44,7 @@ class DdsClient : public ControlClient {
  private:
   std::unique_ptr<dds::Participant> participant_;  // outlives the client
   AskClient client_;
+  bool admitted_ = false;  // as far as that can be
 };
 
 std::vector<dds::FoundService> in_namespace(std::vector<dds::FoundService> found,
@@ -100,7 +106,6 @@ Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& aske
   const std::vector<dds::FoundService> found = look(*finder, target);
   if (found.empty()) return std::unexpected(nobody(target, *config));
   if (found.size() > 1) return std::unexpected(several(found, *config));
-  have_admitted(**participant);
   const std::string& name_space = found.front().name_space;
   auto client = AskClient::create(**participant,
                                   (name_space.empty() ? "/" : "/" + name_space + "/") + kService);

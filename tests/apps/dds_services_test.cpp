@@ -1,5 +1,11 @@
 // A run's services over DDS do what its registry's commands do, and no more than [remote] allows.
 #include "apps/dds_services.hpp"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
 #include "dds/service_client.hpp"
 #include "tests/apps/running.hpp"
 #include "tests/support/dds_domain.hpp"
@@ -356,6 +362,36 @@ TEST_F(DdsCommands, SayWhatIsNotAllowedAndWhatWouldAllowIt) {
   }
   EXPECT_EQ(to_run("controller stop hold").status, 0) << "the local operator may";
   EXPECT_EQ(over_dds("estop").status, 0);
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(end(), 1);
+}
+
+/// A process that hangs holds up everything that waits for its admission; a stop must not.
+TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
+  begin_with("local");
+  std::string runtime = "/tmp/tandem_admission_XXXXXX";
+  ASSERT_NE(::mkdtemp(runtime.data()), nullptr);
+  ASSERT_EQ(::mkdir((runtime + "/tandem").c_str(), 0700), 0);
+  const std::string path = runtime + "/tandem/run-1.sock";  // of a run that answers nothing
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  const int silent = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+  ASSERT_EQ(::bind(silent, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(silent, 8), 0);
+  const auto asked = [silent] {
+    const int client = ::accept(silent, nullptr, nullptr);
+    if (client >= 0) ::close(client);
+    return client >= 0;
+  };
+  const std::string there = " --dds --domain " + std::to_string(dds::test::own_domain());
+  const std::string environment = "XDG_RUNTIME_DIR=" + runtime;
+  EXPECT_EQ(tandem("estop" + there, environment).status, 0);
+  EXPECT_FALSE(asked());
+  EXPECT_EQ(tandem("clock show" + there, environment).status, 0);
+  EXPECT_TRUE(asked());
+  ::close(silent);
+  std::filesystem::remove_all(runtime);
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);
 }
