@@ -209,6 +209,7 @@ std::expected<std::vector<Fault>, Diagnostics> read(Result<TomlDocument> documen
   for (TomlTable& table : root.tables("fault")) faults.push_back(read_fault(table, context));
   if (faults.empty()) {
     root.error("fault", "there is no fault", "add [[fault]] with kind = \"board_kill\", for one");
+    return std::unexpected(document->diagnostics());  // what else is there is of another kind
   }
   if (faults.size() > FaultInjection::kMostFaults) {
     root.error("fault", std::to_string(faults.size()) + " faults are too many",

@@ -95,6 +95,9 @@ TEST(Scenario, SaysWhatIsWrongAndWhere) {
   EXPECT_NE(errors_of("[[fault]]\nkind = \"spring_break\"\njoint = \"swing\"\n", 0).find("rigid"),
             std::string::npos);
   EXPECT_NE(errors_of("").find("there is no fault"), std::string::npos);
+  const std::string robot = errors_of("name = \"arm\"\n[model]\nurdf = \"arm.urdf\"\n");
+  EXPECT_NE(robot.find("there is no fault"), std::string::npos);
+  EXPECT_EQ(robot.find("unknown key"), std::string::npos) << "a file of another kind: " << robot;
   EXPECT_NE(errors_of("[[fault]]\nkind = \"frame_drop\"\nprobability = 0\n").find("probability"),
             std::string::npos);
 }
