@@ -87,13 +87,13 @@ struct Body {
 /// A link of the description. Its frame is that of the joint that leads to it.
 struct Link {
   std::string name;
-  int body = 0;       ///< the body it is part of
-  Placement in_body;  ///< its frame in the body's frame
-  Inertia inertia;    ///< its own, in its own frame; mass 0 when it has none
-  int parent = -1;    ///< link; smaller than its own index; -1: the root
-  std::string joint;  ///< from the parent to it, moving or fixed; empty: the root
-  int moving = -1;    ///< index in `joints` when that joint moves, else -1
-  std::vector<Shape> shapes{};  ///< of no weight in the dynamics
+  int body = 0;                 ///< the body it is part of
+  Placement in_body;            ///< its frame in the body's frame
+  Inertia inertia;              ///< its own, in its own frame; mass 0 when it has none
+  int parent = -1;              ///< link; smaller than its own index; -1: the root
+  std::string joint;            ///< from the parent to it, moving or fixed; empty: the root
+  int moving = -1;              ///< index in `joints` when that joint moves, else -1
+  std::vector<Shape> shapes{};  ///< not part of the dynamics
 };
 
 /// Joints, bodies and links stand in the model's order: depth first from the root, the children

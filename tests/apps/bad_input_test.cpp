@@ -3,59 +3,13 @@
 
 #include <algorithm>
 
-#include "tests/apps/program.hpp"
+#include "tests/apps/bad_input.hpp"
 
 namespace tandem::apps {
 namespace {
 
-std::ptrdiff_t error_lines(const std::string& err) {
-  std::ptrdiff_t lines = 0;
-  std::istringstream in(err);
-  for (std::string line; std::getline(in, line);) lines += line.starts_with("error: ") ? 1 : 0;
-  return lines;
-}
-
-/// A memory disk in `folder` for as long as this lives; root only.
-class Mount {
- public:
-  Mount(std::filesystem::path folder, const std::string& options) : folder_(std::move(folder)) {
-    std::filesystem::create_directory(folder_);
-    mounted_ = run("mount -t tmpfs -o " + options + " tmpfs");
-  }
-  ~Mount() {
-    if (mounted_) {
-      EXPECT_TRUE(run("umount"));
-    }
-  }
-  Mount(const Mount&) = delete;
-  Mount& operator=(const Mount&) = delete;
-  [[nodiscard]] bool mounted() const { return mounted_; }
-
- private:
-  [[nodiscard]] bool run(const std::string& command) const {
-    return std::system((command + " '" + folder_.string() + "' 2>/dev/null").c_str()) == 0;
-  }
-  std::filesystem::path folder_;
-  bool mounted_ = false;
-};
-
-class BadInput : public Program {
- protected:
-  /// The experiment must be refused with one error that holds every one of `texts`.
-  void expect_refused(const std::vector<std::string>& texts,
-                      const std::string& arguments = "run hold.toml --duration 0.05") const {
-    const Outcome outcome = tandem(arguments);
-    EXPECT_EQ(outcome.status, 2) << outcome.err;
-    EXPECT_EQ(error_lines(outcome.err), 1) << outcome.err;
-    for (const std::string& text : texts) {
-      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
-    }
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_FALSE(has_log());
-  }
-};
-
-/// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with success.
+/// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with
+/// success.
 TEST_F(BadInput, FromAControllersLibraryIsRefused) {
   const std::string folder = "TANDEM_CONTROLLERS=" TANDEM_BINARY_DIR "/tests/broken_plugins";
   for (const std::string command : {"check", "run"}) {
@@ -151,8 +105,9 @@ TEST_F(BadInput, AMissingRobotIsNoExperimentToRepair) {
 TEST_F(BadInput, AnEmptyFileIsRefusedAsOne) {
   write_text(folder_ / "hold.toml", " \n\n");
   expect_refused({"hold.toml: the file is empty"});
-  write_text(folder_ / "hold.toml", "robot = 'robot.toml'\nduration_s = 1\n[[controller]]\n"
-                                    "plugin = 'hold'\n");
+  write_text(folder_ / "hold.toml",
+             "robot = 'robot.toml'\nduration_s = 1\n[[controller]]\n"
+             "plugin = 'hold'\n");
   write_text(folder_ / "robot.toml", "");
   expect_refused({"robot.toml: the file is empty", "it is the robot of hold.toml:1"});
 }
@@ -370,34 +325,6 @@ TEST_F(BadInput, APluginOfAnotherAbiIsRefused) {
   expect_refused({"other_abi.so", "ABI"});
 }
 
-TEST_F(BadInput, ALogFolderThatCannotBeMadeIsRefused) {
-  expect_refused({"/proc/tandem", "log's folder", "--log"},
-                 "run hold.toml --duration 0.05 --log /proc/tandem");
-}
-
-TEST_F(BadInput, ALogFolderThatIsAFileIsRefused) {
-  expect_refused({"hold.toml", "log's folder"}, "run hold.toml --duration 0.05 --log hold.toml");
-}
-
-TEST_F(BadInput, AReadOnlyLogFolderIsRefused) {
-  if (geteuid() != 0) {
-    std::filesystem::create_directory(folder_ / "locked");
-    std::filesystem::permissions(folder_ / "locked", std::filesystem::perms::owner_read);
-    expect_refused({"locked", "cannot write"}, "run hold.toml --duration 0.05 --log locked");
-    return;
-  }
-  // Permissions do not stop root: a file system that is mounted read-only does.
-  const Mount disk(folder_ / "locked", "ro");
-  if (!disk.mounted()) GTEST_SKIP() << "a read-only disk needs the right to mount";
-  expect_refused({"locked", "log"}, "run hold.toml --duration 0.05 --log locked");
-}
-
-TEST_F(BadInput, AFullDiskIsRefused) {
-  const Mount disk(folder_ / "disk", "size=64k");
-  if (!disk.mounted()) GTEST_SKIP() << "a small disk needs the right to mount";
-  expect_refused({"disk", "too full"}, "run hold.toml --log disk");
-}
-
 TEST_F(BadInput, APeriodOfZeroIsRefused) {
   edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 0");
   expect_refused({"hold.toml:", "period_ns", "out of range"});
@@ -415,9 +342,10 @@ TEST_F(BadInput, AKernelVariantThatIsNotThereIsRefused) {
 
 TEST_F(BadInput, IsReportedAsJsonByEveryCommand) {
   for (const std::string command :
-       {"run nothing.toml", "check nothing.toml", "model info nothing.toml", "log info nothing.mcap",
-        "log diff nothing.mcap nothing.mcap", "report nothing.mcap", "eds nothing.toml",
-        "new nothing.urdf", "emulate nothing.toml", "serve nothing.toml", "doctor nothing.toml"}) {
+       {"run nothing.toml", "check nothing.toml", "model info nothing.toml",
+        "log info nothing.mcap", "log diff nothing.mcap nothing.mcap", "report nothing.mcap",
+        "eds nothing.toml", "new nothing.urdf", "emulate nothing.toml", "serve nothing.toml",
+        "doctor nothing.toml"}) {
     const Outcome outcome = tandem(command + " --json -");
     EXPECT_EQ(outcome.status, 2) << command;
     const auto json = nlohmann::json::parse(outcome.out, nullptr, false);

@@ -1,5 +1,5 @@
-// After an emergency stop amid a motion: the robot falls as one does, ends where a robot ends,
-// and is recovered by the documented steps.
+// After an emergency stop in motion: the robot falls, lies still within its end stops, and can be
+// reset as docs/safety.md says.
 #include <algorithm>
 #include <cmath>
 
@@ -78,7 +78,7 @@ struct Collapse : Squat {
 void collapse(const std::string& robot, hal::StopCategory category) {
   Collapse run(robot, "squat");
   run.run_to(RunPhase::kRunning);
-  run.steps(4000);  // amid the first squat
+  run.steps(4000);  // half way down the first squat
   const double standing_m = run.plant().q()[2], before_J = run.energy_J();
   run.cycle->requests().emergency_stop(category);
   run.steps(6000);

@@ -1,0 +1,64 @@
+// A log that cannot be written is found before anything runs.
+#include <unistd.h>
+
+#include "tests/apps/bad_input.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// A memory disk in `folder` for as long as this lives; root only.
+class Mount {
+ public:
+  Mount(std::filesystem::path folder, const std::string& options) : folder_(std::move(folder)) {
+    std::filesystem::create_directory(folder_);
+    mounted_ = run("mount -t tmpfs -o " + options + " tmpfs");
+  }
+  ~Mount() {
+    if (mounted_) {
+      EXPECT_TRUE(run("umount"));
+    }
+  }
+  Mount(const Mount&) = delete;
+  Mount& operator=(const Mount&) = delete;
+  [[nodiscard]] bool mounted() const { return mounted_; }
+
+ private:
+  [[nodiscard]] bool run(const std::string& command) const {
+    return std::system((command + " '" + folder_.string() + "' 2>/dev/null").c_str()) == 0;
+  }
+  std::filesystem::path folder_;
+  bool mounted_ = false;
+};
+
+class BadDisk : public BadInput {};
+
+TEST_F(BadDisk, ALogFolderThatCannotBeMadeIsRefused) {
+  expect_refused({"/proc/tandem", "log's folder", "--log"},
+                 "run hold.toml --duration 0.05 --log /proc/tandem");
+}
+
+TEST_F(BadDisk, ALogFolderThatIsAFileIsRefused) {
+  expect_refused({"hold.toml", "log's folder"}, "run hold.toml --duration 0.05 --log hold.toml");
+}
+
+TEST_F(BadDisk, AReadOnlyLogFolderIsRefused) {
+  if (geteuid() != 0) {
+    std::filesystem::create_directory(folder_ / "locked");
+    std::filesystem::permissions(folder_ / "locked", std::filesystem::perms::owner_read);
+    expect_refused({"locked", "cannot write"}, "run hold.toml --duration 0.05 --log locked");
+    return;
+  }
+  // Permissions do not stop root: a file system that is mounted read-only does.
+  const Mount disk(folder_ / "locked", "ro");
+  if (!disk.mounted()) GTEST_SKIP() << "a read-only disk needs the right to mount";
+  expect_refused({"locked", "log"}, "run hold.toml --duration 0.05 --log locked");
+}
+
+TEST_F(BadDisk, AFullDiskIsRefused) {
+  const Mount disk(folder_ / "disk", "size=64k");
+  if (!disk.mounted()) GTEST_SKIP() << "a small disk needs the right to mount";
+  expect_refused({"disk", "too full"}, "run hold.toml --log disk");
+}
+
+}  // namespace
+}  // namespace tandem::apps

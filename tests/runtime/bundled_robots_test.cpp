@@ -1,0 +1,76 @@
+// The robots and experiments that come with Tandem are complete and can be read.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "runtime/experiment.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+class BundledRobot : public testing::TestWithParam<const char*> {};
+
+TEST_P(BundledRobot, IsCompleteWithItsDescription) {
+  const std::string file = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam() + "/robot.toml";
+  auto bundled = hal::read_robot_config(file);
+  ASSERT_TRUE(bundled.has_value()) << bundled.error()[0].to_string();
+  const auto description = complete_robot(*bundled);
+  ASSERT_TRUE(description.has_value()) << description.error()[0].to_string();
+  for (const Error& warning : description->warnings) EXPECT_EQ(warning.key, "dynamics");
+  EXPECT_EQ(description->tree.joints.size(), bundled->joints.size() + bundled->passive.size());
+  for (const hal::JointConfig& joint : bundled->joints) {
+    EXPECT_LT(joint.min_position_rad, joint.max_position_rad) << joint.name;
+    EXPECT_GT(joint.max_torque_Nm, 0.0) << joint.name;
+  }
+}
+
+/// A bundled humanoid whose posture leaves the base's height to the description: that height, less
+/// how far flat soles sink into the ground under its weight.
+double sunk_height_m(const std::string& name, const std::string& given) {
+  const std::string file = TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml";
+  std::ifstream in(file);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  const std::string before = "base_height_m = " + given;
+  auto robot = hal::parse_robot_config(
+      text.replace(text.find(before), before.size(), "base_height_m = \"auto\""), file);
+  EXPECT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_TRUE(std::isnan(robot->posture("stand")->base_height_m));
+  const auto description = complete_robot(*robot);
+  EXPECT_TRUE(description.has_value()) << description.error()[0].to_string();
+  double weight_N = 0.0;
+  for (const model::Body& body : description->tree.bodies) weight_N += 9.81 * body.inertia.mass_kg;
+  std::size_t points = 0;
+  for (const hal::FootConfig& foot : robot->contact.feet) points += foot.points_m.size();
+  const double stiffness_N_m = robot->contact.stiffness_N_m * static_cast<double>(points);
+  return robot->posture("stand")->base_height_m - weight_N / stiffness_N_m;
+}
+
+TEST(StandingHeight, IsWhereTheLowestPointOfTheSolesTouchesTheGround) {
+  // The given figures are those of a robot that the ground carries, rounded to a millimetre.
+  EXPECT_NEAR(sunk_height_m("coman", "0.502"), 0.502, 0.5e-3);
+  EXPECT_NEAR(sunk_height_m("walkman", "1.079"), 1.079, 0.5e-3);
+}
+
+TEST_P(BundledRobot, HasExperimentsThatCanBeRead) {
+  const std::filesystem::path folder = std::string(TANDEM_SOURCE_DIR "/config/") + GetParam();
+  int read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::filesystem::path& file = entry.path();
+    if (file.extension() != ".toml" || file.filename() == "robot.toml") continue;
+    const auto experiment = read_experiment(file.string());
+    EXPECT_TRUE(experiment.has_value()) << experiment.error()[0].to_string();
+    ++read;
+  }
+  EXPECT_GT(read, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BundledRobot,
+                         testing::Values("coman", "walkman", "panda", "ur5e", "double_pendulum",
+                                         "four_bar", "parallel_ankle"),
+                         [](const auto& robot) { return std::string(robot.param); });
+
+}  // namespace
+}  // namespace tandem::runtime
