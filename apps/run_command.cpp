@@ -65,6 +65,7 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
   config.after_reset = e.after_reset;
+  config.on_stray = e.on_stray;
   config.fall = e.fall_limits();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;

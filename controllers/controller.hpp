@@ -43,15 +43,22 @@ class ControllerSetup {
   std::span<const double> start_position_rad;
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
-  /// error before anything moves; a joint that nobody claims is held by the loop.
+  /// error before anything moves; a joint that nobody claims is held by the loop. What a controller
+  /// writes to another joint, and modes that it writes, are taken back and reported.
   void claim(std::size_t joint, hal::ControlMode mode,
              hal::InteractionMode interaction = hal::InteractionMode::kStiff) {
-    claims_.push_back({joint, mode, interaction});
+    claims_.push_back({joint, mode, interaction, false});
+  }
+  /// The same for a controller that writes the joint's mode and interaction in its updates, any
+  /// that the joint can do. They begin as `mode`, stiff.
+  void claim_with_modes(std::size_t joint, hal::ControlMode mode) {
+    claims_.push_back({joint, mode, hal::InteractionMode::kStiff, true});
   }
   struct Claim {
     std::size_t joint;
     hal::ControlMode mode;
     hal::InteractionMode interaction;
+    bool with_modes;
   };
   [[nodiscard]] std::span<const Claim> claims() const { return claims_; }
 
@@ -71,8 +78,8 @@ class Controller {
   virtual void start(const hal::CycleTime& time, const hal::StateImage& state,
                      hal::CommandImage& command) noexcept TANDEM_RT = 0;
 
-  /// Each cycle, the first included: writes the references of the claimed joints. Modes are
-  /// already set from the claims.
+  /// Each cycle, the first included: writes the references of the claimed joints, and of no other.
+  /// Modes are already set from the claims.
   /// @return kOk; kStopped when its task is done; anything else stops the robot (category 1).
   [[nodiscard]] virtual Code update(const hal::CycleTime& time, const hal::StateImage& state,
                                     hal::CommandImage& command) noexcept TANDEM_RT = 0;
@@ -93,12 +100,12 @@ class Controller {
 
 /// Another number whenever a plugin built before a change could misbehave after it: a size that a
 /// plugin sees changes it by itself, the first number is raised for everything else.
-inline constexpr std::uint32_t kControllerAbi =
-    abi_of({2, sizeof(ControllerSetup), sizeof(hal::RobotConfig), sizeof(hal::JointConfig),
-            sizeof(hal::ActuatorConfig), sizeof(hal::GainsConfig), sizeof(hal::BoardConfig),
-            sizeof(hal::BusConfig), sizeof(hal::SensorConfig), sizeof(hal::ContactConfig),
-            sizeof(hal::PostureConfig), sizeof(hal::StateImage), sizeof(hal::CommandImage),
-            sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+inline constexpr std::uint32_t kControllerAbi = abi_of(
+    {3, sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::RobotConfig),
+     sizeof(hal::JointConfig), sizeof(hal::ActuatorConfig), sizeof(hal::GainsConfig),
+     sizeof(hal::BoardConfig), sizeof(hal::BusConfig), sizeof(hal::SensorConfig),
+     sizeof(hal::ContactConfig), sizeof(hal::PostureConfig), sizeof(hal::StateImage),
+     sizeof(hal::CommandImage), sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

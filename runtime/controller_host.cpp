@@ -14,7 +14,8 @@ ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kerne
       period_ns_(period_ns),
       capabilities_(hal::joint_capabilities(robot)),
       owner_(robot.joints.size(), -1),
-      take_over_(robot.joints.size(), period_ns) {
+      take_over_(robot.joints.size(), period_ns),
+      guard_(robot.shape(), capabilities_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
     impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
   }
@@ -84,6 +85,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
   made->controller = std::move(controller);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
   made->claimed.assign(robot_->joints.size(), 0);
+  made->strayed.assign(robot_->joints.size(), 0);
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
   made->id = new_id(name);
   return made;
@@ -173,7 +175,7 @@ void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& st
     if (is_active(slot)) set_modes(*table_[slot], command);
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if (is_active(slot)) enter(*table_[slot]).start(time, state, command);
+    if (is_active(slot)) call_start(*table_[slot], time, state, command);
   }
   leave_calls();
 }
@@ -184,9 +186,9 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
   bool ends = active_ != 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
-    const HostedController& one = *table_[slot];
+    HostedController& one = *table_[slot];
     if ((done_ & only(slot)) == 0) {
-      const Code code = enter(one).update(time, state, command);
+      const Code code = call_update(one, time, state, command);
       if (code == Code::kStopped) {
         done_ |= only(slot);
       } else if (code != Code::kOk) {
@@ -201,6 +203,32 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
   take_over_.after_update(state, command);
   show();
   return ends ? Code::kStopped : Code::kOk;
+}
+
+void ControllerHost::call_start(HostedController& one, const hal::CycleTime& time,
+                                const hal::StateImage& state,
+                                hal::CommandImage& command) noexcept TANDEM_RT {
+  guard_.remember(command);
+  enter(one).start(time, state, command);
+  take_back(one, command);
+}
+
+Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& time,
+                                 const hal::StateImage& state,
+                                 hal::CommandImage& command) noexcept TANDEM_RT {
+  guard_.remember(command);
+  const Code code = enter(one).update(time, state, command);
+  take_back(one, command);
+  return code;
+}
+
+/// Told once of each controller and joint; what finds no room in this cycle is told in a later one.
+void ControllerHost::take_back(HostedController& one,
+                               hal::CommandImage& command) noexcept TANDEM_RT {
+  const std::int32_t joint = guard_.take_back(one.claims, one.claimed, one.strayed, command);
+  if (joint < 0 || stray_) return;
+  one.strayed[static_cast<std::size_t>(joint)] = 1;
+  stray_ = Stray{one.id, static_cast<std::size_t>(joint)};
 }
 
 void ControllerHost::stop() noexcept TANDEM_RT {
@@ -229,7 +257,9 @@ std::uint64_t ControllerHost::fingerprint() const noexcept {
 
 void ControllerHost::archive(Archive& ar) {
   for (HostedController* one : table_) {
-    if (one != nullptr) one->controller->archive(ar);
+    if (one == nullptr) continue;
+    one->controller->archive(ar);
+    ar(one->strayed);
   }
   ar(active_, done_, impedance_, culprit_, take_over_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {

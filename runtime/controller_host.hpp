@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/realtime.hpp"
@@ -20,6 +21,7 @@
 #include "hal/capabilities.hpp"
 #include "hal/image.hpp"
 #include "hal/robot_config.hpp"
+#include "runtime/claim_guard.hpp"
 #include "runtime/loop_mailbox.hpp"
 #include "runtime/take_over.hpp"
 
@@ -37,9 +39,16 @@ struct HostedController {
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
   std::vector<ControllerSetup::Claim> claims;
   std::vector<std::uint8_t> claimed;  ///< by joint
+  std::vector<std::uint8_t> strayed;  ///< by joint: something was taken back, and told
   std::uint32_t id = 0;               ///< of its name, for the fault log
   bool of_experiment = true;          ///< not loaded while the run went on
   bool leaves = false;                ///< the asking side's: the loop was asked to let it go
+};
+
+/// A controller wrote what it had not claimed, and that was taken back.
+struct Stray {
+  std::uint32_t controller = 0;  ///< for ControllerHost::name()
+  std::size_t joint = 0;
 };
 
 /// Two controllers that want one joint.
@@ -142,6 +151,10 @@ class ControllerHost {
   [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT;
   void stop() noexcept TANDEM_RT;
+  /// What was taken back in this cycle, of a controller and joint of which it is the first time.
+  [[nodiscard]] std::optional<Stray> take_stray() noexcept TANDEM_RT {
+    return std::exchange(stray_, std::nullopt);
+  }
 
   /// That are loaded.
   [[nodiscard]] std::size_t size() const noexcept;
@@ -175,6 +188,13 @@ class ControllerHost {
     return (active_ & only(slot)) != 0;
   }
   [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
+  /// The two calls in which a controller writes, each followed by what is taken back.
+  void call_start(HostedController& one, const hal::CycleTime& time, const hal::StateImage& state,
+                  hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] Code call_update(HostedController& one, const hal::CycleTime& time,
+                                 const hal::StateImage& state,
+                                 hal::CommandImage& command) noexcept TANDEM_RT;
+  void take_back(HostedController& one, hal::CommandImage& command) noexcept TANDEM_RT;
   void set_active(ControllerSet active) noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
   [[nodiscard]] Controller& enter(const HostedController& one) noexcept TANDEM_RT {
@@ -200,6 +220,8 @@ class ControllerHost {
   std::vector<std::int32_t> owner_;   // by joint: an active one's slot, or -1
   std::vector<Impedance> impedance_;  // by joint: that a start gives it
   TakeOver take_over_;
+  ClaimGuard guard_;
+  std::optional<Stray> stray_;
   std::size_t culprit_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
   std::atomic<std::int32_t> at_work_{-1};

@@ -139,7 +139,7 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
     set_modes(*table_[slot], command);
-    enter(*table_[slot]).start(time, state, command);
+    call_start(*table_[slot], time, state, command);
   }
   leave_calls();
   return {};

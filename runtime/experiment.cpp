@@ -103,6 +103,8 @@ void read_faults(TomlTable table, Experiment& e) {
     e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
   }
   e.after_reset = read_choice(table, "after_reset", {"hold", "continue"}, e.after_reset);
+  e.on_stray =
+      read_choice(table, "stray_writes", {"category0", "category1", "hold", "warn"}, e.on_stray);
   if (table.has("fall")) e.falls_are_faults = table.choice("fall", {"stop", "allow"}) == "stop";
   if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
   table.finish();
@@ -327,19 +329,18 @@ FallLimits Experiment::fall_limits() const {
 }
 
 sim::SimRobotConfig Experiment::sim_robot_config() const {
-  return {
-      .period_ns = loop.period_ns,
-      .integrator = sim.integrator,
-      .substep_ns = sim.substep_ns,
-      .posture = posture,
-      .hold = sim.hoist,
-      .release_ns = std::llround(sim.hoist_release_s * 1e9),
-      .seed = seed,
-      .truth = sim.ground_truth,
-      .bus_timing = sim.bus_timing,
-      .bus_latency_ns = sim.bus_latency_ns,
-      .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns)),
-      .tree = tree};
+  return {.period_ns = loop.period_ns,
+          .integrator = sim.integrator,
+          .substep_ns = sim.substep_ns,
+          .posture = posture,
+          .hold = sim.hoist,
+          .release_ns = std::llround(sim.hoist_release_s * 1e9),
+          .seed = seed,
+          .truth = sim.ground_truth,
+          .bus_timing = sim.bus_timing,
+          .bus_latency_ns = sim.bus_latency_ns,
+          .answer_window_ns = std::llround(hal.answer_window * static_cast<double>(loop.period_ns)),
+          .tree = tree};
 }
 
 namespace {

@@ -110,9 +110,10 @@ struct Experiment {
   rt::LoopConfig loop;      ///< period, [overrun] and [clock]; the caller sets the pacing
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
-  AfterReset after_reset = AfterReset::kHold;  ///< [faults]
-  bool falls_are_faults = true;                ///< [faults] fall = "stop", or "allow"
-  std::optional<double> watchdog_s;            ///< [faults]; empty: 0.5 on the wall clock, else 5
+  AfterReset after_reset = AfterReset::kHold;             ///< [faults]
+  hal::StopCategory on_stray = hal::StopCategory::kWarn;  ///< [faults] stray_writes
+  bool falls_are_faults = true;                           ///< [faults] fall = "stop", or "allow"
+  std::optional<double> watchdog_s;  ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
   LogOptions log;
   ReportOptions report;

@@ -25,6 +25,7 @@ enum class FaultSource : std::uint8_t {
   kBringUp,        ///< the drives were not enabled in time
   kEmergencyStop,  ///< asked for from outside; `code` is an EmergencyInput
   kOwner,          ///< the owner in another process; `code` is a hal::OwnerLoss, kNone: it asked
+  kStray,          ///< a controller wrote what it had not claimed; `index` joint, `code` controller
   kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
 };
 
@@ -84,9 +85,9 @@ class FaultLog {
 struct Fault {
   std::uint64_t cycle = 0;
   double time_s = 0.0;
-  std::string joint;     ///< joint, sensor or controller; empty when the robot as a whole
-  std::string board;     ///< the joint's; may be empty
-  std::string text;      ///< one sentence, without `joint`
+  std::string joint;  ///< joint, sensor or controller; empty when the robot as a whole
+  std::string board;  ///< the joint's; may be empty
+  std::string text;   ///< one sentence, without `joint`
   hal::StopCategory category = hal::StopCategory::kWarn;
   bool latched = true;
   double cleared_s = 0.0;  ///< when it is not latched

@@ -21,7 +21,7 @@ class OwnerController final : public Controller {
     for (std::size_t j = 0; j < joints.size(); ++j) {
       for (const hal::ControlMode mode : {kPosition, kVelocity, kTorque, kOpenLoop, kCurrent}) {
         if (!joints[j].can(mode, hal::InteractionMode::kStiff)) continue;
-        setup.claim(j, mode);  // until its first command
+        setup.claim_with_modes(j, mode);  // this one until its first command
         break;
       }
     }

@@ -88,9 +88,7 @@ class Requests {
   // One word: flags below, the count of emergency stops above them.
   static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8, kWatchdog = 16;
   static constexpr std::uint32_t kFlags = 0xFF, kOneStop = 0x100, kNumbers = 0xFF'FFFF;
-  static constexpr std::uint32_t number_of(std::uint32_t word) noexcept {
-    return word / kOneStop;
-  }
+  static constexpr std::uint32_t number_of(std::uint32_t word) noexcept { return word / kOneStop; }
   void ask(std::uint32_t what) noexcept {
     asked_.fetch_or(what, std::memory_order_relaxed);
     bell_->ring();

@@ -163,6 +163,16 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   ++ran_;
   const Code code = controllers_->update(time_, state_, controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
+  controllers_answered(code);
+  if (const auto stray = controllers_->take_stray()) {
+    fault({.index = static_cast<std::int32_t>(stray->joint),
+           .code = stray->controller,
+           .source = FaultSource::kStray,
+           .category = config_.on_stray});
+  }
+}
+
+void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
   if (code == Code::kOk) return;
   if (code == Code::kStopped) {
     event(EventKind::kControllersDone);

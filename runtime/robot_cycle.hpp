@@ -38,6 +38,8 @@ struct CycleConfig {
   std::uint64_t shut_down_cycles = 2'000;  ///< at most
   AfterStop after_stop = AfterStop::kEnd;
   AfterReset after_reset = AfterReset::kHold;
+  /// Of a controller that writes what it has not claimed, which never reaches a drive.
+  hal::StopCategory on_stray = hal::StopCategory::kWarn;
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
   std::uint32_t delay_cycles = 0;        ///< between the controllers and the limits
   FallLimits fall = {};                  ///< watched where there is truth
@@ -67,7 +69,8 @@ struct CycleParts {
 ///                             latched. Bring-up and shut-down excepted.
 ///   kFaulted   -> kResetting  when a reset is requested: every joint is enabled where it is
 ///   kResetting -> kHeld       when they follow; back to kFaulted when a cause is still there.
-///                             kSettling with AfterReset::kContinue, or when no controller was active
+///                             kSettling with AfterReset::kContinue, or when no controller was
+///                             active
 ///   kHeld      -> kRunning    when a controller is started, or all that were active, none jumps
 ///   kShutDown  -> kDone       when the drives are disabled
 class RobotCycle {
@@ -173,6 +176,7 @@ class RobotCycle {
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
   void run_controllers() noexcept TANDEM_RT;
+  void controllers_answered(Code code) noexcept TANDEM_RT;
   void start_controllers() noexcept TANDEM_RT;
   [[nodiscard]] bool go_on_from_robot() noexcept TANDEM_RT;
   void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;

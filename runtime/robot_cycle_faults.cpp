@@ -112,9 +112,9 @@ void RobotCycle::check_fall() noexcept TANDEM_RT {
 
 /// Notes it, and carries out what its category says.
 void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
-  const bool of_joint = record.source == FaultSource::kDrive ||
-                        record.source == FaultSource::kJointLost ||
-                        record.source == FaultSource::kCommand;
+  const bool of_joint =
+      record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
+      record.source == FaultSource::kCommand || record.source == FaultSource::kStray;
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
@@ -158,7 +158,7 @@ void RobotCycle::watch_reset() noexcept TANDEM_RT {
   if (at == hal::Phase::kOperational) {
     reset_done();
     hold_back();
-    go(held_back_ != 0                ? RunPhase::kHeld
+    go(held_back_ != 0             ? RunPhase::kHeld
        : config_.settle_cycles > 0 ? RunPhase::kSettling
                                    : RunPhase::kRunning);
   } else if (at == hal::Phase::kFault || late) {

@@ -66,7 +66,8 @@ LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
 void RobotCycle::note_service(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
   const auto joint = static_cast<std::int32_t>(request.joint);
-  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) event(log::EventKind::kControllersSwitched);
+  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn)
+    event(log::EventKind::kControllersSwitched);
   if (request.kind == Kind::kJoint) event(log::EventKind::kJointSet, joint);
   if (request.kind == Kind::kGains) event(log::EventKind::kGainsSet, joint);
 }

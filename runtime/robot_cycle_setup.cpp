@@ -56,8 +56,8 @@ void RobotCycle::archive(Archive& ar) {
   statistics_.archive(ar);
   fall_watch_.archive(ar);
   controllers_->archive(ar);
-  ar(time_, phase_, started_, controlling_, held_back_, joint_fault_, reaction_, read_code_, phase_began_,
-     spent_, ran_);
+  ar(time_, phase_, started_, controlling_, held_back_, joint_fault_, reaction_, read_code_,
+     phase_began_, spent_, ran_);
   ar(joint_faulted_, sensor_lost_, joint_limited_, faults_);
 }
 
@@ -117,6 +117,10 @@ Fault RobotCycle::tell(std::size_t number) const {
     case FaultSource::kCommand:
       fault.text = "a controller's command was not a finite number";
       break;
+    case FaultSource::kStray:
+      fault.text = "the controller '" + controllers_->name(record.code) +
+                   "' wrote to this joint, or its mode, without a claim: taken back";
+      break;
     case FaultSource::kOverrun:
       fault.text = std::to_string(config_.loop.stop_late) + " of the last " +
                    std::to_string(config_.loop.stop_window) + " cycles were late";
@@ -152,7 +156,7 @@ Fault RobotCycle::tell(std::size_t number) const {
       break;
   }
   if (record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
-      record.source == FaultSource::kCommand) {
+      record.source == FaultSource::kCommand || record.source == FaultSource::kStray) {
     fault.joint = robot_->joints[index].name;
     fault.board = robot_->joints[index].board;
   }

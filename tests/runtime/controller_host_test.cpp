@@ -1,5 +1,7 @@
 #include "runtime/controller_host.hpp"
 
+#include <limits>
+
 #include "tests/hal/fake_backend.hpp"
 #include "tests/runtime/test_controllers.hpp"
 
@@ -67,6 +69,80 @@ TEST_F(ControllerHostOfFake, ReportsParametersThatTheControllerDoesNotKnow) {
   ASSERT_EQ(document->diagnostics().size(), 1U);
   EXPECT_EQ(document->diagnostics()[0].key, "amplitude_rd");
   EXPECT_EQ(document->diagnostics()[0].hint, "did you mean 'amplitude_rad'?");
+}
+
+/// Joints 0 and 2 as they were, joint 1 as `writer` wrote it.
+class StrayWrites : public ControllerHostOfFake {
+ protected:
+  test::Stray& begin(bool chooses) {
+    auto made = std::make_unique<test::Stray>(1, chooses);
+    test::Stray& writer = *made;
+    EXPECT_TRUE(host_.add("writer", std::move(made), parameters()));
+    state_.position_rad()[0] = 0.3;
+    host_.start({}, state_, command_);
+    return writer;
+  }
+  void update() { EXPECT_EQ(host_.update({}, state_, command_), Code::kOk); }
+  /// Told of these joints, one a cycle, and then of nothing more.
+  void expect_told(const std::vector<std::size_t>& joints) {
+    for (const std::size_t joint : joints) {
+      const auto stray = host_.take_stray();
+      ASSERT_TRUE(stray.has_value()) << joint;
+      EXPECT_EQ(stray->joint, joint);
+      EXPECT_EQ(host_.name(stray->controller), "writer");
+      update();
+    }
+    update();
+    EXPECT_FALSE(host_.take_stray().has_value());
+  }
+};
+
+TEST_F(StrayWrites, AreTakenBackAndToldOnceOfEachJoint) {
+  begin(false);
+  for (int i = 0; i < 3; ++i) {
+    for (const std::size_t j : {0U, 2U}) {
+      EXPECT_EQ(command_.position_rad()[j], state_.position_rad()[j]);
+      EXPECT_EQ(mode(j), static_cast<int>(ControlMode::kPosition));
+      EXPECT_EQ(command_.torque_Nm()[j] + command_.voltage_V()[j] + command_.current_A()[j], 0.0);
+      EXPECT_EQ(command_.velocity_rad_s()[j], 0.0);
+      EXPECT_NE(command_.stiffness_Nm_rad()[j], 0.07);
+      EXPECT_NE(command_.damping_Nms_rad()[j], 0.07);
+      EXPECT_EQ(command_.interaction()[j] + command_.fault_reset()[j], 0);
+    }
+    EXPECT_EQ(command_.position_rad()[1], 0.07);
+    EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kPosition)) << "its claim's";
+    EXPECT_EQ(command_.interaction()[1], 0);
+    update();
+  }
+  expect_told({0, 2, 1});
+}
+
+TEST_F(StrayWrites, OfModesAreAllowedWhereTheyAreClaimed) {
+  begin(true);
+  EXPECT_EQ(mode(1), static_cast<int>(ControlMode::kTorque));
+  EXPECT_EQ(command_.interaction()[1], 1);
+  EXPECT_EQ(mode(0), static_cast<int>(ControlMode::kPosition));
+  expect_told({0, 2});
+}
+
+TEST_F(StrayWrites, OfNumbersThatAreNoneDoNotGetThrough) {
+  begin(false).value = std::numeric_limits<double>::quiet_NaN();
+  update();
+  EXPECT_EQ(command_.position_rad()[0], 0.3);
+}
+
+TEST(StrayWritesOfAWeakJoint, GetNoModeThatItCannotDo) {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.gains[0].current = {};
+  ControllerHost host(robot, nullptr, 1'000'000);
+  auto writer = std::make_unique<test::Stray>(0, true);
+  writer->mode = ControlMode::kCurrent;
+  ASSERT_TRUE(host.add("writer", std::move(writer), parameters()));
+  const hal::StateImage state{robot.shape()};
+  hal::CommandImage command{robot.shape()};
+  host.start({}, state, command);
+  EXPECT_EQ(command.mode()[0], static_cast<std::int8_t>(ControlMode::kPosition));
+  EXPECT_EQ(host.take_stray()->joint, 1U) << "other joints' first";
 }
 
 TEST_F(ControllerHostOfFake, HoldsJointsThatNobodyClaimedWhereTheyAre) {

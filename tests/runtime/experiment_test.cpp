@@ -146,6 +146,7 @@ lock_memory = false
 [faults]
 after_stop = "wait"
 after_reset = "continue"
+stray_writes = "hold"
 watchdog_s = 0.25
 [remote]
 command = "local"
@@ -193,6 +194,7 @@ foot = "wrist_ft")"),
   EXPECT_FALSE(e->thread.lock_memory);
   EXPECT_EQ(e->after_stop, AfterStop::kWait);
   EXPECT_EQ(e->after_reset, AfterReset::kContinue);
+  EXPECT_EQ(e->on_stray, hal::StopCategory::kHold);
   EXPECT_EQ(e->watchdog_s, 0.25);
   EXPECT_EQ(e->remote.command, RemoteCommand::kLocal);
   EXPECT_EQ(e->log.folder, "logs");

@@ -85,6 +85,36 @@ TEST(RobotCycle, HoldsEveryJointUntilTheRobotHasSettled) {
   EXPECT_EQ(run.controller->updates, 1);
 }
 
+/// The sine moves joint 0; this writes to all three, and has joint 1.
+void run_with_stray(TestRun& run) {
+  EXPECT_TRUE(run.host.add("stray", std::make_unique<test::Stray>(1, false), test::parameters()));
+  run.steps(30);
+  EXPECT_NE(run.cycle->command().position_rad()[0], 0.07);
+  EXPECT_EQ(run.cycle->command().mode()[2], static_cast<std::int8_t>(hal::ControlMode::kPosition));
+  ASSERT_FALSE(run.cycle->faults().empty());
+  const Fault first = run.cycle->faults()[0];
+  EXPECT_EQ(first.cycle, 19U) << "the first in which controllers run";
+  EXPECT_EQ(first.joint, run.robot.joints[0].name);
+  EXPECT_EQ(first.text,
+            "the controller 'stray' wrote to this joint, or its mode, without a claim: "
+            "taken back");
+}
+
+TEST(RobotCycle, WhatAControllerHasNotClaimedIsTakenBackAndTold) {
+  TestRun run;
+  run_with_stray(run);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(run.cycle->faults().size(), 3U) << "once of each joint";
+  EXPECT_EQ(run.cycle->faults()[0].category, hal::StopCategory::kWarn);
+}
+
+TEST(RobotCycle, WhatAControllerHasNotClaimedStopsTheRobotWhereTheExperimentSaysSo) {
+  TestRun run({.after_stop = AfterStop::kWait, .on_stray = hal::StopCategory::kCategory1});
+  run_with_stray(run);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(run.cycle->faults().size(), 1U);
+}
+
 TEST(RobotCycle, AFaultWhileSettlingIsTheJointsStopCategory) {
   TestRun run({.settle_cycles = 30});
   run.steps(25);

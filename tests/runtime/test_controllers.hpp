@@ -58,6 +58,53 @@ class Sine : public Controller {
   std::unique_ptr<int> last_words_;
 };
 
+/// Claims one joint and writes every field of every joint, in start() and update().
+class Stray : public Controller {
+ public:
+  /// @param chooses  it claims its joint with its modes
+  Stray(std::size_t joint, bool chooses) : joint_(joint), chooses_(chooses) {}
+
+  Status configure(ControllerSetup& setup) override {
+    if (chooses_) {
+      setup.claim_with_modes(joint_, hal::ControlMode::kPosition);
+    } else {
+      setup.claim(joint_, hal::ControlMode::kPosition);
+    }
+    return {};
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&,
+             hal::CommandImage& command) noexcept override {
+    scribble(command);
+  }
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage& command) noexcept override {
+    scribble(command);
+    return Code::kOk;
+  }
+
+  hal::ControlMode mode = hal::ControlMode::kTorque;
+  double value = 0.07;
+
+ private:
+  void scribble(hal::CommandImage& command) const noexcept {
+    for (std::size_t j = 0; j < command.joints(); ++j) {
+      command.position_rad()[j] = value;
+      command.velocity_rad_s()[j] = value;
+      command.torque_Nm()[j] = value;
+      command.voltage_V()[j] = value;
+      command.current_A()[j] = value;
+      command.stiffness_Nm_rad()[j] = value;
+      command.damping_Nms_rad()[j] = value;
+      command.mode()[j] = static_cast<std::int8_t>(mode);
+      command.interaction()[j] = 1;
+      command.fault_reset()[j] = 1;
+    }
+  }
+
+  std::size_t joint_;
+  bool chooses_;
+};
+
 /// Parameters without a file.
 inline TomlTable parameters(const std::string& text = "") {
   return TomlDocument::parse(text, "x.toml")->root();
