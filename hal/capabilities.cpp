@@ -46,6 +46,8 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   out.min_position_rad = joint.min_position_rad;
   out.max_position_rad = joint.max_position_rad;
   out.max_velocity_rad_s = joint.max_velocity_rad_s;
+  out.max_acceleration_rad_s2 = joint.max_acceleration_rad_s2;
+  out.max_jerk_rad_s3 = joint.max_jerk_rad_s3;
   const bool torque =
       joint.max_torque_Nm > 0.0 && (any(gains.torque.gains) || gains.torque_feedforward > 0.0);
   const bool current = actuator.current_limit_A > 0.0 && any(gains.current.gains);

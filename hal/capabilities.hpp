@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,8 @@ struct JointCapabilities {
   double min_position_rad = 0.0;
   double max_position_rad = 0.0;
   double max_velocity_rad_s = 0.0;
+  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< as declared
+  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double max_torque_Nm = 0.0;
   double max_voltage_V = 0.0;
   double max_current_A = 0.0;

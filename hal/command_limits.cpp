@@ -16,12 +16,19 @@ bool is(ControlMode mode, std::int64_t value) noexcept {
   return value == static_cast<std::int64_t>(mode);
 }
 
+/// A value on its way to a wish, which nobody has written since it was sent: to that wish.
+void go_on(double& value, double sent, double wish) noexcept TANDEM_RT {
+  if (sent != wish && value == sent) value = wish;
+}
+
 }  // namespace
 
 CommandLimits::CommandLimits(const RobotConfig& robot, std::int64_t period_ns)
     : period_s_(static_cast<double>(period_ns) * 1e-9),
       limits_(joint_capabilities(robot)),
       last_(limits_.size()),
+      position_(limits_.size()),
+      velocity_(limits_.size()),
       counters_(limits_.size()),
       codes_(limits_.size(), Code::kOk) {}
 
@@ -31,21 +38,14 @@ Code CommandLimits::apply(const StateImage& state, CommandImage& command) noexce
     codes_[j] = Code::kOk;
     Last& last = last_[j];
     const JointCapabilities& limit = limits_[j];
+    const Last was = last;
     modes(j, command);
     position(j, state, command);
-    double min_velocity = -limit.max_velocity_rad_s;
-    double max_velocity = limit.max_velocity_rad_s;
-    if (is(ControlMode::kVelocity, last.mode)) {
-      if (state.position_rad()[j] >= limit.max_position_rad) max_velocity = 0.0;
-      if (state.position_rad()[j] <= limit.min_position_rad) min_velocity = 0.0;
-    }
-    bounded(j, command.velocity_rad_s()[j], last.velocity_rad_s, min_velocity, max_velocity);
-    bounded(j, command.torque_Nm()[j], last.torque_Nm, -limit.max_torque_Nm, limit.max_torque_Nm);
+    velocity(j, was, state, command);
+    torque(j, was, state, command);
     bounded(j, command.voltage_V()[j], last.voltage_V, -limit.max_voltage_V, limit.max_voltage_V);
     bounded(j, command.current_A()[j], last.current_A, -limit.max_current_A, limit.max_current_A);
-    bounded(j, command.stiffness_Nm_rad()[j], last.stiffness_Nm_rad, 0.0,
-            limit.max_stiffness_Nm_rad);
-    bounded(j, command.damping_Nms_rad()[j], last.damping_Nms_rad, 0.0, limit.max_damping_Nms_rad);
+    impedance(j, was, state, command);
     if (codes_[j] == Code::kNotFinite || worst == Code::kOk) worst = codes_[j];
   }
   return worst;
@@ -60,8 +60,14 @@ void CommandLimits::follow(const CommandImage& command) noexcept TANDEM_RT {
                 .current_A = command.current_A()[j],
                 .stiffness_Nm_rad = command.stiffness_Nm_rad()[j],
                 .damping_Nms_rad = command.damping_Nms_rad()[j],
+                .velocity_wish_rad_s = command.velocity_rad_s()[j],
+                .torque_wish_Nm = command.torque_Nm()[j],
+                .stiffness_wish_Nm_rad = command.stiffness_Nm_rad()[j],
+                .damping_wish_Nms_rad = command.damping_Nms_rad()[j],
                 .mode = command.mode()[j],
                 .interaction = command.interaction()[j]};
+    position_[j].begin(last_[j].position_rad);
+    velocity_[j].begin(last_[j].velocity_rad_s);
   }
 }
 
@@ -95,15 +101,121 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
     return;
   }
   const double from = last.position_rad;
-  bounded(joint, reference, last.position_rad, limit.min_position_rad, limit.max_position_rad);
-  const double step = limit.max_velocity_rad_s * period_s_;
-  const double limited = std::clamp(reference, from - step, from + step);
-  // A reference that runs at exactly the maximum velocity is not changed for its rounding.
-  if (std::abs(limited - reference) > 1e-9 * step) {
-    reference = limited;
-    ++counters_[joint].too_fast;
+  const double min = std::min(limit.min_position_rad, from);
+  const double max = std::max(limit.max_position_rad, from);
+  const bool outside = from < limit.min_position_rad || from > limit.max_position_rad;
+  const double speed = limit.max_velocity_rad_s * (outside ? kRecoveryShare : 1.0);
+  bounded(joint, reference, last.position_rad, min, max);
+  double limited = 0.0;
+  if (std::isfinite(limit.max_acceleration_rad_s2)) {
+    if (!closed) position_[joint].begin(from);
+    limited = position_[joint].step(reference,
+                                    {.min = min,
+                                     .max = max,
+                                     .velocity = speed,
+                                     .acceleration = limit.max_acceleration_rad_s2,
+                                     .jerk = limit.max_jerk_rad_s3},
+                                    period_s_);
+  } else {
+    const double step = speed * period_s_;
+    limited = std::clamp(reference, from - step, from + step);
+    // A reference that runs at exactly the maximum velocity is not changed for its rounding.
+    if (std::abs(limited - reference) <= 1e-9 * step) limited = reference;
   }
+  if (limited != reference) ++counters_[joint].too_fast;
+  reference = limited;
   last.position_rad = reference;
+}
+
+void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImage& state,
+                             CommandImage& command) noexcept TANDEM_RT {
+  Last& last = last_[joint];
+  const JointCapabilities& limit = limits_[joint];
+  double& reference = command.velocity_rad_s()[joint];
+  double min = -limit.max_velocity_rad_s;
+  double max = limit.max_velocity_rad_s;
+  const bool follows = is(ControlMode::kVelocity, last.mode);
+  if (follows) {
+    const double slow = limit.max_velocity_rad_s * kRecoveryShare;
+    const double position = state.position_rad()[joint];
+    if (position >= limit.max_position_rad) max = 0.0;
+    if (position > limit.max_position_rad) min = -slow;
+    if (position <= limit.min_position_rad) min = 0.0;
+    if (position < limit.min_position_rad) max = slow;
+  }
+  go_on(reference, was.velocity_rad_s, was.velocity_wish_rad_s);
+  bounded(joint, reference, last.velocity_rad_s, min, max);
+  last.velocity_wish_rad_s = reference;
+  if (!follows || !in_operation(state, joint)) return;
+  const bool closed = is(ControlMode::kVelocity, was.mode);
+  const double measured = state.velocity_rad_s()[joint];
+  const double from = closed || !std::isfinite(measured) ? was.velocity_rad_s : measured;
+  if (!std::isfinite(limit.max_jerk_rad_s3)) {
+    const double acceleration =
+        std::min(limit.max_acceleration_rad_s2, limit.max_velocity_rad_s / kFullScale_s);
+    rated(joint, reference, last.velocity_rad_s, from, acceleration * period_s_);
+  } else {
+    if (!closed) velocity_[joint].begin(from);
+    const double limited = velocity_[joint].step(reference,
+                                                 {.min = min,
+                                                  .max = max,
+                                                  .velocity = limit.max_acceleration_rad_s2,
+                                                  .acceleration = limit.max_jerk_rad_s3},
+                                                 period_s_);
+    if (limited != reference) ++counters_[joint].too_fast;
+    reference = last.velocity_rad_s = limited;
+  }
+  if (reference >= min && reference <= max) return;
+  reference = last.velocity_rad_s = std::clamp(reference, min, max);  // at the end of its range
+  velocity_[joint].begin(reference);
+}
+
+void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage& state,
+                           CommandImage& command) noexcept TANDEM_RT {
+  Last& last = last_[joint];
+  double& reference = command.torque_Nm()[joint];
+  const double most = limits_[joint].max_torque_Nm;
+  go_on(reference, was.torque_Nm, was.torque_wish_Nm);
+  bounded(joint, reference, last.torque_Nm, -most, most);
+  last.torque_wish_Nm = reference;
+  if (!in_operation(state, joint)) return;
+  const bool starts = is(ControlMode::kTorque, last.mode) && !is(ControlMode::kTorque, was.mode);
+  const double measured = state.torque_Nm()[joint];
+  rated(joint, reference, last.torque_Nm,
+        starts && std::isfinite(measured) ? measured : was.torque_Nm,
+        most * period_s_ / kFullScale_s);
+}
+
+void CommandLimits::impedance(std::size_t joint, const Last& was, const StateImage& state,
+                              CommandImage& command) noexcept TANDEM_RT {
+  Last& last = last_[joint];
+  const JointCapabilities& limit = limits_[joint];
+  double& stiffness = command.stiffness_Nm_rad()[joint];
+  double& damping = command.damping_Nms_rad()[joint];
+  go_on(stiffness, was.stiffness_Nm_rad, was.stiffness_wish_Nm_rad);
+  go_on(damping, was.damping_Nms_rad, was.damping_wish_Nms_rad);
+  bounded(joint, stiffness, last.stiffness_Nm_rad, 0.0, limit.max_stiffness_Nm_rad);
+  bounded(joint, damping, last.damping_Nms_rad, 0.0, limit.max_damping_Nms_rad);
+  last.stiffness_wish_Nm_rad = stiffness;
+  last.damping_wish_Nms_rad = damping;
+  const auto compliant = static_cast<std::int64_t>(InteractionMode::kCompliant);
+  if (last.interaction != compliant || was.interaction != compliant ||
+      !in_operation(state, joint)) {
+    return;
+  }
+  const double share = period_s_ / kFullScale_s;
+  rated(joint, stiffness, last.stiffness_Nm_rad, was.stiffness_Nm_rad,
+        limit.max_stiffness_Nm_rad * share);
+  rated(joint, damping, last.damping_Nms_rad, was.damping_Nms_rad,
+        limit.max_damping_Nms_rad * share);
+}
+
+void CommandLimits::rated(std::size_t joint, double& value, double& last, double from,
+                          double step) noexcept TANDEM_RT {
+  const double limited = std::clamp(value, from - step, from + step);
+  if (std::abs(limited - value) <= 1e-9 * step) return;
+  value = last = limited;
+  ++counters_[joint].too_fast;
 }
 
 void CommandLimits::bounded(std::size_t joint, double& value, double& last, double min,
@@ -121,6 +233,6 @@ void CommandLimits::bounded(std::size_t joint, double& value, double& last, doub
   last = value;
 }
 
-void CommandLimits::archive(Archive& ar) { ar(last_, counters_, codes_); }
+void CommandLimits::archive(Archive& ar) { ar(last_, position_, velocity_, counters_, codes_); }
 
 }  // namespace tandem::hal

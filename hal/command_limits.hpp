@@ -9,6 +9,7 @@
 #include "base/realtime.hpp"
 #include "hal/capabilities.hpp"
 #include "hal/image.hpp"
+#include "hal/reference_motion.hpp"
 
 namespace tandem {
 class Archive;
@@ -20,7 +21,7 @@ namespace tandem::hal {
 struct LimitCounters {
   std::uint32_t not_finite = 0;    ///< a NaN, an infinity or a mode that does not exist
   std::uint32_t out_of_range = 0;  ///< a reference beyond its limit
-  std::uint32_t too_fast = 0;      ///< a position reference beyond max velocity * period
+  std::uint32_t too_fast = 0;      ///< a reference that moved faster than it may
 };
 
 /// Corrects commands in place, joint by joint: finite check, range limit, rate limit.
@@ -29,12 +30,26 @@ struct LimitCounters {
 /// - Position, velocity, torque, voltage, current, stiffness and damping are held within the
 ///   joint's limits (JointCapabilities). In velocity mode a reference that leads further beyond
 ///   a position limit is zero.
+/// - A joint that stands outside its range when its position loop is closed stays there: its
+///   reference may come in, at kRecoveryShare of its velocity, and not go out again.
 /// - A position reference moves by at most max velocity * period from the last one. Where the
 ///   position loop is not yet closed (other mode, drive not enabled) the last one is the
 ///   measured position, so that every start is from where the joint stands. In other modes the
 ///   position reference is not used, and set to the measured position.
+/// - Where a joint declares them, a position reference keeps its acceleration and jerk, a velocity
+///   reference its acceleration and jerk: ReferenceMotion.
+/// - Torque, and in its mode velocity, stiffness and damping, change by no more than their limit
+///   in kFullScale_s. A loop that was open starts from what is measured, or free. A value that
+///   nobody has written since goes on toward what was wanted.
 class CommandLimits {
  public:
+  /// In which torque, velocity, stiffness or damping may go from nothing to its limit: faster than
+  /// a drive's mechanics, slower than an error in a program.
+  static constexpr double kFullScale_s = 0.01;
+
+  /// Of its maximum velocity: the speed of a joint that is led back into its range.
+  static constexpr double kRecoveryShare = 0.05;
+
   CommandLimits(const RobotConfig& robot, std::int64_t period_ns);
 
   /// Corrects `command`. `state` is this cycle's.
@@ -64,18 +79,33 @@ class CommandLimits {
     double current_A = 0.0;
     double stiffness_Nm_rad = 0.0;
     double damping_Nms_rad = 0.0;
+    // What was wanted of those that may not change at once.
+    double velocity_wish_rad_s = 0.0;
+    double torque_wish_Nm = 0.0;
+    double stiffness_wish_Nm_rad = 0.0;
+    double damping_wish_Nms_rad = 0.0;
     std::int64_t mode = 0;
     std::int64_t interaction = 0;
   };
   void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
   void position(std::size_t joint, const StateImage& state,
                 CommandImage& command) noexcept TANDEM_RT;
+  void velocity(std::size_t joint, const Last& was, const StateImage& state,
+                CommandImage& command) noexcept TANDEM_RT;
+  void torque(std::size_t joint, const Last& was, const StateImage& state,
+              CommandImage& command) noexcept TANDEM_RT;
+  void impedance(std::size_t joint, const Last& was, const StateImage& state,
+                 CommandImage& command) noexcept TANDEM_RT;
+  /// Holds `value` near `from`, and counts it.
+  void rated(std::size_t joint, double& value, double& last, double from,
+             double step) noexcept TANDEM_RT;
   void bounded(std::size_t joint, double& value, double& last, double min,
                double max) noexcept TANDEM_RT;
 
   double period_s_;
   std::vector<JointCapabilities> limits_;
   std::vector<Last> last_;
+  std::vector<ReferenceMotion> position_, velocity_;  // of joints with a declared acceleration
   std::vector<LimitCounters> counters_;
   std::vector<Code> codes_;
 };

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -118,7 +119,10 @@ struct JointConfig {
   double min_position_rad = 0.0;  ///< this and the next three: NaN when the TOML leaves
   double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
-  double max_torque_Nm = 0.0;                 ///< the torque reference's limit
+  double max_torque_Nm = 0.0;  ///< the torque reference's limit
+  double max_acceleration_rad_s2 =
+      std::numeric_limits<double>::infinity();  ///< of the references, as the next
+  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double rated_torque_Nm = 0.0;               ///< CiA 402 6076: torques travel as per mille of it;
                                               ///< default: max_torque_Nm
   double encoder_counts_per_rev = 0.0;        ///< link encoder

@@ -20,6 +20,13 @@ void read_limits(TomlTable& table, JointConfig& joint) {
   joint.max_position_rad = table.number_or("max_position_rad", kUnset);
   joint.max_velocity_rad_s = table.number_or("max_velocity_rad_s", kUnset, kPositive);
   joint.max_torque_Nm = table.number_or("max_torque_Nm", kUnset, kPositive);
+  joint.max_acceleration_rad_s2 =
+      table.number_or("max_acceleration_rad_s2", joint.max_acceleration_rad_s2, kPositive);
+  joint.max_jerk_rad_s3 = table.number_or("max_jerk_rad_s3", joint.max_jerk_rad_s3, kPositive);
+  if (table.has("max_jerk_rad_s3") && !table.has("max_acceleration_rad_s2")) {
+    table.error("max_jerk_rad_s3", "needs a max_acceleration_rad_s2",
+                "give both, or the acceleration alone");
+  }
   joint.rated_torque_Nm = table.number_or("rated_torque_Nm", kUnset, kPositive);
 }
 

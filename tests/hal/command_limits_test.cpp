@@ -1,5 +1,6 @@
 #include "hal/command_limits.hpp"
 
+#include <array>
 #include <limits>
 
 #include "base/archive.hpp"
@@ -33,7 +34,7 @@ class Limits : public testing::Test {
 TEST_F(Limits, LetGoodCommandsPassUnchanged) {
   command.position_rad()[0] = 0.1015;
   command.velocity_rad_s()[0] = 1.5;
-  command.torque_Nm()[0] = -20.0;
+  command.torque_Nm()[0] = -2.0;  // a tenth of what it may be, in a tenth of 10 ms
   command.voltage_V()[0] = 24.0;
   command.current_A()[0] = -10.0;
   command.stiffness_Nm_rad()[0] = 200.0;
@@ -81,6 +82,10 @@ TEST_F(Limits, ReplaceAModeThatDoesNotExist) {
 }
 
 TEST_F(Limits, HoldEveryReferenceWithinItsRange) {
+  for (int i = 0; i < 10; ++i) {
+    command.torque_Nm()[0] = 20.0;
+    ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  }
   command.velocity_rad_s()[0] = -2.5;
   command.torque_Nm()[0] = 21.0;
   command.voltage_V()[0] = -30.0;
@@ -132,12 +137,40 @@ TEST_F(Limits, StartFromTheMeasuredPositionWheneverTheLoopWasOpen) {
   EXPECT_DOUBLE_EQ(command.position_rad()[0], -0.498);
 }
 
-TEST_F(Limits, LeadAJointBackIntoItsRangeWithoutAJump) {
+TEST_F(Limits, LeaveAJointOutsideOfItsRangeWhereItIsAndLeadItBackSlowly) {
   state.position_rad()[0] = 1.6;
   state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kSwitchedOn);
+  command.position_rad()[0] = 1.6;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kOperationEnabled);
+  for (int i = 0; i < 100; ++i) {
+    command.position_rad()[0] = 1.6;  // held: 1.5 would be a jump
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_EQ(command.position_rad()[0], 1.6);
+  }
   command.position_rad()[0] = 1.0;
   EXPECT_EQ(limits.apply(state, command), Code::kOk);
-  EXPECT_DOUBLE_EQ(command.position_rad()[0], 1.598);
+  EXPECT_DOUBLE_EQ(command.position_rad()[0], 1.6 - 0.05 * 2.0 * 1e-3);
+  command.position_rad()[0] = 1.6;  // not out again
+  EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
+  EXPECT_DOUBLE_EQ(command.position_rad()[0], 1.5999);
+  for (int i = 0; i < 2000; ++i) {
+    command.position_rad()[0] = 1.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  }
+  EXPECT_EQ(command.position_rad()[0], 1.0);
+  command.position_rad()[0] = 1.55;
+  EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
+}
+
+TEST_F(Limits, LeadAJointBackSlowlyInVelocityModeToo) {
+  mode(ControlMode::kVelocity);
+  state.position_rad()[0] = -1.6;
+  for (int i = 0; i < 20; ++i) {
+    command.velocity_rad_s()[0] = 2.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
+  }
+  EXPECT_DOUBLE_EQ(command.velocity_rad_s()[0], 0.1);
 }
 
 TEST_F(Limits, StopAVelocityThatLeadsBeyondAPositionLimit) {
@@ -146,9 +179,143 @@ TEST_F(Limits, StopAVelocityThatLeadsBeyondAPositionLimit) {
   command.velocity_rad_s()[0] = 1.0;
   EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
   EXPECT_EQ(command.velocity_rad_s()[0], 0.0);
-  command.velocity_rad_s()[0] = -1.0;
+  command.velocity_rad_s()[0] = -0.2;
   EXPECT_EQ(limits.apply(state, command), Code::kOk);
-  EXPECT_EQ(command.velocity_rad_s()[0], -1.0);
+  EXPECT_EQ(command.velocity_rad_s()[0], -0.2);
+}
+
+TEST_F(Limits, ChangeTorqueAndVelocityByATenthOfTheirLimitInAMillisecond) {
+  command.torque_Nm()[0] = -20.0;  // as a feed-forward
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.torque_Nm()[0], -2.0);
+  EXPECT_EQ(limits.counters()[0].too_fast, 1U);
+
+  mode(ControlMode::kTorque);
+  state.torque_Nm()[0] = 5.0;  // measured: where torque control starts
+  command.torque_Nm()[0] = 20.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 7.0);
+  for (int i = 1; i < 8; ++i) {
+    command.torque_Nm()[0] = 20.0;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  }
+  EXPECT_EQ(command.torque_Nm()[0], 20.0);
+  command.torque_Nm()[0] = -20.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 18.0);
+
+  mode(ControlMode::kVelocity);
+  state.velocity_rad_s()[0] = 0.5;
+  command.velocity_rad_s()[0] = 2.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.velocity_rad_s()[0], 0.7);
+  command.velocity_rad_s()[0] = -2.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.velocity_rad_s()[0], 0.5);
+}
+
+TEST_F(Limits, GoOnTowardATorqueThatIsWrittenOnce) {
+  command.torque_Nm()[0] = 20.0;
+  for (int i = 1; i <= 10; ++i) {
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_NEAR(command.torque_Nm()[0], 2.0 * i, 1e-9);
+  }
+  EXPECT_EQ(command.torque_Nm()[0], 20.0);
+  command.torque_Nm()[0] = 0.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  command.torque_Nm()[0] = 17.0;  // written again: toward that
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_EQ(command.torque_Nm()[0], 17.0);
+}
+
+TEST_F(Limits, LetADriveThatIsOffHaveAnyTorque) {
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kSwitchedOn);
+  command.torque_Nm()[0] = -20.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_EQ(command.torque_Nm()[0], -20.0);
+}
+
+TEST_F(Limits, ChangeAnImpedanceInForceGradually) {
+  const double stiffest = limits.limits()[0].max_stiffness_Nm_rad;
+  const double most = limits.limits()[0].max_damping_Nms_rad;
+  command.interaction()[0] = static_cast<std::uint8_t>(InteractionMode::kCompliant);
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  for (int i = 1; i <= 10; ++i) {
+    command.stiffness_Nm_rad()[0] = stiffest;
+    command.damping_Nms_rad()[0] = most;
+    EXPECT_EQ(limits.apply(state, command), Code::kOk);
+    EXPECT_NEAR(command.stiffness_Nm_rad()[0], 0.1 * i * stiffest, 1e-9 * stiffest);
+    EXPECT_NEAR(command.damping_Nms_rad()[0], 0.1 * i * most, 1e-9 * most);
+  }
+  command.stiffness_Nm_rad()[0] = 0.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_NEAR(command.stiffness_Nm_rad()[0], 0.9 * stiffest, 1e-9 * stiffest);
+}
+
+/// Joint 0 declares 20 rad/s^2 and 400 rad/s^3.
+class DeclaredLimits : public Limits {
+ protected:
+  static RobotConfig declared() {
+    RobotConfig robot = test::fake_robot();
+    robot.joints[0].max_acceleration_rad_s2 = 20.0;
+    robot.joints[0].max_jerk_rad_s3 = 400.0;
+    return robot;
+  }
+  void SetUp() override {
+    Limits::SetUp();
+    limits = CommandLimits(declared(), 1'000'000);
+    ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  }
+  /// The largest first, second and third difference of `field` on its way to `wanted`.
+  std::array<double, 3> way(std::span<double> field, double wanted, int cycles) {
+    std::array<double, 3> most{}, last{}, rate{};
+    double before = field[0];
+    for (int i = 0; i < cycles; ++i) {
+      field[0] = wanted;
+      EXPECT_EQ(limits.apply(state, command), Code::kOk);
+      rate[0] = (field[0] - before) / 1e-3;
+      rate[1] = (rate[0] - last[0]) / 1e-3;
+      rate[2] = (rate[1] - last[1]) / 1e-3;
+      for (std::size_t k = 0; k < 3; ++k) most[k] = std::max(most[k], std::abs(rate[k]));
+      last = rate;
+      before = field[0];
+    }
+    EXPECT_EQ(field[0], wanted);
+    return most;
+  }
+};
+
+TEST_F(DeclaredLimits, HoldForAPosition) {
+  const auto [velocity, acceleration, jerk] = way(command.position_rad(), 1.4, 2000);
+  EXPECT_NEAR(velocity, 2.0, 0.01);
+  EXPECT_NEAR(acceleration, 20.0, 0.5);
+  EXPECT_LE(jerk, 400.1);
+  EXPECT_GT(limits.counters()[0].too_fast, 100U);
+}
+
+TEST_F(DeclaredLimits, HoldForAVelocity) {
+  mode(ControlMode::kVelocity);
+  const auto [acceleration, jerk, snap] = way(command.velocity_rad_s(), 2.0, 500);
+  EXPECT_NEAR(acceleration, 20.0, 0.5);
+  EXPECT_LE(jerk, 400.1);
+  const auto [brake, brake_jerk, brake_snap] = way(command.velocity_rad_s(), -1.0, 500);
+  EXPECT_NEAR(brake, 20.0, 0.5);
+  EXPECT_LE(brake_jerk, 400.1);
+}
+
+TEST_F(DeclaredLimits, YieldToTheEndOfTheRange) {
+  mode(ControlMode::kVelocity);
+  way(command.velocity_rad_s(), 1.0, 500);
+  state.position_rad()[0] = 1.5;
+  command.velocity_rad_s()[0] = 1.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOutOfRange);
+  EXPECT_EQ(command.velocity_rad_s()[0], 0.0);
+}
+
+TEST_F(DeclaredLimits, AreNotThoseOfOtherJoints) {
+  command.position_rad()[1] = 0.102;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_EQ(command.position_rad()[1], 0.102);
 }
 
 TEST_F(Limits, GoOnFromASnapshotAsBefore) {

@@ -196,6 +196,21 @@ TEST(RobotConfig, RefusesGainsOfTheWrongSign) {
                "(gains are not negative: they act on reference minus measurement)");
 }
 
+TEST(RobotConfig, ReadsAccelerationAndJerkAndRefusesAJerkAlone) {
+  const auto joint = [](const std::string& keys) {
+    return with("encoder_counts_per_rev = 65536\n", "encoder_counts_per_rev = 65536\n" + keys);
+  };
+  const auto robot = parse_robot_config(
+      joint("max_acceleration_rad_s2 = 20\nmax_jerk_rad_s3 = 400\n"), "robots/leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->joints[0].max_acceleration_rad_s2, 20.0);
+  EXPECT_EQ(robot->joints[0].max_jerk_rad_s3, 400.0);
+  EXPECT_NE(errors_of(joint("max_jerk_rad_s3 = 400\n")).find("needs a max_acceleration_rad_s2"),
+            std::string::npos);
+  EXPECT_NE(errors_of(joint("max_acceleration_rad_s2 = 0\n")).find("greater than 0"),
+            std::string::npos);
+}
+
 TEST(RobotConfig, RefusesAZeroResistance) {
   expect_error(with("resistance_ohm = 0.664", "resistance_ohm = 0"),
                "robots/leg.toml:13: actuator.big.resistance_ohm: 0 is out of range "
