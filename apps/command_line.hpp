@@ -85,10 +85,10 @@ struct ControllerOptions {
 
 /// tandem joint list|set|gains
 struct JointOptions {
-  enum class Action : std::uint8_t { kList, kSet, kGains } action = Action::kList;
+  enum class Action : std::uint8_t { kList, kSet, kRecover, kGains } action = Action::kList;
   std::vector<std::string> joints;  ///< list: only these; empty: all
   bool gains = false;               ///< list: the gains instead of what is measured
-  std::string joint;                ///< set, gains
+  std::string joint;                ///< set, recover, gains
   std::string mode, interaction;    ///< empty: as it is
   std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
   std::string loop;

@@ -20,6 +20,7 @@ const char kJointExamples[] = R"(Examples:
   tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
+  tandem joint recover LElbj                         outside of its limits: slowly back inside
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
@@ -67,8 +68,7 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   add("unload", "Free an inactive controller", Action::kUnload)
       ->add_option("name", o.name, "Its name")
       ->required();
-  add("start", "Start controllers, all in one cycle; after a reset let them go on",
-      Action::kStart)
+  add("start", "Start controllers, all in one cycle; after a reset let them go on", Action::kStart)
       ->add_option("names", o.start, "Their names; none: those that were active before the reset");
   add("stop", "Stop controllers; what nobody has then is held", Action::kSwitch)
       ->add_option("names", o.stop, "Their names")
@@ -100,6 +100,10 @@ void add_flags(CLI::App& app, JointOptions& o) {
       ->check(is_finite());
   set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
       ->check(is_finite());
+  add("recover", "Lead a free joint that stands outside of its limits back, slowly",
+      Action::kRecover)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
   CLI::App* gains =
       add("gains", "Gains of a loop in its drive; what is left out stays", Action::kGains);
   gains->add_option("joint", o.joint, "Its name")->required();

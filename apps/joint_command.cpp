@@ -67,8 +67,12 @@ Result<Json> only(const Json& joints, const std::vector<std::string>& wanted) {
 
 Json question_of(const JointOptions& o) {
   Json question{{"do", "joint.list"}};
-  if (o.action == JointOptions::Action::kList) return question;
-  question["do"] = o.action == JointOptions::Action::kSet ? "joint.set" : "joint.gains";
+  switch (o.action) {
+    case JointOptions::Action::kList: return question;
+    case JointOptions::Action::kSet: question["do"] = "joint.set"; break;
+    case JointOptions::Action::kRecover: question["do"] = "joint.recover"; break;
+    case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
+  }
   question["joint"] = o.joint;
   if (!o.mode.empty()) question["mode"] = o.mode;
   if (!o.interaction.empty()) question["interaction"] = o.interaction;
@@ -90,6 +94,11 @@ void print_answer(const JointOptions& options, const Json& answer) {
   if (answer.contains("note")) fmt::print("{}\n", answer.value("note", ""));
   if (options.action == JointOptions::Action::kGains) {
     print_gains(Json::array({answer}));
+    return;
+  }
+  if (options.action == JointOptions::Action::kRecover) {
+    fmt::print("{} comes back from {} rad to its limit: tandem joint list {}\n", options.joint,
+               number(answer, "position_rad"), options.joint);
     return;
   }
   Facts facts;

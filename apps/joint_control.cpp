@@ -133,6 +133,12 @@ void add_joint_commands(ControlRegistry& registry, RunServices& services) {
                 {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
                 {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
                [&services](const Json& request) { return set(services, request); });
+  registry.add("joint.recover", ControlEffect::kChanges,
+               "leads a joint that stands outside its limits back, at a twentieth of its velocity",
+               {joint}, [&services](const Json& request) {
+                 const auto name = request["joint"].get<std::string>();
+                 return tell(services, name, services.recover(name));
+               });
   registry.add("joint.gains", ControlEffect::kChanges, "gains of a loop in a joint's drive, by SDO",
                {joint,
                 {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},

@@ -137,7 +137,6 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
   const ErrorCode cause = protection_.update(
       protection_config_,
       {.link_position_rad = measured_.link_position_rad,
-       .link_velocity_rad_s = measured_.link_velocity_rad_s,
        .position_error_rad = controller_.terms().position_error_rad,
        .current_A = measured_.current_A,
        .temperature_C = temperature_C_,

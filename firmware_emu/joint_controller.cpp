@@ -6,8 +6,8 @@ namespace tandem::firmware {
 
 using canopen::Mode;
 
-void JointController::configure(const ControllerConfig& config, double period_s) noexcept
-    TANDEM_RT {
+void JointController::configure(const ControllerConfig& config,
+                                double period_s) noexcept TANDEM_RT {
   config_ = config;
   period_s_ = period_s;
   transfer_decay_ =
@@ -71,13 +71,15 @@ void JointController::begin(Action action, Mode mode, const Measurement& measure
   velocity_.reset();
   current_.reset();
   terms_.held_position_rad = measured.link_position_rad;
+  terms_.last_position_rad = measured.link_position_rad;
 }
 
 double JointController::limited_position(double position_rad) noexcept {
-  if (saturate(position_rad, config_.min_position_rad, config_.max_position_rad) !=
-      Saturation::kNone) {
-    terms_.reference_limited = 1;
-  }
+  // A joint that was enabled outside of its range is not pulled in: it may come, and not go back.
+  const double min = std::min(config_.min_position_rad, terms_.last_position_rad);
+  const double max = std::max(config_.max_position_rad, terms_.last_position_rad);
+  if (saturate(position_rad, min, max) != Saturation::kNone) terms_.reference_limited = 1;
+  terms_.last_position_rad = position_rad;
   return position_rad;
 }
 
@@ -93,8 +95,8 @@ double JointController::limited_velocity(double velocity_rad_s, double position_
   return 0.0;
 }
 
-JointController::Outer JointController::position_outer(double position_rad,
-                                                       double velocity_rad_s, double torque_Nm,
+JointController::Outer JointController::position_outer(double position_rad, double velocity_rad_s,
+                                                       double torque_Nm,
                                                        const Measurement& measured) noexcept {
   const double q_ref = limited_position(position_rad);
   const double link_error = q_ref - measured.link_position_rad;
@@ -102,8 +104,7 @@ JointController::Outer JointController::position_outer(double position_rad,
   double error = link_error;
   double rate = velocity_rad_s - measured.link_velocity_rad_s;
   if (config_.position_feedback == PositionFeedback::kMotor) {
-    const double deflection =
-        config_.spring_Nm_rad > 0.0 ? torque_Nm / config_.spring_Nm_rad : 0.0;
+    const double deflection = config_.spring_Nm_rad > 0.0 ? torque_Nm / config_.spring_Nm_rad : 0.0;
     error = q_ref + deflection - measured.motor_position_rad;
     rate = velocity_rad_s - measured.motor_velocity_rad_s;
   }
@@ -118,13 +119,13 @@ JointController::Outer JointController::velocity_outer(const Reference& referenc
                                                        const Measurement& measured) noexcept {
   const double v_ref = limited_velocity(reference.velocity_rad_s, measured.link_position_rad);
   const double error = v_ref - measured.link_velocity_rad_s;
-  return {.torque_Nm = velocity_.apply(config_.velocity, error,
-                                       -measured.link_acceleration_rad_s2) +
-                       reference.torque_Nm,
-          .integrand = error,
-          .feedforward_Nm = reference.torque_Nm,
-          .loop = &velocity_,
-          .config = &config_.velocity};
+  return {
+      .torque_Nm = velocity_.apply(config_.velocity, error, -measured.link_acceleration_rad_s2) +
+                   reference.torque_Nm,
+      .integrand = error,
+      .feedforward_Nm = reference.torque_Nm,
+      .loop = &velocity_,
+      .config = &config_.velocity};
 }
 
 double JointController::impedance_torque(double position_rad, double velocity_rad_s,
@@ -145,8 +146,8 @@ JointController::Outer JointController::outer_loop(const Reference& reference,
   }
   switch (mode_) {
     case Mode::kCsp:
-      return position_outer(reference.position_rad, reference.velocity_rad_s,
-                            reference.torque_Nm, measured);
+      return position_outer(reference.position_rad, reference.velocity_rad_s, reference.torque_Nm,
+                            measured);
     case Mode::kCsv: return velocity_outer(reference, measured);
     case Mode::kImpedance:
       return {.torque_Nm = impedance_torque(reference.position_rad, reference.velocity_rad_s,
@@ -161,14 +162,14 @@ JointController::Outer JointController::outer_loop(const Reference& reference,
   }
 }
 
-void JointController::cascade(const Reference& reference, const Measurement& measured,
-                              bool change, Step& step) noexcept {
+void JointController::cascade(const Reference& reference, const Measurement& measured, bool change,
+                              Step& step) noexcept {
   const double held_Nm = terms_.torque_reference_Nm;
   Outer& outer = step.outer;
   outer = outer_loop(reference, measured);
   if (change && outer.loop != nullptr && outer.config->ki > 0.0) {
-    outer.torque_Nm = outer.loop->seed(*outer.config, held_Nm - outer.feedforward_Nm) +
-                      outer.feedforward_Nm;
+    outer.torque_Nm =
+        outer.loop->seed(*outer.config, held_Nm - outer.feedforward_Nm) + outer.feedforward_Nm;
   }
   double torque_Nm = outer.torque_Nm;
   terms_.torque_saturation = static_cast<std::int32_t>(
@@ -177,14 +178,12 @@ void JointController::cascade(const Reference& reference, const Measurement& mea
   step.torque_error_Nm = torque_Nm - measured.torque_Nm;
   step.voltage_V = config_.torque_to_voltage_V_Nm * torque_Nm +
                    config_.emf_compensation_Vs_rad * measured.motor_velocity_rad_s +
-                   torque_.apply(config_.torque, step.torque_error_Nm,
-                                 -measured.torque_rate_Nm_s);
+                   torque_.apply(config_.torque, step.torque_error_Nm, -measured.torque_rate_Nm_s);
 }
 
 void JointController::current_loop(double current_A, const Measurement& measured,
                                    Step& step) noexcept {
-  if (saturate(current_A, -config_.current_limit_A, config_.current_limit_A) !=
-      Saturation::kNone) {
+  if (saturate(current_A, -config_.current_limit_A, config_.current_limit_A) != Saturation::kNone) {
     terms_.reference_limited = 1;
   }
   step.current_error_A = current_A - measured.current_A;
@@ -202,8 +201,7 @@ Saturation JointController::limit_voltage(double& voltage_V,
     const double drop_V = config_.resistance_ohm * config_.current_limit_A;
     cut = saturate(voltage_V, emf_V - drop_V, emf_V + drop_V);
   }
-  const double supply_V =
-      std::max(0.0, std::min(config_.voltage_limit_V, measured.bus_voltage_V));
+  const double supply_V = std::max(0.0, std::min(config_.voltage_limit_V, measured.bus_voltage_V));
   const Saturation supply_cut = saturate(voltage_V, -supply_V, supply_V);
   return supply_cut != Saturation::kNone ? supply_cut : cut;
 }

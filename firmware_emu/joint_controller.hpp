@@ -19,10 +19,10 @@ enum class PositionFeedback : std::uint8_t {
 
 /// What the controller has to know of its joint. Link side; the motor reflected to the link.
 struct ControllerConfig {
-  Pid::Config position;  ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
-  Pid::Config velocity;  ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
-  Pid::Config torque;    ///< [V/Nm, V/(Nm s), Vs/Nm, V]
-  Pid::Config current;   ///< [V/A, V/(A s), Vs/A, V]
+  Pid::Config position;                  ///< [Nm/rad, Nm/(rad s), Nms/rad, Nm]
+  Pid::Config velocity;                  ///< [Nms/rad, Nm/rad, Nms^2/rad, Nm]
+  Pid::Config torque;                    ///< [V/Nm, V/(Nm s), Vs/Nm, V]
+  Pid::Config current;                   ///< [V/A, V/(A s), Vs/A, V]
   double torque_to_voltage_V_Nm = 0.0;   ///< feed-forward, times the torque reference
   double emf_compensation_Vs_rad = 0.0;  ///< times the motor velocity
   double resistance_ohm = 0.0;           ///< 0: unknown, the current is not limited by it
@@ -31,7 +31,7 @@ struct ControllerConfig {
   double voltage_limit_V = 0.0;
   double current_limit_A = 0.0;
   double torque_limit_Nm = 0.0;
-  double velocity_limit_rad_s = 0.0;     ///< of velocity references; 0: none
+  double velocity_limit_rad_s = 0.0;  ///< of velocity references; 0: none
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
   double transfer_time_s = 0.02;  ///< in which the voltage step of a mode change decays
@@ -57,7 +57,7 @@ struct Measurement {
   double link_acceleration_rad_s2 = 0.0;
   double motor_position_rad = 0.0;
   double motor_velocity_rad_s = 0.0;
-  double torque_Nm = 0.0;       ///< of the spring, positive when it drives the link to +
+  double torque_Nm = 0.0;  ///< of the spring, positive when it drives the link to +
   double torque_rate_Nm_s = 0.0;
   double current_A = 0.0;
   double bus_voltage_V = 0.0;
@@ -77,10 +77,11 @@ class JointController {
   /// Terms of the last update(), for telemetry.
   struct Terms {
     double torque_reference_Nm = 0.0;
-    double voltage_V = 0.0;           ///< after every limit
-    double transfer_V = 0.0;          ///< what is left of a mode change's step
-    double position_error_rad = 0.0;  ///< of the limited reference, on the link
-    double held_position_rad = 0.0;   ///< kHold's, and the integrated one of -4
+    double voltage_V = 0.0;               ///< after every limit
+    double transfer_V = 0.0;              ///< what is left of a mode change's step
+    double position_error_rad = 0.0;      ///< of the limited reference, on the link
+    double held_position_rad = 0.0;       ///< kHold's, and the integrated one of -4
+    double last_position_rad = 0.0;       ///< reference of position control; first: measured
     std::int32_t voltage_saturation = 0;  ///< Saturation, by the voltage or current limit
     std::int32_t torque_saturation = 0;   ///< Saturation, by the torque limit
     std::int64_t reference_limited = 0;   ///< 1: position or velocity reference was cut
@@ -120,7 +121,7 @@ class JointController {
     double torque_Nm = 0.0;  ///< before the torque limit
     double integrand = 0.0;  ///< what the loop's integral, or -4's position, integrates
     double feedforward_Nm = 0.0;
-    Pid* loop = nullptr;     ///< whose integral it is; none in CST and impedance
+    Pid* loop = nullptr;  ///< whose integral it is; none in CST and impedance
     const Pid::Config* config = nullptr;
   };
   /// One update on its way through the cascade.

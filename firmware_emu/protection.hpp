@@ -28,7 +28,6 @@ struct ProtectionConfig {
 
 struct ProtectionInputs {
   double link_position_rad = 0.0;
-  double link_velocity_rad_s = 0.0;
   double position_error_rad = 0.0;
   double current_A = 0.0;
   double temperature_C = 0.0;
@@ -44,14 +43,14 @@ struct ProtectionInputs {
 ///
 /// I2t is a first-order model of the winding: x' = (i^2 - x) / T, fault at x >= Ic^2, which a
 /// steady current I reaches from cold after T ln(I^2 / (I^2 - Ic^2)).
+///
+/// A joint that is powered beyond its position limits may stand there or come in: the limits are
+/// where it was powered, and follow it in, until they are the configured ones.
 class Protection {
  public:
   /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.
   static constexpr double kWarningShare = 0.9;
   static constexpr double kTemperatureHysteresis_K = 5.0;
-  /// Outward velocity at which leaving the position limits is a fault: a joint that stands beyond
-  /// them, or comes back, may be powered.
-  static constexpr double kOutward_rad_s = 0.02;
 
   /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature,
   /// under-voltage, following
@@ -60,6 +59,7 @@ class Protection {
                             double dt_s) noexcept TANDEM_RT {
     using canopen::ErrorCode;
     if (!in.sensors_valid) return ErrorCode::kPositionSensor;
+    const bool leaves = leaves_limits(config, in);
     state_.heat_A2 += (in.current_A * in.current_A - state_.heat_A2) *
                       std::min(1.0, dt_s / config.thermal_time_s);
     hysteresis(state_.overload, load(config), 1.0, kWarningShare);
@@ -78,7 +78,7 @@ class Protection {
     if (state_.overheated != 0) return ErrorCode::kDriveTemperature;
     if (in.bus_voltage_V < config.undervoltage_V) return ErrorCode::kVoltage;
     if (lags && state_.lagging_s > config.following_timeout_s) return ErrorCode::kFollowingError;
-    if (in.powered && leaves_limits(config, in)) return ErrorCode::kPositionLimit;
+    if (leaves) return ErrorCode::kPositionLimit;
     return ErrorCode::kNone;
   }
 
@@ -98,6 +98,8 @@ class Protection {
     double heat_A2 = 0.0;
     double lagging_s = 0.0;
     double mismatch_s = 0.0;
+    double lower_rad = 0.0;  // position limits in force
+    double upper_rad = 0.0;
     std::int64_t overload = 0;
     std::int64_t overheated = 0;
     std::int64_t warm = 0;
@@ -107,11 +109,13 @@ class Protection {
     if (value >= on) flag = 1;
     if (value < off) flag = 0;
   }
-  static bool leaves_limits(const ProtectionConfig& config, const ProtectionInputs& in) noexcept {
-    const double over = in.link_position_rad - config.max_position_rad;
-    const double under = config.min_position_rad - in.link_position_rad;
-    return (over > config.position_margin_rad && in.link_velocity_rad_s > kOutward_rad_s) ||
-           (under > config.position_margin_rad && in.link_velocity_rad_s < -kOutward_rad_s);
+  bool leaves_limits(const ProtectionConfig& config, const ProtectionInputs& in) noexcept {
+    const double position = in.link_position_rad;
+    if (!in.powered) state_.lower_rad = state_.upper_rad = position;
+    state_.lower_rad = std::min(config.min_position_rad, std::max(state_.lower_rad, position));
+    state_.upper_rad = std::max(config.max_position_rad, std::min(state_.upper_rad, position));
+    return in.powered && (position > state_.upper_rad + config.position_margin_rad ||
+                          position < state_.lower_rad - config.position_margin_rad);
   }
 
   State state_;

@@ -14,6 +14,7 @@ ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kerne
       period_ns_(period_ns),
       capabilities_(hal::joint_capabilities(robot)),
       owner_(robot.joints.size(), -1),
+      recovers_(robot.joints.size()),
       take_over_(robot.joints.size(), period_ns),
       guard_(robot.shape(), capabilities_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
@@ -160,6 +161,7 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
     if (!is_active(slot)) continue;
     for (const auto& claim : table_[slot]->claims) {
       owner_[claim.joint] = static_cast<std::int32_t>(slot);
+      recovers_[claim.joint] = 0;
     }
   }
   show();
@@ -261,7 +263,7 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, impedance_, culprit_, take_over_);
+  ar(active_, done_, impedance_, recovers_, culprit_, take_over_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }

@@ -131,14 +131,21 @@ class ControllerHost {
                                      const hal::StateImage& state,
                                      hal::CommandImage& command) noexcept TANDEM_RT;
 
+  /// Lets a joint that no active controller claims come back to its limits, by lead_back(), at the
+  /// speed that CommandLimits allows out there. A reset ends that.
+  [[nodiscard]] LoopAnswer recover(std::size_t joint,
+                                   const hal::CommandImage& command) noexcept TANDEM_RT;
+
   // The cycle.
 
+  /// Each cycle in which joints are held, last: their references, toward their limits.
+  void lead_back(hal::CommandImage& command) noexcept TANDEM_RT;
   /// Writes "stay where you are" for every joint: position control at the measured position.
   /// A joint that is enabled and whose last command was in position control keeps its reference
   /// and feed-forward.
   void hold(const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
   /// Every joint idle: no torque.
-  void release(hal::CommandImage& command) const noexcept TANDEM_RT;
+  void release(hal::CommandImage& command) noexcept TANDEM_RT;
 
   /// First cycle: holds every joint, sets the claimed modes, lets the active controllers seed
   /// theirs.
@@ -217,8 +224,9 @@ class ControllerHost {
   // The loop's.
   Table table_{};
   ControllerSet active_ = 0, done_ = 0;
-  std::vector<std::int32_t> owner_;   // by joint: an active one's slot, or -1
-  std::vector<Impedance> impedance_;  // by joint: that a start gives it
+  std::vector<std::int32_t> owner_;     // by joint: an active one's slot, or -1
+  std::vector<Impedance> impedance_;    // by joint: that a start gives it
+  std::vector<std::uint8_t> recovers_;  // by joint: it is led back to its limits
   TakeOver take_over_;
   ClaimGuard guard_;
   std::optional<Stray> stray_;

@@ -42,8 +42,9 @@ void ControllerHost::hold(const hal::StateImage& state,
   }
 }
 
-void ControllerHost::release(hal::CommandImage& command) const noexcept TANDEM_RT {
+void ControllerHost::release(hal::CommandImage& command) noexcept TANDEM_RT {
   std::ranges::fill(command.mode(), static_cast<std::int8_t>(ControlMode::kIdle));
+  std::ranges::fill(recovers_, std::uint8_t{0});
 }
 
 void ControllerHost::set_modes(const HostedController& one,
@@ -182,6 +183,32 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, b
     seat(joint, mode, interaction, state, command);
   }
   return {.joint = number, .one = owned_by};
+}
+
+LoopAnswer ControllerHost::recover(std::size_t joint,
+                                   const hal::CommandImage& command) noexcept TANDEM_RT {
+  const auto index = static_cast<std::int32_t>(joint);
+  if (owner_[joint] >= 0) {
+    return {.refusal = Refusal::kClaimed, .joint = index, .one = owner_[joint]};
+  }
+  const hal::JointCapabilities& limit = capabilities_[joint];
+  const double reference = command.position_rad()[joint];
+  const bool within = reference >= limit.min_position_rad && reference <= limit.max_position_rad;
+  if (command.mode()[joint] != kPosition) return {.refusal = Refusal::kOtherMode, .joint = index};
+  if (within || recovers_[joint] != 0) return {.refusal = Refusal::kWithin, .joint = index};
+  recovers_[joint] = 1;
+  return {};
+}
+
+void ControllerHost::lead_back(hal::CommandImage& command) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < recovers_.size(); ++j) {
+    if (recovers_[j] == 0) continue;
+    const hal::JointCapabilities& limit = capabilities_[j];
+    double& reference = command.position_rad()[j];
+    const double wanted = std::clamp(reference, limit.min_position_rad, limit.max_position_rad);
+    if (wanted == reference) recovers_[j] = 0;  // it has arrived
+    reference = wanted;
+  }
 }
 
 }  // namespace tandem::runtime

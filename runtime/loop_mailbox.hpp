@@ -28,12 +28,13 @@ struct JointWish {
 
 struct LoopRequest {
   enum class Kind : std::uint32_t {
-    kInsert,  ///< `controller` into `slot`
-    kRemove,  ///< what is in `slot`
-    kSwitch,  ///< the controllers of `stop` and `start`
-    kGoOn,    ///< the controllers that a reset holds back
-    kJoint,   ///< `wish` of `joint`
-    kGains,   ///< `gains` of `joint` and `loop`
+    kInsert,   ///< `controller` into `slot`
+    kRemove,   ///< what is in `slot`
+    kSwitch,   ///< the controllers of `stop` and `start`
+    kGoOn,     ///< the controllers that a reset holds back
+    kJoint,    ///< `wish` of `joint`
+    kGains,    ///< `gains` of `joint` and `loop`
+    kRecover,  ///< `joint`, back to its limits
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -56,6 +57,9 @@ enum class Refusal : std::uint32_t {
   kActive,      ///< `one` is active, or is not, as asked for already
   kClaimed,     ///< `joint` is `one`'s
   kIncapable,   ///< `joint` lacks the mode
+  kWithin,      ///< `joint` is within its limits
+  kOtherMode,   ///< `joint` is not in position control
+  kNotEnabled,  ///< nothing moves in this phase
   kNotHeld,     ///< no reset holds controllers back
 };
 

@@ -138,7 +138,10 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       (void)go_on_from_robot();
       break;
     case RunPhase::kSettling:
-    case RunPhase::kHeld: controllers_->hold(state_, command_); break;
+    case RunPhase::kHeld:
+      controllers_->hold(state_, command_);
+      controllers_->lead_back(command_);
+      break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;
@@ -162,6 +165,7 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   controlling_ = true;
   ++ran_;
   const Code code = controllers_->update(time_, state_, controlled());
+  controllers_->lead_back(controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
   controllers_answered(code);
   if (const auto stray = controllers_->take_stray()) {

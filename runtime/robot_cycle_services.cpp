@@ -34,6 +34,11 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     case Kind::kJoint:
       return controllers_->set_joint(request.joint, request.wish, controlling_, state_,
                                      controlled());
+    case Kind::kRecover:
+      if (phase_ != RunPhase::kHeld && phase_ != RunPhase::kRunning) {
+        return {.refusal = Refusal::kNotEnabled};
+      }
+      return controllers_->recover(request.joint, controlled());
     case Kind::kGains: break;
   }
   parameters_.set_gains(request.joint, request.loop, request.gains);
@@ -66,9 +71,11 @@ LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
 void RobotCycle::note_service(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
   const auto joint = static_cast<std::int32_t>(request.joint);
-  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn)
+  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) {
     event(log::EventKind::kControllersSwitched);
-  if (request.kind == Kind::kJoint) event(log::EventKind::kJointSet, joint);
+  }
+  if (request.kind == Kind::kJoint || request.kind == Kind::kRecover)
+    event(log::EventKind::kJointSet, joint);
   if (request.kind == Kind::kGains) event(log::EventKind::kGainsSet, joint);
 }
 

@@ -137,6 +137,18 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.message = "is claimed by the controller '" + one + "', which sets its mode";
       error.hint = "stop it first: tandem controller stop " + one;
       break;
+    case Refusal::kWithin:
+      error.message = "is within its limits already, or on its way";
+      error.hint = "tandem joint list shows where it is";
+      break;
+    case Refusal::kOtherMode:
+      error.message = "is not in position control, which leads it back";
+      error.hint = "tandem joint set " + joint + " --mode position";
+      break;
+    case Refusal::kNotEnabled:
+      error.message = "nothing is moved before the joints are enabled, or while a fault is latched";
+      error.hint = "tandem fault reset, then ask again";
+      break;
     case Refusal::kNotHeld:
       error.message = "no controllers are held back by a reset";
       error.hint = "name those to start; while a fault is latched: tandem fault reset first";

@@ -119,6 +119,11 @@ class RunServices {
   /// that the joint lacks; a value beyond its limit (which is named).
   [[nodiscard]] Result<Asked> set_joint(const std::string& joint, const JointWish& wish,
                                         Patience patience = kPatience);
+  /// Leads a joint that stands outside its position limits, and that no active controller claims,
+  /// back to the nearer one, at the speed that CommandLimits allows out there.
+  /// Errors: unknown joint; claimed; within its limits; not in position control; not in the phases
+  /// held or running.
+  [[nodiscard]] Result<Asked> recover(const std::string& joint, Patience patience = kPatience);
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
   [[nodiscard]] Result<Asked> set_gains(const std::string& joint, hal::PidLoop loop,

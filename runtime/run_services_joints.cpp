@@ -120,6 +120,17 @@ Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& 
              patience);
 }
 
+Result<Asked> RunServices::recover(const std::string& joint, Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<std::size_t> index = joint_of(joint);
+  if (!index) return std::unexpected(index.error());
+  return ask(lock,
+             {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
+             patience);
+}
+
 Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
                                      const GainsWish& wish, Patience patience) {
   Lock lock(mutex_);

@@ -43,6 +43,36 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   EXPECT_EQ(result["fault_log"][0]["latched"], false);
 }
 
+TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
+  // Unpowered it falls to where it hangs, at 3.14 rad: the plant's end stop is the URDF's 6.3.
+  edit("double_pendulum.urdf", R"(lower="0" upper="0")", R"(lower="-6.3" upper="6.3")");
+  edit("robot.toml", "max_position_rad = 6.3", "max_position_rad = 2.9");
+  begin("--on-fault wait");
+  const auto joint = [this] {
+    const Outcome list = to_run("joint list joint1 --json -");
+    return nlohmann::json::parse(list.out, nullptr, false)["joints"][0];
+  };
+  const auto refused = [this] { return to_run("joint recover joint1"); };
+  EXPECT_NE(refused().err.find("joint1: is claimed by the controller 'hold'"), std::string::npos);
+  EXPECT_EQ(to_run("estop --category 0").status, 0);
+  EXPECT_NE(refused().err.find("while a fault is latched"), std::string::npos) << refused().err;
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  const double beyond = joint()["position_rad"];
+  ASSERT_GT(beyond, 2.95);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_NEAR(joint()["position_rad"], beyond, 0.01) << "nothing pulls it in";
+  const Outcome recover = to_run("joint recover joint1");
+  EXPECT_EQ(recover.status, 0) << recover.err;
+  EXPECT_NE(recover.out.find("joint1 comes back"), std::string::npos) << recover.out;
+  for (int i = 0; i < 200 && joint()["position_rad"] > 2.91; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_NEAR(joint()["position_rad"], 2.9, 0.02);
+  EXPECT_NE(refused().err.find("is within its limits already"), std::string::npos);
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Faults, AreResetWithoutAnybodyByAnExperimentThatSaysSo) {
   edit("hold.toml", "[[controller]]", "[faults]\nafter_reset = \"continue\"\n[[controller]]");
   begin("--on-fault wait");
@@ -96,9 +126,11 @@ TEST_F(Faults, AClosedTerminalIsAStopInOrder) {
 TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
   for (const std::string pipe : {"| head -n 1", "2>&1 | head -n 1"}) {
     const std::string command =
-        "cd '" + folder_.string() + "' && { timeout 100 '" TANDEM_BINARY_DIR
+        "cd '" + folder_.string() +
+        "' && { timeout 100 '" TANDEM_BINARY_DIR
         "/bin/tandem' run hold.toml --no-log --no-socket --duration 5000 --json run.json; "
-        "echo $? >status; } " + pipe + " >out.txt";
+        "echo $? >status; } " +
+        pipe + " >out.txt";
     EXPECT_EQ(std::system(command.c_str()), 0);
     EXPECT_EQ(read_text(folder_ / "status"), "0\n");
     EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"], 5'000'000) << pipe;

@@ -107,8 +107,7 @@ TEST(JointController, ObeysTheImpedanceLaw) {
 }
 
 TEST(JointController, ObeysTheVelocityImpedanceLawAboutItsIntegratedReference) {
-  JointController controller =
-      settled(config(), Mode::kVelocityImpedance, measured(), reference());
+  JointController controller = settled(config(), Mode::kVelocityImpedance, measured(), reference());
   const double held = controller.terms().held_position_rad;
   EXPECT_NEAR(held, 0.3 + 3 * 0.5 * kDt, 1.0e-12);  // from where the joint was, three periods
   controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
@@ -190,6 +189,27 @@ TEST(JointController, KeepsReferencesWithinPositionAndVelocityLimits) {
   EXPECT_DOUBLE_EQ(velocity.velocity_loop().state.p, 20.0 * (-2.0 - 0.2));
 }
 
+TEST(JointController, LetsAJointThatStandsOutsideOfItsRangeStayAndComeInButNotGoOutAgain) {
+  ControllerConfig c = config();  // up to 1.5 rad
+  Measurement m = measured();
+  m.link_position_rad = 1.8;
+  Reference r = reference();
+  JointController controller;
+  controller.configure(c, kDt);
+  const auto error = [&](double position_rad) {
+    r.position_rad = position_rad;
+    controller.update(Action::kFollow, Mode::kCsp, r, m);
+    return controller.terms().position_error_rad + m.link_position_rad;
+  };
+  EXPECT_DOUBLE_EQ(error(1.8), 1.8) << "no jump to 1.5";
+  EXPECT_FALSE(controller.limited());
+  EXPECT_DOUBLE_EQ(error(2.0), 1.8);
+  EXPECT_DOUBLE_EQ(error(1.7), 1.7);
+  EXPECT_DOUBLE_EQ(error(1.8), 1.7) << "not back out";
+  EXPECT_DOUBLE_EQ(error(1.2), 1.2);
+  EXPECT_DOUBLE_EQ(error(1.6), 1.5);
+}
+
 TEST(JointController, WindsUpNoIntegralOfTheCascadeAgainstTheVoltage) {
   ControllerConfig c = config();
   c.voltage_limit_V = 5.0;
@@ -219,8 +239,7 @@ TEST(JointController, WindsUpNoIntegralAgainstTheTorqueLimit) {
 TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
   ControllerConfig c = config();
   c.torque_limit_Nm = 10.0;
-  JointController controller =
-      settled(c, Mode::kVelocityImpedance, measured(), reference());
+  JointController controller = settled(c, Mode::kVelocityImpedance, measured(), reference());
   for (int k = 0; k < 20000; ++k) {
     controller.update(Action::kFollow, Mode::kVelocityImpedance, reference(), measured());
   }
@@ -230,8 +249,13 @@ TEST(JointController, DoesNotRunAwayFromABlockedJointInVelocityImpedance) {
 TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
   ControllerConfig c = config();
   c.transfer_time_s = 0.02;
-  const Mode modes[] = {Mode::kCsp,     Mode::kCsv,      Mode::kCst, Mode::kImpedance,
-                        Mode::kCurrent, Mode::kOpenLoop, Mode::kVelocityImpedance};
+  const Mode modes[] = {Mode::kCsp,
+                        Mode::kCsv,
+                        Mode::kCst,
+                        Mode::kImpedance,
+                        Mode::kCurrent,
+                        Mode::kOpenLoop,
+                        Mode::kVelocityImpedance};
   for (const Mode from : modes) {
     for (const Mode to : modes) {
       if (from == to) continue;
@@ -260,8 +284,8 @@ TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
   const double held = controller.terms().torque_reference_Nm;
   controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
   EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, held);
-  EXPECT_NEAR(controller.position_loop().state.i, held - 2.0 - 100.0 * 0.1 - 4.0 * 0.3 +
-                                                      50.0 * 0.1 * kDt, 1.0e-12);
+  EXPECT_NEAR(controller.position_loop().state.i,
+              held - 2.0 - 100.0 * 0.1 - 4.0 * 0.3 + 50.0 * 0.1 * kDt, 1.0e-12);
 }
 
 TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
@@ -271,7 +295,7 @@ TEST(JointController, StartsAtTheBackEmfWhenTheBridgeCloses) {
   controller.configure(c, kDt);
   controller.update(Action::kOff, Mode::kCsp, reference(), measured());
   EXPECT_DOUBLE_EQ(controller.update(Action::kFollow, Mode::kCsp, reference(), measured()),
-                   4.0 * 0.25);  // no current
+                   4.0 * 0.25);                                   // no current
   EXPECT_DOUBLE_EQ(controller.terms().torque_reference_Nm, 5.0);  // what the spring carries
 }
 

@@ -10,6 +10,7 @@ namespace tandem::firmware::testing {
 namespace {
 
 using canopen::DriveState;
+using canopen::ErrorCode;
 
 struct Guard : ::testing::Test {
   Rig rig;
@@ -102,6 +103,31 @@ TEST_F(Guard, StopsAJointThatLeavesItsPositionLimits) {
   EXPECT_NEAR(rig.joints[0].q, 0.0, 0.05);
 }
 
+/// A measured velocity is never quite still, and a pendulum takes long to stop.
+TEST(PositionLimits, AreWhereAJointThatIsPoweredBeyondThemStandsAndFollowItIn) {
+  Protection protection;
+  const ProtectionConfig config{.min_position_rad = -1.0,
+                                .max_position_rad = 2.0,
+                                .position_margin_rad = 0.1,
+                                .temperature_limit_C = 100.0};
+  const auto at = [&](double position_rad, bool powered) {
+    return protection.update(config, {.link_position_rad = position_rad, .powered = powered}, 1e-3);
+  };
+  EXPECT_EQ(at(2.6, false), ErrorCode::kNone);
+  EXPECT_EQ(at(2.5, false), ErrorCode::kNone);
+  EXPECT_EQ(at(2.5, true), ErrorCode::kNone);
+  EXPECT_EQ(at(2.55, true), ErrorCode::kNone) << "it swings";
+  EXPECT_EQ(at(2.61, true), ErrorCode::kPositionLimit);
+  EXPECT_EQ(at(2.3, true), ErrorCode::kNone);
+  EXPECT_EQ(at(2.45, true), ErrorCode::kPositionLimit) << "it had come in to 2.3";
+  EXPECT_EQ(at(1.0, true), ErrorCode::kNone);
+  EXPECT_EQ(at(2.09, true), ErrorCode::kNone);
+  EXPECT_EQ(at(2.11, true), ErrorCode::kPositionLimit);
+  EXPECT_EQ(at(-1.3, false), ErrorCode::kNone);
+  EXPECT_EQ(at(-1.35, true), ErrorCode::kNone);
+  EXPECT_EQ(at(-1.45, true), ErrorCode::kPositionLimit);
+}
+
 TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
   BoardSetup setup = board_setup();
   setup.axes[0].continuous_current_A = 5.0;
@@ -109,7 +135,7 @@ TEST_F(Guard, StopsOnI2tAfterTheTimeOfTheModelAndWarnsBefore) {
   start(setup);
   Rig& r = *rig_owner;
   r.enable(-3);
-  r.joints[0].Ks = 1.0e5;  // holds the motor
+  r.joints[0].Ks = 1.0e5;                                 // holds the motor
   ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 1000), 0U);  // 10 A
   const double expected_s = 2.0 * std::log(100.0 / (100.0 - 25.0));
   r.cycles(static_cast<int>(0.95 * expected_s * 1000.0));

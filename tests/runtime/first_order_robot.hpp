@@ -103,6 +103,7 @@ class FirstOrderRobot : public hal::Backend {
     return can_rewind;
   }
   bool can_rewind = true;
+  void push(std::size_t joint, double position) { position_[joint] = position; }
 
  private:
   static constexpr std::uint64_t kEnablingCycles = 5;  // that a reset takes

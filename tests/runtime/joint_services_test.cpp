@@ -47,6 +47,52 @@ struct JointServices : testing::Test {
   std::unique_ptr<RobotCycle> cycle;
 };
 
+/// The elbow's range ends at 1.5 rad, its velocity at 2 rad/s.
+TEST(JointRecovery, LeadsAJointSlowlyToItsLimitWhenItIsAsked) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  ASSERT_TRUE(host.add("sine", std::make_shared<test::Sine>(std::vector<std::size_t>{1}),
+                       test::parameters()));
+  rt::WallClock clock;
+  RobotCycle cycle(CycleParts{robot, backend, host, clock}, {.after_stop = AfterStop::kWait});
+  const auto steps = [&cycle](int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle.step());
+  };
+  const auto recover = [&cycle](const std::string& joint) {
+    const auto asked = cycle.services().recover(joint, RunServices::Patience{0});
+    return asked ? std::string("asked") : asked.error().to_string();
+  };
+  const auto answered = [&] {  // by the loop, to what was asked last
+    steps(1);
+    return cycle.command().position_rad()[1];
+  };
+  steps(100);
+  cycle.requests().emergency_stop(hal::StopCategory::kCategory0);
+  steps(5);
+  backend.push(1, 1.6);
+  steps(5);
+  EXPECT_EQ(recover("elbow"), "asked");
+  EXPECT_EQ(answered(), 1.6) << "a fault is latched: nothing moves";
+  cycle.requests().reset_faults();
+  steps(100);
+  ASSERT_EQ(cycle.phase(), RunPhase::kHeld);
+  EXPECT_EQ(cycle.command().position_rad()[1], 1.6);
+  EXPECT_NE(recover("elbo").find("did you mean 'elbow'"), std::string::npos);
+  EXPECT_EQ(recover("elbow"), "asked");
+  double before = answered();
+  EXPECT_DOUBLE_EQ(before, 1.5999);
+  for (int i = 0; i < 990; ++i) {
+    steps(1);
+    const double now = cycle.command().position_rad()[1];
+    EXPECT_NEAR(before - now, 1e-4, 1e-12);
+    before = now;
+  }
+  steps(100);
+  EXPECT_EQ(cycle.command().position_rad()[1], 1.5);
+  EXPECT_EQ(cycle.phase(), RunPhase::kHeld);
+}
+
 TEST_F(JointServices, ShowEveryJointAfterTheLastCycle) {
   const auto joints = services().joints();
   ASSERT_EQ(joints.size(), 3U);

@@ -16,6 +16,7 @@ struct Swing : ::testing::Test {
   void begin(StopCategory on_fault, AfterReset after_reset = AfterReset::kContinue) {
     robot = tandem::test::swing_robot();
     robot.joints[0].on_fault = on_fault;
+    robot.joints[0].min_position_rad = min_position_rad;
     robot.emergency_stop =
         on_fault == StopCategory::kCategory0 ? on_fault : StopCategory::kCategory1;
     auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
@@ -78,6 +79,7 @@ struct Swing : ::testing::Test {
   std::unique_ptr<ControllerHost> host;
   rt::WallClock clock;
   std::unique_ptr<RobotCycle> cycle;
+  double min_position_rad = -3.0;
   double first_start_Nm = 0.0;  ///< torque_step() of the controller's own beginning, at first
 };
 
@@ -123,6 +125,33 @@ TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted)
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_NEAR(cycle->command().position_rad()[0], held, 1e-3) << "from where it was held";
   EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
+}
+
+/// It hangs at 0, where it may not go.
+TEST_F(Swing, IsHeldBeyondItsLimitAndLedBackSlowly) {
+  min_position_rad = 0.3;
+  begin(StopCategory::kCategory0, AfterReset::kHold);
+  cycle->requests().emergency_stop(StopCategory::kCategory0);
+  come_to_rest();
+  const double rest = cycle->state().position_rad()[0];
+  ASSERT_LT(rest, 0.1);
+  cycle->requests().reset_faults();
+  until(RunPhase::kHeld);
+  steps(1000);
+  EXPECT_NEAR(cycle->state().position_rad()[0], rest, 1e-3) << "nothing pulls it in";
+  ASSERT_TRUE(cycle->services().recover("swing", RunServices::Patience{0}));
+  double fastest = 0.0;
+  int taken = 0;
+  for (; taken < 3000 && cycle->command().position_rad()[0] < 0.3; ++taken) {
+    steps(1);
+    fastest = std::max(fastest, std::abs(cycle->state().velocity_rad_s()[0]));
+  }
+  EXPECT_LT(fastest, 1.5 * 0.05 * 5.0) << "a twentieth of its velocity, and what the spring adds";
+  EXPECT_GT(taken, 1000);
+  steps(1000);
+  EXPECT_NEAR(cycle->state().position_rad()[0], 0.3, 5e-3);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  EXPECT_EQ(cycle->fault_log().latched(), 0U);
 }
 
 // A joint that swings when it is enabled again is caught where it is, not where it was.
