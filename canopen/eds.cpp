@@ -61,9 +61,11 @@ constexpr std::array kNames{
     ObjectName{0x2035, "Under-voltage"},
     ObjectName{0x2036, "Stop time"},
     ObjectName{0x2037, "Position margin"},
+    ObjectName{0x2038, "Sensor mismatch", "Window,Time"},
+    ObjectName{0x2039, "Oscillation", "Limit,Time"},
     ObjectName{0x2040, "Telemetry",
                "Torque reference,Transfer voltage,Position integral,Velocity integral,"
-               "Torque integral,Current integral,I2t load"},
+               "Torque integral,Current integral,I2t load,Oscillation load"},
     ObjectName{0x2041, "Refused values"},
     ObjectName{0x2050, "Ignored frames"},
     ObjectName{0x2051, "Cycle counter"},

@@ -58,6 +58,7 @@ const char* to_string(ErrorCode code) noexcept {
     case ErrorCode::kPositionLimit: return "position limit exceeded";
     case ErrorCode::kCommandTimeout: return "command time-out";
     case ErrorCode::kEmergencyInput: return "emergency stop input active";
+    case ErrorCode::kOscillation: return "the joint oscillates";
   }
   return "error";
 }

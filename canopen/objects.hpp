@@ -116,6 +116,7 @@ inline constexpr std::uint16_t kI2t = 0x2031;               // f32: I2tSub
 inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: never
 inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link rev]
 inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
+inline constexpr std::uint16_t kOscillation = 0x2039;       // f32: OscillationSub
 
 // The manufacturer's, of a board
 inline constexpr std::uint16_t kCycleCounter = 0x2051;  // u8: by RPDO, echoed by TPDO
@@ -156,6 +157,11 @@ enum LimitSub : std::uint8_t {
 enum I2tSub : std::uint8_t {
   kContinuousCurrent = 1,  ///< [A] that can be borne for ever
   kThermalTime,            ///< [s] time constant of the winding
+};
+/// Sub-indices of object::kOscillation.
+enum OscillationSub : std::uint8_t {
+  kOscillationLimit = 1,  ///< [Nm] RMS of the motor torque's fast part; 0: not watched
+  kOscillationTime,       ///< [s] over which the mean is taken
 };
 /// Sub-indices of object::kIdentity.
 enum IdentitySub : std::uint8_t { kVendor = 1, kProduct, kRevision, kSerial };
@@ -240,6 +246,7 @@ enum class ErrorCode : std::uint16_t {
   kSyncLost = 0x8700,         ///< sync controller
   kCommandTimeout = 0xFF01,   ///< ours: SYNCs came without commands
   kEmergencyInput = 0xFF02,   ///< ours: the interlock input (60FD bit 3) is active
+  kOscillation = 0xFF03,      ///< ours: the motor's torque oscillates (2039)
   kVelocityControl = 0x8400,  ///< velocity (limit) exceeded
   kFollowingError = 0x8611,
   kPositionLimit = 0x8612,  ///< reference or position limit

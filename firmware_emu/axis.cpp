@@ -68,7 +68,9 @@ void Axis::apply_settings() noexcept TANDEM_RT {
       .temperature_limit_C = objects_.temperature_limit * 0.1,
       .undervoltage_V = objects_.undervoltage_V,
       .mismatch_window_rad = objects_.mismatch[kMismatchWindow - 1],
-      .mismatch_timeout_s = objects_.mismatch[kMismatchTimeout - 1]};
+      .mismatch_timeout_s = objects_.mismatch[kMismatchTimeout - 1],
+      .oscillation_limit_Nm = objects_.oscillation[canopen::kOscillationLimit - 1],
+      .oscillation_time_s = objects_.oscillation[canopen::kOscillationTime - 1]};
   settings_changed_ = false;
 }
 
@@ -142,8 +144,11 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
        .temperature_C = temperature_C_,
        .bus_voltage_V = measured_.bus_voltage_V,
        .mismatch_rad = mismatch_rad(),
+       .motor_torque_Nm =
+           objects_.motor_data[canopen::kMotorTorqueConstant - 1] * measured_.current_A,
        .sensors_valid = sensors_valid_,
        .powered = powered(),
+       .drives = action() == Action::kFollow || action() == Action::kHold,
        .follows_position = follows},
       period_s_);
   const bool interlock = (objects_.digital_inputs & canopen::digital_input::kInterlock) != 0;
@@ -254,7 +259,8 @@ void Axis::show_controller() noexcept {
                         static_cast<float>(controller_.velocity_loop().state.i),
                         static_cast<float>(controller_.torque_loop().state.i),
                         static_cast<float>(controller_.electrical_loop().state.i),
-                        static_cast<float>(protection_.load(protection_config_))};
+                        static_cast<float>(protection_.load(protection_config_)),
+                        static_cast<float>(protection_.oscillation(protection_config_))};
 }
 
 AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {

@@ -64,6 +64,7 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
               real32(c.velocity_limit_rad_s)};
   o.i2t = {real32(setup.continuous_current_A), real32(setup.thermal_time_s)};
   o.mismatch = {real32(setup.mismatch_window_rad), real32(setup.mismatch_timeout_s)};
+  o.oscillation = {real32(setup.oscillation_limit_Nm), real32(setup.oscillation_time_s)};
   o.transfer_time_s = real32(c.transfer_time_s);
   o.undervoltage_V = real32(setup.undervoltage_V);
   o.stop_time_s = real32(setup.stop_time_s);
@@ -142,6 +143,7 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          add_array(od, at(co::kLimits), limits, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kI2t), i2t, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(own::kMismatch), mismatch, kReadWrite, kNotNegative, &owner) &&
+         add_array(od, at(co::kOscillation), oscillation, kReadWrite, kNotNegative, &owner) &&
          od.add(at(co::kCommandTimeout), 0, command_timeout, kReadWrite) &&
          od.add(at(co::kTemperatureLimit), 0, temperature_limit, kReadWrite, {}, &owner) &&
          od.add(at(own::kUndervoltage), 0, undervoltage_V, kReadWrite, kNotNegative, &owner) &&

@@ -45,11 +45,12 @@ enum TelemetrySub : std::uint8_t {
   kTorqueIntegral,       ///< [V]
   kCurrentIntegral,      ///< [V]
   kI2tLoad,              ///< 1: trips
+  kOscillationLoad,      ///< 1: trips
 };
-inline constexpr std::size_t kTelemetryValues = 7;
+inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 103;
+inline constexpr std::size_t kAxisEntries = 107;
 
 /// Plain variables behind the dictionary, the widest first: no padding. Units as in
 /// canopen/objects.hpp.
@@ -80,6 +81,7 @@ struct AxisObjects {
   std::array<float, 4> limits{};
   std::array<float, 2> i2t{};
   std::array<float, 2> mismatch{};
+  std::array<float, 2> oscillation{};
   float transfer_time_s = 0.0F;
   float undervoltage_V = 0.0F;
   float stop_time_s = 0.0F;

@@ -70,7 +70,9 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
                              axis.undervoltage_V,
                              axis.stop_time_s,
                              axis.mismatch_window_rad,
-                             axis.mismatch_timeout_s}) {
+                             axis.mismatch_timeout_s,
+                             axis.oscillation_limit_Nm,
+                             axis.oscillation_time_s}) {
     if (!std::isfinite(value) || value < 0.0) {
       return bad(key, "a setting is negative or not finite");
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include "base/realtime.hpp"
 #include "canopen/objects.hpp"
@@ -24,6 +25,8 @@ struct ProtectionConfig {
   double undervoltage_V = 0.0;       ///< 0: not watched
   double mismatch_window_rad = 0.0;  ///< 0: not watched
   double mismatch_timeout_s = 0.0;
+  double oscillation_limit_Nm = 0.0;  ///< 0: not watched
+  double oscillation_time_s = 1.0;
 };
 
 struct ProtectionInputs {
@@ -34,8 +37,10 @@ struct ProtectionInputs {
   double bus_voltage_V = 0.0;
   /// Motor angle less link angle less what the spring's torque accounts for.
   double mismatch_rad = 0.0;
+  double motor_torque_Nm = 0.0;   ///< N K i
   bool sensors_valid = true;      ///< every reading is a number
   bool powered = false;           ///< the bridge is on
+  bool drives = false;            ///< it is, and does not merely short the winding
   bool follows_position = false;  ///< CSP: position_error_rad means something
 };
 
@@ -46,15 +51,28 @@ struct ProtectionInputs {
 ///
 /// A joint that is powered beyond its position limits may stand there or come in: the limits are
 /// where it was powered, and follow it in, until they are the configured ones.
+///
+/// Oscillation is what a loop does whose gains are too high: the motor's torque u = N K i swings to
+/// and fro and moves little. Its fast part is u less its own low-pass at f = 10 Hz, and x the mean
+/// of that part's square,
+///
+///     s' = 2 pi f (u - s),    x' = ((u - s)^2 - x) / T,    fault at x >= limit^2,
+///
+/// in every mode of operation, because the current is measured in each. A swing of amplitude a is
+/// found after -T ln(1 - limit^2 / r^2), with r = a for a square wave and a / sqrt(2) for a sine
+/// (less below f: r is multiplied by F / sqrt(F^2 + f^2) at the frequency F); one step of the
+/// torque by d adds no more than d^2 / (4 pi f T) to x. A shorted winding is not watched: its
+/// torque only brakes.
 class Protection {
  public:
   /// Share of a limit from which the statusword warns, and to which I2t must fall before a reset.
   static constexpr double kWarningShare = 0.9;
   static constexpr double kTemperatureHysteresis_K = 5.0;
+  /// f above.
+  static constexpr double kFastTorque_Hz = 10.0;
 
   /// @return kNone, or the first of: position sensor, sensor mismatch, I2t, temperature,
-  /// under-voltage, following
-  ///         error, position limit.
+  ///         under-voltage, oscillation, following error, position limit.
   canopen::ErrorCode update(const ProtectionConfig& config, const ProtectionInputs& in,
                             double dt_s) noexcept TANDEM_RT {
     using canopen::ErrorCode;
@@ -72,11 +90,13 @@ class Protection {
     const bool contradicts =
         config.mismatch_window_rad > 0.0 && std::abs(in.mismatch_rad) > config.mismatch_window_rad;
     state_.mismatch_s = contradicts ? state_.mismatch_s + dt_s : 0.0;
+    watch_oscillation(config, in, dt_s);
 
     if (state_.mismatch_s > config.mismatch_timeout_s) return ErrorCode::kSensorMismatch;
     if (state_.overload != 0) return ErrorCode::kI2t;
     if (state_.overheated != 0) return ErrorCode::kDriveTemperature;
     if (in.bus_voltage_V < config.undervoltage_V) return ErrorCode::kVoltage;
+    if (oscillation(config) >= 1.0) return ErrorCode::kOscillation;
     if (lags && state_.lagging_s > config.following_timeout_s) return ErrorCode::kFollowingError;
     if (leaves) return ErrorCode::kPositionLimit;
     return ErrorCode::kNone;
@@ -86,6 +106,11 @@ class Protection {
   [[nodiscard]] double load(const ProtectionConfig& config) const noexcept {
     const double bearable = config.continuous_current_A * config.continuous_current_A;
     return bearable > 0.0 ? state_.heat_A2 / bearable : 0.0;
+  }
+  /// The mean square of the fast torque as a share of what trips it; 0 when not watched.
+  [[nodiscard]] double oscillation(const ProtectionConfig& config) const noexcept {
+    const double limit = config.oscillation_limit_Nm * config.oscillation_limit_Nm;
+    return limit > 0.0 ? state_.fast_Nm2 / limit : 0.0;
   }
   [[nodiscard]] bool warning(const ProtectionConfig& config) const noexcept {
     return state_.warm != 0 || load(config) > kWarningShare;
@@ -100,11 +125,27 @@ class Protection {
     double mismatch_s = 0.0;
     double lower_rad = 0.0;  // position limits in force
     double upper_rad = 0.0;
+    double slow_Nm = 0.0;   ///< s above
+    double fast_Nm2 = 0.0;  ///< x above
     std::int64_t overload = 0;
     std::int64_t overheated = 0;
     std::int64_t warm = 0;
   };
 
+  void watch_oscillation(const ProtectionConfig& config, const ProtectionInputs& in,
+                         double dt_s) noexcept {
+    if (!in.drives) {
+      state_.slow_Nm = in.motor_torque_Nm;
+      state_.fast_Nm2 = 0.0;
+      return;
+    }
+    // By the trapezoidal rule: no gain beyond 1 at half the control rate.
+    const double half = std::numbers::pi * kFastTorque_Hz * dt_s;
+    const double fast = (in.motor_torque_Nm - state_.slow_Nm) / (1.0 + half);
+    state_.slow_Nm += 2.0 * half * fast;
+    state_.fast_Nm2 +=
+        (fast * fast - state_.fast_Nm2) * std::min(1.0, dt_s / config.oscillation_time_s);
+  }
   static void hysteresis(std::int64_t& flag, double value, double on, double off) noexcept {
     if (value >= on) flag = 1;
     if (value < off) flag = 0;

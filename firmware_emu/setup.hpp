@@ -52,6 +52,8 @@ struct AxisSetup {
   double undervoltage_V = 0.0;             ///< 2035; 0: not watched
   double mismatch_window_rad = 0.0;        ///< 2038:1; 0: not watched
   double mismatch_timeout_s = 0.01;        ///< 2038:2
+  double oscillation_limit_Nm = 0.0;       ///< 2039:1; 0: not watched
+  double oscillation_time_s = 1.0;         ///< 2039:2
   double stop_time_s = 1.0;                ///< 2036: longest stop until the bridge opens
 };
 

@@ -130,9 +130,16 @@ struct JointConfig {
   double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
   double following_error_rad = 0.5;  ///< in CSP, beyond it for longer than the next: a fault;
   double following_timeout_s = 0.1;  ///< 0 rad: not watched
+  double max_oscillation = 0.35;     ///< RMS of the motor torque's fast part over the most that the
+                                     ///< drive gives; 0: not watched
+  double oscillation_time_s = 1.0;   ///< of that mean
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                                      ///< in the TOML, for messages
 };
+
+/// max_oscillation in torque, object 2039:1 [Nm]: of max_torque_Nm, or of what the current limit
+/// gives where that is less.
+[[nodiscard]] double oscillation_limit_Nm(const JointConfig& joint, const ActuatorConfig& actuator);
 
 /// [[passive]]: a joint that moves but has no motor and no encoder. It is in the dynamics and
 /// nowhere else: not in the process image, not on a board.

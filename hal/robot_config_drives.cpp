@@ -82,6 +82,12 @@ std::string actuator_problem(const ActuatorConfig& a) {
   return {};
 }
 
+double oscillation_limit_Nm(const JointConfig& joint, const ActuatorConfig& actuator) {
+  const double most_Nm =
+      actuator.gear_ratio * actuator.torque_constant_Nm_A * actuator.current_limit_A;
+  return joint.max_oscillation * std::min(joint.max_torque_Nm, most_Nm);
+}
+
 void read_drive_tables(TomlTable& root, RobotConfig& robot) {
   const TomlTable actuator_defaults = read_defaults(root, "actuator_defaults", read_actuator);
   TomlTable actuators = root.table_or_empty("actuator");

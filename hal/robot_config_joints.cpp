@@ -44,6 +44,9 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
   joint.following_timeout_s =
       table.number_or("following_timeout_s", joint.following_timeout_s, {0.0, 65.0});
+  joint.max_oscillation = table.number_or("max_oscillation", joint.max_oscillation, {0.0, 10.0});
+  joint.oscillation_time_s =
+      table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
   joint.on_fault = read_stop_category(table);
   return joint;
 }

@@ -121,6 +121,8 @@ void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorCon
       clamp_round<std::uint32_t>(joint.following_error_rad * AxisScale::of(joint).counts_per_rad));
   add(object::kFollowingErrorTimeout, 0,
       clamp_round<std::uint16_t>(1000.0 * joint.following_timeout_s));
+  add(object::kOscillation, kOscillationLimit, to_float(oscillation_limit_Nm(joint, motor)));
+  add(object::kOscillation, kOscillationTime, to_float(joint.oscillation_time_s));
 }
 
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {

@@ -43,6 +43,8 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.thermal_time_s = actuator.thermal_time_s;
   axis.temperature_limit_C = actuator.temperature_limit_C;
   axis.mismatch_window_rad = kMismatchWindow_rad;
+  axis.oscillation_limit_Nm = hal::oscillation_limit_Nm(joint, actuator);
+  axis.oscillation_time_s = joint.oscillation_time_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
   c.position = pid(gains.position, joint.max_torque_Nm);

@@ -326,6 +326,112 @@ TEST_F(Guard, ClearsTheEmergencyWhenTheLastFaultIsReset) {
   for (int byte = 0; byte < 8; ++byte) EXPECT_EQ(emergencies[0].data[byte], 0) << byte;
 }
 
+/// A board that watches oscillation as robot.toml's defaults have it.
+BoardSetup watched_setup() {
+  BoardSetup setup = board_setup();
+  setup.axes[0].oscillation_limit_Nm = 0.35 * 60.0;
+  setup.axes[0].oscillation_time_s = 1.0;
+  return setup;
+}
+
+TEST_F(Guard, StopsAJointThatRingsInEveryModeWhoseGainsAreTooHigh) {
+  struct Case {
+    std::int8_t mode;
+    std::uint16_t gains;  ///< the object of the loop that rings
+    float factor;
+  };
+  for (const Case& one : {Case{8, 0x2020, 1000.0F}, Case{9, 0x2021, 1000.0F},
+                          Case{10, 0x2022, 1000.0F}, Case{-1, 0x2022, 1000.0F},
+                          Case{-3, 0x2023, 1000.0F}}) {
+    SCOPED_TRACE(static_cast<int>(one.mode));
+    start(watched_setup());
+    Rig& r = *rig_owner;
+    r.joints[0].link_inertia = 0.2;
+    r.enable(one.mode);
+    r.cycles(500);
+    ASSERT_EQ(r.error(), 0);
+    for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 3}) {
+      const auto gain = r.object<float>(one.gains, sub);
+      ASSERT_EQ(r.write(one.gains, sub, gain * one.factor), 0U);
+    }
+    if (one.mode == -3) {
+      ASSERT_EQ(r.write<std::int16_t>(0x2013, 0, 100), 0U);
+    } else {
+      r.commands[0].torque_offset = 10;
+    }
+    r.seen.clear();
+    EXPECT_LT(until_fault(r, 1000), 300) << "ms";
+    expect_fault(r, 0xFF03, 0x20);
+    EXPECT_TRUE(reset(r));
+  }
+}
+
+// x = r^2 (1 - exp(-t / T)) reaches limit^2 after -T ln(1 - limit^2 / r^2).
+TEST_F(Guard, FindsASquareWaveAfterTheTimeOfTheFormula) {
+  BoardSetup setup = watched_setup();
+  setup.axes[0].oscillation_limit_Nm = 8.0;
+  start(setup);
+  Rig& r = *rig_owner;
+  r.joints[0].J = 1.0e6;  // the rotor stands: u = N K V / R
+  r.enable(-2);
+  r.cycles(20);
+  int taken = 0;
+  for (; taken < 1000 && r.error() == 0; ++taken) {
+    const double volts = taken / 5 % 2 == 0 ? 2.0 : -2.0;  // 100 Hz
+    ASSERT_EQ(r.write(0x2012, 0, static_cast<std::int16_t>(volts * 100.0)), 0U);
+    r.cycle();
+  }
+  const double amplitude = 4.1 * 2.0 / 0.664;
+  const double seconds = -std::log(1.0 - std::pow(8.0 / amplitude, 2));
+  EXPECT_NEAR(taken, seconds * 1000.0, 0.05 * seconds * 1000.0);
+  EXPECT_EQ(r.error(), 0xFF03);
+}
+
+TEST_F(Guard, LeavesHonestMotionsAlone) {
+  const auto quiet = [this](Rig& r) {
+    EXPECT_EQ(r.error(), 0);
+    EXPECT_LT(r.object<float>(0x2040, 8), 0.7F) << "of what trips it";
+  };
+  start(watched_setup());
+  rig_owner->joints[0].link_inertia = 0.2;
+  rig_owner->enable();
+  for (const double to : {0.3, -0.3, 0.0}) {  // step references
+    rig_owner->commands[0].position = Rig::counts(to);
+    for (int k = 0; k < 500; ++k) {
+      rig_owner->cycle();
+      quiet(*rig_owner);
+    }
+  }
+  for (const double amplitude_rad : {1.5, 0.5}) {  // sines at the joint's velocity limit, 8 rad/s
+    start(watched_setup());
+    Rig& r = *rig_owner;
+    r.joints[0].link_inertia = 0.2;
+    r.enable();
+    const double w = 8.0 / amplitude_rad;
+    for (int k = 0; k < 5000; ++k) {
+      const double t = 1.0e-3 * k;
+      const double in = std::min(1.0, t);  // grows for a second
+      r.commands[0].position = Rig::counts(in * amplitude_rad * std::sin(w * t));
+      r.commands[0].velocity_offset = Rig::counts(in * 8.0 * std::cos(w * t));
+      r.cycle();
+      quiet(r);
+    }
+    EXPECT_GT(std::abs(r.joints[0].v) + std::abs(w * r.joints[0].q), 5.0) << "it moves";
+  }
+}
+
+TEST_F(Guard, DoesNotWatchOscillationWhereTheLimitIsZero) {
+  rig.joints[0].link_inertia = 0.2;
+  rig.start();
+  rig.enable();
+  for (const std::uint8_t sub : std::initializer_list<std::uint8_t>{1, 3}) {
+    ASSERT_EQ(rig.write(0x2020, sub, rig.object<float>(0x2020, sub) * 1000.0F), 0U);
+  }
+  rig.commands[0].torque_offset = 10;
+  rig.cycles(1000);
+  EXPECT_EQ(rig.error(), 0);
+}
+
 TEST_F(Guard, DoesNotBumpTheJointWhenAFaultIsResetAndTheDriveEnabledAgain) {
   rig.joints[0].link_inertia = 0.5;
   rig.joints[0].load_Nm = -8.0;
