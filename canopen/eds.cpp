@@ -91,6 +91,7 @@ constexpr std::array kNames{
     ObjectName{0x6077, "Torque actual value"},
     ObjectName{0x607A, "Target position"},
     ObjectName{0x607D, "Software position limit", "Min position limit,Max position limit"},
+    ObjectName{0x6087, "Torque slope"},
     ObjectName{0x608F, "Position encoder resolution", "Encoder increments,Motor revolutions"},
     ObjectName{0x60B1, "Velocity offset"},
     ObjectName{0x60B2, "Torque offset"},

@@ -85,6 +85,7 @@ inline constexpr std::uint16_t kTorque = 0x6077;                 // i16 [per mil
 inline constexpr std::uint16_t kTargetPosition = 0x607A;         // i32 [link counts]
 inline constexpr std::uint16_t kSoftwareLimits = 0x607D;         // i32: 1 min, 2 max [link counts]
 inline constexpr std::uint16_t kQuickStopDeceleration = 0x6085;  // u32 [link counts/s^2]
+inline constexpr std::uint16_t kTorqueSlope = 0x6087;            // u32 [per mille of rated / s]
 inline constexpr std::uint16_t kEncoderResolution = 0x608F;      // u32: 1 counts, 2 per revolutions
 inline constexpr std::uint16_t kVelocityOffset = 0x60B1;         // i32 [link counts/s]
 inline constexpr std::uint16_t kTorqueOffset = 0x60B2;           // i16 [per mille of rated]

@@ -50,6 +50,8 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.max_position = clamp_round<std::int32_t>(c.max_position_rad * counts_per_rad);
   o.following_window = clamp_round<std::uint32_t>(setup.following_window_rad * counts_per_rad);
   o.rated_torque_mNm = std::max(1U, clamp_round<std::uint32_t>(setup.rated_torque_Nm * 1.0e3));
+  o.torque_slope =
+      std::max(1U, clamp_round<std::uint32_t>(c.torque_slope_Nm_s * 1.0e3 / setup.rated_torque_Nm));
   o.link_counts = clamp_round<std::uint32_t>(setup.link_counts_per_rev);
   o.motor_counts = clamp_round<std::uint32_t>(setup.motor_counts_per_rev);
   o.stiffness = real32(setup.stiffness_Nm_rad);
@@ -86,6 +88,7 @@ ControllerConfig AxisObjects::controller() const noexcept TANDEM_RT {
   const bool below = min_position == std::numeric_limits<std::int32_t>::min();
   const bool above = max_position == std::numeric_limits<std::int32_t>::max();
   const double torque_limit_Nm = limits[kTorqueLimit - 1];
+  const double slope_Nm_s = torque_slope * 1.0e-3 * rated_torque_Nm();
   return {.position = pid_of(gains[0]),
           .velocity = pid_of(gains[1]),
           .torque = pid_of(gains[2]),
@@ -98,6 +101,7 @@ ControllerConfig AxisObjects::controller() const noexcept TANDEM_RT {
           .voltage_limit_V = limits[kVoltageLimit - 1],
           .current_limit_A = limits[kCurrentLimit - 1],
           .torque_limit_Nm = std::min(torque_limit_Nm, max_torque * 1.0e-3 * rated_torque_Nm()),
+          .torque_slope_Nm_s = torque_slope == kNoTorqueSlope ? kInfinity : slope_Nm_s,
           .velocity_limit_rad_s = limits[kVelocityLimit - 1],
           .min_position_rad = below ? -kInfinity : min_position * rad_per_count(),
           .max_position_rad = above ? kInfinity : max_position * rad_per_count(),
@@ -132,6 +136,7 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          od.add(at(co::kFollowingErrorTimeout), 0, following_timeout_ms, kReadWrite, {}, &owner) &&
          od.add(at(co::kMaxTorque), 0, max_torque, kReadWrite, {}, &owner) &&
          od.add(at(co::kRatedTorque), 0, rated_torque_mNm, kReadWrite, {1, 4294967295.0}, &owner) &&
+         od.add(at(co::kTorqueSlope), 0, torque_slope, kReadWrite, {1, 4294967295.0}, &owner) &&
          od.add_value<std::uint8_t>(at(co::kSoftwareLimits), 0, 2) &&
          od.add(at(co::kSoftwareLimits), 1, min_position, kReadWrite, {}, &owner) &&
          od.add(at(co::kSoftwareLimits), 2, max_position, kReadWrite, {}, &owner) &&

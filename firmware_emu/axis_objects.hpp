@@ -50,7 +50,10 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 107;
+inline constexpr std::size_t kAxisEntries = 108;
+
+/// 6087: the torque reference may change as it likes.
+inline constexpr std::uint32_t kNoTorqueSlope = std::numeric_limits<std::uint32_t>::max();
 
 /// Plain variables behind the dictionary, the widest first: no padding. Units as in
 /// canopen/objects.hpp.
@@ -68,6 +71,7 @@ struct AxisObjects {
   std::int32_t max_position = std::numeric_limits<std::int32_t>::max();
   std::uint32_t following_window = 0;
   std::uint32_t rated_torque_mNm = 1000;
+  std::uint32_t torque_slope = kNoTorqueSlope;  ///< [per mille of rated / s]
   std::uint32_t link_counts = 1;
   std::uint32_t motor_counts = 1;
   std::uint32_t refused_values = 0;

@@ -83,6 +83,7 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
   if (!(axis.rated_torque_Nm >= 1.0e-3) || !std::isfinite(axis.rated_torque_Nm)) {
     return bad(key, "the rated torque is below 1 mNm");
   }
+  if (!(c.torque_slope_Nm_s > 0.0)) return bad(key, "the torque's slope is not positive");
   if (!(c.min_position_rad < c.max_position_rad)) return bad(key, "position limits are inverted");
   if (!std::isfinite(axis.temperature_limit_C)) return bad(key, "no temperature limit");
   return {};

@@ -172,13 +172,21 @@ void JointController::cascade(const Reference& reference, const Measurement& mea
         outer.loop->seed(*outer.config, held_Nm - outer.feedforward_Nm) + outer.feedforward_Nm;
   }
   double torque_Nm = outer.torque_Nm;
-  terms_.torque_saturation = static_cast<std::int32_t>(
-      saturate(torque_Nm, -config_.torque_limit_Nm, config_.torque_limit_Nm));
+  terms_.torque_saturation = static_cast<std::int32_t>(limit_torque(torque_Nm, held_Nm));
   terms_.torque_reference_Nm = torque_Nm;
   step.torque_error_Nm = torque_Nm - measured.torque_Nm;
   step.voltage_V = config_.torque_to_voltage_V_Nm * torque_Nm +
                    config_.emf_compensation_Vs_rad * measured.motor_velocity_rad_s +
                    torque_.apply(config_.torque, step.torque_error_Nm, -measured.torque_rate_Nm_s);
+}
+
+// First the slope, then the limit: a limit that is lowered is obeyed at once.
+Saturation JointController::limit_torque(double& torque_Nm, double last_Nm) const noexcept {
+  const double step_Nm = config_.torque_slope_Nm_s * period_s_;
+  const Saturation slope = saturate(torque_Nm, last_Nm - step_Nm, last_Nm + step_Nm);
+  const Saturation limit =
+      saturate(torque_Nm, -config_.torque_limit_Nm, config_.torque_limit_Nm);
+  return limit != Saturation::kNone ? limit : slope;
 }
 
 void JointController::current_loop(double current_A, const Measurement& measured,

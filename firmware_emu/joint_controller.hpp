@@ -31,7 +31,9 @@ struct ControllerConfig {
   double voltage_limit_V = 0.0;
   double current_limit_A = 0.0;
   double torque_limit_Nm = 0.0;
-  double velocity_limit_rad_s = 0.0;  ///< of velocity references; 0: none
+  /// By how much the torque reference may change: the limit of its rate.
+  double torque_slope_Nm_s = std::numeric_limits<double>::infinity();
+  double velocity_limit_rad_s = 0.0;     ///< of velocity references; 0: none
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
   double transfer_time_s = 0.02;  ///< in which the voltage step of a mode change decays
@@ -83,7 +85,7 @@ class JointController {
     double held_position_rad = 0.0;       ///< kHold's, and the integrated one of -4
     double last_position_rad = 0.0;       ///< reference of position control; first: measured
     std::int32_t voltage_saturation = 0;  ///< Saturation, by the voltage or current limit
-    std::int32_t torque_saturation = 0;   ///< Saturation, by the torque limit
+    std::int32_t torque_saturation = 0;   ///< Saturation, by the torque's limit or slope
     std::int64_t reference_limited = 0;   ///< 1: position or velocity reference was cut
   };
 
@@ -147,6 +149,7 @@ class JointController {
   void cascade(const Reference& reference, const Measurement& measured, bool change,
                Step& step) noexcept;
   void current_loop(double current_A, const Measurement& measured, Step& step) noexcept;
+  [[nodiscard]] Saturation limit_torque(double& torque_Nm, double last_Nm) const noexcept;
   [[nodiscard]] Saturation limit_voltage(double& voltage_V,
                                          const Measurement& measured) const noexcept;
   void integrate(const Step& step, Saturation voltage_cut) noexcept;

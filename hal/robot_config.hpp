@@ -125,6 +125,7 @@ struct JointConfig {
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double rated_torque_Nm = 0.0;               ///< CiA 402 6076: torques travel as per mille of it;
                                               ///< default: max_torque_Nm
+  std::optional<double> max_torque_rate_Nm_s;  ///< of the torque reference; see torque_rate_Nm_s()
   double encoder_counts_per_rev = 0.0;        ///< link encoder
   double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
   double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
@@ -136,6 +137,9 @@ struct JointConfig {
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                                      ///< in the TOML, for messages
 };
+
+/// max_torque_rate_Nm_s, or without one max_torque_Nm in a millisecond.
+[[nodiscard]] double torque_rate_Nm_s(const JointConfig& joint) noexcept;
 
 /// max_oscillation in torque, object 2039:1 [Nm]: of max_torque_Nm, or of what the current limit
 /// gives where that is less.

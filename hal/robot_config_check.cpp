@@ -279,7 +279,21 @@ class Completion : private Check {
             "max_torque_Nm is more than 32 times the rated torque, the most the wire can say",
             "raise rated_torque_Nm");
     }
+    check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
     check_gains(joint);
+  }
+
+  /// Slower than the full torque in a second nothing can be controlled, and 6087 has 32 bits.
+  void check_torque_rate(const JointConfig& joint, const std::string& key) {
+    if (!joint.max_torque_rate_Nm_s) return;
+    const double most = 4.0e6 * joint.rated_torque_Nm;
+    if (*joint.max_torque_rate_Nm_s < joint.max_torque_Nm) {
+      error(joint.line, key, "the joint would need more than a second to its max_torque_Nm",
+            "at least " + std::to_string(joint.max_torque_Nm));
+    } else if (*joint.max_torque_rate_Nm_s > most) {
+      error(joint.line, key, "is more than the wire can say",
+            "at most " + std::to_string(most) + ", 4e6 times the rated torque");
+    }
   }
 
   /// One message for each loop of a table, however many joints have it.

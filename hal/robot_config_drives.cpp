@@ -82,6 +82,11 @@ std::string actuator_problem(const ActuatorConfig& a) {
   return {};
 }
 
+double torque_rate_Nm_s(const JointConfig& joint) noexcept {
+  constexpr double kFullTorques_s = 1000.0;
+  return joint.max_torque_rate_Nm_s.value_or(kFullTorques_s * joint.max_torque_Nm);
+}
+
 double oscillation_limit_Nm(const JointConfig& joint, const ActuatorConfig& actuator) {
   const double most_Nm =
       actuator.gear_ratio * actuator.torque_constant_Nm_A * actuator.current_limit_A;

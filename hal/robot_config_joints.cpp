@@ -28,6 +28,9 @@ void read_limits(TomlTable& table, JointConfig& joint) {
                 "give both, or the acceleration alone");
   }
   joint.rated_torque_Nm = table.number_or("rated_torque_Nm", kUnset, kPositive);
+  if (table.has("max_torque_rate_Nm_s")) {
+    joint.max_torque_rate_Nm_s = table.number("max_torque_rate_Nm_s", kPositive);
+  }
 }
 
 /// What joints may have in common.

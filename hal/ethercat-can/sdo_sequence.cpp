@@ -79,6 +79,8 @@ void add_scales(AxisSteps& add, const JointConfig& joint) {
   add(object::kMotorResolution, 0, clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev));
   add(object::kRatedTorque, 0, clamp_round<std::uint32_t>(1000.0 * rated_Nm));
   add(object::kMaxTorque, 0, clamp_round<std::uint16_t>(1000.0 * joint.max_torque_Nm / rated_Nm));
+  add(object::kTorqueSlope, 0,
+      std::max(1U, clamp_round<std::uint32_t>(1000.0 * torque_rate_Nm_s(joint) / rated_Nm)));
   // By way of "no upper limit", so that no order of old and new limits is refused.
   add(object::kSoftwareLimits, 2, std::numeric_limits<std::int32_t>::max());
   add(object::kSoftwareLimits, 1,

@@ -59,6 +59,7 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   c.voltage_limit_V = actuator.voltage_limit_V;
   c.current_limit_A = actuator.current_limit_A;
   c.torque_limit_Nm = joint.max_torque_Nm;
+  c.torque_slope_Nm_s = hal::torque_rate_Nm_s(joint);
   c.velocity_limit_rad_s = joint.max_velocity_rad_s;
   c.min_position_rad = joint.min_position_rad;
   c.max_position_rad = joint.max_position_rad;

@@ -324,5 +324,52 @@ TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
   EXPECT_NEAR(controller.terms().position_error_rad, -0.05, 1.0e-15);
 }
 
+TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) {
+  for (const Mode mode : {Mode::kCsp, Mode::kCsv, Mode::kCst, Mode::kImpedance,
+                          Mode::kVelocityImpedance}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    ControllerConfig c = config();
+    c.torque_slope_Nm_s = 5000.0;
+    JointController controller = settled(c, mode, measured(), reference());
+    double last = controller.terms().torque_reference_Nm;
+    double most = 0.0;
+    for (int k = 0; k < 60; ++k) {
+      Reference step = reference();
+      const double side = k / 20 % 2 == 0 ? 1.0 : -1.0;
+      step.position_rad = side;
+      step.velocity_rad_s = 5.0 * side;
+      step.torque_Nm = 100.0 * side;
+      controller.update(Action::kFollow, mode, step, measured());
+      const double now = controller.terms().torque_reference_Nm;
+      most = std::max(most, std::abs(now - last));
+      if (k == 20) {
+        EXPECT_TRUE(controller.limited()) << "statusword bit 11";
+      }
+      last = now;
+    }
+    EXPECT_NEAR(most, 5.0, 1.0e-9);
+    EXPECT_NEAR(last, 60.0, 1.0e-9) << "it gets there";
+  }
+}
+
+TEST(JointController, DelaysNeitherBrakeNorOpenBridgeNorALoweredLimitByTheSlope) {
+  ControllerConfig c = config();
+  c.torque_slope_Nm_s = 10.0;
+  Reference full = reference();
+  full.torque_Nm = 60.0;
+  JointController controller = settled(config(), Mode::kCst, measured(), full);
+  ASSERT_EQ(controller.terms().torque_reference_Nm, 60.0);
+  controller.configure(c, kDt);
+  c.torque_limit_Nm = 20.0;
+  controller.configure(c, kDt);
+  controller.update(Action::kFollow, Mode::kCst, full, measured());
+  EXPECT_EQ(controller.terms().torque_reference_Nm, 20.0);
+  controller.update(Action::kFollow, Mode::kCst, full, measured());
+  JointController braking = controller;
+  braking.update(Action::kBrake, Mode::kCst, full, measured());
+  EXPECT_EQ(braking.update(Action::kBrake, Mode::kCst, full, measured()), 0.0);
+  EXPECT_EQ(controller.update(Action::kOff, Mode::kCst, full, measured()), 0.0);
+}
+
 }  // namespace
 }  // namespace tandem::firmware

@@ -226,5 +226,20 @@ TEST_F(Completed, RefusesAPostureBeyondTheLimits) {
   EXPECT_NE(errors.find("posture.home.knee: is beyond the joint's limits"), std::string::npos);
 }
 
+TEST_F(Completed, RefusesATorqueRateThatControlsNothingOrThatTheWireCannotSay) {
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nmax_torque_rate_Nm_s = 79"));
+  EXPECT_NE(errors.find("max_torque_rate_Nm_s: the joint would need more than a second"),
+            std::string::npos)
+      << errors;
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nmax_torque_rate_Nm_s = 1e9"));
+  EXPECT_NE(errors.find("max_torque_rate_Nm_s: is more than the wire can say"), std::string::npos)
+      << errors;
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nmax_torque_rate_Nm_s = 80"));
+  EXPECT_EQ(errors, "");
+  EXPECT_EQ(torque_rate_Nm_s(robot.joints[1]), 80.0);
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80"));
+  EXPECT_EQ(torque_rate_Nm_s(robot.joints[1]), 80'000.0) << "all of it in a millisecond";
+}
+
 }  // namespace
 }  // namespace tandem::hal
