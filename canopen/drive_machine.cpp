@@ -77,6 +77,7 @@ DriveState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
   } else {
     follow(word, inputs, options);
   }
+  command_brake(inputs, options);
   last_reset_bit_ = (word & kFaultReset) != 0;
   compose_statusword(inputs);
   return state_;
@@ -101,14 +102,18 @@ void DriveMachine::follow(std::uint16_t word, const DriveInputs& inputs,
         enter(DriveState::kSwitchOnDisabled);  // 10
       } else if (shuts_down(word)) {
         enter(DriveState::kReadyToSwitchOn);  // 6
-      } else if (enables(word)) {
+      } else if (!enables(word)) {
+        motion_ = DriveMotion::kNone;
+      } else if (!inputs.has_brake || (!brake_set_ && inputs.brake_moved)) {
         enter(DriveState::kOperationEnabled);  // 4
+      } else {
+        motion_ = DriveMotion::kSlowDown;  // holds while the brake opens
       }
       break;
     case DriveState::kOperationEnabled: from_enabled(word, inputs, options); break;
     case DriveState::kQuickStopActive: from_quick_stop(word, inputs, options); break;
     case DriveState::kFaultReactionActive:
-      if (motion_ == DriveMotion::kNone || inputs.at_rest) enter(DriveState::kFault);  // 14
+      if (motion_ == DriveMotion::kNone || ramp_ended(inputs)) enter(DriveState::kFault);  // 14
       break;
     case DriveState::kFault:
       if ((word & kFaultReset) != 0 && !last_reset_bit_ && !inputs.fault) {
@@ -126,7 +131,7 @@ void DriveMachine::from_enabled(std::uint16_t word, const DriveInputs& inputs,
   } else if (quick_stops(word)) {
     quick_stop(options);  // 11
   } else if (after_ramp_ != DriveState::kOperationEnabled) {
-    if (inputs.at_rest) enter(after_ramp_);  // 5 or 8 ends
+    if (ramp_ended(inputs)) enter(after_ramp_);  // 5 or 8 ends
   } else if (shuts_down(word)) {
     slow_down_to(DriveState::kReadyToSwitchOn, options.shutdown);  // 8
   } else if (disables_operation(word)) {
@@ -141,10 +146,27 @@ void DriveMachine::from_enabled(std::uint16_t word, const DriveInputs& inputs,
 void DriveMachine::from_quick_stop(std::uint16_t word, const DriveInputs& inputs,
                                    const DriveOptions& options) noexcept {
   const bool stays = options.quick_stop >= 5;
-  if (disables_voltage(word) || (!stays && inputs.at_rest)) {
+  if (disables_voltage(word) || (!stays && ramp_ended(inputs))) {
     enter(DriveState::kSwitchOnDisabled);  // 12
   } else if (stays && enables(word)) {
     enter(DriveState::kOperationEnabled);  // 16
+  }
+}
+
+bool DriveMachine::ramp_ended(const DriveInputs& inputs) const noexcept {
+  return inputs.has_brake ? brake_set_ && inputs.brake_moved : inputs.at_rest;
+}
+
+void DriveMachine::command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept {
+  const bool ramp = state_ == DriveState::kFaultReactionActive ||
+                    (state_ == DriveState::kQuickStopActive && options.quick_stop < 5) ||
+                    after_ramp_ != DriveState::kOperationEnabled;
+  if (motion_ == DriveMotion::kNone) {
+    brake_set_ = true;
+  } else if (!ramp) {
+    brake_set_ = false;
+  } else if (inputs.at_rest) {
+    brake_set_ = true;
   }
 }
 
@@ -211,7 +233,7 @@ void DriveMachine::compose_statusword(const DriveInputs& inputs) noexcept {
 }
 
 void DriveMachine::archive(Archive& ar) {
-  ar(state_, after_ramp_, motion_, last_reset_bit_, fault_was_reset_, statusword_);
+  ar(state_, after_ramp_, motion_, last_reset_bit_, fault_was_reset_, brake_set_, statusword_);
 }
 
 }  // namespace tandem::canopen

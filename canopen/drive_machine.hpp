@@ -58,9 +58,16 @@ struct DriveInputs {
   bool follows_command = false;  ///< statusword bit 12, shown in Operation Enabled
   bool following_error = false;  ///< statusword bit 13
   bool warning = false;          ///< statusword bit 7
+  bool has_brake = false;        ///< the motor has a brake
+  bool brake_moved = true;       ///< it has had the time that it needs to obey brake_set()
 };
 
 /// The drive's side: transitions 0 to 16, at most one per step.
+///
+/// A brake delays two of them. Enabling (4) holds the axis in Switched On, its bridge closed, until
+/// the brake is open. A ramp that ends in an open bridge sets the brake when the axis is at rest,
+/// and the bridge stays closed until the brake holds. What opens the bridge at once is not delayed:
+/// it sets the brake in the same step.
 class DriveMachine {
  public:
   /// Takes the controlword in force, makes the transition that it or the inputs ask for.
@@ -72,6 +79,8 @@ class DriveMachine {
 
   [[nodiscard]] DriveState state() const noexcept { return state_; }
   [[nodiscard]] DriveMotion motion() const noexcept { return motion_; }
+  /// Whether the brake is to hold: its coil has no current.
+  [[nodiscard]] bool brake_set() const noexcept { return brake_set_; }
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   /// True in the step that left Fault by a reset.
   [[nodiscard]] bool fault_was_reset() const noexcept { return fault_was_reset_; }
@@ -90,6 +99,8 @@ class DriveMachine {
   void quick_stop(const DriveOptions& options) noexcept;
   void slow_down_to(DriveState state, std::int16_t option) noexcept;
   void enter(DriveState state) noexcept;
+  [[nodiscard]] bool ramp_ended(const DriveInputs& inputs) const noexcept;
+  void command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept;
   void compose_statusword(const DriveInputs& inputs) noexcept;
 
   DriveState state_ = DriveState::kNotReadyToSwitchOn;
@@ -97,6 +108,7 @@ class DriveMachine {
   DriveMotion motion_ = DriveMotion::kNone;
   bool last_reset_bit_ = true;  ///< a bit that is set from the beginning is no edge
   bool fault_was_reset_ = false;
+  bool brake_set_ = true;
   std::uint16_t statusword_ = 0;
 };
 

@@ -63,6 +63,7 @@ constexpr std::array kNames{
     ObjectName{0x2037, "Position margin"},
     ObjectName{0x2038, "Sensor mismatch", "Window,Time"},
     ObjectName{0x2039, "Oscillation", "Limit,Time"},
+    ObjectName{0x203A, "Brake", "Fitted,Release time,Engage time"},
     ObjectName{0x2040, "Telemetry",
                "Torque reference,Transfer voltage,Position integral,Velocity integral,"
                "Torque integral,Current integral,I2t load,Oscillation load"},
@@ -96,6 +97,8 @@ constexpr std::array kNames{
     ObjectName{0x60B1, "Velocity offset"},
     ObjectName{0x60B2, "Torque offset"},
     ObjectName{0x60F4, "Following error actual value"},
+    ObjectName{0x60FD, "Digital inputs"},
+    ObjectName{0x60FE, "Digital outputs", "Physical outputs"},
     ObjectName{0x60FF, "Target velocity"},
     ObjectName{0x6502, "Supported drive modes"},
 };

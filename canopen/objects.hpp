@@ -92,6 +92,7 @@ inline constexpr std::uint16_t kTorqueOffset = 0x60B2;           // i16 [per mil
 inline constexpr std::uint16_t kInterpolationPeriod = 0x60C2;    // u8 units, i8 power of ten [s]
 inline constexpr std::uint16_t kFollowingError = 0x60F4;         // i32 [link counts]
 inline constexpr std::uint16_t kDigitalInputs = 0x60FD;          // u32: digital_input
+inline constexpr std::uint16_t kDigitalOutputs = 0x60FE;         // u32: 1 digital_output
 inline constexpr std::uint16_t kTargetVelocity = 0x60FF;         // i32 [link counts/s]
 inline constexpr std::uint16_t kSupportedModes = 0x6502;         // u32
 
@@ -118,6 +119,7 @@ inline constexpr std::uint16_t kCommandTimeout = 0x2032;    // u16 [SYNCs], 0: n
 inline constexpr std::uint16_t kMotorResolution = 0x2033;   // u32 [motor counts per link rev]
 inline constexpr std::uint16_t kTemperatureLimit = 0x2034;  // i16 [0.1 degC]
 inline constexpr std::uint16_t kOscillation = 0x2039;       // f32: OscillationSub
+inline constexpr std::uint16_t kBrake = 0x203A;             // u16: BrakeSub
 
 // The manufacturer's, of a board
 inline constexpr std::uint16_t kCycleCounter = 0x2051;  // u8: by RPDO, echoed by TPDO
@@ -163,6 +165,12 @@ enum I2tSub : std::uint8_t {
 enum OscillationSub : std::uint8_t {
   kOscillationLimit = 1,  ///< [Nm] RMS of the motor torque's fast part; 0: not watched
   kOscillationTime,       ///< [s] over which the mean is taken
+};
+/// Sub-indices of object::kBrake.
+enum BrakeSub : std::uint8_t {
+  kBrakeFitted = 1,  ///< 1: the motor has a spring-applied brake; 0: none
+  kBrakeRelease,     ///< [ms] from its coil's current until it is open
+  kBrakeEngage,      ///< [ms] from the current's end until it holds
 };
 /// Sub-indices of object::kIdentity.
 enum IdentitySub : std::uint8_t { kVendor = 1, kProduct, kRevision, kSerial };
@@ -226,6 +234,11 @@ inline constexpr std::uint16_t kFollowingError = 1u << 13;  ///< CSP
 namespace digital_input {
 inline constexpr std::uint32_t kInterlock = 1u << 3;  ///< the emergency stop's
 }  // namespace digital_input
+
+/// Bits of the digital outputs (60FE:1).
+namespace digital_output {
+inline constexpr std::uint32_t kSetBrake = 1u << 0;  ///< the brake's coil has no current
+}  // namespace digital_output
 
 /// Emergency and drive error codes (EMCY, 1003, 603F): CiA 301 and 402.
 enum class ErrorCode : std::uint16_t {

@@ -12,6 +12,7 @@ using namespace canopen;
 
 constexpr double kRestVelocity_rad_s = 0.05;  // of the motor, reflected to the link
 constexpr double kRestTime_s = 0.02;
+constexpr double kSlower_rad_s = 0.01;  // what counts as having become slower
 
 bool supported(std::int8_t mode) noexcept {
   return (mode >= -4 && mode <= 0) || (mode >= 8 && mode <= 10);
@@ -43,6 +44,9 @@ void Axis::power_on() noexcept TANDEM_RT {
   mode_ = Mode::kNone;
   stopping_s_ = 0.0;
   resting_s_ = 0.0;
+  slowest_rad_s_ = 0.0;
+  stalled_s_ = 0.0;
+  brake_periods_ = 0;
   apply_settings();
   take_demands();
 }
@@ -175,16 +179,20 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   const ErrorCode cause = present_cause(connection);
   watch_stop();
   const DriveState before = machine_.state();
+  const bool brake_was_set = machine_.brake_set();
   const DriveState now = machine_.step(
       objects_.controlword,
       {.fault = cause != ErrorCode::kNone,
-       .at_rest = resting_s_ >= kRestTime_s || stopping_s_ >= objects_.stop_time_s,
+       .at_rest = stopped(),
        .internal_limit = controller_.limited(),
        .follows_command = mode_ != Mode::kNone,
        .following_error = protection_.lagging(),
-       .warning = protection_.warning(protection_config_)},
+       .warning = protection_.warning(protection_config_),
+       .has_brake = has_brake(),
+       .brake_moved = brake_moved()},
       objects_.options);
   objects_.statusword = machine_.statusword();
+  watch_brake(brake_was_set);
 
   AxisEvents events;
   if (now == DriveState::kFaultReactionActive && before != now) {
@@ -212,6 +220,30 @@ void Axis::watch_stop() noexcept {
   const bool rests = std::abs(measured_.motor_velocity_rad_s) < kRestVelocity_rad_s;
   stopping_s_ = stops ? stopping_s_ + period_s_ : 0.0;
   resting_s_ = stops && rests ? resting_s_ + period_s_ : 0.0;
+  const double speed = std::abs(measured_.motor_velocity_rad_s);
+  const bool slower = stopping_s_ <= period_s_ || speed < slowest_rad_s_ - kSlower_rad_s;
+  if (slower) slowest_rad_s_ = speed;
+  stalled_s_ = stops && !slower ? stalled_s_ + period_s_ : 0.0;
+}
+
+// Gravity keeps a shorted motor turning: a brake need not wait for a rest that does not come.
+bool Axis::stopped() const noexcept {
+  return resting_s_ >= kRestTime_s || stopping_s_ >= objects_.stop_time_s ||
+         (has_brake() && stalled_s_ >= kRestTime_s);
+}
+
+bool Axis::brake_moved() const noexcept {
+  const std::size_t sub = machine_.brake_set() ? canopen::kBrakeEngage : canopen::kBrakeRelease;
+  constexpr double kRounding = 1.0e-6;  // a time of whole periods takes no more of them
+  const double periods = objects_.brake[sub - 1] * 1.0e-3 / period_s_;
+  return static_cast<double>(brake_periods_) >= periods - kRounding;
+}
+
+void Axis::watch_brake(bool was_set) noexcept {
+  const bool set = machine_.brake_set();
+  brake_periods_ = set == was_set ? brake_periods_ + 1 : 1;
+  const bool shown = set && has_brake();
+  objects_.digital_outputs = shown ? canopen::digital_output::kSetBrake : 0;
 }
 
 Action Axis::action() const noexcept {
@@ -245,7 +277,9 @@ AxisDrive Axis::control() noexcept TANDEM_RT {
   const Action doing = action();
   const double voltage_V = controller_.update(doing, mode_, reference(), measured_);
   show_controller();
-  return {.voltage_V = voltage_V, .enabled = doing != Action::kOff};
+  return {.voltage_V = voltage_V,
+          .enabled = doing != Action::kOff,
+          .brake_open = !machine_.brake_set()};
 }
 
 void Axis::show_controller() noexcept {
@@ -274,6 +308,7 @@ AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexc
     case canopen::object::kEncoderResolution:
     case canopen::object::kMotorResolution:
     case canopen::object::kRatedTorque:  // they give every position and torque its meaning
+    case canopen::object::kBrake:
       return powered() ? AbortCode::kDeviceState : AbortCode::kNone;
     default: return AbortCode::kNone;
   }
@@ -304,7 +339,8 @@ void Axis::archive(Archive& ar) {
   settings_changed_ = changed;
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
-     damping_Nms_rad_, stopping_s_, resting_s_, mode_, sensors_valid_);
+     damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_,
+     brake_periods_, mode_, sensors_valid_);
 }
 
 }  // namespace tandem::firmware

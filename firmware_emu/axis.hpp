@@ -60,6 +60,13 @@ class Axis final : private canopen::ObjectOwner {
   void take_demands() noexcept;
   void seed_references() noexcept;
   void watch_stop() noexcept;
+  [[nodiscard]] bool stopped() const noexcept;
+  [[nodiscard]] bool has_brake() const noexcept {
+    return objects_.brake[canopen::kBrakeFitted - 1] != 0;
+  }
+  /// Whether the brake has had the time that its last command takes.
+  [[nodiscard]] bool brake_moved() const noexcept;
+  void watch_brake(bool was_set) noexcept;
   [[nodiscard]] canopen::ErrorCode present_cause(canopen::ErrorCode connection) noexcept;
   /// By how much motor angle, link angle and the spring's torque contradict each other.
   [[nodiscard]] double mismatch_rad() const noexcept;
@@ -88,6 +95,9 @@ class Axis final : private canopen::ObjectOwner {
   double damping_Nms_rad_ = 0.0;
   double stopping_s_ = 0.0;        ///< since the stop in progress began
   double resting_s_ = 0.0;         ///< since the motor came to rest in it
+  double slowest_rad_s_ = 0.0;     ///< of the motor, in it
+  double stalled_s_ = 0.0;         ///< since it last became slower
+  std::int64_t brake_periods_ = 0;  ///< since the brake's command changed
   canopen::Mode mode_ = canopen::Mode::kNone;
   bool sensors_valid_ = true;
   bool settings_changed_ = false;

@@ -15,6 +15,7 @@ namespace co = canopen::object;
 namespace own = firmware::object;
 
 constexpr ObjectRange kNotNegative{0.0, 3.0e38};
+constexpr double kLongestBrake_ms = 10'000.0;
 
 /// CSP, CSV and CST are bits 7 to 9 of 6502; the manufacturer's modes -1 to -4 bits 16 to 19.
 constexpr std::uint32_t kModes = 0x7U << 7 | 0xFU << 16;
@@ -72,6 +73,8 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.stop_time_s = real32(setup.stop_time_s);
   o.position_margin_rad = real32(setup.position_margin_rad);
   o.following_timeout_ms = clamp_round<std::uint16_t>(setup.following_timeout_s * 1.0e3);
+  o.brake = {static_cast<std::uint16_t>(setup.brake ? 1 : 0), setup.brake_release_ms,
+             setup.brake_engage_ms};
   o.max_torque = std::numeric_limits<std::uint16_t>::max();
   o.command_timeout = clamp_round<std::uint16_t>(command_timeout_syncs);
   o.temperature_limit = clamp_round<std::int16_t>(setup.temperature_limit_C * 10.0);
@@ -149,6 +152,10 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          add_array(od, at(co::kI2t), i2t, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(own::kMismatch), mismatch, kReadWrite, kNotNegative, &owner) &&
          add_array(od, at(co::kOscillation), oscillation, kReadWrite, kNotNegative, &owner) &&
+         od.add_value<std::uint8_t>(at(co::kBrake), 0, 3) &&
+         od.add(at(co::kBrake), kBrakeFitted, brake[0], kReadWrite, {0, 1}, &owner) &&
+         od.add(at(co::kBrake), kBrakeRelease, brake[1], kReadWrite, {0, kLongestBrake_ms}, &owner) &&
+         od.add(at(co::kBrake), kBrakeEngage, brake[2], kReadWrite, {0, kLongestBrake_ms}, &owner) &&
          od.add(at(co::kCommandTimeout), 0, command_timeout, kReadWrite) &&
          od.add(at(co::kTemperatureLimit), 0, temperature_limit, kReadWrite, {}, &owner) &&
          od.add(at(own::kUndervoltage), 0, undervoltage_V, kReadWrite, kNotNegative, &owner) &&
@@ -163,6 +170,8 @@ bool AxisObjects::add_actual(ObjectDictionary& od, int axis) {
          od.add(at(co::kTorque), 0, torque, kReadTpdo) &&
          od.add(at(co::kFollowingError), 0, following_error, kReadTpdo) &&
          od.add(at(co::kDigitalInputs), 0, digital_inputs, kReadTpdo) &&
+         od.add_value<std::uint8_t>(at(co::kDigitalOutputs), 0, 1) &&
+         od.add(at(co::kDigitalOutputs), 1, digital_outputs, kReadTpdo) &&
          od.add(at(co::kMotorPosition), 0, motor_position, kReadTpdo) &&
          od.add(at(co::kMotorVelocity), 0, motor_velocity, kReadTpdo) &&
          od.add(at(co::kCurrent), 0, current, kReadTpdo) &&

@@ -50,7 +50,7 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 108;
+inline constexpr std::size_t kAxisEntries = 114;
 
 /// 6087: the torque reference may change as it likes.
 inline constexpr std::uint32_t kNoTorqueSlope = std::numeric_limits<std::uint32_t>::max();
@@ -76,6 +76,7 @@ struct AxisObjects {
   std::uint32_t motor_counts = 1;
   std::uint32_t refused_values = 0;
   std::uint32_t digital_inputs = 0;
+  std::uint32_t digital_outputs = 0;
   float stiffness = 0.0F;
   float damping = 0.0F;
   std::array<std::array<float, 4>, 4> gains{};  ///< position, velocity, torque, current; PidSub
@@ -96,6 +97,7 @@ struct AxisObjects {
   std::uint16_t controlword = 0;
   std::uint16_t statusword = 0;
   std::uint16_t following_timeout_ms = 0;
+  std::array<std::uint16_t, 3> brake{};  ///< BrakeSub
   std::uint16_t max_torque = 0;  ///< [per mille of rated]
   std::int16_t torque = 0;
   std::int16_t target_torque = 0;
@@ -113,7 +115,7 @@ struct AxisObjects {
   std::int8_t mode = 0;
   std::int8_t mode_display = 0;
   std::uint8_t position_feedback = 0;
-  std::array<std::uint8_t, 3> reserved{};  ///< no padding in a snapshot
+  std::array<std::uint8_t, 1> reserved{};  ///< no padding in a snapshot
 
   /// Power-on values.
   [[nodiscard]] static AxisObjects from(const AxisSetup& setup, int command_timeout_syncs);

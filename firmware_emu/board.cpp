@@ -258,7 +258,7 @@ void Board::archive(Archive& ar) {
   for (const auto& axis : axes_) axis->archive(ar);
   ar(commands_, ignored_frames_, cycle_counter_, until_control_ns_, since_sync_ns_, offline_,
      heartbeat_lost_, sync_pending_);
-  for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled);
+  for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled, drive.brake_open);
   archive_outbox(ar, outbox_, kOutboxFrames);
 }
 

@@ -27,6 +27,7 @@ struct AxisSense {
 struct AxisDrive {
   double voltage_V = 0.0;
   bool enabled = false;  ///< false: bridge open, no current whatever the back-EMF
+  bool brake_open = false;  ///< the brake's coil has current; without power it is set
 };
 
 /// Power-on values of one axis: its object dictionary starts with them.
@@ -54,6 +55,9 @@ struct AxisSetup {
   double mismatch_timeout_s = 0.01;        ///< 2038:2
   double oscillation_limit_Nm = 0.0;       ///< 2039:1; 0: not watched
   double oscillation_time_s = 1.0;         ///< 2039:2
+  bool brake = false;                      ///< 203A:1: the motor has a spring-applied brake
+  std::uint16_t brake_release_ms = 0;      ///< 203A:2
+  std::uint16_t brake_engage_ms = 0;       ///< 203A:3
   double stop_time_s = 1.0;                ///< 2036: longest stop until the bridge opens
 };
 

@@ -109,6 +109,13 @@ struct GainsConfig {
   double damping_Nms_rad = 0.0;
 };
 
+/// A joint's `brake`: a spring presses it on, current in its coil lifts it.
+struct BrakeConfig {
+  double torque_Nm = 0.0;  ///< that it holds; on the link's side of the gear, the motor's of a spring
+  int release_ms = 0;      ///< from the coil's current until it is open
+  int engage_ms = 0;       ///< from the current's end until it holds
+};
+
 /// [[joint]]
 struct JointConfig {
   std::string name;  ///< URDF joint
@@ -134,6 +141,7 @@ struct JointConfig {
   double max_oscillation = 0.35;     ///< RMS of the motor torque's fast part over the most that the
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
+  std::optional<BrakeConfig> brake;
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                                      ///< in the TOML, for messages
 };

@@ -33,6 +33,18 @@ void read_limits(TomlTable& table, JointConfig& joint) {
   }
 }
 
+std::optional<BrakeConfig> read_brake(TomlTable& table) {
+  if (!table.has("brake")) return {};
+  constexpr std::int64_t kLongest_ms = 10'000;
+  TomlTable brake = table.table("brake");
+  BrakeConfig b;
+  b.torque_Nm = brake.number("torque_Nm", kPositive);
+  b.release_ms = static_cast<int>(brake.integer("release_ms", 0, kLongest_ms));
+  b.engage_ms = static_cast<int>(brake.integer("engage_ms", 0, kLongest_ms));
+  brake.finish();
+  return b;
+}
+
 /// What joints may have in common.
 JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   JointConfig joint;
@@ -50,6 +62,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.max_oscillation = table.number_or("max_oscillation", joint.max_oscillation, {0.0, 10.0});
   joint.oscillation_time_s =
       table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
+  joint.brake = read_brake(table);
   joint.on_fault = read_stop_category(table);
   return joint;
 }

@@ -125,6 +125,10 @@ void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorCon
       clamp_round<std::uint16_t>(1000.0 * joint.following_timeout_s));
   add(object::kOscillation, kOscillationLimit, to_float(oscillation_limit_Nm(joint, motor)));
   add(object::kOscillation, kOscillationTime, to_float(joint.oscillation_time_s));
+  if (!joint.brake) return;
+  add(object::kBrake, kBrakeFitted, std::uint16_t{1});
+  add(object::kBrake, kBrakeRelease, static_cast<std::uint16_t>(joint.brake->release_ms));
+  add(object::kBrake, kBrakeEngage, static_cast<std::uint16_t>(joint.brake->engage_ms));
 }
 
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {

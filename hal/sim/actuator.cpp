@@ -85,6 +85,8 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   braked_.assign(n, 0);
   broken_.assign(n, 0);
   cooling_.assign(n, 1.0);
+  brakes_.resize(n);
+  brake_states_.resize(n);
   for (const ActuatorModel& model : models_) feeds_through_ |= model.order == 0;
 }
 
@@ -98,6 +100,62 @@ void Actuators::set_brake(std::size_t joint, bool engaged, double position_rad,
   braked_[joint] = engaged ? 1 : 0;
   brake_rad_[joint] = position_rad;
   brake_Nm_[joint] = load_Nm;
+}
+
+void Actuators::fit_brake(std::size_t joint, const hal::BrakeConfig& brake, double substep_s) {
+  const double J = models_[joint].inertia_kg_m2;
+  constexpr std::int64_t kNsPerMs = 1'000'000;
+  brakes_[joint] = {.torque_Nm = brake.torque_Nm,
+                    .stiffness_Nm_rad = J * (0.4 / substep_s) * (0.4 / substep_s),
+                    .damping_Nms_rad = 0.3 * J / substep_s,
+                    .release_ns = brake.release_ms * kNsPerMs,
+                    .engage_ns = brake.engage_ms * kNsPerMs};
+  brake_states_[joint] = {.closed = 1};
+  any_brake_ = true;
+}
+
+void Actuators::seat_brakes(const double* position_rad) noexcept {
+  for (std::size_t j = 0; j < brakes_.size(); ++j) brake_states_[j].anchor_rad = position_rad[j];
+}
+
+void Actuators::set_coil(std::size_t joint, bool current) noexcept TANDEM_RT {
+  BrakeState& state = brake_states_[joint];
+  const std::int64_t coil = current ? 1 : 0;
+  if (state.coil != coil) state.since_ns = 0;
+  state.coil = coil;
+}
+
+void Actuators::obey_coil(std::size_t joint, double position_rad) noexcept {
+  BrakeState& state = brake_states_[joint];
+  const Brake& brake = brakes_[joint];
+  if (state.coil != 0 && state.since_ns >= brake.release_ns) state.closed = 0;
+  if (state.coil != 0 || state.closed != 0 || state.since_ns < brake.engage_ns) return;
+  state.closed = 1;
+  state.anchor_rad = position_rad;
+}
+
+void Actuators::advance_brakes(std::int64_t step_ns, const double* position_rad) noexcept
+    TANDEM_RT {
+  if (!any_brake_) return;
+  for (std::size_t j = 0; j < brakes_.size(); ++j) {
+    const Brake& brake = brakes_[j];
+    if (!(brake.torque_Nm > 0.0)) continue;
+    BrakeState& state = brake_states_[j];
+    state.since_ns += step_ns;
+    obey_coil(j, position_rad[j]);
+    const double reach = brake.torque_Nm / brake.stiffness_Nm_rad;
+    state.anchor_rad = std::clamp(state.anchor_rad, position_rad[j] - reach, position_rad[j] + reach);
+  }
+}
+
+double Actuators::brake_torque(std::size_t joint, double position_rad,
+                               double velocity_rad_s) const noexcept {
+  const BrakeState& state = brake_states_[joint];
+  if (state.closed == 0) return 0.0;
+  const Brake& brake = brakes_[joint];
+  const double spring = clamp_to(
+      brake.stiffness_Nm_rad * (state.anchor_rad - position_rad), brake.torque_Nm);
+  return clamp_to(spring - brake.damping_Nms_rad * velocity_rad_s, brake.torque_Nm);
 }
 
 double Actuators::current(std::size_t joint, double velocity_rad_s) const noexcept {
@@ -127,7 +185,10 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
       rate.current_A[j] =
           (voltage_[j] - m.resistance_ohm * i - m.back_emf_Vs_rad * velocity) / m.inductance_H;
     }
-    const double drive = m.torque_per_A * i - m.friction_Nms_rad * velocity;
+    double drive = m.torque_per_A * i - m.friction_Nms_rad * velocity;
+    if (brake_states_[j].closed != 0) {
+      drive += brake_torque(j, m.elastic() ? motor.position_rad[j] : q[j], velocity);
+    }
     if (!m.elastic()) {
       rate.position_rad[j] = 0.0;
       rate.velocity_rad_s[j] = 0.0;

@@ -88,6 +88,26 @@ class Actuators {
                  double load_Nm) noexcept TANDEM_RT;
   [[nodiscard]] bool braked(std::size_t joint) const noexcept { return braked_[joint] != 0; }
 
+  /// Fits a motor brake: dry friction on the rotor that holds up to torque_Nm and slips above.
+  ///
+  ///   spring = cut(-k (th - a))        a: where the rotor stuck, dragged to fit the cut
+  ///   torque = cut(spring - d th')     cut: to +-torque_Nm
+  ///
+  /// with k = J (0.4 / h)^2 and d = 0.3 J / h for the sub-step `substep_s`, so that any joint stays
+  /// well inside what that can integrate. Inside the cut the anchor rests: it does not creep. Both
+  /// cuts are projections, so it only ever takes energy. Closed at first.
+  void fit_brake(std::size_t joint, const hal::BrakeConfig& brake, double substep_s);
+  /// Sets every brake's anchor to where its motor is. `position_rad` (n)
+  void seat_brakes(const double* position_rad) noexcept;
+  /// Current in the coil of the joint's brake, or none. It obeys after its time.
+  void set_coil(std::size_t joint, bool current) noexcept TANDEM_RT;
+  /// Whether the joint has a brake that presses on its rotor now.
+  [[nodiscard]] bool brake_closed(std::size_t joint) const noexcept {
+    return brake_states_[joint].closed != 0;
+  }
+  /// After a sub-step to motor positions `position_rad` (n): coils' times and anchors.
+  void advance_brakes(std::int64_t step_ns, const double* position_rad) noexcept TANDEM_RT;
+
   /// The series spring of `joint` parts, for good: nothing passes between motor and link any more.
   /// What the spring had stored is lost; energy does not appear. @pre the actuator is elastic
   void break_spring(std::size_t joint) noexcept TANDEM_RT { broken_[joint] = 1; }
@@ -114,16 +134,32 @@ class Actuators {
   [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }
 
   void archive(Archive& ar) {
-    ar(voltage_, bridge_, braked_, broken_, brake_rad_, brake_Nm_, temperature_);
+    ar(voltage_, bridge_, braked_, broken_, brake_rad_, brake_Nm_, temperature_, brake_states_);
   }
 
  private:
+  /// What a brake is; torque_Nm is 0 where there is none.
+  struct Brake {
+    double torque_Nm = 0.0, stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;
+    std::int64_t release_ns = 0, engage_ns = 0;
+  };
+  struct BrakeState {  // wide flags: no padding in a snapshot
+    double anchor_rad = 0.0;
+    std::int64_t since_ns = 0;  ///< the coil's last change
+    std::int64_t coil = 0, closed = 0;
+  };
+  void obey_coil(std::size_t joint, double position_rad) noexcept;
+  [[nodiscard]] double brake_torque(std::size_t joint, double position_rad,
+                                    double velocity_rad_s) const noexcept;
   [[nodiscard]] double current(std::size_t joint, double velocity_rad_s) const noexcept;
   [[nodiscard]] double rigid_brake(std::size_t joint, double q, double qd) const noexcept;
 
   std::vector<ActuatorModel> models_;
   std::vector<double> voltage_, brake_rad_, brake_Nm_, temperature_;
   std::vector<std::uint8_t> bridge_, braked_, broken_;
+  std::vector<Brake> brakes_;
+  std::vector<BrakeState> brake_states_;
+  bool any_brake_ = false;
   std::vector<double> cooling_;  // exp(-h / time constant) of the last step length
   double cooling_h_s_ = 0.0;
   double ambient_C_;

@@ -42,7 +42,7 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     const hal::JointConfig& joint = robot.joints[j];
     const double position = posture != nullptr ? posture->position_rad[j] : 0.0;
-    plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0});
+    plant.joints.push_back({joint.name, robot.actuator_of(joint), position, 0.0, joint.brake});
   }
   plant.passive = robot.passive;
   plant.loops = robot.loop_specs();
@@ -325,6 +325,7 @@ void EmulatedRobot::run_boards() noexcept {
         voltage_V = std::clamp(voltage_V, -most_V, most_V);
       }
       plant_.set_drive(node.joints[axis], voltage_V, drives[axis].enabled);
+      plant_.set_brake_coil(node.joints[axis], drives[axis].brake_open);
     }
   }
   for (SensorNode& node : sensor_nodes_) {
@@ -353,7 +354,7 @@ void EmulatedRobot::archive(Archive& ar) {
   for (BoardNode& node : boards_) ar(*node.board, node.powered);
   for (SensorNode& node : sensor_nodes_) ar(*node.board, node.powered);
   for (const Twin& twin : twins_) ar(*twin.board);
-  for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled);
+  for (firmware::AxisDrive& drive : drive_) ar(drive.voltage_V, drive.enabled, drive.brake_open);
   for (Wire& wire : wires_) ar(wire.model, wire.answers_ns, wire.sync_waits);
   ar(faults_, disturbances_, now_ns_, first_ns_, enabled_ns_, started_, let_down_);
 }

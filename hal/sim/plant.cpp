@@ -54,6 +54,12 @@ Result<Plant> Plant::create(const PlantConfig& config) {
   Plant plant(config);
   if (Status status = plant.map_joints(config); !status) return std::unexpected(status.error());
   plant.actuators_ = Actuators(in_model_order(config));
+  for (std::size_t j = 0; j < config.joints.size(); ++j) {
+    const PlantJoint& joint = config.joints[j];
+    if (!joint.brake) continue;
+    plant.actuators_.fit_brake(plant.map_[j], *joint.brake,
+                               static_cast<double>(config.substep_ns) * 1e-9);
+  }
   if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
   if (Status status = plant.make_loops(config); !status) return std::unexpected(status.error());
   if (Status status = plant.start(config); !status) return std::unexpected(status.error());
@@ -197,6 +203,7 @@ Status Plant::start(const PlantConfig& config) {
     }
     actuators_.set_brake(i, config.held, q[base_q_ + i], joint_load);
   }
+  actuators_.seat_brakes(at_start.position_rad);
   held_ = config.held ? 1 : 0;
   released_ = config.held ? 0 : 1;
   if (config.held && base_q_ != 0) hold(q.data(), load);
@@ -243,6 +250,7 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
     motors.position_rad[i] = q[base_q_ + i];
     motors.velocity_rad_s[i] = v[base_v_ + i];
   }
+  actuators_.seat_brakes(motors.position_rad);
   loops_.changed();
   bodies_.lost();
   contact_fresh_ = vdot_fresh_ = 0;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,6 +34,7 @@ struct PlantJoint {
   hal::ActuatorConfig actuator;
   double position_rad = 0.0;     ///< at the start
   double damping_Nms_rad = 0.0;  ///< of the joint itself, on the link side
+  std::optional<hal::BrakeConfig> brake = {};
 };
 
 struct PlantConfig {
@@ -89,7 +91,15 @@ class Plant {
 
   /// What joint `joint`'s drive applies from now on.
   void set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT;
-  /// Opens the brakes for good and starts to let the base down. Further calls do nothing.
+  /// Current in the coil of its brake, or none: it obeys after its time. Without a brake nothing.
+  void set_brake_coil(std::size_t joint, bool current) noexcept TANDEM_RT {
+    actuators_.set_coil(map_[joint], current);
+  }
+  /// Whether its brake presses on the rotor.
+  [[nodiscard]] bool brake_closed(std::size_t joint) const noexcept {
+    return actuators_.brake_closed(map_[joint]);
+  }
+  /// Lets go what holds joints at power-on, for good, and starts to let the base down. Further calls do nothing.
   void release() noexcept TANDEM_RT;
   [[nodiscard]] bool released() const noexcept { return released_ != 0 && !hoist_.holding(); }
 

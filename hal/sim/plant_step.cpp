@@ -79,6 +79,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     bodies_.moved(v(), h_s);
     contact_fresh_ = vdot_fresh_ = 0;
     actuators_.finish_step(h_s, q() + base_q_, v() + base_v_, motor(x_.data()));
+    actuators_.advance_brakes(step_ns, motor(x_.data()).position_rad);
     hoist_.advance(step_ns);
     time_ns_ += step_ns;
     duration_ns -= step_ns;

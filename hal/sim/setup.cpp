@@ -45,6 +45,11 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.mismatch_window_rad = kMismatchWindow_rad;
   axis.oscillation_limit_Nm = hal::oscillation_limit_Nm(joint, actuator);
   axis.oscillation_time_s = joint.oscillation_time_s;
+  axis.brake = joint.brake.has_value();
+  if (joint.brake) {
+    axis.brake_release_ms = static_cast<std::uint16_t>(joint.brake->release_ms);
+    axis.brake_engage_ms = static_cast<std::uint16_t>(joint.brake->engage_ms);
+  }
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
   c.position = pid(gains.position, joint.max_torque_Nm);

@@ -206,5 +206,96 @@ TEST_F(Drive, ArchiveRestoresARampInProgress) {
   EXPECT_EQ(other.step(0x07, inputs, options), kSwitchedOn);
 }
 
+// --- with a brake ---
+
+struct Braked : Drive {
+  Braked() { inputs.has_brake = true; }
+  DriveState step(int word, bool moved) {
+    inputs.brake_moved = moved;
+    return Drive::step(word);
+  }
+  void enable() {
+    for (const int word : {0x00, 0x06, 0x07, 0x0F}) step(word, true);
+    step(0x0F, true);
+    ASSERT_EQ(drive.state(), kOperationEnabled);
+    ASSERT_FALSE(drive.brake_set());
+  }
+};
+
+TEST_F(Braked, HoldsInSwitchedOnUntilTheBrakeIsOpen) {
+  for (const int word : {0x00, 0x06, 0x07}) step(word, true);
+  EXPECT_TRUE(drive.brake_set());
+  EXPECT_EQ(step(0x0F, true), kSwitchedOn) << "it has not even been told";
+  EXPECT_FALSE(drive.brake_set());
+  EXPECT_EQ(drive.motion(), DriveMotion::kSlowDown) << "the bridge holds";
+  EXPECT_EQ(step(0x0F, false), kSwitchedOn);
+  EXPECT_EQ(drive.statusword(), 0x0233);
+  EXPECT_EQ(step(0x0F, true), kOperationEnabled);
+  EXPECT_EQ(drive.motion(), DriveMotion::kFollow);
+}
+
+TEST_F(Braked, SetsTheBrakeAgainWhenEnablingIsGivenUp) {
+  for (const int word : {0x07, 0x06, 0x00, 0x02}) {
+    drive.reset();
+    for (const int up : {0x00, 0x06, 0x07, 0x0F}) step(up, true);
+    ASSERT_FALSE(drive.brake_set());
+    step(word, false);
+    EXPECT_TRUE(drive.brake_set()) << word;
+    EXPECT_EQ(drive.motion(), DriveMotion::kNone) << word;
+  }
+}
+
+TEST_F(Braked, KeepsTheBridgeUntilTheBrakeHoldsAfterEveryRamp) {
+  struct Case {
+    int word;
+    bool fault;
+    DriveState during, after;
+  };
+  for (const Case& one : {Case{0x02, false, kQuickStopActive, kSwitchOnDisabled},
+                          Case{0x07, false, kOperationEnabled, kSwitchedOn},
+                          Case{0x0F, true, kFaultReactionActive, kFault}}) {
+    SCOPED_TRACE(one.word);
+    drive.reset();
+    inputs.at_rest = inputs.fault = false;
+    enable();
+    inputs.fault = one.fault;
+    EXPECT_EQ(step(one.word, true), one.during);
+    EXPECT_FALSE(drive.brake_set()) << "it still moves";
+    inputs.at_rest = true;
+    EXPECT_EQ(step(one.word, true), one.during);
+    EXPECT_TRUE(drive.brake_set());
+    inputs.at_rest = false;  // what rests is not released again
+    EXPECT_EQ(step(one.word, false), one.during);
+    EXPECT_TRUE(drive.brake_set());
+    EXPECT_NE(drive.motion(), DriveMotion::kNone);
+    EXPECT_EQ(step(one.word, true), one.after);
+    EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  }
+}
+
+TEST_F(Braked, OpensTheBridgeAtOnceWhereThatIsAskedAndSetsTheBrakeWithIt) {
+  enable();
+  EXPECT_EQ(step(0x00, true), kSwitchOnDisabled);
+  EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  EXPECT_TRUE(drive.brake_set());
+  drive.reset();
+  enable();
+  options.fault_reaction = 0;
+  inputs.fault = true;
+  step(0x0F, true);
+  EXPECT_EQ(drive.motion(), DriveMotion::kNone);
+  EXPECT_TRUE(drive.brake_set());
+}
+
+TEST_F(Braked, LeavesTheBrakeOpenWhereAStopStaysUnderPower) {
+  options.quick_stop = 6;
+  enable();
+  step(0x02, true);
+  inputs.at_rest = true;
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(step(0x02, true), kQuickStopActive);
+  EXPECT_FALSE(drive.brake_set());
+  EXPECT_EQ(step(0x0F, true), kOperationEnabled);
+}
+
 }  // namespace
 }  // namespace tandem::canopen

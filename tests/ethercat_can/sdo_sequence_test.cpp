@@ -59,6 +59,9 @@ TEST(SdoSequence, WritesTheProtections) {
   robot.actuators[0].temperature_limit_C = 110.0;
   robot.joints[1].following_error_rad = 0.25 * test::kPi;
   robot.joints[1].following_timeout_s = 0.05;
+  robot.joints[1].oscillation_time_s = 0.5;
+  robot.joints[1].max_torque_rate_Nm_s = 2.0 * robot.joints[1].rated_torque_Nm;
+  robot.joints[1].brake = BrakeConfig{.torque_Nm = 9.0, .release_ms = 40, .engage_ms = 10};
   const auto layout = make_pdo_layout(robot);
   ASSERT_TRUE(layout);
   const auto steps = make_configuration(robot, layout->nodes[0]);
@@ -70,6 +73,12 @@ TEST(SdoSequence, WritesTheProtections) {
   EXPECT_EQ(value(0x2034, 0), 1100u);
   EXPECT_EQ(value(0x6865, 0), 4500u) << "45 degrees of 36000 counts";
   EXPECT_EQ(value(0x6866, 0), 50u);
+  EXPECT_EQ(value(0x2839, 2), 0x3F000000u) << "0.5";
+  EXPECT_EQ(value(0x6887, 0), 2000u) << "per mille of rated torque and second";
+  EXPECT_EQ(value(0x283A, 1), 1u);
+  EXPECT_EQ(value(0x283A, 2), 40u);
+  EXPECT_EQ(value(0x283A, 3), 10u);
+  EXPECT_EQ(find(steps, 0x203A, 1), nullptr) << "axis 0 has no brake: nothing is written";
 }
 
 TEST(SdoSequence, WritesTheSecondAxis800Higher) {

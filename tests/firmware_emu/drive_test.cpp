@@ -201,5 +201,74 @@ TEST_F(Drive, LeavesNoTraceOfTheSessionAfterAnNmtReset) {
   EXPECT_EQ(state(), DriveState::kSwitchOnDisabled);
 }
 
+/// An axis with a brake that opens in 7 and closes in 5 periods.
+BoardSetup braked_setup() {
+  BoardSetup setup = board_setup();
+  setup.axes[0].brake = true;
+  setup.axes[0].brake_release_ms = 7;
+  setup.axes[0].brake_engage_ms = 5;
+  return setup;
+}
+
+TEST(Brake, OpensBeforeOperationIsEnabledAndClosesBeforeTheBridgeOpens) {
+  Rig rig(braked_setup());
+  rig.start();
+  const auto set = [&rig] { return rig.object<std::uint32_t>(0x60FE, 1) & 1U; };
+  for (const int word : {0x00, 0x06, 0x07}) {
+    rig.commands[0].controlword = static_cast<std::uint16_t>(word);
+    rig.cycles(3);
+  }
+  EXPECT_EQ(set(), 1U);
+  EXPECT_FALSE(rig.drives[0].brake_open);
+  rig.commands[0].controlword = 0x0F;
+  rig.cycle();
+  int open = 0;
+  for (; open < 50 && rig.state() != DriveState::kOperationEnabled; ++open) {
+    rig.cycle();
+    EXPECT_EQ(rig.drives[0].enabled, rig.drives[0].brake_open) << "it holds while it opens";
+  }
+  EXPECT_EQ(open, 1 + 7) << "the cycle that tells the brake, and its 7 ms";
+  EXPECT_EQ(set(), 0U);
+  rig.commands[0].controlword = 0x07;  // disable operation: a ramp, at rest after 20 ms
+  rig.cycle();
+  int until_set = 0, until_off = 0;
+  for (int k = 0; k < 100 && rig.drives[0].enabled; ++k) {
+    rig.cycle();
+    if (rig.drives[0].brake_open) ++until_set;
+    ++until_off;
+  }
+  EXPECT_EQ(until_off - until_set, 5 + 1) << "5 ms with brake and bridge, then without";
+  EXPECT_EQ(rig.state(), DriveState::kSwitchedOn);
+  EXPECT_EQ(set(), 1U);
+}
+
+TEST(Brake, ClosesAtOnceWithTheBridgeInCategory0AndWithoutPower) {
+  Rig rig(braked_setup());
+  rig.start();
+  rig.enable();
+  rig.cycles(20);
+  ASSERT_EQ(rig.state(), DriveState::kOperationEnabled);
+  rig.commands[0].controlword = 0x00;
+  rig.cycle();
+  rig.cycle();
+  EXPECT_FALSE(rig.drives[0].enabled);
+  EXPECT_FALSE(rig.drives[0].brake_open);
+  EXPECT_FALSE(AxisDrive{}.brake_open) << "what a board without power does";
+}
+
+TEST(Brake, IsNotChangedUnderPowerAndShowsNothingWhereThereIsNone) {
+  Rig rig(braked_setup());
+  rig.start();
+  EXPECT_EQ(rig.write<std::uint16_t>(0x203A, 2, 8), 0U);
+  rig.enable();
+  rig.cycles(20);
+  EXPECT_EQ(rig.write<std::uint16_t>(0x203A, 2, 9), 0x08000022U);
+  EXPECT_EQ(rig.read<std::uint32_t>(0x60FE, 1), 0U);
+  Rig plain;
+  plain.start();
+  plain.cycles(3);
+  EXPECT_EQ(plain.object<std::uint32_t>(0x60FE, 1), 0U) << "no brake is set";
+}
+
 }  // namespace
 }  // namespace tandem::firmware::testing

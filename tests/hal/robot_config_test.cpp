@@ -421,5 +421,57 @@ TEST(RobotConfig, ReportsAllErrorsInTheFilesOrder) {
   EXPECT_EQ(robot.error()[0].hint, "did you mean 'floating'?");
 }
 
+TEST(RobotConfig, ReadsTheWatchOfOscillationTheTorquesRateAndTheBrake) {
+  const auto plain = parse_robot_config(kRobot, "leg.toml");
+  ASSERT_TRUE(plain.has_value());
+  EXPECT_EQ(plain->joints[0].max_oscillation, 0.35);
+  EXPECT_EQ(plain->joints[0].oscillation_time_s, 1.0);
+  EXPECT_FALSE(plain->joints[0].max_torque_rate_Nm_s.has_value());
+  EXPECT_FALSE(plain->joints[0].brake.has_value());
+  const auto robot = parse_robot_config(
+      with(kRobot, "[[sensor]]",
+           "max_oscillation = 0\noscillation_time_s = 0.5\nmax_torque_rate_Nm_s = 9000\n"
+           "brake = { torque_Nm = 120.5, release_ms = 40, engage_ms = 0 }\n"),
+      "leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  const JointConfig& joint = robot->joints[1];
+  EXPECT_EQ(joint.max_oscillation, 0.0);
+  EXPECT_EQ(joint.oscillation_time_s, 0.5);
+  EXPECT_EQ(torque_rate_Nm_s(joint), 9000.0);
+  ASSERT_TRUE(joint.brake.has_value());
+  EXPECT_EQ(joint.brake->torque_Nm, 120.5);
+  EXPECT_EQ(joint.brake->release_ms, 40);
+  EXPECT_EQ(joint.brake->engage_ms, 0);
+  EXPECT_FALSE(robot->joints[0].brake.has_value());
+}
+
+TEST(RobotConfig, RefusesStrangeBrakesOscillationsAndRatesWithLineAndKey) {
+  struct Case {
+    const char* line;
+    const char* key;
+  };
+  for (const Case& one :
+       {Case{"brake = 5", "brake"}, Case{"brake = {}", "torque_Nm"},
+        Case{"brake = { torque_Nm = 0, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
+        Case{"brake = { torque_Nm = nan, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
+        Case{"brake = { torque_Nm = inf, release_ms = 5, engage_ms = 5 }", "torque_Nm"},
+        Case{"brake = { torque_Nm = 5, release_ms = -1, engage_ms = 5 }", "release_ms"},
+        Case{"brake = { torque_Nm = 5, release_ms = 2.5, engage_ms = 5 }", "release_ms"},
+        Case{"brake = { torque_Nm = 5, release_ms = 5 }", "engage_ms"},
+        Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 10001 }", "engage_ms"},
+        Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 5, colour = 1 }", "colour"},
+        Case{"brake = [5, 5, 5]", "brake"}, Case{"max_oscillation = -0.1", "max_oscillation"},
+        Case{"max_oscillation = 11", "max_oscillation"},
+        Case{"oscillation_time_s = 0", "oscillation_time_s"},
+        Case{"max_torque_rate_Nm_s = 0", "max_torque_rate_Nm_s"},
+        Case{"max_torque_rate_Nm_s = -5", "max_torque_rate_Nm_s"},
+        Case{"max_torque_rate_Nm_s = nan", "max_torque_rate_Nm_s"}}) {
+    const std::string found =
+        errors_of(with(kRobot, "[[sensor]]", std::string(one.line) + "\n"));
+    EXPECT_NE(found.find("robots/leg.toml:"), std::string::npos) << one.line << "\n" << found;
+    EXPECT_NE(found.find(one.key), std::string::npos) << one.line << "\n" << found;
+  }
+}
+
 }  // namespace
 }  // namespace tandem::hal

@@ -293,5 +293,102 @@ TEST(Plant, ConfigurationErrorsNameTheJointOrSite) {
   EXPECT_FALSE(Plant::create(config));
 }
 
+// --- motor brakes ---
+
+/// A pendulum at 1 rad, where gravity asks for 8.25 Nm, with a brake and neither friction nor
+/// current.
+PlantConfig braked(int order, double torque_Nm) {
+  PlantConfig config =
+      pendulum(order == 0 ? pendulum_kernels<139>() : pendulum_kernels<0>(), order, 1.0);
+  config.joints[0].actuator.damping_Nms_rad = 0.0;
+  config.joints[0].brake = hal::BrakeConfig{.torque_Nm = torque_Nm, .release_ms = 7,
+                                            .engage_ms = 5};
+  return config;
+}
+
+double gravity_Nm(double q) {
+  return test::kPendulumMass * test::kG * test::kPendulumLength * std::sin(q);
+}
+
+TEST(PlantBrake, HoldsWithoutCreeping) {
+  for (const int order : {0, 2}) {
+    for (const Integrator integrator :
+         {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+      PlantConfig config = braked(order, 20.0);  // the spring swings to twice the load at first
+      config.integrator = integrator;
+      config.joints[0].actuator.spring_damping_Nms_rad = 5.0;
+      Plant plant = make(config);
+      ASSERT_EQ(plant.advance(10'000'000'000), Code::kOk);
+      const double motor_rad = plant.joint(0).motor_position_rad;
+      EXPECT_NEAR(motor_rad, 1.0, 1.0e-3) << order;
+      ASSERT_EQ(plant.advance(60'000'000'000), Code::kOk);
+      EXPECT_NEAR(plant.joint(0).motor_position_rad, motor_rad, 1.0e-9) << order;
+    }
+  }
+}
+
+// Dry friction takes torque_Nm for every rad: nothing else does here.
+TEST(PlantBrake, SlipsAboveItsTorqueAndTakesJustThatMuchEnergy) {
+  for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+    PlantConfig config = braked(0, 5.0);
+    config.integrator = integrator;
+    config.substep_ns = 50'000;
+    Plant plant = make(config);
+    ASSERT_EQ(plant.advance(200'000'000), Code::kOk);
+    const double q = plant.q()[0], v = plant.v()[0];
+    ASSERT_LT(q, 0.95) << "it slips";
+    const double gained = gravity_Nm(std::numbers::pi / 2) * (std::cos(q) - std::cos(1.0));
+    const double moving = 0.5 * (test::pendulum::kInertia + 0.139) * v * v;
+    EXPECT_NEAR(moving, gained - 5.0 * (1.0 - q), 0.01 * gained);
+  }
+}
+
+TEST(PlantBrake, NeverGivesEnergyHoweverItsCoilIsSwitched) {
+  for (const int order : {0, 2}) {
+    PlantConfig config = braked(order, 3.0);
+    config.joints[0].brake->release_ms = config.joints[0].brake->engage_ms = 0;
+    config.integrator = Integrator::kRungeKutta4;
+    config.substep_ns = 50'000;
+    Plant plant = make(config);
+    const auto energy = [&] {
+      const JointReading at = plant.joint(0);
+      const double twist = order == 0 ? 0.0 : at.motor_position_rad - at.position_rad;
+      const double link = test::pendulum::kInertia * at.velocity_rad_s * at.velocity_rad_s;
+      const double rotor = 0.139 * at.motor_velocity_rad_s * at.motor_velocity_rad_s;
+      return 0.5 * (link + rotor + 395.46 * twist * twist) -
+             gravity_Nm(std::numbers::pi / 2) * std::cos(at.position_rad);
+    };
+    const double reach_J = 0.5 * 3.0 * 3.0 / (0.139 * std::pow(0.4 / 50.0e-6, 2));
+    double last = energy();
+    for (int k = 0; k < 3000; ++k) {
+      plant.set_brake_coil(0, k * 7 % 13 < 6);
+      ASSERT_EQ(plant.advance(1'000'000), Code::kOk);
+      const double now = energy();
+      EXPECT_LE(now, last + 2.0 * reach_J + 1.0e-6) << order << " at " << k;
+      last = now;
+    }
+  }
+}
+
+TEST(PlantBrake, ObeysItsCoilAfterItsTimes) {
+  Plant plant = make(braked(0, 20.0));
+  ASSERT_TRUE(plant.brake_closed(0));
+  plant.set_brake_coil(0, true);
+  ASSERT_EQ(plant.advance(6'750'000), Code::kOk);
+  EXPECT_TRUE(plant.brake_closed(0));
+  ASSERT_EQ(plant.advance(250'000), Code::kOk);
+  EXPECT_FALSE(plant.brake_closed(0));
+  plant.set_brake_coil(0, false);
+  ASSERT_EQ(plant.advance(4'750'000), Code::kOk);
+  EXPECT_FALSE(plant.brake_closed(0));
+  ASSERT_EQ(plant.advance(250'000), Code::kOk);
+  EXPECT_TRUE(plant.brake_closed(0));
+  plant.set_brake_coil(0, true);
+  ASSERT_EQ(plant.advance(3'000'000), Code::kOk);
+  plant.set_brake_coil(0, false);  // before it has opened
+  ASSERT_EQ(plant.advance(20'000'000), Code::kOk);
+  EXPECT_TRUE(plant.brake_closed(0));
+}
+
 }  // namespace
 }  // namespace tandem::sim
