@@ -36,7 +36,7 @@ std::set<std::string> keys_read() {
   std::set<std::string> keys;
   for (const char* file :
        {"hal/robot_config.cpp", "hal/robot_config_drives.cpp", "hal/robot_config_loops.cpp",
-        "hal/sim/scenario.cpp",
+        "hal/robot_config_joints.cpp", "hal/sim/scenario.cpp",
         "runtime/experiment.cpp", "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(

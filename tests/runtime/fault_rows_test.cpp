@@ -266,6 +266,17 @@ TEST(FaultRow, SupplySags) {
   expect_stopped(rig, "0x3100");
 }
 
+TEST(FaultRow, JointRings) {
+  ArmRig rig;
+  rig.run();
+  ASSERT_TRUE(rig.cycle->services().set_gains("shoulder_pan_joint", hal::PidLoop::kPosition,
+                                              {.kp = 1.4e6, .kd = 14'000.0},
+                                              RunServices::Patience{0}));
+  expect_row(rig.watch());
+  expect_stopped(rig, "0xFF03");
+  EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
+}
+
 // --- controllers ---
 
 TEST(FaultRow, ControllerGivesNaN) {
