@@ -3,12 +3,20 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace tandem::log {
 namespace {
 
 constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 30;
+
+/// The most bytes that `compressed` ones can hold, so that no more room is made than there is
+/// content for: lz4 grows a byte to 255 at most, zstd one of 4 bytes to a block of 128 KiB.
+std::uint64_t most_content(Compression compression, std::size_t compressed) {
+  const std::uint64_t growth = compression == Compression::kLz4 ? 255 : 32 * 1024;
+  return compression == Compression::kNone ? compressed : growth * compressed;
+}
 
 bool lz4_decompress(std::span<const std::byte> data, Bytes& out) {
   LZ4F_dctx* context = nullptr;
@@ -67,7 +75,9 @@ void compress(Compression compression, std::span<const std::byte> data, Bytes& o
 
 Status decompress(Compression compression, std::span<const std::byte> data, std::uint64_t size,
                   Bytes& out) {
-  if (size > kLargestChunk) return fail("a chunk claims " + std::to_string(size) + " bytes");
+  if (size > std::min(kLargestChunk, most_content(compression, data.size()))) {
+    return fail("a chunk claims " + std::to_string(size) + " bytes");
+  }
   bool good = false;
   if (compression == Compression::kNone) {
     out.assign(data.begin(), data.end());

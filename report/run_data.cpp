@@ -77,17 +77,25 @@ Status read_description(RunData& run) {
   return {};
 }
 
-/// All elements of some fields as columns to ask for.
-std::vector<log::Column> columns_of(const log::LogFile& file, const std::string& topic,
-                                    std::initializer_list<const char*> fields) {
+/// A field and how many elements the robot's own files give it.
+using Wanted = std::pair<const char*, std::size_t>;
+
+/// All elements of some fields as columns to ask for: the reader refuses a log that has fewer.
+std::vector<log::Column> columns_of(std::initializer_list<Wanted> fields) {
   std::vector<log::Column> columns;
-  const log::Topic* found = file.find(topic);
-  for (const char* name : fields) {
-    const hal::Field* field = found == nullptr ? nullptr : found->layout.find(name);
-    const std::size_t count = field == nullptr ? 1 : field->count;  // the reader names what lacks
+  for (const auto& [name, count] : fields) {
     for (std::size_t i = 0; i < count; ++i) columns.push_back({name, i});
   }
   return columns;
+}
+
+/// Some columns of a topic. Errors: LogFile::read()'s; times that go back.
+Result<log::Table> read_columns(const log::LogFile& file, const std::string& topic,
+                                std::initializer_list<Wanted> fields) {
+  auto table = file.read(topic, columns_of(fields));
+  if (!table || std::ranges::is_sorted(table->time_s)) return table;
+  return std::unexpected(Error{"the messages of " + topic + " are not in the order of their times",
+                               "the file is damaged; record the run again", file.path(), 0, {}});
 }
 
 /// Moves `count` columns from `from` on.
@@ -161,13 +169,11 @@ Window window_of(const std::vector<log::EventText>& events, double settle_s) {
 
 /// Begins with the bring-up's end when the run ended before its controllers started.
 Status read_state(const log::LogFile& file, Window& window, RunData& run) {
-  std::vector<log::Column> columns =
-      columns_of(file, kState, {"position_rad", "velocity_rad_s", "torque_Nm"});
-  if (!run.robot.sensors.empty()) {
-    const auto sensors = columns_of(file, kState, {"sensor"});
-    columns.insert(columns.end(), sensors.begin(), sensors.end());
-  }
-  auto table = file.read(kState, columns);
+  const std::size_t n = run.robot.joints.size();
+  const std::size_t channels = run.first_channel(run.robot.sensors.size());
+  auto table = read_columns(
+      file, kState,
+      {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_Nm", n}, {"sensor", channels}});
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
   run.controllers_ran = std::min(end_s, window.fault_s) > window.begin_s;
@@ -176,23 +182,22 @@ Status read_state(const log::LogFile& file, Window& window, RunData& run) {
   window.end_s = std::min(window.end_s, window.fault_s + after_fault_s(ran_s));
   window.end_s = std::max(window.end_s, window.begin_s);
   crop(*table, window.begin_s, window.end_s);
-  const std::size_t n = run.robot.joints.size();
-  if (table->columns.size() < 3 * n || table->time_s.size() < 2) {
+  if (table->time_s.size() < 2) {
     return log_error(run, "this log has no cycle after the drives' bring-up", {});
   }
   run.time_s = table->time_s;
   run.position_rad = take(*table, 0, n);
   run.velocity_rad_s = take(*table, n, n);
   run.torque_Nm = take(*table, 2 * n, n);
-  run.sensor = take(*table, 3 * n, table->columns.size() - 3 * n);
+  run.sensor = take(*table, 3 * n, channels);
   return {};
 }
 
 /// References of the joints that the command puts under position control, by the state's times.
 Status read_command(const log::LogFile& file, RunData& run) {
-  auto table = file.read(kCommand, columns_of(file, kCommand, {"position_rad", "mode"}));
-  if (!table) return std::unexpected(table.error());
   const std::size_t n = run.robot.joints.size();
+  auto table = read_columns(file, kCommand, {{"position_rad", n}, {"mode", n}});
+  if (!table) return std::unexpected(table.error());
   const double gap = std::numeric_limits<double>::quiet_NaN();
   run.reference_rad.assign(n, std::vector<double>(run.rows(), gap));
   constexpr auto kPosition = static_cast<double>(hal::ControlMode::kPosition);
@@ -210,24 +215,19 @@ Status read_command(const log::LogFile& file, RunData& run) {
 
 Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
-  std::vector<log::Column> wanted =
-      columns_of(file, kTruth, {"base_position_m", "base_quaternion", "base_velocity"});
   const std::size_t feet = 3 * run.robot.contact.feet.size();
-  if (feet > 0) {  // a robot without feet has no such fields
-    const auto of_feet =
-        columns_of(file, kTruth, {"foot_position_m", "foot_force_N", "foot_moment_Nm"});
-    wanted.insert(wanted.end(), of_feet.begin(), of_feet.end());
-  }
-  if (!run.robot.loops.empty()) {
-    const auto loops =
-        columns_of(file, kTruth, {"loop_position_error_m", "loop_velocity_error_m_s"});
-    wanted.insert(wanted.end(), loops.begin(), loops.end());
-  }
-  if (!run.robot.passive.empty()) {
-    const auto passive = columns_of(file, kTruth, {"passive_position_rad"});
-    wanted.insert(wanted.end(), passive.begin(), passive.end());
-  }
-  auto table = file.read(kTruth, wanted);
+  const std::size_t loops = run.robot.loops.size();
+  const std::size_t passive = run.robot.passive.size();
+  auto table = read_columns(file, kTruth,
+                            {{"base_position_m", 3},
+                             {"base_quaternion", 4},
+                             {"base_velocity", 6},
+                             {"foot_position_m", feet},
+                             {"foot_force_N", feet},
+                             {"foot_moment_Nm", feet},
+                             {"loop_position_error_m", loops},
+                             {"loop_velocity_error_m_s", loops},
+                             {"passive_position_rad", passive}});
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
   // The log of a killed run may end between a state and its truth.
@@ -240,9 +240,8 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
   run.foot_position_m = take(*table, 13, feet);
   run.foot_force_N = take(*table, 13 + feet, feet);
   run.foot_moment_Nm = take(*table, 13 + 2 * feet, feet);
-  const std::size_t loops = 2 * run.robot.loops.size();
-  run.loop_error = take(*table, 13 + 3 * feet, loops);
-  run.passive_rad = take(*table, 13 + 3 * feet + loops, run.robot.passive.size());
+  run.loop_error = take(*table, 13 + 3 * feet, 2 * loops);
+  run.passive_rad = take(*table, 13 + 3 * feet + 2 * loops, passive);
   run.time_s.resize(rows);
   for (Columns* columns :
        {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,

@@ -31,6 +31,9 @@ TEST_P(EveryCompression, RefusesCutAndWronglySizedData) {
   EXPECT_FALSE(decompress(GetParam(), std::span(packed).first(packed.size() / 2), 10'000, back));
   EXPECT_FALSE(decompress(GetParam(), packed, 9'999, back));
   EXPECT_FALSE(decompress(GetParam(), packed, std::uint64_t{1} << 40, back));
+  Bytes room;  // a chunk of 200 bytes took a GiB of memory before its content was looked at
+  EXPECT_FALSE(decompress(GetParam(), std::span(packed).first(200), std::uint64_t{1} << 30, room));
+  EXPECT_LT(room.capacity(), std::size_t{1} << 24);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EveryCompression,
