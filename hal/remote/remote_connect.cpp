@@ -1,6 +1,9 @@
 // How a client finds a server, gets the robot, keeps it, and gives it back.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <span>
 
 #include "hal/remote/remote_backend.hpp"
 #include "hal/run_phase.hpp"
@@ -9,6 +12,8 @@ namespace tandem::remote {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
+using hal::StopCategory;
+constexpr double kLongestLease_s = 1e9;  // that a clock can count
 constexpr auto kAgain = std::chrono::milliseconds(100);
 /// For a second server, of which each is heard ten times a second.
 constexpr auto kLookAround = std::chrono::milliseconds(300);
@@ -30,6 +35,23 @@ std::vector<std::string> texts(const Sequence& sequence) {
 std::string seconds(double value) {
   std::string text = std::to_string(value);
   return text.substr(0, text.find('.') + 2) + " s";
+}
+
+bool all_finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+
+/// Whether every number of it is one, and every state one that there is.
+bool is_sound(const hal::StateImage& state) {
+  for (const auto values :
+       {state.position_rad(), state.velocity_rad_s(), state.acceleration_rad_s2(),
+        state.torque_Nm(), state.motor_position_rad(), state.motor_velocity_rad_s(),
+        state.current_A(), state.voltage_V(), state.temperature_C(), state.sensor()}) {
+    if (!all_finite(values)) return false;
+  }
+  return std::ranges::all_of(state.drive_state(), [](std::uint8_t one) {
+    return one <= static_cast<std::uint8_t>(hal::DriveState::kFault);
+  });
 }
 
 std::unexpected<Error> interrupted() {
@@ -177,6 +199,7 @@ void RemoteBackend::take_told() {
     const std::lock_guard lock(mutex_);
     endpoints_.server.take([this](const tandem_msgs::LinkServer& sample, const auto& info) {
       const std::optional<Sender>& sender = server_senders_.of(info);
+      if (!(sample.lease_timeout_s > 0.0 && sample.lease_timeout_s <= kLongestLease_s)) return;
       if (!sender || (run_ != 0 && sample.run != run_)) return;  // another server
       if (server_ && sender != server_) return;                  // somebody who says he is this one
       const bool other = told_ && (sample.run != told_->run || sender != told_->sender);
@@ -217,7 +240,7 @@ void RemoteBackend::take_states() {
   news_.notify_all();
 }
 
-/// False: not this robot's, which no server of it sends.
+/// False: not this robot's, or no numbers, which no server of it sends.
 bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   Seen& to = newest_.back();
   if (sample.state._length != to.state.bytes().size() ||
@@ -226,6 +249,8 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   }
   std::memcpy(to.state.bytes().data(), sample.state._buffer, sample.state._length);
   std::memcpy(to.command.bytes().data(), sample.command._buffer, sample.command._length);
+  if (!is_sound(to.state) || !is_sound(to.command)) return false;
+  if (sample.reaction > static_cast<std::uint8_t>(StopCategory::kWarn)) return false;
   to.causes.assign(sample.causes._buffer, sample.causes._buffer + joints_);
   to.cycle = sample.cycle;
   to.owner = sample.owner;
