@@ -1,5 +1,7 @@
 #include "apps/loop_thread.hpp"
 
+#include <fmt/core.h>
+
 #include <chrono>
 
 #include "apps/bus_watch.hpp"
@@ -15,6 +17,13 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
   if (time_stands(cycle)) return "paused";
   const runtime::RunPhase phase = cycle.progress().phase.load();
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
+}
+
+void warn_of_log(const log::Recorder& recorder) {
+  fmt::print(stderr,
+             "warning: {}: nothing is logged any more: {}; the run goes on without a log (end it "
+             "with Ctrl-C or tandem ask '{{\"do\": \"run.stop\"}}', and start it again)\n",
+             recorder.path(), recorder.trouble());
 }
 
 }  // namespace
@@ -39,13 +48,18 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
 }
 
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, std::FILE* out, bool quiet) {
+           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool quiet) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
   Progress bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.can_buses(), stderr);
+  bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
+    if (logged && recorder->failed()) {
+      logged = false;
+      warn_of_log(*recorder);
+    }
     if (!quiet) buses.look();
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,

@@ -33,8 +33,9 @@ class LoopThread {
 };
 
 /// Shows progress and the buses' states until the loop is done, or given up; with `quiet` it only
-/// waits.
+/// waits. Either way it warns when the log is lost.
+/// @param recorder  null: nothing is logged
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, std::FILE* out, bool quiet);
+           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool quiet);
 
 }  // namespace tandem::apps

@@ -7,6 +7,7 @@
 #include "apps/commands.hpp"
 #include "apps/composition.hpp"
 #include "apps/console.hpp"
+#include "apps/control_socket.hpp"
 #include "apps/dds_admission.hpp"
 #include "apps/dds_run.hpp"
 #include "apps/dds_services.hpp"
@@ -230,7 +231,7 @@ Exit run(Composition& c, const RunOptions& options) {
   auto guard = LoopGuard::open(c, cycle);
   if (!guard) return refuse(guard.error());
   LoopThread loop(cycle, e.thread);
-  watch(cycle, loop, c, **guard, out, options.quiet);
+  watch(cycle, loop, c, **guard, recorder.get(), out, options.quiet);
   if ((*guard)->gave_up()) end_without_loop(**guard, options, c, recorder.get(), *socket);
   loop.join();
   guard->reset();

@@ -1,6 +1,7 @@
 #include "log/mcap_writer.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -91,6 +92,11 @@ void McapWriter::emit(std::span<const std::byte> bytes) {
 }
 
 void McapWriter::emit_raw(std::span<const std::byte> bytes) {
+  struct stat found {};
+  if (!failed() && ::fstat(file_, &found) == 0 && S_ISREG(found.st_mode) && found.st_nlink == 0) {
+    deleted_ = true;
+    error_ = "its file was deleted during the run";
+  }
   while (!bytes.empty() && !failed()) {
     const ssize_t written = ::write(file_, bytes.data(), bytes.size());
     if (written < 0) {
@@ -324,7 +330,8 @@ Status McapWriter::close() {
   if (closed != 0 && !failed()) error_ = std::strerror(errno);
   if (!failed()) return {};
   return std::unexpected(Error{.message = "the log is incomplete: " + error_,
-                               .hint = "it can be read up to where writing failed",
+                               .hint = deleted_ ? "record the run again"
+                                                : "it can be read up to where writing failed",
                                .file = path_,
                                .key = {}});
 }

@@ -51,6 +51,8 @@ class McapWriter {
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
+  /// The file is in no folder any more: what was written is lost as well.
+  [[nodiscard]] bool deleted() const noexcept { return deleted_; }
   [[nodiscard]] std::uint64_t bytes_written() const noexcept { return offset_; }
   [[nodiscard]] std::uint64_t messages() const noexcept { return statistics_.messages; }
 
@@ -84,6 +86,7 @@ class McapWriter {
   [[nodiscard]] Bytes chunk_index_content(const Chunk& chunk) const;
 
   int file_ = -1;
+  bool deleted_ = false;
   std::string path_, error_;
   WriterOptions options_;
   std::uint64_t offset_ = 0;

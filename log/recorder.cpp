@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <utility>
 
 #include "log/schema.hpp"
 
@@ -110,8 +111,8 @@ void Recorder::write(std::span<const std::byte> slot) {
   hash_.update(hashed);
   hash_.update(body);
   if (!writer_.write(head.channel, head.time_ns, kCdrHeader, body)) {
-    ++lost_;
-    failed_.store(true, std::memory_order_relaxed);
+    if (lost_++ == 0) trouble_ = writer_.error();
+    failed_.store(true, std::memory_order_release);
   }
 }
 
@@ -135,6 +136,7 @@ RecordingResult Recorder::close(const StringMap& extra) {
   map.insert(map.end(), extra.begin(), extra.end());
   writer_.add_metadata(kResultRecord, map);
   if (const Status closed = writer_.close(); !closed) result.error = closed.error().message;
+  if (writer_.deleted()) result.failed += std::exchange(result.messages, 0);
   result.bytes = writer_.bytes_written();
   return result;
 }

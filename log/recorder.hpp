@@ -33,7 +33,7 @@ struct RecordingResult {
   std::string path;
   std::uint64_t messages = 0;  ///< in the file
   std::uint64_t dropped = 0;   ///< refused because the ring was full
-  std::uint64_t failed = 0;    ///< lost because writing failed (disk full)
+  std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted)
   std::uint64_t bytes = 0;     ///< of the file
   std::string data_sha256;     ///< over channel id, time and data of every message, in order
   std::string error;           ///< why writing failed; empty when it did not
@@ -69,8 +69,10 @@ class Recorder {
   void wait_for_space(std::size_t messages) const noexcept;
 
   [[nodiscard]] std::uint64_t dropped() const noexcept { return ring_->dropped(); }
-  /// True once the disk refused data. Readable while recording.
-  [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_relaxed); }
+  /// True once the disk refused data, or the file was deleted. Readable while recording.
+  [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
+  /// Why. @pre failed()
+  [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
 
   /// Writes what is in the ring, adds the metadata record "result" (with `extra` entries), ends
@@ -94,6 +96,7 @@ class Recorder {
   std::thread thread_;
   std::atomic<bool> closing_{false};
   std::atomic<bool> failed_{false};
+  std::string trouble_;  // the writer's thread, before failed_
   std::uint64_t lost_ = 0;  // the writer's thread, read after its end
   Bytes event_;             // reused
 };
