@@ -1,13 +1,36 @@
 #include "dds/domain.hpp"
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <cstdio>
+#include <vector>
 
 namespace tandem::dds {
 namespace {
 
 constexpr std::uint64_t kMostLogLines = 40;
+
+/// Sockets and wake-up pipes of a domain, with what a process opens beside it: Cyclone DDS itself
+/// checks some of them only after it has used them, and crashes.
+constexpr std::size_t kDescriptors = 16, kDescriptorsOfAnInterface = 4;
+
+Status check_descriptors(std::size_t needed) {
+  std::vector<int> opened;
+  while (opened.size() < needed) {
+    const int one = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    if (one < 0) break;
+    opened.push_back(one);
+  }
+  const std::size_t found = opened.size();
+  for (const int one : opened) ::close(one);
+  if (found == needed) return {};
+  return fail(fmt::format("DDS needs {} more open files than this process has, which may open {} "
+                          "more",
+                          needed, found),
+              "raise the limit: ulimit -n 1024, or LimitNOFILE= of its systemd unit");
+}
 
 }  // namespace
 
@@ -26,6 +49,10 @@ void DdsLog::write(void* self, const dds_log_data_t* data) {
 }
 
 Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
+  const std::size_t descriptors = kDescriptors + kDescriptorsOfAnInterface * config.interfaces.size();
+  if (const Status room = check_descriptors(descriptors); !room) {
+    return std::unexpected(room.error());
+  }
   auto log = std::make_unique<DdsLog>();
   Entity entity(
       dds_create_domain(static_cast<dds_domainid_t>(config.domain), to_xml(config).c_str()));

@@ -325,6 +325,25 @@ TEST_F(BadInput, APluginOfAnotherAbiIsRefused) {
   expect_refused({"other_abi.so", "ABI"});
 }
 
+// With 6 and 7 Cyclone DDS crashed in its own clean-up.
+TEST_F(BadInput, OfTooFewOpenFilesForDdsIsRefusedWhateverIsLeft) {
+  for (int limit = 4; limit <= 40; ++limit) {
+    const Outcome outcome =
+        tandem("run hold.toml --duration 0.05 --no-log --no-socket -q --dds --domain 99",
+               "ulimit -n " + std::to_string(limit) + ";");
+    if (outcome.status == 0) {
+      EXPECT_GE(limit, 20) << "it needs so many";
+      continue;
+    }
+    EXPECT_EQ(outcome.status, 2) << limit << ": " << outcome.err;
+    EXPECT_EQ(error_lines(outcome.err), 1) << limit << ": " << outcome.err;
+    EXPECT_LT(limit, 30) << "there is room";
+  }
+  EXPECT_NE(tandem("run hold.toml --no-log --no-socket -q --dds", "ulimit -n 10;")
+                .err.find("DDS needs 20 more open files than this process has, which may open"),
+            std::string::npos);
+}
+
 TEST_F(BadInput, APeriodOfZeroIsRefused) {
   edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 0");
   expect_refused({"hold.toml:", "period_ns", "out of range"});
