@@ -1,11 +1,13 @@
 #include "rt/thread_setup.hpp"
 
 #include <alloca.h>
+#include <linux/capability.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -55,12 +57,20 @@ void set_affinity(const ThreadConfig& config, ThreadReport& report) {
                                 " CPUs that this process may use (`taskset -p $$`)"});
 }
 
+/// CAP_IPC_LOCK, which no limit holds: root's, as a rule, or given to a service.
+bool has_ipc_lock() {
+  __user_cap_header_struct head{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  __user_cap_data_struct sets[_LINUX_CAPABILITY_U32S_3]{};
+  if (syscall(SYS_capget, &head, sets) != 0) return false;
+  return (sets[CAP_TO_INDEX(CAP_IPC_LOCK)].effective & CAP_TO_MASK(CAP_IPC_LOCK)) != 0;
+}
+
 void lock_memory(const ThreadConfig& config, ThreadReport& report) {
   if (!config.lock_memory) return;
   // mlockall can succeed under a small limit and let later allocations fail: ask first.
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);
-  const bool unlimited = limit.rlim_cur == RLIM_INFINITY || geteuid() == 0;
+  const bool unlimited = limit.rlim_cur == RLIM_INFINITY || has_ipc_lock();
   if (unlimited && mlockall(MCL_CURRENT | MCL_FUTURE) == 0) {
     report.granted.emplace_back("locked memory");
     return;
