@@ -100,4 +100,17 @@ class ControlSocket {
   std::thread worker_;
 };
 
+/// How a process takes questions over a socket.
+struct ControlSocketOptions {
+  std::string path;     ///< empty: the default one of `kind`
+  std::string kind;     ///< "run", "emulate"
+  bool wanted = true;   ///< false: none is opened
+  bool needed = false;  ///< a robot moves: without a way to stop it nothing starts
+};
+
+/// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
+/// which is said on standard error. Errors: a socket that is needed and cannot be opened.
+[[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
+                                                           const ControlSocketOptions& options);
+
 }  // namespace tandem::apps

@@ -124,19 +124,4 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
   add_clock_commands(registry, cycle);
 }
 
-Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
-                                             const ControlSocketOptions& options) {
-  if (!options.wanted) return nullptr;
-  const std::string& path = options.path;
-  auto socket = ControlSocket::open(path.empty() ? default_control_path(options.kind) : path,
-                                    registry);
-  if (socket) return socket;
-  if (options.needed) {
-    return fail("`tandem estop` would not reach this robot: " + socket.error().message,
-                socket.error().hint);
-  }
-  fmt::print(stderr, "note: no control socket: {}\n", socket.error().to_string());
-  return nullptr;
-}
-
 }  // namespace tandem::apps
