@@ -1,6 +1,8 @@
 # Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
+FUZZ_RUNS ?=
+FUZZ_JOBS ?= 1
 
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
@@ -8,6 +10,7 @@ help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
+	@echo "make fuzz   the fuzzers, a minute each; FUZZ_RUNS=1000000: so many inputs each, FUZZ_JOBS=2: two at a time"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
@@ -62,7 +65,7 @@ fuzz:
 	@scripts/install-dependencies test
 	@cmake --preset fuzz --log-level=WARNING
 	@cmake --build --preset fuzz --parallel $(JOBS)
-	@scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS)
+	@scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS) "$(FUZZ_RUNS)" $(FUZZ_JOBS)
 
 clean:
 	@rm -rf build runs

@@ -35,7 +35,7 @@ target_include_directories(tandem_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_link_libraries(tandem_options INTERFACE Threads::Threads)
 
 # The headers that cost most, parsed once for all rooms and plugins. Every source includes what it
-# needs all the same: the preset fuzz builds without this (CMAKE_DISABLE_PRECOMPILE_HEADERS).
+# needs all the same: it has to compile with CMAKE_DISABLE_PRECOMPILE_HEADERS as well.
 set(TANDEM_COSTLY_HEADERS <algorithm> <array> <chrono> <cmath> <filesystem> <functional> <map> <memory>
   <optional> <span> <string> <thread> <vector> <Eigen/Dense> <nlohmann/json.hpp>)
 add_library(tandem_pch STATIC ${CMAKE_CURRENT_LIST_DIR}/pch.cpp)

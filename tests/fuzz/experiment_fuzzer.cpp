@@ -1,15 +1,13 @@
 // Whatever bytes stand for an experiment: errors with a message, or one that a run can start from.
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "runtime/experiment.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace {
 
-void require(bool holds) {
-  if (!holds) std::abort();
-}
+using tandem::fuzz::require;
 
 }  // namespace
 

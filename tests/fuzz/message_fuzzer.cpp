@@ -1,19 +1,17 @@
 // Whatever bytes a peer sends as a sample, and whatever text stands for a definition. The first
 // byte chooses: the definition that the rest is a sample of, or that the rest is a definition.
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <string_view>
 
 #include "dds/cdr.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace {
 
 using namespace tandem::dds;
 
-void require(bool holds) {
-  if (!holds) std::abort();
-}
+using tandem::fuzz::require;
 
 /// Numbers, texts and bools in it.
 std::size_t leaves(const Value& value) {

@@ -2,16 +2,14 @@
 // lead somewhere.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "hal/robot_config.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace {
 
-void require(bool holds) {
-  if (!holds) std::abort();
-}
+using tandem::fuzz::require;
 
 void check(tandem::hal::RobotConfig robot) {
   tandem::hal::RobotDescription description;

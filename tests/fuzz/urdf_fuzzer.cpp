@@ -1,18 +1,16 @@
 // Whatever bytes stand for a URDF: errors with a message, or a tree that the dynamics can use.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "model/urdf.hpp"
+#include "tests/fuzz/require.hpp"
 
 namespace {
 
 using tandem::model::Tree;
 
-void require(bool holds) {
-  if (!holds) std::abort();
-}
+using tandem::fuzz::require;
 
 void check(const Tree& tree) {
   require(tree.bodies.size() == tree.joints.size() + 1);
