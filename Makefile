@@ -2,7 +2,7 @@
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
-FUZZ_JOBS ?= 1
+FUZZ_JOBS ?= 2
 
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
@@ -10,7 +10,7 @@ help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
-	@echo "make fuzz   the fuzzers, a minute each; FUZZ_RUNS=1000000: so many inputs each, FUZZ_JOBS=2: two at a time"
+	@echo "make fuzz   the fuzzers, a minute each; two at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
