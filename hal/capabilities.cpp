@@ -61,6 +61,8 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   out.max_current_A = actuator.current_limit_A;
   if (torque) {
     out.max_torque_Nm = joint.max_torque_Nm;
+    out.max_torque_rate_Nm_s =
+        joint.max_torque_rate_Nm_s.value_or(joint.max_torque_Nm / kFullScale_s);
     out.most_gains = most_gains(out.max_torque_Nm, out.max_voltage_V, out.max_current_A);
     out.stiffness_Nm_rad = gains.stiffness_Nm_rad;
     out.damping_Nms_rad = gains.damping_Nms_rad;

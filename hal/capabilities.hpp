@@ -26,6 +26,10 @@ enum class Capability : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(Capability capability) noexcept;
 
+/// In which torque, velocity, stiffness or damping may go from nothing to its limit where the joint
+/// declares no rate: faster than a drive's mechanics, slower than an error in a program.
+inline constexpr double kFullScale_s = 0.01;
+
 /// A joint's limits, link side, and its capabilities. Torque and
 /// impedance limits of a joint that cannot do torque control are 0.
 struct JointCapabilities {
@@ -35,6 +39,8 @@ struct JointCapabilities {
   double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< as declared
   double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
   double max_torque_Nm = 0.0;
+  /// Of the torque reference, as declared; else its limit in kFullScale_s.
+  double max_torque_rate_Nm_s = 0.0;
   double max_voltage_V = 0.0;
   double max_current_A = 0.0;
   /// Of the virtual spring: the position loop's kp (softer than stiff control), or the

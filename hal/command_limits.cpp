@@ -183,7 +183,7 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   const double measured = state.torque_Nm()[joint];
   rated(joint, reference, last.torque_Nm,
         starts && std::isfinite(measured) ? measured : was.torque_Nm,
-        most * period_s_ / kFullScale_s);
+        limits_[joint].max_torque_rate_Nm_s * period_s_);
 }
 
 void CommandLimits::impedance(std::size_t joint, const Last& was, const StateImage& state,

@@ -43,10 +43,6 @@ struct LimitCounters {
 ///   nobody has written since goes on toward what was wanted.
 class CommandLimits {
  public:
-  /// In which torque, velocity, stiffness or damping may go from nothing to its limit: faster than
-  /// a drive's mechanics, slower than an error in a program.
-  static constexpr double kFullScale_s = 0.01;
-
   /// Of its maximum velocity: the speed of a joint that is led back into its range.
   static constexpr double kRecoveryShare = 0.05;
 

@@ -111,9 +111,10 @@ struct GainsConfig {
 
 /// A joint's `brake`: a spring presses it on, current in its coil lifts it.
 struct BrakeConfig {
-  double torque_Nm = 0.0;  ///< that it holds; on the link's side of the gear, the motor's of a spring
-  int release_ms = 0;      ///< from the coil's current until it is open
-  int engage_ms = 0;       ///< from the current's end until it holds
+  double torque_Nm =
+      0.0;             ///< that it holds; on the link's side of the gear, the motor's of a spring
+  int release_ms = 0;  ///< from the coil's current until it is open
+  int engage_ms = 0;   ///< from the current's end until it holds
 };
 
 /// [[joint]]
@@ -127,26 +128,26 @@ struct JointConfig {
   double max_position_rad = 0.0;  ///< them to the URDF, until complete_from_description()
   double max_velocity_rad_s = 0.0;
   double max_torque_Nm = 0.0;  ///< the torque reference's limit
-  double max_acceleration_rad_s2 =
-      std::numeric_limits<double>::infinity();  ///< of the references, as the next
-  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();
-  double rated_torque_Nm = 0.0;               ///< CiA 402 6076: torques travel as per mille of it;
-                                              ///< default: max_torque_Nm
-  std::optional<double> max_torque_rate_Nm_s;  ///< of the torque reference; see torque_rate_Nm_s()
-  double encoder_counts_per_rev = 0.0;        ///< link encoder
-  double motor_encoder_counts_per_rev = 0.0;  ///< motor encoder, per revolution at the link
+  double max_acceleration_rad_s2 = std::numeric_limits<double>::infinity();  ///< of references
+  double max_jerk_rad_s3 = std::numeric_limits<double>::infinity();          ///< the same
+  double rated_torque_Nm = 0.0;  ///< CiA 402 6076: torques travel as per mille of it;
+                                 ///< default: max_torque_Nm
+  std::optional<double> max_torque_rate_Nm_s = {};  ///< of the torque reference
+  double encoder_counts_per_rev = 0.0;              ///< link encoder
+  double motor_encoder_counts_per_rev = 0.0;        ///< motor encoder, per revolution at the link
   double torque_noise_Nm = 0.0;      ///< standard deviation of the spring torque's measurement
   double following_error_rad = 0.5;  ///< in CSP, beyond it for longer than the next: a fault;
   double following_timeout_s = 0.1;  ///< 0 rad: not watched
   double max_oscillation = 0.35;     ///< RMS of the motor torque's fast part over the most that the
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
-  std::optional<BrakeConfig> brake;
+  std::optional<BrakeConfig> brake = {};
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int line = 0;                                      ///< in the TOML, for messages
 };
 
-/// max_torque_rate_Nm_s, or without one max_torque_Nm in a millisecond.
+/// By how much a drive lets its torque reference change (6087): max_torque_rate_Nm_s, or without
+/// one max_torque_Nm in a millisecond. CommandLimits allows less then.
 [[nodiscard]] double torque_rate_Nm_s(const JointConfig& joint) noexcept;
 
 /// max_oscillation in torque, object 2039:1 [Nm]: of max_torque_Nm, or of what the current limit
