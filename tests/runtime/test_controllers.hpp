@@ -1,9 +1,12 @@
 // Controllers for tests of the loop: one that moves joints on a sine, and one that misbehaves.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <thread>
 #include <utility>
 
 #include "controllers/controller.hpp"
@@ -31,6 +34,7 @@ class Sine : public Controller {
   Code update(const hal::CycleTime& time, const hal::StateImage&,
               hal::CommandImage& command) noexcept override {
     ++updates;
+    while (hangs) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (allocates) last_words_ = std::make_unique<int>(updates);
     if (answer != Code::kOk) return answer;
     const double t = static_cast<double>(time.time_ns - began_ns_) * 1e-9;
@@ -47,6 +51,7 @@ class Sine : public Controller {
 
   Code answer = Code::kOk;
   bool not_finite = false, allocates = false;
+  std::atomic<bool> hangs{false};  ///< the next update() does not return while it is set
   int updates = 0, starts = 0, stops = 0;
 
  private:
