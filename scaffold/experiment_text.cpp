@@ -77,7 +77,7 @@ std::string hold_text(const NewRobot& robot) {
   std::string text =
       head(robot, stands ? "Stands on its feet." : "Holds the posture it starts in.", 10.0);
   text += "\n[[controller]]\nplugin = \"hold\"\n";
-  if (!robot.like.empty()) {
+  if (stands && !robot.like.empty()) {  // an arm's light links would ring with it
     text += fmt::format(
         "[controller.parameters]\nlink_damping_Nms_rad = {:.3g}  # guess: the links swing on their "
         "springs\n",

@@ -330,7 +330,7 @@ TEST_F(BadInput, OfTooFewOpenFilesForDdsIsRefusedWhateverIsLeft) {
   for (int limit = 4; limit <= 40; ++limit) {
     const Outcome outcome =
         tandem("run hold.toml --duration 0.05 --no-log --no-socket -q --dds --domain 99",
-               "ulimit -n " + std::to_string(limit) + ";");
+               "prlimit --nofile=" + std::to_string(limit));
     if (outcome.status == 0) {
       EXPECT_GE(limit, 20) << "it needs so many";
       continue;
@@ -339,7 +339,7 @@ TEST_F(BadInput, OfTooFewOpenFilesForDdsIsRefusedWhateverIsLeft) {
     EXPECT_EQ(error_lines(outcome.err), 1) << limit << ": " << outcome.err;
     EXPECT_LT(limit, 30) << "there is room";
   }
-  EXPECT_NE(tandem("run hold.toml --no-log --no-socket -q --dds", "ulimit -n 10;")
+  EXPECT_NE(tandem("run hold.toml --no-log --no-socket -q --dds", "prlimit --nofile=10")
                 .err.find("DDS needs 20 more open files than this process has, which may open"),
             std::string::npos);
 }

@@ -41,33 +41,135 @@ std::vector<std::string> of_unit(const std::string& key) {
   return all;
 }
 
-#define CALL(name) {#name, SYS_##name}
+#define CALL(name) \
+  { #name, SYS_##name }
 const std::map<std::string, int> kCalls{
-    CALL(execve), CALL(exit), CALL(exit_group), CALL(clone), CALL(clone3), CALL(futex),
-    CALL(set_robust_list), CALL(set_tid_address), CALL(rseq), CALL(prctl), CALL(restart_syscall),
-    CALL(wait4), CALL(getpid), CALL(gettid), CALL(getuid), CALL(geteuid), CALL(getgid),
-    CALL(getegid), CALL(uname), CALL(sysinfo), CALL(prlimit64), CALL(getrlimit), CALL(getrusage),
-    CALL(getrandom), CALL(capget), CALL(sched_setscheduler), CALL(sched_getscheduler), CALL(sched_getparam),
-    CALL(sched_setaffinity), CALL(sched_getaffinity), CALL(sched_get_priority_max),
-    CALL(sched_get_priority_min), CALL(sched_yield), CALL(clock_nanosleep), CALL(nanosleep),
-    CALL(clock_gettime), CALL(clock_getres), CALL(gettimeofday), CALL(brk), CALL(mmap),
-    CALL(munmap), CALL(mprotect), CALL(mremap), CALL(madvise), CALL(mlock), CALL(mlockall),
-    CALL(munlockall), CALL(rt_sigaction), CALL(rt_sigprocmask), CALL(rt_sigreturn),
-    CALL(rt_sigpending), CALL(sigaltstack), CALL(kill), CALL(tgkill), CALL(openat), CALL(close),
-    CALL(read), CALL(write), CALL(readv), CALL(writev), CALL(pread64), CALL(pwrite64), CALL(lseek),
-    CALL(fstat), CALL(newfstatat), CALL(statx), CALL(statfs), CALL(fstatfs), CALL(faccessat),
-    CALL(faccessat2), CALL(readlinkat), CALL(getcwd), CALL(getdents64), CALL(unlinkat),
-    CALL(fchmod), CALL(ftruncate), CALL(fallocate), CALL(fsync), CALL(fdatasync), CALL(fcntl),
-    CALL(flock), CALL(ioctl), CALL(dup), CALL(dup3), CALL(pipe2), CALL(eventfd2), CALL(umask),
-    CALL(socket), CALL(socketpair), CALL(bind), CALL(listen), CALL(connect), CALL(accept),
-    CALL(accept4), CALL(getsockname), CALL(getpeername), CALL(getsockopt), CALL(setsockopt),
-    CALL(sendto), CALL(sendmsg), CALL(sendmmsg), CALL(recvfrom), CALL(recvmsg), CALL(recvmmsg),
-    CALL(shutdown), CALL(ppoll), CALL(pselect6), CALL(epoll_create1), CALL(epoll_ctl),
+    CALL(execve),
+    CALL(exit),
+    CALL(exit_group),
+    CALL(clone),
+    CALL(clone3),
+    CALL(futex),
+    CALL(set_robust_list),
+    CALL(set_tid_address),
+    CALL(rseq),
+    CALL(prctl),
+    CALL(restart_syscall),
+    CALL(wait4),
+    CALL(getpid),
+    CALL(gettid),
+    CALL(getuid),
+    CALL(geteuid),
+    CALL(getgid),
+    CALL(getegid),
+    CALL(uname),
+    CALL(sysinfo),
+    CALL(prlimit64),
+    CALL(getrlimit),
+    CALL(getrusage),
+    CALL(getrandom),
+    CALL(capget),
+    CALL(sched_setscheduler),
+    CALL(sched_getscheduler),
+    CALL(sched_getparam),
+    CALL(sched_setaffinity),
+    CALL(sched_getaffinity),
+    CALL(sched_get_priority_max),
+    CALL(sched_get_priority_min),
+    CALL(sched_yield),
+    CALL(clock_nanosleep),
+    CALL(nanosleep),
+    CALL(clock_gettime),
+    CALL(clock_getres),
+    CALL(gettimeofday),
+    CALL(brk),
+    CALL(mmap),
+    CALL(munmap),
+    CALL(mprotect),
+    CALL(mremap),
+    CALL(madvise),
+    CALL(mlock),
+    CALL(mlockall),
+    CALL(munlockall),
+    CALL(rt_sigaction),
+    CALL(rt_sigprocmask),
+    CALL(rt_sigreturn),
+    CALL(rt_sigpending),
+    CALL(sigaltstack),
+    CALL(kill),
+    CALL(tgkill),
+    CALL(openat),
+    CALL(close),
+    CALL(read),
+    CALL(write),
+    CALL(readv),
+    CALL(writev),
+    CALL(pread64),
+    CALL(pwrite64),
+    CALL(lseek),
+    CALL(fstat),
+    CALL(newfstatat),
+    CALL(statx),
+    CALL(statfs),
+    CALL(fstatfs),
+    CALL(faccessat),
+    CALL(faccessat2),
+    CALL(readlinkat),
+    CALL(getcwd),
+    CALL(getdents64),
+    CALL(unlinkat),
+    CALL(fchmod),
+    CALL(ftruncate),
+    CALL(fallocate),
+    CALL(fsync),
+    CALL(fdatasync),
+    CALL(fcntl),
+    CALL(flock),
+    CALL(ioctl),
+    CALL(dup),
+    CALL(dup3),
+    CALL(pipe2),
+    CALL(eventfd2),
+    CALL(umask),
+    CALL(socket),
+    CALL(socketpair),
+    CALL(bind),
+    CALL(listen),
+    CALL(connect),
+    CALL(accept),
+    CALL(accept4),
+    CALL(getsockname),
+    CALL(getpeername),
+    CALL(getsockopt),
+    CALL(setsockopt),
+    CALL(sendto),
+    CALL(sendmsg),
+    CALL(sendmmsg),
+    CALL(recvfrom),
+    CALL(recvmsg),
+    CALL(recvmmsg),
+    CALL(shutdown),
+    CALL(ppoll),
+    CALL(pselect6),
+    CALL(epoll_create1),
+    CALL(epoll_ctl),
     CALL(epoll_pwait),
 #ifdef __x86_64__
-    CALL(arch_prctl), CALL(open), CALL(stat), CALL(lstat), CALL(access), CALL(readlink),
-    CALL(mkdir), CALL(rmdir), CALL(unlink), CALL(rename), CALL(chmod), CALL(dup2), CALL(poll),
-    CALL(select), CALL(epoll_wait),
+    CALL(arch_prctl),
+    CALL(open),
+    CALL(stat),
+    CALL(lstat),
+    CALL(access),
+    CALL(readlink),
+    CALL(mkdir),
+    CALL(rmdir),
+    CALL(unlink),
+    CALL(rename),
+    CALL(chmod),
+    CALL(dup2),
+    CALL(poll),
+    CALL(select),
+    CALL(epoll_wait),
 #endif
 };
 #undef CALL
@@ -173,9 +275,9 @@ class Confined : public Program {
   }
   /// A socket's path is short, the build folder's may be long.
   const std::filesystem::path runtime_ = "/tmp/tandem-confined-" + std::to_string(::getpid());
-  Rights rights{numbers("CapabilityBoundingSet", kCapabilities),
-                filter(numbers("SystemCallFilter", kCalls),
-                       numbers("RestrictAddressFamilies", kFamilies))};
+  Rights rights{
+      numbers("CapabilityBoundingSet", kCapabilities),
+      filter(numbers("SystemCallFilter", kCalls), numbers("RestrictAddressFamilies", kFamilies))};
 
   /// Runs a probe in a child with these rights. @return its exit status
   template <class Probe>
@@ -206,7 +308,8 @@ class Confined : public Program {
   }
   /// `tandem run hold.toml MORE`, confined.
   [[nodiscard]] pid_t begin(const std::vector<std::string>& more) const {
-    std::vector<std::string> words{TANDEM_BINARY_DIR "/bin/tandem", "run", "hold.toml", "--no-build"};
+    std::vector<std::string> words{TANDEM_BINARY_DIR "/bin/tandem", "run", "hold.toml",
+                                   "--no-build"};
     words.insert(words.end(), more.begin(), more.end());
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
@@ -233,8 +336,8 @@ class Confined : public Program {
   [[nodiscard]] static std::set<int> policies(pid_t process) {
     std::set<int> all;
     std::error_code gone;
-    for (const auto& task : std::filesystem::directory_iterator(
-             "/proc/" + std::to_string(process) + "/task", gone)) {
+    for (const auto& task :
+         std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task", gone)) {
       all.insert(::sched_getscheduler(std::stoi(task.path().filename())));
     }
     return all;
@@ -258,7 +361,8 @@ TEST_F(Confined, ARunEndsInOrderWithRealTimePriorityAndLockedMemory) {
   give_folder();
   std::ofstream(folder_ / "hold.toml", std::ios::app) << "\n[realtime]\n";  // FIFO, 80, locked
   for (const bool dds : {false, true}) {
-    std::vector<std::string> more{"--realtime", "--duration", "2", "--log", "logs", "--json", "run.json"};
+    std::vector<std::string> more{"--realtime", "--duration", "2",       "--log",
+                                  "logs",       "--json",     "run.json"};
     if (dds) more.insert(more.end(), {"--dds", "--domain", "98"});
     const pid_t run = begin(more);
     EXPECT_TRUE(tandem::test::eventually([&] { return policies(run).contains(SCHED_FIFO); }));
@@ -283,7 +387,10 @@ TEST_F(Confined, ARunIsAskedAndStopsBySignal) {
            std::string::npos;
   }));
   EXPECT_EQ(this->tandem("ask '{\"do\": \"controller.load\", \"plugin\": \"hold\", \"name\": "
-                         "\"other\"}' --socket " + socket).status, 0);
+                         "\"other\"}' --socket " +
+                         socket)
+                .status,
+            0);
   ASSERT_EQ(::kill(run, SIGINT), 0);
   EXPECT_EQ(wait(run), 0) << read_text(folder_ / "err.txt");
 }

@@ -155,13 +155,17 @@ TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
 
 // The run went on, ended with status 0 and named a log that was not there.
 TEST_F(Run, OfALogThatIsDeletedWarnsAtOnceAndIsNoSuccess) {
-  for (const char* remove : {"rm -r logs", "rm logs/*.mcap", "cp $(ls logs/*.mcap) x && mv x logs/*.mcap"}) {
+  for (const char* remove :
+       {"rm -r logs", "rm logs/*.mcap", "cp $(ls logs/*.mcap) x && mv x logs/*.mcap"}) {
     const std::string command =
         "( while ! test -s logs/double_pendulum-hold-001.mcap; do sleep 0.02; done; sleep 0.2; " +
-        std::string(remove) + " ) & '" TANDEM_BINARY_DIR
-        "/bin/tandem' run hold.toml --duration 3 --rate 2 --no-socket -q --log logs --json run.json "
+        std::string(remove) +
+        " ) & '" TANDEM_BINARY_DIR
+        "/bin/tandem' run hold.toml --duration 3 --rate 2 --no-socket -q --log logs --json "
+        "run.json "
         "2>err.txt; s=$?; wait; exit $s";
-    const int raw = std::system(("cd '" + folder_.string() + "' && rm -rf logs && " + command).c_str());
+    const int raw =
+        std::system(("cd '" + folder_.string() + "' && rm -rf logs || exit 3; " + command).c_str());
     EXPECT_EQ(WEXITSTATUS(raw), 1) << remove;
     const std::string err = read_text(folder_ / "err.txt");
     EXPECT_NE(err.find("001.mcap: nothing is logged any more: its file was deleted during the run"),

@@ -34,10 +34,9 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 /// Keys that the readers of robots and experiments ask for.
 std::set<std::string> keys_read() {
   std::set<std::string> keys;
-  for (const char* file :
-       {"hal/robot_config.cpp", "hal/robot_config_drives.cpp", "hal/robot_config_loops.cpp",
-        "hal/robot_config_joints.cpp", "hal/sim/scenario.cpp",
-        "runtime/experiment.cpp", "dds/config.cpp"}) {
+  for (const char* file : {"hal/robot_config.cpp", "hal/robot_config_drives.cpp",
+                           "hal/robot_config_loops.cpp", "hal/robot_config_joints.cpp",
+                           "hal/sim/scenario.cpp", "runtime/experiment.cpp", "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(
         source,
@@ -62,9 +61,10 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   const std::string page = text_of(kRoot / "docs/json.md");
   for (const char* file :
        {"apps/run_summary.cpp", "apps/bus_table.cpp", "apps/check_command.cpp",
-        "apps/model_command.cpp", "apps/new_command.cpp", "apps/log_command.cpp", "apps/latency_report.cpp",
-        "apps/doctor_command.cpp", "apps/round_trips.cpp", "apps/controller_control.cpp",
-        "apps/joint_control.cpp", "apps/topic_command.cpp", "apps/topic_rate.cpp"}) {
+        "apps/model_command.cpp", "apps/new_command.cpp", "apps/log_command.cpp",
+        "apps/latency_report.cpp", "apps/doctor_command.cpp", "apps/round_trips.cpp",
+        "apps/controller_control.cpp", "apps/joint_control.cpp", "apps/topic_command.cpp",
+        "apps/topic_rate.cpp"}) {
     const std::string source = text_of(kRoot / file);
     for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
       for (const std::string& key : matches(source, pattern)) {
@@ -78,6 +78,7 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
 TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
   const auto named = matches(text_of(kRoot / "docs/faults.md"), "`FaultRow\\.(\\w+)`");
   const auto tests = matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp") +
+                                 text_of(kRoot / "tests/runtime/fault_rows_coman_test.cpp") +
                                  text_of(kRoot / "tests/runtime/fault_rows_wire_test.cpp"),
                              "TEST\\(FaultRow, (\\w+)\\)");
   EXPECT_GT(tests.size(), 20U);

