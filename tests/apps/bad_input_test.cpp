@@ -331,6 +331,8 @@ TEST_F(BadInput, OfTooFewOpenFilesForDdsIsRefusedWhateverIsLeft) {
     const Outcome outcome =
         tandem("run hold.toml --duration 0.05 --no-log --no-socket -q --dds --domain 99",
                "prlimit --nofile=" + std::to_string(limit));
+    const bool loaded = outcome.err.find("loading shared libraries") == std::string::npos;
+    if (!loaded && limit < 10) continue;  // with what the test runner has open
     if (outcome.status == 0) {
       EXPECT_GE(limit, 20) << "it needs so many";
       continue;
