@@ -1,11 +1,9 @@
 // Faults on a real CAN stack: in lockstep the same outcome as in process, and in real time what
 // happens when one of two processes, or the wire between them, goes away.
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <vector>
 
-#include "tests/hil/witness.hpp"
+#include "tests/hil/process.hpp"
 
 namespace tandem {
 namespace {
@@ -168,83 +166,6 @@ TEST_F(HilRealTimeFault, AnInjectedDeathOfABoardStopsTheRun) {
   EXPECT_NE(faults_of("run.json").find("no feedback"), std::string::npos) << faults_of("run.json");
   EXPECT_EQ(robot_->interrupt(), 0) << robot_->output();
   EXPECT_EQ(read("robot.json")["injected"], 1);
-}
-
-/// COMAN at 50 Hz: 29 axes on 15 boards and five interfaces, which this machine's one CPU may be
-/// late for.
-class HilComanFault : public HilFault {
- protected:
-  static constexpr int kBorne = 30;  // cycles without SYNC that are no fault yet
-  static constexpr std::size_t kBoards = 15;
-
-  void SetUp() override {
-    const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/coman";
-    for (const auto& one : std::filesystem::directory_iterator(source)) {
-      std::filesystem::copy(one.path(), folder_ / one.path().filename(),
-                            std::filesystem::copy_options::recursive);
-    }
-    rewrite("robot.toml", "slow_pdo_every = 4",
-            "slow_pdo_every = 4\nheartbeat_ms = 1000\ncommand_timeout_cycles = " +
-                std::to_string(kBorne));
-    rewrite("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 20_000_000");
-  }
-  void rewrite(const std::string& name, const std::string& from, const std::string& to) const {
-    std::string text = test::text_of(file(name));
-    const std::size_t at = text.find(from);
-    ASSERT_NE(at, std::string::npos) << name << " has no '" << from << "'";
-    std::ofstream(file(name)) << text.replace(at, from.size(), to);
-  }
-};
-
-TEST_F(HilComanFault, EveryBoardStopsByItselfWhenTheMasterIsKilled) {
-  std::vector<std::unique_ptr<test::Candump>> candumps;  // one a bus
-  for (const char* bus : {"can0", "can1", "can2", "can3", "can4"}) {
-    candumps.push_back(std::make_unique<test::Candump>(bus, folder_ / (std::string(bus) + ".log")));
-  }
-  const std::string socket = std::filesystem::temp_directory_path() / "hil_coman.sock";
-  Process robot(tandem({"emulate", file("hold.toml"), "--socket", socket, "--json",
-                        file("robot.json")}),
-                file("robot.txt"));
-  ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
-  Process master(tandem({"run", file("hold.toml"), "--hal", "can", "--on-fault", "end", "--no-log",
-                         "--no-socket", "--no-build"}),
-                 file("run.txt"));
-  const auto status = [&] {
-    Process asked(tandem({"ask", R"({"do": "status"})", "--socket", socket}), file("status.txt"));
-    EXPECT_EQ(asked.wait(), 0) << asked.output();
-    return json::parse(asked.output());
-  };
-  ASSERT_TRUE(test::eventually([&] {
-    ::usleep(200'000);
-    return status().value("all_enabled", false);
-  })) << master.output();
-  master.signal(SIGKILL);
-  EXPECT_EQ(master.wait(), -SIGKILL);
-  ASSERT_TRUE(test::eventually([&] {
-    ::usleep(200'000);
-    return status().value("open_after_steps", 0) > 0;
-  })) << "every bridge opens";
-  ASSERT_EQ(robot.interrupt(), 0) << robot.output();
-  const json record = read("robot.json");
-  EXPECT_EQ(record["safe_after_steps"], kBorne + 2) << "as docs/faults.md counts: 12 of 10";
-  EXPECT_FALSE(record["all_enabled"].get<bool>());
-
-  // Each board tells why, by itself: EMCY 8700, behind the last SYNC of its bus.
-  std::size_t boards = 0;
-  for (const auto& candump : candumps) {
-    double sync_s = 0.0;
-    for (const test::LoggedFrame& frame : candump->stop()) {
-      if (frame.id() == "080") sync_s = frame.time_s;
-      const bool stops = frame.id() > "080" && frame.id() < "100" &&
-                         frame.text.find("#0087") != std::string::npos;
-      if (!stops) continue;
-      ++boards;
-      EXPECT_GT(sync_s, 0.0);
-      std::printf("%s: %.0f ms after the last SYNC\n", frame.text.substr(0, 8).c_str(),
-                  1e3 * (frame.time_s - sync_s));
-    }
-  }
-  EXPECT_EQ(boards, kBoards);
 }
 
 }  // namespace
