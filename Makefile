@@ -3,6 +3,8 @@ JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
+# `request` needs most of the program built once more: it is `make test-all`'s.
+FUZZ_TARGETS ?= urdf robot experiment message mcap
 
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
@@ -10,7 +12,7 @@ help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
-	@echo "make fuzz   the fuzzers, a minute each; two at a time; FUZZ_RUNS=1000000: so many inputs each"
+	@echo "make fuzz   the fuzzers, a minute each, two at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
@@ -40,6 +42,7 @@ test:
 test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
+	@$(MAKE) --no-print-directory fuzz FUZZ_TARGETS=request
 
 unit:
 	@scripts/install-dependencies test
@@ -64,8 +67,8 @@ rtsan:
 fuzz:
 	@scripts/install-dependencies test
 	@cmake --preset fuzz --log-level=WARNING
-	@cmake --build --preset fuzz --parallel $(JOBS)
-	@scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS) "$(FUZZ_RUNS)" $(FUZZ_JOBS)
+	@cmake --build build/fuzz --target $(addprefix fuzz_,$(FUZZ_TARGETS)) --parallel $(JOBS)
+	@TARGETS="$(FUZZ_TARGETS)" scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS) "$(FUZZ_RUNS)" $(FUZZ_JOBS)
 
 clean:
 	@rm -rf build runs
