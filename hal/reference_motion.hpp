@@ -27,8 +27,8 @@ struct MotionBounds {
 
 /// A reference in force, cycle by cycle: its differences are its velocity, acceleration and jerk.
 ///
-/// A wanted reference within the bounds passes unchanged. One that is not is chased: as fast as
-/// the bounds allow, braking in time to meet it, as if it went on with the velocity that it has.
+/// A wanted reference within the bounds passes unchanged. One beyond them is followed as fast as
+/// the bounds allow. The motion brakes in time to meet it, if its velocity stays as it is.
 /// The bounds hold in each step, and the way to rest stays within min and max.
 class ReferenceMotion {
  public:

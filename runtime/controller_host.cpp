@@ -224,7 +224,7 @@ Code ControllerHost::call_update(HostedController& one, const hal::CycleTime& ti
   return code;
 }
 
-/// Told once of each controller and joint; what finds no room in this cycle is told in a later one.
+/// Reports each controller and joint once, and at most one a cycle: others follow in later cycles.
 void ControllerHost::take_back(HostedController& one,
                                hal::CommandImage& command) noexcept TANDEM_RT {
   const std::int32_t joint = guard_.take_back(one.claims, one.claimed, one.strayed, command);

@@ -1,5 +1,5 @@
 // The rows of docs/faults.md about COMAN: 29 joints on 15 boards and five buses, standing on its
-// own feet amid a squat. What no fixed arm shows: falling, lying, and being held upright.
+// own feet in the middle of a squat. A fixed arm cannot fall, lie on the ground, or be held upright.
 #include <csignal>
 #include <thread>
 
