@@ -46,6 +46,7 @@ Code CommandLimits::apply(const StateImage& state, CommandImage& command) noexce
     bounded(j, command.voltage_V()[j], last.voltage_V, -limit.max_voltage_V, limit.max_voltage_V);
     bounded(j, command.current_A()[j], last.current_A, -limit.max_current_A, limit.max_current_A);
     impedance(j, was, state, command);
+    last.operates = in_operation(state, j) ? 1 : 0;
     if (codes_[j] == Code::kNotFinite || worst == Code::kOk) worst = codes_[j];
   }
   return worst;
@@ -65,7 +66,8 @@ void CommandLimits::follow(const CommandImage& command) noexcept TANDEM_RT {
                 .stiffness_wish_Nm_rad = command.stiffness_Nm_rad()[j],
                 .damping_wish_Nms_rad = command.damping_Nms_rad()[j],
                 .mode = command.mode()[j],
-                .interaction = command.interaction()[j]};
+                .interaction = command.interaction()[j],
+                .operates = 1};
     position_[j].begin(last_[j].position_rad);
     velocity_[j].begin(last_[j].velocity_rad_s);
   }
@@ -147,7 +149,7 @@ void CommandLimits::velocity(std::size_t joint, const Last& was, const StateImag
   bounded(joint, reference, last.velocity_rad_s, min, max);
   last.velocity_wish_rad_s = reference;
   if (!follows || !in_operation(state, joint)) return;
-  const bool closed = is(ControlMode::kVelocity, was.mode);
+  const bool closed = is(ControlMode::kVelocity, was.mode) && was.operates != 0;
   const double measured = state.velocity_rad_s()[joint];
   const double from = closed || !std::isfinite(measured) ? was.velocity_rad_s : measured;
   if (!std::isfinite(limit.max_jerk_rad_s3)) {
@@ -179,7 +181,8 @@ void CommandLimits::torque(std::size_t joint, const Last& was, const StateImage&
   bounded(joint, reference, last.torque_Nm, -most, most);
   last.torque_wish_Nm = reference;
   if (!in_operation(state, joint)) return;
-  const bool starts = is(ControlMode::kTorque, last.mode) && !is(ControlMode::kTorque, was.mode);
+  const bool closed = is(ControlMode::kTorque, was.mode) && was.operates != 0;
+  const bool starts = is(ControlMode::kTorque, last.mode) && !closed;
   const double measured = state.torque_Nm()[joint];
   rated(joint, reference, last.torque_Nm,
         starts && std::isfinite(measured) ? measured : was.torque_Nm,
@@ -199,7 +202,7 @@ void CommandLimits::impedance(std::size_t joint, const Last& was, const StateIma
   last.stiffness_wish_Nm_rad = stiffness;
   last.damping_wish_Nms_rad = damping;
   const auto compliant = static_cast<std::int64_t>(InteractionMode::kCompliant);
-  if (last.interaction != compliant || was.interaction != compliant ||
+  if (last.interaction != compliant || was.interaction != compliant || was.operates == 0 ||
       !in_operation(state, joint)) {
     return;
   }

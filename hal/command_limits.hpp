@@ -82,6 +82,7 @@ class CommandLimits {
     double damping_wish_Nms_rad = 0.0;
     std::int64_t mode = 0;
     std::int64_t interaction = 0;
+    std::int64_t operates = 0;  // the drive followed it
   };
   void modes(std::size_t joint, CommandImage& command) noexcept TANDEM_RT;
   void position(std::size_t joint, const StateImage& state,

@@ -235,6 +235,26 @@ TEST_F(Limits, LetADriveThatIsOffHaveAnyTorque) {
   EXPECT_EQ(command.torque_Nm()[0], -20.0);
 }
 
+TEST_F(Limits, StartFromWhatIsMeasuredWhenADriveIsEnabledAgain) {
+  mode(ControlMode::kVelocity);
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kFault);
+  command.velocity_rad_s()[0] = 2.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kOperationEnabled);
+  command.velocity_rad_s()[0] = 2.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.velocity_rad_s()[0], 0.2) << "it stands";
+
+  mode(ControlMode::kTorque);
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kFault);
+  command.torque_Nm()[0] = 20.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kOperationEnabled);
+  command.torque_Nm()[0] = 20.0;
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.torque_Nm()[0], 2.0);
+}
+
 TEST_F(Limits, ChangeAnImpedanceInForceGradually) {
   const double stiffest = limits.limits()[0].max_stiffness_Nm_rad;
   const double most = limits.limits()[0].max_damping_Nms_rad;
