@@ -8,8 +8,6 @@
 namespace tandem::sim {
 namespace {
 
-constexpr int kPostures = 16;  // beside the start
-
 /// A share of a range, 0 to 1: a Weyl sequence, the same on every machine.
 class Shares {
  public:
@@ -40,12 +38,12 @@ std::size_t joint_of(const tandem_kernels& kernels, const std::string& name) {
 }
 
 std::vector<Posture> postures_within(const tandem_kernels& kernels, std::span<const double> start,
-                                     std::span<const JointRange> ranges) {
+                                     std::span<const JointRange> ranges, int more) {
   const std::size_t first = kernels.nq - kernels.joints;
   std::vector<Posture> postures;
   postures.push_back(posture_at(kernels, {start.begin(), start.end()}));
   Shares shares;
-  for (int n = 0; n < kPostures; ++n) {
+  for (int n = 0; n < more; ++n) {
     std::vector<double> q(start.begin(), start.end());
     for (std::size_t i = first; i < q.size(); ++i) {
       q[i] += std::numbers::pi * (2.0 * shares.next() - 1.0);

@@ -29,11 +29,12 @@ struct Posture {
   Eigen::LLT<Eigen::MatrixXd> factor;
 };
 
-/// `start` (nq) and a few more, drawn from a generator with a fixed seed: each joint evenly within
+/// `start` (nq) and `more`, drawn from a generator with a fixed seed: each joint evenly within
 /// its range, or a turn about its start where it has none.
 [[nodiscard]] std::vector<Posture> postures_within(const tandem_kernels& kernels,
                                                    std::span<const double> start,
-                                                   std::span<const JointRange> ranges);
+                                                   std::span<const JointRange> ranges,
+                                                   int more = 16);
 
 /// Along one joint, on the link side [kg m^2 or kg].
 struct JointInertia {

@@ -222,6 +222,9 @@ void Plant::place_surroundings(const PlantConfig& config) {
   }
   const auto postures = postures_within(*kernels_, {q(), kernels_->nq}, ranges);
   stops_ = EndStops(*kernels_, ranges, joint_inertias(*kernels_, postures), substep_ns_);
+  const auto many = postures_within(*kernels_, {q(), kernels_->nq}, ranges, 128);
+  light_ = LightJoints(*kernels_, actuators_, damping_, joint_inertias(*kernels_, many),
+                       step_stretch(integrator_), substep_ns_);
   if (!described) return;
   bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
 }
@@ -253,6 +256,7 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
   actuators_.seat_brakes(motors.position_rad);
   loops_.changed();
   bodies_.lost();
+  light_.lost();
   contact_fresh_ = vdot_fresh_ = 0;
 }
 
@@ -297,8 +301,8 @@ std::string Plant::diverged_text() const {
 }
 
 void Plant::archive(Archive& ar) {
-  ar(actuators_, contact_, bodies_, hoist_, loops_, x_, tau_, applied_tau_, vdot_, wrench_, motor_rate_,
-     pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
+  ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
+     motor_rate_, pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
      diverged_rate_);
 }
 

@@ -18,6 +18,7 @@
 #include "hal/sim/contact.hpp"
 #include "hal/sim/end_stops.hpp"
 #include "hal/sim/hoist.hpp"
+#include "hal/sim/light_joints.hpp"
 #include "hal/sim/loop_forces.hpp"
 #include "model/kernels.h"
 
@@ -27,6 +28,11 @@ enum class Integrator : std::uint8_t {
   kSemiImplicitEuler,  ///< order 1, one evaluation a sub-step; positions move with new velocities
   kRungeKutta4,        ///< order 4, four evaluations a sub-step
 };
+
+/// The sub-step in units of u, which hal/sim/stability.hpp limits.
+[[nodiscard]] constexpr double step_stretch(Integrator integrator) noexcept {
+  return integrator == Integrator::kRungeKutta4 ? 2.6 : 2.0;
+}
 
 /// One joint of the plant, in the process image's order.
 struct PlantJoint {
@@ -99,7 +105,8 @@ class Plant {
   [[nodiscard]] bool brake_closed(std::size_t joint) const noexcept {
     return actuators_.brake_closed(map_[joint]);
   }
-  /// Lets go what holds joints at power-on, for good, and starts to let the base down. Further calls do nothing.
+  /// Lets go what holds joints at power-on, for good, and starts to let the base down. Further
+  /// calls do nothing.
   void release() noexcept TANDEM_RT;
   [[nodiscard]] bool released() const noexcept { return released_ != 0 && !hoist_.holding(); }
 
@@ -169,7 +176,8 @@ class Plant {
 
   void touch_ground(const double* x, bool move_anchors) noexcept;
   void rates(const double* x, MotorState motor_rate) noexcept;
-  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const double* q, const double* v) noexcept;
+  [[nodiscard]] const std::vector<double>& with_ends_and_ground(const double* q,
+                                                                const double* v) noexcept;
   void accelerate(const double* q, const double* v, const double* forces) noexcept;
   void step_semi_implicit(double h_s) noexcept;
   void step_runge_kutta(double h_s) noexcept;
@@ -182,18 +190,19 @@ class Plant {
   Integrator integrator_;
   std::int64_t substep_ns_, release_ns_;
   double rate_limit_;
-  std::size_t base_q_, base_v_;   // 7 and 6, or 0 and 0
-  std::vector<std::size_t> map_;  // joint -> model joint
+  std::size_t base_q_, base_v_;       // 7 and 6, or 0 and 0
+  std::vector<std::size_t> map_;      // joint -> model joint
   std::vector<std::size_t> passive_;  // passive joint -> model joint
   std::vector<double> damping_;       // model order
   Actuators actuators_;
   Contact contact_;
   BodyContact bodies_;
   EndStops stops_;
+  LightJoints light_;
   Hoist hoist_;
   LoopForces loops_;
 
-  std::vector<double> x_;  // q, v, th, th', i
+  std::vector<double> x_;       // q, v, th, th', i
   std::vector<double> tau_;     // of actuators, joint friction and hoist
   std::vector<double> forces_;  // with what else acts, where anything does
   std::vector<double> applied_tau_, vdot_, wrench_, motor_rate_;

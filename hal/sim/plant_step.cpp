@@ -67,9 +67,12 @@ void Plant::evaluate() noexcept TANDEM_RT {
 Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
   while (duration_ns > 0) {
     if (diverged_ >= 0) return Code::kDiverged;
-    const std::int64_t step_ns = std::min(duration_ns, substep_ns_);
-    const double h_s = static_cast<double>(step_ns) * 1e-9;
     evaluate();
+    if (light_.due(time_ns_)) {
+      light_.look(*kernels_, q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
+    }
+    const std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
+    const double h_s = static_cast<double>(step_ns) * 1e-9;
     if (integrator_ == Integrator::kRungeKutta4) {
       step_runge_kutta(h_s);
     } else {

@@ -118,8 +118,7 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   const Eigen::VectorXd mode = L.matrixU().solve(eigen.eigenvectors().rightCols(1));
   Eigen::Index most = 0;
   mode.cwiseAbs().maxCoeff(&most);
-  const double stretch = config.integrator == Integrator::kRungeKutta4 ? 2.6 : 2.0;
-  return {stretch * low, place_of(k, most)};
+  return {step_stretch(config.integrator) * low, place_of(k, most)};
 }
 
 }  // namespace tandem::sim
