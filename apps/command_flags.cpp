@@ -34,6 +34,7 @@ Without --socket or --dds it is the only `tandem run` of this user.)";
 const char kEstopExamples[] = R"(Examples:
   tandem estop                                       with the category of robot.toml's [safety]
   tandem estop --category 0                          take the torque away at once
+  tandem estop --category 2                          a safe posture first, where a controller has one
 Exit status: 0 the loop has carried it out (or simulated time stands, and it is next); 1 no stop
 is confirmed. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
 
@@ -270,8 +271,8 @@ void add_flags(CLI::App& app, FaultOptions& o) {
 }
 
 void add_flags(CLI::App& app, EstopOptions& o) {
-  app.add_option("--category", o.category, "0 or 1, instead of the robot's [safety]")
-      ->check(CLI::IsMember({0, 1}));
+  app.add_option("--category", o.category, "0, 1 or 2, instead of the robot's [safety]")
+      ->check(CLI::IsMember({0, 1, 2}));
   add_target(app, o.target);
   app.footer(kEstopExamples);
 }

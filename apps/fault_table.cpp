@@ -9,6 +9,7 @@ const char* reaction(hal::StopCategory category) {
   switch (category) {
     case hal::StopCategory::kCategory0: return "torque off";
     case hal::StopCategory::kCategory1: return "stop, torque off";
+    case hal::StopCategory::kCategory2: return "safe posture, stop, torque off";
     case hal::StopCategory::kHold: return "every joint held";
     case hal::StopCategory::kWarn: return "reported";
   }

@@ -67,6 +67,8 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
   config.after_reset = e.after_reset;
   config.on_stray = e.on_stray;
+  config.retreat_cycles =
+      static_cast<std::uint64_t>(e.retreat_s * 1e9 / static_cast<double>(e.loop.period_ns));
   config.fall = e.fall_limits();
   config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
   return config;

@@ -62,8 +62,8 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
 Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCategory category) {
   if (request.contains("category")) {
     const auto number = request["category"].get<std::int64_t>();
-    if (number != 0 && number != 1) return fail("estop: \"category\" is not 0 or 1");
-    category = number == 0 ? hal::StopCategory::kCategory0 : hal::StopCategory::kCategory1;
+    if (number < 0 || number > 2) return fail("estop: \"category\" is not 0, 1 or 2");
+    category = static_cast<hal::StopCategory>(number);
   }
   const std::uint32_t number = cycle.requests().emergency_stop(category);
   const rt::ClockState clock = cycle.clock_control().state();
@@ -112,7 +112,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
       "estop", ControlEffect::kStops, "emergency stop, latched; waits until the loop confirms it",
       {{.name = "category",
         .type = ControlKey::Type::kInteger,
-        .doc = "0 or 1; else what robot.toml's [safety] says"}},
+        .doc = "0, 1 or 2; else what robot.toml's [safety] says"}},
       [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
   registry.add("run.stop", ControlEffect::kChanges, "ends the run in order", {},
                [&cycle](const Json&) -> Result<Json> {

@@ -84,6 +84,15 @@ class Controller {
   [[nodiscard]] virtual Code update(const hal::CycleTime& time, const hal::StateImage& state,
                                     hal::CommandImage& command) noexcept TANDEM_RT = 0;
 
+  /// A stop of category 2 begins: from now on update() brings the robot to a posture in which less
+  /// happens when the drives are stopped, and then returns kStopped. It has the time of [faults]
+  /// retreat_s for that.
+  /// @return false: it cannot, and is stopped; its joints are held
+  [[nodiscard]] virtual bool retreat(const hal::CycleTime&, const hal::StateImage&) noexcept
+      TANDEM_RT {
+    return false;
+  }
+
   /// After the last update.
   virtual void stop() noexcept TANDEM_RT {}
 
@@ -101,7 +110,7 @@ class Controller {
 /// Another number whenever a plugin built before a change could misbehave after it: a size that a
 /// plugin sees changes it by itself, the first number is raised for everything else.
 inline constexpr std::uint32_t kControllerAbi = abi_of(
-    {3, sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::RobotConfig),
+    {4, sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::RobotConfig),
      sizeof(hal::JointConfig), sizeof(hal::ActuatorConfig), sizeof(hal::GainsConfig),
      sizeof(hal::BoardConfig), sizeof(hal::BusConfig), sizeof(hal::SensorConfig),
      sizeof(hal::ContactConfig), sizeof(hal::PostureConfig), sizeof(hal::StateImage),

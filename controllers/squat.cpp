@@ -1,5 +1,6 @@
 // squat: the feet stay, the centre of mass stays over them, the base goes down and up again.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -47,10 +48,60 @@ struct Plan {
     const MinJerk profile = min_jerk((down ? phase : period_s - phase) / half);
     return {depth_m * profile.s, (down ? depth_m : -depth_m) * profile.ds / half};
   }
+  /// The rate's own rate [m/s^2], downward.
+  [[nodiscard]] double acceleration_m_s2(double t_s) const noexcept TANDEM_RT {
+    const double since = t_s - start_s;
+    if (since <= 0.0 || since >= cycles * period_s) return 0.0;
+    const double half = period_s / 2.0;
+    const double phase = std::fmod(since, period_s);
+    return depth_m * min_jerk((phase < half ? phase : period_s - phase) / half).dds / (half * half);
+  }
+  /// That a motion from `t_s` to the lowest point takes: what is left of the way down, or a way.
+  [[nodiscard]] double to_the_bottom_s(double t_s) const noexcept TANDEM_RT {
+    const double since = t_s - start_s;
+    const double half = period_s / 2.0;
+    const double phase =
+        since > 0.0 && since < cycles * period_s ? std::fmod(since, period_s) : 0.0;
+    return phase < half ? half - phase : half;
+  }
   [[nodiscard]] double peak_rate_m_s() const { return kMinJerkPeak * depth_m / (period_s / 2.0); }
   [[nodiscard]] bool over(double t_s) const noexcept TANDEM_RT {
     return settle_s >= 0.0 && t_s >= start_s + cycles * period_s + settle_s;
   }
+};
+
+/// From a motion to rest at `end_m` in `time_s`: the polynomial of fifth order that continues
+/// position, velocity and acceleration.
+class Retreat {
+ public:
+  Retreat() = default;
+  Retreat(const Plan::Way& from, double acceleration_m_s2, double end_m, double time_s) noexcept
+      : time_s_(time_s), end_m_(end_m) {
+    const double way = end_m - from.down_m, v = from.rate_m_s * time_s,
+                 a = acceleration_m_s2 * time_s * time_s;
+    c_ = {from.down_m,
+          v,
+          a / 2.0,
+          10.0 * way - 6.0 * v - 1.5 * a,
+          -15.0 * way + 8.0 * v + 1.5 * a,
+          6.0 * way - 3.0 * v - 0.5 * a};
+  }
+  [[nodiscard]] Plan::Way at(double t_s) const noexcept TANDEM_RT {
+    if (over(t_s)) return {end_m_, 0.0};
+    const double x = t_s / time_s_;
+    Plan::Way way;
+    for (std::size_t i = c_.size(); i-- > 0;) {
+      way.rate_m_s = way.rate_m_s * x + way.down_m;
+      way.down_m = way.down_m * x + c_[i];
+    }
+    way.rate_m_s /= time_s_;
+    return way;
+  }
+  [[nodiscard]] bool over(double t_s) const noexcept TANDEM_RT { return t_s >= time_s_; }
+
+ private:
+  double time_s_ = 0.0, end_m_ = 0.0;
+  std::array<double, 6> c_{};
 };
 
 class Squat : public Controller {
@@ -82,6 +133,7 @@ class Squat : public Controller {
   void start(const hal::CycleTime& time, const hal::StateImage& state,
              hal::CommandImage&) noexcept TANDEM_RT override {
     start_ns_ = time.time_ns;
+    retreats_ = 0;
     std::ranges::copy(state.position_rad(), measured_.begin());
     height_m_ = stance_->place(state.position_rad());
     standing_ = stance_->solve(height_m_, kFirstSolve).converged;
@@ -92,7 +144,8 @@ class Squat : public Controller {
               hal::CommandImage& command) noexcept TANDEM_RT override {
     if (standing_ == 0) return Code::kFault;
     const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
-    const Plan::Way way = plan_.at(t_s);
+    const double back_s = static_cast<double>(time.time_ns - retreat_ns_) * 1e-9;
+    const Plan::Way way = retreats_ != 0 ? retreat_.at(back_s) : plan_.at(t_s);
     stance_->predict(period_s_);
     if (!stance_->solve(height_m_ - way.down_m, kCycleSolve).converged) return Code::kFault;
     stance_->move(-way.rate_m_s);
@@ -103,11 +156,23 @@ class Squat : public Controller {
     }
     stance_->carry(vdot_);
     write(min_jerk(t_s / plan_.approach_s), state, command);
-    return plan_.over(t_s) ? Code::kStopped : Code::kOk;
+    const bool over = retreats_ != 0 ? retreat_.over(back_s) : plan_.over(t_s);
+    return over ? Code::kStopped : Code::kOk;
+  }
+
+  /// To the lowest point, from which it does not fall far; from wherever it is amid its squat.
+  bool retreat(const hal::CycleTime& time, const hal::StateImage&) noexcept TANDEM_RT override {
+    if (standing_ == 0) return false;
+    const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    retreat_ = Retreat(plan_.at(t_s), plan_.acceleration_m_s2(t_s), plan_.depth_m,
+                       plan_.to_the_bottom_s(t_s));
+    retreat_ns_ = time.time_ns;
+    retreats_ = 1;
+    return true;
   }
 
   void archive(Archive& ar) override {
-    ar(start_ns_, height_m_, standing_, measured_, last_v_);
+    ar(start_ns_, retreat_ns_, retreats_, retreat_, height_m_, standing_, measured_, last_v_);
     if (stance_) stance_->archive(ar);
   }
 
@@ -196,6 +261,8 @@ class Squat : public Controller {
   std::optional<Stance> stance_;
   double period_s_ = 0.0;
   std::int64_t start_ns_ = 0;
+  std::int64_t retreat_ns_ = 0, retreats_ = 0;  // when it began; whether it has
+  Retreat retreat_;
   double height_m_ = 0.0;              // of the base above the feet at the start
   std::int64_t standing_ = 0;          // whether the start posture was found
   double link_damping_Nms_rad_ = 0.0;  // of the legs' joints

@@ -214,8 +214,10 @@ void read_posture(TomlTable table, const std::string& name, bool fixed_base, Rob
 
 void read_safety(TomlTable table, RobotConfig& robot) {
   const std::string stop =
-      table.choice_or("emergency_stop", "category1", {"category0", "category1"});
-  robot.emergency_stop = stop == "category0" ? StopCategory::kCategory0 : StopCategory::kCategory1;
+      table.choice_or("emergency_stop", "category1", {"category0", "category1", "category2"});
+  robot.emergency_stop = stop == "category0"   ? StopCategory::kCategory0
+                         : stop == "category2" ? StopCategory::kCategory2
+                                               : StopCategory::kCategory1;
   table.finish();
 }
 

@@ -10,7 +10,8 @@ constexpr Range kCounts{100.0, 1e12};  // per revolution; bits (20) would be far
 constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
 
 StopCategory read_stop_category(TomlTable& table) {
-  static const std::vector<std::string> kNames{"category0", "category1", "hold", "warn"};
+  static const std::vector<std::string> kNames{"category0", "category1", "category2", "hold",
+                                               "warn"};
   const auto found = std::ranges::find(kNames, table.choice_or("on_fault", "category1", kNames));
   return static_cast<StopCategory>(found - kNames.begin());
 }

@@ -15,7 +15,8 @@ enum class RunPhase : std::uint8_t {
   kResetting,  ///< faults are cleared, and every joint enabled where it is
   kShutDown,   ///< the drives stop and are disabled
   kDone,
-  kHeld,  ///< after a reset: every joint is held until controllers are started
+  kHeld,        ///< after a reset: every joint is held until controllers are started
+  kRetreating,  ///< a stop of category 2: controllers bring the robot to a safe posture
 };
 
 /// The run is over, or about to be.
@@ -31,6 +32,7 @@ enum class RunPhase : std::uint8_t {
     case RunPhase::kFaulted: return "faulted";
     case RunPhase::kResetting: return "resetting";
     case RunPhase::kHeld: return "held";
+    case RunPhase::kRetreating: return "retreating";
     case RunPhase::kShutDown: return "shut-down";
     case RunPhase::kDone: return "done";
   }

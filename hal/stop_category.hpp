@@ -11,9 +11,17 @@ namespace tandem::hal {
 enum class StopCategory : std::uint8_t {
   kCategory0 = 0,  ///< the torque is taken away at once
   kCategory1 = 1,  ///< every axis is brought to rest, then its torque is taken away
-  kHold = 2,       ///< every axis stays under control where it is
-  kWarn = 3,       ///< nothing is stopped: it is told
+  /// Controllers that can go on to a posture in which less happens, for a limited time, and then
+  /// category 1: a protective stop (ISO 10218), which a standing robot survives.
+  kCategory2 = 2,
+  kHold = 3,  ///< every axis stays under control where it is
+  kWarn = 4,  ///< nothing is stopped: it is told
 };
+
+/// Whether it keeps drives from following commands at once. In category 2 they follow the retreat.
+[[nodiscard]] constexpr bool stops_drives(StopCategory category) noexcept {
+  return category != StopCategory::kCategory2 && category != StopCategory::kWarn;
+}
 
 /// Why a joint is in fault.
 enum class FaultCause : std::uint8_t {
@@ -34,6 +42,7 @@ enum class FaultCause : std::uint8_t {
   switch (category) {
     case StopCategory::kCategory0: return "category0";
     case StopCategory::kCategory1: return "category1";
+    case StopCategory::kCategory2: return "category2";
     case StopCategory::kHold: return "hold";
     case StopCategory::kWarn: return "warn";
   }

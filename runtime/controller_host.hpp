@@ -158,6 +158,10 @@ class ControllerHost {
   [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT;
   void stop() noexcept TANDEM_RT;
+  /// A stop of category 2: those that can retreat go on to do so, the others are stopped.
+  /// @return false: none can, and nothing has changed
+  [[nodiscard]] bool retreat(const hal::CycleTime& time, const hal::StateImage& state,
+                             hal::CommandImage& command) noexcept TANDEM_RT;
   /// What was taken back in this cycle, of a controller and joint of which it is the first time.
   [[nodiscard]] std::optional<Stray> take_stray() noexcept TANDEM_RT {
     return std::exchange(stray_, std::nullopt);

@@ -146,6 +146,19 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   return {};
 }
 
+bool ControllerHost::retreat(const hal::CycleTime& time, const hal::StateImage& state,
+                             hal::CommandImage& command) noexcept TANDEM_RT {
+  ControllerSet retreating = 0;
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if (!is_active(slot) || (done_ & only(slot)) != 0) continue;
+    if (enter(*table_[slot]).retreat(time, state)) retreating |= only(slot);
+  }
+  leave_calls();
+  if (retreating == 0) return false;
+  (void)switch_over(active_ & ~retreating, 0, true, time, state, command);
+  return true;
+}
+
 LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, bool running,
                                      const hal::StateImage& state,
                                      hal::CommandImage& command) noexcept TANDEM_RT {

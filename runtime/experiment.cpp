@@ -103,8 +103,9 @@ void read_faults(TomlTable table, Experiment& e) {
     e.after_stop = ends ? AfterStop::kEnd : AfterStop::kWait;
   }
   e.after_reset = read_choice(table, "after_reset", {"hold", "continue"}, e.after_reset);
-  e.on_stray =
-      read_choice(table, "stray_writes", {"category0", "category1", "hold", "warn"}, e.on_stray);
+  e.on_stray = read_choice(table, "stray_writes",
+                           {"category0", "category1", "category2", "hold", "warn"}, e.on_stray);
+  e.retreat_s = table.number_or("retreat_s", e.retreat_s, {0.1, 60.0});
   if (table.has("fall")) e.falls_are_faults = table.choice("fall", {"stop", "allow"}) == "stop";
   if (table.has("watchdog_s")) e.watchdog_s = table.number("watchdog_s", {0.05, 3600.0});
   table.finish();

@@ -111,6 +111,7 @@ struct Experiment {
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
   AfterReset after_reset = AfterReset::kHold;             ///< [faults]
+  double retreat_s = 5.0;  ///< [faults]: at most, in a stop of category 2
   hal::StopCategory on_stray = hal::StopCategory::kWarn;  ///< [faults] stray_writes
   bool falls_are_faults = true;                           ///< [faults] fall = "stop", or "allow"
   std::optional<double> watchdog_s;  ///< [faults]; empty: 0.5 on the wall clock, else 5

@@ -33,10 +33,12 @@ class Requests {
     bell_->end();
   }
   void reset_faults() noexcept { ask(kReset); }
-  /// kCategory0; every other category stops as category 1.
+  /// kCategory0 or kCategory2; every other category stops as category 1.
   /// @return the stop's number, for confirmed()
   std::uint32_t emergency_stop(hal::StopCategory category) noexcept {
-    asked_.fetch_or(category == hal::StopCategory::kCategory0 ? kStop0 : kStop1,
+    asked_.fetch_or(category == hal::StopCategory::kCategory0   ? kStop0
+                    : category == hal::StopCategory::kCategory2 ? kStop2
+                                                                : kStop1,
                     std::memory_order_relaxed);
     // After its flag: whoever takes this number has taken the flag too, now or before.
     const std::uint32_t before = asked_.fetch_add(kOneStop, std::memory_order_relaxed);
@@ -73,6 +75,7 @@ class Requests {
             .reset = (asked & kReset) != 0,
             .emergency_stop = (asked & kStop0) != 0   ? hal::StopCategory::kCategory0
                               : (asked & kStop1) != 0 ? hal::StopCategory::kCategory1
+                              : (asked & kStop2) != 0 ? hal::StopCategory::kCategory2
                                                       : hal::StopCategory::kWarn,
             .by_watchdog = (asked & kWatchdog) != 0,
             .controller = hung_in_.load(std::memory_order_relaxed)};
@@ -86,7 +89,8 @@ class Requests {
 
  private:
   // One word: flags below, the count of emergency stops above them.
-  static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8, kWatchdog = 16;
+  static constexpr std::uint32_t kEnd = 1, kReset = 2, kStop0 = 4, kStop1 = 8, kWatchdog = 16,
+                                 kStop2 = 32;
   static constexpr std::uint32_t kFlags = 0xFF, kOneStop = 0x100, kNumbers = 0xFF'FFFF;
   static constexpr std::uint32_t number_of(std::uint32_t word) noexcept { return word / kOneStop; }
   void ask(std::uint32_t what) noexcept {

@@ -94,7 +94,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
     check_joints();
     check_sensors();
   }
-  if (phase_ == RunPhase::kRunning) check_fall();
+  if (phase_ == RunPhase::kRunning || phase_ == RunPhase::kRetreating) check_fall();
   check_backend(read_code_);
   advance_phase();
 }
@@ -145,6 +145,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;
+    case RunPhase::kRetreating: go_on_retreating(); break;
     case RunPhase::kFaulted:
     case RunPhase::kShutDown:
       if (reaction_ == hal::StopCategory::kCategory0) {
@@ -187,6 +188,15 @@ void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
          .code = static_cast<std::uint32_t>(code),
          .source = FaultSource::kController,
          .category = hal::StopCategory::kCategory1});
+}
+
+/// Until they have brought the robot to its posture, or their time is over.
+void RobotCycle::go_on_retreating() noexcept TANDEM_RT {
+  const Code code = controllers_->update(time_, state_, controlled());
+  if (delay_.on()) delay_.pass(wanted_, command_);
+  if (code != Code::kOk && code != Code::kStopped) return controllers_answered(code);
+  const bool late = time_.cycle - phase_began_ >= config_.retreat_cycles;
+  if (late || code == Code::kStopped) react(hal::StopCategory::kCategory1);
 }
 
 void RobotCycle::stamp(hal::CommandImage& command) const noexcept TANDEM_RT {

@@ -40,6 +40,7 @@ struct CycleConfig {
   AfterReset after_reset = AfterReset::kHold;
   /// Of a controller that writes what it has not claimed, which never reaches a drive.
   hal::StopCategory on_stray = hal::StopCategory::kWarn;
+  std::uint64_t retreat_cycles = 5'000;  ///< at most, in a stop of category 2
   std::uint32_t lost_after_cycles = 10;  ///< feedback older than this is a lost joint or sensor
   std::uint32_t delay_cycles = 0;        ///< between the controllers and the limits
   FallLimits fall = {};                  ///< watched where there is truth
@@ -67,6 +68,9 @@ struct CycleParts {
 ///                             or in a fault with AfterStop::kEnd
 ///   any        -> kFaulted    in a fault of category "hold", 0 or 1: the stop is carried out and
 ///                             latched. Bring-up and shut-down excepted.
+///   kRunning   -> kRetreating in a fault of category 2, when a controller can bring the robot to a
+///                             safe posture; to kFaulted when it has, or after retreat_cycles. With
+///                             none that can it is category 1.
 ///   kFaulted   -> kResetting  when a reset is requested: every joint is enabled where it is
 ///   kResetting -> kHeld       when they follow; back to kFaulted when a cause is still there.
 ///                             kSettling with AfterReset::kContinue, or when no controller was
@@ -168,6 +172,7 @@ class RobotCycle {
   [[nodiscard]] bool is_lost(std::size_t joint) const noexcept TANDEM_RT;
   void fault(FaultRecord record) noexcept TANDEM_RT;
   void react(hal::StopCategory category) noexcept TANDEM_RT;
+  [[nodiscard]] bool retreat() noexcept TANDEM_RT;
   void begin_reset() noexcept TANDEM_RT;
   void watch_reset() noexcept TANDEM_RT;
   void reset_done() noexcept TANDEM_RT;
@@ -176,6 +181,7 @@ class RobotCycle {
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
   void run_controllers() noexcept TANDEM_RT;
+  void go_on_retreating() noexcept TANDEM_RT;
   void controllers_answered(Code code) noexcept TANDEM_RT;
   void start_controllers() noexcept TANDEM_RT;
   [[nodiscard]] bool go_on_from_robot() noexcept TANDEM_RT;
@@ -222,6 +228,7 @@ class RobotCycle {
   bool started_ = false;                                   // the first cycle was
   bool controlling_ = false;                               // controllers are started
   ControllerSet held_back_ = 0;                            // active before the reset
+  ControllerSet before_retreat_ = 0;                       // active then
   bool joint_fault_ = false;                               // of some joint one is latched
   hal::StopCategory reaction_ = hal::StopCategory::kWarn;  // the hardest that is latched
   Code read_code_ = Code::kOk;

@@ -1,5 +1,6 @@
 // Faults of a run, from the cycle that notices one to the reset: noted, reacted to, cleared.
 #include <algorithm>
+#include <utility>
 
 #include "rt/stop_signal.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -16,7 +17,9 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
     emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
   }
   if (asked.by_watchdog) {
-    emergency_stop(EmergencyInput::kWatchdog, robot_->emergency_stop, asked.controller);
+    // Not category 2: who hung cannot be trusted to retreat.
+    emergency_stop(EmergencyInput::kWatchdog,
+                   std::min(robot_->emergency_stop, StopCategory::kCategory1), asked.controller);
   }
   if (rt::take_emergency_stop()) emergency_stop(EmergencyInput::kSignal, robot_->emergency_stop);
   if (asked.reset) begin_reset();
@@ -128,6 +131,11 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
 
 void RobotCycle::react(StopCategory category) noexcept TANDEM_RT {
   if (category == StopCategory::kWarn) return;
+  if (phase_ == RunPhase::kRetreating && category >= StopCategory::kCategory2) return;
+  if (category == StopCategory::kCategory2) {
+    if (retreat()) return;
+    category = StopCategory::kCategory1;  // nobody can
+  }
   reaction_ = std::min(reaction_, category);
   backend_->stop(category);
   if (phase_ == RunPhase::kShutDown) return;
@@ -138,6 +146,18 @@ void RobotCycle::react(StopCategory category) noexcept TANDEM_RT {
   } else if (phase_ != RunPhase::kFaulted) {
     go(RunPhase::kFaulted);
   }
+}
+
+/// The drives go on to follow those controllers that can bring the robot to a safe posture.
+bool RobotCycle::retreat() noexcept TANDEM_RT {
+  if (phase_ != RunPhase::kRunning || !controlling_) return false;
+  const ControllerSet active = controllers_->shown().active;
+  if (!controllers_->retreat(time_, state_, controlled())) return false;
+  before_retreat_ = active;
+  spent_ += time_.cycle - phase_began_;
+  phase_ = RunPhase::kRetreating;  // not go(), which stops controllers
+  phase_began_ = time_.cycle;
+  return true;
 }
 
 /// Nothing latched: nothing to do, and no bump.
@@ -190,10 +210,11 @@ void RobotCycle::reset_done() noexcept TANDEM_RT {
 /// process, which comes and goes by itself, and holds its own controllers back.
 void RobotCycle::hold_back() noexcept TANDEM_RT {
   if (config_.after_reset == AfterReset::kContinue) return;
-  const ControllerSet active = controllers_->shown().active;
+  const ControllerSet now = controllers_->shown().active;
+  const ControllerSet active = now | std::exchange(before_retreat_, ControllerSet{0});
   if (active == 0) return;
   if (go_on_from_robot()) limits_.follow(command_);
-  (void)controllers_->switch_over(active, 0, false, time_, state_, controlled());
+  (void)controllers_->switch_over(now, 0, false, time_, state_, controlled());
   held_back_ |= seat_.port != nullptr ? active & ~only(seat_.slot) : active;
 }
 

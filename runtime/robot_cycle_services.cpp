@@ -19,6 +19,7 @@ void RobotCycle::take_services() noexcept TANDEM_RT {
 
 LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
+  if (phase_ == RunPhase::kRetreating) return {.refusal = Refusal::kNotEnabled};
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: {

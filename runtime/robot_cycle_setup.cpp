@@ -56,8 +56,8 @@ void RobotCycle::archive(Archive& ar) {
   statistics_.archive(ar);
   fall_watch_.archive(ar);
   controllers_->archive(ar);
-  ar(time_, phase_, started_, controlling_, held_back_, joint_fault_, reaction_, read_code_,
-     phase_began_, spent_, ran_);
+  ar(time_, phase_, started_, controlling_, held_back_, before_retreat_, joint_fault_, reaction_,
+     read_code_, phase_began_, spent_, ran_);
   ar(joint_faulted_, sensor_lost_, joint_limited_, faults_);
 }
 

@@ -29,7 +29,7 @@ class AxisMaster {
     kBringUp,    ///< the same as kEnable, and a fault from before this master's time is cleared
     kEnable,     ///< walk to Operation Enabled, hold the measured position
     kFollow,     ///< the command image
-    kHold,       ///< keep the position that it has (stop category 2)
+    kHold,       ///< keep the position that it has
     kQuickStop,  ///< stop category 1
     kReset,      ///< clear the drive's fault; then it waits, disabled
   };
@@ -65,8 +65,8 @@ class AxisMaster {
   void set_goal(Goal goal, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Makes the raw command of the goal; kFollow takes it from the image.
   /// @return true when a reset or a re-enabling has just failed and was latched.
-  bool command(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept
-      TANDEM_RT;
+  bool command(const CommandImage* image, std::size_t joint,
+               std::int64_t now_ns) noexcept TANDEM_RT;
 
   /// The joint's fields of the image.
   void fill(StateImage& state, std::size_t joint) const noexcept TANDEM_RT;

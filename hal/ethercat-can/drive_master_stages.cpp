@@ -149,7 +149,7 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
     }
     if (is_new) worst = std::min(worst, category(joint));
   }
-  if (worst != StopCategory::kWarn) react(worst);
+  if (stops_drives(worst)) react(worst);
 }
 
 void DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
@@ -276,7 +276,7 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM
       if (stage == Stage::kEnabling) return fail();
     }
   }
-  if (worst != StopCategory::kWarn) react(worst);
+  if (stops_drives(worst)) react(worst);
 }
 
 bool DriveMaster::Impl::all_enabled() const noexcept TANDEM_RT {

@@ -82,6 +82,7 @@ hal::Phase RemoteBackend::phase() const noexcept {
     case RunPhase::kSettling:
     case RunPhase::kResetting:
     case RunPhase::kHeld: return hal::Phase::kBringUp;
+    case RunPhase::kRetreating:
     case RunPhase::kFaulted:
     case RunPhase::kShutDown:
     case RunPhase::kDone: break;

@@ -97,6 +97,41 @@ void collapse(const std::string& robot, hal::StopCategory category) {
   EXPECT_LT(run.kinetic_J(), 0.05);
 }
 
+/// The stop of `category` amid COMAN's squat, and the fall after it.
+struct Fall {
+  Fall(hal::StopCategory category, int after) {
+    run.run_to(RunPhase::kRunning);
+    run.steps(after);
+    (void)run.cycle->requests().emergency_stop(category);
+    for (int i = 0; i < 9000; ++i) {
+      EXPECT_TRUE(run.cycle->step());
+      if (run.cycle->phase() != RunPhase::kFaulted) continue;
+      if (begin_J == 0.0) {
+        begin_J = run.energy_J();
+        from_m = run.plant().q()[2];
+      }
+      most_J = std::max(most_J, run.energy_J());
+    }
+    EXPECT_FALSE(run.plant().diverged()) << run.plant().diverged_text();
+  }
+  Collapse run{"coman", "squat"};
+  double begin_J = 0.0, most_J = 0.0, from_m = 0.0;
+};
+
+// Also with straight arms on the ground, whose shoulder yaw the sub-step does not integrate.
+TEST(Collapse, OfComanGainsNoEnergyAndIsFromItsLowestPointAfterARetreat) {
+  for (const int after : {500, 2000}) {  // standing, going down
+    SCOPED_TRACE(after);
+    const Fall hard(hal::StopCategory::kCategory1, after);
+    const Fall soft(hal::StopCategory::kCategory2, after);
+    for (const Fall* fall : {&hard, &soft}) {
+      EXPECT_GT(fall->begin_J, 10.0);
+      EXPECT_LT(fall->most_J, fall->begin_J + 1.0) << "the motors brake, and springs give little";
+    }
+    EXPECT_LT(soft.from_m, hard.from_m);
+  }
+}
+
 // Without dampers and friction the ground's forces are the slope of its springs' energy: an
 // independent way to every entry of J^T f.
 TEST(Collapse, LiesOnForcesThatAreTheSlopeOfTheGroundsEnergy) {

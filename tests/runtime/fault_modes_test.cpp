@@ -87,7 +87,10 @@ TEST_P(Category, IsWhatTheOtherJointsDoWhenABoardDies) {
   const DriveMotion others = rig.axis(1).machine().motion();
   switch (GetParam()) {
     case hal::StopCategory::kCategory0: EXPECT_EQ(others, DriveMotion::kNone); break;
-    case hal::StopCategory::kCategory1: EXPECT_NE(others, DriveMotion::kFollow); break;
+    case hal::StopCategory::kCategory1:
+    case hal::StopCategory::kCategory2:  // the sine cannot retreat
+      EXPECT_NE(others, DriveMotion::kFollow);
+      break;
     case hal::StopCategory::kHold:
       EXPECT_EQ(others, DriveMotion::kFollow);
       EXPECT_EQ(rig.backend->phase(), hal::Phase::kFault);
@@ -102,7 +105,8 @@ TEST_P(Category, IsWhatTheOtherJointsDoWhenABoardDies) {
 
 INSTANTIATE_TEST_SUITE_P(Fault, Category,
                          testing::Values(hal::StopCategory::kCategory0,
-                                         hal::StopCategory::kCategory1, hal::StopCategory::kHold,
+                                         hal::StopCategory::kCategory1,
+                                         hal::StopCategory::kCategory2, hal::StopCategory::kHold,
                                          hal::StopCategory::kWarn),
                          [](const auto& one) { return "category" + std::to_string(one.index); });
 

@@ -1,5 +1,6 @@
 // The rows of docs/faults.md about COMAN: 29 joints on 15 boards and five buses, standing on its
-// own feet in the middle of a squat. A fixed arm cannot fall, lie on the ground, or be held upright.
+// own feet in the middle of a squat. A fixed arm cannot fall, lie on the ground, or be held
+// upright.
 #include <csignal>
 #include <thread>
 
@@ -84,6 +85,25 @@ struct ComanRig : Squat {
   [[nodiscard]] double height_m() const { return backend->plant().q()[2]; }
 };
 
+/// COMAN with a controller of the test instead of its squat.
+struct OtherRig : ComanRig {
+  OtherRig(const CycleConfig& config, const char* name, std::shared_ptr<Controller> controller,
+           const std::string& its_parameters = "")
+      : ComanRig(config) {
+    wanted.fall = experiment->fall_limits();
+    cycle.reset();
+    Experiment& e = *experiment;
+    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
+    EXPECT_TRUE(host->add(name, std::move(controller), parameters(its_parameters)));
+    CycleConfig all = wanted;
+    all.loop = e.loop;
+    all.running_cycles = 1'000'000;
+    all.settle_cycles = e.settle_cycles();
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{e.robot, *backend, *host, clock, nullptr, &backend->truth()}, all);
+  }
+};
+
 TEST(FaultRow, MasterOfComanDies) {
   ComanRig rig;
   rig.run();
@@ -164,6 +184,47 @@ TEST(FaultRow, TerminalOfComanIsClosed) {
   rt::clear_stop();
 }
 
+TEST(FaultRow, ControllerOfComanWritesWithoutAClaim) {
+  auto stray = std::make_shared<test::Stray>(0, false);
+  stray->scribbles = false;
+  OtherRig rig({.after_stop = AfterStop::kWait, .on_stray = hal::StopCategory::kCategory1}, "stray",
+               stray);
+  rig.run_to(RunPhase::kRunning);
+  rig.steps(100);
+  ASSERT_FALSE(rig.noticed()) << rig.causes();
+  stray->scribbles = true;
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the controller 'stray' wrote to this joint"), std::string::npos)
+      << rig.causes();
+}
+
+TEST(FaultRow, JointOfComanRings) {
+  ComanRig rig;
+  rig.run();
+  const auto set = rig.cycle->services().set_gains(
+      "RElbj", hal::PidLoop::kPosition, {.kp = 4e5, .kd = 4e3}, RunServices::Patience{0});
+  ASSERT_TRUE(set) << set.error().to_string();
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
+}
+
+TEST(FaultRow, RetreatOfComan) {
+  ComanRig rig;
+  rig.run_to(RunPhase::kRunning);
+  const double standing_m = rig.height_m();
+  rig.run();
+  (void)rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory2);
+  Outcome found;
+  double stopped_m = 0.0;
+  for (int i = 1; i <= 9000 && found.open < 0; ++i) {
+    (void)rig.cycle->step();
+    rig.note(found, i, rig.noticed());
+    if (rig.cycle->phase() == RunPhase::kRetreating) stopped_m = rig.height_m();
+  }
+  expect_row(found);
+  EXPECT_NEAR(stopped_m, standing_m - 0.1, 0.005) << "the squat's depth";
+}
+
 TEST(FaultRow, ResetOfComanHolds) {
   ComanRig rig;
   for (hal::JointConfig& joint : rig.experiment->robot.joints) {
@@ -194,31 +255,13 @@ TEST(FaultRow, ResetOfComanHolds) {
   EXPECT_FALSE(std::ranges::equal(rig.cycle->command().position_rad(), references));
 }
 
-/// COMAN with one knee that a controller moves so far that it falls.
-struct FallingRig : ComanRig {
-  FallingRig() {
-    wanted.fall = experiment->fall_limits();
-    cycle.reset();
-    compose("coman", 1'000'000, nullptr);
-    cycle.reset();
-    Experiment& e = *experiment;
-    host = std::make_unique<ControllerHost>(e.robot, kernels.get(), e.loop.period_ns);
-    const auto knee = std::ranges::find(e.robot.joints, "LKneeSag", &hal::JointConfig::name);
-    EXPECT_TRUE(host->add("sine",
-                          std::make_shared<Sine>(
-                              std::vector{static_cast<std::size_t>(knee - e.robot.joints.begin())}),
-                          parameters("amplitude_rad = 1.0")));
-    CycleConfig config = wanted;
-    config.loop = e.loop;
-    config.running_cycles = 1'000'000;
-    config.settle_cycles = e.settle_cycles();
-    cycle = std::make_unique<RobotCycle>(
-        CycleParts{e.robot, *backend, *host, clock, nullptr, &backend->truth()}, config);
-  }
-};
-
 TEST(FaultRow, ComanFalls) {
-  FallingRig rig;
+  const auto lowered = tandem::test::load_test_robot("coman").robot.joints;
+  const auto knee = std::ranges::find(lowered, "LKneeSag", &hal::JointConfig::name);
+  OtherRig rig(
+      {.after_stop = AfterStop::kWait}, "sine",
+      std::make_shared<Sine>(std::vector{static_cast<std::size_t>(knee - lowered.begin())}),
+      "amplitude_rad = 1.0");
   rig.run_to(RunPhase::kRunning);
   // The fault acts when the base passes what counts as fallen.
   const double limit_m = rig.wanted.fall.lowest_share * rig.wanted.fall.standing_m;

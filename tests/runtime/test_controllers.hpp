@@ -45,10 +45,16 @@ class Sine : public Controller {
     }
     return Code::kOk;
   }
+  bool retreat(const hal::CycleTime&, const hal::StateImage&) noexcept override {
+    if (retreats) ++retreating;
+    return retreats;
+  }
   void stop() noexcept override { ++stops; }
   void archive(Archive& ar) override { ar(began_ns_, middle_); }
 
   Code answer = Code::kOk;
+  bool retreats = false;  ///< it can
+  int retreating = 0;     ///< calls of retreat() that it answered so
   bool not_finite = false, allocates = false;
   std::atomic<bool> hangs{false};  ///< the next update() does not return while it is set
   int updates = 0, starts = 0, stops = 0;
@@ -88,9 +94,11 @@ class Stray : public Controller {
 
   hal::ControlMode mode = hal::ControlMode::kTorque;
   double value = 0.07;
+  bool scribbles = true;
 
  private:
   void scribble(hal::CommandImage& command) const noexcept {
+    if (!scribbles) return;
     for (std::size_t j = 0; j < command.joints(); ++j) {
       command.position_rad()[j] = value;
       command.velocity_rad_s()[j] = value;

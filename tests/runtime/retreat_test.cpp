@@ -1,0 +1,146 @@
+// The stop of category 2: controllers that can go on to a safe posture do, for a limited time, and
+// then the drives are stopped as in category 1.
+#include <csignal>
+
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/support/rt_trap.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::StopCategory;
+
+/// `able` has joint 0 and can retreat, `other` has joint 1 and cannot.
+struct RetreatRun : ::testing::Test {
+  void begin(bool can = true) {
+    const auto add = [this](const char* name, std::size_t joint) {
+      auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{joint});
+      test::Sine* made = sine.get();
+      EXPECT_TRUE(host.add(name, std::move(sine), test::parameters()));
+      return made;
+    };
+    able = add("able", 0);
+    other = add("other", 1);
+    able->retreats = can;
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{robot, backend, host, clock},
+        CycleConfig{.after_stop = AfterStop::kWait, .retreat_cycles = 200});
+    steps(100);
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+  }
+  void stop(StopCategory category) {
+    (void)cycle->requests().emergency_stop(category);
+    steps(1);
+  }
+
+  hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend{robot};
+  ControllerHost host{robot, nullptr, 1'000'000};
+  rt::WallClock clock;
+  test::Sine *able = nullptr, *other = nullptr;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST_F(RetreatRun, GoesOnUntilThePostureIsReachedAndStopsThen) {
+  begin();
+  stop(StopCategory::kCategory2);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRetreating);
+  EXPECT_EQ(backend.stops, 0U) << "the drives follow";
+  EXPECT_EQ(able->retreating, 1);
+  EXPECT_EQ(other->stops, 1) << "it cannot: its joint is held";
+  const int updates = able->updates;
+  const double held = cycle->command().position_rad()[1];
+  steps(50);
+  EXPECT_EQ(able->updates, updates + 50);
+  EXPECT_NEAR(cycle->command().position_rad()[1], held, 1e-2);
+  EXPECT_EQ(cycle->faults()[0].category, StopCategory::kCategory2);
+  able->answer = Code::kStopped;  // it is there
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory1);
+  EXPECT_EQ(able->stops, 1);
+}
+
+TEST_F(RetreatRun, EndsWhenItsTimeIsOver) {
+  begin();
+  stop(StopCategory::kCategory2);
+  steps(199);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRetreating);
+  steps(2);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory1);
+}
+
+TEST_F(RetreatRun, IsCategory1WhereNobodyCan) {
+  begin(false);
+  stop(StopCategory::kCategory2);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory1);
+}
+
+TEST_F(RetreatRun, YieldsToAHarderStopAtOnceAndToNoSofterOne) {
+  begin();
+  stop(StopCategory::kCategory2);
+  stop(StopCategory::kCategory2);
+  EXPECT_EQ(able->retreating, 1) << "once";
+  EXPECT_EQ(cycle->phase(), RunPhase::kRetreating);
+  stop(StopCategory::kCategory0);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory0);
+}
+
+TEST_F(RetreatRun, ThatGivesUpIsCategory1) {
+  begin();
+  stop(StopCategory::kCategory2);
+  able->answer = Code::kFault;
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory1);
+  EXPECT_EQ(cycle->faults().size(), 2U);
+}
+
+TEST_F(RetreatRun, TakesNoRequestsAndIsResetAsEveryStop) {
+  begin();
+  stop(StopCategory::kCategory2);
+  EXPECT_TRUE(cycle->services().recover("wrist", RunServices::Patience{0}));
+  steps(1);
+  cycle->requests().reset_faults();
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRetreating) << "no reset before it has stopped";
+  able->answer = Code::kStopped;
+  steps(1);
+  able->answer = Code::kOk;
+  cycle->requests().reset_faults();
+  steps(50);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  const int of_able = able->updates, of_other = other->updates;
+  steps(10);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_GT(able->updates, of_able);
+  EXPECT_GT(other->updates, of_other) << "both were active before the stop";
+}
+
+TEST_F(RetreatRun, GoesOnFromASnapshotAsBefore) {
+  begin();
+  stop(StopCategory::kCategory2);
+  steps(20);
+  const auto saved = cycle->save();
+  ASSERT_TRUE(saved);
+  steps(100);
+  const double then = cycle->command().position_rad()[0];
+  ASSERT_TRUE(cycle->restore(*saved));
+  EXPECT_EQ(cycle->phase(), RunPhase::kRetreating);
+  steps(100);
+  EXPECT_EQ(cycle->command().position_rad()[0], then);
+}
+
+}  // namespace
+}  // namespace tandem::runtime
