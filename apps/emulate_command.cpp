@@ -124,6 +124,19 @@ std::string interfaces_of(const hal::RobotConfig& robot) {
   return names;
 }
 
+/// How each board stopped without SYNC.
+Json boards_json(const Emulation& e) {
+  const std::vector<sim::BoardStop>& stops = e.emulator->statistics().boards;
+  Json list = Json::array();
+  for (std::size_t b = 0; b < stops.size(); ++b) {
+    list.push_back({{"name", e.subject.robot.boards[b].name},
+                    {"silent_steps", stops[b].silent_steps},
+                    {"safe_after_steps", stops[b].safe_after_steps},
+                    {"open_after_steps", stops[b].open_after_steps}});
+  }
+  return list;
+}
+
 Json summary_json(const Emulation& e, bool lockstep) {
   const sim::EmulatorStatistics& s = e.emulator->statistics();
   Json json;
@@ -136,6 +149,7 @@ Json summary_json(const Emulation& e, bool lockstep) {
   json["silent_steps"] = s.silent_steps;
   json["safe_after_steps"] = s.safe_after_steps;
   json["open_after_steps"] = s.open_after_steps;
+  json["boards"] = boards_json(e);
   json["injected"] = e.injected;
   json["frames_in"] = s.frames_in;
   json["frames_out"] = s.frames_out;

@@ -221,16 +221,28 @@ bool EmulatedRobot::all_enabled() const noexcept {
   });
 }
 
+bool EmulatedRobot::safe(std::size_t board) const noexcept TANDEM_RT {
+  const BoardNode& node = boards_[board];
+  if (node.powered == 0) return true;
+  for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+    const canopen::DriveMotion motion = node.board->axis(axis).machine().motion();
+    const bool brakes = motion == canopen::DriveMotion::kQuickStop;
+    if (!brakes && motion != canopen::DriveMotion::kNone) return false;
+  }
+  return true;
+}
+
+bool EmulatedRobot::powerless(std::size_t board) const noexcept TANDEM_RT {
+  const BoardNode& node = boards_[board];
+  return std::ranges::none_of(std::span(drive_).subspan(node.first, node.joints.size()),
+                              &firmware::AxisDrive::enabled);
+}
+
 bool EmulatedRobot::safe() const noexcept TANDEM_RT {
-  return std::ranges::all_of(boards_, [](const BoardNode& node) {
-    if (node.powered == 0) return true;
-    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
-      const canopen::DriveMotion motion = node.board->axis(axis).machine().motion();
-      const bool brakes = motion == canopen::DriveMotion::kQuickStop;
-      if (!brakes && motion != canopen::DriveMotion::kNone) return false;
-    }
-    return true;
-  });
+  for (std::size_t b = 0; b < boards_.size(); ++b) {
+    if (!safe(b)) return false;
+  }
+  return true;
 }
 
 bool EmulatedRobot::powerless() const noexcept TANDEM_RT {

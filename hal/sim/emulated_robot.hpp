@@ -105,9 +105,16 @@ class EmulatedRobot {
   /// True when every axis of every board is in Operation Enabled.
   [[nodiscard]] bool all_enabled() const noexcept;
 
-  /// No motor drives: every winding is shorted, or its bridge open.
+  [[nodiscard]] std::size_t boards() const noexcept { return boards_.size(); }
+  /// The bus that a board is on.
+  [[nodiscard]] std::size_t bus_of(std::size_t board) const noexcept { return boards_[board].bus; }
+  /// No motor of the board drives: every winding is shorted, or its bridge open.
+  [[nodiscard]] bool safe(std::size_t board) const noexcept TANDEM_RT;
+  /// Every bridge of the board is open: none of its motors has a voltage or a current.
+  [[nodiscard]] bool powerless(std::size_t board) const noexcept TANDEM_RT;
+  /// Every board is safe.
   [[nodiscard]] bool safe() const noexcept TANDEM_RT;
-  /// Every bridge is open: no motor has a voltage or a current.
+  /// Every board is powerless.
   [[nodiscard]] bool powerless() const noexcept TANDEM_RT;
 
   /// Adds a fault, between two steps. A start that has passed is the next step.

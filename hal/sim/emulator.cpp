@@ -22,6 +22,7 @@ Emulator::Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
                    hal::can::FrameWait& wait, const EmulatorConfig& config)
     : robot_(&robot), wait_(&wait), config_(config), batch_(kBatch) {
   for (hal::can::Bus* bus : buses) ports_.push_back({bus});
+  statistics_.boards.resize(robot.boards());
 }
 
 Code Emulator::poll(std::int64_t patience_ns) noexcept {
@@ -80,30 +81,41 @@ Code Emulator::step(std::int64_t now_ns) noexcept {
   }
   stepped_ns_ = now_ns;
   running_ = true;
-  bool synced = first_sync_ns_ != 0;
   first_sync_ns_ = 0;
-  for (Port& port : ports_) port.sync = false;
   for (; periods > 0; --periods) {
     const Code code = robot_->step(next_time_ns_);
     if (code != Code::kOk) return code;
     next_time_ns_ += config_.period_ns;
     ++statistics_.steps;
-    if (synced) {
-      statistics_.silent_steps = statistics_.safe_after_steps = statistics_.open_after_steps = 0;
-    } else {
-      watch_silence();
-    }
-    synced = false;  // SYNC was for the first of them
+    watch_silence();
+    for (Port& port : ports_) port.sync = false;  // it was for the first of them
     answer();
   }
   return Code::kOk;
 }
 
+namespace {
+
+/// Another step that had SYNC, or had not. `stop` is of a board or of all of them.
+void count(auto& stop, bool synced, bool safe, bool open) noexcept {
+  if (synced) {
+    stop.silent_steps = stop.safe_after_steps = stop.open_after_steps = 0;
+    return;
+  }
+  ++stop.silent_steps;
+  if (stop.safe_after_steps == 0 && safe) stop.safe_after_steps = stop.silent_steps;
+  if (stop.open_after_steps == 0 && open) stop.open_after_steps = stop.silent_steps;
+}
+
+}  // namespace
+
 void Emulator::watch_silence() noexcept {
-  EmulatorStatistics& s = statistics_;
-  ++s.silent_steps;
-  if (s.safe_after_steps == 0 && robot_->safe()) s.safe_after_steps = s.silent_steps;
-  if (s.open_after_steps == 0 && robot_->powerless()) s.open_after_steps = s.silent_steps;
+  const bool on_any = std::ranges::any_of(ports_, &Port::sync);
+  count(statistics_, on_any, robot_->safe(), robot_->powerless());
+  for (std::size_t b = 0; b < statistics_.boards.size(); ++b) {
+    const bool on_bus = ports_[robot_->bus_of(b)].sync;
+    count(statistics_.boards[b], on_bus, robot_->safe(b), robot_->powerless(b));
+  }
 }
 
 void Emulator::answer() noexcept {

@@ -17,16 +17,25 @@ struct EmulatorConfig {
   bool lockstep = false;
 };
 
+/// How a board stops without SYNC, in steps since SYNC came last on its bus. 0: not (yet). A master
+/// that dies amid its SYNCs leaves buses whose last one is older than the others'.
+struct BoardStop {
+  std::uint64_t silent_steps = 0;      ///< so far
+  std::uint64_t safe_after_steps = 0;  ///< until none of its motors drove any more
+  std::uint64_t open_after_steps = 0;  ///< until every one of its bridges was open
+};
+
 /// What has passed.
 struct EmulatorStatistics {
   std::uint64_t steps = 0;
   std::uint64_t steps_without_sync = 0;  ///< real time: the boards' own clocks went on
   std::uint64_t slipped = 0;             ///< real time: periods that were too many to be made up
-  // Since SYNC came last: steps, and after how many of them no motor drove any more, and every
-  // bridge was open. 0: not (yet).
+  // Since SYNC came last on any bus: steps, and after how many of them no motor drove any more, and
+  // every bridge was open. 0: not (yet).
   std::uint64_t silent_steps = 0;
   std::uint64_t safe_after_steps = 0;
   std::uint64_t open_after_steps = 0;
+  std::vector<BoardStop> boards;         ///< each by itself, in the robot's order
   std::uint64_t frames_in = 0;
   std::uint64_t frames_out = 0;
   std::uint64_t frames_lost = 0;         ///< answers that a bus did not take
@@ -56,7 +65,7 @@ class Emulator {
  private:
   struct Port {
     hal::can::Bus* bus;
-    bool sync = false;  ///< one has come since the last step
+    bool sync = false;  ///< one has come since the last step, or is that of the step
   };
   /// When a step is due without any further frame.
   struct Due {
