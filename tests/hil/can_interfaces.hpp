@@ -29,10 +29,10 @@ inline void shell(const std::string& command) {
   return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
 }
 
-/// Calls `done` every millisecond until it answers true. @return false after ten seconds.
+/// Calls `done` every millisecond until it answers true. @return false after `patience_s`.
 template <class Done>
-[[nodiscard]] bool eventually(Done done) {
-  const std::int64_t end = monotonic_ns() + 10'000'000'000;
+[[nodiscard]] bool eventually(Done done, std::int64_t patience_s = 10) {
+  const std::int64_t end = monotonic_ns() + patience_s * 1'000'000'000;
   while (monotonic_ns() < end) {
     if (done()) return true;
     ::usleep(1000);
@@ -89,6 +89,18 @@ class RawCan {
     std::copy(data.begin(), data.end(), frame.data);
     const std::size_t size = fd ? CANFD_MTU : CAN_MTU;
     EXPECT_EQ(::write(socket_, &frame, size), static_cast<ssize_t>(size));
+  }
+  /// From now on the kernel keeps only identifiers with `bits` where `mask` is set.
+  void keep_only(std::uint32_t bits, std::uint32_t mask) const {
+    const can_filter filter{.can_id = bits, .can_mask = mask | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    EXPECT_EQ(::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof(filter)), 0);
+  }
+  /// What the kernel has kept so far, in its order.
+  [[nodiscard]] std::vector<canfd_frame> kept() const {
+    std::vector<canfd_frame> frames;
+    canfd_frame frame{};
+    while (::recv(socket_, &frame, sizeof(frame), MSG_DONTWAIT) > 0) frames.push_back(frame);
+    return frames;
   }
   /// @return bytes that the kernel gave: 16 or 72; 0 when nothing came for five seconds.
   [[nodiscard]] std::size_t read(canfd_frame& frame) const {

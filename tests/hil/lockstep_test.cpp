@@ -51,6 +51,7 @@ class Lockstep : public test::OwnFolder {
     const auto emulated = json("robot.json");
     EXPECT_EQ(emulated["steps"], cycles);
     EXPECT_EQ(emulated["frames_lost"], 0);
+    EXPECT_EQ(emulated["silent_steps"], 0) << "each had its SYNC";
     std::printf("%s: %llu cycles, %llu frames to the boards, %llu back\n", log.c_str(),
                 static_cast<unsigned long long>(cycles),
                 emulated["frames_in"].get<unsigned long long>(),

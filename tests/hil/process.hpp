@@ -73,12 +73,26 @@ class Process {
     return wait();
   }
   [[nodiscard]] std::string output() const { return text_of(output_); }
-  /// Waits until `words` stand in the output. @return false when they do not come in ten seconds.
-  [[nodiscard]] bool says(const std::string& words) const {
-    return eventually([&] { return output().find(words) != std::string::npos; });
+  /// Waits until `words` stand in the output. @return false when the process ended without them,
+  /// or they did not come in `patience_s`.
+  [[nodiscard]] bool says(const std::string& words, std::int64_t patience_s = 10) const {
+    bool said = false;
+    const auto known = [&] {
+      const bool over = ended();  // before the look: what was said last is still seen
+      said = output().find(words) != std::string::npos;
+      return said || over;
+    };
+    return eventually(known, patience_s) && said;
   }
 
  private:
+  [[nodiscard]] bool ended() const {
+    if (id_ < 0) return true;
+    siginfo_t info{};
+    const int flags = WEXITED | WNOHANG | WNOWAIT;
+    return ::waitid(P_PID, static_cast<id_t>(id_), &info, flags) == 0 && info.si_pid != 0;
+  }
+
   std::filesystem::path output_;
   pid_t id_ = -1;
   int code_ = -1;

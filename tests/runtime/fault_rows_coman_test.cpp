@@ -1,4 +1,4 @@
-// The rows of docs/faults.md about COMAN: 29 joints on 15 boards and five buses, standing on its
+// The rows of docs/faults.md about COMAN: 29 joints on 16 boards and five buses, standing on its
 // own feet in the middle of a squat. A fixed arm cannot fall, lie on the ground, or be held
 // upright.
 #include <csignal>
