@@ -215,18 +215,24 @@ TEST_F(HilComanFault, EveryBoardStopsByItselfWhenTheMasterIsKilled) {
     EXPECT_EQ(asked.wait(), 0) << asked.output();
     return json::parse(asked.output());
   };
-  Process master(tandem({"run", file("hold.toml"), "--hal", "can", "--on-fault", "end", "--no-log",
-                         "--no-socket", "--duration", "10"}),
-                 file("run.txt"));
-  // Bring-up takes some 430 cycles, as every node has its configuration by SDO.
-  ASSERT_TRUE(master.says(" 10 %", 60)) << master.output() << robot.output();
-  ASSERT_TRUE(status()["all_enabled"].get<bool>()) << master.output();
+  // Bring-up takes some 430 cycles, as every node has its configuration by SDO. It ends in a fault
+  // where this machine sleeps for the 150 ms that a sensor node's heartbeat may be late: once more.
+  std::optional<Process> master;
+  const auto stands = [&] {
+    master.emplace(tandem({"run", file("hold.toml"), "--hal", "can", "--on-fault", "end",
+                           "--no-log", "--no-socket", "--duration", "10"}),
+                   file("run.txt"));
+    const bool runs = master->says(" 10 %", 60) && status()["all_enabled"].get<bool>();
+    if (!runs) std::printf("%s\n", master->output().c_str());
+    return runs;
+  };
+  ASSERT_TRUE(stands() || stands() || stands()) << robot.output();
   std::map<std::string, test::RawCan> emergencies;  // by bus
   for (const char* bus : {"can0", "can1", "can2", "can3", "can4"}) {
     emergencies.try_emplace(bus, bus).first->second.keep_only(kSync, 0x780);
   }
-  master.signal(SIGKILL);
-  ASSERT_EQ(master.wait(), -SIGKILL) << master.output();
+  master->signal(SIGKILL);
+  ASSERT_EQ(master->wait(), -SIGKILL) << master->output();
   ASSERT_TRUE(test::eventually([&] {
     ::usleep(500'000);
     return status()["open_after_steps"] > 0;
