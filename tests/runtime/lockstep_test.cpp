@@ -203,5 +203,52 @@ TEST(RealTimeRun, DoesNotTakeALateAnswerForTheNextOne) {
   EXPECT_EQ(cycle.state().age_cycles()[0], 0U);
 }
 
+/// The wall clock of an emulator that never sleeps.
+struct SetClock final : hal::can::FrameWait {
+  std::int64_t now_ns() noexcept override { return ns; }
+  void wait(std::int64_t, int) noexcept override {}
+  std::int64_t ns = 1'000'000'000;
+};
+
+// A master that is late and dies amid its SYNCs: the boards of the other buses stop sooner than the
+// last SYNC would say.
+TEST(RealTimeEmulator, CountsABoardsSilenceFromTheLastSyncOfItsOwnBus) {
+  Squat squat("coman");
+  auto robot =
+      sim::EmulatedRobot::create(squat.e.robot, squat.kernels.get(), squat.e.sim_robot_config());
+  ASSERT_TRUE(robot) << robot.error().to_string();
+  std::vector<std::unique_ptr<hal::can::LoopbackBus>> wires;
+  std::vector<hal::can::Bus*> far;
+  for (std::size_t b = 0; b < (*robot)->buses(); ++b) {
+    wires.push_back(std::make_unique<hal::can::LoopbackBus>());
+    far.push_back(&wires.back()->boards());
+  }
+  SetClock clock;
+  const std::int64_t period_ns = squat.e.loop.period_ns;
+  sim::Emulator emulator(**robot, far, clock, {period_ns, false});
+  const auto sync = [&](std::size_t buses) {
+    const canopen::Frame frame = canopen::make_sync();
+    for (std::size_t b = 0; b < buses; ++b) (void)wires[b]->master().send({&frame, 1});
+  };
+  const sim::EmulatorStatistics& seen = emulator.statistics();
+  ASSERT_EQ(emulator.poll(0), Code::kOk) << "powered on";
+  sync(far.size());
+  ASSERT_EQ(emulator.poll(0), Code::kOk);
+  EXPECT_EQ(seen.silent_steps, 0U);
+  clock.ns += 6 * period_ns;  // both slept
+  sync(1);
+  ASSERT_EQ(emulator.poll(0), Code::kTimeout) << "waits for the other buses";
+  clock.ns += period_ns / 2;
+  ASSERT_EQ(emulator.poll(0), Code::kOk);
+  const std::uint64_t made_up = seen.steps - 2;
+  ASSERT_GE(made_up, 6U);
+  EXPECT_EQ(seen.silent_steps, made_up - 1) << "SYNC was for the first of them";
+  for (std::size_t b = 0; b < seen.boards.size(); ++b) {
+    const bool had_sync = (*robot)->bus_of(b) == 0;
+    EXPECT_EQ(seen.boards[b].silent_steps, had_sync ? made_up - 1 : made_up) << "board " << b;
+    EXPECT_EQ(seen.boards[b].safe_after_steps, 1U) << "never enabled";
+  }
+}
+
 }  // namespace
 }  // namespace tandem::runtime
