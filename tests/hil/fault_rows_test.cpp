@@ -261,8 +261,8 @@ TEST_F(HilComanFault, EveryBoardStopsByItselfWhenTheMasterIsKilled) {
   for (const auto& [bus, ear] : emergencies) {
     std::set<std::uint32_t> heard;
     for (const canfd_frame& frame : ear.kept()) {
-      const bool first = frame.can_id != kSync && heard.insert(frame.can_id).second;
-      if (first && (frame.data[0] | frame.data[1] << 8) == kSyncLost) ++told;
+      const bool its_first = frame.can_id != kSync && heard.insert(frame.can_id).second;
+      if (its_first && (frame.data[0] | frame.data[1] << 8) == kSyncLost) ++told;
     }
   }
   EXPECT_EQ(told, kBoards);
