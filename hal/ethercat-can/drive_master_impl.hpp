@@ -88,7 +88,7 @@ struct DriveMaster::Impl {
   void advance() noexcept TANDEM_RT;
   void boot() noexcept TANDEM_RT;
   void watch() noexcept TANDEM_RT;
-  void react(StopCategory category) noexcept TANDEM_RT;
+  bool react(StopCategory category) noexcept TANDEM_RT;
   void recover() noexcept TANDEM_RT;
   void stop(StopCategory category) noexcept TANDEM_RT;
   void reset() noexcept TANDEM_RT;

@@ -149,19 +149,23 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
     }
     if (is_new) worst = std::min(worst, category(joint));
   }
-  if (stops_drives(worst)) react(worst);
+  if (stops_drives(worst)) (void)react(worst);
 }
 
-void DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
+/// @return whether an axis is to do something else than before.
+bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
   stage = Stage::kFaulted;
   const Goal goal = reaction == StopCategory::kCategory0   ? Goal::kNothing
                     : reaction == StopCategory::kCategory1 ? Goal::kQuickStop
                                                            : Goal::kHold;
+  bool changed = false;
   for (AxisMaster& axis : axes) {
-    const bool healthy = axis.trouble() == AxisTrouble::kNone;
-    axis.set_goal(healthy ? goal : Goal::kNothing, now_ns);
+    const Goal its = axis.trouble() == AxisTrouble::kNone ? goal : Goal::kNothing;
+    changed = changed || axis.goal() != its;
+    axis.set_goal(its, now_ns);
   }
+  return changed;
 }
 
 void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
@@ -169,13 +173,11 @@ void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
   latched = std::min(latched, category);
   resetting = false;
   if (stage == Stage::kFailed) return;
-  const bool harder = stage != Stage::kFaulted || category < reaction;
   if (stage == Stage::kBooting || stage == Stage::kEnabling) {
     fail();
-  } else {
-    react(category);
+  } else if (!react(category)) {
+    return;  // it has been told
   }
-  if (!harder) return;
   make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
   write_pdos();
   (void)flush();
@@ -276,7 +278,7 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM
       if (stage == Stage::kEnabling) return fail();
     }
   }
-  if (stops_drives(worst)) react(worst);
+  if (stops_drives(worst)) (void)react(worst);
 }
 
 bool DriveMaster::Impl::all_enabled() const noexcept TANDEM_RT {

@@ -250,6 +250,24 @@ TEST(Stop, StaysUntilTheResetThatEnablesEveryAxisWhereItIs) {
   }
 }
 
+TEST(Stop, WhileAResetEnablesTheAxesTakesEffectWithTheNextSync) {
+  RobotConfig robot = robot_config();
+  robot.joints[1].brake = BrakeConfig{.torque_Nm = 9.0, .release_ms = 40, .engage_ms = 10};
+  Rig rig(robot);
+  rig.bring_up();
+  rig.master->stop(StopCategory::kCategory0);
+  rig.steps(50);
+  rig.master->reset();
+  rig.steps(20);
+  ASSERT_EQ(rig.axis(0).machine().motion(), canopen::DriveMotion::kFollow);
+  ASSERT_EQ(rig.axis(1).machine().motion(), canopen::DriveMotion::kSlowDown) << "its brake opens";
+  (void)rig.read();
+  rig.master->stop(StopCategory::kCategory0);
+  (void)rig.write();
+  (void)rig.read();
+  EXPECT_TRUE(every_axis(rig, canopen::DriveMotion::kNone));
+}
+
 TEST(Stop, IsResetTogetherWithTheFaultsOfDrivesAndBoards) {
   Rig rig;
   rig.bring_up();
