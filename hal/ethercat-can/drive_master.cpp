@@ -197,6 +197,15 @@ void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
   }
 }
 
+/// A board whose answers or heartbeats are lost may hear and move on: it stops by itself now, not
+/// when it has missed its commands for long enough.
+void DriveMaster::Impl::stop_when_lost(Node& node) noexcept TANDEM_RT {
+  if (node.master.stage() != NodeMaster::Stage::kDown || node.counters_sent == 0) return;
+  node.counters_sent = 0;
+  if (shutting_down || node.plan.board < 0) return;
+  ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
+}
+
 void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
   for (Node& node : nodes) {
     node.master.process(now_ns, dt_ns, ports[node.plan.bus].sink);
@@ -213,6 +222,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
       node.master.fail(NodeTrouble::kFeedbackLost, now_ns);
     }
   }
+  for (Node& node : nodes) stop_when_lost(node);
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     axes[joint].received(joint_fresh[joint] != 0, now_ns);
     joint_fresh[joint] = 0;

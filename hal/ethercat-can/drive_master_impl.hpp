@@ -76,6 +76,7 @@ struct DriveMaster::Impl {
   void on_echo(Node& node, std::uint8_t echo, std::int64_t at_ns) noexcept TANDEM_RT;
   void on_emergency(Node& node, const canopen::Frame& frame) noexcept TANDEM_RT;
   void watch_doubles(Node& node) noexcept TANDEM_RT;
+  void stop_when_lost(Node& node) noexcept TANDEM_RT;
   void process_nodes() noexcept TANDEM_RT;
   void fill(StateImage& state) noexcept TANDEM_RT;
   void write_pdos() noexcept TANDEM_RT;

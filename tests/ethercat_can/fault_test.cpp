@@ -181,6 +181,25 @@ TEST(Fault, ABoardThatRebootsIsConfiguredAnewByTheReset) {
   EXPECT_EQ(rig.axis(5).objects().gains[0][0], 500.0F) << "what was set at run time is sent again";
 }
 
+TEST(Fault, ABoardThatCountsAsLostButStillHearsIsStoppedWithTheNextSync) {
+  Rig rig;
+  rig.bring_up();
+  const std::array<canopen::Frame, 1> told{
+      canopen::make_heartbeat(12, canopen::NmtState::kPreOperational)};
+  (void)rig.legs.boards().send(told);
+  rig.steps(1);
+  ASSERT_EQ(rig.state.fault()[4], 0x8130u);
+  rig.master->stop(StopCategory::kCategory0);
+  rig.steps(1);
+  for (const std::size_t j : {4u, 5u}) {
+    EXPECT_EQ(rig.axis(j).machine().motion(), canopen::DriveMotion::kQuickStop) << j;
+  }
+  rig.steps(1500);
+  rig.master->reset();
+  rig.leave(Phase::kBringUp, 2000);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+}
+
 bool every_axis(const Rig& rig, canopen::DriveMotion motion) {
   for (std::size_t j = 0; j < 6; ++j) {
     if (rig.axis(j).machine().motion() != motion) return false;
