@@ -44,10 +44,13 @@ double JointController::update(Action action, Mode mode, const Reference& refere
   Step step;
   if (cascaded()) {
     cascade(reference, measured, change, step);
-  } else if (action_ == Action::kFollow && mode_ == Mode::kCurrent) {
-    current_loop(reference.current_A, measured, step);
-  } else if (action_ == Action::kFollow && mode_ == Mode::kOpenLoop) {
-    step.voltage_V = reference.voltage_V;
+  } else {
+    terms_.torque_reference_Nm = 0.0;
+    if (action_ == Action::kFollow && mode_ == Mode::kCurrent) {
+      current_loop(reference.current_A, measured, step);
+    } else if (action_ == Action::kFollow && mode_ == Mode::kOpenLoop) {
+      step.voltage_V = reference.voltage_V;
+    }
   }
   terms_.transfer_V =
       change || retuned_ ? held_V - step.voltage_V : terms_.transfer_V * transfer_decay_;

@@ -78,7 +78,7 @@ class JointController {
  public:
   /// Terms of the last update(), for telemetry.
   struct Terms {
-    double torque_reference_Nm = 0.0;
+    double torque_reference_Nm = 0.0;     ///< of the cascade; 0: it does not run
     double voltage_V = 0.0;               ///< after every limit
     double transfer_V = 0.0;              ///< what is left of a mode change's step
     double position_error_rad = 0.0;      ///< of the limited reference, on the link

@@ -352,6 +352,18 @@ TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) 
   }
 }
 
+TEST(JointController, ShowsNoTorqueReferenceThatIsNotInForce) {
+  for (const Mode mode : {Mode::kCst, Mode::kCurrent, Mode::kOpenLoop}) {
+    JointController controller;
+    controller.configure(config(), kDt);
+    controller.update(Action::kFollow, Mode::kCst, reference(), measured());
+    ASSERT_NE(controller.terms().torque_reference_Nm, 0.0);
+    const Action then = mode == Mode::kCst ? Action::kBrake : Action::kFollow;
+    controller.update(then, mode, reference(), measured());
+    EXPECT_EQ(controller.terms().torque_reference_Nm, 0.0) << static_cast<int>(mode);
+  }
+}
+
 TEST(JointController, DelaysNeitherBrakeNorOpenBridgeNorALoweredLimitByTheSlope) {
   ControllerConfig c = config();
   c.torque_slope_Nm_s = 10.0;
