@@ -4,7 +4,7 @@ FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 # `request` needs most of the program built once more: it is `make test-all`'s.
-FUZZ_TARGETS ?= urdf robot experiment message mcap
+FUZZ_TARGETS ?= urdf robot experiment message sample frames mcap
 
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
