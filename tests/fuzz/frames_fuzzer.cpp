@@ -126,6 +126,14 @@ struct Wires {
     arms.take_to_boards(arms.to_boards().size());
   }
 
+  /// A board whose power comes back boots: it knows nothing of before.
+  void power(std::size_t b, bool on) {
+    if (on && !powered[b]) {
+      boards[b] = std::make_unique<firmware::Board>(hal::can::test::board_setup(robot, b));
+    }
+    powered[b] = on;
+  }
+
   [[nodiscard]] const firmware::Axis& axis(std::size_t joint) const {
     return boards[joint / kAxes]->axis(joint % kAxes);
   }
@@ -289,7 +297,7 @@ class Play {
     at.bus_voltage_V = how & 1 ? 40.0 : 10.0;
     at.temperature_C = how & 2 ? 25.0 : 130.0;
     at.emergency_stop = (how & 4) != 0;
-    wires_.powered[joint / kAxes] = (how & 8) == 0;
+    wires_.power(joint / kAxes, (how & 8) == 0);
   }
 
   void ask(unsigned what) {

@@ -32,7 +32,7 @@ using namespace tandem::remote;
 
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr int kMostSteps = 24;
-constexpr double kStrangersMark = 1.375;  // [rad] the first joint's position in a stranger's command
+constexpr double kStrangersMark = 1.375;  // [rad] first joint's position in a stranger's command
 
 
 template <class T>
@@ -134,7 +134,8 @@ class Peer {
 
 /// One participant's ways to a server.
 struct Client {
-  explicit Client(dds::Participant& of) : requests(of, kRequestTopic), commands(of, kCommandTopic) {}
+  explicit Client(dds::Participant& of)
+      : requests(of, kRequestTopic), commands(of, kCommandTopic) {}
   Peer<tandem_msgs::LinkRequest> requests;
   Peer<tandem_msgs::LinkCommand> commands;
 };
@@ -146,9 +147,9 @@ struct RobotEnd {
   std::unique_ptr<dds::Participant> at_owner = participant(domain, "owner");
   std::unique_ptr<dds::Participant> at_stranger = participant(domain, "stranger");
   std::unique_ptr<Server> server = must(Server::open(
-      *at_robot, robot(), identity(), {.max_age_cycles = 20, .admits = [this](const Sender& sender) {
-        return sender == dds::id_of(*at_owner);
-      }}));
+      *at_robot, robot(), identity(),
+      {.max_age_cycles = 20,
+       .admits = [this](const Sender& sender) { return sender == dds::id_of(*at_owner); }}));
   Client owner{*at_owner}, stranger{*at_stranger};
   hal::StateImage state{robot().shape()};
   hal::CommandImage command{robot().shape()};
@@ -161,7 +162,9 @@ struct OwnersEnd {
   OwnersEnd() {
     backend = must(RemoteBackend::connect(
         *at_owner, robot(), identity(),
-        {.name = "fuzz", .server = server->number(), .interrupted = [this] { return connected.load(); }}));
+        {.name = "fuzz",
+         .server = server->number(),
+         .interrupted = [this] { return connected.load(); }}));
     connected = true;
   }
   std::shared_ptr<dds::Domain> domain = another_domain();
@@ -182,6 +185,7 @@ class Play {
  public:
   Play(RobotEnd& robot_end, OwnersEnd& owners_end, Input input)
       : end_(robot_end), owners_(owners_end), input_(input) {
+    exchange();  // the first input, too, answers a cycle that there was
     client_ = 1 + end_.turn++ % 2;  // another one than before: its numbers begin anew
     request(end_.owner, Action::kAcquire, client_);
     require(end_.server->lease().owner() == client_);
@@ -241,7 +245,8 @@ class Play {
   void raw_command(Client& from, std::span<const std::uint64_t> known) {
     const std::uint64_t taken = end_.server->count(Verdict::kTaken);
     const auto bytes = input_.bytes(2 * std::size_t{input_.byte()});
-    const auto mark = std::bit_cast<std::array<std::uint8_t, sizeof kStrangersMark>>(kStrangersMark);
+    using Mark = std::array<std::uint8_t, sizeof kStrangersMark>;
+    const auto mark = std::bit_cast<Mark>(kStrangersMark);
     if (&from == &end_.owner && !std::ranges::search(bytes, mark).empty()) return;
     from.commands.write_bytes(bytes, known);
     if (&from == &end_.stranger) require(end_.server->count(Verdict::kTaken) == taken);
