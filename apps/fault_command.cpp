@@ -32,8 +32,8 @@ Exit show(const FaultOptions& options) {
   return Exit::kDone;
 }
 
-/// Why a reset did not succeed, with the joints whose faults are latched.
-Error failed_reset(const Json& answer, bool through) {
+/// "RKneeSag: position sensor (error code 0x7300); …": what is latched.
+std::string causes_of(const Json& answer) {
   std::string causes;
   for (const Json& fault : answer.value("faults", Json::array())) {
     if (!fault.value("latched", false)) continue;
@@ -41,13 +41,27 @@ Error failed_reset(const Json& answer, bool through) {
     causes += (causes.empty() ? "" : "; ") + (joint.empty() ? "" : joint + ": ") +
               fault.value("cause", "?");
   }
+  return causes;
+}
+
+Error faulted_again(const Json& answer) {
+  return {.message = fmt::format("the reset succeeded, and a fault followed at once ({})",
+                                 causes_of(answer)),
+          .hint = "reset a robot that lies or hangs still, then `tandem fault reset` again",
+          .file = {},
+          .key = {}};
+}
+
+/// Why a reset did not succeed, with the joints whose faults are latched.
+Error failed_reset(const Json& answer, bool through) {
   const std::string why = through ? "a cause is still there"
                                   : fmt::format("not through after {} s, in the phase {}",
                                                 kResetTime.count(), answer.value("phase", "?"));
-  return {.message = fmt::format("the reset failed, {} ({}): nothing moves", why, causes),
-          .hint = "remove the cause, then `tandem fault reset` again",
-          .file = {},
-          .key = {}};
+  return {
+      .message = fmt::format("the reset failed, {} ({}): nothing moves", why, causes_of(answer)),
+      .hint = "remove the cause, then `tandem fault reset` again",
+      .file = {},
+      .key = {}};
 }
 
 /// The run's answer once a reset is through; the last one when it takes too long.
@@ -90,8 +104,10 @@ Exit reset(const FaultOptions& options) {
     const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
     print_errors({failed_reset(answer, through)});
   }
+  const bool again = done && answer.value("latched", 0) > 0;
+  if (again) print_errors({faulted_again(answer)});
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
-  return nothing || kept || done ? Exit::kDone : Exit::kFault;
+  return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
 }
 
 }  // namespace
@@ -108,7 +124,10 @@ Exit estop_command(const EstopOptions& options) {
     print_errors({answer.error()});
     return Exit::kFault;
   }
-  fmt::print("emergency stop, {}\n", answer->value("category", "?"));
+  const std::string category = answer->value("category", "?");
+  const bool no_retreat = options.category == 2 && category == "category1";
+  fmt::print("emergency stop, {}{}\n", category,
+             no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
   if (answer->value("paused", false)) fmt::print("{}\n", kKept);
   return Exit::kDone;
 }

@@ -51,12 +51,25 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
   const RunPhase phase = cycle.progress().phase.load();
   Json answer = status(cycle);
   if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
+  if (phase == RunPhase::kRetreating) {
+    return fail("the robot is on its way to a safe posture", "reset it when that is over");
+  }
   if (phase == RunPhase::kBringUp || phase == RunPhase::kShutDown || phase == RunPhase::kDone) {
     return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
                 "a fault is reset while the run waits for it: tandem run --on-fault wait");
   }
   cycle.requests().reset_faults();
   return answer;
+}
+
+/// Category 2 is category 1 where no controller can retreat: the loop's own record tells.
+hal::StopCategory carried_out_category(const runtime::RobotCycle& cycle, std::uint64_t at_cycle,
+                                       hal::StopCategory asked) {
+  if (asked != hal::StopCategory::kCategory2) return asked;
+  for (const runtime::Fault& fault : cycle.faults()) {
+    if (fault.cycle == at_cycle && fault.category == asked) return asked;
+  }
+  return hal::StopCategory::kCategory1;
 }
 
 Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCategory category) {
@@ -73,6 +86,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
   for (;;) {
     if (const auto carried_out = cycle.requests().confirmed(number)) {
       answer["cycle"] = *carried_out;
+      answer["category"] = hal::to_string(carried_out_category(cycle, *carried_out, category));
       return answer;
     }
     if (time_stands(cycle)) {  // the loop waits, and nothing moves until it has seen the stop

@@ -36,7 +36,7 @@ void read_limits(TomlTable& table, JointConfig& joint) {
 
 std::optional<BrakeConfig> read_brake(TomlTable& table) {
   if (!table.has("brake")) return {};
-  constexpr std::int64_t kLongest_ms = 10'000;
+  constexpr std::int64_t kLongest_ms = 1'000;
   TomlTable brake = table.table("brake");
   BrakeConfig b;
   b.torque_Nm = brake.number("torque_Nm", kPositive);

@@ -125,6 +125,10 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
     event(of_sensor ? EventKind::kSensorLost : EventKind::kFault, of_joint ? record.index : -1,
           record.code);
   }
+  if (record.category == StopCategory::kCategory2 && phase_ != RunPhase::kRetreating &&
+      !retreat()) {
+    record.category = StopCategory::kCategory1;  // nobody can
+  }
   faults_.note(record);
   react(record.category);
 }
@@ -132,10 +136,6 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
 void RobotCycle::react(StopCategory category) noexcept TANDEM_RT {
   if (category == StopCategory::kWarn) return;
   if (phase_ == RunPhase::kRetreating && category >= StopCategory::kCategory2) return;
-  if (category == StopCategory::kCategory2) {
-    if (retreat()) return;
-    category = StopCategory::kCategory1;  // nobody can
-  }
   reaction_ = std::min(reaction_, category);
   backend_->stop(category);
   if (phase_ == RunPhase::kShutDown) return;

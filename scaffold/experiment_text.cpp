@@ -70,6 +70,20 @@ std::string report(const std::vector<std::string>& joints) {
                      toml_string(joints.back()));
 }
 
+/// Quoted, in the order of [[joint]].
+std::vector<std::string> legs_joints(const NewRobot& robot) {
+  std::vector<std::string> names;
+  for (const hal::JointConfig& joint : robot.config.joints) {
+    for (const Limb& limb : robot.limbs) {
+      const bool its = std::ranges::any_of(limb.joints, [&](int index) {
+        return robot.tree.joints[static_cast<std::size_t>(index)].name == joint.name;
+      });
+      if (limb.foot >= 0 && its) names.push_back(toml_string(joint.name));
+    }
+  }
+  return names;
+}
+
 }  // namespace
 
 std::string hold_text(const NewRobot& robot) {
@@ -77,11 +91,11 @@ std::string hold_text(const NewRobot& robot) {
   std::string text =
       head(robot, stands ? "Stands on its feet." : "Holds the posture it starts in.", 10.0);
   text += "\n[[controller]]\nplugin = \"hold\"\n";
-  if (stands && !robot.like.empty()) {  // an arm's light links would ring with it
+  if (stands && !robot.like.empty()) {  // light links, of arms and heads, would ring with it
     text += fmt::format(
-        "[controller.parameters]\nlink_damping_Nms_rad = {:.3g}  # guess: the links swing on their "
-        "springs\n",
-        rounded(kLikeDamping_Nms_rad * robot.scale));
+        "[controller.parameters]\njoints = [{}]  # the legs'; all others are held as they are\n"
+        "link_damping_Nms_rad = {:.3g}  # guess: the links swing on their springs\n",
+        fmt::join(legs_joints(robot), ", "), rounded(kLikeDamping_Nms_rad * robot.scale));
   }
   return text + report(robot.report);
 }

@@ -82,6 +82,19 @@ TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(Faults, OfCategory2AreCategory1WhereNoControllerCanRetreat) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("estop --category 2").out,
+            "emergency stop, category1: no active controller can bring the robot to a safe "
+            "posture\n");
+  const Outcome shown = to_run("fault show --json -");
+  const auto answer = nlohmann::json::parse(shown.out, nullptr, false);
+  EXPECT_EQ(answer["phase"], "faulted");
+  EXPECT_EQ(answer["faults"][0]["category"], "category1");
+  EXPECT_EQ(answer["faults"][0]["reaction"], "stop, torque off");
+  EXPECT_EQ(end(), 1);
+}
+
 TEST_F(Faults, AreResetWithoutAnybodyByAnExperimentThatSaysSo) {
   edit("hold.toml", "[[controller]]", "[faults]\nafter_reset = \"continue\"\n[[controller]]");
   begin("--on-fault wait");

@@ -458,7 +458,7 @@ TEST(RobotConfig, RefusesStrangeBrakesOscillationsAndRatesWithLineAndKey) {
         Case{"brake = { torque_Nm = 5, release_ms = -1, engage_ms = 5 }", "release_ms"},
         Case{"brake = { torque_Nm = 5, release_ms = 2.5, engage_ms = 5 }", "release_ms"},
         Case{"brake = { torque_Nm = 5, release_ms = 5 }", "engage_ms"},
-        Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 10001 }", "engage_ms"},
+        Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 1001 }", "engage_ms"},
         Case{"brake = { torque_Nm = 5, release_ms = 5, engage_ms = 5, colour = 1 }", "colour"},
         Case{"brake = [5, 5, 5]", "brake"}, Case{"max_oscillation = -0.1", "max_oscillation"},
         Case{"max_oscillation = 11", "max_oscillation"},

@@ -208,8 +208,8 @@ TEST(FaultRow, JointOfComanRings) {
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, RetreatOfComan) {
-  ComanRig rig;
+/// @return how high the base was when the drives were stopped
+double retreat(ComanRig& rig) {
   rig.run_to(RunPhase::kRunning);
   const double standing_m = rig.height_m();
   rig.run();
@@ -223,6 +223,28 @@ TEST(FaultRow, RetreatOfComan) {
   }
   expect_row(found);
   EXPECT_NEAR(stopped_m, standing_m - 0.1, 0.005) << "the squat's depth";
+  return stopped_m;
+}
+
+TEST(FaultRow, RetreatOfComan) {
+  ComanRig rig;
+  (void)retreat(rig);
+}
+
+TEST(FaultRow, RetreatOfComanWithBrakes) {
+  ComanRig rig;
+  for (hal::JointConfig& joint : rig.experiment->robot.joints) {
+    joint.brake = hal::BrakeConfig{.torque_Nm = 60.0, .release_ms = 30, .engage_ms = 30};
+  }
+  rig.cycle.reset();
+  rig.compose("coman", 1'000'000, nullptr);
+  const double stopped_m = retreat(rig);
+  rig.steps(3000);
+  EXPECT_NEAR(rig.height_m(), stopped_m, 0.01) << "it stays in its squat";
+  rig.reset();
+  ASSERT_TRUE(rig.cycle->services().go_on(RunServices::Patience{0}));
+  rig.steps(3000);
+  EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << rig.causes();
 }
 
 TEST(FaultRow, ResetOfComanHolds) {

@@ -191,6 +191,9 @@ TEST(NewRobot, TakesSpringsInProportionFromAnother) {
       make_robot({.urdf = path_of(kPublicRobots[5]), .name = "coman", .like = &coman});
   ASSERT_TRUE(same) << same.error().front().to_string();
   EXPECT_NEAR(same->scale, 1.0, 1e-9);
+  const std::string hold = hold_text(*same);  // its wrists would ring
+  EXPECT_NE(hold.find("\"RKneeSag\""), std::string::npos) << hold;
+  EXPECT_EQ(hold.find("Wrj"), std::string::npos) << hold;
   for (const hal::JointConfig& joint : same->config.joints) {  // like itself: the same drives
     const hal::JointConfig& theirs = read->joints[read->joint_index(joint.name)];
     EXPECT_EQ(joint.actuator, theirs.actuator) << joint.name;
