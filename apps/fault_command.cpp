@@ -18,6 +18,9 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::chrono::seconds kResetTime{30};
 
 const char kKept[] = "simulated time stands: it is done in the next cycle (tandem clock resume)";
+const char kAsked[] =
+    "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
+    "fault show)";
 
 void print_answer(const Json& answer) {
   fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
@@ -95,7 +98,7 @@ Exit reset(const FaultOptions& options) {
   const bool held = answer.value("phase", "") == "held";
   if (options.json != "-") {
     if (nothing) fmt::print("nothing is latched\n");
-    if (kept) fmt::print("{}\n", kKept);
+    if (kept) fmt::print("{}\n", kAsked);
     if (done) fmt::print("reset: every joint is enabled where it is\n");
     if (!nothing) print_answer(answer);
     if (done && held) fmt::print("held: `tandem controller start` lets the controllers go on\n");

@@ -23,17 +23,24 @@ std::string mode_of(const Json& joint) {
   return mode + yields + (in_force == mode ? "" : " (" + in_force + ")");
 }
 
+/// Its state and fault; of a drive that is not heard, whose figures are old, that alone.
+std::string drive_of(const Json& joint) {
+  constexpr std::uint32_t kLost_cycles = 10;  // as the loop has it
+  const auto age_cycles = joint.value("age_cycles", 0U);
+  if (age_cycles > kLost_cycles) return fmt::format("not heard for {} cycles", age_cycles);
+  const auto fault = joint.value("fault", 0U);
+  const std::string state = joint.value("drive_state", "");
+  return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);
+}
+
 void print_joints(const Json& joints) {
   Table table({"joint", "controller", "mode", "position [rad]", "velocity [rad/s]", "torque [Nm]",
                "drive"});
   for (const Json& joint : joints) {
-    const auto fault = joint.value("fault", 0U);
-    const std::string drive = joint.value("drive_state", "");
     const std::string owner = joint.value("controller", "");
     table.add({joint.value("joint", ""), owner.empty() ? "-" : owner, mode_of(joint),
                number(joint, "position_rad"), number(joint, "velocity_rad_s"),
-               number(joint, "torque_Nm"),
-               fault == 0 ? drive : fmt::format("{} (0x{:04X})", drive, fault)});
+               number(joint, "torque_Nm"), drive_of(joint)});
   }
   table.print(stdout);
 }

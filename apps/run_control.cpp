@@ -50,6 +50,9 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
   using runtime::RunPhase;
   const RunPhase phase = cycle.progress().phase.load();
   Json answer = status(cycle);
+  if (cycle.requests().stop_waits()) {
+    return fail("an emergency stop waits for the loop", "let it be carried out first");
+  }
   if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
   if (phase == RunPhase::kRetreating) {
     return fail("the robot is on its way to a safe posture", "reset it when that is over");

@@ -128,6 +128,21 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
   table.print(out);
 }
 
+/// A motion that was not the one that was asked for looks like one that was followed well.
+void add_limited(const RunSummary& s, Facts& facts) {
+  const std::vector<std::uint64_t> limited = s.cycle.statistics().limited_cycles();
+  const auto most = std::ranges::max_element(limited);
+  if (most == limited.end() || *most == 0) return;
+  const auto joints = limited.size() - static_cast<std::size_t>(std::ranges::count(limited, 0U));
+  facts.add("commands limited",
+            fmt::format("{} in {} of {}{}",
+                        s.composition.experiment.robot
+                            .joints[static_cast<std::size_t>(most - limited.begin())]
+                            .name,
+                        *most, counted(s.cycle.running_cycles(), "cycle"),
+                        joints > 1 ? fmt::format(", {} more joints", joints - 1) : ""));
+}
+
 }  // namespace
 
 double RunSummary::sim_s() const {
@@ -159,9 +174,11 @@ Json RunSummary::json() const {
   json["buses"] = buses_json(composition.can_buses());
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
+  const auto limited = cycle.statistics().limited_cycles();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
     json["joints"][e.robot.joints[i].name] = {{"rms_tracking_error_rad", tracking[i].rms_rad},
-                                              {"max_tracking_error_rad", tracking[i].max_rad}};
+                                              {"max_tracking_error_rad", tracking[i].max_rad},
+                                              {"limited_cycles", limited[i]}};
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["loops"] = loops_json(e.robot, cycle.statistics().loops());
@@ -187,6 +204,7 @@ void RunSummary::print(std::FILE* out) const {
     fmt::print(out, "\n");
   }
   Facts facts;
+  add_limited(*this, facts);
   if (const auto ground = cycle.statistics().ground(weight_N(*composition.kernels))) {
     facts.add("force on the ground",
               fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",

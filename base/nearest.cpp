@@ -26,14 +26,21 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return d[a.size()][b.size()];
 }
 
+std::size_t too_far(std::string_view name) { return std::max<std::size_t>(2, name.size() / 2) + 1; }
+
+/// The distance, or what a lacking unit counts.
+std::size_t nearness(std::string_view name, const std::string& candidate) {
+  const bool lacks_unit = !name.empty() && candidate.starts_with(std::string(name) + "_");
+  return std::min(distance(name, candidate), lacks_unit ? 2 : too_far(name));
+}
+
 }  // namespace
 
 std::string nearest(std::string_view name, std::span<const std::string> candidates) {
   std::string best;
-  std::size_t best_distance = std::max<std::size_t>(2, name.size() / 2) + 1;
+  std::size_t best_distance = too_far(name);
   for (const std::string& candidate : candidates) {
-    const bool lacks_unit = !name.empty() && candidate.starts_with(std::string(name) + "_");
-    const std::size_t d = std::min(distance(name, candidate), lacks_unit ? 2 : best_distance);
+    const std::size_t d = nearness(name, candidate);
     if (d < best_distance) {
       best_distance = d;
       best = candidate;
@@ -44,9 +51,12 @@ std::string nearest(std::string_view name, std::span<const std::string> candidat
 
 std::string suggest(std::string_view name, std::span<const std::string> candidates,
                     std::size_t most) {
-  if (const std::string best = nearest(name, candidates); !best.empty()) {
-    return "did you mean '" + best + "'?";
-  }
+  const std::string best = nearest(name, candidates);
+  const auto as_near = [&](const std::string& one) {
+    return !best.empty() && nearness(name, one) == nearness(name, best);
+  };
+  // Of "category0" and "category1" neither is meant by "category3": all are listed.
+  if (std::ranges::count_if(candidates, as_near) == 1) return "did you mean '" + best + "'?";
   if (candidates.empty()) return {};
   std::string text = "known: ";
   for (std::size_t i = 0; i < std::min(most, candidates.size()); ++i) {

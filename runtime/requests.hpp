@@ -33,6 +33,10 @@ class Requests {
     bell_->end();
   }
   void reset_faults() noexcept { ask(kReset); }
+  /// Whether an emergency stop was asked for that the loop has not taken yet.
+  [[nodiscard]] bool stop_waits() const noexcept {
+    return (asked_.load(std::memory_order_relaxed) & (kStop0 | kStop1 | kStop2)) != 0;
+  }
   /// kCategory0 or kCategory2; every other category stops as category 1.
   /// @return the stop's number, for confirmed()
   std::uint32_t emergency_stop(hal::StopCategory category) noexcept {

@@ -254,7 +254,9 @@ void RobotCycle::write() noexcept TANDEM_RT {
 }
 
 void RobotCycle::hand_over() noexcept TANDEM_RT {
-  if (phase_ == RunPhase::kRunning) statistics_.take(state_, command_, truth_);
+  if (phase_ == RunPhase::kRunning) {
+    statistics_.take(state_, command_, truth_, limits_.counters());
+  }
   if (recorder_ != nullptr) {
     recorder_->push(state_channel_, time_.time_ns, state_.bytes());
     recorder_->push(command_channel_, time_.time_ns, command_.bytes());

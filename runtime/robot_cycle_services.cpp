@@ -63,6 +63,8 @@ LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexc
 
 /// Starts who was active before the reset.
 LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
+  const bool stopped = phase_ == RunPhase::kFaulted || phase_ == RunPhase::kResetting;
+  if (stopped) return {.refusal = Refusal::kNotEnabled};
   if (phase_ != RunPhase::kHeld) return {.refusal = Refusal::kNotHeld};
   if (held_back_ == 0) return {.refusal = Refusal::kGone};
   return leave_hold(0, held_back_);

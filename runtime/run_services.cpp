@@ -118,7 +118,7 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       break;
     case Refusal::kNotRunning:
       error.message = "every joint is held until the controllers run";
-      error.hint = "ask again in the phase running";
+      error.hint = "ask again in the phase running; after a fault: tandem fault reset first";
       break;
     case Refusal::kConflict:
       error.message =
@@ -151,7 +151,7 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       break;
     case Refusal::kNotHeld:
       error.message = "no controllers are held back by a reset";
-      error.hint = "name those to start; while a fault is latched: tandem fault reset first";
+      error.hint = "name those to start";
       break;
     case Refusal::kIncapable:
       error.message = "cannot be put into this mode";

@@ -8,10 +8,18 @@
 namespace tandem::runtime {
 
 RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops)
-    : errors_(joints), feet_(feet), loops_(loops) {}
+    : errors_(joints), limited_(joints), feet_(feet), loops_(loops) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
-                         const hal::TruthImage* truth) noexcept TANDEM_RT {
+                         const hal::TruthImage* truth,
+                         std::span<const hal::LimitCounters> limits) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < limits.size(); ++j) {
+    const hal::LimitCounters& now = limits[j];
+    const std::uint64_t count = std::uint64_t{now.not_finite} + now.out_of_range + now.too_fast;
+    if (cycles_ > 0 && count != limited_[j].count) ++limited_[j].cycles;
+    limited_[j].count = count;
+  }
+  ++cycles_;
   const auto mode = command.mode();
   const auto wanted = command.position_rad();
   const auto measured = state.position_rad();
@@ -62,6 +70,12 @@ std::vector<TrackingError> RunStatistics::tracking() const {
   return out;
 }
 
+std::vector<std::uint64_t> RunStatistics::limited_cycles() const {
+  std::vector<std::uint64_t> cycles;
+  for (const Limited& one : limited_) cycles.push_back(one.cycles);
+  return cycles;
+}
+
 std::optional<GroundFigures> RunStatistics::ground(double weight_N) const {
   if (free_cycles_ == 0 || feet_.empty()) return std::nullopt;
   return GroundFigures{weight_N, force_sum_N_ / static_cast<double>(free_cycles_), slip_m_};
@@ -73,8 +87,8 @@ std::optional<BaseFigures> RunStatistics::base() const {
 }
 
 void RunStatistics::archive(Archive& ar) {
-  ar(errors_, feet_, loops_, free_cycles_, force_sum_N_, slip_m_, min_height_m_, max_height_m_,
-     tilt_rad_);
+  ar(errors_, limited_, cycles_, feet_, loops_, free_cycles_, force_sum_N_, slip_m_, min_height_m_,
+     max_height_m_, tilt_rad_);
 }
 
 }  // namespace tandem::runtime

@@ -5,10 +5,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
+#include "hal/command_limits.hpp"
 #include "hal/image.hpp"
 #include "hal/truth.hpp"
 
@@ -43,11 +45,14 @@ class RunStatistics {
   /// @param feet, loops  of the truth image; 0 without one.
   RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0);
 
-  /// A cycle in which the controllers ran. `truth` may be null.
+  /// A cycle in which the controllers ran. `truth` may be null; `limits` are CommandLimits' own.
   void take(const hal::StateImage& state, const hal::CommandImage& command,
-            const hal::TruthImage* truth) noexcept TANDEM_RT;
+            const hal::TruthImage* truth,
+            std::span<const hal::LimitCounters> limits) noexcept TANDEM_RT;
 
   [[nodiscard]] std::vector<TrackingError> tracking() const;
+  /// Per joint: cycles in which a controller's command was not what the joint was given.
+  [[nodiscard]] std::vector<std::uint64_t> limited_cycles() const;
   /// Empty when there was no truth, no foot, or no cycle with a free base.
   [[nodiscard]] std::optional<GroundFigures> ground(double weight_N) const;
   [[nodiscard]] std::optional<BaseFigures> base() const;
@@ -63,6 +68,10 @@ class RunStatistics {
     double max = 0.0;
     std::uint64_t count = 0;
   };
+  struct Limited {
+    std::uint64_t count = 0;   // of CommandLimits, in the last cycle that was taken
+    std::uint64_t cycles = 0;  // in which it grew
+  };
   struct Foot {
     double anchor_x = 0.0, anchor_y = 0.0;  // where it touched down
     std::uint64_t touching = 0;
@@ -70,6 +79,8 @@ class RunStatistics {
   void take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT;
 
   std::vector<Error> errors_;
+  std::vector<Limited> limited_;
+  std::uint64_t cycles_ = 0;
   std::vector<Foot> feet_;
   std::vector<LoopFigures> loops_;
   std::uint64_t free_cycles_ = 0;

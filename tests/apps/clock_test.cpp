@@ -57,6 +57,9 @@ TEST_F(Clock, KeepsAnEmergencyStopForTheNextCycle) {
   const Outcome stop = to_run("estop");
   EXPECT_NE(stop.out.find("in the next cycle"), std::string::npos) << stop.out;
   EXPECT_EQ(clock("show")["phase"], "running");
+  const Outcome early = to_run("fault reset");
+  EXPECT_EQ(early.status, 2);
+  EXPECT_NE(early.err.find("an emergency stop waits"), std::string::npos) << early.err;
   EXPECT_EQ(clock("step 1")["phase"], "faulted");
   const Outcome reset = to_run("fault reset");
   EXPECT_EQ(reset.status, 0) << reset.err;

@@ -95,6 +95,19 @@ TEST_F(Faults, OfCategory2AreCategory1WhereNoControllerCanRetreat) {
   EXPECT_EQ(end(), 1);
 }
 
+TEST_F(Faults, OfABoardLeaveNoFiguresThatLookLive) {
+  begin("--on-fault wait");
+  EXPECT_EQ(to_run("inject kind=board_kill board=board_1").status, 0);
+  until(R"("phase": "faulted")");
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const Outcome list = to_run("joint list joint1");
+  EXPECT_NE(list.out.find("not heard for "), std::string::npos) << list.out;
+  EXPECT_EQ(to_run("controller start").status, 2);
+  EXPECT_NE(to_run("controller start").err.find("tandem fault reset, then ask again"),
+            std::string::npos);
+  EXPECT_EQ(end(), 1);
+}
+
 TEST_F(Faults, AreResetWithoutAnybodyByAnExperimentThatSaysSo) {
   edit("hold.toml", "[[controller]]", "[faults]\nafter_reset = \"continue\"\n[[controller]]");
   begin("--on-fault wait");

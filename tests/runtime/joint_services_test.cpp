@@ -225,7 +225,7 @@ TEST(JointServicesOf, ARunThatDoesNotControlYetRefuseModes) {
   ASSERT_EQ(cycle.phase(), RunPhase::kSettling);
   const auto mode = cycle.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0});
   ASSERT_FALSE(mode);
-  EXPECT_EQ(mode.error().hint, "ask again in the phase running");
+  EXPECT_EQ(mode.error().hint, "ask again in the phase running; after a fault: tandem fault reset first");
   EXPECT_TRUE(
       cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0}, RunServices::Patience{0}));
   EXPECT_TRUE(cycle.services().set_gains("elbow", PidLoop::kPosition, {.kd = 9.0},

@@ -13,7 +13,7 @@ class RunStatisticsOfTwo : public testing::Test {
     command_.mode()[0] = kPosition;
     command_.position_rad()[0] = wanted;
     state_.position_rad()[0] = measured;
-    statistics_.take(state_, command_, &truth_);
+    statistics_.take(state_, command_, &truth_, limits_);
   }
   void foot(std::size_t index, double x, double force_N) {
     truth_.foot_position_m()[3 * index] = x;
@@ -23,8 +23,24 @@ class RunStatisticsOfTwo : public testing::Test {
   hal::StateImage state_{{.joints = 2, .sensor_channels = {}}};
   hal::CommandImage command_{{.joints = 2, .sensor_channels = {}}};
   hal::TruthImage truth_{2, 2};
+  std::vector<hal::LimitCounters> limits_{2};
   RunStatistics statistics_{2, 2};
 };
+
+TEST_F(RunStatisticsOfTwo, CountTheCyclesInWhichACommandWasLimited) {
+  limits_[1].too_fast = 7;  // before the controllers ran
+  take(0.0, 0.0);
+  take(0.0, 0.0);
+  EXPECT_EQ(statistics_.limited_cycles(), (std::vector<std::uint64_t>{0, 0}));
+  for (int i = 0; i < 3; ++i) {
+    ++limits_[1].too_fast;
+    limits_[1].out_of_range += 2;
+    take(0.0, 0.0);
+  }
+  limits_[0].not_finite = 1;
+  take(0.0, 0.0);
+  EXPECT_EQ(statistics_.limited_cycles(), (std::vector<std::uint64_t>{1, 3}));
+}
 
 TEST_F(RunStatisticsOfTwo, GivesRmsAndMaximumOfTheTrackingError) {
   take(0.0, 0.3);
@@ -60,7 +76,7 @@ TEST_F(RunStatisticsOfTwo, KeepsTheWorstErrorOfEachLoop) {
   for (const double error : {1e-9, 3e-9, 2e-9}) {
     truth.loop_position_error_m()[1] = error;
     truth.loop_velocity_error_m_s()[0] = 2.0 * error;
-    statistics.take(state_, command_, &truth);
+    statistics.take(state_, command_, &truth, {});
   }
   EXPECT_EQ(statistics.loops()[0].max_position_error_m, 0.0);
   EXPECT_EQ(statistics.loops()[0].max_velocity_error_m_s, 6e-9);
