@@ -160,7 +160,7 @@ class Squat : public Controller {
     return over ? Code::kStopped : Code::kOk;
   }
 
-  /// To the lowest point, from which it does not fall far; from wherever it is amid its squat.
+  /// To the lowest point, wherever in its squat it is. From there it falls less far.
   bool retreat(const hal::CycleTime& time, const hal::StateImage&) noexcept TANDEM_RT override {
     if (standing_ == 0) return false;
     const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;

@@ -6,6 +6,14 @@ namespace tandem::runtime {
 
 using log::EventKind;
 
+namespace {
+
+bool controllers_run(RunPhase phase) noexcept TANDEM_RT {
+  return phase == RunPhase::kRunning || phase == RunPhase::kRetreating;
+}
+
+}  // namespace
+
 // A run's course, one cycle: everything else in this file is one of its stages.
 
 bool RobotCycle::step() noexcept {
@@ -94,7 +102,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
     check_joints();
     check_sensors();
   }
-  if (phase_ == RunPhase::kRunning || phase_ == RunPhase::kRetreating) check_fall();
+  if (controllers_run(phase_)) check_fall();
   check_backend(read_code_);
   advance_phase();
 }
@@ -231,7 +239,7 @@ void RobotCycle::limit() noexcept TANDEM_RT {
       event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]));
       joint_limited_[j] = 1;
     }
-    if (codes[j] == Code::kNotFinite && phase_ == RunPhase::kRunning) {
+    if (codes[j] == Code::kNotFinite && controllers_run(phase_)) {
       fault({.index = joint,
              .code = static_cast<std::uint32_t>(codes[j]),
              .source = FaultSource::kCommand,

@@ -18,7 +18,7 @@ struct EmulatorConfig {
 };
 
 /// How a board stops without SYNC, in steps since SYNC came last on its bus. 0: not (yet). A master
-/// that dies amid its SYNCs leaves buses whose last one is older than the others'.
+/// that dies between two SYNCs of a cycle leaves some buses with an older last SYNC than others.
 struct BoardStop {
   std::uint64_t silent_steps = 0;      ///< so far
   std::uint64_t safe_after_steps = 0;  ///< until none of its motors drove any more

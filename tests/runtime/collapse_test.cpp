@@ -97,7 +97,7 @@ void collapse(const std::string& robot, hal::StopCategory category) {
   EXPECT_LT(run.kinetic_J(), 0.05);
 }
 
-/// The stop of `category` amid COMAN's squat, and the fall after it.
+/// COMAN is stopped in its squat, by `category`, and falls.
 struct Fall {
   Fall(hal::StopCategory category, int after) {
     run.run_to(RunPhase::kRunning);

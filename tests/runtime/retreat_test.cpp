@@ -1,5 +1,6 @@
 // The stop of category 2: controllers that can go on to a safe posture do, for a limited time, and
 // then the drives are stopped as in category 1.
+#include <cmath>
 #include <csignal>
 
 #include "rt/clock.hpp"
@@ -104,6 +105,16 @@ TEST_F(RetreatRun, ThatGivesUpIsCategory1) {
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
   EXPECT_EQ(backend.latched, StopCategory::kCategory1);
   EXPECT_EQ(cycle->faults().size(), 2U);
+}
+
+TEST_F(RetreatRun, ThatGivesNaNIsCategory1) {
+  begin();
+  stop(StopCategory::kCategory2);
+  able->not_finite = true;
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(backend.latched, StopCategory::kCategory1);
+  EXPECT_TRUE(std::isfinite(cycle->command().position_rad()[0]));
 }
 
 TEST_F(RetreatRun, TakesNoRequestsAndIsResetAsEveryStop) {
