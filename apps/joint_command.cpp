@@ -7,6 +7,7 @@
 #include "apps/console.hpp"
 #include "apps/control_client.hpp"
 #include "base/nearest.hpp"
+#include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -25,9 +26,9 @@ std::string mode_of(const Json& joint) {
 
 /// Its state and fault; of a drive that is not heard, whose figures are old, that alone.
 std::string drive_of(const Json& joint) {
-  constexpr std::uint32_t kLost_cycles = 10;  // as the loop has it
   const auto age_cycles = joint.value("age_cycles", 0U);
-  if (age_cycles > kLost_cycles) return fmt::format("not heard for {} cycles", age_cycles);
+  if (age_cycles > runtime::CycleConfig().lost_after_cycles)
+    return fmt::format("not heard for {} cycles", age_cycles);
   const auto fault = joint.value("fault", 0U);
   const std::string state = joint.value("drive_state", "");
   return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);

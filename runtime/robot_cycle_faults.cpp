@@ -209,9 +209,14 @@ void RobotCycle::reset_done() noexcept TANDEM_RT {
 /// A reset is no start: who was active waits for a second, deliberate act. Not an owner in another
 /// process, which comes and goes by itself, and holds its own controllers back.
 void RobotCycle::hold_back() noexcept TANDEM_RT {
-  if (config_.after_reset == AfterReset::kContinue) return;
   const ControllerSet now = controllers_->shown().active;
   const ControllerSet active = now | std::exchange(before_retreat_, ControllerSet{0});
+  if (config_.after_reset == AfterReset::kContinue) {  // those, too, that a retreat has stopped
+    if (active != now) {
+      (void)controllers_->switch_over(0, active & ~now, false, time_, state_, controlled());
+    }
+    return;
+  }
   if (active == 0) return;
   if (go_on_from_robot()) limits_.follow(command_);
   (void)controllers_->switch_over(now, 0, false, time_, state_, controlled());

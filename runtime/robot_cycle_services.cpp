@@ -24,7 +24,10 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: {
       const LoopAnswer answer = controllers_->remove(request.slot);
-      if (answer.refusal == Refusal::kNone) held_back_ &= ~only(request.slot);
+      if (answer.refusal == Refusal::kNone) {
+        held_back_ &= ~only(request.slot);
+        before_retreat_ &= ~only(request.slot);
+      }
       return answer;
     }
     case Kind::kGoOn: return go_on();

@@ -17,7 +17,7 @@ using hal::StopCategory;
 
 /// `able` has joint 0 and can retreat, `other` has joint 1 and cannot.
 struct RetreatRun : ::testing::Test {
-  void begin(bool can = true) {
+  void begin(bool can = true, AfterReset after_reset = AfterReset::kHold) {
     const auto add = [this](const char* name, std::size_t joint) {
       auto sine = std::make_unique<test::Sine>(std::vector<std::size_t>{joint});
       test::Sine* made = sine.get();
@@ -29,7 +29,8 @@ struct RetreatRun : ::testing::Test {
     able->retreats = can;
     cycle = std::make_unique<RobotCycle>(
         CycleParts{robot, backend, host, clock},
-        CycleConfig{.after_stop = AfterStop::kWait, .retreat_cycles = 200});
+        CycleConfig{
+            .after_stop = AfterStop::kWait, .after_reset = after_reset, .retreat_cycles = 200});
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   }
@@ -137,6 +138,21 @@ TEST_F(RetreatRun, TakesNoRequestsAndIsResetAsEveryStop) {
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_GT(able->updates, of_able);
   EXPECT_GT(other->updates, of_other) << "both were active before the stop";
+}
+
+TEST_F(RetreatRun, LetsAllGoOnAfterAResetWithoutAnybody) {
+  begin(true, AfterReset::kContinue);
+  stop(StopCategory::kCategory2);
+  able->answer = Code::kStopped;
+  steps(1);
+  able->answer = Code::kOk;
+  cycle->requests().reset_faults();
+  steps(50);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  const int of_able = able->updates, of_other = other->updates;
+  steps(10);
+  EXPECT_GT(able->updates, of_able);
+  EXPECT_GT(other->updates, of_other) << "the retreat had stopped it";
 }
 
 TEST_F(RetreatRun, GoesOnFromASnapshotAsBefore) {
