@@ -3,8 +3,7 @@ JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
-# `request` needs most of the program built once more: it is `make test-all`'s.
-FUZZ_TARGETS ?= urdf robot experiment message sample frames mcap
+FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
 .PHONY: demo test test-all unit hil rtsan fuzz clean help
 
@@ -42,7 +41,6 @@ test:
 test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
-	@$(MAKE) --no-print-directory fuzz FUZZ_TARGETS=request
 
 unit:
 	@scripts/install-dependencies test

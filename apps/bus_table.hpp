@@ -7,7 +7,7 @@
 
 #include "apps/console.hpp"
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::apps {
 

@@ -10,9 +10,9 @@
 
 #include "apps/interface_lock.hpp"
 #include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
 #include "hal/ethercat-can/socket_can_bus.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::apps {
 
@@ -48,8 +48,7 @@ class CanSockets final : public hal::can::FrameWait {
 /// nodes and take the torque from the robot that the first one moves.
 /// @param period_ns  of the loop
 /// Errors: a bus on which another master is at work; one that cannot be opened.
-[[nodiscard]] Diagnostics listen_for_masters(const hal::RobotConfig& robot,
-                                             std::int64_t period_ns);
+[[nodiscard]] Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t period_ns);
 
 /// Puts the interfaces of the command line in the place of robot.toml's: "can0=vcan0".
 /// Errors: no such form, an interface that no bus has (the nearest is suggested).

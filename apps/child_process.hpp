@@ -12,9 +12,6 @@
 
 namespace tandem::apps {
 
-/// Whether `program` is in one of $PATH's folders.
-[[nodiscard]] bool is_installed(const std::string& program);
-
 /// One child. Its standard input is empty; what it prints goes to a file.
 class ChildProcess {
  public:

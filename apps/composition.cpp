@@ -64,6 +64,7 @@ void add_controllers(Composition& c, Collector& errors) {
       continue;
     }
     const std::string doc = loaded->plugin().doc;
+    const bool retreats = (*loaded)->can_retreat();
     if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
       const Status added =
           c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
@@ -74,9 +75,36 @@ void add_controllers(Composition& c, Collector& errors) {
         continue;
       }
     }
-    c.notes.push_back({spec.name, doc, spec.active});
+    c.notes.push_back({spec.name, doc, spec.active, retreats});
   }
   errors.add(c.experiment.document.diagnostics());
+}
+
+/// Stops of category 2 that robot.toml asks for, and that no controller can carry out.
+std::optional<Error> no_retreat(const Composition& c) {
+  using hal::StopCategory;
+  const hal::RobotConfig& robot = c.experiment.robot;
+  if (std::ranges::any_of(c.notes, &ControllerNote::retreats)) return std::nullopt;
+  std::vector<std::pair<int, std::string>> keys;  // by line
+  if (robot.emergency_stop == StopCategory::kCategory2) {
+    keys.emplace_back(robot.emergency_stop_line, "safety.emergency_stop");
+  }
+  for (const hal::JointConfig& joint : robot.joints) {
+    if (joint.on_fault != StopCategory::kCategory2) continue;
+    keys.emplace_back(joint.on_fault_line, "joint." + joint.name + ".on_fault");
+  }
+  if (keys.empty()) return std::nullopt;
+  std::ranges::sort(keys);
+  const std::string more =
+      keys.size() == 1 ? "" : fmt::format(", and so will {} more", keys.size() - 1);
+  return Error{.message = fmt::format("\"category2\" will be category 1{}: no controller of {} can "
+                                      "bring the robot to a safe posture",
+                                      more, c.experiment.file),
+               .hint = "add a controller that can retreat, such as squat, or say \"category1\" "
+                       "(docs/safety.md)",
+               .file = robot.file,
+               .line = keys.front().first,
+               .key = keys.front().second};
 }
 
 /// Where the joints stand when the run starts, as far as the experiment says.
@@ -221,6 +249,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
+  if (auto warning = no_retreat(*c)) c->warnings.push_back(std::move(*warning));
   if (c->kernels.get() == nullptr) return c;
   if (e.hal.backend != runtime::BackendKind::kSim) {
     if (overrides.scenario.empty()) return c;

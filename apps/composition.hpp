@@ -47,6 +47,7 @@ struct ControllerNote {
   std::string name;
   std::string doc;     ///< its plugin's one line
   bool active = true;  ///< from the start
+  bool retreats = false;  ///< it can, in a stop of category 2
 };
 
 struct Composition {
@@ -64,7 +65,8 @@ struct Composition {
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
   std::size_t owner_slot = 0;                       ///< its in `controllers`
   std::vector<ControllerNote> notes;
-  Diagnostics warnings;  ///< start_warnings(), and links that start inside the ground
+  /// start_warnings(), links that start inside the ground, a category 2 that nobody can carry out
+  Diagnostics warnings;
 
   /// Empty without a CAN backend.
   [[nodiscard]] std::span<hal::can::SocketCanBus* const> can_buses() const {

@@ -22,6 +22,7 @@ namespace tandem::apps {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
 
 class Descriptor {
  public:
@@ -38,18 +39,25 @@ class Descriptor {
 };
 
 /// 0, or the errno of what went wrong.
-int connect_to(const Descriptor& descriptor, const sockaddr_un& address) {
+int connect_to(const Descriptor& descriptor, const sockaddr_un& address,
+               std::chrono::milliseconds patience) {
   if (descriptor.get() < 0) return errno;
+  // A process that is stopped accepts nobody: once enough wait before us, connect() waits, too.
+  const timeval wait{.tv_sec = patience / 1s, .tv_usec = patience % 1s / 1us};
+  (void)::setsockopt(descriptor.get(), SOL_SOCKET, SO_SNDTIMEO, &wait, sizeof wait);
   const auto* raw = reinterpret_cast<const sockaddr*>(&address);
   return ::connect(descriptor.get(), raw, sizeof address) == 0 ? 0 : errno;
 }
 
-/// Whoever listens must be this user, or root. Root may ask anybody's process when it names it.
+/// Whoever listens must be this user, or root. Root may ask anybody's process when it names it, and
+/// nobody else may have put another one in its place.
 Status check_listener(int descriptor, const std::string& path) {
   const std::int64_t user = peer_user(descriptor);
-  if (user == ::geteuid() || user == 0) return {};
   const bool named = std::filesystem::path(path).parent_path() != control_folder();
-  if (::geteuid() == 0 && named && user >= 0) return {};
+  const bool trusted = user == ::geteuid() || user == 0 || (::geteuid() == 0 && named && user >= 0);
+  if (trusted) {
+    return named ? check_socket_folder(path, static_cast<uid_t>(user)) : Status{};
+  }
   return fail(fmt::format("what listens at {} belongs to user {}, not to you: nothing was asked",
                           path, user),
               "name your own run's socket with --socket, or stop the robot by its own means");
@@ -64,8 +72,19 @@ bool owner_is_dead(const std::string& name) {
   return named && pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH;
 }
 
-/// Sends all of `out`, then receives up to the end of a line, both by `deadline`.
-Result<std::string> exchange(int fd, std::string out, SteadyClock::time_point deadline) {
+Error no_answer(std::chrono::milliseconds patience) {
+  return {.message = fmt::format("no answer within {:g} s", patience / 1.0s),
+          .hint = patience == kStopAnswer ? "a process that was stopped carries the stop out when "
+                                            "it goes on; until then stop the robot by its own stop "
+                                            "circuit"
+                                          : "is the process stopped, or very busy?",
+          .file = {},
+          .key = {}};
+}
+
+/// Sends all of `out`, then receives up to the end of a line, both in `patience` from now on.
+Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds patience) {
+  const auto deadline = SteadyClock::now() + patience;
   std::string in;
   while (!in.ends_with('\n')) {
     const auto left =
@@ -74,7 +93,7 @@ Result<std::string> exchange(int fd, std::string out, SteadyClock::time_point de
     const int ready =
         ::poll(&watched, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
     if (ready < 0 && errno == EINTR) continue;
-    if (ready <= 0) return fail("no answer in time", "is the process stopped, or very busy?");
+    if (ready <= 0) return std::unexpected(no_answer(patience));
     char bytes[4096];
     const ssize_t count = out.empty()
                               ? ::recv(fd, bytes, sizeof bytes, MSG_DONTWAIT)
@@ -101,6 +120,10 @@ class SocketClient : public ControlClient {
 
 }  // namespace
 
+std::chrono::milliseconds answer_time(const Json& question) {
+  return question.value("do", "") == "estop" ? kStopAnswer : 5000ms;
+}
+
 Result<sockaddr_un> control_address(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -118,7 +141,7 @@ bool control_socket_alive(const std::string& path) {
   const Result<sockaddr_un> address = control_address(path);
   if (!address) return false;
   const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  const int error = connect_to(descriptor, *address);
+  const int error = connect_to(descriptor, *address, 0ms);  // it does not block
   return error == 0 || error == EAGAIN;  // EAGAIN: it listens, and others wait before us
 }
 
@@ -156,22 +179,25 @@ Result<std::string> find_control_socket(const std::string& path, const std::stri
   }
   std::string list;
   for (const std::string& one : running) list += "\n  --socket " + one;
-  return fail(fmt::format("{} running `{}`", running.size(), what), "say which:" + list);
+  return fail(fmt::format("{} running `{}`, and none of them was asked", running.size(), what),
+              "say which:" + list);
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {
   const Result<sockaddr_un> address = control_address(path);
   if (!address) return std::unexpected(address.error());
   const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  if (const int error = connect_to(descriptor, *address); error != 0) {
+  const std::chrono::milliseconds patience = answer_time(question);
+  const int error = connect_to(descriptor, *address, patience);
+  if (error == EAGAIN) return std::unexpected(no_answer(patience));
+  if (error != 0) {
     return fail(fmt::format("nobody listens at {}: {}", path, std::strerror(error)),
                 "is the process running?");
   }
   if (const Status ours = check_listener(descriptor.get(), path); !ours) {
     return std::unexpected(ours.error());
   }
-  const auto deadline = SteadyClock::now() + std::chrono::milliseconds(kControlAnswer_ms);
-  const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", deadline);
+  const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", patience);
   if (!line) return std::unexpected(line.error());
   return read_answer(*line, "what listens at " + path);
 }

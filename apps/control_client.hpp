@@ -4,6 +4,7 @@
 
 #include <sys/un.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,8 +16,11 @@
 
 namespace tandem::apps {
 
-/// How long ask() waits for an answer.
-inline constexpr int kControlAnswer_ms = 5000;
+/// How long an emergency stop waits for its answer: who asks has to know soon that nothing stops
+/// the robot. More than the longest time in which a run looks for the loop's confirmation.
+inline constexpr std::chrono::milliseconds kStopAnswer{3000};
+/// How long ask() waits for the answer to `question`: kStopAnswer, or 5 s.
+[[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
 
 /// The socket's address. Errors: a path that is empty, or longer than the 107 bytes of one.
 [[nodiscard]] Result<sockaddr_un> control_address(const std::string& path);
@@ -35,7 +39,7 @@ inline constexpr int kControlAnswer_ms = 5000;
                                                       const std::string& kind);
 
 /// Sends `question` and waits for its answer.
-/// Errors: nobody listens; no answer in time; {"ok": false}, with its error and hint.
+/// Errors: nobody listens; no answer within answer_time(); {"ok": false}, with its error and hint.
 [[nodiscard]] Result<Json> ask(const std::string& path, const Json& question);
 
 /// An answer's text. Errors: {"ok": false}, with its error and hint; what is no answer, which names
@@ -51,7 +55,7 @@ class ControlClient {
   /// Errors: find_control_socket()'s, or open_dds_client()'s.
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> open(const ControlTarget& target,
                                                                    const std::string& kind);
-  /// Errors: nobody is there; no answer within kControlAnswer_ms; read_answer()'s.
+  /// Errors: nobody is there; no answer within answer_time(); read_answer()'s.
   [[nodiscard]] virtual Result<Json> ask(const Json& question) = 0;
 };
 

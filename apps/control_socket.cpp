@@ -15,6 +15,7 @@
 #include <filesystem>
 
 #include "apps/control_client.hpp"
+#include "base/trusted_code.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -33,14 +34,19 @@ std::string refused(const std::string& error, const std::string& hint) {
 
 std::string reason() { return std::strerror(errno); }
 
-/// The folder of the default paths: made when it is missing, refused when it is not ours alone.
-Status prepare_folder(const std::string& folder) {
-  if (folder != control_folder()) return {};
+std::string folder_of(const std::string& path) {
+  return std::filesystem::path(path).parent_path().string();
+}
+
+/// The folder of the default paths is made when it is missing. Refused is one that others may change.
+Status prepare_folder(const std::string& path) {
+  const std::string folder = folder_of(path);
+  if (folder != control_folder()) return check_socket_folder(path);
   if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
     return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
                 "choose another place with --socket");
   }
-  return check_private_folder(folder);
+  return check_socket_folder(path);
 }
 
 /// Removes the socket of a dead process; what is anything else stays.
@@ -98,6 +104,19 @@ Status check_private_folder(const std::string& folder) {
               "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
 }
 
+Status check_socket_folder(const std::string& path, std::optional<uid_t> partner) {
+  const std::string folder = folder_of(path);
+  if (folder == control_folder()) return check_private_folder(folder);
+  std::error_code error;
+  if (!folder.empty() && !std::filesystem::exists(folder, error)) return {};
+  const Status ours = check_trusted_folder(folder, partner);
+  if (ours) return {};
+  return fail(fmt::format("the socket's folder {} {}: somebody else's socket could take the place of "
+                          "{}, and be told of an emergency stop instead",
+                          ours.error().file, ours.error().message, path),
+              ours.error().hint + "; or choose another folder with --socket");
+}
+
 std::int64_t peer_user(int descriptor) {
   ucred peer{};
   socklen_t size = sizeof peer;
@@ -126,8 +145,7 @@ Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& pa
 Status ControlSocket::listen() {
   const Result<sockaddr_un> address = control_address(path_);
   if (!address) return std::unexpected(address.error());
-  const std::string folder = std::filesystem::path(path_).parent_path().string();
-  if (Status ready = prepare_folder(folder); !ready) return ready;
+  if (Status ready = prepare_folder(path_); !ready) return ready;
   if (Status clear = clear_way(path_); !clear) return clear;
   listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -326,6 +344,9 @@ Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
                                              const ControlSocketOptions& options) {
   if (!options.wanted) return nullptr;
   const std::string& path = options.path;
+  if (!path.empty()) {
+    if (const Status ours = check_socket_folder(path); !ours) return std::unexpected(ours.error());
+  }
   auto socket = ControlSocket::open(path.empty() ? default_control_path(options.kind) : path,
                                     registry);
   if (socket) return socket;

@@ -10,6 +10,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -35,6 +36,11 @@ inline constexpr std::size_t kMaxControlWaiting = 64;
 /// Whether `folder` is a folder that this user alone may change: in any other one somebody else may
 /// have put a socket of theirs. Errors: it is not, with its owner; it is not there.
 [[nodiscard]] Status check_private_folder(const std::string& folder);
+/// Whether nobody else could have put a socket of theirs at `path`: check_private_folder() of the
+/// default folder, check_trusted_folder() of any other. A folder that is not there is nobody's.
+/// @param partner  who listens, and may own the folder; empty: this user is to listen
+[[nodiscard]] Status check_socket_folder(const std::string& path,
+                                         std::optional<uid_t> partner = {});
 /// The user at the other end of a connection of AF_UNIX.  @return -1: unknown
 [[nodiscard]] std::int64_t peer_user(int descriptor);
 /// "<control_folder()>/<kind>-<pid>.sock" of this process.
@@ -50,7 +56,8 @@ class ControlSocket {
   /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
   /// process is replaced.
   /// @param registry  complete; outlives the socket
-  /// Errors: a path that is too long; a folder that is missing or another user's; a file that is
+  /// Errors: a path that is too long; a folder that is missing, another user's or one that others
+  /// may change; a file that is
   /// no socket; a process that listens there.
   [[nodiscard]] static Result<std::unique_ptr<ControlSocket>> open(const std::string& path,
                                                                    const ControlRegistry& registry);
@@ -109,7 +116,8 @@ struct ControlSocketOptions {
 };
 
 /// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
-/// which is said on standard error. Errors: a socket that is needed and cannot be opened.
+/// which is said on standard error. Errors: a socket that is needed and cannot be opened; a path
+/// that was named in a folder that others may change.
 [[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
                                                            const ControlSocketOptions& options);
 

@@ -21,7 +21,7 @@ ControlKey names_key(const char* name, const char* doc) {
 
 Json list(RunServices& services, const hal::RobotConfig& robot) {
   Json all = Json::array();
-  for (const runtime::ControllerLook& one : services.controllers()) {
+  for (const runtime::ControllerStatus& one : services.controllers()) {
     Json claims = Json::array();
     for (const auto& claim : one.claims) {
       claims.push_back({{"joint", robot.joints[claim.joint].name},
@@ -39,11 +39,11 @@ Json list(RunServices& services, const hal::RobotConfig& robot) {
 }
 
 /// What was done, and who is active now.
-Result<Json> tell(RunServices& services, const Result<runtime::Asked>& asked) {
+Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& asked) {
   if (!asked) return std::unexpected(asked.error());
   Json answer = asked_json(*asked);
   answer["active"] = Json::array();
-  for (const runtime::ControllerLook& one : services.controllers()) {
+  for (const runtime::ControllerStatus& one : services.controllers()) {
     if (one.active) answer["active"].push_back(one.name);
   }
   return answer;
@@ -51,7 +51,7 @@ Result<Json> tell(RunServices& services, const Result<runtime::Asked>& asked) {
 
 /// A switch that an operator asks for. The owner in another process comes and goes with its lease.
 Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start) {
-  for (const runtime::ControllerLook& one : services.controllers()) {
+  for (const runtime::ControllerStatus& one : services.controllers()) {
     if (one.name != runtime::kOwnerController || !one.plugin.empty()) continue;
     const auto named = std::ranges::count(stop, one.name) + std::ranges::count(start, one.name);
     if (named == 0) continue;
@@ -92,7 +92,7 @@ Names names_of(const Json& request, const char* key) {
 
 }  // namespace
 
-Json asked_json(const runtime::Asked& asked) {
+Json asked_json(const runtime::RequestResult& asked) {
   if (asked.done) return {{"done", true}, {"cycle", asked.cycle}};
   return {{"done", false}, {"note", "asked for; it will happen in the loop's next cycle"}};
 }
@@ -116,8 +116,9 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
                });
   registry.add("controller.start", ControlEffect::kChanges,
                "starts a controller, or all that a reset holds back",
-               {{.name = "name", .doc = "of a loaded controller; else those that were active before "
-                                        "the reset"}},
+               {{.name = "name",
+                 .doc = "of a loaded controller; else those that were active before "
+                        "the reset"}},
                [&services](const Json& request) {
                  if (!request.contains("name")) return tell(services, services.go_on());
                  const Names names{request["name"].get<std::string>()};

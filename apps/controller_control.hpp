@@ -13,6 +13,6 @@ void add_controller_commands(ControlRegistry& registry, runtime::RunServices& se
                              const hal::RobotConfig& robot);
 
 /// {"done": …, "cycle": …}: what became of a request.
-[[nodiscard]] Json asked_json(const runtime::Asked& asked);
+[[nodiscard]] Json asked_json(const runtime::RequestResult& asked);
 
 }  // namespace tandem::apps

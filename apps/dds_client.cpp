@@ -35,7 +35,7 @@ class DdsClient : public ControlClient {
     dds::tandem_msgs::Ask_Request request{};
     request.request = text.data();
     const Status asked = client_.call(
-        request, std::chrono::milliseconds(kControlAnswer_ms),
+        request, answer_time(question),
         [&answer](const dds::tandem_msgs::Ask_Response& reply) { answer = reply.answer; });
     if (!asked) return std::unexpected(asked.error());
     return read_answer(answer, "what serves tandem/ask");

@@ -36,8 +36,8 @@ class DdsRun {
 
   /// For others that talk DDS in this run, such as services. Outlived by this.
   [[nodiscard]] dds::Participant& participant() { return *participant_; }
-  /// CycleParts::tap
-  [[nodiscard]] hal::CycleTap& tap() { return *publisher_; }
+  /// CycleParts::observer
+  [[nodiscard]] hal::CycleObserver& tap() { return *publisher_; }
 
   /// From now on cycles are published. Before the first of them; the cycle stays until finish().
   void start(const runtime::RobotCycle& cycle);

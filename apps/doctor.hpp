@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/machine.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::apps {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::apps {
 

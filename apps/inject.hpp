@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "apps/control_registry.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/fault_injection.hpp"
 
 namespace tandem::apps {

@@ -34,7 +34,7 @@ Result<Enum> choice(const Json& request, const char* key, const std::array<Enum,
 }
 
 Json joint_json(const runtime::JointInfo& joint) {
-  const runtime::JointLook& look = joint.look;
+  const runtime::JointStatus& look = joint.look;
   Json gains = Json::object();
   for (const hal::PidLoop loop : kLoops) {
     const hal::PidGains& of = joint.gains[static_cast<std::size_t>(loop)];
@@ -68,7 +68,7 @@ Json list(RunServices& services) {
 
 /// What was done, and what the joint is now. A controller's own joints are its own.
 Result<Json> tell(RunServices& services, const std::string& name,
-                  const Result<runtime::Asked>& asked) {
+                  const Result<runtime::RequestResult>& asked) {
   if (!asked) return std::unexpected(asked.error());
   Json answer = asked_json(*asked);
   for (const runtime::JointInfo& joint : services.joints()) {
@@ -85,7 +85,7 @@ Result<Json> tell(RunServices& services, const std::string& name,
 Result<Json> set(RunServices& services, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   if (request.size() == 2) return fail("joint.set: nothing is to be set", "name a value");
-  runtime::JointWish wish;
+  runtime::JointRequest wish;
   if (request.contains("mode")) {
     const auto mode = choice(request, "mode", kModes);
     if (!mode) return std::unexpected(mode.error());
@@ -105,7 +105,7 @@ Result<Json> set_gains(RunServices& services, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   const auto loop = choice(request, "loop", kLoops);
   if (!loop) return std::unexpected(loop.error());
-  runtime::GainsWish wish;
+  runtime::GainsRequest wish;
   if (request.contains("kp")) wish.kp = request["kp"].get<double>();
   if (request.contains("ki")) wish.ki = request["ki"].get<double>();
   if (request.contains("kd")) wish.kd = request["kd"].get<double>();

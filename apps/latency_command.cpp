@@ -13,6 +13,7 @@
 #include "apps/console.hpp"
 #include "apps/latency_measure.hpp"
 #include "apps/latency_report.hpp"
+#include "base/process.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -69,7 +70,7 @@ Result<LatencyPlan> plan_of(const LatencyOptions& options) {
       note("both are measured with SCHED_OTHER");
     }
   }
-  plan.cyclictest = is_installed("cyclictest");
+  plan.cyclictest = program_exists("cyclictest");
   if (!plan.cyclictest) {
     note("cyclictest is not installed: our loop is measured alone (apt-get install rt-tests)");
   }
@@ -78,7 +79,7 @@ Result<LatencyPlan> plan_of(const LatencyOptions& options) {
 }
 
 Result<std::vector<std::string>> loads_of(const LatencyOptions& options) {
-  const bool stress = is_installed("stress-ng");
+  const bool stress = program_exists("stress-ng");
   if (options.load.empty() || options.load == "both") {
     if (stress) return std::vector<std::string>{"idle", "stress"};
     if (!options.load.empty())

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/console.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::apps {
@@ -25,9 +25,9 @@ struct LoopClosing {
 
 struct LoopStudy {
   std::vector<LoopClosing> postures;
-  std::size_t freedom = 0;  ///< degrees that remain with the loops closed
+  std::size_t freedom = 0;       ///< degrees that remain with the loops closed
   std::size_t open_freedom = 0;  ///< of the tree that the loops close
-  Diagnostics errors;       ///< a loop that does not close, with its line and what is left open
+  Diagnostics errors;  ///< a loop that does not close, with its line and what is left open
 };
 
 /// Empty for a robot without loops.

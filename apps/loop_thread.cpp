@@ -40,7 +40,7 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
     const SteadyClock::time_point time = SteadyClock::now();
     if (now == runtime::RunPhase::kRunning) began = time;
     if (before == runtime::RunPhase::kRunning) {
-      wall_s_ = std::chrono::duration<double>(time - began).count();
+      wall_s_ += std::chrono::duration<double>(time - began).count();
     }
     before = now;
   }

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/model_spec.hpp"
 #include "model/right_angles.hpp"
 #include "model/tree.hpp"
@@ -18,7 +18,7 @@ struct RobotFiles {
   model::Tree tree;
   model::ModelSpec spec;
   model::RightAngles right_angles;  ///< what the description has of few digits
-  Diagnostics warnings;  ///< what the description's reader tolerated
+  Diagnostics warnings;             ///< what the description's reader tolerated
 };
 
 /// Reads the description that `config` names, checks the two against each other, and that the

@@ -194,7 +194,7 @@ Exit run(Composition& c, const RunOptions& options) {
                              .clock = clock,
                              .recorder = recorder.get(),
                              .truth = truth,
-                             .tap = *dds == nullptr ? nullptr : &(*dds)->tap(),
+                             .observer = *dds == nullptr ? nullptr : &(*dds)->tap(),
                              .owner = {server->get(), c.owner.get(), c.owner_slot}},
                             config);
   if (*server != nullptr) tell_faults(**server, cycle);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "apps/clock_control.hpp"
+#include "apps/control_client.hpp"
 #include "apps/controller_control.hpp"
 #include "apps/fault_table.hpp"
 #include "apps/joint_control.hpp"
@@ -22,7 +23,7 @@ constexpr std::chrono::microseconds kLook{200};  // between two looks for a conf
 std::chrono::nanoseconds stop_patience(const rt::ClockState& clock) {
   constexpr std::chrono::nanoseconds kOnRobot = std::chrono::milliseconds(100);
   constexpr std::chrono::nanoseconds kElsewhere = std::chrono::seconds(1);
-  constexpr std::chrono::nanoseconds kMost = std::chrono::seconds(3);  // less than clients wait
+  constexpr std::chrono::nanoseconds kMost = kStopAnswer - std::chrono::milliseconds(500);
   constexpr double kCycles = 10.0;
   const double rate = clock.rate > 0.0 ? clock.rate : 1.0;
   const double cycles_ns = kCycles * static_cast<double>(clock.period_ns) / rate;

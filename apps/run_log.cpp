@@ -5,6 +5,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -42,7 +43,13 @@ std::uint64_t bytes_needed(const Composition& c) {
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
-  const std::uint64_t whole = e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + kFixed;
+  // Joint states and the base's frame, for viewers: three numbers and a name of each joint.
+  const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
+  const auto cycles_per_view =
+      std::max<std::int64_t>(1, log::RobotView::kPeriod_ns / e.loop.period_ns);
+  const std::uint64_t views = e.cycles() / static_cast<std::uint64_t>(cycles_per_view) + 1;
+  const std::uint64_t whole =
+      e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + views * view_bytes + kFixed;
   switch (e.log.compression) {
     case runtime::LogCompression::kNone: return whole;
     case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
@@ -95,9 +102,12 @@ Result<std::string> claim_path(const std::string& folder, const std::string& nam
   }
 }
 
-log::RecorderOptions recorder_options(runtime::LogCompression compression) {
+log::RecorderOptions recorder_options(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
   log::RecorderOptions options;
-  switch (compression) {
+  options.viewed.urdf = text_of(e.robot.model.urdf);
+  if (c.tree.floating_base) options.viewed.base_link = c.tree.links.front().name;
+  switch (e.log.compression) {
     case runtime::LogCompression::kNone:
       options.writer.compression = log::Compression::kNone;
       break;
@@ -117,7 +127,7 @@ Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std:
       c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
   const Result<std::string> path = claim_path(folder, name);
   if (!path) return std::unexpected(path.error());
-  return log::Recorder::open(*path, info_of(c), recorder_options(c.experiment.log.compression));
+  return log::Recorder::open(*path, info_of(c), recorder_options(c));
 }
 
 }  // namespace tandem::apps

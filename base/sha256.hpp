@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 struct evp_md_ctx_st;
 
@@ -28,5 +29,8 @@ class Sha256 {
 
 /// Of one block.
 [[nodiscard]] std::string sha256(std::span<const std::byte> bytes);
+[[nodiscard]] inline std::string sha256(std::string_view text) {
+  return sha256(std::as_bytes(std::span(text)));
+}
 
 }  // namespace tandem

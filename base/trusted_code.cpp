@@ -31,8 +31,9 @@ bool trusted(uid_t user) {
 }
 
 /// Empty, or what is wrong with the owner or mode of a file or folder.
-std::string problem_of(const struct stat& found) {
-  if (!trusted(found.st_uid)) return "belongs to user " + std::to_string(found.st_uid);
+std::string problem_of(const struct stat& found, std::optional<uid_t> partner = {}) {
+  if (!trusted(found.st_uid) && found.st_uid != partner)
+    return "belongs to user " + std::to_string(found.st_uid);
   const bool sticky_folder = S_ISDIR(found.st_mode) && (found.st_mode & S_ISVTX) != 0;
   if ((found.st_mode & S_IWOTH) != 0 && !sticky_folder) return "may be changed by everybody";
   const bool own_group = found.st_gid == ::getegid() || found.st_gid == 0;
@@ -52,7 +53,22 @@ bool is_above_program(const fs::path& folder) {
   return program().string().starts_with(prefix);
 }
 
-std::string digest(const std::string& bytes) { return sha256(std::as_bytes(std::span(bytes))); }
+/// The first of `folder` and those above it that somebody else may change.
+struct OpenFolder {
+  fs::path path;
+  std::string problem;
+  mode_t mode = 0;
+};
+std::optional<OpenFolder> open_folder(fs::path folder, std::optional<uid_t> partner = {}) {
+  struct stat found {};
+  for (; !is_above_program(folder); folder = folder.parent_path()) {
+    if (::stat(folder.c_str(), &found) != 0) return OpenFolder{folder, "cannot be looked at"};
+    if (std::string problem = problem_of(found, partner); !problem.empty()) {
+      return OpenFolder{folder, std::move(problem), found.st_mode & 07777};
+    }
+  }
+  return std::nullopt;
+}
 
 Result<std::string> read(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
@@ -79,27 +95,35 @@ Status check_trusted_code(const std::string& path) {
   if (error || ::stat(file.c_str(), &found) != 0 || !S_ISREG(found.st_mode)) {
     return refuse(path, "there is no such file", "correct the path");
   }
-  const std::string hint = "code that others may change is not loaded: give it to this user or root, "
-                           "and take the right to write from others (chmod go-w)";
+  const std::string hint =
+      "code that others may change is not loaded: give it to this user or root, "
+      "and take the right to write from others (chmod go-w)";
   if (const std::string problem = problem_of(found); !problem.empty()) {
     return refuse(path, problem, hint);
   }
-  for (fs::path folder = file.parent_path();; folder = folder.parent_path()) {
-    if (is_above_program(folder)) return {};
-    if (::stat(folder.c_str(), &found) != 0) {
-      return refuse(path, "cannot look at its folder " + folder.string(), "check its permissions");
-    }
-    if (const std::string problem = problem_of(found); !problem.empty()) {
-      return refuse(path, "its folder " + folder.string() + " " + problem, hint);
-    }
-  }
+  const std::optional<OpenFolder> open = open_folder(file.parent_path());
+  if (!open) return {};
+  return refuse(path, "its folder " + open->path.string() + " " + open->problem, hint);
+}
+
+Status check_trusted_folder(const std::string& folder, std::optional<uid_t> partner) {
+  std::error_code error;
+  const fs::path path = fs::canonical(folder.empty() ? "." : folder, error);
+  if (error) return refuse(folder, "there is no such folder", "make it, or correct the path");
+  const std::optional<OpenFolder> open = open_folder(path, partner);
+  if (!open) return {};
+  std::ostringstream mode;
+  mode << std::oct << open->mode;
+  return refuse(open->path.string(), open->problem + " (its mode is " + mode.str() + ")",
+                "give it to this user, and take the right to write from others: chmod go-w " +
+                    open->path.string());
 }
 
 Status seal_library(const std::string& path) {
   const Result<std::string> bytes = read(path);
   if (!bytes) return std::unexpected(bytes.error());
   std::ofstream out(path, std::ios::binary | std::ios::app);
-  out << kSeal << digest(*bytes) << std::flush;
+  out << kSeal << sha256(*bytes) << std::flush;
   if (!out) return refuse(path, "cannot be written", "check permissions and free space");
   return {};
 }
@@ -111,7 +135,7 @@ Status check_seal(const std::string& path) {
   if (at == std::string::npos) return refuse(path, "is cut short, or was not made by tandem", {});
   const std::string said = bytes->substr(at + kSeal.size());
   bytes->resize(at);
-  if (digest(*bytes) == said) return {};
+  if (sha256(*bytes) == said) return {};
   return refuse(path, "has been damaged since it was made", {});
 }
 

@@ -1,7 +1,11 @@
-// Whether a library may be loaded: only code that nobody else could have put there.
+// Whether a library may be loaded, or a process be asked: only what nobody else could have put
+// where it is.
 // Layer: base.  Thread: any, not RT.
 #pragma once
 
+#include <sys/types.h>
+
+#include <optional>
 #include <string>
 
 #include "base/result.hpp"
@@ -17,6 +21,15 @@ namespace tandem {
 /// @param path  of a file, followed through links
 /// Errors: no such file, or no regular one; who may write where, with the path.
 [[nodiscard]] Status check_trusted_code(const std::string& path);
+
+/// The same of a folder, and of every folder above it: whoever may change one of them may put
+/// another file in the place of one that is there.
+///
+/// @param folder   followed through links; empty: the working directory
+/// @param partner  a user who may own them, too
+/// Errors: no such folder; who may write where, with the folder and its mode.
+[[nodiscard]] Status check_trusted_folder(const std::string& folder,
+                                          std::optional<uid_t> partner = {});
 
 /// Adds the SHA-256 of a library's bytes behind its end, where no loader looks.
 /// Errors: the file cannot be read or written.

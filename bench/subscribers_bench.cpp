@@ -135,9 +135,9 @@ int be_subscribers(int domain_number) {
 }
 
 /// The publisher, with the time of each cycle's work kept in the block's histogram.
-class TimedTap final : public hal::CycleTap {
+class TimedTap final : public hal::CycleObserver {
  public:
-  explicit TimedTap(hal::CycleTap& tap) : tap_(tap) {}
+  explicit TimedTap(hal::CycleObserver& tap) : tap_(tap) {}
   void take(const hal::CycleView& view) noexcept TANDEM_RT override {
     const std::size_t block = view.time.cycle / cycles_per_block;
     const bool settled = view.time.cycle % cycles_per_block > 100;  // the other process has changed
@@ -149,7 +149,7 @@ class TimedTap final : public hal::CycleTap {
   std::vector<rt::Histogram> blocks;
 
  private:
-  hal::CycleTap& tap_;
+  hal::CycleObserver& tap_;
 };
 
 void print(const TimedTap& tap) {
@@ -215,7 +215,7 @@ int run(const Options& options, const char* program) {
                              .controllers = *(*rig)->host,
                              .clock = clock,
                              .truth = &(*robot)->truth(),
-                             .tap = &tap},
+                             .observer = &tap},
                             config);
   const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
   std::FILE* words = ::popen(others.c_str(), "w");

@@ -27,11 +27,11 @@ find_package(nlohmann_json REQUIRED)
 # Contraction is off so that a run's bits do not depend on the build type. What is silenced for g++
 # are its warnings of what std::string does inside (GCC bug 105651).
 add_library(tandem_options INTERFACE)
-target_compile_options(tandem_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-  "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>"
-  -ffp-contract=off)
-target_include_directories(tandem_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_features(tandem_options INTERFACE cxx_std_23)
+target_compile_options(tandem_options INTERFACE -ffp-contract=off
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
+  "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>>")
+target_include_directories(tandem_options INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
 target_link_libraries(tandem_options INTERFACE Threads::Threads)
 
 # The headers that cost most, parsed once for all rooms and plugins. Every source includes what it
@@ -58,25 +58,7 @@ function(tandem_room name)
   target_precompile_headers(tandem_${name} REUSE_FROM tandem_pch)
 endfunction()
 
-# tandem_controller(NAME SOURCES … LINKS … [FOLDER dir]): the plugin NAME.so, found by its name
-# in build/lib/controllers (or dir).
-function(tandem_controller name)
-  cmake_parse_arguments(PLUGIN "" "FOLDER" "SOURCES;LINKS" ${ARGN})
-  if(NOT PLUGIN_FOLDER)
-    set(PLUGIN_FOLDER ${PROJECT_BINARY_DIR}/lib/controllers)
-  endif()
-  add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
-  target_link_libraries(controller_${name} PRIVATE tandem_hal ${PLUGIN_LINKS})
-  target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)
-  # Nothing undefined that the loader would find missing, nothing exported but the entry point.
-  # (A sanitizer's symbols stay undefined until then: they are in the executable.)
-  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL)
-  if(NOT TANDEM_SANITIZE)
-    target_link_options(controller_${name} PRIVATE -Wl,--no-undefined)
-  endif()
-  set_target_properties(controller_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name}
-    CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER})
-endfunction()
+include(TandemController)
 
 # tandem_kernels(ROBOT TOML): the target kernels_ROBOT makes lib/models/ROBOT_kernels.so by `tandem
 # model build`. The builder skips what is up to date, so the target always runs and mostly does

@@ -3,6 +3,10 @@
 // Layer: controllers.  Thread: configure non-RT; start, update, stop RT.
 #pragma once
 
+#if __cplusplus < 202100L
+#error "controllers are C++23: build with -std=c++23, of g++ 12 or newer"
+#endif
+
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -15,9 +19,9 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
-#include "hal/backend.hpp"
+#include "hal/cycle_time.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 #include "model/kernels.h"
 
 namespace tandem {
@@ -25,7 +29,7 @@ namespace tandem {
 /// What a controller may know and ask for when it is configured.
 class ControllerSetup {
  public:
-  ControllerSetup(const hal::RobotConfig& robot_in, const tandem_kernels* kernels_in,
+  ControllerSetup(const hal::Robot& robot_in, const tandem_kernels* kernels_in,
                   std::int64_t period_ns_in, TomlTable parameters_in,
                   std::span<const double> start_position_rad_in = {})
       : robot(robot_in),
@@ -34,7 +38,7 @@ class ControllerSetup {
         parameters(std::move(parameters_in)),
         start_position_rad(start_position_rad_in) {}
 
-  const hal::RobotConfig& robot;  ///< joints and sensors in the image's order, postures, limits
+  const hal::Robot& robot;        ///< joints and their limits, sensors, sites, feet, postures
   const tandem_kernels* kernels;  ///< the robot's generated model; null when it has none
   std::int64_t period_ns;         ///< the cycle's nominal period
   TomlTable parameters;           ///< [controller.parameters]; unknown keys are reported for you
@@ -84,12 +88,15 @@ class Controller {
   [[nodiscard]] virtual Code update(const hal::CycleTime& time, const hal::StateImage& state,
                                     hal::CommandImage& command) noexcept TANDEM_RT = 0;
 
+  /// Whether retreat() can ever be true. `tandem check` asks, also before configure().
+  [[nodiscard]] virtual bool can_retreat() const noexcept TANDEM_RT { return false; }
+
   /// A stop of category 2 begins: from now on update() brings the robot to a posture in which less
   /// happens when the drives are stopped, and then returns kStopped. It has the time of [faults]
-  /// retreat_s for that.
+  /// retreat_s for that. Not called where can_retreat() is false.
   /// @return false: it cannot, and is stopped; its joints are held
-  [[nodiscard]] virtual bool retreat(const hal::CycleTime&, const hal::StateImage&) noexcept
-      TANDEM_RT {
+  [[nodiscard]] virtual bool retreat(const hal::CycleTime&,
+                                     const hal::StateImage&) noexcept TANDEM_RT {
     return false;
   }
 
@@ -100,21 +107,26 @@ class Controller {
   virtual void archive(Archive&) {}
 };
 
-/// FNV-1a of some numbers, folded to 32 bits.
-[[nodiscard]] constexpr std::uint32_t abi_of(std::initializer_list<std::size_t> numbers) noexcept {
+/// Version of what a plugin sees: this header and those that it includes. Raised with every change
+/// of them after which a plugin has to be built again. How a robot is wired is in none of them.
+inline constexpr std::uint32_t kControllerInterface = 5;
+
+/// FNV-1a of some numbers, folded to 16 bits.
+[[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
   std::uint64_t hash = 0xCBF29CE484222325U;
   for (const std::size_t number : numbers) hash = (hash ^ number) * 0x100000001B3U;
-  return static_cast<std::uint32_t>(hash ^ (hash >> 32));
+  return static_cast<std::uint32_t>((hash ^ hash >> 16 ^ hash >> 32 ^ hash >> 48) & 0xFFFFU);
 }
 
-/// Another number whenever a plugin built before a change could misbehave after it: a size that a
-/// plugin sees changes it by itself, the first number is raised for everything else.
-inline constexpr std::uint32_t kControllerAbi = abi_of(
-    {4, sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::RobotConfig),
-     sizeof(hal::JointConfig), sizeof(hal::ActuatorConfig), sizeof(hal::GainsConfig),
-     sizeof(hal::BoardConfig), sizeof(hal::BusConfig), sizeof(hal::SensorConfig),
-     sizeof(hal::ContactConfig), sizeof(hal::PostureConfig), sizeof(hal::StateImage),
-     sizeof(hal::CommandImage), sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+/// The version, and below it a hash of the sizes that go with it: a change whose version nobody
+/// raised, or another standard library, is found as well.
+inline constexpr std::uint32_t kControllerAbi =
+    kControllerInterface << 16 |
+    hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
+             sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
+             sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
+             sizeof(hal::StateImage), sizeof(hal::CommandImage), sizeof(hal::CycleTime),
+             sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

@@ -37,13 +37,13 @@ void describe(Foot& foot) {
 
 }  // namespace
 
-std::vector<std::string> foot_names(const hal::RobotConfig& robot) {
+std::vector<std::string> foot_names(const hal::Robot& robot) {
   std::vector<std::string> names;
-  for (const hal::FootConfig& foot : robot.contact.feet) names.push_back(foot.site);
+  for (const hal::Foot& foot : robot.feet) names.push_back(foot.site);
   return names;
 }
 
-Result<std::vector<Foot>> find_feet(const hal::RobotConfig& robot, const tandem_kernels& kernels,
+Result<std::vector<Foot>> find_feet(const hal::Robot& robot, const tandem_kernels& kernels,
                                     std::span<const std::string> names) {
   if (names.empty()) {
     return fail("the robot has no foot to stand on",
@@ -51,8 +51,8 @@ Result<std::vector<Foot>> find_feet(const hal::RobotConfig& robot, const tandem_
   }
   std::vector<Foot> feet;
   for (const std::string& name : names) {
-    const auto found = std::ranges::find(robot.contact.feet, name, &hal::FootConfig::site);
-    if (found == robot.contact.feet.end()) {
+    const auto found = std::ranges::find(robot.feet, name, &hal::Foot::site);
+    if (found == robot.feet.end()) {
       return fail("the robot has no foot '" + name + "'", suggest(name, foot_names(robot)));
     }
     if (std::ranges::find(feet, name, &Foot::name) != feet.end()) {

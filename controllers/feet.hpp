@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 #include "model/kernels.h"
 
 namespace tandem {
@@ -38,11 +38,11 @@ inline constexpr double kFootExtent_m = 0.005;
 /// The feet of these names, in their order.
 /// Errors: no name at all, one that is no [[contact.foot]], one twice, a site that the kernels
 /// lack.
-[[nodiscard]] Result<std::vector<Foot>> find_feet(const hal::RobotConfig& robot,
+[[nodiscard]] Result<std::vector<Foot>> find_feet(const hal::Robot& robot,
                                                   const tandem_kernels& kernels,
                                                   std::span<const std::string> names);
 
 /// The names of every [[contact.foot]], in the file's order.
-[[nodiscard]] std::vector<std::string> foot_names(const hal::RobotConfig& robot);
+[[nodiscard]] std::vector<std::string> foot_names(const hal::Robot& robot);
 
 }  // namespace tandem

@@ -15,9 +15,9 @@ namespace tandem {
 namespace {
 
 /// The model has an IMU as a site: one that stands in its link's frame, or else one of its name.
-std::string imu_site(const hal::RobotConfig& robot, const hal::SensorConfig& sensor) {
+std::string imu_site(const hal::Robot& robot, const hal::Sensor& sensor) {
   const std::array<double, 3> none{};
-  for (const hal::SiteConfig& site : robot.model.sites) {
+  for (const hal::Site& site : robot.sites) {
     if (site.link == sensor.link && site.xyz_m == none && site.rpy_rad == none) return site.name;
   }
   return sensor.name;
@@ -40,7 +40,7 @@ class GravityCompensation : public Controller {
     compliant_ =
         setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
     if (const Status standing = stand(setup); !standing) return standing;
-    if (const Status joints = claim_joints(setup); !joints) return joints;
+    claim_joints(setup);
     q_.assign(kernels_->nq, 0.0);
     map_.passive_to_q(q_);
     rest_.assign(kernels_->nv, 0.0);
@@ -99,7 +99,7 @@ class GravityCompensation : public Controller {
     if (!feet) return std::unexpected(feet.error());
     support_.emplace(*feet);
     for (std::size_t i = 0; i < setup.robot.sensors.size(); ++i) {
-      const hal::SensorConfig& sensor = setup.robot.sensors[i];
+      const hal::Sensor& sensor = setup.robot.sensors[i];
       if (sensor.type != hal::SensorType::kImu) continue;
       if (const Result<std::size_t> site = site_index(*kernels_, imu_site(setup.robot, sensor))) {
         imu_ = Imu{i, *site};
@@ -108,31 +108,29 @@ class GravityCompensation : public Controller {
     return {};
   }
 
-  Status claim_joints(ControllerSetup& setup) {
-    const std::vector<hal::JointCapabilities> limits = hal::joint_capabilities(setup.robot);
+  void claim_joints(ControllerSetup& setup) {
+    const std::vector<hal::Joint>& limits = setup.robot.joints;
     // Negative: the key is missing, each joint has its own.
     const double stiffness = setup.parameters.number_or("stiffness_Nm_rad", -1.0, kNotNegative);
     const double damping = setup.parameters.number_or("damping_Nms_rad", -1.0, kNotNegative);
     for (const std::size_t j : joints_parameter(setup)) {
-      const Status claimed = compliant_ ? claim(setup, j, hal::ControlMode::kPosition,
-                                                hal::InteractionMode::kCompliant)
-                                        : claim(setup, j, hal::ControlMode::kTorque);
-      if (!claimed) return claimed;
+      if (compliant_) {
+        setup.claim(j, hal::ControlMode::kPosition, hal::InteractionMode::kCompliant);
+      } else {
+        setup.claim(j, hal::ControlMode::kTorque);
+      }
       Joint joint{.index = j,
                   .stiffness_Nm_rad = stiffness < 0.0 ? limits[j].stiffness_Nm_rad : stiffness,
                   .damping_Nms_rad = damping < 0.0 ? limits[j].damping_Nms_rad : damping};
       joints_.push_back(joint);
       if (joint.stiffness_Nm_rad > limits[j].max_stiffness_Nm_rad) {
-        setup.parameters.error("stiffness_Nm_rad",
-                               "is too much for joint '" + setup.robot.joints[j].name + "'",
+        setup.parameters.error("stiffness_Nm_rad", "is too much for joint '" + limits[j].name + "'",
                                "give at most its position loop's kp");
       }
       if (joint.damping_Nms_rad > limits[j].max_damping_Nms_rad) {
-        setup.parameters.error("damping_Nms_rad",
-                               "is too much for joint '" + setup.robot.joints[j].name + "'");
+        setup.parameters.error("damping_Nms_rad", "is too much for joint '" + limits[j].name + "'");
       }
     }
-    return {};
   }
 
   /// The torques that hold the measured posture, in tau_.

@@ -14,18 +14,16 @@ class Hold : public Controller {
     const std::string interaction =
         setup.parameters.choice_or("interaction", "stiff", {"stiff", "compliant"});
     duration_s_ = setup.parameters.number_or("duration_s", 3.0, kPositive);
-    link_damping_Nms_rad_ =
-        setup.parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
+    link_damping_Nms_rad_ = setup.parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
     posture_ = posture_parameter(setup);
     for (const std::size_t joint : joints_parameter(setup)) {
-      const Status claimed = claim(
-          setup, joint, hal::ControlMode::kPosition,
+      setup.claim(
+          joint, hal::ControlMode::kPosition,
           interaction == "stiff" ? hal::InteractionMode::kStiff : hal::InteractionMode::kCompliant);
-      if (!claimed) return claimed;
       moves_.push_back({joint, 0.0, 0.0});
       if (posture_ == nullptr) continue;  // start() makes the measured position the target
       const double target = moves_.back().to_rad = posture_->position_rad.at(joint);
-      const hal::JointConfig& limit = setup.robot.joints[joint];
+      const hal::Joint& limit = setup.robot.joints[joint];
       if (target < limit.min_position_rad || target > limit.max_position_rad) {
         setup.parameters.error("posture", "is beyond the limits of joint '" + limit.name + "'",
                                "choose another posture, or leave the joint out of `joints`");
@@ -66,7 +64,7 @@ class Hold : public Controller {
     std::size_t joint;
     double from_rad, to_rad;
   };
-  const hal::PostureConfig* posture_ = nullptr;
+  const hal::Posture* posture_ = nullptr;
   double duration_s_ = 0.0;
   double link_damping_Nms_rad_ = 0.0;
   std::int64_t start_ns_ = 0;

@@ -26,10 +26,7 @@ class JointTrajectory : public Controller {
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
     joints_ = joints_parameter(setup);
     joints_known_ = !setup.parameters.has_errors();
-    for (const std::size_t joint : joints_) {
-      const Status claimed = claim(setup, joint, hal::ControlMode::kPosition);
-      if (!claimed) return claimed;
-    }
+    for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
     std::vector<TomlTable> tables = parameters.tables("waypoint");
     if (tables.empty()) {
       parameters.error("", "there is no way-point",
@@ -123,9 +120,9 @@ class JointTrajectory : public Controller {
     if (time_s <= times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
-    std::vector<const hal::JointConfig*> beyond;
+    std::vector<const hal::Joint*> beyond;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
+      const hal::Joint& joint = setup.robot.joints[joints_[k]];
       if (each_has_one &&
           (positions[k] < joint.min_position_rad || positions[k] > joint.max_position_rad)) {
         beyond.push_back(&joint);
@@ -133,7 +130,7 @@ class JointTrajectory : public Controller {
       points_.push_back({positions[k], 0.0, 0.0});
     }
     if (!beyond.empty()) {
-      const hal::JointConfig& first = *beyond.front();
+      const hal::Joint& first = *beyond.front();
       const std::string others = beyond.size() == 1 ? " leaves its limits"
                                                     : " and " + std::to_string(beyond.size() - 1) +
                                                           " more leave their limits";
@@ -163,7 +160,7 @@ class JointTrajectory : public Controller {
     double fastest = 0.0;
     bool inside = true;
   };
-  Way way_of(const hal::JointConfig& joint, std::size_t segment, std::size_t k) {
+  Way way_of(const hal::Joint& joint, std::size_t segment, std::size_t k) {
     const double duration = times_s_[segment + 1] - times_s_[segment];
     Way way;
     for (int i = 0; i <= kSamples; ++i) {
@@ -183,7 +180,7 @@ class JointTrajectory : public Controller {
     double worst = 1.0;  // of the limit
     std::string text;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-      const hal::JointConfig& joint = setup.robot.joints[joints_[k]];
+      const hal::Joint& joint = setup.robot.joints[joints_[k]];
       const Way way = way_of(joint, segment, k);
       const double share = way.fastest / joint.max_velocity_rad_s;
       if (share > 1.0) ++too_fast;

@@ -13,7 +13,7 @@ std::vector<std::string> names_of(const char* const* names, std::size_t count) {
 
 }  // namespace
 
-Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+Result<ModelMap> ModelMap::make(const hal::Robot& robot, const tandem_kernels* kernels,
                                 PassiveJoints passive) {
   if (kernels == nullptr) {
     return fail("this controller needs the robot's generated model",
@@ -22,7 +22,7 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
   const std::vector<std::string> model = names_of(kernels->joint_names, kernels->joints);
   ModelMap map;
   map.base_ = kernels->floating_base != 0 ? 6 : 0;
-  for (const hal::JointConfig& joint : robot.joints) {
+  for (const hal::Joint& joint : robot.joints) {
     const auto found = std::ranges::find(model, joint.name);
     if (found == model.end()) {
       return fail(
@@ -35,8 +35,9 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
     if (robot.joint_index(name) < 0 &&
         !(passive == PassiveJoints::kClosed && robot.is_passive(name))) {
       if (robot.is_passive(name)) {
-        return fail("the joint '" + name + "' is passive, and this controller needs a motor at "
-                    "every joint",
+        return fail("the joint '" + name +
+                        "' is passive, and this controller needs a motor at "
+                        "every joint",
                     "run hold, joint_trajectory or gravity_compensation");
       }
       return fail("joint '" + name + "' of the model is not driven",
@@ -44,10 +45,10 @@ Result<ModelMap> ModelMap::make(const hal::RobotConfig& robot, const tandem_kern
     }
   }
   if (robot.passive.empty()) return map;
-  auto loops = model::ClosedLoops::create(robot.loop_specs(), robot.passive_names(), *kernels);
+  auto loops = model::ClosedLoops::create(robot.loops, robot.passive_names(), *kernels);
   if (!loops) return std::unexpected(loops.error());
   map.loops_ = std::move(*loops);
-  for (const hal::PassiveConfig& joint : robot.passive)
+  for (const hal::PassiveJoint& joint : robot.passive)
     map.passive_rad_.push_back(joint.position_rad);
   return map;
 }

@@ -9,7 +9,7 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 #include "model/closed_loops.hpp"
 #include "model/kernels.h"
 
@@ -24,8 +24,7 @@ class ModelMap {
  public:
   /// Errors: there are no kernels; a joint of one side that the other lacks; a passive joint where
   /// they are refused.
-  [[nodiscard]] static Result<ModelMap> make(const hal::RobotConfig& robot,
-                                             const tandem_kernels* kernels,
+  [[nodiscard]] static Result<ModelMap> make(const hal::Robot& robot, const tandem_kernels* kernels,
                                              PassiveJoints passive = PassiveJoints::kRefused);
 
   [[nodiscard]] std::size_t joints() const noexcept { return index_.size(); }

@@ -6,9 +6,9 @@
 
 namespace tandem {
 
-std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
+std::vector<std::string> joint_names(const hal::Robot& robot) {
   std::vector<std::string> names;
-  for (const hal::JointConfig& joint : robot.joints) names.push_back(joint.name);
+  for (const hal::Joint& joint : robot.joints) names.push_back(joint.name);
   return names;
 }
 
@@ -29,25 +29,18 @@ std::vector<std::size_t> joints_parameter(ControllerSetup& setup) {
   return joints;
 }
 
-const hal::PostureConfig* posture_parameter(ControllerSetup& setup) {
+const hal::Posture* posture_parameter(ControllerSetup& setup) {
   const std::string name = setup.parameters.text_or("posture", "");
   if (name.empty()) return nullptr;
-  const hal::PostureConfig* posture = setup.robot.posture(name);
+  const hal::Posture* posture = setup.robot.posture(name);
   if (posture == nullptr) {
     std::vector<std::string> known;
-    for (const hal::PostureConfig& one : setup.robot.postures) known.push_back(one.name);
-    setup.parameters.error("posture", "the robot has no posture '" + name + "'",
-                           known.empty() ? "add [posture." + name + "] to " + setup.robot.file
-                                         : suggest(name, known));
+    for (const hal::Posture& one : setup.robot.postures) known.push_back(one.name);
+    setup.parameters.error(
+        "posture", "the robot has no posture '" + name + "'",
+        known.empty() ? "add [posture." + name + "] to " + setup.robot.file : suggest(name, known));
   }
   return posture;
-}
-
-Status claim(ControllerSetup& setup, std::size_t joint, hal::ControlMode mode,
-             hal::InteractionMode interaction) {
-  const Status able = hal::check_capability(setup.robot, joint, mode, interaction);
-  if (able) setup.claim(joint, mode, interaction);
-  return able;
 }
 
 }  // namespace tandem

@@ -2,11 +2,10 @@
 // Layer: controllers.  Thread: non-RT only.
 #pragma once
 
-#include <string_view>
+#include <string>
 #include <vector>
 
 #include "controllers/controller.hpp"
-#include "hal/capabilities.hpp"
 
 namespace tandem {
 
@@ -15,13 +14,9 @@ namespace tandem {
 [[nodiscard]] std::vector<std::size_t> joints_parameter(ControllerSetup& setup);
 
 /// The robot's joint names in the image's order.
-[[nodiscard]] std::vector<std::string> joint_names(const hal::RobotConfig& robot);
+[[nodiscard]] std::vector<std::string> joint_names(const hal::Robot& robot);
 
 /// `posture = "name"`: null when the key is missing or names none (then it is reported).
-[[nodiscard]] const hal::PostureConfig* posture_parameter(ControllerSetup& setup);
-
-/// Claims a joint in a mode that it can do. @return check_capability()'s error otherwise.
-[[nodiscard]] Status claim(ControllerSetup& setup, std::size_t joint, hal::ControlMode mode,
-                           hal::InteractionMode interaction = hal::InteractionMode::kStiff);
+[[nodiscard]] const hal::Posture* posture_parameter(ControllerSetup& setup);
 
 }  // namespace tandem

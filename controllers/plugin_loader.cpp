@@ -55,7 +55,9 @@ std::string missing_hint(const std::string& name, const std::vector<std::string>
       fs::exists(build / "CMakeCache.txt", ignored)) {
     return "build it: cmake --build " + build.string() + " --target controller_" + name;
   }
-  return suggest(name, available_controllers(folders));
+  const std::string nearest = suggest(name, available_controllers(folders));
+  return (nearest.empty() ? nearest : nearest + "; ") +
+         "one of your own is found in the folders of TANDEM_CONTROLLERS, or by a path with a '/'";
 }
 
 bool is_file(const fs::path& path) {
@@ -77,13 +79,20 @@ Result<std::string> find(const std::string& name, const std::vector<std::string>
                 missing_hint(name, folders));
 }
 
+/// What a library of another ABI says of itself.
+std::string built_for(std::uint32_t abi) {
+  const std::uint32_t version = abi >> 16;
+  if (version == kControllerInterface) {
+    return "was built with other headers of controller interface " + std::to_string(version);
+  }
+  return "was built for controller interface " + std::to_string(version) + ", this program has " +
+         std::to_string(kControllerInterface);
+}
+
 /// A library of another ABI is only asked for its entry's first two members, which never move.
 Status check(const ControllerPlugin& plugin, const std::string& name, const std::string& file) {
   if (plugin.abi != kControllerAbi) {
-    return refuse(name, file,
-                  "was built for controller ABI " + std::to_string(plugin.abi) +
-                      ", this program has " + std::to_string(kControllerAbi),
-                  "build it again with this version's headers");
+    return refuse(name, file, built_for(plugin.abi), "build it again with this version's headers");
   }
   if (std::strcmp(plugin.compiler, __VERSION__) != 0) {
     return refuse(name, file,

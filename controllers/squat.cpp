@@ -108,14 +108,13 @@ class Squat : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     read(setup.parameters);
-    const hal::PostureConfig* posture = posture_parameter(setup);
+    const hal::Posture* posture = posture_parameter(setup);
     const std::vector<std::string> feet =
         setup.parameters.texts_or("feet", foot_names(setup.robot));
     Result<Stance> stance = Stance::make(setup.robot, setup.kernels, feet);
     if (!stance) return std::unexpected(stance.error());
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
-      const Status claimed = claim(setup, j, hal::ControlMode::kPosition);
-      if (!claimed) return claimed;
+      setup.claim(j, hal::ControlMode::kPosition);
     }
     period_s_ = static_cast<double>(setup.period_ns) * 1e-9;
     measured_.assign(setup.robot.joints.size(), 0.0);
@@ -160,6 +159,7 @@ class Squat : public Controller {
     return over ? Code::kStopped : Code::kOk;
   }
 
+  [[nodiscard]] bool can_retreat() const noexcept TANDEM_RT override { return true; }
   /// To the lowest point, wherever in its squat it is. From there it falls less far.
   bool retreat(const hal::CycleTime& time, const hal::StateImage&) noexcept TANDEM_RT override {
     if (standing_ == 0) return false;
@@ -233,7 +233,7 @@ class Squat : public Controller {
   }
 
   /// What the configuration at hand would break, moving at the squat's largest speed.
-  [[nodiscard]] std::string beyond_limits(const hal::RobotConfig& robot) {
+  [[nodiscard]] std::string beyond_limits(const hal::Robot& robot) {
     if (stance_->slip_m() > kMostSlip_m) {
       return "the legs have too few joints to keep every foot in its place";
     }
@@ -242,7 +242,7 @@ class Squat : public Controller {
     stance_->carry(vdot_);
     const ModelMap& map = stance_->map();
     for (std::size_t j = 0; j < map.joints(); ++j) {
-      const hal::JointConfig& joint = robot.joints[j];
+      const hal::Joint& joint = robot.joints[j];
       const double q = stance_->q()[map.q_index(j)];
       if (q < joint.min_position_rad || q > joint.max_position_rad) {
         return "joint '" + joint.name + "' leaves its limits";

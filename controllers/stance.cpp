@@ -45,7 +45,7 @@ Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> fe
       com_J_(3 * kernels.nv, 0.0),
       wrench_(6 * kernels.wrenches, 0.0) {}
 
-Result<Stance> Stance::make(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+Result<Stance> Stance::make(const hal::Robot& robot, const tandem_kernels* kernels,
                             std::span<const std::string> feet) {
   Result<ModelMap> map = ModelMap::make(robot, kernels);
   if (!map) return std::unexpected(map.error());
@@ -59,7 +59,7 @@ Result<Stance> Stance::make(const hal::RobotConfig& robot, const tandem_kernels*
   return stance;
 }
 
-Status Stance::find_legs(const hal::RobotConfig& robot) {
+Status Stance::find_legs(const hal::Robot& robot) {
   // Near where it will stand, but without symmetry: what depends on what here, does so always.
   std::vector<double> near(robot.joints.size(), 0.0);
   if (!robot.postures.empty()) near = robot.postures[0].position_rad;

@@ -16,7 +16,7 @@
 #include "controllers/feet.hpp"
 #include "controllers/model_map.hpp"
 #include "controllers/support.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 #include "model/kernels.h"
 
 namespace tandem {
@@ -39,8 +39,7 @@ class Stance {
  public:
   /// @param feet  names of [[contact.foot]]s
   /// Errors: no kernels, no floating base, as find_feet(), a foot that no joint moves.
-  [[nodiscard]] static Result<Stance> make(const hal::RobotConfig& robot,
-                                           const tandem_kernels* kernels,
+  [[nodiscard]] static Result<Stance> make(const hal::Robot& robot, const tandem_kernels* kernels,
                                            std::span<const std::string> feet);
 
   /// Puts the feet where joint positions (the image's order) have them, flat on the ground, and
@@ -94,7 +93,7 @@ class Stance {
   };
 
   Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet);
-  [[nodiscard]] Status find_legs(const hal::RobotConfig& robot);
+  [[nodiscard]] Status find_legs(const hal::Robot& robot);
   [[nodiscard]] std::vector<Row> all_rows() const;
   void choose(const std::vector<std::size_t>& columns);
   void evaluate() noexcept TANDEM_RT;

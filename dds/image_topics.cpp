@@ -24,6 +24,15 @@ tandem_msgs_msg_dds__Histogram_ message_of(const rt::Histogram& histogram, std::
   return message;
 }
 
+/// A message's member takes an image's field: a number, or a list.
+void fill(auto& member, const auto& field) {
+  if constexpr (std::is_arithmetic_v<std::remove_reference_t<decltype(member)>>) {
+    member = field.front();
+  } else {
+    refer(member, field);
+  }
+}
+
 }  // namespace
 
 ImageTopics::ImageTopics(OutputMaker& maker, const RunDescription& run)
@@ -68,49 +77,26 @@ void ImageTopics::publish(const CycleSample& sample) {
 }
 
 void ImageTopics::publish_state(const CycleSample& sample) {
-  const hal::StateImage& state = sample.state;
   tandem_msgs::State message{};
   message.run = run_;
-  message.cycle = sample.time.cycle;
-  message.time_ns = sample.time.time_ns;
   message.phase = static_cast<std::uint8_t>(sample.phase);
   message.code = static_cast<std::uint8_t>(sample.read_code);
-  refer(message.position_rad, state.position_rad());
-  refer(message.velocity_rad_s, state.velocity_rad_s());
-  refer(message.acceleration_rad_s2, state.acceleration_rad_s2());
-  refer(message.torque_nm, state.torque_Nm());
-  refer(message.motor_position_rad, state.motor_position_rad());
-  refer(message.motor_velocity_rad_s, state.motor_velocity_rad_s());
-  refer(message.current_a, state.current_A());
-  refer(message.voltage_v, state.voltage_V());
-  refer(message.temperature_c, state.temperature_C());
-  refer(message.sensor, state.sensor());
-  refer(message.fault, state.fault());
-  refer(message.age_cycles, state.age_cycles());
-  refer(message.sensor_age_cycles, state.sensor_age_cycles());
-  refer(message.statusword, state.statusword());
-  refer(message.mode, state.mode());
-  refer(message.interaction, state.interaction());
-  refer(message.drive_state, state.drive_state());
+#define TANDEM_STATE(member, field) fill(message.member, sample.state.field());
+#define TANDEM_COMMAND(member, field)
+#include <image_members.inc>
+#undef TANDEM_STATE
+#undef TANDEM_COMMAND
   state_.write(message);
 }
 
 void ImageTopics::publish_command(const CycleSample& sample) {
-  const hal::CommandImage& command = sample.command;
   tandem_msgs::Command message{};
   message.run = run_;
-  message.cycle = sample.time.cycle;
-  message.time_ns = sample.time.time_ns;
-  refer(message.position_rad, command.position_rad());
-  refer(message.velocity_rad_s, command.velocity_rad_s());
-  refer(message.torque_nm, command.torque_Nm());
-  refer(message.voltage_v, command.voltage_V());
-  refer(message.current_a, command.current_A());
-  refer(message.stiffness_nm_rad, command.stiffness_Nm_rad());
-  refer(message.damping_nms_rad, command.damping_Nms_rad());
-  refer(message.mode, command.mode());
-  refer(message.interaction, command.interaction());
-  refer(message.fault_reset, command.fault_reset());
+#define TANDEM_STATE(member, field)
+#define TANDEM_COMMAND(member, field) fill(message.member, sample.command.field());
+#include <image_members.inc>
+#undef TANDEM_STATE
+#undef TANDEM_COMMAND
   command_.write(message);
 }
 

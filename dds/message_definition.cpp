@@ -241,7 +241,7 @@ std::string type_hash(const MessageDefinition& definition) {
   const std::string text =
       fmt::format(R"({{"type_description": {}, "referenced_type_descriptions": [{}]}})",
                   description(definition), referenced);
-  return "RIHS01_" + sha256(std::as_bytes(std::span(text)));
+  return "RIHS01_" + sha256(text);
 }
 
 std::string full_text(const MessageDefinition& definition) {

@@ -14,7 +14,7 @@
 
 #include "base/spsc_ring.hpp"
 #include "dds/topic_group.hpp"
-#include "hal/cycle_tap.hpp"
+#include "hal/cycle_observer.hpp"
 
 namespace tandem::dds {
 
@@ -26,7 +26,7 @@ struct FaultSource {
   std::function<std::uint64_t()> lost;  ///< that the list had no room for
 };
 
-class Publisher final : public hal::CycleTap {
+class Publisher final : public hal::CycleObserver {
  public:
   /// Makes every topic; nothing is published yet. Robot, tree and participant outlive it.
   /// Errors: Endpoint::create()'s; two sensors whose names are the same in ROS 2.

@@ -136,7 +136,9 @@ Status ServiceClientBase::call(void* request, Patience patience, const Use& use)
   for (;;) {
     if (take(header, use)) return {};
     if (SteadyClock::now() > deadline) {
-      return fail("no answer in time from " + name_, "is the process stopped, or very busy?");
+      return fail(fmt::format("no answer within {:g} s from {}",
+                              std::chrono::duration<double>(patience).count(), name_),
+                  "is the process stopped, or very busy?");
     }
     if (servers() == 0) {
       return fail("who serves " + name_ + " went away before it answered",

@@ -5,6 +5,7 @@
 
 #include <dds/dds.h>
 #include <ros2.h>
+#include <tandem_images.h>
 #include <tandem_link.h>
 #include <tandem_msgs.h>
 

@@ -1,5 +1,5 @@
 // The contract between the loop and whatever stands for the robot.
-// Layer: hal.  Thread: open/close non-RT; read/write RT.
+// Layer: hal.  Thread: the loop's, but for status_text() and fault_text(); made non-RT.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,7 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
+#include "hal/cycle_time.hpp"
 #include "hal/fault_kind.hpp"
 #include "hal/image.hpp"
 #include "hal/stop_category.hpp"
@@ -23,7 +24,7 @@ namespace tandem::hal {
 enum class Pace : std::uint8_t {
   kWallClock,       ///< the loop sleeps to absolute wall-clock times
   kSimulatedClock,  ///< time is the count of cycles; the loop may run at any speed
-  kBus,             ///< read() returns when the bus' cycle comes round
+  kBus,             ///< exchange() returns when the robot's cycle comes round
 };
 
 /// Where a backend stands between power-on and power-off.
@@ -31,13 +32,6 @@ enum class Phase : std::uint8_t {
   kBringUp,      ///< nodes are being configured and drives enabled, at first or by reset()
   kOperational,  ///< every axis follows the command
   kFault,        ///< latched; `status_text()` says the cause
-};
-
-/// Exact nominal time of a cycle. `time_ns == cycle * period_ns`.
-struct CycleTime {
-  std::uint64_t cycle = 0;
-  std::int64_t time_ns = 0;
-  std::int64_t period_ns = 1'000'000;
 };
 
 /// An injected fault that has begun.

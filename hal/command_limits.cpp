@@ -23,9 +23,9 @@ void go_on(double& value, double sent, double wish) noexcept TANDEM_RT {
 
 }  // namespace
 
-CommandLimits::CommandLimits(const RobotConfig& robot, std::int64_t period_ns)
+CommandLimits::CommandLimits(const Robot& robot, std::int64_t period_ns)
     : period_s_(static_cast<double>(period_ns) * 1e-9),
-      limits_(joint_capabilities(robot)),
+      limits_(robot.joints.begin(), robot.joints.end()),
       last_(limits_.size()),
       position_(limits_.size()),
       velocity_(limits_.size()),

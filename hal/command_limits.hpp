@@ -7,9 +7,10 @@
 #include <vector>
 
 #include "base/realtime.hpp"
-#include "hal/capabilities.hpp"
 #include "hal/image.hpp"
+#include "hal/joint_capabilities.hpp"
 #include "hal/reference_motion.hpp"
+#include "hal/robot.hpp"
 
 namespace tandem {
 class Archive;
@@ -46,7 +47,7 @@ class CommandLimits {
   /// Of its maximum velocity: the speed of a joint that is led back into its range.
   static constexpr double kRecoveryShare = 0.05;
 
-  CommandLimits(const RobotConfig& robot, std::int64_t period_ns);
+  CommandLimits(const Robot& robot, std::int64_t period_ns);
 
   /// Corrects `command`. `state` is this cycle's.
   /// @return kNotFinite or kOutOfRange when a joint needed it (the former goes first); a

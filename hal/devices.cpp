@@ -5,9 +5,9 @@
 
 namespace tandem::hal {
 
-Devices::Devices(const RobotConfig& robot, const StateImage& state, CommandImage& command,
+Devices::Devices(const Robot& robot, const StateImage& state, CommandImage& command,
                  ParameterImage& parameters, std::int64_t period_ns)
-    : access_{state, command, parameters, joint_capabilities(robot), period_ns},
+    : access_{state, command, parameters, {robot.joints.begin(), robot.joints.end()}, period_ns},
       sensors_(robot.sensors),
       encoders(access_),
       modes(access_),

@@ -7,7 +7,7 @@
 
 #include "base/result.hpp"
 #include "hal/joint_devices.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 #include "hal/sensor_devices.hpp"
 #include "hal/service_devices.hpp"
 
@@ -19,7 +19,7 @@ namespace tandem::hal {
 class Devices {
  public:
   /// The images outlive this. Gives every compliant joint its default impedance.
-  Devices(const RobotConfig& robot, const StateImage& state, CommandImage& command,
+  Devices(const Robot& robot, const StateImage& state, CommandImage& command,
           ParameterImage& parameters, std::int64_t period_ns);
   Devices(const Devices&) = delete;
   Devices& operator=(const Devices&) = delete;
@@ -38,7 +38,7 @@ class Devices {
 
  private:
   JointAccess access_;
-  std::vector<SensorConfig> sensors_;
+  std::vector<Sensor> sensors_;
   [[nodiscard]] Result<std::size_t> sensor(std::string_view name, SensorType type) const;
 
  public:

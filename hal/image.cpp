@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/archive.hpp"
+#include "hal/wire_name.hpp"
 
 namespace tandem::hal {
 
@@ -98,83 +99,41 @@ void Image::assign(const Image& other) noexcept {
 
 void Image::archive(Archive& ar) { ar.raw(block_.data(), layout_->bytes()); }
 
+Image::Slot Image::slot(std::string_view name) const {
+  const Field* field = layout_->find(wire_name(name));
+  assert(field != nullptr);
+  return {field->offset, field->count};
+}
+
 namespace {
 
-const char kLink[] = "link side, positive about the joint's +axis";
-
-std::shared_ptr<const Layout> state_layout(const ImageShape& shape) {
+// `count` of a row says these names.
+std::shared_ptr<const Layout> state_layout(std::size_t joints, std::size_t sensors,
+                                           std::size_t channels) {
   auto layout = std::make_shared<Layout>();
-  const std::size_t n = shape.joints;
-  layout->add("cycle", FieldType::kU64, 1, "number of the loop's cycle");
-  layout->add("time_ns", FieldType::kI64, 1, "nominal time of the cycle since the start");
-  layout->add("position_rad", FieldType::kF64, n, kLink);
-  layout->add("velocity_rad_s", FieldType::kF64, n, kLink);
-  layout->add("acceleration_rad_s2", FieldType::kF64, n, "differenced velocity_rad_s");
-  layout->add("torque_Nm", FieldType::kF64, n, "of the spring on the link");
-  layout->add("motor_position_rad", FieldType::kF64, n, "motor, reflected to the link");
-  layout->add("motor_velocity_rad_s", FieldType::kF64, n, "motor, reflected to the link");
-  layout->add("current_A", FieldType::kF64, n, "motor current");
-  layout->add("voltage_V", FieldType::kF64, n, "motor voltage applied");
-  layout->add("temperature_C", FieldType::kF64, n, "winding");
-  layout->add("sensor", FieldType::kF64, shape.channels(), "every sensor's channels in order");
-  layout->add("fault", FieldType::kU32, n, "0 or the drive's CiA 402 error code");
-  layout->add("age_cycles", FieldType::kU32, n, "0: fresh in this cycle");
-  layout->add("sensor_age_cycles", FieldType::kU32, shape.sensor_channels.size(), "0: fresh");
-  layout->add("statusword", FieldType::kU16, n, "CiA 402");
-  layout->add("mode", FieldType::kI8, n, "ControlMode in force");
-  layout->add("interaction", FieldType::kU8, n, "InteractionMode in force");
-  layout->add("drive_state", FieldType::kU8, n, "DriveState");
+#define TANDEM_FIELD(type, name, count, doc) \
+  layout->add(wire_name(#name), field_type<type>(), count, doc);
+#include "hal/state_fields.inc"
+#undef TANDEM_FIELD
   return layout;
 }
 
-std::shared_ptr<const Layout> command_layout(const ImageShape& shape) {
+std::shared_ptr<const Layout> command_layout(std::size_t joints) {
   auto layout = std::make_shared<Layout>();
-  const std::size_t n = shape.joints;
-  layout->add("cycle", FieldType::kU64, 1, "the cycle that computed it");
-  layout->add("time_ns", FieldType::kI64, 1, "its nominal time");
-  layout->add("position_rad", FieldType::kF64, n, kLink);
-  layout->add("velocity_rad_s", FieldType::kF64, n, "reference or feed-forward");
-  layout->add("torque_Nm", FieldType::kF64, n, "reference or feed-forward");
-  layout->add("voltage_V", FieldType::kF64, n, "open loop");
-  layout->add("current_A", FieldType::kF64, n, "current mode");
-  layout->add("stiffness_Nm_rad", FieldType::kF64, n, "virtual spring when compliant");
-  layout->add("damping_Nms_rad", FieldType::kF64, n, "virtual damper when compliant");
-  layout->add("mode", FieldType::kI8, n, "ControlMode wanted");
-  layout->add("interaction", FieldType::kU8, n, "InteractionMode wanted");
-  layout->add("fault_reset", FieldType::kU8, n, "1: clear the joint's latched fault");
+#define TANDEM_FIELD(type, name, count, doc) \
+  layout->add(wire_name(#name), field_type<type>(), count, doc);
+#include "hal/command_fields.inc"
+#undef TANDEM_FIELD
   return layout;
-}
-
-template <class Slot>
-Slot slot(const Layout& layout, std::string_view name) {
-  const Field* field = layout.find(name);
-  return {field->offset, field->count};
 }
 
 }  // namespace
 
-#define TANDEM_BIND(name) name##_ = slot<Slot>(layout(), #name)
-
-StateImage::StateImage(const ImageShape& shape) : Image(state_layout(shape)) {
-  TANDEM_BIND(cycle);
-  TANDEM_BIND(time_ns);
-  TANDEM_BIND(position_rad);
-  TANDEM_BIND(velocity_rad_s);
-  TANDEM_BIND(acceleration_rad_s2);
-  TANDEM_BIND(torque_Nm);
-  TANDEM_BIND(motor_position_rad);
-  TANDEM_BIND(motor_velocity_rad_s);
-  TANDEM_BIND(current_A);
-  TANDEM_BIND(voltage_V);
-  TANDEM_BIND(temperature_C);
-  TANDEM_BIND(sensor);
-  TANDEM_BIND(fault);
-  TANDEM_BIND(age_cycles);
-  TANDEM_BIND(sensor_age_cycles);
-  TANDEM_BIND(statusword);
-  TANDEM_BIND(mode);
-  TANDEM_BIND(interaction);
-  TANDEM_BIND(drive_state);
+StateImage::StateImage(const ImageShape& shape)
+    : Image(state_layout(shape.joints, shape.sensor_channels.size(), shape.channels())) {
+#define TANDEM_FIELD(type, name, count, doc) name##_ = slot(#name);
+#include "hal/state_fields.inc"
+#undef TANDEM_FIELD
   std::size_t first = 0;
   for (const std::size_t channels : shape.sensor_channels) {
     sensors_.push_back({first, channels});
@@ -189,22 +148,11 @@ std::span<double> StateImage::sensor_values(std::size_t index) noexcept {
   return sensor().subspan(sensors_[index].offset, sensors_[index].count);
 }
 
-CommandImage::CommandImage(const ImageShape& shape) : Image(command_layout(shape)) {
-  TANDEM_BIND(cycle);
-  TANDEM_BIND(time_ns);
-  TANDEM_BIND(position_rad);
-  TANDEM_BIND(velocity_rad_s);
-  TANDEM_BIND(torque_Nm);
-  TANDEM_BIND(voltage_V);
-  TANDEM_BIND(current_A);
-  TANDEM_BIND(stiffness_Nm_rad);
-  TANDEM_BIND(damping_Nms_rad);
-  TANDEM_BIND(mode);
-  TANDEM_BIND(interaction);
-  TANDEM_BIND(fault_reset);
+CommandImage::CommandImage(const ImageShape& shape) : Image(command_layout(shape.joints)) {
+#define TANDEM_FIELD(type, name, count, doc) name##_ = slot(#name);
+#include "hal/command_fields.inc"
+#undef TANDEM_FIELD
 }
-
-#undef TANDEM_BIND
 
 void ParameterImage::archive(Archive& ar) { ar(gains_, revision_); }
 

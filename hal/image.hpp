@@ -2,6 +2,7 @@
 // Layer: hal.  Thread: owned by one thread at a time; copied as bytes to hand it over.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -19,16 +20,28 @@ namespace tandem::hal {
 
 enum class FieldType : std::uint8_t { kF64, kI64, kU64, kU32, kU16, kI8, kU8 };
 
+/// That of a C++ type.
+template <class T>
+[[nodiscard]] consteval FieldType field_type() {
+  if constexpr (std::same_as<T, double>) return FieldType::kF64;
+  if constexpr (std::same_as<T, std::int64_t>) return FieldType::kI64;
+  if constexpr (std::same_as<T, std::uint64_t>) return FieldType::kU64;
+  if constexpr (std::same_as<T, std::uint32_t>) return FieldType::kU32;
+  if constexpr (std::same_as<T, std::uint16_t>) return FieldType::kU16;
+  if constexpr (std::same_as<T, std::int8_t>) return FieldType::kI8;
+  if constexpr (std::same_as<T, std::uint8_t>) return FieldType::kU8;
+}
+
 /// Bytes of one element.
 [[nodiscard]] std::size_t size_of(FieldType type) noexcept;
 
 /// One array of the block: `count` elements of `type` from byte `offset`.
 struct Field {
-  std::string name;  ///< with unit suffix, "position_rad"
+  std::string name;  ///< on the wire (hal/wire_name.hpp), with unit suffix: "torque_nm"
   FieldType type;
   std::size_t count;
   std::size_t offset;
-  std::string doc;  ///< one line: meaning, side, sign
+  std::string doc;  ///< one line: unit, meaning, side, sign
 };
 
 /// The table of an image's fields. Elements of 8 bytes come first, then 4, 2, 1, so that the
@@ -98,15 +111,24 @@ class Image {
   void archive(Archive& ar);
 
  protected:
+  /// Where a field's elements are, so that no cycle looks for its name.
+  struct Slot {
+    std::size_t offset = 0;
+    std::size_t count = 0;
+  };
+  /// @param name  of the field in C++. @pre the layout has it
+  [[nodiscard]] Slot slot(std::string_view name) const;
+
   template <class T>
-  [[nodiscard]] std::span<T> field(std::size_t offset, std::size_t count) noexcept {
-    return {reinterpret_cast<T*>(reinterpret_cast<std::byte*>(block_.data()) + offset), count};
+  [[nodiscard]] std::span<T> field(Slot at) noexcept {
+    return {reinterpret_cast<T*>(reinterpret_cast<std::byte*>(block_.data()) + at.offset),
+            at.count};
   }
   template <class T>
-  [[nodiscard]] std::span<const T> field(std::size_t offset, std::size_t count) const noexcept {
+  [[nodiscard]] std::span<const T> field(Slot at) const noexcept {
     return {
-        reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(block_.data()) + offset),
-        count};
+        reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(block_.data()) + at.offset),
+        at.count};
   }
 
  private:
@@ -114,40 +136,24 @@ class Image {
   std::vector<double> block_;  // doubles for their alignment
 };
 
-// Declares the read and write accessor of one field.
-#define TANDEM_FIELD(type, name)                                                    \
-  [[nodiscard]] std::span<type> name() noexcept {                                   \
-    return field<type>(name##_.offset, name##_.count);                              \
-  }                                                                                 \
-  [[nodiscard]] std::span<const type> name() const noexcept {                       \
-    return field<type>(name##_.offset, name##_.count);                              \
-  }
+// A row of an image's table of fields as members: the accessors `name()`, to write and to read.
+#define TANDEM_IMAGE_MEMBERS(type, name, count, doc)                                         \
+ public:                                                                                     \
+  [[nodiscard]] std::span<type> name() noexcept { return field<type>(name##_); }             \
+  [[nodiscard]] std::span<const type> name() const noexcept { return field<type>(name##_); } \
+                                                                                             \
+ private:                                                                                    \
+  Slot name##_;
 
-/// What was measured in one cycle. n = joints, c = sensor channels, s = sensors.
-/// Link side unless the name says motor; positive about the URDF joint's +axis.
+/// What was measured in one cycle: for each row of hal/state_fields.inc the accessor of its name,
+/// `std::span<double> position_rad()`.
 class StateImage : public Image {
+#define TANDEM_FIELD TANDEM_IMAGE_MEMBERS
+#include "hal/state_fields.inc"
+#undef TANDEM_FIELD
+
  public:
   explicit StateImage(const ImageShape& shape);
-
-  TANDEM_FIELD(std::uint64_t, cycle)          ///< (1) number of the loop's cycle, from 0
-  TANDEM_FIELD(std::int64_t, time_ns)         ///< (1) nominal time of the cycle since the start
-  TANDEM_FIELD(double, position_rad)          ///< (n) link position [rad or m]
-  TANDEM_FIELD(double, velocity_rad_s)        ///< (n) link velocity
-  TANDEM_FIELD(double, acceleration_rad_s2)   ///< (n) link acceleration, differenced velocity
-  TANDEM_FIELD(double, torque_Nm)             ///< (n) link torque, from the spring [Nm or N]
-  TANDEM_FIELD(double, motor_position_rad)    ///< (n) motor position, reflected to the link
-  TANDEM_FIELD(double, motor_velocity_rad_s)  ///< (n) motor velocity, reflected to the link
-  TANDEM_FIELD(double, current_A)             ///< (n) motor current
-  TANDEM_FIELD(double, voltage_V)             ///< (n) motor voltage applied
-  TANDEM_FIELD(double, temperature_C)         ///< (n) winding temperature
-  TANDEM_FIELD(double, sensor)                ///< (c) every sensor's channels, one after another
-  TANDEM_FIELD(std::uint32_t, fault)          ///< (n) 0, or the drive's CiA 402 error code
-  TANDEM_FIELD(std::uint32_t, age_cycles)     ///< (n) 0 fresh, k: the sample is k cycles old
-  TANDEM_FIELD(std::uint32_t, sensor_age_cycles)  ///< (s)
-  TANDEM_FIELD(std::uint16_t, statusword)     ///< (n) CiA 402 statusword
-  TANDEM_FIELD(std::int8_t, mode)             ///< (n) ControlMode in force, as the drive says
-  TANDEM_FIELD(std::uint8_t, interaction)     ///< (n) InteractionMode in force
-  TANDEM_FIELD(std::uint8_t, drive_state)     ///< (n) DriveState
 
   [[nodiscard]] std::size_t joints() const noexcept { return position_rad_.count; }
   /// Channels of sensor `index`, in the sensor's documented order.
@@ -155,47 +161,22 @@ class StateImage : public Image {
   [[nodiscard]] std::span<double> sensor_values(std::size_t index) noexcept;
 
  private:
-  struct Slot {
-    std::size_t offset = 0;
-    std::size_t count = 0;
-  };
-  Slot cycle_, time_ns_, position_rad_, velocity_rad_s_, acceleration_rad_s2_, torque_Nm_,
-      motor_position_rad_, motor_velocity_rad_s_, current_A_, voltage_V_, temperature_C_, sensor_,
-      fault_, age_cycles_, sensor_age_cycles_, statusword_, mode_, interaction_, drive_state_;
   std::vector<Slot> sensors_;  // within sensor(), offset in elements
 };
 
-/// What is asked of the drives in one cycle. A reference that its mode does not use is ignored,
-/// except torque_Nm, which is the feed-forward in position, velocity and impedance control.
+/// What is asked of the drives in one cycle: the accessors of hal/command_fields.inc. A reference
+/// that its mode does not use is ignored, except torque_Nm, which is the feed-forward in position,
+/// velocity and impedance control.
 class CommandImage : public Image {
+#define TANDEM_FIELD TANDEM_IMAGE_MEMBERS
+#include "hal/command_fields.inc"
+#undef TANDEM_FIELD
+
  public:
   explicit CommandImage(const ImageShape& shape);
 
-  TANDEM_FIELD(std::uint64_t, cycle)           ///< (1) the cycle that computed it
-  TANDEM_FIELD(std::int64_t, time_ns)          ///< (1) its nominal time
-  TANDEM_FIELD(double, position_rad)           ///< (n) link position reference
-  TANDEM_FIELD(double, velocity_rad_s)         ///< (n) link velocity reference or feed-forward
-  TANDEM_FIELD(double, torque_Nm)              ///< (n) link torque reference or feed-forward
-  TANDEM_FIELD(double, voltage_V)              ///< (n) motor voltage, mode kOpenLoop
-  TANDEM_FIELD(double, current_A)              ///< (n) motor current, mode kCurrent
-  TANDEM_FIELD(double, stiffness_Nm_rad)       ///< (n) virtual spring, compliant
-  TANDEM_FIELD(double, damping_Nms_rad)        ///< (n) virtual damper, compliant
-  TANDEM_FIELD(std::int8_t, mode)              ///< (n) ControlMode wanted
-  TANDEM_FIELD(std::uint8_t, interaction)      ///< (n) InteractionMode wanted
-  TANDEM_FIELD(std::uint8_t, fault_reset)      ///< (n) 1: clear this joint's latched fault
-
   [[nodiscard]] std::size_t joints() const noexcept { return position_rad_.count; }
-
- private:
-  struct Slot {
-    std::size_t offset = 0;
-    std::size_t count = 0;
-  };
-  Slot cycle_, time_ns_, position_rad_, velocity_rad_s_, torque_Nm_, voltage_V_, current_A_,
-      stiffness_Nm_rad_, damping_Nms_rad_, mode_, interaction_, fault_reset_;
 };
-
-#undef TANDEM_FIELD
 
 /// Gains of one loop of a drive's firmware, in the units that its output needs.
 struct PidGains {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/realtime.hpp"
-#include "hal/capabilities.hpp"
 #include "hal/image.hpp"
+#include "hal/joint_capabilities.hpp"
 #include "hal/trapezoid.hpp"
 
 namespace tandem {

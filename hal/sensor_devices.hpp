@@ -9,7 +9,7 @@
 #include "base/realtime.hpp"
 #include "hal/backend.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
 
 namespace tandem::hal {
 

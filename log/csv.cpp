@@ -65,6 +65,10 @@ Status write_csv(const LogFile& log, const std::string& topic, std::size_t every
                  std::span<const std::string> fields) {
   if (topic == "/tandem/event") return write_events(log, out);
   const Topic* found = log.find(topic);
+  if (found != nullptr && found->layout.fields().empty()) {
+    return fail("the messages of '" + topic + "' are no numbers of a fixed count",
+                "take another topic, /tandem/state for one, or a ROS viewer");
+  }
   const auto chosen = choose(found, fields);
   if (!chosen) return std::unexpected(chosen.error());
   if (found != nullptr) out << header(*chosen, log.info()) << "\n";

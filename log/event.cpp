@@ -4,6 +4,7 @@
 
 #include "base/realtime.hpp"
 #include "hal/fault_kind.hpp"
+#include "log/cdr_writer.hpp"
 
 namespace tandem::log {
 
@@ -66,15 +67,13 @@ const std::string& event_schema() {
 }
 
 void encode_event(const Event& event, std::string_view text, Bytes& out) {
-  append(out, event.cycle);
-  append(out, static_cast<std::uint64_t>(event.time_ns));
-  append(out, event.code);
-  append(out, static_cast<std::uint32_t>(event.joint));
-  append(out, static_cast<std::uint8_t>(event.kind));
-  out.insert(out.end(), 3, std::byte{0});  // CDR aligns the string's length to 4
-  append(out, static_cast<std::uint32_t>(text.size() + 1));
-  append(out, std::as_bytes(std::span(text)));
-  out.push_back(std::byte{0});
+  CdrWriter cdr(out);
+  cdr.number(event.cycle);
+  cdr.number(static_cast<std::uint64_t>(event.time_ns));
+  cdr.number(event.code);
+  cdr.number(static_cast<std::uint32_t>(event.joint));
+  cdr.number(static_cast<std::uint8_t>(event.kind));
+  cdr.text(text);
 }
 
 Result<EventText> decode_event(std::span<const std::byte> body) {

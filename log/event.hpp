@@ -50,7 +50,7 @@ static_assert(std::is_trivially_copyable_v<Event> && sizeof(Event) == 32);
 /// The channel's ros2msg definition.
 [[nodiscard]] const std::string& event_schema();
 
-/// The event's CDR body (without header), its text last.
+/// Makes `out` the event's CDR body (without header), its text last.
 void encode_event(const Event& event, std::string_view text, Bytes& out);
 
 /// An event read back.

@@ -28,6 +28,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const 
   std::unique_ptr<Recorder> recorder(new Recorder);
   recorder->path_ = path;
   recorder->joints_ = info.joints;
+  recorder->view_ = RobotView(options.viewed, info.joints);
   recorder->ring_slots_ = options.ring_slots;
   McapWriter& writer = recorder->writer_;
   if (Status opened = writer.open(path, options.writer); !opened) {
@@ -50,10 +51,13 @@ Recorder::Channel Recorder::add_channel(const std::string& topic, const std::str
                                         const hal::Layout& layout) {
   largest_ = std::max(largest_, layout.bytes());
   const std::uint16_t schema = writer_.add_schema(type, "ros2msg", ros2msg_of(layout));
-  return writer_.add_channel(schema, topic, "cdr");
+  const Channel channel = writer_.add_channel(schema, topic, "cdr");
+  view_.take_channel(channel, topic, layout);
+  return channel;
 }
 
 void Recorder::start() {
+  view_.add_channels(writer_);
   ring_ = std::make_unique<SpscRing>((sizeof(Slot) + largest_ + 7) / 8 * 8, ring_slots_);
   thread_ = std::thread([this] { run(); });
 }
@@ -96,21 +100,27 @@ void Recorder::run() {
 void Recorder::write(std::span<const std::byte> slot) {
   Slot head{};
   std::memcpy(&head, slot.data(), sizeof head);
-  std::span<const std::byte> body = slot.subspan(sizeof head, head.bytes);
+  const std::span<const std::byte> body = slot.subspan(sizeof head, head.bytes);
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);
-    event_.clear();
     encode_event(event, describe(event, joints_), event_);
-    body = event_;
+    write(head.channel, head.time_ns, event_);
+    return;
   }
+  write(head.channel, head.time_ns, body);
+  view_.follow(head.channel, head.time_ns, body,
+               [&](Channel channel, auto message) { write(channel, head.time_ns, message); });
+}
+
+void Recorder::write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body) {
   std::array<std::byte, 14> hashed;  // channel, time, CDR header; the body follows
-  store(hashed.data(), head.channel);
-  store(hashed.data() + 2, static_cast<std::uint64_t>(head.time_ns));
+  store(hashed.data(), channel);
+  store(hashed.data() + 2, static_cast<std::uint64_t>(time_ns));
   std::memcpy(hashed.data() + 10, kCdrHeader.data(), kCdrHeader.size());
   hash_.update(hashed);
   hash_.update(body);
-  if (!writer_.write(head.channel, head.time_ns, kCdrHeader, body)) {
+  if (!writer_.write(channel, time_ns, kCdrHeader, body)) {
     if (lost_++ == 0) trouble_ = writer_.error();
     failed_.store(true, std::memory_order_release);
   }

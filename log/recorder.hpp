@@ -18,6 +18,7 @@
 #include "log/event.hpp"
 #include "log/info.hpp"
 #include "log/mcap_writer.hpp"
+#include "log/robot_view.hpp"
 #include "base/sha256.hpp"
 
 namespace tandem::log {
@@ -26,6 +27,7 @@ struct RecorderOptions {
   WriterOptions writer{};
   /// Messages between the threads. 2048 are half a second of three channels at 1 kHz.
   std::size_t ring_slots = 2048;
+  ViewedRobot viewed{};  ///< with a description: what a ROS viewer needs is logged, too
 };
 
 /// What a closed recording amounts to.
@@ -84,11 +86,13 @@ class Recorder {
   Recorder() = default;
   void run();
   void write(std::span<const std::byte> slot);
+  void write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void stop_thread();
 
   std::string path_;
   std::vector<std::string> joints_;
   McapWriter writer_;
+  RobotView view_;
   Sha256 hash_;
   std::size_t largest_ = sizeof(Event);
   std::size_t ring_slots_ = 0;

@@ -1,8 +1,7 @@
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
+#include "base/sha256.hpp"
 #include "model/generate.hpp"
-#include "model/hash.hpp"
 #include "model/kernels.h"
 
 namespace tandem::model {
@@ -58,18 +57,9 @@ std::string text_of(const ModelSpec& spec) {
 
 }  // namespace
 
-std::string sha256_hex(std::string_view text) {
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int size = 0;
-  EVP_Digest(text.data(), text.size(), digest, &size, EVP_sha256(), nullptr);
-  std::string result;
-  for (unsigned int i = 0; i < size; ++i) result += fmt::format("{:02x}", digest[i]);
-  return result;
-}
-
 std::string description_hash(const Tree& tree, const ModelSpec& spec) {
-  return sha256_hex(fmt::format("generator {} abi {}\n", kGeneratorVersion, TANDEM_KERNELS_ABI) +
-                    text_of(tree) + text_of(spec));
+  return sha256(fmt::format("generator {} abi {}\n", kGeneratorVersion, TANDEM_KERNELS_ABI) +
+                text_of(tree) + text_of(spec));
 }
 
 }  // namespace tandem::model

@@ -11,12 +11,12 @@
 #include <mutex>
 #include <thread>
 
+#include "base/process.hpp"
+#include "base/sha256.hpp"
 #include "base/trusted_code.hpp"
 #include "model/file_lock.hpp"
-#include "model/hash.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_sources.hpp"
-#include "model/process.hpp"
 
 namespace tandem::model {
 namespace {
@@ -42,6 +42,14 @@ std::vector<Variant> variants() {
                   {"-march=x86-64-v4", "-mprefer-vector-width=256", "-ffp-contract=fast"}});
 #endif
   return list;
+}
+
+/// Runs `command` in `directory`, what it says to the file `log` there.
+bool succeeds(const std::vector<std::string>& command, const fs::path& directory,
+              const std::string& log) {
+  const Result<pid_t> child = spawn(
+      {.command = command, .output = (directory / log).string(), .directory = directory.string()});
+  return child && wait_for(*child) == 0;
 }
 
 // One file to compile.
@@ -98,7 +106,7 @@ Job make_job(const SourceFile& source, const Variant* variant, const std::string
     job.command.push_back(word);
   std::string all = headers + source.text;
   for (const std::string& word : job.command) all += word + '\0';
-  job.stamp = sha256_hex(all);
+  job.stamp = sha256(all);
   return job;
 }
 
@@ -141,7 +149,7 @@ Status compile(const std::vector<Job>& jobs, const fs::path& directory,
   const auto work = [&] {
     for (std::size_t i = next++; i < jobs.size(); i = next++) {
       const Job& job = jobs[i];
-      const bool ok = run_program(job.command, directory, directory / (job.object + ".log"));
+      const bool ok = succeeds(job.command, directory, job.object + ".log");
       if (ok) std::ofstream(directory / (job.object + ".stamp")) << job.stamp;
       const std::lock_guard lock(mutex);
       if (!ok) {
@@ -194,7 +202,7 @@ Status link(const std::vector<Job>& jobs, const std::vector<std::string>& compil
   std::vector<std::string> command = compiler;
   for (const char* word : {"-shared", "-o", kFreshLibrary}) command.emplace_back(word);
   for (const Job& job : jobs) command.push_back(job.object);
-  if (!run_program(command, directory, directory / "link.log")) {
+  if (!succeeds(command, directory, "link.log")) {
     return std::unexpected(compile_error(directory, "link"));
   }
   return seal_library((directory / kFreshLibrary).string());
@@ -245,7 +253,7 @@ Result<BuildReport> build_kernels(const Tree& tree, const ModelSpec& spec,
   const std::vector<Job> jobs = make_jobs(*generated, compiler);
   std::string all;
   for (const Job& job : jobs) all += job.stamp;
-  const std::string stamp = sha256_hex(all);
+  const std::string stamp = sha256(all);
   if (read_file(directory / "library.stamp") == stamp && check_seal(library.string())) {
     report.was_up_to_date = true;
     return report;

@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,9 +12,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include "base/process.hpp"
 #include "report/layout.hpp"
-
-extern char** environ;
 
 namespace tandem::report {
 namespace {
@@ -182,39 +179,25 @@ Status write_all(int pipe, const std::string& text) {
   return {};
 }
 
-/// Runs gnuplot on `script`; what it says on standard error goes to the file `complaints`.
+/// Runs gnuplot on `script`; what it says goes to the file `complaints`.
 Status run_gnuplot(const std::string& script, const std::string& complaints) {
+  const std::string hint = "install it: apt-get install gnuplot-nox";
   int pipe_ends[2];
   if (pipe2(pipe_ends, O_CLOEXEC) != 0) return fail("no pipe: " + std::string(strerror(errno)));
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, pipe_ends[0], 0);
-  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 2, complaints.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                   0644);
-  char program[] = "gnuplot";
-  char from_standard_input[] = "-";
-  char* arguments[] = {program, from_standard_input, nullptr};
-  pid_t child = 0;
-  const int spawned = posix_spawnp(&child, program, &actions, nullptr, arguments, environ);
-  posix_spawn_file_actions_destroy(&actions);
+  const Result<pid_t> child =
+      spawn({.command = {"gnuplot", "-"}, .output = complaints, .input = pipe_ends[0]});
   close(pipe_ends[0]);
-  if (spawned != 0) {
+  if (!child) {
     close(pipe_ends[1]);
-    return fail("gnuplot could not be started: " + std::string(strerror(spawned)),
-                "install it: apt-get install gnuplot-nox");
+    return fail(child.error().message, hint);
   }
   const auto former = std::signal(SIGPIPE, SIG_IGN);
   const Status written = write_all(pipe_ends[1], script);
   close(pipe_ends[1]);
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = wait_for(*child);
   std::signal(SIGPIPE, former);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 127) {
-    return fail("gnuplot could not be started", "install it: apt-get install gnuplot-nox");
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return fail("gnuplot failed");
+  if (status == 127) return fail("gnuplot could not be started", hint);
+  if (status != 0) return fail("gnuplot failed");
   return written;
 }
 

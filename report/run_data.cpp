@@ -173,7 +173,7 @@ Status read_state(const log::LogFile& file, Window& window, RunData& run) {
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
   auto table = read_columns(
       file, kState,
-      {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_Nm", n}, {"sensor", channels}});
+      {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_nm", n}, {"sensor", channels}});
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
   run.controllers_ran = std::min(end_s, window.fault_s) > window.begin_s;
@@ -223,8 +223,8 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
                              {"base_quaternion", 4},
                              {"base_velocity", 6},
                              {"foot_position_m", feet},
-                             {"foot_force_N", feet},
-                             {"foot_moment_Nm", feet},
+                             {"foot_force_n", feet},
+                             {"foot_moment_nm", feet},
                              {"loop_position_error_m", loops},
                              {"loop_velocity_error_m_s", loops},
                              {"passive_position_rad", passive}});

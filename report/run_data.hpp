@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "log/log_file.hpp"
 #include "model/tree.hpp"
 

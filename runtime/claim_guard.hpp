@@ -8,8 +8,8 @@
 
 #include "base/realtime.hpp"
 #include "controllers/controller.hpp"
-#include "hal/capabilities.hpp"
 #include "hal/image.hpp"
+#include "hal/joint_capabilities.hpp"
 
 namespace tandem::runtime {
 

@@ -7,16 +7,17 @@
 #include "controllers/hosted_call.hpp"
 
 namespace tandem::runtime {
-ControllerHost::ControllerHost(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kernels* kernels,
                                std::int64_t period_ns)
-    : robot_(&robot),
+    : config_(&config),
+      robot_(hal::robot_of(config)),
       kernels_(kernels),
       period_ns_(period_ns),
-      capabilities_(hal::joint_capabilities(robot)),
-      owner_(robot.joints.size(), -1),
-      recovers_(robot.joints.size()),
-      take_over_(robot.joints.size(), period_ns),
-      guard_(robot.shape(), capabilities_) {
+      capabilities_(robot_.joints.begin(), robot_.joints.end()),
+      owner_(robot_.joints.size(), -1),
+      recovers_(robot_.joints.size()),
+      transfer_(robot_.joints.size(), period_ns),
+      guard_(robot_.shape(), capabilities_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
     impedance_.push_back({joint.stiffness_Nm_rad, joint.damping_Nms_rad});
   }
@@ -48,7 +49,7 @@ Status ControllerHost::add(const std::string& name, std::shared_ptr<Controller> 
   if (const auto conflict = active ? find_conflict(table_, after) : std::nullopt) {
     table_[slot] = nullptr;
     return fail_at(
-        robot_->joints[conflict->joint].name,
+        robot_.joints[conflict->joint].name,
         "is claimed by the controllers '" + owned_[conflict->one]->name + "' and '" + name + "'",
         "let one controller have the joint, or give one of them "
         "active = false");
@@ -76,17 +77,20 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
     std::span<const double> start_rad) {
-  ControllerSetup setup(*robot_, kernels_, period_ns_, std::move(parameters), start_rad);
-  Status configured = hosted_call(name, [&] { return controller->configure(setup); });
-  setup.parameters.finish();
-  if (configured) configured = check_claims(name, setup.claims());
+  ControllerSetup setup(robot_, kernels_, period_ns_, std::move(parameters), start_rad);
+  const Status configured = hosted_call(name, [&] { return controller->configure(setup); });
+  // Keys that it did not get to before it failed are not wrong.
   if (!configured) return std::unexpected(configured.error());
+  setup.parameters.finish();
+  if (Status claims = check_claims(name, setup.claims()); !claims) {
+    return std::unexpected(claims.error());
+  }
   auto made = std::make_unique<HostedController>();
   made->name = name;
   made->controller = std::move(controller);
   made->claims.assign(setup.claims().begin(), setup.claims().end());
-  made->claimed.assign(robot_->joints.size(), 0);
-  made->strayed.assign(robot_->joints.size(), 0);
+  made->claimed.assign(robot_.joints.size(), 0);
+  made->strayed.assign(robot_.joints.size(), 0);
   for (const auto& claim : made->claims) made->claimed[claim.joint] = 1;
   made->id = new_id(name);
   return made;
@@ -94,7 +98,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
 
 Status ControllerHost::check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const {
-  std::vector<std::uint8_t> claimed(robot_->joints.size());
+  std::vector<std::uint8_t> claimed(robot_.joints.size());
   for (const auto& claim : claims) {
     if (claim.joint >= claimed.size()) {
       return fail_at(name,
@@ -103,11 +107,11 @@ Status ControllerHost::check_claims(const std::string& name,
                      "joints are numbered from 0 in the robot.toml's order");
     }
     if (claimed[claim.joint] != 0) {
-      return fail_at(robot_->joints[claim.joint].name,
+      return fail_at(robot_.joints[claim.joint].name,
                      "is claimed twice by the controller '" + name + "'", "claim each joint once");
     }
     claimed[claim.joint] = 1;
-    if (Status able = hal::check_capability(*robot_, claim.joint, claim.mode, claim.interaction);
+    if (Status able = hal::check_capability(*config_, claim.joint, claim.mode, claim.interaction);
         !able) {
       return able;
     }
@@ -169,7 +173,7 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
 
 void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& state,
                            hal::CommandImage& command) noexcept TANDEM_RT {
-  take_over_.clear();
+  transfer_.clear();
   release(command);  // so that hold() takes every measured position
   hold(state, command);
   done_ = 0;
@@ -184,7 +188,7 @@ void ControllerHost::start(const hal::CycleTime& time, const hal::StateImage& st
 
 Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT {
-  take_over_.before_update(command);
+  transfer_.before_update(command);
   bool ends = active_ != 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot)) continue;
@@ -194,7 +198,7 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
       if (code == Code::kStopped) {
         done_ |= only(slot);
       } else if (code != Code::kOk) {
-        culprit_ = one.id;
+        failed_controller_ = one.id;
         leave_calls();
         return code;
       }
@@ -202,7 +206,7 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
   leave_calls();
-  take_over_.after_update(state, command);
+  transfer_.after_update(state, command);
   show();
   return ends ? Code::kStopped : Code::kOk;
 }
@@ -238,7 +242,7 @@ void ControllerHost::stop() noexcept TANDEM_RT {
     if (is_active(slot)) enter(*table_[slot]).stop();
   }
   leave_calls();
-  take_over_.clear();
+  transfer_.clear();
 }
 
 std::uint64_t ControllerHost::fingerprint() const noexcept {
@@ -263,7 +267,7 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, impedance_, recovers_, culprit_, take_over_);
+  ar(active_, done_, impedance_, recovers_, failed_controller_, transfer_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }

@@ -18,12 +18,13 @@
 #include "base/result.hpp"
 #include "controllers/controller.hpp"
 #include "controllers/plugin_loader.hpp"
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/robot.hpp"
+#include "runtime/bumpless_transfer.hpp"
 #include "runtime/claim_guard.hpp"
 #include "runtime/loop_mailbox.hpp"
-#include "runtime/take_over.hpp"
 
 namespace tandem::runtime {
 
@@ -64,8 +65,8 @@ class ControllerHost {
  public:
   using Table = std::array<HostedController*, kMostControllers>;
 
-  /// The robot must outlive the host. `kernels` may be null.
-  ControllerHost(const hal::RobotConfig& robot, const tandem_kernels* kernels,
+  /// `config` must outlive the host. `kernels` may be null.
+  ControllerHost(const hal::RobotConfig& config, const tandem_kernels* kernels,
                  std::int64_t period_ns);
   ControllerHost(const ControllerHost&) = delete;
   ControllerHost& operator=(const ControllerHost&) = delete;
@@ -121,15 +122,20 @@ class ControllerHost {
                                   HostedController& controller) noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer remove(std::size_t slot) noexcept TANDEM_RT;
   /// Stops and starts controllers, all or none. When they are `running`, what they leave is held
-  /// and every joint that changes hands is led over (TakeOver); else it is who will start.
+  /// and every joint that changes hands does so without a bump (BumplessTransfer); else it is who
+  /// will start.
   [[nodiscard]] LoopAnswer switch_over(ControllerSet stop, ControllerSet start, bool running,
                                        const hal::CycleTime& time, const hal::StateImage& state,
                                        hal::CommandImage& command) noexcept TANDEM_RT;
   /// Sets a joint's impedance, and the mode of one that no active controller claims: position at
   /// the measured one, velocity 0, torque (reference or feed-forward) the measured one.
-  [[nodiscard]] LoopAnswer set_joint(std::size_t joint, const JointWish& wish, bool running,
+  [[nodiscard]] LoopAnswer set_joint(std::size_t joint, const JointRequest& wish, bool running,
                                      const hal::StateImage& state,
                                      hal::CommandImage& command) noexcept TANDEM_RT;
+
+  /// kRecovering when one of `start` claims a joint that recover() leads back: its start would end
+  /// that.
+  [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
 
   /// Lets a joint that no active controller claims come back to its limits, by lead_back(), at the
   /// speed that CommandLimits allows out there. A reset ends that.
@@ -154,7 +160,7 @@ class ControllerHost {
   /// Every cycle, the first included.
   /// @return kOk; kStopped when a controller is active, and every active one is done (one that is
   ///         done keeps its last references) and came with the experiment; else the first code
-  ///         that is neither, culprit() says whose.
+  ///         that is neither, failed_controller() says whose.
   [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT;
   void stop() noexcept TANDEM_RT;
@@ -170,7 +176,7 @@ class ControllerHost {
   /// That are loaded.
   [[nodiscard]] std::size_t size() const noexcept;
   /// For name(): the controller whose code update() returned last.
-  [[nodiscard]] std::size_t culprit() const noexcept { return culprit_; }
+  [[nodiscard]] std::size_t failed_controller() const noexcept { return failed_controller_; }
   /// For name(): the controller that is in a call of the cycle; -1: none. Any thread.
   [[nodiscard]] std::int32_t at_work() const noexcept {
     return at_work_.load(std::memory_order_relaxed);
@@ -219,7 +225,8 @@ class ControllerHost {
     double damping_Nms_rad = 0.0;
   };
 
-  const hal::RobotConfig* robot_;
+  const hal::RobotConfig* config_;
+  const hal::Robot robot_;  // what the controllers see of it
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
   std::vector<double> start_rad_;  // of start_from()
@@ -231,10 +238,10 @@ class ControllerHost {
   std::vector<std::int32_t> owner_;     // by joint: an active one's slot, or -1
   std::vector<Impedance> impedance_;    // by joint: that a start gives it
   std::vector<std::uint8_t> recovers_;  // by joint: it is led back to its limits
-  TakeOver take_over_;
+  BumplessTransfer transfer_;
   ClaimGuard guard_;
   std::optional<Stray> stray_;
-  std::size_t culprit_ = 0;
+  std::size_t failed_controller_ = 0;
   std::atomic<std::uint64_t> shown_{0};  // active, and done in the upper half
   std::atomic<std::int32_t> at_work_{-1};
 

@@ -11,15 +11,15 @@ using hal::InteractionMode;
 
 namespace {
 
-constexpr auto kPosition = static_cast<std::int8_t>(ControlMode::kPosition);
-constexpr auto kStiff = static_cast<std::uint8_t>(InteractionMode::kStiff);
+constexpr auto kPositionMode = static_cast<std::int8_t>(ControlMode::kPosition);
+constexpr auto kStiffMode = static_cast<std::uint8_t>(InteractionMode::kStiff);
 
 bool is_enabled(const hal::StateImage& state, std::size_t joint) noexcept TANDEM_RT {
   return state.drive_state()[joint] ==
          static_cast<std::uint8_t>(hal::DriveState::kOperationEnabled);
 }
 
-LoopAnswer refuse(Refusal why, std::size_t one) noexcept TANDEM_RT {
+LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
   return {.refusal = why, .one = static_cast<std::int32_t>(one)};
 }
 
@@ -32,9 +32,9 @@ void ControllerHost::hold(const hal::StateImage& state,
       command.mode()[j] = static_cast<std::int8_t>(ControlMode::kIdle);
       continue;
     }
-    if (command.mode()[j] != kPosition || !is_enabled(state, j)) {
-      command.mode()[j] = kPosition;
-      command.interaction()[j] = kStiff;
+    if (command.mode()[j] != kPositionMode || !is_enabled(state, j)) {
+      command.mode()[j] = kPositionMode;
+      command.interaction()[j] = kStiffMode;
       command.position_rad()[j] = state.position_rad()[j];
       command.torque_Nm()[j] = 0.0;
     }
@@ -78,8 +78,8 @@ void ControllerHost::seat(std::size_t joint, ControlMode mode, InteractionMode i
 /// A joint that nobody has any more stays: with its reference, when that was a stiff position.
 void ControllerHost::leave(std::size_t joint, const hal::StateImage& state,
                            hal::CommandImage& command) const noexcept TANDEM_RT {
-  const bool keeps = command.mode()[joint] == kPosition && command.interaction()[joint] == kStiff &&
-                     is_enabled(state, joint);
+  const bool keeps = command.mode()[joint] == kPositionMode &&
+                     command.interaction()[joint] == kStiffMode && is_enabled(state, joint);
   if (keeps) {
     command.velocity_rad_s()[joint] = 0.0;
     return;
@@ -103,8 +103,8 @@ LoopAnswer ControllerHost::insert(std::size_t slot,
 }
 
 LoopAnswer ControllerHost::remove(std::size_t slot) noexcept TANDEM_RT {
-  if (table_[slot] == nullptr) return refuse(Refusal::kGone, slot);
-  if (is_active(slot)) return refuse(Refusal::kActive, slot);
+  if (table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
+  if (is_active(slot)) return refuse(RejectReason::kActive, slot);
   table_[slot] = nullptr;
   return {};
 }
@@ -115,13 +115,13 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   const ControllerSet after = (active_ & ~stop) | start;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     const bool named = ((stop | start) & only(slot)) != 0;
-    if (named && table_[slot] == nullptr) return refuse(Refusal::kGone, slot);
+    if (named && table_[slot] == nullptr) return refuse(RejectReason::kGone, slot);
     if (named && is_active(slot) != ((stop & only(slot)) != 0)) {
-      return refuse(Refusal::kActive, slot);
+      return refuse(RejectReason::kActive, slot);
     }
   }
   if (const auto conflict = find_conflict(table_, after)) {
-    return {.refusal = Refusal::kConflict,
+    return {.refusal = RejectReason::kConflict,
             .joint = static_cast<std::int32_t>(conflict->joint),
             .one = static_cast<std::int32_t>(conflict->one),
             .other = static_cast<std::int32_t>(conflict->other)};
@@ -130,7 +130,7 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   set_active(after);
   if (!running) return {};
   for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    if (is_claimed(j, stop | start)) take_over_.begin(j, state, command);
+    if (is_claimed(j, stop | start)) transfer_.begin(j, state, command);
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((stop & only(slot)) == 0) continue;
@@ -151,7 +151,8 @@ bool ControllerHost::retreat(const hal::CycleTime& time, const hal::StateImage& 
   ControllerSet retreating = 0;
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (!is_active(slot) || (done_ & only(slot)) != 0) continue;
-    if (enter(*table_[slot]).retreat(time, state)) retreating |= only(slot);
+    Controller& controller = enter(*table_[slot]);
+    if (controller.can_retreat() && controller.retreat(time, state)) retreating |= only(slot);
   }
   leave_calls();
   if (retreating == 0) return false;
@@ -159,7 +160,7 @@ bool ControllerHost::retreat(const hal::CycleTime& time, const hal::StateImage& 
   return true;
 }
 
-LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, bool running,
+LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish, bool running,
                                      const hal::StateImage& state,
                                      hal::CommandImage& command) noexcept TANDEM_RT {
   const auto number = static_cast<std::int32_t>(joint);
@@ -171,13 +172,13 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, b
   if (moves) {
     LoopAnswer refused{.joint = number, .one = owned_by};
     if (owned_by >= 0) {
-      refused.refusal = Refusal::kClaimed;
+      refused.refusal = RejectReason::kClaimed;
     } else if (!running) {
-      refused.refusal = Refusal::kNotRunning;
+      refused.refusal = RejectReason::kNotRunning;
     } else if (!capabilities_[joint].can(mode, interaction)) {
-      refused.refusal = Refusal::kIncapable;
+      refused.refusal = RejectReason::kIncapable;
     }
-    if (refused.refusal != Refusal::kNone) return refused;
+    if (refused.refusal != RejectReason::kNone) return refused;
   }
   Impedance& impedance = impedance_[joint];
   const Impedance before = impedance;
@@ -188,7 +189,7 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointWish& wish, b
   const bool yields = impedance.stiffness_Nm_rad != before.stiffness_Nm_rad ||
                       impedance.damping_Nms_rad != before.damping_Nms_rad;
   if (!running || (same && !yields)) return {.joint = number, .one = owned_by};
-  take_over_.begin(joint, state, command);
+  transfer_.begin(joint, state, command);
   if (same) {
     command.stiffness_Nm_rad()[joint] = impedance.stiffness_Nm_rad;
     command.damping_Nms_rad()[joint] = impedance.damping_Nms_rad;
@@ -202,14 +203,28 @@ LoopAnswer ControllerHost::recover(std::size_t joint,
                                    const hal::CommandImage& command) noexcept TANDEM_RT {
   const auto index = static_cast<std::int32_t>(joint);
   if (owner_[joint] >= 0) {
-    return {.refusal = Refusal::kClaimed, .joint = index, .one = owner_[joint]};
+    return {.refusal = RejectReason::kClaimed, .joint = index, .one = owner_[joint]};
   }
   const hal::JointCapabilities& limit = capabilities_[joint];
   const double reference = command.position_rad()[joint];
   const bool within = reference >= limit.min_position_rad && reference <= limit.max_position_rad;
-  if (command.mode()[joint] != kPosition) return {.refusal = Refusal::kOtherMode, .joint = index};
-  if (within || recovers_[joint] != 0) return {.refusal = Refusal::kWithin, .joint = index};
+  if (command.mode()[joint] != kPositionMode)
+    return {.refusal = RejectReason::kOtherMode, .joint = index};
+  if (within || recovers_[joint] != 0) return {.refusal = RejectReason::kWithin, .joint = index};
   recovers_[joint] = 1;
+  return {};
+}
+
+LoopAnswer ControllerHost::may_start(ControllerSet start) const noexcept TANDEM_RT {
+  for (std::size_t slot = 0; slot < table_.size(); ++slot) {
+    if ((start & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    for (const auto& claim : table_[slot]->claims) {
+      if (recovers_[claim.joint] == 0) continue;
+      return {.refusal = RejectReason::kRecovering,
+              .joint = static_cast<std::int32_t>(claim.joint),
+              .one = static_cast<std::int32_t>(slot)};
+    }
+  }
   return {};
 }
 

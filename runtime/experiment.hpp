@@ -14,7 +14,7 @@
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
 #include "dds/config.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/urdf.hpp"
 #include "rt/cyclic_loop.hpp"
@@ -110,8 +110,8 @@ struct Experiment {
   rt::LoopConfig loop;      ///< period, [overrun] and [clock]; the caller sets the pacing
   rt::ThreadConfig thread;  ///< [realtime]; nothing is asked for without that table
   std::optional<AfterStop> after_stop;  ///< [faults]; empty: wait on the wall clock, else end
-  AfterReset after_reset = AfterReset::kHold;             ///< [faults]
-  double retreat_s = 5.0;  ///< [faults]: at most, in a stop of category 2
+  AfterReset after_reset = AfterReset::kHold;  ///< [faults]
+  double retreat_s = 5.0;                      ///< [faults]: at most, in a stop of category 2
   hal::StopCategory on_stray = hal::StopCategory::kWarn;  ///< [faults] stray_writes
   bool falls_are_faults = true;                           ///< [faults] fall = "stop", or "allow"
   std::optional<double> watchdog_s;  ///< [faults]; empty: 0.5 on the wall clock, else 5

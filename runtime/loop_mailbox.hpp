@@ -17,7 +17,7 @@ namespace tandem::runtime {
 struct HostedController;
 
 /// What to set of a joint. What is negative or NaN stays.
-struct JointWish {
+struct JointRequest {
   static constexpr double kAsItIs = std::numeric_limits<double>::quiet_NaN();
 
   double stiffness_Nm_rad = kAsItIs;
@@ -43,12 +43,12 @@ struct LoopRequest {
   std::uint32_t joint = 0;
   hal::PidLoop loop = hal::PidLoop::kPosition;
   HostedController* controller = nullptr;
-  JointWish wish{};
+  JointRequest wish{};
   hal::PidGains gains{};
 };
 
 /// Why the loop did not do it. Nothing has changed then.
-enum class Refusal : std::uint32_t {
+enum class RejectReason : std::uint32_t {
   kNone,        ///< it is done
   kEnding,      ///< the run shuts down
   kNotRunning,  ///< joints are held in this phase
@@ -61,12 +61,13 @@ enum class Refusal : std::uint32_t {
   kOtherMode,   ///< `joint` is not in position control
   kNotEnabled,  ///< nothing moves in this phase
   kNotHeld,     ///< no reset holds controllers back
+  kRecovering,  ///< `joint`, which `one` claims, is on its way back to its limits
 };
 
 struct LoopAnswer {
   std::uint64_t number = 0;  ///< the request's
   std::uint64_t cycle = 0;   ///< in which it was done
-  Refusal refusal = Refusal::kNone;
+  RejectReason refusal = RejectReason::kNone;
   std::int32_t joint = -1;
   std::int32_t one = -1, other = -1;  ///< slots
 };

@@ -3,8 +3,7 @@
 #pragma once
 
 #include "controllers/controller.hpp"
-#include "hal/capabilities.hpp"
-#include "hal/command_port.hpp"
+#include "hal/remote_command.hpp"
 
 namespace tandem::runtime {
 
@@ -17,7 +16,7 @@ class OwnerController final : public Controller {
  public:
   [[nodiscard]] Status configure(ControllerSetup& setup) override {
     using enum hal::ControlMode;
-    const auto joints = hal::joint_capabilities(setup.robot);
+    const std::vector<hal::Joint>& joints = setup.robot.joints;
     for (std::size_t j = 0; j < joints.size(); ++j) {
       for (const hal::ControlMode mode : {kPosition, kVelocity, kTorque, kOpenLoop, kCurrent}) {
         if (!joints[j].can(mode, hal::InteractionMode::kStiff)) continue;
@@ -28,7 +27,7 @@ class OwnerController final : public Controller {
     return {};
   }
   /// What update() writes from now on.
-  void follow(const hal::OwnerWish& wish) noexcept TANDEM_RT {
+  void follow(const hal::RemoteCommand& wish) noexcept TANDEM_RT {
     command_ = wish.live ? wish.command : nullptr;
     done_ = wish.done && wish.ends_run;
   }
@@ -47,8 +46,8 @@ class OwnerController final : public Controller {
 };
 
 /// What a cycle needs for an owner in another process. All null: there is none.
-struct OwnerSeat {
-  hal::CommandPort* port = nullptr;
+struct RemoteCommandParts {
+  hal::RemoteCommandPort* port = nullptr;
   OwnerController* controller = nullptr;
   std::size_t slot = 0;  ///< the controller's in its host
 };

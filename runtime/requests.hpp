@@ -17,7 +17,7 @@ namespace tandem::runtime {
 class Requests {
  public:
   /// What was asked for since the last take().
-  struct Asked {
+  struct Pending {
     bool end = false;                                             ///< of the run, in order
     bool reset = false;                                           ///< of every latched fault
     hal::StopCategory emergency_stop = hal::StopCategory::kWarn;  ///< the hardest; kWarn: none
@@ -69,7 +69,7 @@ class Requests {
     return (asked_.load(std::memory_order_relaxed) & kFlags) != 0;
   }
   /// The loop's.
-  [[nodiscard]] Asked take() noexcept TANDEM_RT {
+  [[nodiscard]] Pending take() noexcept TANDEM_RT {
     const std::uint32_t seen = asked_.load(std::memory_order_relaxed);
     taken_ = number_of(seen);
     if ((seen & kFlags) == 0) return {};

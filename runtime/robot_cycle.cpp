@@ -192,7 +192,7 @@ void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
     go(RunPhase::kShutDown);
     return;
   }
-  fault({.index = static_cast<std::int32_t>(controllers_->culprit()),
+  fault({.index = static_cast<std::int32_t>(controllers_->failed_controller()),
          .code = static_cast<std::uint32_t>(code),
          .source = FaultSource::kController,
          .category = hal::StopCategory::kCategory1});
@@ -282,19 +282,19 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
 }
 
 void RobotCycle::show() noexcept TANDEM_RT {
-  if (tap_ == nullptr) return;
-  tap_->take({.time = time_,
-              .phase = phase_,
-              .read_code = read_code_,
-              .state = state_,
-              .command = command_,
-              .truth = truth_,
-              .times = {.begin_ns = begin_ns_,
-                        .wakeup_ns = wakeup_ns_,
-                        .bus_ns = loop_.last_bus_ns(),
-                        .work_ns = loop_.last_work_ns(),
-                        .overruns = loop_.statistics().overruns,
-                        .skipped = loop_.statistics().skipped}});
+  if (observer_ == nullptr) return;
+  observer_->take({.time = time_,
+                   .phase = phase_,
+                   .read_code = read_code_,
+                   .state = state_,
+                   .command = command_,
+                   .truth = truth_,
+                   .times = {.begin_ns = begin_ns_,
+                             .wakeup_ns = wakeup_ns_,
+                             .bus_ns = loop_.last_bus_ns(),
+                             .work_ns = loop_.last_work_ns(),
+                             .overruns = loop_.statistics().overruns,
+                             .skipped = loop_.statistics().skipped}});
 }
 
 void RobotCycle::go(RunPhase next) noexcept TANDEM_RT {

@@ -9,8 +9,8 @@
 #include "base/result.hpp"
 #include "hal/backend.hpp"
 #include "hal/command_limits.hpp"
-#include "hal/cycle_tap.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
+#include "hal/cycle_observer.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
 #include "rt/clock_control.hpp"
@@ -55,8 +55,8 @@ struct CycleParts {
   rt::Clock& clock;
   log::Recorder* recorder = nullptr;       ///< null: nothing is logged. Not started yet.
   const hal::TruthImage* truth = nullptr;  ///< the simulation's, filled by backend.read()
-  hal::CycleTap* tap = nullptr;            ///< null: nobody watches
-  OwnerSeat owner = {};                    ///< for one in another process
+  hal::CycleObserver* observer = nullptr;  ///< null: nobody watches
+  RemoteCommandParts owner = {};           ///< for one in another process
 };
 
 /// A run from bring-up to shut-down, cycle by cycle:
@@ -205,8 +205,8 @@ class RobotCycle {
   rt::Clock* clock_;
   log::Recorder* recorder_;
   const hal::TruthImage* truth_;
-  hal::CycleTap* tap_;
-  OwnerSeat seat_;
+  hal::CycleObserver* observer_;
+  RemoteCommandParts seat_;
   CycleConfig config_;
 
   rt::Doorbell bell_;  // rings when a loop that blocks has something to look at
@@ -245,7 +245,7 @@ class RobotCycle {
   Heartbeat heartbeat_;
   LoopMailbox mailbox_;
   RunServices services_;
-  std::vector<JointLook> looks_;
+  std::vector<JointStatus> looks_;
   CycleTrace trace_;
   CycleStamps* stamps_ = nullptr;  // this cycle's; null: not traced
   std::int64_t finished_ns_ = 0;   // clock time at which the last cycle was done; 0: none was

@@ -12,7 +12,7 @@ using log::EventKind;
 
 /// What other threads and signals have asked for since the last cycle.
 void RobotCycle::take_requests() noexcept TANDEM_RT {
-  const Requests::Asked asked = requests_.take();
+  const Requests::Pending asked = requests_.take();
   if (asked.emergency_stop != StopCategory::kWarn) {
     emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
   }

@@ -43,7 +43,7 @@ void RobotCycle::await_owner() noexcept {
 
 void RobotCycle::follow_owner() noexcept TANDEM_RT {
   if (seat_.port == nullptr) return;
-  const hal::OwnerWish wish = seat_.port->exchange(port_view());
+  const hal::RemoteCommand wish = seat_.port->exchange(port_view());
   seat_.controller->follow(wish);
   if (wish.gains != nullptr) take_gains(*wish.gains);
   if (wish.stop != hal::StopCategory::kWarn) {
@@ -75,7 +75,7 @@ void RobotCycle::seat_owner(bool owned) noexcept TANDEM_RT {
       owned ? controllers_->switch_over(controllers_->shown().active, owner, controlling_, time_,
                                         state_, controlled())
             : controllers_->switch_over(owner, 0, controlling_, time_, state_, controlled());
-  if (answer.refusal == Refusal::kNone && controlling_) event(EventKind::kControllersSwitched);
+  if (answer.refusal == RejectReason::kNone && controlling_) event(EventKind::kControllersSwitched);
 }
 
 void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {

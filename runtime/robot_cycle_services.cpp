@@ -9,8 +9,8 @@ void RobotCycle::take_services() noexcept TANDEM_RT {
     const std::optional<LoopRequest> request = mailbox_.take();
     if (!request) return;
     const bool ending = phase_ == RunPhase::kShutDown || phase_ == RunPhase::kDone;
-    LoopAnswer answer = ending ? LoopAnswer{.refusal = Refusal::kEnding} : carry_out(*request);
-    if (answer.refusal == Refusal::kNone) note_service(*request);
+    LoopAnswer answer = ending ? LoopAnswer{.refusal = RejectReason::kEnding} : carry_out(*request);
+    if (answer.refusal == RejectReason::kNone) note_service(*request);
     answer.number = request->number;
     answer.cycle = time_.cycle;
     mailbox_.answer(answer);
@@ -19,12 +19,12 @@ void RobotCycle::take_services() noexcept TANDEM_RT {
 
 LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
-  if (phase_ == RunPhase::kRetreating) return {.refusal = Refusal::kNotEnabled};
+  if (phase_ == RunPhase::kRetreating) return {.refusal = RejectReason::kNotEnabled};
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: {
       const LoopAnswer answer = controllers_->remove(request.slot);
-      if (answer.refusal == Refusal::kNone) {
+      if (answer.refusal == RejectReason::kNone) {
         held_back_ &= ~only(request.slot);
         before_retreat_ &= ~only(request.slot);
       }
@@ -32,6 +32,10 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     }
     case Kind::kGoOn: return go_on();
     case Kind::kSwitch:
+      if (const LoopAnswer no = controllers_->may_start(request.start);
+          no.refusal != RejectReason::kNone) {
+        return no;
+      }
       if (phase_ == RunPhase::kHeld) return leave_hold(request.stop, request.start);
       return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
                                        controlled());
@@ -40,7 +44,7 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
                                      controlled());
     case Kind::kRecover:
       if (phase_ != RunPhase::kHeld && phase_ != RunPhase::kRunning) {
-        return {.refusal = Refusal::kNotEnabled};
+        return {.refusal = RejectReason::kNotEnabled};
       }
       return controllers_->recover(request.joint, controlled());
     case Kind::kGains: break;
@@ -57,7 +61,7 @@ LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexc
   }
   const LoopAnswer answer =
       controllers_->switch_over(stop, start, true, time_, state_, controlled());
-  if (answer.refusal != Refusal::kNone) return answer;
+  if (answer.refusal != RejectReason::kNone) return answer;
   held_back_ = 0;
   go(RunPhase::kRunning);
   controlling_ = true;  // they are started
@@ -67,9 +71,11 @@ LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexc
 /// Starts who was active before the reset.
 LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
   const bool stopped = phase_ == RunPhase::kFaulted || phase_ == RunPhase::kResetting;
-  if (stopped) return {.refusal = Refusal::kNotEnabled};
-  if (phase_ != RunPhase::kHeld) return {.refusal = Refusal::kNotHeld};
-  if (held_back_ == 0) return {.refusal = Refusal::kGone};
+  if (stopped) return {.refusal = RejectReason::kNotEnabled};
+  if (phase_ != RunPhase::kHeld) return {.refusal = RejectReason::kNotHeld};
+  if (held_back_ == 0) return {.refusal = RejectReason::kGone};
+  const LoopAnswer no = controllers_->may_start(held_back_);
+  if (no.refusal != RejectReason::kNone) return no;
   return leave_hold(0, held_back_);
 }
 

@@ -57,7 +57,7 @@ void RunServices::collect() {
 
 void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& answer) {
   using Kind = LoopRequest::Kind;
-  const bool done = answer.refusal == Refusal::kNone;
+  const bool done = answer.refusal == RejectReason::kNone;
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
   } else if (request.kind == Kind::kRemove) {
@@ -65,7 +65,7 @@ void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& a
   }
 }
 
-Result<Asked> RunServices::ask(Lock& lock, LoopRequest request, Patience patience) {
+Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience patience) {
   request.number = ++number_;
   if (!mailbox_->ask(request)) {
     if (request.kind == LoopRequest::Kind::kInsert) host_->owned()[request.slot].reset();
@@ -93,10 +93,10 @@ Result<Asked> RunServices::ask(Lock& lock, LoopRequest request, Patience patienc
   awaited_.erase(request.number);
   if (!found) {
     if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-    return Asked{};
+    return RequestResult{};
   }
-  if (found->refusal != Refusal::kNone) return std::unexpected(refusal(*found));
-  return Asked{.done = true, .cycle = found->cycle};
+  if (found->refusal != RejectReason::kNone) return std::unexpected(refusal(*found));
+  return RequestResult{.done = true, .cycle = found->cycle};
 }
 
 std::string RunServices::controller_name(std::int32_t slot) const {
@@ -111,49 +111,54 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
   const std::string one = controller_name(answer.one);
   switch (answer.refusal) {
-    case Refusal::kNone: break;
-    case Refusal::kEnding:
+    case RejectReason::kNone: break;
+    case RejectReason::kEnding:
       error.message = "the run shuts down";
       error.hint = "start another run";
       break;
-    case Refusal::kNotRunning:
+    case RejectReason::kNotRunning:
       error.message = "every joint is held until the controllers run";
       error.hint = "ask again in the phase running; after a fault: tandem fault reset first";
       break;
-    case Refusal::kConflict:
+    case RejectReason::kConflict:
       error.message =
           "is claimed by the controllers '" + one + "' and '" + controller_name(answer.other) + "'";
       error.hint = "stop one of them in the same switch";
       break;
-    case Refusal::kGone:
+    case RejectReason::kGone:
       error.message = "there is no such controller any more";
       error.hint = "tandem controller list shows what is loaded";
       break;
-    case Refusal::kActive:
+    case RejectReason::kActive:
       error.message = "the controller '" + one + "' is active, or is not, already";
       error.hint = "tandem controller list shows which are";
       break;
-    case Refusal::kClaimed:
+    case RejectReason::kClaimed:
       error.message = "is claimed by the controller '" + one + "', which sets its mode";
       error.hint = "stop it first: tandem controller stop " + one;
       break;
-    case Refusal::kWithin:
+    case RejectReason::kWithin:
       error.message = "is within its limits already, or on its way";
       error.hint = "tandem joint list shows where it is";
       break;
-    case Refusal::kOtherMode:
+    case RejectReason::kOtherMode:
       error.message = "is not in position control, which leads it back";
       error.hint = "tandem joint set " + joint + " --mode position";
       break;
-    case Refusal::kNotEnabled:
+    case RejectReason::kNotEnabled:
       error.message = "nothing is moved before the joints are enabled, or while a fault is latched";
       error.hint = "tandem fault reset, then ask again";
       break;
-    case Refusal::kNotHeld:
+    case RejectReason::kNotHeld:
       error.message = "no controllers are held back by a reset";
       error.hint = "name those to start";
       break;
-    case Refusal::kIncapable:
+    case RejectReason::kRecovering:
+      error.message =
+          "is on its way back to its limits, which the controller '" + one + "' would end";
+      error.hint = "ask again when it is inside: tandem joint list " + joint + " shows where it is";
+      break;
+    case RejectReason::kIncapable:
       error.message = "cannot be put into this mode";
       error.hint = "its [gains] table lacks the loop";
       break;
@@ -169,11 +174,11 @@ void RunServices::restored(const hal::ParameterImage& parameters) {
 
 // Controllers.
 
-std::vector<ControllerLook> RunServices::controllers() {
+std::vector<ControllerStatus> RunServices::controllers() {
   const Lock lock(mutex_);
   collect();
   const ControllerHost::Shown shown = host_->shown();
-  std::vector<ControllerLook> all;
+  std::vector<ControllerStatus> all;
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if (one == nullptr || one->leaves) continue;
@@ -218,23 +223,25 @@ Status RunServices::check_name(const std::string& name) {
   return {};
 }
 
-Result<Asked> RunServices::load(const std::string& name, LoadedController plugin,
-                                const TomlDocument& parameters, Patience patience) {
+Result<RequestResult> RunServices::load(const std::string& name, LoadedController plugin,
+                                        const TomlDocument& parameters, Patience patience) {
   auto made = host_->configure(name, std::move(plugin), parameters.root());
   if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
   return load(std::move(*made), patience);
 }
 
-Result<Asked> RunServices::load(const std::string& name, std::shared_ptr<Controller> controller,
-                                const TomlDocument& parameters, Patience patience) {
+Result<RequestResult> RunServices::load(const std::string& name,
+                                        std::shared_ptr<Controller> controller,
+                                        const TomlDocument& parameters, Patience patience) {
   auto made = host_->configure(name, std::move(controller), parameters.root());
   if (Status read = errors_of(parameters); !read) return std::unexpected(read.error());
   if (!made) return std::unexpected(made.error());
   return load(std::move(*made), patience);
 }
 
-Result<Asked> RunServices::load(std::unique_ptr<HostedController> controller, Patience patience) {
+Result<RequestResult> RunServices::load(std::unique_ptr<HostedController> controller,
+                                        Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -255,7 +262,7 @@ Result<Asked> RunServices::load(std::unique_ptr<HostedController> controller, Pa
   return ask(lock, request, patience);
 }
 
-Result<Asked> RunServices::unload(const std::string& name, Patience patience) {
+Result<RequestResult> RunServices::unload(const std::string& name, Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -299,7 +306,7 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
     }
   }
   if (const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start)) {
-    return std::unexpected(refusal({.refusal = Refusal::kConflict,
+    return std::unexpected(refusal({.refusal = RejectReason::kConflict,
                                     .joint = static_cast<std::int32_t>(conflict->joint),
                                     .one = static_cast<std::int32_t>(conflict->one),
                                     .other = static_cast<std::int32_t>(conflict->other)}));
@@ -307,9 +314,9 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
   return {};
 }
 
-Result<Asked> RunServices::switch_controllers(const std::vector<std::string>& stop,
-                                              const std::vector<std::string>& start,
-                                              Patience patience) {
+Result<RequestResult> RunServices::switch_controllers(const std::vector<std::string>& stop,
+                                                      const std::vector<std::string>& start,
+                                                      Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -325,7 +332,7 @@ Result<Asked> RunServices::switch_controllers(const std::vector<std::string>& st
              patience);
 }
 
-Result<Asked> RunServices::go_on(Patience patience) {
+Result<RequestResult> RunServices::go_on(Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());

@@ -18,8 +18,8 @@
 #include "base/seqlock.hpp"
 #include "base/toml_reader.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
 #include "rt/clock_control.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/loop_mailbox.hpp"
@@ -28,13 +28,13 @@
 namespace tandem::runtime {
 
 /// What became of a request that nothing speaks against.
-struct Asked {
+struct RequestResult {
   bool done = false;  ///< false: the loop has not come to it yet, and does it in its next cycle
   std::uint64_t cycle = 0;  ///< in which it was done
 };
 
 /// A loaded controller.
-struct ControllerLook {
+struct ControllerStatus {
   std::string name;
   std::string plugin;  ///< its library's path; may be empty
   bool active = false;
@@ -44,7 +44,7 @@ struct ControllerLook {
 };
 
 /// A joint after the last cycle: plain words, as the loop shows them.
-struct JointLook {
+struct JointStatus {
   std::uint64_t cycle = 0;
   double position_rad = 0.0, velocity_rad_s = 0.0, torque_Nm = 0.0;  ///< measured
   double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;              ///< commanded
@@ -61,12 +61,12 @@ struct JointLook {
 struct JointInfo {
   std::string name;
   std::string owner;  ///< controller; empty: nobody
-  JointLook look;
+  JointStatus look;
   std::array<hal::PidGains, hal::kPidLoops> gains{};  ///< by hal::PidLoop, as asked for last
 };
 
 /// Gains to set; what is empty stays.
-struct GainsWish {
+struct GainsRequest {
   std::optional<double> kp{}, ki{}, kd{};
 };
 
@@ -87,59 +87,66 @@ class RunServices {
               hal::ParameterImage parameters);
 
   /// Loaded controllers, in the order in which they run.
-  [[nodiscard]] std::vector<ControllerLook> controllers();
+  [[nodiscard]] std::vector<ControllerStatus> controllers();
 
   /// Configures a controller and hands it to the loop, inactive.
   /// Errors: ControllerHost::configure()'s; those of its parameters, all of them; a name that is
   /// taken; too many controllers. The run goes on as if nothing had been asked.
-  [[nodiscard]] Result<Asked> load(const std::string& name, LoadedController plugin,
-                                   const TomlDocument& parameters, Patience patience = kPatience);
-  [[nodiscard]] Result<Asked> load(const std::string& name, std::shared_ptr<Controller> controller,
-                                   const TomlDocument& parameters, Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> load(const std::string& name, LoadedController plugin,
+                                           const TomlDocument& parameters,
+                                           Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> load(const std::string& name,
+                                           std::shared_ptr<Controller> controller,
+                                           const TomlDocument& parameters,
+                                           Patience patience = kPatience);
   /// Takes an inactive controller from the loop and frees it.
   /// Errors: unknown (with the nearest name); active.
-  [[nodiscard]] Result<Asked> unload(const std::string& name, Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> unload(const std::string& name,
+                                             Patience patience = kPatience);
 
   /// Stops some controllers and starts others in one cycle, all or none. Before the controllers
   /// have started, and after a stop, it sets who will start; after a reset, in the phase held, it
   /// starts them at once.
   /// Errors: unknown; named twice; stopped and not active; started and active; a joint that two
   /// would claim (both and the joint are named).
-  [[nodiscard]] Result<Asked> switch_controllers(const std::vector<std::string>& stop,
-                                                 const std::vector<std::string>& start,
-                                                 Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> switch_controllers(const std::vector<std::string>& stop,
+                                                         const std::vector<std::string>& start,
+                                                         Patience patience = kPatience);
   /// Starts, in one cycle and without a bump, the controllers that were active before a reset.
   /// Errors: nothing is held back; all of them were unloaded; a joint that two would claim.
-  [[nodiscard]] Result<Asked> go_on(Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> go_on(Patience patience = kPatience);
 
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();
   /// Mode and interaction of a joint that no active controller claims, impedance of any.
   /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
   /// that the joint lacks; a value beyond its limit (which is named).
-  [[nodiscard]] Result<Asked> set_joint(const std::string& joint, const JointWish& wish,
-                                        Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> set_joint(const std::string& joint, const JointRequest& wish,
+                                                Patience patience = kPatience);
   /// Leads a joint that stands outside its position limits, and that no active controller claims,
   /// back to the nearer one, at the speed that CommandLimits allows out there.
   /// Errors: unknown joint; claimed; within its limits; not in position control; not in the phases
   /// held or running.
-  [[nodiscard]] Result<Asked> recover(const std::string& joint, Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> recover(const std::string& joint,
+                                              Patience patience = kPatience);
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
-  [[nodiscard]] Result<Asked> set_gains(const std::string& joint, hal::PidLoop loop,
-                                        const GainsWish& wish, Patience patience = kPatience);
+  [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,
+                                                const GainsRequest& wish,
+                                                Patience patience = kPatience);
 
   /// The loop's: shows the joints. @rt wait-free.
-  void show(std::span<const JointLook> joints) noexcept TANDEM_RT { looks_.write(joints); }
+  void show(std::span<const JointStatus> joints) noexcept TANDEM_RT { looks_.write(joints); }
   /// Between two steps: the run has been set back to a snapshot.
   void restored(const hal::ParameterImage& parameters);
 
  private:
   using Lock = std::unique_lock<std::mutex>;
 
-  [[nodiscard]] Result<Asked> load(std::unique_ptr<HostedController> controller, Patience patience);
+  [[nodiscard]] Result<RequestResult> load(std::unique_ptr<HostedController> controller,
+                                           Patience patience);
   [[nodiscard]] Status check_name(const std::string& name);
-  [[nodiscard]] Result<Asked> ask(Lock& lock, LoopRequest request, Patience patience);
+  [[nodiscard]] Result<RequestResult> ask(Lock& lock, LoopRequest request, Patience patience);
   void collect();
   void free_what_left(const LoopRequest& request, const LoopAnswer& answer);
   [[nodiscard]] Error refusal(const LoopAnswer& answer) const;
@@ -149,9 +156,9 @@ class RunServices {
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
-  [[nodiscard]] Status check_mode(std::size_t joint, const JointWish& wish,
-                                  const JointLook& now) const;
-  [[nodiscard]] std::vector<JointLook> looks() const;
+  [[nodiscard]] Status check_mode(std::size_t joint, const JointRequest& wish,
+                                  const JointStatus& now) const;
+  [[nodiscard]] std::vector<JointStatus> looks() const;
   [[nodiscard]] std::string controller_name(std::int32_t slot) const;
 
   const hal::RobotConfig* robot_;
@@ -159,7 +166,7 @@ class RunServices {
   LoopMailbox* mailbox_;
   const Progress* progress_;
   const rt::ClockControl* clock_;
-  Seqlock<JointLook> looks_;
+  Seqlock<JointStatus> looks_;
 
   std::mutex mutex_;           // of all below, and of the asking side of mailbox and host
   hal::ParameterImage gains_;  // as asked for last

@@ -43,8 +43,8 @@ Result<std::size_t> RunServices::joint_of(const std::string& name) const {
   return fail_at(name, "the robot has no joint '" + name + "'", suggest(name, names));
 }
 
-std::vector<JointLook> RunServices::looks() const {
-  std::vector<JointLook> looks(robot_->joints.size());
+std::vector<JointStatus> RunServices::looks() const {
+  std::vector<JointStatus> looks(robot_->joints.size());
   while (!looks_.read(looks)) std::this_thread::yield();
   return looks;
 }
@@ -52,7 +52,7 @@ std::vector<JointLook> RunServices::looks() const {
 std::vector<JointInfo> RunServices::joints() {
   const Lock lock(mutex_);
   collect();
-  const std::vector<JointLook> now = looks();
+  const std::vector<JointStatus> now = looks();
   std::vector<JointInfo> all;
   for (std::size_t j = 0; j < now.size(); ++j) {
     JointInfo& joint = all.emplace_back();
@@ -67,8 +67,8 @@ std::vector<JointInfo> RunServices::joints() {
 }
 
 /// Whether the loop would put the joint into the mode. The loop looks again.
-Status RunServices::check_mode(std::size_t joint, const JointWish& wish,
-                               const JointLook& now) const {
+Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
+                               const JointStatus& now) const {
   const auto mode = static_cast<hal::ControlMode>(wish.mode >= 0 ? wish.mode : now.mode);
   const auto interaction =
       static_cast<hal::InteractionMode>(wish.interaction >= 0 ? wish.interaction : now.interaction);
@@ -78,24 +78,24 @@ Status RunServices::check_mode(std::size_t joint, const JointWish& wish,
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if ((active & only(slot)) == 0 || one == nullptr || one->claimed[joint] == 0) continue;
-    refused.refusal = Refusal::kClaimed;
+    refused.refusal = RejectReason::kClaimed;
     refused.one = static_cast<std::int32_t>(slot);
     return std::unexpected(refusal(refused));
   }
   if (progress_->phase.load() == RunPhase::kRunning) return {};
-  refused.refusal = Refusal::kNotRunning;
+  refused.refusal = RejectReason::kNotRunning;
   return std::unexpected(refusal(refused));
 }
 
-Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& wish,
-                                     Patience patience) {
+Result<RequestResult> RunServices::set_joint(const std::string& joint, const JointRequest& wish,
+                                             Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
   const Result<std::size_t> index = joint_of(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointCapabilities& limit = host_->capabilities()[*index];
-  const JointLook now = looks()[*index];
+  const JointStatus now = looks()[*index];
   if (wish.mode >= 0 || wish.interaction >= 0) {
     if (Status free = check_mode(*index, wish, now); !free) return std::unexpected(free.error());
   }
@@ -120,7 +120,7 @@ Result<Asked> RunServices::set_joint(const std::string& joint, const JointWish& 
              patience);
 }
 
-Result<Asked> RunServices::recover(const std::string& joint, Patience patience) {
+Result<RequestResult> RunServices::recover(const std::string& joint, Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
@@ -131,8 +131,8 @@ Result<Asked> RunServices::recover(const std::string& joint, Patience patience) 
              patience);
 }
 
-Result<Asked> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
-                                     const GainsWish& wish, Patience patience) {
+Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
+                                             const GainsRequest& wish, Patience patience) {
   Lock lock(mutex_);
   collect();
   if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "scaffold/loads.hpp"
 
 namespace tandem::scaffold {

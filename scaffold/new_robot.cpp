@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "model/urdf.hpp"
+#include "scaffold/firmness.hpp"
 #include "scaffold/ground.hpp"
 #include "scaffold/like.hpp"
 #include "scaffold/moves.hpp"
@@ -234,6 +235,7 @@ Status Maker::choose_drives() {
   robot_.stands_share = standing_->height_m() / standing_->greatest_height_m();
   fill_posture("stand", robot_.stands_m);
   warn_of_weakness(torques);
+  if (auto warning = falls_over(robot_, q_)) robot_.warnings.push_back(std::move(*warning));
   return {};
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/right_angles.hpp"
 #include "scaffold/drives.hpp"
 #include "scaffold/limbs.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/tree.hpp"
 #include "scaffold/outfit.hpp"
 

@@ -2,6 +2,7 @@
 //   cmake --build build/release --target tandem controller_sway    (`make demo` has done so)
 //   export TANDEM_CONTROLLERS=build/release/lib/examples
 //   build/release/bin/tandem run examples/03_controller/sway.toml
+// Its CMakeLists.txt says how it is built by itself, against an installed Tandem.
 #include <cmath>
 
 #include "controllers/controller.hpp"
@@ -9,8 +10,10 @@
 class Sway : public tandem::Controller {
  public:
   tandem::Status configure(tandem::ControllerSetup& setup) override {
-    const int joint = setup.robot.joint_index(setup.parameters.text("joint"));
-    if (joint < 0) return tandem::fail("the robot has no such joint", "see its robot.toml");
+    const std::string name = setup.parameters.text("joint");
+    const int joint = setup.robot.joint_index(name);
+    if (joint < 0)
+      return tandem::fail("there is no joint '" + name + "'", "see " + setup.robot.file);
     joint_ = static_cast<std::size_t>(joint);
     amplitude_rad_ = setup.parameters.number("amplitude_rad", tandem::kPositive);
     frequency_rad_s_ = 2.0 * M_PI / setup.parameters.number_or("period_s", 2.0, tandem::kPositive);

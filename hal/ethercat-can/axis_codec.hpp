@@ -8,9 +8,9 @@
 #include "base/realtime.hpp"
 #include "canopen/drive_machine.hpp"
 #include "canopen/objects.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem {
 class Archive;
@@ -68,11 +68,11 @@ struct RawCommand {
 };
 
 /// The mode of operation for what the image asks; kNone for kIdle.
-[[nodiscard]] canopen::Mode wire_mode(ControlMode mode, InteractionMode interaction) noexcept
-    TANDEM_RT;
+[[nodiscard]] canopen::Mode wire_mode(ControlMode mode,
+                                      InteractionMode interaction) noexcept TANDEM_RT;
 /// The way back, for the mode display; kIdle for a mode that is none of ours.
-[[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept
-    TANDEM_RT;
+[[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(
+    std::int8_t mode) noexcept TANDEM_RT;
 /// The image's number of a drive state.
 [[nodiscard]] DriveState image_state(canopen::DriveState state) noexcept TANDEM_RT;
 

@@ -17,8 +17,7 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
   if (heard_ && elapsed_ns > 0) {
     const double change = static_cast<double>(feedback_.velocity) - previous_velocity_;
-    acceleration_rad_s2_ =
-        change / scale_.counts_per_rad * 1.0e9 / static_cast<double>(elapsed_ns);
+    acceleration_rad_s2_ = change / scale_.counts_per_rad * 1.0e9 / static_cast<double>(elapsed_ns);
   }
   previous_velocity_ = feedback_.velocity;
   sample_ns_ = now_ns;
@@ -30,67 +29,66 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
   if (!heard_) return false;
   const WireState state = drive();
   const bool faulted = state == WireState::kFault || state == WireState::kFaultReactionActive;
-  if (trouble_ != AxisTrouble::kNone) {
+  if (error_ != AxisError::kNone) {
     // The error code may come later than the statusword: it travels in the slow PDO.
     const bool vague = fault_code_ == static_cast<std::uint16_t>(ErrorCode::kGeneric);
-    if (trouble_ == AxisTrouble::kDriveFault && faulted && vague && feedback_.error_code != 0) {
+    if (error_ == AxisError::kDriveFault && faulted && vague && feedback_.error_code != 0) {
       fault_code_ = feedback_.error_code;
     }
     return false;
   }
-  if (faulted && goal_ != Goal::kReset && goal_ != Goal::kBringUp) {
-    const std::uint16_t code =
-        feedback_.error_code != 0 ? feedback_.error_code : emergency_code_;
-    latch(AxisTrouble::kDriveFault,
+  if (faulted && target_ != TargetState::kReset && target_ != TargetState::kBringUp) {
+    const std::uint16_t code = feedback_.error_code != 0 ? feedback_.error_code : emergency_code_;
+    latch(AxisError::kDriveFault,
           code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
   if (was_enabled_ && state != WireState::kOperationEnabled &&
-      (goal_ == Goal::kFollow || goal_ == Goal::kHold)) {
-    latch(AxisTrouble::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
+      (target_ == TargetState::kFollow || target_ == TargetState::kHold)) {
+    latch(AxisError::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
   return false;
 }
 
-void AxisMaster::latch(AxisTrouble trouble, std::uint16_t code,
+void AxisMaster::latch(AxisError error, std::uint16_t code,
                        std::int64_t now_ns) noexcept TANDEM_RT {
-  trouble_ = trouble;
+  error_ = error;
   fault_code_ = code;
   trouble_ns_ = now_ns;
 }
 
-void AxisMaster::set_goal(Goal goal, std::int64_t now_ns) noexcept TANDEM_RT {
-  if (goal == goal_) return;
-  const bool goes_on =
-      (goal_ == Goal::kBringUp || goal_ == Goal::kEnable) && goal == Goal::kFollow;
+void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT {
+  if (target == target_) return;
+  const bool goes_on = (target_ == TargetState::kBringUp || target_ == TargetState::kEnable) &&
+                       target == TargetState::kFollow;
   if (!goes_on) was_enabled_ = false;
-  if (goal == Goal::kHold) {
+  if (target == TargetState::kHold) {
     was_enabled_ = enabled();
     seed();
   }
-  if (goal == Goal::kReset || goal == Goal::kBringUp) emergency_code_ = 0;
-  goal_ = goal;
+  if (target == TargetState::kReset || target == TargetState::kBringUp) emergency_code_ = 0;
+  target_ = target;
   since_ns_ = now_ns;
   reset_cycles_ = 0;
 }
 
 bool AxisMaster::command(const CommandImage* image, std::size_t joint,
                          std::int64_t now_ns) noexcept TANDEM_RT {
-  switch (goal_) {
-    case Goal::kNothing: raw_.controlword = controlword::kCommandDisableVoltage; return false;
-    case Goal::kQuickStop: raw_.controlword = controlword::kCommandQuickStop; return false;
-    case Goal::kHold:
-      // A drive that is not enabled stays as it is: holding must not switch anything on.
-      raw_.controlword = was_enabled_ ? controlword::kCommandEnableOperation
-                                      : controlword::kCommandDisableVoltage;
+  switch (target_) {
+    case TargetState::kNothing:
+      raw_.controlword = controlword::kCommandDisableVoltage;
       return false;
-    case Goal::kBringUp: walk_up(true); return enable_is_late(now_ns);
-    case Goal::kEnable: walk_up(false); return enable_is_late(now_ns);
-    case Goal::kReset:
-      raw_.controlword = reset_controlword();
-      return reset_is_late(now_ns);
-    case Goal::kFollow:
+    case TargetState::kQuickStop: raw_.controlword = controlword::kCommandQuickStop; return false;
+    case TargetState::kHold:
+      // A drive that is not enabled stays as it is: holding must not switch anything on.
+      raw_.controlword =
+          was_enabled_ ? controlword::kCommandEnableOperation : controlword::kCommandDisableVoltage;
+      return false;
+    case TargetState::kBringUp: walk_up(true); return enable_is_late(now_ns);
+    case TargetState::kEnable: walk_up(false); return enable_is_late(now_ns);
+    case TargetState::kReset: raw_.controlword = reset_controlword(); return reset_is_late(now_ns);
+    case TargetState::kFollow:
       if (image != nullptr) follow(*image, joint, now_ns);
       return enable_is_late(now_ns);
   }
@@ -151,12 +149,12 @@ void AxisMaster::seed() noexcept {
 }
 
 bool AxisMaster::enable_is_late(std::int64_t now_ns) noexcept {
-  const bool late = !was_enabled_ && !enabled() && trouble_ == AxisTrouble::kNone &&
+  const bool late = !was_enabled_ && !enabled() && error_ == AxisError::kNone &&
                     now_ns - since_ns_ >= kEnableTimeoutNs;
   if (!late) return false;
   const bool fault = drive() == WireState::kFault;
   const std::uint16_t code = feedback_.error_code;
-  latch(fault ? AxisTrouble::kDriveFault : AxisTrouble::kNotEnabled,
+  latch(fault ? AxisError::kDriveFault : AxisError::kNotEnabled,
         fault && code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
   return true;
 }
@@ -184,7 +182,7 @@ void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDE
   }
   state.acceleration_rad_s2()[joint] = acceleration_rad_s2_;
   state.age_cycles()[joint] = age_cycles_;
-  state.fault()[joint] = trouble_ != AxisTrouble::kNone ? fault_code_ : 0u;
+  state.fault()[joint] = error_ != AxisError::kNone ? fault_code_ : 0u;
 }
 
 void AxisMaster::forget() noexcept TANDEM_RT {
@@ -196,7 +194,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
-  ar(feedback_, raw_, goal_, trouble_, heard_, was_enabled_, fault_code_, emergency_code_,
+  ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_);
 }

@@ -13,7 +13,7 @@
 namespace tandem::hal::can {
 
 /// Why an axis does not follow its command.
-enum class AxisTrouble : std::uint8_t {
+enum class AxisError : std::uint8_t {
   kNone = 0,
   kDriveFault,   ///< the drive says so; the code is CiA 402's error code
   kNotEnabled,   ///< it did not reach Operation Enabled in time
@@ -23,8 +23,8 @@ enum class AxisTrouble : std::uint8_t {
 
 class AxisMaster {
  public:
-  /// What the axis is to do. Every goal but kFollow makes its own command.
-  enum class Goal : std::uint8_t {
+  /// What the axis is to do. Every target but kFollow makes its own command.
+  enum class TargetState : std::uint8_t {
     kNothing,    ///< disable voltage: the bridge stays open
     kBringUp,    ///< the same as kEnable, and a fault from before this master's time is cleared
     kEnable,     ///< walk to Operation Enabled, hold the measured position
@@ -60,10 +60,10 @@ class AxisMaster {
   void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Looks for a fault in what was received. @return true when it is a new one.
   bool check(std::int64_t now_ns) noexcept TANDEM_RT;
-  void latch(AxisTrouble trouble, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
+  void latch(AxisError error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
 
-  void set_goal(Goal goal, std::int64_t now_ns) noexcept TANDEM_RT;
-  /// Makes the raw command of the goal; kFollow takes it from the image.
+  void set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Makes the raw command of the target; kFollow takes it from the image.
   /// @return true when a reset or a re-enabling has just failed and was latched.
   bool command(const CommandImage* image, std::size_t joint,
                std::int64_t now_ns) noexcept TANDEM_RT;
@@ -73,7 +73,7 @@ class AxisMaster {
 
   [[nodiscard]] const RawCommand& raw() const noexcept { return raw_; }
   [[nodiscard]] const RawFeedback& feedback() const noexcept { return feedback_; }
-  [[nodiscard]] Goal goal() const noexcept { return goal_; }
+  [[nodiscard]] TargetState target() const noexcept { return target_; }
   [[nodiscard]] bool heard() const noexcept { return heard_; }
   [[nodiscard]] std::uint32_t age_cycles() const noexcept { return age_cycles_; }
   [[nodiscard]] canopen::DriveState drive() const noexcept {
@@ -84,10 +84,10 @@ class AxisMaster {
   }
   /// True when no torque can come from the drive any more.
   [[nodiscard]] bool off() const noexcept TANDEM_RT;
-  [[nodiscard]] AxisTrouble trouble() const noexcept { return trouble_; }
+  [[nodiscard]] AxisError error() const noexcept { return error_; }
   [[nodiscard]] std::uint16_t fault_code() const noexcept { return fault_code_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
-  void clear_trouble() noexcept { trouble_ = AxisTrouble::kNone; }
+  void clear_error() noexcept { error_ = AxisError::kNone; }
   /// The node is configured anew: nothing of what was heard holds any more.
   void forget() noexcept TANDEM_RT;
 
@@ -105,8 +105,8 @@ class AxisMaster {
   RawFeedback feedback_;
   RawFeedback sample_;  ///< what has come of this cycle's sample; no state
   RawCommand raw_;
-  Goal goal_ = Goal::kNothing;
-  AxisTrouble trouble_ = AxisTrouble::kNone;
+  TargetState target_ = TargetState::kNothing;
+  AxisError error_ = AxisError::kNone;
   bool heard_ = false;
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
@@ -116,7 +116,7 @@ class AxisMaster {
   std::int32_t previous_velocity_ = 0;
   std::int64_t sample_ns_ = 0;
   std::int64_t trouble_ns_ = 0;
-  std::int64_t since_ns_ = 0;  ///< when the goal, or the wish to be enabled, began
+  std::int64_t since_ns_ = 0;  ///< when the target, or the wish to be enabled, began
   double acceleration_rad_s2_ = 0.0;
 };
 

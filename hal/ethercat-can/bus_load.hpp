@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/frame_time.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::hal::can {
 
@@ -22,7 +22,7 @@ struct BusLoadRow {
   std::string what;
   Kind kind = Kind::kUrgent;
   double frames = 0.0;
-  double bits = 0.0;     ///< at both rates
+  double bits = 0.0;  ///< at both rates
   double time_us = 0.0;
 };
 
@@ -32,7 +32,7 @@ struct BusLoad {
   bool fd = true;
   BitRates rates;
   std::int64_t period_ns = 0;
-  double max_load = 0.0;   ///< of the configuration, a share
+  double max_load = 0.0;  ///< of the configuration, a share
   std::vector<BusLoadRow> rows;
   double urgent_us = 0.0;  ///< what every cycle must carry
   double load = 0.0;       ///< mean share of the wire's time; slow commands are left out

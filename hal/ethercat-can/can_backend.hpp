@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "hal/backend.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::hal::can {
 

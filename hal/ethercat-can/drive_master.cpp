@@ -63,15 +63,14 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
   for (NodePlan& plan : layout.nodes) {
     Port& port = ports[plan.bus];
     const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
-    port.heartbeat_ns = port.heartbeat_ns == 0 ? heartbeat_ns
-                                               : std::min(port.heartbeat_ns, heartbeat_ns);
+    port.heartbeat_ns =
+        port.heartbeat_ns == 0 ? heartbeat_ns : std::min(port.heartbeat_ns, heartbeat_ns);
     port.nodes[static_cast<std::size_t>(plan.id)] = static_cast<std::int16_t>(nodes.size());
     for (const std::size_t joint : plan.joints) joint_node[joint] = nodes.size();
     auto steps = make_configuration(robot, plan);
-    const int timeout = plan.board < 0
-                            ? kSensorTimeoutCycles
-                            : robot.boards[static_cast<std::size_t>(plan.board)]
-                                  .command_timeout_cycles;
+    const int timeout =
+        plan.board < 0 ? kSensorTimeoutCycles
+                       : robot.boards[static_cast<std::size_t>(plan.board)].command_timeout_cycles;
     Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
     node.first_channel = channel;
     channel += node.channels.size();
@@ -140,8 +139,8 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
 void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
                                 std::int64_t at_ns) noexcept TANDEM_RT {
   const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
-  const bool listening = node.master.running() ||
-                         node.master.stage() == NodeMaster::Stage::kStarting;
+  const bool listening =
+      node.master.running() || node.master.stage() == NodeMaster::Stage::kStarting;
   if (p < 0 || !listening) return;
   const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
   if (frame.length < pdo.bytes) return;
@@ -193,7 +192,7 @@ void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
   node.doubled_cycles = node.answers > 1 ? node.doubled_cycles + 1 : 0;
   node.answers = 0;
   if (node.master.running() && node.doubled_cycles > kDoubledCycles) {
-    node.master.fail(NodeTrouble::kTwoNodes, now_ns);
+    node.master.fail(NodeError::kTwoNodes, now_ns);
   }
 }
 
@@ -219,7 +218,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     if (!complete && stage == Stage::kRunning && !shutting_down) ++node.missed;
     if (!node.master.running() || node.timeout_cycles == 0) continue;
     if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
-      node.master.fail(NodeTrouble::kFeedbackLost, now_ns);
+      node.master.fail(NodeError::kFeedbackLost, now_ns);
     }
   }
   for (Node& node : nodes) stop_when_lost(node);
@@ -260,8 +259,8 @@ void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
           axes[node.plan.joints[field.axis]].raw().give(field.field, bytes);
         }
       }
-      const bool due = pdo.group == PdoGroup::kCommand || node.sent[p] == 0 ||
-                       frame.data != node.frames[p].data;
+      const bool due =
+          pdo.group == PdoGroup::kCommand || node.sent[p] == 0 || frame.data != node.frames[p].data;
       if (!due || !ports[node.plan.bus].sink.push(frame)) continue;
       node.frames[p] = frame;
       node.sent[p] = 1;
@@ -404,9 +403,8 @@ void DriveMaster::Impl::archive(Archive& ar) {
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
-    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles,
-       node.doubled_cycles, node.counters_sent, node.recovering,
-       node.sending, node.next_item);
+    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.doubled_cycles,
+       node.counters_sent, node.recovering, node.sending, node.next_item);
   }
 }
 

@@ -13,9 +13,9 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/backend.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem {

@@ -23,8 +23,8 @@ struct DriveMaster::Impl {
     kBooting,   ///< nodes are configured and started
     kEnabling,  ///< axes walk to Operation Enabled for the first time
     kRunning,
-    kFaulted,   ///< the reaction is carried out; resets lead back to kRunning
-    kFailed,    ///< bring-up failed, for good
+    kFaulted,  ///< the reaction is carried out; resets lead back to kRunning
+    kFailed,   ///< bring-up failed, for good
   };
   /// One bus: what goes out, who is on it.
   struct Port {
@@ -43,7 +43,7 @@ struct DriveMaster::Impl {
     Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
     NodePlan plan;
     NodeMaster master;
-    int timeout_cycles;   ///< without feedback; 0: never
+    int timeout_cycles;                              ///< without feedback; 0: never
     std::array<int, canopen::kPdosPerNode> tpdos{};  ///< by number - 1: index in plan.pdos, or -1
     std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
     std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
@@ -52,12 +52,12 @@ struct DriveMaster::Impl {
     std::size_t first_channel = 0;                   ///< of them in StateImage::sensor()
     int next_part = 0;                               ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
-    std::uint32_t answers = 0;                       ///< this cycle's first TPDOs
-    std::uint32_t doubled_cycles = 0;                ///< in succession, with several of them
-    std::uint8_t counters_sent = 0;                  ///< since its start; stays at 255
-    bool recovering = false;                         ///< a lost node that is configured anew
+    std::uint32_t answers = 0;         ///< this cycle's first TPDOs
+    std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them
+    std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
+    bool recovering = false;           ///< a lost node that is configured anew
     // Parameters at run time
-    std::int16_t sending = -1;                       ///< item under way: see parameter_items
+    std::int16_t sending = -1;  ///< item under way: see parameter_items
     std::size_t next_item = 0;
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
@@ -97,7 +97,7 @@ struct DriveMaster::Impl {
   void take_resets(const CommandImage& command) noexcept TANDEM_RT;
   void enable_again() noexcept TANDEM_RT;
   void watch_reset() noexcept TANDEM_RT;
-  void set_goals(AxisMaster::Goal goal) noexcept TANDEM_RT;
+  void set_targets(AxisMaster::TargetState target) noexcept TANDEM_RT;
   void fail() noexcept TANDEM_RT;
   void make_commands(const CommandImage* image) noexcept TANDEM_RT;
   [[nodiscard]] bool all_enabled() const noexcept TANDEM_RT;
@@ -125,11 +125,11 @@ struct DriveMaster::Impl {
   std::vector<Port> ports;
   std::vector<Node> nodes;
   std::array<canopen::Frame, 64> inbox{};  ///< what is taken from a bus at once; no state
-  std::vector<AxisMaster> axes;          ///< by joint
-  std::vector<std::size_t> joint_node;   ///< by joint: index in nodes
-  std::vector<std::uint8_t> joint_fresh; ///< by joint: a whole sample came in this cycle
-  std::vector<PidGains> file_gains;      ///< by joint and loop: what the configuration writes
-  std::vector<PidGains> sent_gains;      ///< by joint and loop: what the drive has
+  std::vector<AxisMaster> axes;            ///< by joint
+  std::vector<std::size_t> joint_node;     ///< by joint: index in nodes
+  std::vector<std::uint8_t> joint_fresh;   ///< by joint: a whole sample came in this cycle
+  std::vector<PidGains> file_gains;        ///< by joint and loop: what the configuration writes
+  std::vector<PidGains> sent_gains;        ///< by joint and loop: what the drive has
   std::vector<std::uint32_t> sent_revision;
 
   Stage stage = Stage::kBooting;
@@ -138,7 +138,7 @@ struct DriveMaster::Impl {
   bool resetting = false;                       ///< reset() is not through yet
   bool begun = false;
   bool shutting_down = false;
-  std::uint8_t counter = 0;              ///< of SYNCs; goes out with the commands
+  std::uint8_t counter = 0;  ///< of SYNCs; goes out with the commands
   std::int64_t now_ns = 0;
   std::int64_t dt_ns = 0;
   std::int64_t shut_down_since_ns = 0;

@@ -5,25 +5,25 @@
 
 namespace tandem::hal::can {
 
-using Goal = AxisMaster::Goal;
+using TargetState = AxisMaster::TargetState;
 using NodeStage = NodeMaster::Stage;
 
 namespace {
 
 /// How long shut_down() waits for the drives to come to rest.
 constexpr std::int64_t kShutDownNs = 3'000'000'000;
-FaultCause node_cause(NodeTrouble trouble) noexcept {
-  switch (trouble) {
-    case NodeTrouble::kHeartbeatLost: return FaultCause::kHeartbeatLost;
-    case NodeTrouble::kRebooted: return FaultCause::kBoardRebooted;
-    case NodeTrouble::kLeftOperational: return FaultCause::kBoardStopped;
-    case NodeTrouble::kWrongIdentity:
-    case NodeTrouble::kSdoAbort:
-    case NodeTrouble::kNotOperational: return FaultCause::kBoardRefused;
-    case NodeTrouble::kTwoNodes: return FaultCause::kTwoBoards;
-    case NodeTrouble::kNone:
-    case NodeTrouble::kNoBootUp:
-    case NodeTrouble::kFeedbackLost: return FaultCause::kBoardSilent;
+FaultCause node_cause(NodeError error) noexcept {
+  switch (error) {
+    case NodeError::kHeartbeatLost: return FaultCause::kHeartbeatLost;
+    case NodeError::kRebooted: return FaultCause::kBoardRebooted;
+    case NodeError::kLeftOperational: return FaultCause::kBoardStopped;
+    case NodeError::kWrongIdentity:
+    case NodeError::kSdoAbort:
+    case NodeError::kNotOperational: return FaultCause::kBoardRefused;
+    case NodeError::kTwoNodes: return FaultCause::kTwoBoards;
+    case NodeError::kNone:
+    case NodeError::kNoBootUp:
+    case NodeError::kFeedbackLost: return FaultCause::kBoardSilent;
   }
   return FaultCause::kBoardSilent;
 }
@@ -39,7 +39,7 @@ void DriveMaster::Impl::advance() noexcept TANDEM_RT {
       if (std::ranges::any_of(nodes, [](const Node& n) { return !n.master.running(); })) {
         fail();
       } else if (all_enabled()) {
-        set_goals(Goal::kFollow);
+        set_targets(TargetState::kFollow);
         stage = Stage::kRunning;
       }
       break;
@@ -61,17 +61,17 @@ void DriveMaster::Impl::advance() noexcept TANDEM_RT {
 void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
   if (latched != StopCategory::kWarn) return;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
-    if (stands_in_the_way(joint) || axes[joint].goal() == Goal::kReset) return;
+    if (stands_in_the_way(joint) || axes[joint].target() == TargetState::kReset) return;
   }
   bool all = true;
   for (AxisMaster& axis : axes) {
-    if (axis.trouble() != AxisTrouble::kNone) continue;  // "warn": the others go on without it
-    axis.set_goal(Goal::kEnable, now_ns);
+    if (axis.error() != AxisError::kNone) continue;  // "warn": the others go on without it
+    axis.set_target(TargetState::kEnable, now_ns);
     all = all && axis.enabled();
   }
   if (!all) return;
   for (AxisMaster& axis : axes) {
-    if (axis.trouble() == AxisTrouble::kNone) axis.set_goal(Goal::kFollow, now_ns);
+    if (axis.error() == AxisError::kNone) axis.set_target(TargetState::kFollow, now_ns);
   }
   reaction = StopCategory::kWarn;
   stage = Stage::kRunning;
@@ -79,20 +79,20 @@ void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
 
 /// A joint whose category is "warn" never keeps the others from moving.
 bool DriveMaster::Impl::stands_in_the_way(std::size_t joint) const noexcept TANDEM_RT {
-  return axes[joint].trouble() != AxisTrouble::kNone && category(joint) != StopCategory::kWarn;
+  return axes[joint].error() != AxisError::kNone && category(joint) != StopCategory::kWarn;
 }
 
 FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT {
   const AxisMaster& axis = axes[joint];
-  switch (axis.trouble()) {
-    case AxisTrouble::kNone: break;
-    case AxisTrouble::kDriveFault:
+  switch (axis.error()) {
+    case AxisError::kNone: break;
+    case AxisError::kDriveFault:
       return axis.fault_code() == static_cast<std::uint16_t>(canopen::ErrorCode::kEmergencyInput)
                  ? FaultCause::kEmergencyInput
                  : FaultCause::kDrive;
-    case AxisTrouble::kNotEnabled: return FaultCause::kNotEnabled;
-    case AxisTrouble::kLeftEnabled: return FaultCause::kLeftEnabled;
-    case AxisTrouble::kNodeLost: return node_cause(nodes[joint_node[joint]].master.trouble());
+    case AxisError::kNotEnabled: return FaultCause::kNotEnabled;
+    case AxisError::kLeftEnabled: return FaultCause::kLeftEnabled;
+    case AxisError::kNodeLost: return node_cause(nodes[joint_node[joint]].master.error());
   }
   return FaultCause::kDrive;
 }
@@ -104,12 +104,12 @@ void DriveMaster::Impl::watch_reset() noexcept TANDEM_RT {
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     const AxisMaster& axis = axes[joint];
     const Node& node = node_of(joint);
-    const bool node_starts = axis.trouble() == AxisTrouble::kNodeLost &&
-                             (node.recovering || node.master.running());
-    if (axis.goal() == Goal::kReset || node_starts) return;
+    const bool node_starts =
+        axis.error() == AxisError::kNodeLost && (node.recovering || node.master.running());
+    if (axis.target() == TargetState::kReset || node_starts) return;
     if (stage == Stage::kFaulted && stands_in_the_way(joint)) under_way = false;
-    if (stage == Stage::kRunning && axis.trouble() == AxisTrouble::kNone &&
-        axis.goal() != Goal::kFollow) {
+    if (stage == Stage::kRunning && axis.error() == AxisError::kNone &&
+        axis.target() != TargetState::kFollow) {
       under_way = true;
     }
   }
@@ -128,7 +128,7 @@ void DriveMaster::Impl::boot() noexcept TANDEM_RT {
   if (all_ready) {
     for (Node& node : nodes) node.master.start(now_ns, ports[node.plan.bus].sink);
   } else if (all_running) {
-    set_goals(Goal::kBringUp);
+    set_targets(TargetState::kBringUp);
     stage = Stage::kEnabling;
   }
 }
@@ -140,9 +140,9 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
     AxisMaster& axis = axes[joint];
     const Node& node = node_of(joint);
     bool is_new = false;
-    if (node.master.stage() == NodeStage::kDown && axis.trouble() != AxisTrouble::kNodeLost) {
-      axis.latch(AxisTrouble::kNodeLost, kNodeLostCode, now_ns);
-      axis.set_goal(Goal::kNothing, now_ns);
+    if (node.master.stage() == NodeStage::kDown && axis.error() != AxisError::kNodeLost) {
+      axis.latch(AxisError::kNodeLost, kNodeLostCode, now_ns);
+      axis.set_target(TargetState::kNothing, now_ns);
       is_new = true;
     } else {
       is_new = axis.check(now_ns);
@@ -156,14 +156,14 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
 bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
   stage = Stage::kFaulted;
-  const Goal goal = reaction == StopCategory::kCategory0   ? Goal::kNothing
-                    : reaction == StopCategory::kCategory1 ? Goal::kQuickStop
-                                                           : Goal::kHold;
+  const TargetState target = reaction == StopCategory::kCategory0   ? TargetState::kNothing
+                             : reaction == StopCategory::kCategory1 ? TargetState::kQuickStop
+                                                                    : TargetState::kHold;
   bool changed = false;
   for (AxisMaster& axis : axes) {
-    const Goal its = axis.trouble() == AxisTrouble::kNone ? goal : Goal::kNothing;
-    changed = changed || axis.goal() != its;
-    axis.set_goal(its, now_ns);
+    const TargetState its = axis.error() == AxisError::kNone ? target : TargetState::kNothing;
+    changed = changed || axis.target() != its;
+    axis.set_target(its, now_ns);
   }
   return changed;
 }
@@ -193,8 +193,7 @@ void DriveMaster::Impl::reset() noexcept TANDEM_RT {
 /// Goes on with what reset_joint() began: drives that are reset, nodes that are configured anew.
 void DriveMaster::Impl::recover() noexcept TANDEM_RT {
   for (Node& node : nodes) {
-    const bool sensor_lost =
-        node.plan.sensor >= 0 && node.master.stage() == NodeStage::kDown;
+    const bool sensor_lost = node.plan.sensor >= 0 && node.master.stage() == NodeStage::kDown;
     if (sensor_lost) {  // it moves nothing: it may come back by itself
       node.master.restart(now_ns);
       node.recovering = true;
@@ -211,21 +210,21 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
   }
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
-    if (axis.trouble() == AxisTrouble::kNodeLost) {
-      if (node_of(joint).master.running() && axis.heard()) axis.clear_trouble();
-    } else if (axis.goal() == Goal::kReset) {
+    if (axis.error() == AxisError::kNodeLost) {
+      if (node_of(joint).master.running() && axis.heard()) axis.clear_error();
+    } else if (axis.target() == TargetState::kReset) {
       using canopen::DriveState;
-      const bool faulted = axis.drive() == DriveState::kFault ||
-                           axis.drive() == DriveState::kFaultReactionActive;
+      const bool faulted =
+          axis.drive() == DriveState::kFault || axis.drive() == DriveState::kFaultReactionActive;
       if (faulted) continue;
-      axis.clear_trouble();
-      axis.set_goal(Goal::kNothing, now_ns);
+      axis.clear_error();
+      axis.set_target(TargetState::kNothing, now_ns);
     }
-    const bool idle_alone = stage == Stage::kRunning && axis.goal() == Goal::kNothing &&
-                            axis.trouble() == AxisTrouble::kNone;
-    if (idle_alone) axis.set_goal(Goal::kEnable, now_ns);
-    if (stage == Stage::kRunning && axis.goal() == Goal::kEnable && axis.enabled()) {
-      axis.set_goal(Goal::kFollow, now_ns);
+    const bool idle_alone = stage == Stage::kRunning && axis.target() == TargetState::kNothing &&
+                            axis.error() == AxisError::kNone;
+    if (idle_alone) axis.set_target(TargetState::kEnable, now_ns);
+    if (stage == Stage::kRunning && axis.target() == TargetState::kEnable && axis.enabled()) {
+      axis.set_target(TargetState::kFollow, now_ns);
     }
   }
 }
@@ -239,9 +238,9 @@ void DriveMaster::Impl::take_resets(const CommandImage& command) noexcept TANDEM
 /// Begins to clear what is latched of a joint; recover() goes on with it.
 void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   AxisMaster& axis = axes[joint];
-  if (axis.trouble() == AxisTrouble::kNone) return;
-  if (axis.trouble() != AxisTrouble::kNodeLost) {
-    axis.set_goal(Goal::kReset, now_ns);
+  if (axis.error() == AxisError::kNone) return;
+  if (axis.error() != AxisError::kNodeLost) {
+    axis.set_target(TargetState::kReset, now_ns);
     return;
   }
   Node& node = node_of(joint);
@@ -257,13 +256,13 @@ void DriveMaster::Impl::reset_joint(std::size_t joint) noexcept TANDEM_RT {
   }
 }
 
-void DriveMaster::Impl::set_goals(Goal goal) noexcept TANDEM_RT {
-  for (AxisMaster& axis : axes) axis.set_goal(goal, now_ns);
+void DriveMaster::Impl::set_targets(TargetState target) noexcept TANDEM_RT {
+  for (AxisMaster& axis : axes) axis.set_target(target, now_ns);
 }
 
 void DriveMaster::Impl::fail() noexcept TANDEM_RT {
   stage = Stage::kFailed;
-  set_goals(Goal::kNothing);
+  set_targets(TargetState::kNothing);
 }
 
 void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM_RT {
@@ -271,8 +270,8 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     AxisMaster& axis = axes[joint];
     if (!axis.command(image, joint, now_ns)) continue;
-    if (axis.goal() == Goal::kReset) {  // the cause is still there: stays latched
-      axis.set_goal(Goal::kNothing, now_ns);
+    if (axis.target() == TargetState::kReset) {  // the cause is still there: stays latched
+      axis.set_target(TargetState::kNothing, now_ns);
     } else {
       worst = std::min(worst, category(joint));
       if (stage == Stage::kEnabling) return fail();
@@ -289,11 +288,12 @@ bool DriveMaster::Impl::shut_down() noexcept TANDEM_RT {
   if (!shutting_down) {
     shutting_down = true;
     shut_down_since_ns = now_ns;
-    set_goals(reaction == StopCategory::kCategory0 ? Goal::kNothing : Goal::kQuickStop);
+    set_targets(reaction == StopCategory::kCategory0 ? TargetState::kNothing
+                                                     : TargetState::kQuickStop);
   }
   const bool at_rest = std::ranges::all_of(axes, [](const AxisMaster& axis) { return axis.off(); });
   const bool done = at_rest || now_ns - shut_down_since_ns >= kShutDownNs;
-  if (done) set_goals(Goal::kNothing);
+  if (done) set_targets(TargetState::kNothing);
   make_commands(nullptr);
   write_pdos();
   if (!done) return false;

@@ -59,41 +59,41 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
   const std::string who = fmt::format("{} {} (node {}, bus {})", label(node.plan), node.plan.name,
                                       node.plan.id, robot.buses[node.plan.bus].name);
   const double limit_s = seconds(NodeMaster::kBootTimeoutNs);
-  switch (m.trouble()) {
-    case NodeTrouble::kNone: break;
-    case NodeTrouble::kNoBootUp:
+  switch (m.error()) {
+    case NodeError::kNone: break;
+    case NodeError::kNoBootUp:
       return fmt::format(
           "{}: no boot-up message within {:.0f} s; is it powered and connected, "
           "and is its node id {}?",
           who, limit_s, node.plan.id);
-    case NodeTrouble::kWrongIdentity: {
+    case NodeError::kWrongIdentity: {
       const SdoStep& step = m.steps()[m.step()];
       return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}{}", who,
                          identity_name(step), step.index, step.sub, m.read_value(), number(step),
                          step.use == SdoUse::kCheckRevision ? " or a later minor of it" : "");
     }
-    case NodeTrouble::kSdoAbort: {
+    case NodeError::kSdoAbort: {
       const SdoStep& step = m.steps()[m.step()];
       return fmt::format("{} {} failed: {} (abort code 0x{:08X})",
                          step.use != SdoUse::kWrite ? "reading" : "writing", step_text(node, step),
                          canopen::to_string(m.abort_code()),
                          static_cast<std::uint32_t>(m.abort_code()));
     }
-    case NodeTrouble::kNotOperational:
+    case NodeError::kNotOperational:
       return fmt::format("{}: stays {} after NMT start", who, canopen::to_string(m.nmt_state()));
-    case NodeTrouble::kRebooted:
+    case NodeError::kRebooted:
       return fmt::format("{}: booted again by itself at {:.3f} s", who,
                          seconds(m.trouble_time_ns()));
-    case NodeTrouble::kHeartbeatLost:
+    case NodeError::kHeartbeatLost:
       return fmt::format("{}: heartbeat lost at {:.3f} s (none for {} ms)", who,
                          seconds(m.trouble_time_ns()), kHeartbeatPeriods * node.plan.heartbeat_ms);
-    case NodeTrouble::kLeftOperational:
+    case NodeError::kLeftOperational:
       return fmt::format("{}: went to {} by itself at {:.3f} s", who,
                          canopen::to_string(m.nmt_state()), seconds(m.trouble_time_ns()));
-    case NodeTrouble::kTwoNodes:
+    case NodeError::kTwoNodes:
       return fmt::format("{}: two nodes answer under this id at {:.3f} s; give one of them another",
                          who, seconds(m.trouble_time_ns()));
-    case NodeTrouble::kFeedbackLost:
+    case NodeError::kFeedbackLost:
       return fmt::format("{}: no complete TPDO for {} cycles at {:.3f} s", who, node.timeout_cycles,
                          seconds(m.trouble_time_ns()));
   }
@@ -110,22 +110,22 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
 std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
   const AxisMaster& axis = axes[joint];
   const double at_s = seconds(axis.trouble_time_ns());
-  switch (axis.trouble()) {
-    case AxisTrouble::kNone: return {};
-    case AxisTrouble::kDriveFault:
+  switch (axis.error()) {
+    case AxisError::kNone: return {};
+    case AxisError::kDriveFault:
       return fmt::format("{}: {} at {:.3f} s", joint_name(joint), error_text(axis.fault_code()),
                          at_s);
-    case AxisTrouble::kNotEnabled:
+    case AxisError::kNotEnabled:
       return fmt::format(
           "{}: stays in '{}' (statusword {:04X}:00 = 0x{:04X}) after controlword "
           "0x{:04X}",
           joint_name(joint), canopen::to_string(axis.drive()),
           canopen::of_axis(canopen::object::kStatusword, robot.joints[joint].axis),
           axis.feedback().statusword, axis.raw().controlword);
-    case AxisTrouble::kLeftEnabled:
+    case AxisError::kLeftEnabled:
       return fmt::format("{}: left 'operation enabled' for '{}' by itself at {:.3f} s",
                          joint_name(joint), canopen::to_string(axis.drive()), at_s);
-    case AxisTrouble::kNodeLost: {
+    case AxisError::kNodeLost: {
       const std::string cause = node_text(nodes[joint_node[joint]]);
       return fmt::format("{}: board lost at {:.3f} s{}{}", joint_name(joint), at_s,
                          cause.empty() ? "" : ": ", cause);
@@ -145,8 +145,8 @@ std::string DriveMaster::Impl::status() const {
     const bool told = !causes.empty() && node.plan.board >= 0;
     const bool waits = stage == Stage::kBooting ? node.master.stage() != NodeStage::kReady
                                                 : !node.master.running();
-    const bool troubled = node.master.trouble() != NodeTrouble::kNone;
-    if (told || (!troubled && (!waits || stage == Stage::kFailed))) continue;
+    const bool has_error = node.master.error() != NodeError::kNone;
+    if (told || (!has_error && (!waits || stage == Stage::kFailed))) continue;
     if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
   }
   for (std::size_t j = 0; stage == Stage::kEnabling && j < axes.size(); ++j) {

@@ -7,8 +7,8 @@
 
 #include "base/result.hpp"
 #include "canopen/frame.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::hal::can {
 

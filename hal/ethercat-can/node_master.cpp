@@ -21,14 +21,14 @@ NodeMaster::NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps)
 void NodeMaster::set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT {
   for (SdoStep& step : steps_) {
     if (step.index != canopen::object::kSyncPeriod) continue;
-    canopen::put(step.bytes.data(), canopen::clamp_round<std::uint32_t>(
-                                        static_cast<double>(period_ns) / 1000.0));
+    canopen::put(step.bytes.data(),
+                 canopen::clamp_round<std::uint32_t>(static_cast<double>(period_ns) / 1000.0));
   }
 }
 
 void NodeMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   enter(Stage::kWaitBootUp, now_ns);
-  trouble_ = NodeTrouble::kNone;
+  error_ = NodeError::kNone;
   next_reset_ns_ = now_ns;
   reboots_ = 0;
 }
@@ -40,16 +40,16 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
     if (stage_ == Stage::kDown) return;
     const bool again = booted_ns_ == now_ns;  // no node boots twice in a cycle
     booted_ns_ = now_ns;
-    if (again) return fail(NodeTrouble::kTwoNodes, now_ns);
+    if (again) return fail(NodeError::kTwoNodes, now_ns);
     const bool expected = stage_ == Stage::kWaitBootUp;
     const bool too_often = !expected && ++reboots_ > kReboots;
-    if (stage_ == Stage::kRunning || too_often) return fail(NodeTrouble::kRebooted, now_ns);
+    if (stage_ == Stage::kRunning || too_often) return fail(NodeError::kRebooted, now_ns);
     return enter(Stage::kConfigure, now_ns);
   }
   if (stage_ == Stage::kStarting && state == NmtState::kOperational) {
     enter(Stage::kRunning, now_ns);
   } else if (stage_ == Stage::kRunning && state != NmtState::kOperational) {
-    fail(NodeTrouble::kLeftOperational, now_ns);
+    fail(NodeError::kLeftOperational, now_ns);
   }
 }
 
@@ -61,7 +61,7 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
                          FrameSink& out) noexcept TANDEM_RT {
   switch (stage_) {
     case Stage::kWaitBootUp:
-      if (now_ns - since_ns_ >= kBootTimeoutNs) return fail(NodeTrouble::kNoBootUp, now_ns);
+      if (now_ns - since_ns_ >= kBootTimeoutNs) return fail(NodeError::kNoBootUp, now_ns);
       if (now_ns < next_reset_ns_) return;
       out.push(canopen::make_nmt(canopen::NmtCommand::kResetNode, id_));
       next_reset_ns_ = now_ns + kResetEveryNs;
@@ -71,12 +71,10 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
     case Stage::kStarting:
       watch_heartbeat(now_ns);
       if (stage_ == Stage::kStarting && now_ns - since_ns_ >= kStartTimeoutNs) {
-        fail(NodeTrouble::kNotOperational, now_ns);
+        fail(NodeError::kNotOperational, now_ns);
       }
       return;
-    case Stage::kRunning:
-      sdo_.process(dt_ns, kSdoAnswerNs, out);
-      return watch_heartbeat(now_ns);
+    case Stage::kRunning: sdo_.process(dt_ns, kSdoAnswerNs, out); return watch_heartbeat(now_ns);
     case Stage::kDown: return;
   }
 }
@@ -103,15 +101,14 @@ void NodeMaster::step_answered(std::int64_t now_ns) noexcept {
   if (sdo_.status() == SdoClient::Status::kAborted) {
     abort_code_ = sdo_.abort_code();
     if (abort_code_ == AbortCode::kTimeout && ++tries_ < kSdoTries) return;  // a frame was lost
-    return fail(NodeTrouble::kSdoAbort, now_ns);
+    return fail(NodeError::kSdoAbort, now_ns);
   }
   const SdoStep& step = steps_[step_];
   if (step.use != SdoUse::kWrite && !step.accepts(sdo_.value())) {
     std::array<std::uint8_t, 4> bytes{};
-    std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()),
-                bytes.begin());
+    std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()), bytes.begin());
     read_value_ = canopen::get<std::uint32_t>(bytes.data());
-    return fail(NodeTrouble::kWrongIdentity, now_ns);
+    return fail(NodeError::kWrongIdentity, now_ns);
   }
   tries_ = 0;
   if (++step_ == steps_.size()) {
@@ -126,11 +123,11 @@ void NodeMaster::start(std::int64_t now_ns, FrameSink& out) noexcept TANDEM_RT {
 }
 
 void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
-  if (now_ns - heard_ns_ >= heartbeat_timeout_ns_) fail(NodeTrouble::kHeartbeatLost, now_ns);
+  if (now_ns - heard_ns_ >= heartbeat_timeout_ns_) fail(NodeError::kHeartbeatLost, now_ns);
 }
 
-void NodeMaster::fail(NodeTrouble trouble, std::int64_t now_ns) noexcept TANDEM_RT {
-  trouble_ = trouble;
+void NodeMaster::fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT {
+  error_ = error;
   trouble_ns_ = now_ns;
   stage_ = Stage::kDown;
 }
@@ -146,7 +143,7 @@ void NodeMaster::enter(Stage stage, std::int64_t now_ns) noexcept {
 }
 
 void NodeMaster::archive(Archive& ar) {
-  ar(stage_, trouble_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
+  ar(stage_, error_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
      heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
 }
 

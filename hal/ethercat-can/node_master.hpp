@@ -13,7 +13,7 @@
 namespace tandem::hal::can {
 
 /// Why a node is not, or no longer, in operation.
-enum class NodeTrouble : std::uint8_t {
+enum class NodeError : std::uint8_t {
   kNone = 0,
   kNoBootUp,        ///< it never said that it is there
   kWrongIdentity,   ///< a check step read something else
@@ -35,7 +35,7 @@ class NodeMaster {
     kReady,     ///< configured; start() lets it run
     kStarting,  ///< NMT start is sent
     kRunning,
-    kDown,      ///< trouble() says why
+    kDown,  ///< error() says why
   };
 
   static constexpr std::int64_t kBootTimeoutNs = 3'000'000'000;
@@ -54,19 +54,18 @@ class NodeMaster {
   void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;
   void on_sdo(const canopen::Frame& frame, canopen::FrameSink& out) noexcept TANDEM_RT;
   /// Once per cycle, after the cycle's frames.
-  void process(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept
-      TANDEM_RT;
+  void process(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept TANDEM_RT;
   /// NMT start. @pre stage() == kReady
   void start(std::int64_t now_ns, canopen::FrameSink& out) noexcept TANDEM_RT;
-  /// Takes it out of operation with this trouble; nothing is sent.
-  void fail(NodeTrouble trouble, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Takes it out of operation with this error; nothing is sent.
+  void fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT;
 
   /// The client for transfers at run time. @pre stage() == kRunning
   [[nodiscard]] canopen::SdoClient& sdo() noexcept { return sdo_; }
 
   [[nodiscard]] Stage stage() const noexcept { return stage_; }
   [[nodiscard]] bool running() const noexcept { return stage_ == Stage::kRunning; }
-  [[nodiscard]] NodeTrouble trouble() const noexcept { return trouble_; }
+  [[nodiscard]] NodeError error() const noexcept { return error_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return nmt_; }
   [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return abort_code_; }
@@ -89,16 +88,16 @@ class NodeMaster {
   std::vector<SdoStep> steps_;
 
   Stage stage_ = Stage::kWaitBootUp;
-  NodeTrouble trouble_ = NodeTrouble::kNone;
+  NodeError error_ = NodeError::kNone;
   canopen::NmtState nmt_ = canopen::NmtState::kBootUp;
   bool requested_ = false;  ///< the step's request is out
   int tries_ = 0;
   int reboots_ = 0;
   std::size_t step_ = 0;
-  std::int64_t since_ns_ = 0;       ///< when the stage began
+  std::int64_t since_ns_ = 0;  ///< when the stage began
   std::int64_t next_reset_ns_ = 0;
-  std::int64_t heard_ns_ = 0;       ///< last heartbeat
-  std::int64_t booted_ns_ = -1;     ///< last boot-up
+  std::int64_t heard_ns_ = 0;    ///< last heartbeat
+  std::int64_t booted_ns_ = -1;  ///< last boot-up
   std::int64_t trouble_ns_ = 0;
   canopen::AbortCode abort_code_ = canopen::AbortCode::kNone;
   std::uint32_t read_value_ = 0;

@@ -9,7 +9,7 @@
 
 #include "base/result.hpp"
 #include "canopen/pdo.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::hal::can {
 
@@ -51,10 +51,10 @@ enum class PdoGroup : std::uint8_t { kCommand, kSlowCommand, kFeedback, kSlowFee
 /// One mapped object.
 struct MappedField {
   WireField field = WireField::kControlword;
-  std::uint8_t axis = 0;     ///< of the node's axes; a sensor's channel, from 0
-  std::uint8_t offset = 0;   ///< of its first byte in the PDO
-  std::uint8_t size = 0;     ///< bytes
-  std::uint16_t index = 0;   ///< of the object, the axis' offset included
+  std::uint8_t axis = 0;    ///< of the node's axes; a sensor's channel, from 0
+  std::uint8_t offset = 0;  ///< of its first byte in the PDO
+  std::uint8_t size = 0;    ///< bytes
+  std::uint16_t index = 0;  ///< of the object, the axis' offset included
   std::uint8_t sub = 0;
 };
 
@@ -62,23 +62,23 @@ struct MappedField {
 struct PdoPlan {
   PdoGroup group = PdoGroup::kCommand;
   canopen::PdoDirection direction = canopen::PdoDirection::kReceive;  ///< as the node sees it
-  int number = 1;              ///< 1 to canopen::kPdosPerNode, of its direction
+  int number = 1;  ///< 1 to canopen::kPdosPerNode, of its direction
   std::uint32_t cob_id = 0;
   std::uint8_t transmission = canopen::kEverySync;
-  std::uint8_t bytes = 0;      ///< mapped; the frame may be longer
-  std::uint8_t part = 0;       ///< feedback, sensor: of the NodePlan::parts of a sample, from 0
+  std::uint8_t bytes = 0;  ///< mapped; the frame may be longer
+  std::uint8_t part = 0;   ///< feedback, sensor: of the NodePlan::parts of a sample, from 0
   std::vector<MappedField> fields;
 };
 
 /// One node: a board with its axes, or a sensor.
 struct NodePlan {
-  std::string name;            ///< of the board or the sensor
-  std::size_t bus = 0;         ///< index in RobotConfig::buses
+  std::string name;     ///< of the board or the sensor
+  std::size_t bus = 0;  ///< index in RobotConfig::buses
   int id = 0;
   int heartbeat_ms = 50;
-  int board = -1;              ///< index in RobotConfig::boards; -1: a sensor
-  int sensor = -1;             ///< index in RobotConfig::sensors; -1: a board
-  int parts = 1;               ///< TPDOs that one sample of an axis, or of the sensor, takes
+  int board = -1;                     ///< index in RobotConfig::boards; -1: a sensor
+  int sensor = -1;                    ///< index in RobotConfig::sensors; -1: a board
+  int parts = 1;                      ///< TPDOs that one sample of an axis, or of the sensor, takes
   std::vector<std::size_t> joints{};  ///< by axis: index in RobotConfig::joints
   std::vector<PdoPlan> pdos{};  ///< commands first, then slow commands, feedback, slow feedback
 };

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "canopen/bytes.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::hal::can {
 
@@ -25,7 +25,7 @@ struct SdoStep {
   SdoUse use = SdoUse::kWrite;
   std::uint8_t sub = 0;
   std::uint16_t index = 0;
-  std::int8_t axis = -1;     ///< for messages; -1: the node's own object
+  std::int8_t axis = -1;  ///< for messages; -1: the node's own object
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
 

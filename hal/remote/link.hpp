@@ -12,8 +12,8 @@
 #include "base/realtime.hpp"
 #include "dds/endpoint.hpp"
 #include "dds/service.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::remote {
 
@@ -22,8 +22,14 @@ namespace tandem_msgs = dds::tandem_msgs;
 /// kp, ki and kd of every loop, as the link's samples list them joint by joint.
 inline constexpr std::size_t kGainsPerJoint = 3 * hal::kPidLoops;
 
+/// Raised with every change of what the link's samples mean: their members, the numbers of stop
+/// categories, phases, modes, codes and causes, the images' fields. Builds before 2 say no number;
+/// they and later ones do not hear each other.
+inline constexpr std::uint32_t kLinkProtocol = 2;
+
 /// What two processes must agree on before one drives the other's robot.
 struct Identity {
+  std::uint32_t protocol = kLinkProtocol;
   std::string robot;
   std::string description_hash;  ///< of everything its kernels are made from
   std::int64_t period_ns = 0;
@@ -36,7 +42,7 @@ struct Identity {
 };
 [[nodiscard]] Identity identity_of(const hal::RobotConfig& robot, std::string description_hash,
                                    std::int64_t period_ns);
-/// What `there` has otherwise than `here`, in words; empty: nothing.
+/// What `there` has otherwise than `here`, in words; empty: nothing. @pre one protocol
 [[nodiscard]] std::string difference(const Identity& here, const Identity& there);
 
 inline constexpr const char* kServerTopic = "tandem/link/server";

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "base/triple_buffer.hpp"
 #include "hal/backend.hpp"
 #include "hal/remote/link.hpp"
-#include "hal/remote/newest.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem::remote {
@@ -132,7 +132,7 @@ class RemoteBackend final : public hal::Backend {
   std::atomic<std::int64_t> heard_ns_{0};
   std::atomic<std::uint8_t> phase_{0};  // the server's run's
   std::atomic<bool> leased_{false}, lost_{false}, ending_{false}, gone_{false};
-  Newest<Seen> newest_;
+  TripleBuffer<Seen> newest_;
 
   // The loop's.
   bool fresh_ = false, first_ = true, pending_ = false, live_ = false, done_ = false;

@@ -54,6 +54,16 @@ bool is_sound(const hal::StateImage& state) {
   });
 }
 
+Status same_protocol(std::uint32_t here, std::uint32_t there) {
+  if (here == there) return {};
+  const bool older = there < here;
+  return fail(std::string("the server is of ") + (older ? "an older" : "a newer") +
+                  " version of Tandem: the link's protocol is " + std::to_string(there) +
+                  " there, " + std::to_string(here) + " here",
+              std::string("install the same version on both; the older one is ") +
+                  (older ? "the server's" : "this one"));
+}
+
 std::unexpected<Error> interrupted() {
   return fail("interrupted before it had the robot", "nothing was moved");
 }
@@ -126,13 +136,15 @@ Status RemoteBackend::find_server(const Identity& identity) {
   if (!found()) {
     if (config_.interrupted && config_.interrupted()) return interrupted();
     return fail("no server was found within " + seconds(config_.connect_timeout_s),
-                "start `tandem serve` with the same [dds] domain and namespace");
+                "start `tandem serve` of the same version, with the same [dds] domain and "
+                "namespace");
   }
   if (config_.server == 0) news_.wait_for(lock, kLookAround, [this] { return several_; });
   if (several_) {
     return fail("several servers were found",
                 "give each a [dds] namespace or domain of its own, or end all but one");
   }
+  if (Status same = same_protocol(identity.protocol, told_->identity.protocol); !same) return same;
   if (const std::string other = difference(identity, told_->identity); !other.empty()) {
     return fail("the server's robot is not this one: " + other,
                 "run both with the same robot.toml, description and period");
@@ -178,6 +190,7 @@ void RemoteBackend::ask(Action action) {
   tandem_msgs::LinkRequest sample{};
   sample.run = run_;
   sample.client = client_;
+  sample.protocol = kLinkProtocol;
   sample.action = static_cast<std::uint8_t>(action);
   sample.name = config_.name.data();
   (void)endpoints_.requests.write(sample);
@@ -204,7 +217,8 @@ void RemoteBackend::take_told() {
       if (server_ && sender != server_) return;                  // somebody who says he is this one
       const bool other = told_ && (sample.run != told_->run || sender != told_->sender);
       if (other && !told_->ending && !sample.ending) several_ = true;
-      told_ = Told{.identity = {.robot = text(sample.robot),
+      told_ = Told{.identity = {.protocol = sample.protocol,
+                                .robot = text(sample.robot),
                                 .description_hash = text(sample.description_hash),
                                 .period_ns = sample.period_ns,
                                 .joints = texts(sample.joints),

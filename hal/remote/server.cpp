@@ -94,6 +94,7 @@ void Server::take_requests() {
 }
 
 void Server::acquire(const tandem_msgs::LinkRequest& sample, const std::optional<Sender>& sender) {
+  if (sample.protocol != identity_.protocol) return;  // it has been told
   if (!sender || (config_.admits && !config_.admits(*sender))) return;
   const std::lock_guard lock(owner_mutex_);
   if (lease_.owner() == sample.client && sender != owner_sender_) return;  // another one's number
@@ -219,9 +220,9 @@ std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
   return now + kLook_ns;
 }
 
-hal::OwnerWish Server::exchange(const hal::PortView& view) noexcept TANDEM_RT {
+hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_RT {
   if (!config_.lockstep) push(view);
-  hal::OwnerWish wish;
+  hal::RemoteCommand wish;
   wish.on_loss = config_.on_lost;
   constexpr auto kNone = static_cast<std::uint8_t>(StopCategory::kWarn);
   if (stop_.load(std::memory_order_relaxed) != kNone) {

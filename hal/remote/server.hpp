@@ -1,5 +1,5 @@
 // The owner's end of the robot: shows each cycle on DDS, and takes one client's commands.
-// Layer: hal/remote.  Thread: made and closed by one; its CommandPort is the loop's.
+// Layer: hal/remote.  Thread: made and closed by one; its RemoteCommandPort is the loop's.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 #include "base/result.hpp"
 #include "base/spsc_ring.hpp"
-#include "hal/capabilities.hpp"
-#include "hal/command_port.hpp"
+#include "base/triple_buffer.hpp"
+#include "hal/config/capabilities.hpp"
 #include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
-#include "hal/remote/newest.hpp"
+#include "hal/remote_command.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem::remote {
@@ -34,7 +34,7 @@ struct ServerConfig {
   std::function<bool(const Sender&)> admits = {};
 };
 
-class Server final : public hal::CommandPort {
+class Server final : public hal::RemoteCommandPort {
  public:
   /// Begins to tell of the robot. The participant outlives it.
   /// Errors: what DDS refuses.
@@ -52,7 +52,7 @@ class Server final : public hal::CommandPort {
   [[nodiscard]] bool lockstep() const noexcept override { return config_.lockstep; }
   void send(const hal::PortView& view) noexcept override;
   [[nodiscard]] std::int64_t wait_until_ns(const hal::PortView& view) noexcept override;
-  [[nodiscard]] hal::OwnerWish exchange(const hal::PortView& view) noexcept TANDEM_RT override;
+  [[nodiscard]] hal::RemoteCommand exchange(const hal::PortView& view) noexcept TANDEM_RT override;
   void on_news(std::function<void()> ring) override;
 
   /// Its number among the servers of a domain, drawn at the start.
@@ -135,7 +135,7 @@ class Server final : public hal::CommandPort {
   std::uint32_t gate_stops_ = 0, gate_resets_ = 0;
   hal::ParameterImage gains_;  // the newest
   std::uint64_t gains_number_ = 0;
-  Newest<Taken> newest_;
+  TripleBuffer<Taken> newest_;
   std::atomic<std::uint8_t> stop_;  // a hal::StopCategory, to be carried out
   std::atomic<bool> reset_{false};
   std::mutex ring_mutex_;

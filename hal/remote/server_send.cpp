@@ -78,6 +78,7 @@ void Server::tell() {
   const std::vector<char*> sensors = pointers(identity_.sensors);
   tandem_msgs::LinkServer sample{};
   sample.run = run_;
+  sample.protocol = identity_.protocol;
   sample.robot = const_cast<char*>(identity_.robot.c_str());
   sample.description_hash = const_cast<char*>(identity_.description_hash.c_str());
   sample.period_ns = identity_.period_ns;

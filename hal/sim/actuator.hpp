@@ -11,7 +11,7 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::sim {
 

@@ -9,7 +9,7 @@
 
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/apparent_inertia.hpp"
 #include "hal/sim/ground_law.hpp"
 #include "hal/sim/link_points.hpp"

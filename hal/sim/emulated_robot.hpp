@@ -12,9 +12,9 @@
 
 #include "firmware_emu/board.hpp"
 #include "firmware_emu/sensor_board.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/loopback.hpp"
 #include "hal/ethercat-can/wire_model.hpp"
-#include "hal/robot_config.hpp"
 #include "hal/sim/fault_injection.hpp"
 #include "hal/sim/plant.hpp"
 #include "hal/sim/sensors.hpp"
@@ -32,11 +32,11 @@ struct SimRobotConfig {
   std::int64_t release_ns = 1'000'000'000;  ///< in which the hoist lets the base down
   std::uint64_t seed = 1;                   ///< of every measurement's noise
   bool truth = true;                        ///< keep truth() up to date
-  double rate_limit = 1000.0;  ///< any rate beyond it [rad/s or m/s] counts as diverged
-  bool bus_timing = false;     ///< frames take the time that they need on a real bus
-  std::int64_t bus_latency_ns = 0;          ///< with it: of every node's driver or firmware
+  double rate_limit = 1000.0;       ///< any rate beyond it [rad/s or m/s] counts as diverged
+  bool bus_timing = false;          ///< frames take the time that they need on a real bus
+  std::int64_t bus_latency_ns = 0;  ///< with it: of every node's driver or firmware
   std::int64_t answer_window_ns = 500'000;  ///< with it: after SYNC, until the master goes on
-  std::vector<Fault> faults = {};  ///< a scenario: read_scenario()
+  std::vector<Fault> faults = {};           ///< a scenario: read_scenario()
   /// The description: end stops, and links that touch the ground. Null: there are neither.
   std::shared_ptr<const model::Tree> tree = {};
 };
@@ -87,8 +87,9 @@ class EmulatedRobot {
   /// @param kernels  of this robot; outlive it
   /// Errors: those of Plant and Sensors; a posture, board or sensor that cannot be; a sub-step that
   /// is unstable in the posture (names the joint and the longest that is not).
-  [[nodiscard]] static Result<std::unique_ptr<EmulatedRobot>> create(
-      const hal::RobotConfig& robot, const tandem_kernels* kernels, const SimRobotConfig& config);
+  [[nodiscard]] static Result<std::unique_ptr<EmulatedRobot>> create(const hal::RobotConfig& robot,
+                                                                     const tandem_kernels* kernels,
+                                                                     const SimRobotConfig& config);
 
   /// Advances to `time_ns`; the first call starts time there. The frames of each bus up to its
   /// last SYNC are delivered, or all when there is none, and the nodes' answers put out.
@@ -157,9 +158,9 @@ class EmulatedRobot {
   };
   /// What is wrong with a joint's sensors and supply.
   struct Disturbance {
-    double jump_rad[2] = {};    // by EncoderSide
+    double jump_rad[2] = {};  // by EncoderSide
     double frozen_rad[2] = {};
-    double supply_V = 0.0;      // most that there is
+    double supply_V = 0.0;  // most that there is
     std::uint32_t frozen[2] = {};
     std::uint32_t unplugged[2] = {};
     std::uint32_t emergency_stop = 0, padding = 0;
@@ -174,8 +175,7 @@ class EmulatedRobot {
   void pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept;
   void receive(std::size_t bus, const canopen::Frame& frame) noexcept;
   void run_boards() noexcept;
-  void answer(std::size_t bus, std::size_t sender,
-              std::span<const canopen::Frame> frames) noexcept;
+  void answer(std::size_t bus, std::size_t sender, std::span<const canopen::Frame> frames) noexcept;
   void put_out(std::size_t bus, std::size_t sender,
                std::span<const canopen::Frame> frames) noexcept;
 

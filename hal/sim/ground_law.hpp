@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::sim {
 

@@ -12,7 +12,7 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/body_contact.hpp"
 #include "hal/sim/contact.hpp"

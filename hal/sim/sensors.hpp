@@ -10,7 +10,7 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/plant.hpp"
 
 namespace tandem::sim {

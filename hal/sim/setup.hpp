@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "firmware_emu/setup.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/apparent_inertia.hpp"
 #include "model/model_spec.hpp"
 #include "model/tree.hpp"

@@ -321,8 +321,9 @@ TEST_F(BadInput, APluginWithoutItsEntryPointIsRefused) {
 }
 
 TEST_F(BadInput, APluginOfAnotherAbiIsRefused) {
-  edit("hold.toml", "\"hold\"", "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/other_abi.so\"");
-  expect_refused({"other_abi.so", "ABI"});
+  edit("hold.toml", "\"hold\"",
+       "\"" TANDEM_BINARY_DIR "/tests/broken_plugins/older_interface.so\"");
+  expect_refused({"older_interface.so", "interface"});
 }
 
 // With 6 and 7 Cyclone DDS crashed in its own clean-up.

@@ -54,6 +54,48 @@ TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
   }
 }
 
+/// It is category 1 then, which was first said when somebody pressed the button.
+TEST_F(Check, WarnsOfACategory2ThatNoControllerCanCarryOut) {
+  const std::string robot = read_text(folder_ / "robot.toml");
+  write_text(folder_ / "robot.toml", robot + "\n[safety]\nemergency_stop = \"category2\"\n");
+  const auto line = std::ranges::count(robot, '\n') + 3;
+  const std::string warning =
+      "robot.toml:" + std::to_string(line) +
+      ": safety.emergency_stop: \"category2\" will be category 1: no "
+      "controller of hold.toml can bring the robot to a safe posture (add a "
+      "controller that can retreat, such as squat, or say \"category1\" "
+      "(docs/safety.md))\n";
+  for (const std::string command : {"check hold.toml", "run hold.toml --no-log --duration 0.1"}) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("warning: "), 0U) << outcome.err;
+    EXPECT_NE(outcome.err.find(warning), std::string::npos) << outcome.err << warning;
+  }
+  write_text(folder_ / "robot.toml", robot);
+  edit("robot.toml", "names = [", "on_fault = \"category2\"\nnames = [");
+  const Outcome joints = tandem("check hold.toml");
+  EXPECT_NE(
+      joints.err.find(": joint.joint1.on_fault: \"category2\" will be category 1, and so will "
+                      "1 more: no controller"),
+      std::string::npos)
+      << joints.err;
+  edit("robot.toml", "category2", "category1");
+  EXPECT_EQ(tandem("check hold.toml").err.find("category"), std::string::npos);
+}
+
+TEST_F(Check, WarnsOfNoCategory2ThatAControllerCanCarryOut) {
+  for (const char* file : {"coman.urdf", "robot.toml", "squat.toml", "hold.toml"}) {
+    std::filesystem::copy_file(std::filesystem::path(TANDEM_SOURCE_DIR "/config/coman") / file,
+                               folder_ / file, std::filesystem::copy_options::overwrite_existing);
+  }
+  write_text(folder_ / "robot.toml",
+             read_text(folder_ / "robot.toml") + "\n[safety]\nemergency_stop = \"category2\"\n");
+  EXPECT_NE(tandem("check hold.toml").err.find("safety.emergency_stop"), std::string::npos);
+  const Outcome squat = tandem("check squat.toml");
+  EXPECT_EQ(squat.status, 0) << squat.err;
+  EXPECT_EQ(squat.err.find("safety.emergency_stop"), std::string::npos) << squat.err;
+}
+
 TEST_F(Check, ShowsTheLoadOfEveryBus) {
   const Outcome outcome = tandem("check --bus hold.toml --json -");
   EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -364,6 +364,23 @@ TEST_F(Socket, ReplacesTheFileOfADeadProcessAndNothingElse) {
   EXPECT_EQ(std::filesystem::file_size(folder + "/file"), 8U);
 }
 
+// A process that is stopped: connect() itself had waited for ever.
+TEST_F(Socket, ThatAcceptsNobodyIsNoAnswerInTime) {
+  const int stopped = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  const auto address = control_address(path);
+  const auto* raw = reinterpret_cast<const sockaddr*>(&*address);
+  ASSERT_EQ(::bind(stopped, raw, sizeof *address), 0);
+  ASSERT_EQ(::listen(stopped, 0), 0);
+  std::vector<int> waiting;
+  do waiting.push_back(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0));
+  while (::connect(waiting.back(), raw, sizeof *address) == 0);
+  const auto answer = ask(path, {{"do", "estop"}});
+  ASSERT_FALSE(answer.has_value());
+  EXPECT_EQ(answer.error().message, "no answer within 3 s");
+  for (const int fd : waiting) ::close(fd);
+  ::close(stopped);
+}
+
 TEST_F(Socket, RefusesPathsThatCannotBe) {
   EXPECT_NE(refusal(folder + "/" + std::string(100, 'x')).find("107 are possible"),
             std::string::npos);
@@ -421,7 +438,7 @@ struct Impostor : Socket {
   static constexpr uid_t kStranger = 65534, kVictim = 65533;
   void SetUp() override {
     if (::geteuid() != 0) GTEST_SKIP() << "only root can act as two users";
-    ASSERT_EQ(::chmod(folder.c_str(), 0777), 0);
+    ASSERT_EQ(::chmod(folder.c_str(), 01777), 0);
   }
   void TearDown() override {
     if (child > 0) {
@@ -470,6 +487,56 @@ TEST_F(Impostor, CannotTakeTheFolderOfARunToCome) {
   listen_as_stranger(control_folder() + "/run-1.sock");
   EXPECT_NE(refusal(default_control_path("run")).find("no folder of this user alone"),
             std::string::npos);
+}
+
+// Neither end uses a socket that somebody else could have put there, or could replace.
+TEST_F(Socket, LiesInNoFolderThatOthersMayChange) {
+  const std::string open_folder = folder + "/open", inner = open_folder + "/inner";
+  std::filesystem::create_directories(inner);
+  const std::string where = open_folder + "/s.sock";
+  const auto served = open(where);
+  ASSERT_EQ(::chmod(open_folder.c_str(), 0777), 0);
+  const std::string named = "the socket's folder " + open_folder +
+                            " may be changed by everybody (its mode is 777): ";
+  const auto told = ask(where, {{"do", "help"}});
+  ASSERT_FALSE(told.has_value());
+  EXPECT_EQ(told.error().message.find(named), 0U) << told.error().to_string();
+  for (const std::string& path : {open_folder + "/t.sock", inner + "/t.sock"}) {
+    EXPECT_EQ(refusal(path).find(named), 0U) << refusal(path);
+    EXPECT_NE(refusal(path).find("chmod go-w " + open_folder + "; or choose another folder with "
+                                 "--socket"),
+              std::string::npos);
+  }
+  const auto simulated = serve(registry, {.path = open_folder + "/t.sock", .kind = "run"});
+  ASSERT_FALSE(simulated.has_value()) << "a run goes on without a socket only by --no-socket";
+  ASSERT_EQ(::chmod(open_folder.c_str(), 01777), 0);  // as /tmp
+  EXPECT_TRUE(ask(where, {{"do", "help"}}).has_value());
+  EXPECT_NE(open(open_folder + "/t.sock"), nullptr);
+}
+
+TEST_F(Socket, LiesInNoFolderOfAnotherUserOrGroup) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder away";
+  const std::string theirs = folder + "/theirs";
+  std::filesystem::create_directory(theirs);
+  ASSERT_EQ(::chown(theirs.c_str(), 65534, 0), 0);
+  EXPECT_NE(refusal(theirs + "/s.sock").find("belongs to user 65534"), std::string::npos);
+  ASSERT_EQ(::chmod(theirs.c_str(), 01755), 0);
+  EXPECT_NE(refusal(theirs + "/s.sock").find("belongs to user 65534"), std::string::npos);
+  ASSERT_EQ(::chown(theirs.c_str(), 0, 65534), 0);
+  ASSERT_EQ(::chmod(theirs.c_str(), 0775), 0);
+  EXPECT_NE(refusal(theirs + "/s.sock").find("may be changed by group 65534 (its mode is 775)"),
+            std::string::npos);
+  ASSERT_EQ(::chown(theirs.c_str(), 0, 0), 0);
+  EXPECT_NE(open(theirs + "/s.sock"), nullptr) << "this user's own group may";
+}
+
+// `sudo tandem estop --socket` of a user's run.
+TEST_F(Impostor, IsNobodyWhomRootNamesInTheFolderOfItsOwner) {
+  const std::string where = folder + "/of/s.sock";
+  listen_as_stranger(where);
+  EXPECT_TRUE(ask(where, {{"do", "estop"}}).has_value());
+  ASSERT_EQ(::chmod((folder + "/of").c_str(), 0777), 0);
+  EXPECT_FALSE(ask(where, {{"do", "estop"}}).has_value());
 }
 
 TEST_F(Impostor, FindsTheSocketOfARunShut) {

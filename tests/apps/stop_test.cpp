@@ -39,9 +39,10 @@ TEST_F(Stops, AreNotConfirmedByALoopThatHangsWhichTheWatchdogEnds) {
       << stop.err;
   EXPECT_EQ(join(), 1);
   const std::string told = read_text(folder_ / "run.txt");
-  EXPECT_NE(told.find("fault: the loop hangs: no cycle for 2 s, it is in the controller 'lazy'. The "
-                      "emergency stop is latched; the process ends in 2 s"),
-            std::string::npos)
+  EXPECT_NE(
+      told.find("fault: the loop hangs: no cycle for 2 s, it is in the controller 'lazy'. The "
+                "emergency stop is latched; the process ends in 2 s"),
+      std::string::npos)
       << told;
   const std::string last = "the loop hung in the controller 'lazy' and did not come back";
   EXPECT_NE(told.find("fault: " + last), std::string::npos) << told;
@@ -63,9 +64,8 @@ TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
   hang("1.0", "[faults]\nwatchdog_s = 0.2\n");
   const Outcome run = tandem("run hold.toml --no-log --no-socket --json run.json");
   EXPECT_EQ(run.status, 1);
-  for (const char* text :
-       {"the loop hangs: no cycle for 0.2 s, it is in the controller 'lazy'",
-        "lazy: emergency stop by the watchdog: the loop hung"}) {
+  for (const char* text : {"the loop hangs: no cycle for 0.2 s, it is in the controller 'lazy'",
+                           "lazy: emergency stop by the watchdog: the loop hung"}) {
     EXPECT_NE(run.err.find(text), std::string::npos) << text << "\nin: " << run.err;
   }
   EXPECT_EQ(json("run.json")["fault_log"][0]["joint"], "lazy");
@@ -93,10 +93,27 @@ TEST_F(Stops, AreNotConfirmedByAProcessThatDoesNotAnswer) {
   signal("STOP");
   const Outcome stop = to_run("estop");
   EXPECT_EQ(stop.status, 1);
-  EXPECT_NE(stop.err.find("no answer in time"), std::string::npos) << stop.err;
+  EXPECT_EQ(stop.err,
+            "error: no answer within 3 s (a process that was stopped carries the stop out when it "
+            "goes on; "
+            "until then stop the robot by its own stop circuit)\n");
   signal("CONT");
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);
+}
+
+TEST_F(Stops, CannotBeToldToAnImpostorInAFolderThatIsOpen) {
+  const std::filesystem::path open = folder_ / "open";
+  std::filesystem::create_directory(open);
+  std::filesystem::permissions(open, std::filesystem::perms::all);
+  const Outcome run = tandem("run hold.toml --no-log --socket open/s.sock");
+  EXPECT_EQ(run.status, 2);
+  EXPECT_EQ(run.err,
+            "error: the socket's folder " + open.string() +
+                " may be changed by everybody (its mode is 777): somebody else's socket could take "
+                "the place of open/s.sock, and be told of an emergency stop instead (give it to "
+                "this user, and take the right to write from others: chmod go-w " +
+                open.string() + "; or choose another folder with --socket)\n");
 }
 
 TEST_F(Stops, OfNoRunAreNoSuccess) { EXPECT_EQ(to_run("estop").status, 1); }

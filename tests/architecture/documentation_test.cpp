@@ -34,9 +34,10 @@ std::set<std::string> matches(const std::string& text, const char* pattern) {
 /// Keys that the readers of robots and experiments ask for.
 std::set<std::string> keys_read() {
   std::set<std::string> keys;
-  for (const char* file : {"hal/robot_config.cpp", "hal/robot_config_drives.cpp",
-                           "hal/robot_config_loops.cpp", "hal/robot_config_joints.cpp",
-                           "hal/sim/scenario.cpp", "runtime/experiment.cpp", "dds/config.cpp"}) {
+  for (const char* file :
+       {"hal/config/robot_config.cpp", "hal/config/robot_config_drives.cpp",
+        "hal/config/robot_config_loops.cpp", "hal/config/robot_config_joints.cpp",
+        "hal/sim/scenario.cpp", "runtime/experiment.cpp", "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(
         source,
@@ -86,9 +87,11 @@ TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
 }
 
 TEST(Documentation, LinksLeadToFilesThatExist) {
-  std::vector<fs::path> pages{kRoot / "README.md"};
-  for (const auto& entry : fs::directory_iterator(kRoot / "docs")) {
-    if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  std::vector<fs::path> pages;
+  for (const fs::path& folder : {kRoot, kRoot / "docs"}) {
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (entry.path().extension() == ".md") pages.push_back(entry.path());
+    }
   }
   int links = 0;
   for (const fs::path& page : pages) {

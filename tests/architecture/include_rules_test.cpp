@@ -25,21 +25,22 @@ const Rules& rules() {
       {"canopen", {"base"}},
       {"firmware_emu", {"base", "canopen"}},
       {"hal", {"base", "model/loop_spec.hpp"}},
-      {"hal/ethercat-can", {"base", "canopen", "hal", "rt/histogram.hpp"}},
-      {"hal/sim", {"base", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can"}},
-      {"hal/remote", {"base", "hal", "dds", "rt/histogram.hpp"}},
-      {"dds", {"base", "hal", "model", "rt/histogram.hpp"}},
+      {"hal/config", {"base", "hal", "model/loop_spec.hpp"}},
+      {"hal/ethercat-can", {"base", "canopen", "hal", "hal/config", "rt/histogram.hpp"}},
+      {"hal/sim",
+       {"base", "model", "canopen", "firmware_emu", "hal", "hal/config", "hal/ethercat-can"}},
+      {"hal/remote", {"base", "hal", "hal/config", "dds", "rt/histogram.hpp"}},
+      {"dds", {"base", "hal", "hal/config", "model", "rt/histogram.hpp"}},
       {"controllers", {"base", "hal", "model/kernels.h", "model/closed_loops.hpp"}},
       {"log", {"base", "hal"}},
-      {"report", {"base", "hal", "log", "model"}},
+      {"report", {"base", "hal", "hal/config", "log", "model"}},
       {"runtime",
-       {"base", "rt", "model", "hal", "hal/ethercat-can", "hal/sim", "hal/remote", "dds",
-        "controllers", "log"}},
-      {"scaffold", {"base", "model", "hal", "hal/ethercat-can"}},
+       {"base", "rt", "model", "hal", "hal/config", "hal/ethercat-can", "hal/sim", "hal/remote",
+        "dds", "controllers", "log"}},
+      {"scaffold", {"base", "model", "hal", "hal/config", "hal/ethercat-can"}},
       {"apps",
-       {"base", "rt", "model", "canopen", "firmware_emu", "hal", "hal/ethercat-can", "hal/sim",
-        "hal/remote", "dds", "controllers", "log", "report", "runtime",
-        "scaffold"}},
+       {"base", "rt", "model", "canopen", "firmware_emu", "hal", "hal/config", "hal/ethercat-can",
+        "hal/sim", "hal/remote", "dds", "controllers", "log", "report", "runtime", "scaffold"}},
   };
   return table;
 }
@@ -115,6 +116,8 @@ TEST(Architecture, RuleRefusesARoomAboveAndAcceptsOneBelow) {
   EXPECT_TRUE(may_include("controllers", "model/kernels.h"));
   EXPECT_FALSE(may_include("controllers", "model/tree.hpp"));
   EXPECT_FALSE(may_include("hal", "hal/sim/plant.hpp"));
+  EXPECT_FALSE(may_include("hal", "hal/config/robot_config.hpp"));
+  EXPECT_FALSE(may_include("controllers", "hal/config/robot_config.hpp"));
   EXPECT_FALSE(may_include("base", "rt/loop.hpp"));
 }
 

@@ -49,6 +49,17 @@ TEST_F(TrustedCode, IsNothingThatEverybodyMayChange) {
   EXPECT_EQ(error(), "its folder " + (folder / "inner").string() + " may be changed by everybody");
 }
 
+TEST_F(TrustedCode, LiesInAFolderThatMayBeAskedFor) {
+  EXPECT_TRUE(check_trusted_folder((folder / "inner").string()));
+  EXPECT_EQ(check_trusted_folder((folder / "none").string()).error().message,
+            "there is no such folder");
+  ::chmod(folder.c_str(), 0777);
+  const Status refused = check_trusted_folder((folder / "inner").string());
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().file, folder.string());
+  EXPECT_EQ(refused.error().message, "may be changed by everybody (its mode is 777)");
+}
+
 TEST_F(TrustedCode, IsNoOtherUsers) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
   ASSERT_EQ(::chown(file.c_str(), 65534, 0), 0);

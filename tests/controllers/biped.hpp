@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/kernels.h"
 
 namespace tandem::test {

@@ -116,7 +116,9 @@ TEST(GravityCompensation, TurnsWithTheImu) {
   std::vector<double> pose(24), twist(12), J(12 * test::kBipedNv);
   test::biped_site_motion(q.data(), nullptr, nullptr, pose.data(), twist.data(), rest.data());
   test::biped_site_jacobians(q.data(), J.data());
-  Support support(find_feet(robot, *test::biped_kernels(), foot_names(robot)).value());
+  Support support(
+      find_feet(hal::robot_of(robot), *test::biped_kernels(), foot_names(hal::robot_of(robot)))
+          .value());
   support.carry(*test::biped_kernels(), q, pose, J, tau);
   const int ankle = robot.joint_index("LAnkSag");
   EXPECT_NEAR(run.command.torque_Nm()[static_cast<std::size_t>(ankle)], tau[6 + 5], 1e-9);

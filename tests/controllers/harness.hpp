@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controllers/plugin_loader.hpp"
+#include "hal/config/capabilities.hpp"
 #include "rt/scoped_realtime.hpp"
 
 namespace tandem::test {
@@ -19,9 +20,9 @@ inline std::vector<std::string> bundled_folder() {
 
 class Harness {
  public:
-  Harness(hal::RobotConfig config, const std::string& plugin, const std::string& parameters,
+  Harness(const hal::RobotConfig& config, const std::string& plugin, const std::string& parameters,
           const tandem_kernels* kernels = nullptr, std::span<const double> start_rad = {})
-      : robot(std::move(config)),
+      : robot(hal::robot_of(config)),
         state(robot.shape()),
         command(robot.shape()),
         loaded_(load_controller(plugin, bundled_folder())),
@@ -74,7 +75,7 @@ class Harness {
     return code;
   }
 
-  hal::RobotConfig robot;
+  hal::Robot robot;
   hal::CycleTime time;
   hal::StateImage state;
   hal::CommandImage command;

@@ -87,13 +87,6 @@ TEST(Hold, SaysWhereARobotWithoutPosturesGetsOne) {
             "arm/robot.toml)");
 }
 
-TEST(Hold, RefusesAJointWithoutPositionControl) {
-  hal::RobotConfig config = robot();
-  config.gains[0].position = {};
-  EXPECT_NE(test::Harness(config, "hold", "").problem().find("no position control"),
-            std::string::npos);
-}
-
 TEST(Hold, GoesOnFromASnapshot) {
   test::Harness run(robot(), "hold", "posture = 'ready'\n");
   run.start();

@@ -26,7 +26,10 @@ TEST(PluginLoader, NamesTheFoldersSearchedAndTheNearestController) {
   ASSERT_FALSE(loaded.has_value());
   EXPECT_EQ(loaded.error().message,
             "there is no controller 'hodl' in " + test::bundled_folder()[0]);
-  EXPECT_EQ(loaded.error().hint, "did you mean 'hold'?");
+  EXPECT_EQ(
+      loaded.error().hint,
+      "did you mean 'hold'?; one of your own is found in the folders of TANDEM_CONTROLLERS, or by "
+      "a path with a '/'");
 }
 
 TEST(PluginLoader, SaysHowABundledControllerIsBuilt) {
@@ -48,11 +51,27 @@ TEST(PluginLoader, RefusesALibraryWithoutItsEntryPoint) {
   EXPECT_EQ(loaded.error().message, "has no entry point tandem_controller_plugin()");
 }
 
-TEST(PluginLoader, RefusesALibraryOfAnotherAbi) {
-  const auto loaded = load_controller("other_abi", kBroken);
+TEST(PluginLoader, RefusesALibraryOfOlderHeaders) {
+  const auto loaded = load_controller("older_interface", kBroken);
   ASSERT_FALSE(loaded.has_value());
   EXPECT_EQ(loaded.error().message,
-            "was built for controller ABI 999, this program has " + std::to_string(kControllerAbi));
+            "was built for controller interface " + std::to_string(kControllerInterface - 1) +
+                ", this program has " + std::to_string(kControllerInterface));
+}
+
+// What a joint is has changed, and nobody has raised the version.
+TEST(PluginLoader, RefusesALibraryOfOtherHeadersOfThisVersion) {
+  const auto loaded = load_controller("other_layout", kBroken);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_EQ(loaded.error().message, "was built with other headers of controller interface " +
+                                        std::to_string(kControllerInterface));
+}
+
+// A robot's wiring is its own affair: a controller built before it had one more key still loads.
+TEST(PluginLoader, TakesALibraryOfHeadersInWhichOnlyTheWiringDiffers) {
+  const auto loaded = load_controller("other_wiring", kBroken);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().to_string();
+  EXPECT_STREQ(loaded->plugin().name, "sway");
 }
 
 TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {

@@ -22,8 +22,9 @@ class SquatRobots : public testing::TestWithParam<Case> {
 };
 
 TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
+  Stance stance = Stance::make(hal::robot_of(loaded.robot), loaded.kernels.get(),
+                               foot_names(hal::robot_of(loaded.robot)))
+                      .value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   for (int i = 0; i <= 100; ++i) {
@@ -34,8 +35,9 @@ TEST_P(SquatRobots, InverseKinematicsHoldToRoundingAllTheWayDown) {
 }
 
 TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
+  Stance stance = Stance::make(hal::robot_of(loaded.robot), loaded.kernels.get(),
+                               foot_names(hal::robot_of(loaded.robot)))
+                      .value();
   const double height = stance.place(posture);
   ASSERT_TRUE(stance.solve(height, 50).converged);
   const double rate = GetParam().depth_m / 2.0;
@@ -51,8 +53,9 @@ TEST_P(SquatRobots, OneNewtonStepACycleIsEnough) {
 
 TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
   // The same torques and the ground's wrenches, through inverse dynamics once more.
-  Stance stance =
-      Stance::make(loaded.robot, loaded.kernels.get(), foot_names(loaded.robot)).value();
+  Stance stance = Stance::make(hal::robot_of(loaded.robot), loaded.kernels.get(),
+                               foot_names(hal::robot_of(loaded.robot)))
+                      .value();
   const double height = stance.place(posture);
   const tandem_kernels& kernels = *loaded.kernels;
   ASSERT_TRUE(stance.solve(height - GetParam().depth_m, 50).converged);
@@ -68,7 +71,9 @@ TEST_P(SquatRobots, TorquesLeaveNothingForTheBase) {
   std::vector<double> pose(12 * kernels.sites), twist(6 * kernels.sites), acceleration(twist);
   kernels.site_motion(stance.q().data(), rest.data(), rest.data(), pose.data(), twist.data(),
                       acceleration.data());
-  const auto feet = find_feet(loaded.robot, kernels, foot_names(loaded.robot)).value();
+  const auto feet =
+      find_feet(hal::robot_of(loaded.robot), kernels, foot_names(hal::robot_of(loaded.robot)))
+          .value();
   for (std::size_t w = 0; w < feet.size(); ++w) {
     for (std::size_t i = 0; i < 3; ++i) wrench[6 * w + i] = share * pose[12 * feet[w].site + 6 + i];
     wrench[6 * w + 4] = -middle * share;  // of a sole, whose site is upright
@@ -89,7 +94,7 @@ TEST_P(SquatRobots, TheWholeSquatRunsWithinEveryLimit) {
   while (code == Code::kOk) {
     code = run.step();
     for (std::size_t j = 0; j < run.robot.joints.size(); ++j) {
-      const hal::JointConfig& joint = run.robot.joints[j];
+      const hal::Joint& joint = run.robot.joints[j];
       ASSERT_GE(run.command.position_rad()[j], joint.min_position_rad) << joint.name;
       ASSERT_LE(run.command.position_rad()[j], joint.max_position_rad) << joint.name;
       ASSERT_LE(std::abs(run.command.velocity_rad_s()[j]), joint.max_velocity_rad_s);

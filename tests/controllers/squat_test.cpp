@@ -26,7 +26,9 @@ TEST(MinJerk, IsTheClosedFormAndItsDerivatives) {
 class StanceTest : public testing::Test {
  protected:
   hal::RobotConfig robot = test::biped_robot();
-  Stance stance = Stance::make(robot, test::biped_kernels(), foot_names(robot)).value();
+  Stance stance =
+      Stance::make(hal::robot_of(robot), test::biped_kernels(), foot_names(hal::robot_of(robot)))
+          .value();
   double height = stance.place(robot.postures[0].position_rad);
 };
 
@@ -187,8 +189,8 @@ TEST(Squat, RefusesARobotThatCannotSquat) {
                 .problem()
                 .find("needs the robot's generated model"),
             std::string::npos);
-  EXPECT_NE(test::Harness(test::biped_robot(), "squat",
-                          std::string(kSquat) + "feet = ['l_sloe']\n", test::biped_kernels())
+  EXPECT_NE(test::Harness(test::biped_robot(), "squat", std::string(kSquat) + "feet = ['l_sloe']\n",
+                          test::biped_kernels())
                 .problem()
                 .find("has no foot 'l_sloe' (did you mean 'l_sole'?)"),
             std::string::npos);

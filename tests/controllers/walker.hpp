@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/interpreted_kernels.hpp"
 #include "model/urdf.hpp"
@@ -102,14 +102,13 @@ inline hal::RobotConfig walker_robot(const Walker& walker) {
 struct WalkerRobot {
   explicit WalkerRobot(const Walker& walker)
       : robot(walker_robot(walker)),
-        kernels(
-            model::make_mechanism(
-                model::parse_urdf(walker_urdf(walker), "walker.urdf", {.floating_base = true})
-                    .value()
-                    .tree,
-                sim::model_spec(robot))
-                .value(),
-            robot.name) {}
+        kernels(model::make_mechanism(
+                    model::parse_urdf(walker_urdf(walker), "walker.urdf", {.floating_base = true})
+                        .value()
+                        .tree,
+                    sim::model_spec(robot))
+                    .value(),
+                robot.name) {}
   hal::RobotConfig robot;
   model::InterpretedKernels kernels;
 };

@@ -54,7 +54,9 @@ class Walkers : public testing::TestWithParam<Walker> {
   void TearDown() override { static_cast<void>(test::take_rt_violations()); }
   test::WalkerRobot one{GetParam()};
   const tandem_kernels& kernels = *one.kernels.get();
-  Stance stance = Stance::make(one.robot, &kernels, foot_names(one.robot)).value();
+  Stance stance =
+      Stance::make(hal::robot_of(one.robot), &kernels, foot_names(hal::robot_of(one.robot)))
+          .value();
   double height = stance.place(one.robot.postures[0].position_rad);
 
   /// Two more steps than it needs: to rounding.
@@ -63,7 +65,8 @@ class Walkers : public testing::TestWithParam<Walker> {
     ASSERT_TRUE(stance.solve(height - down_m, 50).converged) << down_m;
   }
   [[nodiscard]] std::vector<Foot> feet() const {
-    return find_feet(one.robot, kernels, foot_names(one.robot)).value();
+    return find_feet(hal::robot_of(one.robot), kernels, foot_names(hal::robot_of(one.robot)))
+        .value();
   }
 };
 
@@ -247,8 +250,10 @@ TEST_F(SupportTest, PushAndTurnAreSharedAsTheFeetCarry) {
 TEST(Feet, HaveTheShapeOfTheirPoints) {
   const auto shape = [](std::vector<std::array<double, 3>> points) {
     test::WalkerRobot one(Walker{"", 1, kThree, std::move(points)});
-    const Foot foot =
-        find_feet(one.robot, *one.kernels.get(), foot_names(one.robot)).value().front();
+    const Foot foot = find_feet(hal::robot_of(one.robot), *one.kernels.get(),
+                                foot_names(hal::robot_of(one.robot)))
+                          .value()
+                          .front();
     return std::pair{foot.shape, foot.axis};
   };
   EXPECT_EQ(shape(kBall).first, FootShape::kPoint);

@@ -205,13 +205,15 @@ std::string idl_members(const MessageDefinition& definition) {
   return out;
 }
 
-/// Every structure of dds/idl: "std_msgs/msg/String" -> "string data;"
+/// Every structure of dds/idl and of the images' IDL: "std_msgs/msg/String" -> "string data;"
 std::map<std::string, std::string> structures() {
   static const std::regex kToken(R"(module (\w+) \{ module (\w+) \{|struct (\w+)_ \{ ([^}]*?) \})");
   std::map<std::string, std::string> out;
-  for (const char* file : {"ros2.idl", "tandem_msgs.idl"}) {
+  for (const char* file :
+       {TANDEM_SOURCE_DIR "/dds/idl/ros2.idl", TANDEM_SOURCE_DIR "/dds/idl/tandem_msgs.idl",
+        TANDEM_BINARY_DIR "/dds/tandem_images.idl"}) {
     std::stringstream in;
-    in << std::ifstream(std::string(TANDEM_SOURCE_DIR) + "/dds/idl/" + file).rdbuf();
+    in << std::ifstream(file).rdbuf();
     std::string text = std::regex_replace(in.str(), std::regex("//[^\n]*"), "");
     text = std::regex_replace(text, std::regex("\\s+"), " ");
     text = std::regex_replace(text, std::regex(R"(\w+::msg::dds_::)"), "");
@@ -228,9 +230,19 @@ std::map<std::string, std::string> structures() {
   return out;
 }
 
+TEST(MessageDefinition, HasFieldNamesThatRos2Allows) {
+  const std::regex allowed("[a-z](_?[a-z0-9]+)*");
+  for (const MessageDefinition& definition : definitions()) {
+    for (const Field& field : definition.fields) {
+      EXPECT_TRUE(std::regex_match(field.name, allowed)) << definition.name << ": " << field.name;
+    }
+  }
+}
+
 TEST(MessageDefinition, SaysTheSameAsTheIdl) {
   const auto idl = structures();
   EXPECT_GT(idl.size(), 40u);
+  EXPECT_TRUE(idl.contains("tandem_msgs/msg/State") && idl.contains("tandem_msgs/msg/Command"));
   for (const auto& [name, members] : idl) {
     const MessageDefinition* definition = find_definition(name);
     ASSERT_NE(definition, nullptr) << name;

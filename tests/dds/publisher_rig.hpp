@@ -78,6 +78,8 @@ struct PublisherRig {
   void show(std::uint64_t cycle) {
     const auto time_ns = static_cast<std::int64_t>(cycle) * kPeriod_ns;
     const hal::CycleTime time{cycle, time_ns, kPeriod_ns};
+    state.cycle()[0] = command.cycle()[0] = cycle;
+    state.time_ns()[0] = command.time_ns()[0] = time_ns;
     publisher->take({time,
                      phase,
                      Code::kOk,

@@ -96,6 +96,24 @@ TEST_P(EveryRobot, HasTheWholeStateAndCommand) {
             1U);
 }
 
+TEST(ImageMessages, HaveEveryFieldOfTheImages) {
+  const hal::ImageShape shape{.joints = 3, .sensor_channels = {6, 10}};
+  const hal::StateImage state(shape);
+  const hal::CommandImage command(shape);
+  for (const auto& [name, image] :
+       {std::pair<const char*, const hal::Image*>{"tandem_msgs/msg/State", &state},
+        {"tandem_msgs/msg/Command", &command}}) {
+    const MessageDefinition* definition = find_definition(name);
+    ASSERT_NE(definition, nullptr);
+    for (const hal::Field& field : image->layout().fields()) {
+      const auto found = std::ranges::find(definition->fields, field.name, &Field::name);
+      ASSERT_NE(found, definition->fields.end()) << name << " has no " << field.name;
+      const bool one = found->repeat == Repeat::kOne;
+      EXPECT_EQ(one, field.count == 1) << field.name;
+    }
+  }
+}
+
 std::size_t sensor_of(const hal::RobotConfig& robot, hal::SensorType type) {
   for (std::size_t s = 0; s < robot.sensors.size(); ++s) {
     if (robot.sensors[s].type == type) return s;

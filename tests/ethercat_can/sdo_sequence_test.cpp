@@ -148,7 +148,7 @@ TEST_F(ScriptedNode, IsResetAgainEveryHalfSecondUntilItBoots) {
   EXPECT_TRUE(wait(499).empty());
   EXPECT_EQ(wait(1).size(), 1u);
   (void)wait(2500);
-  EXPECT_EQ(node.trouble(), NodeTrouble::kNoBootUp);
+  EXPECT_EQ(node.error(), NodeError::kNoBootUp);
 }
 
 TEST_F(ScriptedNode, IsAskedThreeTimesBeforeTheSdoTimesOut) {
@@ -159,7 +159,7 @@ TEST_F(ScriptedNode, IsAskedThreeTimesBeforeTheSdoTimesOut) {
     for (const Frame& frame : wait(1)) requests += frame.data[0] == 0x40 ? 1 : 0;
   }
   EXPECT_EQ(requests, 2) << "besides the first";
-  EXPECT_EQ(node.trouble(), NodeTrouble::kSdoAbort);
+  EXPECT_EQ(node.error(), NodeError::kSdoAbort);
   EXPECT_EQ(node.abort_code(), canopen::AbortCode::kTimeout);
 }
 
@@ -168,7 +168,7 @@ TEST_F(ScriptedNode, IsRefusedWithAnotherIdentity) {
   (void)wait(1);
   answer({0x43, 0x18, 0x10, 0x02, 0x03, 0x04, 0, 0});
   (void)wait(1);
-  EXPECT_EQ(node.trouble(), NodeTrouble::kWrongIdentity);
+  EXPECT_EQ(node.error(), NodeError::kWrongIdentity);
   EXPECT_EQ(node.read_value(), 0x403u);
 }
 
@@ -180,7 +180,7 @@ TEST_F(ScriptedNode, ThatDoesNotStartIsReported) {
     node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
     (void)wait(50);
   }
-  EXPECT_EQ(node.trouble(), NodeTrouble::kNotOperational);
+  EXPECT_EQ(node.error(), NodeError::kNotOperational);
 }
 
 TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
@@ -188,7 +188,7 @@ TEST_F(ScriptedNode, ThatLeavesOperationalByItselfIsReported) {
   node.start(now_ns, sink);
   node.on_heartbeat(canopen::NmtState::kOperational, now_ns);
   node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
-  EXPECT_EQ(node.trouble(), NodeTrouble::kLeftOperational);
+  EXPECT_EQ(node.error(), NodeError::kLeftOperational);
 }
 
 TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
@@ -200,13 +200,13 @@ TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
   }
   now_ns += 1'000'000;
   boot();
-  EXPECT_EQ(node.trouble(), NodeTrouble::kRebooted);
+  EXPECT_EQ(node.error(), NodeError::kRebooted);
 }
 
 TEST_F(ScriptedNode, ThatBootsTwiceInACycleIsTwoNodes) {
   boot();
   boot();
-  EXPECT_EQ(node.trouble(), NodeTrouble::kTwoNodes);
+  EXPECT_EQ(node.error(), NodeError::kTwoNodes);
 }
 
 }  // namespace

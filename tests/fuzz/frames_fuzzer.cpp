@@ -15,15 +15,15 @@
 #include <vector>
 
 #include "base/archive.hpp"
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 #include "tests/ethercat_can/rig.hpp"
 #include "tests/fuzz/require.hpp"
 
 namespace {
 
 using namespace tandem;
-using fuzz::require;
 using canopen::Frame;
+using fuzz::require;
 using hal::can::DriveMaster;
 using hal::can::LoopbackBus;
 
@@ -31,7 +31,6 @@ constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr std::size_t kBoards = 2, kAxes = 1, kJoints = kBoards * kAxes;
 constexpr int kMostCycles = 32;  // of an input
 constexpr double kRounding = 1e-6;
-
 
 /// Two boards of an axis on one bus, a sensor node on the other.
 hal::RobotConfig small_robot() {
@@ -65,8 +64,7 @@ class Input {
 struct Wires {
   Wires() {
     for (std::size_t b = 0; b < kBoards; ++b) {
-      boards.push_back(
-          std::make_unique<firmware::Board>(hal::can::test::board_setup(robot, b)));
+      boards.push_back(std::make_unique<firmware::Board>(hal::can::test::board_setup(robot, b)));
     }
     const std::array<hal::can::Bus*, 2> ends{&legs.master(), &arms.master()};
     auto created = DriveMaster::create(robot, ends);
@@ -369,8 +367,8 @@ class Play {
   Input input_;
   Wires::Strangers strangers_;
   std::vector<Frame> heard_;  // by the boards, of the stranger
-  bool stopped_ = false;    // no axis may be enabled until a reset
-  bool disturbed_ = false;  // a stop's frame may be lost
+  bool stopped_ = false;      // no axis may be enabled until a reset
+  bool disturbed_ = false;    // a stop's frame may be lost
   bool shut_down_ = false;
   static constexpr int kNever = 1 << 20;
   int cycles_ = 0, stops_at_ = kNever;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "tests/fuzz/require.hpp"
 
 namespace {

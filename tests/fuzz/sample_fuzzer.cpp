@@ -20,9 +20,9 @@
 
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/server.hpp"
+#include "tests/fuzz/require.hpp"
 #include "tests/hal/fake_backend.hpp"
 #include "tests/support/dds_domain.hpp"
-#include "tests/fuzz/require.hpp"
 
 namespace {
 
@@ -33,7 +33,6 @@ using namespace tandem::remote;
 constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr int kMostSteps = 24;
 constexpr double kStrangersMark = 1.375;  // [rad] first joint's position in a stranger's command
-
 
 template <class T>
 T must(Result<T> made) {
@@ -99,10 +98,10 @@ template <class T>
 class Peer {
  public:
   Peer(dds::Participant& participant, const char* topic)
-      : writer_(must(dds::Writer<T>::create(participant, participant.topic_name(topic),
-                                            link_qos()))) {
-    auto reader = must(
-        dds::Reader<T>::create(participant, participant.topic_name(topic), link_qos()));
+      : writer_(
+            must(dds::Writer<T>::create(participant, participant.topic_name(topic), link_qos()))) {
+    auto reader =
+        must(dds::Reader<T>::create(participant, participant.topic_name(topic), link_qos()));
     T sample{};
     require(writer_.write(sample));
     dds_sample_info_t info;
@@ -112,8 +111,7 @@ class Peer {
   void write(const T& sample) { (void)writer_.write(sample); }
   /// @param known  numbers that a sample begins with and no input can guess; they take the place
   ///               of its first bytes
-  void write_bytes(std::span<const std::uint8_t> bytes,
-                   std::span<const std::uint64_t> known = {}) {
+  void write_bytes(std::span<const std::uint8_t> bytes, std::span<const std::uint64_t> known = {}) {
     std::vector<std::uint8_t> padded{0, 1, 0, 0};  // little-endian CDR
     const std::size_t begin = padded.size();
     padded.insert(padded.end(), bytes.begin(), bytes.end());
@@ -146,10 +144,11 @@ struct RobotEnd {
   std::unique_ptr<dds::Participant> at_robot = participant(domain, "robot");
   std::unique_ptr<dds::Participant> at_owner = participant(domain, "owner");
   std::unique_ptr<dds::Participant> at_stranger = participant(domain, "stranger");
-  std::unique_ptr<Server> server = must(Server::open(
-      *at_robot, robot(), identity(),
-      {.max_age_cycles = 20,
-       .admits = [this](const Sender& sender) { return sender == dds::id_of(*at_owner); }}));
+  std::unique_ptr<Server> server =
+      must(Server::open(*at_robot, robot(), identity(),
+                        {.max_age_cycles = 20, .admits = [this](const Sender& sender) {
+                           return sender == dds::id_of(*at_owner);
+                         }}));
   Client owner{*at_owner}, stranger{*at_stranger};
   hal::StateImage state{robot().shape()};
   hal::CommandImage command{robot().shape()};
@@ -160,11 +159,10 @@ struct RobotEnd {
 /// The owner's end, with the server that it has chosen, and a stranger.
 struct OwnersEnd {
   OwnersEnd() {
-    backend = must(RemoteBackend::connect(
-        *at_owner, robot(), identity(),
-        {.name = "fuzz",
-         .server = server->number(),
-         .interrupted = [this] { return connected.load(); }}));
+    backend = must(RemoteBackend::connect(*at_owner, robot(), identity(),
+                                          {.name = "fuzz",
+                                           .server = server->number(),
+                                           .interrupted = [this] { return connected.load(); }}));
     connected = true;
   }
   std::shared_ptr<dds::Domain> domain = another_domain();
@@ -185,7 +183,7 @@ class Play {
  public:
   Play(RobotEnd& robot_end, OwnersEnd& owners_end, Input input)
       : end_(robot_end), owners_(owners_end), input_(input) {
-    exchange();  // the first input, too, answers a cycle that there was
+    exchange();                     // the first input, too, answers a cycle that there was
     client_ = 1 + end_.turn++ % 2;  // another one than before: its numbers begin anew
     request(end_.owner, Action::kAcquire, client_);
     require(end_.server->lease().owner() == client_);
@@ -212,8 +210,8 @@ class Play {
                                   known(what, {end_.server->number(), client_}));
         break;
       case 1:
-        raw_command(from, known(what, {end_.server->number(), client_, ++end_.sequence,
-                                       end_.cycle}));
+        raw_command(from,
+                    known(what, {end_.server->number(), client_, ++end_.sequence, end_.cycle}));
         break;
       case 2: {
         const std::uint8_t how = input_.byte();
@@ -256,6 +254,7 @@ class Play {
     char name[] = "fuzz";
     from.requests.write({.run = end_.server->number(),
                          .client = client,
+                         .protocol = kLinkProtocol,
                          .action = static_cast<std::uint8_t>(action),
                          .name = name});
   }
@@ -272,8 +271,10 @@ class Play {
     sample.command._length = static_cast<std::uint32_t>(image.bytes().size());
     std::vector<double> gains;
     if (!plain) change(sample, image, gains);
-    if (&from == &end_.stranger) image.position_rad()[0] = kStrangersMark;
-    else if (image.position_rad()[0] == kStrangersMark) image.position_rad()[0] = 0.0;
+    if (&from == &end_.stranger)
+      image.position_rad()[0] = kStrangersMark;
+    else if (image.position_rad()[0] == kStrangersMark)
+      image.position_rad()[0] = 0.0;
     std::vector<std::byte> bytes(image.bytes().begin(), image.bytes().end());
     bytes.resize(sample.command._length);
     sample.command._buffer = reinterpret_cast<std::uint8_t*>(bytes.data());
@@ -317,13 +318,13 @@ class Play {
                               .time_ns = static_cast<std::int64_t>(end_.cycle) * kPeriod_ns,
                               .period_ns = kPeriod_ns};
     const std::uint64_t owner = end_.server->lease().owner();
-    const hal::OwnerWish wish = end_.server->exchange({.time = time,
-                                                       .phase = hal::RunPhase::kRunning,
-                                                       .read_code = Code::kOk,
-                                                       .reaction = hal::StopCategory::kWarn,
-                                                       .state = end_.state,
-                                                       .command = end_.command,
-                                                       .causes = end_.causes});
+    const hal::RemoteCommand wish = end_.server->exchange({.time = time,
+                                                           .phase = hal::RunPhase::kRunning,
+                                                           .read_code = Code::kOk,
+                                                           .reaction = hal::StopCategory::kWarn,
+                                                           .state = end_.state,
+                                                           .command = end_.command,
+                                                           .causes = end_.causes});
     require(wish.stop <= hal::StopCategory::kWarn);
     if (wish.live || wish.done) require(owner == client_ && wish.command != nullptr);
     if (wish.command != nullptr) {
@@ -399,8 +400,8 @@ class Play {
     const hal::CycleTime time{.cycle = owners_.cycle};
     backend.exchange(time);
     (void)backend.read(time, owners_.state);
-    for (const auto values : {owners_.state.position_rad(), owners_.state.temperature_C(),
-                              owners_.state.sensor()}) {
+    for (const auto values :
+         {owners_.state.position_rad(), owners_.state.temperature_C(), owners_.state.sensor()}) {
       require(std::ranges::all_of(values, [](double value) { return std::isfinite(value); }));
     }
     (void)backend.phase();

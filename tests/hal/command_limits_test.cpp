@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/archive.hpp"
+#include "hal/config/capabilities.hpp"
 #include "tests/hal/fake_backend.hpp"
 
 namespace tandem::hal {
@@ -28,7 +29,7 @@ class Limits : public testing::Test {
   RobotConfig robot = test::fake_robot();  // +-1.5 rad, 2 rad/s, 20 Nm, 24 V, 10 A
   StateImage state{robot.shape()};
   CommandImage command{robot.shape()};
-  CommandLimits limits{robot, 1'000'000};
+  CommandLimits limits{robot_of(robot), 1'000'000};
 };
 
 TEST_F(Limits, LetGoodCommandsPassUnchanged) {
@@ -283,7 +284,7 @@ class DeclaredLimits : public Limits {
   }
   void SetUp() override {
     Limits::SetUp();
-    limits = CommandLimits(declared(), 1'000'000);
+    limits = CommandLimits(robot_of(declared()), 1'000'000);
     ASSERT_EQ(limits.apply(state, command), Code::kOk);
   }
   /// The largest first, second and third difference of `field` on its way to `wanted`.

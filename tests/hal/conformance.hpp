@@ -14,6 +14,7 @@
 #include "base/archive.hpp"
 #include "hal/backend.hpp"
 #include "hal/command_limits.hpp"
+#include "hal/config/capabilities.hpp"
 #include "hal/devices.hpp"
 
 namespace tandem::hal::test {
@@ -22,13 +23,13 @@ namespace tandem::hal::test {
 struct ConformanceRobot {
   RobotConfig robot;
   std::unique_ptr<Backend> backend;
-  std::size_t joint = 0;   ///< is moved; everything else holds its position
-  double way_rad = 0.2;    ///< it may move this far to both sides of where it stands
-  double torque_Nm = 0.5;  ///< moves it gently
+  std::size_t joint = 0;      ///< is moved; everything else holds its position
+  double way_rad = 0.2;       ///< it may move this far to both sides of where it stands
+  double torque_Nm = 0.5;     ///< moves it gently
   double torque_share = 0.3;  ///< of it that reaches the free link at least: the rotor takes J of
                               ///< J + m, and a light link m has little to push against
-  double voltage_V = 0.5;  ///< moves it gently
-  double current_A = 0.2;  ///< moves it gently
+  double voltage_V = 0.5;     ///< moves it gently
+  double current_A = 0.2;     ///< moves it gently
   std::function<void(std::size_t joint)> provoke_fault;  ///< makes the joint's drive trip
   std::shared_ptr<void> keep;                            ///< whatever else must live
 };
@@ -47,8 +48,8 @@ class Rig {
         state(it.robot.shape()),
         command(it.robot.shape()),
         parameters(initial_parameters(it.robot)),
-        devices(it.robot, state, command, parameters, time.period_ns),
-        limits(it.robot, time.period_ns),
+        devices(robot_of(it.robot), state, command, parameters, time.period_ns),
+        limits(robot_of(it.robot), time.period_ns),
         j(it.joint) {}
 
   /// One cycle. Codes are the caller's to look at: `read`, `limited`, `written`.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/trapezoid.hpp"
 #include "tests/hal/fake_backend.hpp"
 
@@ -51,7 +52,7 @@ class DevicesTest : public testing::Test {
   StateImage state{robot.shape()};
   CommandImage command{robot.shape()};
   ParameterImage parameters = initial_parameters(robot);
-  Devices devices{robot, state, command, parameters, 1'000'000};
+  Devices devices{robot_of(robot), state, command, parameters, 1'000'000};
 };
 
 TEST_F(DevicesTest, RefuseWhatIsNotFiniteOrBeyondALimitAndChangeNothing) {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::hal {
 

@@ -23,8 +23,8 @@ TEST(Lease, HasOneOwnerAtATime) {
   EXPECT_EQ(lease.given(), 2U);
 }
 
-TEST(Newest, GivesWhatWasPublishedLast) {
-  Newest<int> box(0);
+TEST(TripleBuffer, GivesWhatWasPublishedLast) {
+  TripleBuffer<int> box(0);
   EXPECT_FALSE(box.refresh());
   for (const int value : {1, 2, 3}) {
     box.back() = value;
@@ -80,11 +80,14 @@ class LinkChecks : public testing::Test {
     told_->take([this](const tandem_msgs::LinkServer& sample, const auto&) { run_ = sample.run; });
     return run_;
   }
-  void acquire(std::uint64_t client) {
+  void acquire(std::uint64_t client, std::uint32_t protocol = kLinkProtocol,
+               Action action = Action::kAcquire) {
     std::string name = "talker";
     tandem_msgs::LinkRequest sample{};
     sample.run = run_;
     sample.client = client;
+    sample.protocol = protocol;
+    sample.action = static_cast<std::uint8_t>(action);
     sample.name = name.data();
     requests_->write(sample);
   }
@@ -97,7 +100,7 @@ class LinkChecks : public testing::Test {
     out.cycle = served.cycle->progress().cycles.load() - 1;
     out.state_ns = out.sent_ns = now_ns();
     out.live = true;
-    out.stop = 3;
+    out.stop = static_cast<std::uint8_t>(hal::StopCategory::kWarn);
     out.command._buffer = reinterpret_cast<std::uint8_t*>(image_.bytes().data());
     out.command._length = out.command._maximum = static_cast<std::uint32_t>(image_.bytes().size());
     return out;
@@ -130,6 +133,14 @@ TEST_F(LinkChecks, ACommandOfItsOwnerIsTakenAndNobodyElses) {
   expect(Verdict::kNoLease, earlier);
 }
 
+TEST_F(LinkChecks, AClientOfAnotherVersionGetsNoLease) {
+  acquire(kClient, kLinkProtocol, Action::kRelease);
+  ASSERT_TRUE(eventually([this] { return served.server->lease().owner() == 0; }));
+  acquire(4712, kLinkProtocol + 1);
+  acquire(4713);
+  EXPECT_TRUE(eventually([this] { return served.server->lease().owner() == 4713; }));
+}
+
 /// Everything that the owner writes can be read by everybody in the domain, his number, too.
 TEST_F(LinkChecks, WhoKnowsTheOwnersNumberIsNotTheOwner) {
   expect(Verdict::kTaken, sample());
@@ -148,6 +159,7 @@ TEST_F(LinkChecks, WhoKnowsTheOwnersNumberIsNotTheOwner) {
   std::string text = "impostor";
   tandem_msgs::LinkRequest request{};
   request.run = run_;
+  request.protocol = kLinkProtocol;
   request.client = kClient;
   request.name = text.data();
   for (const Action action : {Action::kAcquire, Action::kRelease}) {

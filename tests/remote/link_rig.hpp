@@ -50,7 +50,7 @@ inline std::unique_ptr<dds::Participant> participant(const std::string& node) {
 }
 
 /// What a run was, cycle by cycle; the room for it is there before.
-class Record final : public hal::CycleTap {
+class Record final : public hal::CycleObserver {
  public:
   struct Cycle {
     RunPhase phase;
@@ -82,7 +82,7 @@ class Served {
  public:
   /// @param kept  participant to use; null: one of its own
   explicit Served(const ServerConfig& config, runtime::CycleConfig cycle_config = {},
-                  hal::CycleTap* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot(),
+                  hal::CycleObserver* tap = nullptr, hal::RobotConfig of = hal::test::fake_robot(),
                   dds::Participant* kept = nullptr)
       : robot(std::move(of)),
         backend(robot),
@@ -101,7 +101,7 @@ class Served {
                                                          .controllers = host,
                                                          .clock = clock,
                                                          .truth = &backend.truth,
-                                                         .tap = tap,
+                                                         .observer = tap,
                                                          .owner = {server.get(), owner.get(), 0}},
                                      cycle_config);
   }

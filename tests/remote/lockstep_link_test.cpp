@@ -23,7 +23,7 @@ void in_process(Record& record, std::uint32_t delay) {
                     .controllers = host,
                     .clock = clock,
                     .truth = &backend.truth,
-                    .tap = &record},
+                    .observer = &record},
                    {.running_cycles = kRunning, .settle_cycles = kSettling, .delay_cycles = delay});
   cycle.run();
   EXPECT_TRUE(cycle.faults().empty());

@@ -30,7 +30,8 @@ struct OddServer : testing::Test {
     ASSERT_TRUE(test::eventually([&] { return writer->endpoint().matched() > 0; }));
     ASSERT_TRUE(writer->write(sample));
   }
-  void show(hal::StateImage& state, hal::CommandImage& command, std::uint8_t reaction = 3) {
+  void show(hal::StateImage& state, hal::CommandImage& command,
+            hal::StopCategory reaction = hal::StopCategory::kWarn) {
     const auto bytes = [](auto& image) {
       const auto size = static_cast<std::uint32_t>(image.bytes().size());
       return dds_sequence_octet{size, size, reinterpret_cast<std::uint8_t*>(image.bytes().data()),
@@ -40,7 +41,7 @@ struct OddServer : testing::Test {
     sample.run = server->number();
     sample.cycle = ++cycle;
     sample.phase = static_cast<std::uint8_t>(hal::RunPhase::kRunning);
-    sample.reaction = reaction;
+    sample.reaction = static_cast<std::uint8_t>(reaction);
     sample.state = bytes(state);
     sample.command = bytes(command);
     std::vector<std::uint8_t> causes(robot.joints.size());
@@ -77,12 +78,39 @@ TEST_F(OddServer, ShowsNoNumbersAndIsNotFollowed) {
   EXPECT_EQ(next(seen), Code::kTimeout);
   show(good, odd_command);
   EXPECT_EQ(next(seen), Code::kTimeout);
-  show(good, command, 200);  // a stop category that there is not
+  show(good, command, static_cast<hal::StopCategory>(200));  // there is none
   EXPECT_EQ(next(seen), Code::kTimeout);
   good.position_rad()[1] = 0.25;
   show(good, command);
   ASSERT_TRUE(test::eventually([&] { return next(seen) == Code::kOk; }));
   EXPECT_EQ(seen.position_rad()[1], 0.25);
+}
+
+// Builds that number the stop categories in different ways had driven each other's robots.
+TEST(OtherVersions, AreRefusedAndToldWhichIsOlder) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  const auto at_robot = test::participant("robot"), at_owner = test::participant("owner");
+  const auto refusal = [&](std::uint32_t protocol) {
+    Identity identity = identity_of(robot, "hash", test::kPeriod_ns);
+    identity.protocol = protocol;
+    const auto server = Server::open(*at_robot, robot, identity, {});
+    EXPECT_TRUE(server);
+    const auto owner =
+        RemoteBackend::connect(*at_owner, robot, identity_of(robot, "hash", test::kPeriod_ns),
+                               {.name = "test", .server = (*server)->number()});
+    EXPECT_FALSE(owner.has_value());
+    EXPECT_EQ((*server)->lease().owner(), 0U);
+    return owner ? "" : owner.error().to_string();
+  };
+  const std::string here = std::to_string(kLinkProtocol);
+  EXPECT_EQ(refusal(kLinkProtocol - 1),
+            "the server is of an older version of Tandem: the link's protocol is " +
+                std::to_string(kLinkProtocol - 1) + " there, " + here +
+                " here (install the same version on both; the older one is the server's)");
+  EXPECT_EQ(refusal(kLinkProtocol + 1),
+            "the server is of a newer version of Tandem: the link's protocol is " +
+                std::to_string(kLinkProtocol + 1) + " there, " + here +
+                " here (install the same version on both; the older one is this one)");
 }
 
 // The owner's thread that renews its lease waited so long: never, or without an end.
@@ -91,6 +119,7 @@ TEST_F(OddServer, GivesItsLeaseForNoTime) {
     char name[] = "fake", other[] = "told";
     tandem_msgs::LinkServer sample{};
     sample.run = server->number();
+    sample.protocol = kLinkProtocol;
     sample.robot = name;
     sample.description_hash = sample.owner_name = name;
     sample.status = other;

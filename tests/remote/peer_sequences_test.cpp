@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <mutex>
 
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 #include "tests/remote/played.hpp"
 
 namespace tandem::remote {

@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 inline constexpr std::uint64_t kShutDown = 3;  // cycles
 
 /// Counts the cycles that have ended.
-class Watch final : public hal::CycleTap {
+class Watch final : public hal::CycleObserver {
  public:
   void take(const hal::CycleView& view) noexcept override {
     if (publisher) publisher->take(view);

@@ -27,7 +27,7 @@ double largest_step(std::span<const Record::Cycle> cycles) {
   return most;
 }
 
-TEST(TakeOver, OverTheLinkMakesNoStepEitherWay) {
+TEST(BumplessTransfer, OverTheLinkMakesNoStepEitherWay) {
   Record record(hal::test::fake_robot(), 60'000);
   ServerConfig config;
   config.max_age_cycles = 50'000;  // of a busy machine

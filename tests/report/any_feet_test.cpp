@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "controllers/stance.hpp"
+#include "hal/config/capabilities.hpp"
 #include "report/logged_torque.hpp"
 #include "report/run_figures.hpp"
 #include "tests/controllers/walker.hpp"
@@ -20,7 +21,8 @@ class AnyFeet : public testing::TestWithParam<int> {
   static constexpr std::size_t kRows = 41;
   explicit AnyFeet(int legs = GetParam()) : walker{"", legs, kLeg, {{0, 0, 0}}}, one(walker) {
     const tandem_kernels& kernels = *one.kernels.get();
-    const std::vector<Foot> feet = find_feet(one.robot, kernels, foot_names(one.robot)).value();
+    const std::vector<Foot> feet =
+        find_feet(hal::robot_of(one.robot), kernels, foot_names(hal::robot_of(one.robot))).value();
     stance.place(one.robot.postures[0].position_rad);
     EXPECT_TRUE(stance.solve(0.7, 50).converged);
     const std::vector<double> rest(kernels.nv);
@@ -72,7 +74,9 @@ class AnyFeet : public testing::TestWithParam<int> {
 
   test::Walker walker;
   test::WalkerRobot one;
-  Stance stance = Stance::make(one.robot, one.kernels.get(), foot_names(one.robot)).value();
+  Stance stance = Stance::make(hal::robot_of(one.robot), one.kernels.get(),
+                               foot_names(hal::robot_of(one.robot)))
+                      .value();
   RunData run;
   std::vector<Figure> figures;
 };

@@ -71,6 +71,28 @@ TEST_F(ControllerHostOfFake, ReportsParametersThatTheControllerDoesNotKnow) {
   EXPECT_EQ(document->diagnostics()[0].hint, "did you mean 'amplitude_rad'?");
 }
 
+/// Asks for one parameter and refuses the rest unread.
+class Refusing final : public Controller {
+ public:
+  Status configure(ControllerSetup& setup) override {
+    return fail("there is no joint '" + setup.parameters.text("joint") + "'");
+  }
+  void start(const hal::CycleTime&, const hal::StateImage&,
+             hal::CommandImage&) noexcept TANDEM_RT override {}
+  Code update(const hal::CycleTime&, const hal::StateImage&,
+              hal::CommandImage&) noexcept TANDEM_RT override {
+    return Code::kOk;
+  }
+};
+
+TEST_F(ControllerHostOfFake, FindsNoFaultWithParametersThatARefusingControllerDidNotGetTo) {
+  const auto document = TomlDocument::parse("joint = 'x'\nperiod_s = 2.0", "x.toml");
+  const Status added = host_.add("left", std::make_unique<Refusing>(), document->root());
+  ASSERT_FALSE(added);
+  EXPECT_EQ(added.error().message, "there is no joint 'x'");
+  EXPECT_TRUE(document->diagnostics().empty()) << document->diagnostics().front().to_string();
+}
+
 /// Joints 0 and 2 as they were, joint 1 as `writer` wrote it.
 class StrayWrites : public ControllerHostOfFake {
  protected:
@@ -186,7 +208,7 @@ TEST_F(ControllerHostOfFake, NamesTheControllerThatGaveUp) {
   last_->answer = Code::kNotFinite;
   host_.start({}, state_, command_);
   EXPECT_EQ(host_.update({}, state_, command_), Code::kNotFinite);
-  EXPECT_EQ(host_.name(host_.culprit()), "two");
+  EXPECT_EQ(host_.name(host_.failed_controller()), "two");
 }
 
 TEST_F(ControllerHostOfFake, HoldKeepsAPositionReferenceAndItsFeedForward) {

@@ -8,7 +8,7 @@
 
 #include "base/archive.hpp"
 #include "hal/backend.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/truth.hpp"
 
 namespace tandem::runtime::test {

@@ -35,7 +35,7 @@ TEST_F(Asking, StopsOfOneCycleAreConfirmedTogetherAndTheHardestIsTaken) {
   const std::uint32_t other = requests.emergency_stop(StopCategory::kCategory0);
   requests.end_run();
   requests.reset_faults();
-  const Requests::Asked asked = requests.take();
+  const Requests::Pending asked = requests.take();
   EXPECT_EQ(asked.emergency_stop, StopCategory::kCategory0);
   EXPECT_TRUE(asked.end);
   EXPECT_TRUE(asked.reset);

@@ -425,7 +425,7 @@ TEST(Requests, KeepTheHardestUntilTheyAreTaken) {
   requests.emergency_stop(StopCategory::kCategory1);
   requests.emergency_stop(StopCategory::kCategory0);
   requests.reset_faults();
-  const Requests::Asked asked = requests.take();
+  const Requests::Pending asked = requests.take();
   EXPECT_EQ(asked.emergency_stop, StopCategory::kCategory0);
   EXPECT_TRUE(asked.reset);
   EXPECT_FALSE(asked.end);

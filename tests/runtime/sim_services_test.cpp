@@ -59,7 +59,7 @@ TEST_F(SimServices, AJointThatCarriesAWeightChangesItsModeWithoutABump) {
   const double at_rest_Nm = torque_step(300);
   struct Step {
     const char* what;
-    JointWish wish;
+    JointRequest wish;
   };
   const Step steps[] = {{"to torque", {.mode = 3}},           {"to position", {.mode = 1}},
                         {"to compliant", {.interaction = 1}}, {"to stiff", {.interaction = 0}},

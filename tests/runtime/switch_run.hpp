@@ -45,12 +45,12 @@ struct SwitchRun {
   /// Into the motion.
   void run() { steps(100); }
   [[nodiscard]] RunServices& services() const { return cycle->services(); }
-  [[nodiscard]] Result<Asked> change(const Names& stop, const Names& start) const {
+  [[nodiscard]] Result<RequestResult> change(const Names& stop, const Names& start) const {
     return services().switch_controllers(stop, start, kNow);
   }
   [[nodiscard]] Names active() const {
     Names names;
-    for (const ControllerLook& one : services().controllers()) {
+    for (const ControllerStatus& one : services().controllers()) {
       if (one.active) names.push_back(one.name);
     }
     return names;

@@ -45,6 +45,7 @@ class Sine : public Controller {
     }
     return Code::kOk;
   }
+  bool can_retreat() const noexcept override { return retreats; }
   bool retreat(const hal::CycleTime&, const hal::StateImage&) noexcept override {
     if (retreats) ++retreating;
     return retreats;

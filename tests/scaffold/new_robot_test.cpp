@@ -203,6 +203,32 @@ TEST(NewRobot, TakesSpringsInProportionFromAnother) {
   }
 }
 
+/// COMAN's springs times 0.911 let iCub fall over in 3 s; with 1.5 times as stiff ones it stands.
+TEST(NewRobot, WarnsOfSpringsOnWhichItWouldFallOver) {
+  auto read = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  ASSERT_TRUE(read);
+  auto description = runtime::complete_robot(*read);
+  ASSERT_TRUE(description);
+  const auto firmness = [&](const PublicRobot& robot, double springs) {
+    Like like{*read, description->tree};
+    for (hal::ActuatorConfig& drive : like.config.actuators) drive.spring_Nm_rad *= springs;
+    const auto made = make_robot({.urdf = path_of(robot), .name = robot.name, .like = &like});
+    EXPECT_TRUE(made) << made.error().front().to_string();
+    std::string said;
+    for (const Error& warning : made->warnings) {
+      if (warning.message.contains("it falls over")) said += warning.to_string();
+    }
+    return said;
+  };
+  EXPECT_EQ(firmness(kPublicRobots[5], 1.0), "") << "COMAN on its own";
+  EXPECT_EQ(firmness(kPublicRobots[6], 1.0), "") << "WALK-MAN";
+  EXPECT_EQ(firmness(kPublicRobots[4], 1.0), "") << "simple_humanoid";
+  const std::string icub = firmness(kPublicRobots[7], 1.0);
+  EXPECT_NE(icub.find("Nm/rad, and the robot needs"), std::string::npos) << icub;
+  EXPECT_NE(icub.find("make [actuator.soft_leg] spring_Nm_rad"), std::string::npos) << icub;
+  EXPECT_EQ(firmness(kPublicRobots[7], 1.5), "");
+}
+
 /// Numbers come from the description, from an option, or are marked. Lists of texts, and the
 /// count in `base_height_m`'s own comment, are no numbers of ours.
 TEST_P(EveryPublicRobot, MarksEveryNumberThatIsNotTheDescriptionsAsAGuess) {

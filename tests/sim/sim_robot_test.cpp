@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "canopen/messages.hpp"
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 #include "tests/sim/swing_loop.hpp"
 
 namespace tandem::sim {

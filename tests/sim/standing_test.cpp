@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/support/rt_trap.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/archive.hpp"
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 #include "tests/sim/swing_robot.hpp"
 
 namespace tandem::test {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "tests/sim/hand_kernels.hpp"
 

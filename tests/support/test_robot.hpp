@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 #include "model/kernel_library.hpp"
 
 namespace tandem::test {

@@ -1,8 +1,7 @@
-#include "hal/capabilities.hpp"
+#include "hal/config/capabilities.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace tandem::hal {
 namespace {
@@ -11,18 +10,6 @@ bool any(const PidGains& gains) { return gains.kp != 0.0 || gains.ki != 0.0 || g
 
 std::uint8_t bit(Capability capability, bool set) {
   return set ? static_cast<std::uint8_t>(capability) : std::uint8_t{0};
-}
-
-Capability needed(ControlMode mode) noexcept TANDEM_RT {
-  switch (mode) {
-    case ControlMode::kVelocity: return Capability::kVelocity;
-    case ControlMode::kTorque: return Capability::kTorque;
-    case ControlMode::kOpenLoop: return Capability::kOpenLoop;
-    case ControlMode::kCurrent: return Capability::kCurrent;
-    case ControlMode::kIdle:
-    case ControlMode::kPosition: break;
-  }
-  return Capability::kPosition;
 }
 
 /// @param full  of the output over that of the input
@@ -38,6 +25,31 @@ std::array<PidGains, kPidLoops> most_gains(double torque, double voltage, double
 }
 
 }  // namespace
+
+Robot robot_of(const RobotConfig& config) {
+  Robot robot{
+      .name = config.name, .file = config.file, .floating_base = config.model.floating_base};
+  for (const JointConfig& joint : config.joints) {
+    robot.joints.push_back({capabilities_of(config, joint), joint.name});
+  }
+  for (const PassiveConfig& joint : config.passive) {
+    robot.passive.push_back({joint.name, joint.position_rad});
+  }
+  robot.loops = config.loop_specs();
+  for (const SensorConfig& sensor : config.sensors) {
+    robot.sensors.push_back({sensor.name, sensor.type, sensor.joint, sensor.link});
+  }
+  for (const SiteConfig& site : config.model.sites) {
+    robot.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench});
+  }
+  for (const FootConfig& foot : config.contact.feet) {
+    robot.feet.push_back({foot.site, foot.points_m});
+  }
+  for (const PostureConfig& posture : config.postures) {
+    robot.postures.push_back({posture.name, posture.base_height_m, posture.position_rad});
+  }
+  return robot;
+}
 
 JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint) {
   const ActuatorConfig& actuator = robot.actuator_of(joint);
@@ -71,40 +83,6 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
     out.max_damping_Nms_rad = std::max({critical, gains.position.gains.kd, gains.damping_Nms_rad});
   }
   return out;
-}
-
-const char* to_string(Capability capability) noexcept {
-  switch (capability) {
-    case Capability::kPosition: return "position";
-    case Capability::kVelocity: return "velocity";
-    case Capability::kTorque: return "torque";
-    case Capability::kCompliant: return "compliant";
-    case Capability::kOpenLoop: return "open_loop";
-    case Capability::kCurrent: return "current";
-  }
-  return "?";
-}
-
-bool JointCapabilities::can(ControlMode mode,
-                            InteractionMode interaction) const noexcept TANDEM_RT {
-  if (mode == ControlMode::kIdle) return true;
-  if (!can(needed(mode))) return false;
-  return interaction == InteractionMode::kStiff || can(Capability::kCompliant);
-}
-
-std::string gains_problem(const JointCapabilities& joint, PidLoop loop, const PidGains& gains) {
-  const PidGains& most = joint.most_gains[static_cast<std::size_t>(loop)];
-  const auto beyond = [](const char* what, double value, double limit) {
-    char text[96];
-    std::snprintf(text, sizeof text,
-                  "%s = %g is beyond %g, the most that the joint's limits can use", what, value,
-                  limit);
-    return std::string(text);
-  };
-  if (!(gains.kp <= most.kp)) return beyond("kp", gains.kp, most.kp);
-  if (!(gains.ki <= most.ki)) return beyond("ki", gains.ki, most.ki);
-  if (!(gains.kd <= most.kd)) return beyond("kd", gains.kd, most.kd);
-  return {};
 }
 
 std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot) {

@@ -1,9 +1,9 @@
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 #include <filesystem>
 #include <limits>
 
-#include "hal/robot_config_read.hpp"
+#include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {
@@ -218,6 +218,7 @@ void read_safety(TomlTable table, RobotConfig& robot) {
   robot.emergency_stop = stop == "category0"   ? StopCategory::kCategory0
                          : stop == "category2" ? StopCategory::kCategory2
                                                : StopCategory::kCategory1;
+  robot.emergency_stop_line = table.line("emergency_stop");
   table.finish();
 }
 

@@ -15,6 +15,7 @@
 
 #include "base/result.hpp"
 #include "hal/image.hpp"
+#include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
 #include "model/loop_spec.hpp"
 
@@ -143,7 +144,8 @@ struct JointConfig {
   double oscillation_time_s = 1.0;   ///< of that mean
   std::optional<BrakeConfig> brake = {};
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
-  int line = 0;                                      ///< in the TOML, for messages
+  int on_fault_line = 0;                             ///< in the TOML, for messages
+  int line = 0;                                      ///< the same
 };
 
 /// By how much a drive lets its torque reference change (6087): max_torque_rate_Nm_s, or without
@@ -195,12 +197,7 @@ struct BoardConfig {
   int line = 0;  ///< in the TOML, for messages
 };
 
-enum class SensorType : std::uint8_t { kForceTorque, kImu };
-
-/// [[sensor]]: a node of its own.
-/// force_torque channels: fx fy fz [N] tx ty tz [Nm].
-/// imu channels: qx qy qz qw (sensor to W), wx wy wz [rad/s], ax ay az [m/s^2] specific force,
-/// the last six in the sensor's frame.
+/// [[sensor]]: a node of its own. Its channels: channels_of().
 struct SensorConfig {
   std::string name;
   SensorType type = SensorType::kForceTorque;
@@ -212,7 +209,7 @@ struct SensorConfig {
   std::vector<double> bias;   ///< per channel; empty: none
   int line = 0;               ///< in the TOML, for messages
 
-  [[nodiscard]] std::size_t channels() const { return type == SensorType::kForceTorque ? 6 : 10; }
+  [[nodiscard]] std::size_t channels() const { return channels_of(type); }
 };
 
 /// [[contact.foot]]: points of a sole that may touch the ground.
@@ -259,7 +256,8 @@ struct RobotConfig {
   std::vector<SensorConfig> sensors;  ///< the process image's order
   ContactConfig contact;
   std::vector<PostureConfig> postures;
-  StopCategory emergency_stop = StopCategory::kCategory1;  ///< [safety]; 0 or 1
+  StopCategory emergency_stop = StopCategory::kCategory1;  ///< [safety]; 0, 1 or 2
+  int emergency_stop_line = 0;                             ///< in the TOML, for messages
 
   [[nodiscard]] ImageShape shape() const;
   /// Index in `joints`, or -1.

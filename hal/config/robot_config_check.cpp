@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "hal/capabilities.hpp"
-#include "hal/robot_config_read.hpp"
+#include "hal/config/capabilities.hpp"
+#include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {

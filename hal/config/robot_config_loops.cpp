@@ -1,7 +1,7 @@
 // [[passive]] and [[loop]]: joints without a motor, and what closes loops of the tree.
 #include <cmath>
 
-#include "hal/robot_config_read.hpp"
+#include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {

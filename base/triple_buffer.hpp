@@ -1,5 +1,5 @@
-// The newest of what one thread makes, for one other that takes it: what it does not take is lost.
-// Layer: hal/remote.  Thread: one writer, one reader, both wait-free.
+// A triple buffer: the newest value that one thread makes, for one other that takes it. What it
+// does not take is lost. Layer: base.  Thread: one writer, one reader, both wait-free.
 #pragma once
 
 #include <array>
@@ -8,13 +8,13 @@
 
 #include "base/realtime.hpp"
 
-namespace tandem::remote {
+namespace tandem {
 
 /// Three values: one is written, one is read, one waits.
 template <class T>
-class Newest {
+class TripleBuffer {
  public:
-  explicit Newest(const T& value) : slots_{value, value, value} {}
+  explicit TripleBuffer(const T& value) : slots_{value, value, value} {}
 
   /// The writer's: to be filled, then published.
   [[nodiscard]] T& back() noexcept { return slots_[back_]; }
@@ -40,4 +40,4 @@ class Newest {
   std::atomic<std::uint8_t> middle_{2};
 };
 
-}  // namespace tandem::remote
+}  // namespace tandem

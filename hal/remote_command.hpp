@@ -34,7 +34,7 @@ enum class OwnerLoss : std::uint8_t {
 };
 
 /// What the owner wants in a cycle. Pointers are good until the next exchange().
-struct OwnerWish {
+struct RemoteCommand {
   bool live = false;                  ///< `command` is to be followed
   bool done = false;                  ///< it gives the robot back, with `command` as its last
   bool ends_run = false;              ///< with `done`: nobody else is waited for
@@ -46,9 +46,9 @@ struct OwnerWish {
   const ParameterImage* gains = nullptr;  ///< null: as they were
 };
 
-class CommandPort {
+class RemoteCommandPort {
  public:
-  virtual ~CommandPort() = default;
+  virtual ~RemoteCommandPort() = default;
 
   /// In lockstep each cycle waits for the command that was computed from it: the loop calls send()
   /// and wait_until_ns() then, outside of its real-time part.
@@ -61,7 +61,7 @@ class CommandPort {
 
   /// Once per cycle: shows it when that was not done by send(), and takes the newest command.
   /// @rt wait-free
-  [[nodiscard]] virtual OwnerWish exchange(const PortView& view) noexcept TANDEM_RT = 0;
+  [[nodiscard]] virtual RemoteCommand exchange(const PortView& view) noexcept TANDEM_RT = 0;
 
   /// `ring` is called on another thread whenever wait_until_ns() may have another answer. An empty
   /// one ends that: it is not called any more afterwards.

@@ -14,18 +14,18 @@
 namespace tandem::runtime {
 
 /// In the cycle in which a joint changes hands its command is the last one again, and what the new
-/// owner writes differs from it by an offset. The offset goes to nothing within kTime, on a
+/// owner writes differs from it by an offset, which falls to zero within kTime on a
 /// minimum-jerk profile.
 ///
 /// - The same mode and interaction: the offsets of position, velocity, torque, stiffness, damping.
 /// - Another one: torque goes over from the measured torque, velocity from the measured velocity;
 ///   position starts at the measured one anyhow (CommandLimits).
 /// - A drive that was idle or is not enabled: none.
-class TakeOver {
+class BumplessTransfer {
  public:
   static constexpr std::int64_t kTime_ns = 100'000'000;
 
-  TakeOver(std::size_t joints, std::int64_t period_ns);
+  BumplessTransfer(std::size_t joints, std::int64_t period_ns);
 
   /// `joint` changes hands in this cycle; `command` is still what was sent last, and then what the
   /// owner until now wrote.

@@ -1,4 +1,4 @@
-// What each joint can do and how far: read off the robot's configuration, once.
+// What a joint can do and how far: plain data.
 // Layer: hal.  Thread: non-RT to make; immutable afterwards.
 #pragma once
 
@@ -6,12 +6,9 @@
 #include <cstdint>
 #include <limits>
 #include <string>
-#include <vector>
 
 #include "base/realtime.hpp"
-#include "base/result.hpp"
 #include "hal/image.hpp"
-#include "hal/robot_config.hpp"
 
 namespace tandem::hal {
 
@@ -65,22 +62,8 @@ struct JointCapabilities {
   [[nodiscard]] bool can(ControlMode mode, InteractionMode interaction) const noexcept TANDEM_RT;
 };
 
-/// @pre  the joint's limits are known
-[[nodiscard]] JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& joint);
-
-/// Of every joint, in the image's order.
-[[nodiscard]] std::vector<JointCapabilities> joint_capabilities(const RobotConfig& robot);
-
 /// "" or what is wrong with gains of `loop`: "kp = 1e+30 is beyond …, all that … can use".
 [[nodiscard]] std::string gains_problem(const JointCapabilities& joint, PidLoop loop,
                                         const PidGains& gains);
-
-/// Whether a joint can be put into a mode; asked for every claim at configuration.
-/// @return an Error that names the joint, the mode and the gains table that lacks a loop.
-[[nodiscard]] Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode mode,
-                                      InteractionMode interaction = InteractionMode::kStiff);
-
-/// The gains that bring-up gives the drives, as the parameters at revision 0.
-[[nodiscard]] ParameterImage initial_parameters(const RobotConfig& robot);
 
 }  // namespace tandem::hal

@@ -1,4 +1,4 @@
-#include "runtime/take_over.hpp"
+#include "runtime/bumpless_transfer.hpp"
 
 #include <algorithm>
 
@@ -21,18 +21,18 @@ bool follows_a_motion(std::int8_t mode) noexcept TANDEM_RT {
 
 }  // namespace
 
-TakeOver::TakeOver(std::size_t joints, std::int64_t period_ns)
+BumplessTransfer::BumplessTransfer(std::size_t joints, std::int64_t period_ns)
     : cycles_(std::max<std::int64_t>(1, kTime_ns / period_ns)), joints_(joints) {}
 
-TakeOver::References TakeOver::read(const hal::CommandImage& command,
-                                    std::size_t joint) noexcept TANDEM_RT {
+BumplessTransfer::References BumplessTransfer::read(const hal::CommandImage& command,
+                                                    std::size_t joint) noexcept TANDEM_RT {
   return {command.position_rad()[joint], command.velocity_rad_s()[joint],
           command.torque_Nm()[joint], command.stiffness_Nm_rad()[joint],
           command.damping_Nms_rad()[joint]};
 }
 
-void TakeOver::write(hal::CommandImage& command, std::size_t joint,
-                     const References& values) noexcept TANDEM_RT {
+void BumplessTransfer::write(hal::CommandImage& command, std::size_t joint,
+                             const References& values) noexcept TANDEM_RT {
   command.position_rad()[joint] = values[kPosition];
   command.velocity_rad_s()[joint] = values[kVelocity];
   command.torque_Nm()[joint] = values[kTorque];
@@ -40,8 +40,8 @@ void TakeOver::write(hal::CommandImage& command, std::size_t joint,
   command.damping_Nms_rad()[joint] = values[kDamping];
 }
 
-void TakeOver::begin(std::size_t joint, const hal::StateImage& state,
-                     hal::CommandImage& command) noexcept TANDEM_RT {
+void BumplessTransfer::begin(std::size_t joint, const hal::StateImage& state,
+                             hal::CommandImage& command) noexcept TANDEM_RT {
   Joint& of = joints_[joint];
   of.offset = read(command, joint);
   if (of.left == 0) ++going_;
@@ -56,15 +56,15 @@ void TakeOver::begin(std::size_t joint, const hal::StateImage& state,
           : 0;
 }
 
-void TakeOver::before_update(hal::CommandImage& command) const noexcept TANDEM_RT {
+void BumplessTransfer::before_update(hal::CommandImage& command) const noexcept TANDEM_RT {
   if (going_ == 0) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     if (joints_[j].left > 0 && joints_[j].known != 0) write(command, j, joints_[j].written);
   }
 }
 
-void TakeOver::find_offset(Joint& joint, std::size_t index, const hal::StateImage& state,
-                           const hal::CommandImage& command) const noexcept TANDEM_RT {
+void BumplessTransfer::find_offset(Joint& joint, std::size_t index, const hal::StateImage& state,
+                                   const hal::CommandImage& command) const noexcept TANDEM_RT {
   const std::int8_t mode = command.mode()[index];
   const References last = joint.offset;
   joint.offset = {};
@@ -80,8 +80,8 @@ void TakeOver::find_offset(Joint& joint, std::size_t index, const hal::StateImag
   }
 }
 
-void TakeOver::after_update(const hal::StateImage& state,
-                            hal::CommandImage& command) noexcept TANDEM_RT {
+void BumplessTransfer::after_update(const hal::StateImage& state,
+                                    hal::CommandImage& command) noexcept TANDEM_RT {
   if (going_ == 0) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Joint& joint = joints_[j];
@@ -98,7 +98,7 @@ void TakeOver::after_update(const hal::StateImage& state,
   }
 }
 
-void TakeOver::clear() noexcept TANDEM_RT {
+void BumplessTransfer::clear() noexcept TANDEM_RT {
   for (Joint& joint : joints_) joint.left = 0;
   going_ = 0;
 }

@@ -34,9 +34,9 @@ struct CycleView {
   CycleTimes times;
 };
 
-class CycleTap {
+class CycleObserver {
  public:
-  virtual ~CycleTap() = default;
+  virtual ~CycleObserver() = default;
   /// The last step of every cycle.
   /// @rt wait-free: copies what it needs into a ring, and counts what does not fit.
   virtual void take(const CycleView& view) noexcept TANDEM_RT = 0;

@@ -15,7 +15,7 @@
 #include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "base/toml_reader.hpp"
-#include "hal/robot_config.hpp"
+#include "hal/config/robot_config.hpp"
 
 namespace tandem::hal {
 

@@ -1,4 +1,4 @@
-#include "hal/robot_config_read.hpp"
+#include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {

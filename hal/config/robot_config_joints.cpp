@@ -1,6 +1,6 @@
 #include <limits>
 
-#include "hal/robot_config_read.hpp"
+#include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {
@@ -65,6 +65,7 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
       table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
   joint.brake = read_brake(table);
   joint.on_fault = read_stop_category(table);
+  joint.on_fault_line = table.line("on_fault");
   return joint;
 }
 

@@ -1,0 +1,36 @@
+// Other programs: found, started, waited for.
+// Layer: base.  Thread: non-RT.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+
+namespace tandem {
+
+/// Whether `program` is an executable file, or the name of one in $PATH.
+[[nodiscard]] bool program_exists(const std::string& program);
+
+/// What a program is started with.
+struct Spawn {
+  std::vector<std::string> command;  ///< the program, looked for in $PATH, and its arguments
+  std::string output;                ///< file for standard output and standard error
+  std::string directory = ".";       ///< that it works in
+  int input = -1;                    ///< descriptor of its standard input; -1: it is empty
+  bool own_group = false;            ///< a process group of its own, whose number is the child's
+};
+
+/// Starts it. No shell is between: a word of `command` is a word of the program's.
+/// Errors: the program cannot be started.
+[[nodiscard]] Result<pid_t> spawn(const Spawn& what);
+
+/// Waits until it has ended.
+/// @return its exit status; 128 + signal when a signal ended it; -1: it is no child of ours
+[[nodiscard]] int wait_for(pid_t child);
+/// The same of what waitpid() answered.
+[[nodiscard]] int exit_status(int raw) noexcept;
+
+}  // namespace tandem

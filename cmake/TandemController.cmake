@@ -1,0 +1,23 @@
+# tandem_add_controller(NAME SOURCES … LINKS … [FOLDER dir]): the plugin NAME.so, found by its name
+# in lib/controllers of the project's build folder (or dir). For this project's own controllers, and
+# by find_package(tandem) for everybody's.
+function(tandem_add_controller name)
+  cmake_parse_arguments(PLUGIN "" "FOLDER" "SOURCES;LINKS" ${ARGN})
+  if(NOT PLUGIN_FOLDER)
+    set(PLUGIN_FOLDER ${PROJECT_BINARY_DIR}/lib/controllers)
+  endif()
+  add_library(controller_${name} MODULE ${PLUGIN_SOURCES})
+  target_link_libraries(controller_${name} PRIVATE tandem::plugin ${PLUGIN_LINKS})
+  if(TARGET tandem_pch)
+    target_precompile_headers(controller_${name} REUSE_FROM tandem_pch)
+  endif()
+  # Nothing undefined that the loader would find missing, nothing exported but the entry point.
+  # (A sanitizer's symbols stay undefined until then: they are in the executable.)
+  target_link_options(controller_${name} PRIVATE -Wl,--exclude-libs,ALL)
+  if(NOT TANDEM_SANITIZE)
+    target_link_options(controller_${name} PRIVATE -Wl,--no-undefined)
+  endif()
+  set_target_properties(controller_${name} PROPERTIES PREFIX "" OUTPUT_NAME ${name}
+    CXX_VISIBILITY_PRESET hidden LIBRARY_OUTPUT_DIRECTORY ${PLUGIN_FOLDER}
+    POSITION_INDEPENDENT_CODE ON)
+endfunction()

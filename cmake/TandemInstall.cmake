@@ -1,0 +1,60 @@
+# What `cmake --install` lays down: the program, its controllers and robots with the kernels that
+# are built, and what it takes to build a controller elsewhere.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# All that a plugin may see: controllers/controller.hpp and what it includes. The loader refuses a
+# plugin of another version of them (kControllerInterface).
+set(TANDEM_PLUGIN_HEADERS
+  base/archive.hpp
+  base/realtime.hpp
+  base/result.hpp
+  base/toml_reader.hpp
+  controllers/controller.hpp
+  hal/command_fields.inc
+  hal/cycle_time.hpp
+  hal/image.hpp
+  hal/joint_capabilities.hpp
+  hal/robot.hpp
+  hal/state_fields.inc
+  model/kernels.h
+  model/loop_spec.hpp)
+
+# tandem_install(): to be called when every target is there. The program looks for its parts beside
+# itself, in ../lib and ../share, whatever a system calls its folders.
+function(tandem_install)
+  install(TARGETS tandem RUNTIME DESTINATION bin)
+  foreach(name IN LISTS TANDEM_BUNDLED_CONTROLLERS)
+    install(TARGETS controller_${name} DESTINATION lib/tandem/controllers)
+  endforeach()
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/lib/models/ DESTINATION lib/tandem/models
+    FILES_MATCHING PATTERN "*_kernels.so")
+  install(DIRECTORY config/ DESTINATION share/tandem/config
+    PATTERN CMakeLists.txt EXCLUDE)
+  install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs)
+  # The example's robot lies elsewhere then.
+  set(example examples/03_controller)
+  file(READ ${example}/sway.toml experiment)
+  string(REPLACE "../../config" "../../../../tandem/config" experiment "${experiment}")
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/installed/sway.toml CONTENT "${experiment}" @ONLY)
+  install(FILES ${example}/CMakeLists.txt ${example}/sway.cpp
+    ${PROJECT_BINARY_DIR}/installed/sway.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/${example})
+
+  foreach(header IN LISTS TANDEM_PLUGIN_HEADERS)
+    cmake_path(GET header PARENT_PATH folder)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem/${folder})
+  endforeach()
+  install(TARGETS tandem_options tandem_base tandem_hal EXPORT tandem
+    ARCHIVE DESTINATION lib/tandem
+    INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem)
+  set(package lib/cmake/tandem)
+  install(EXPORT tandem NAMESPACE tandem:: FILE tandemTargets.cmake DESTINATION ${package})
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
+    ${PROJECT_BINARY_DIR}/tandemConfig.cmake INSTALL_DESTINATION ${package})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/tandemConfigVersion.cmake
+    COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/tandemConfig.cmake
+    ${PROJECT_BINARY_DIR}/tandemConfigVersion.cmake cmake/TandemController.cmake
+    DESTINATION ${package})
+endfunction()

@@ -1,0 +1,48 @@
+# Installs into WORK, builds example 03 against that, as it is installed and as a copy in a folder with
+# a blank, and lets the installed program run both on an installed robot.
+# -DBUILD=… -DWORK=… -DCOMPILER=…
+file(REMOVE_RECURSE ${WORK})
+set(prefix ${WORK}/prefix)
+set(strange "${WORK}/a strange folder")
+execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix}
+  OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+
+# All headers that it lays down, and what the one for plugins includes.
+file(GLOB_RECURSE installed RELATIVE ${prefix}/include/tandem ${prefix}/include/*)
+set(wanted controllers/controller.hpp)
+foreach(header IN LISTS installed)
+  file(STRINGS ${prefix}/include/tandem/${header} lines REGEX "#include \"")
+  foreach(line IN LISTS lines)
+    string(REGEX REPLACE ".*\"(.*)\".*" "\\1" included "${line}")
+    list(APPEND wanted ${included})
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES wanted)
+list(SORT wanted)
+list(SORT installed)
+if(NOT wanted STREQUAL installed)
+  message(FATAL_ERROR "installed headers: ${installed}\nthat a plugin includes: ${wanted}")
+endif()
+
+function(build from to)
+  execute_process(COMMAND ${CMAKE_COMMAND} -S ${from} -B ${to} -DCMAKE_PREFIX_PATH=${prefix}
+    -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Release OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND ${CMAKE_COMMAND} --build ${to} OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+set(example ${prefix}/share/doc/tandem/examples/03_controller)
+build(${example} ${WORK}/in_place)
+set(ENV{TANDEM_CONTROLLERS} ${WORK}/in_place/lib/controllers)
+execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet ${example}/sway.toml
+  COMMAND_ERROR_IS_FATAL ANY)
+
+file(COPY ${example}/ DESTINATION ${strange})
+build(${strange} ${strange}/build)
+
+file(READ ${strange}/sway.toml experiment)
+string(REPLACE "../../../../tandem/config" "${prefix}/share/tandem/config" experiment "${experiment}")
+file(WRITE ${strange}/sway.toml "${experiment}")
+set(ENV{TANDEM_CONTROLLERS} ${strange}/build/lib/controllers)
+execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 sway.toml
+  WORKING_DIRECTORY ${strange} COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${prefix}/bin/tandem check ${prefix}/share/tandem/config/double_pendulum/hold.toml
+  COMMAND_ERROR_IS_FATAL ANY)

@@ -1,0 +1,116 @@
+#include "log/robot_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "log/cdr_writer.hpp"
+#include "log/schema.hpp"
+
+namespace tandem::log {
+namespace {
+
+struct Definition {
+  std::string_view name;
+  std::string_view text;
+};
+
+// Each with the texts of all messages in it; log/CMakeLists.txt says which.
+constexpr Definition kDefinitions[] = {
+#include <view_definitions.inc>
+};
+
+constexpr char kWorld[] = "odom";  // as over DDS
+
+std::uint16_t add(McapWriter& writer, const char* topic, std::string_view type) {
+  const auto* found = std::ranges::find(kDefinitions, type, &Definition::name);
+  return writer.add_channel(writer.add_schema(found->name, "ros2msg", found->text), topic, "cdr");
+}
+
+/// std_msgs/Header
+void write_header(CdrWriter& out, std::int64_t time_ns, std::string_view frame) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  out.number(static_cast<std::uint32_t>(time_ns / kSecond_ns));
+  out.number(static_cast<std::uint32_t>(time_ns % kSecond_ns));
+  out.text(frame);
+}
+
+void read_field(const hal::Layout& layout, std::string_view name, std::span<const std::byte> body,
+                std::vector<double>& out) {
+  const hal::Field& field = *layout.find(name);
+  out.clear();
+  for (std::size_t i = 0; i < field.count; ++i) out.push_back(element(field, body, i));
+}
+
+}  // namespace
+
+RobotView::RobotView(ViewedRobot robot, std::vector<std::string> joints)
+    : robot_(std::move(robot)), joints_(std::move(joints)) {}
+
+void RobotView::take_channel(std::uint16_t channel, std::string_view topic,
+                             const hal::Layout& layout) {
+  if (robot_.urdf.empty()) return;
+  if (topic == "/tandem/state") {
+    state_.channel = channel;
+    state_layout_ = layout;
+  } else if (topic == "/tandem/truth" && !robot_.base_link.empty()) {
+    truth_.channel = channel;
+    truth_layout_ = layout;
+  }
+}
+
+void RobotView::add_channels(McapWriter& writer) {
+  if (state_.channel >= 0) {
+    joint_states_ = add(writer, "/joint_states", "sensor_msgs/msg/JointState");
+    description_ = add(writer, "/robot_description", "std_msgs/msg/String");
+  }
+  if (truth_.channel >= 0) tf_ = add(writer, "/tf", "tf2_msgs/msg/TFMessage");
+}
+
+bool RobotView::Source::due(std::uint16_t of, std::int64_t time_ns) {
+  if (of != channel) return false;
+  const std::int64_t period = time_ns / kPeriod_ns;
+  return std::exchange(last_period, period) != period;
+}
+
+void RobotView::follow(std::uint16_t channel, std::int64_t time_ns,
+                       std::span<const std::byte> image,
+                       const std::function<void(std::uint16_t, std::span<const std::byte>)>& emit) {
+  if (state_.due(channel, time_ns)) {
+    if (!std::exchange(described_, true)) {
+      CdrWriter(body_).text(robot_.urdf);
+      emit(description_, body_);
+    }
+    write_joint_states(time_ns, image);
+    emit(joint_states_, body_);
+  }
+  if (truth_.due(channel, time_ns) && write_base(time_ns, image)) emit(tf_, body_);
+}
+
+void RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::byte> state) {
+  CdrWriter out(body_);
+  write_header(out, time_ns, "");
+  out.number(static_cast<std::uint32_t>(joints_.size()));
+  for (const std::string& joint : joints_) out.text(joint);
+  for (const char* field : {"position_rad", "velocity_rad_s", "torque_nm"}) {
+    read_field(state_layout_, field, state, values_);
+    out.list(values_);
+  }
+}
+
+bool RobotView::write_base(std::int64_t time_ns, std::span<const std::byte> truth) {
+  CdrWriter out(body_);
+  out.number(std::uint32_t{1});  // of the list of transforms
+  write_header(out, time_ns, kWorld);
+  out.text(robot_.base_link);
+  for (const char* field : {"base_position_m", "base_quaternion"}) {
+    read_field(truth_layout_, field, truth, values_);
+    if (!std::ranges::all_of(values_, [](double value) { return std::isfinite(value); })) {
+      return false;
+    }
+    for (const double value : values_) out.number(value);
+  }
+  return true;
+}
+
+}  // namespace tandem::log

@@ -1,0 +1,66 @@
+// What a ROS viewer needs to show the robot of a log: its description, the state of its joints and
+// where its base is. Made from the images that the log has anyway.
+// Layer: log.  Thread: set up non-RT; follow() the recorder's.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "hal/image.hpp"
+#include "log/bytes.hpp"
+#include "log/mcap_writer.hpp"
+
+namespace tandem::log {
+
+/// The robot, as viewers want to know it.
+struct ViewedRobot {
+  std::string urdf{};       ///< the description's text; empty: the log has nothing for viewers
+  std::string base_link{};  ///< of a floating base: the root link; empty: the base does not move
+};
+
+/// Topics /joint_states, /tf and /robot_description, of the types that ROS 2 has for them.
+class RobotView {
+ public:
+  /// Simulated time from one message of a topic to the next: 50 Hz. A cycle that takes longer has
+  /// one each.
+  static constexpr std::int64_t kPeriod_ns = 20'000'000;
+
+  RobotView() = default;  ///< of no robot: no topics
+  /// @param joints  names in the images' order
+  RobotView(ViewedRobot robot, std::vector<std::string> joints);
+
+  /// A channel of the log: it looks for /tandem/state and /tandem/truth.
+  void take_channel(std::uint16_t channel, std::string_view topic, const hal::Layout& layout);
+  /// Once all channels are known: makes those that it can fill.
+  void add_channels(McapWriter& writer);
+
+  /// Calls `emit` for each message that comes with an image: the first one of every 20 ms has
+  /// some. The description comes with the first state.
+  void follow(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> image,
+              const std::function<void(std::uint16_t, std::span<const std::byte>)>& emit);
+
+ private:
+  /// A source's image: whose channel, and when a message was last made from it.
+  struct Source {
+    int channel = -1;
+    std::int64_t last_period = std::numeric_limits<std::int64_t>::min();
+    [[nodiscard]] bool due(std::uint16_t of, std::int64_t time_ns);
+  };
+  void write_joint_states(std::int64_t time_ns, std::span<const std::byte> state);
+  /// @return false: the base's place is no number
+  [[nodiscard]] bool write_base(std::int64_t time_ns, std::span<const std::byte> truth);
+
+  ViewedRobot robot_;
+  std::vector<std::string> joints_;
+  Source state_, truth_;
+  hal::Layout state_layout_, truth_layout_;
+  std::uint16_t joint_states_ = 0, tf_ = 0, description_ = 0;  // channels
+  bool described_ = false;
+  Bytes body_;                  // reused
+  std::vector<double> values_;  // reused
+};
+
+}  // namespace tandem::log

@@ -1,0 +1,109 @@
+// What a reset is answered while the robot retreats, and when a fault follows it at once: the
+// commands of a run, its socket and `tandem fault reset`, over a robot of first order.
+#include <unistd.h>
+
+#include <memory>
+#include <string>
+
+#include "apps/commands.hpp"
+#include "apps/control_socket.hpp"
+#include "apps/run_control.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using runtime::RunPhase;
+
+/// A run whose cycles a test makes itself, and whose controller can retreat.
+struct AnsweredRun : ::testing::Test {
+  void SetUp() override {
+    auto sine = std::make_unique<runtime::test::Sine>(std::vector<std::size_t>{0});
+    controller = sine.get();
+    controller->retreats = true;
+    ASSERT_TRUE(host.add("able", std::move(sine), runtime::test::parameters()));
+    cycle = std::make_unique<runtime::RobotCycle>(
+        runtime::CycleParts{robot, backend, host, clock},
+        runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait, .retreat_cycles = 200});
+    steps(100);
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+    add_run_commands(registry, *cycle, robot);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+  }
+
+  hal::RobotConfig robot = hal::test::fake_robot();
+  runtime::test::FirstOrderRobot backend{robot};
+  runtime::ControllerHost host{robot, nullptr, 1'000'000};
+  rt::WallClock clock;
+  runtime::test::Sine* controller = nullptr;
+  std::unique_ptr<runtime::RobotCycle> cycle;
+  ControlRegistry registry;
+  std::string out, err;  // of the last command
+};
+
+TEST_F(AnsweredRun, RefusesAResetAtOnceWhileTheRobotRetreats) {
+  (void)cycle->requests().emergency_stop(hal::StopCategory::kCategory2);
+  steps(1);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRetreating);
+  const Json refused = registry.answer(R"({"do": "fault.reset"})");
+  EXPECT_EQ(refused["ok"], false) << refused;
+  EXPECT_EQ(refused.value("error", ""), "the robot is on its way to a safe posture");
+  EXPECT_EQ(refused.value("hint", ""), "reset it when that is over");
+  EXPECT_FALSE(cycle->requests().pending()) << "nothing was asked of the loop";
+  controller->answer = Code::kStopped;  // it is there
+  steps(1);
+  ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(registry.answer(R"({"do": "fault.reset"})")["ok"], true);
+  steps(20);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+}
+
+/// The run goes on only when `tandem fault reset` looks for its answer: the joint that was enabled
+/// trips before that.
+TEST_F(AnsweredRun, EndsAResetThatAFaultFollowsAtOnceWithStatus1) {
+  backend.latch_on_fault = true;
+  const auto reset = [this](bool trips) {
+    (void)cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+    steps(1);
+    EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+    ControlRegistry served;
+    served.add("fault.reset", ControlEffect::kChanges, "as the run's", {},
+               [this](const Json&) -> Result<Json> {
+                 return registry.answer(R"({"do": "fault.reset"})");
+               });
+    served.add("fault.show", ControlEffect::kReads, "as the run's, some cycles later", {},
+               [this, trips](const Json&) -> Result<Json> {
+                 steps(20);
+                 if (trips) backend.faulted_joint = 1;
+                 steps(1);
+                 return registry.answer(R"({"do": "fault.show"})");
+               });
+    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-reset.sock";
+    const auto socket = ControlSocket::open(path, served);
+    EXPECT_TRUE(socket) << socket.error().to_string();
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    const Exit status = fault_command({.action = FaultOptions::Action::kReset,
+                                       .target = {.socket = path, .place = {}},
+                                       .json = {}});
+    out = ::testing::internal::GetCapturedStdout();
+    err = ::testing::internal::GetCapturedStderr();
+    return status;
+  };
+  EXPECT_EQ(reset(false), Exit::kDone) << err;
+  EXPECT_EQ(err, "");
+  EXPECT_EQ(reset(true), Exit::kFault);
+  EXPECT_NE(out.find("reset: every joint is enabled where it is"), std::string::npos) << out;
+  EXPECT_NE(err.find("error: the reset succeeded, and a fault followed at once (elbow: "),
+            std::string::npos)
+      << err;
+}
+
+}  // namespace
+}  // namespace tandem::apps

@@ -1,0 +1,119 @@
+// The topics for ROS viewers, by literal bytes and by their rate. tests/apps/log_decoded_test.cpp
+// has another project decode them.
+#include "log/robot_view.hpp"
+
+#include "hal/truth.hpp"
+#include "log/log_file.hpp"
+#include "log/recorder.hpp"
+#include "tests/log/scratch_folder.hpp"
+
+namespace tandem::log {
+namespace {
+
+constexpr std::int64_t kCycle_ns = 3'000'000;
+
+struct Counts {
+  std::uint64_t joint_states = 0, tf = 0, descriptions = 0;
+  bool operator==(const Counts&) const = default;
+};
+
+/// A log of two joints on a base, `cycles` long.
+struct View {
+  explicit View(ViewedRobot robot, bool has_truth = true, std::uint64_t cycles = 100) {
+    auto recorder =
+        Recorder::open(path, {.robot = "two", .joints = {"hip", "knee"}, .period_ns = kCycle_ns},
+                       {.viewed = std::move(robot)});
+    EXPECT_TRUE(recorder);
+    const auto state_channel =
+        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+    const auto truth_channel =
+        has_truth ? (*recorder)->add_channel("/tandem/truth", "tandem/msg/Truth", truth.layout())
+                  : state_channel;
+    (*recorder)->start();
+    for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
+      const auto time_ns = static_cast<std::int64_t>(cycle) * kCycle_ns;
+      state.position_rad()[0] = truth.base_position_m()[2] = static_cast<double>(cycle);
+      (*recorder)->wait_for_space(2);
+      (*recorder)->push(state_channel, time_ns, state.bytes());
+      if (has_truth) (*recorder)->push(truth_channel, time_ns, truth.bytes());
+    }
+    messages = (*recorder)->close().messages;
+    auto opened = LogFile::open(path);
+    EXPECT_TRUE(opened) << opened.error().to_string();
+    log = std::move(*opened);
+  }
+
+  [[nodiscard]] Counts counts() const {
+    const auto of = [this](const char* topic) {
+      const Topic* found = log.find(topic);
+      return found == nullptr ? 0 : found->messages;
+    };
+    return {of("/joint_states"), of("/tf"), of("/robot_description")};
+  }
+  [[nodiscard]] std::vector<std::pair<std::int64_t, std::string>> of(const char* topic) const {
+    std::vector<std::pair<std::int64_t, std::string>> all;
+    EXPECT_TRUE(log.for_each(topic, [&](std::int64_t time_ns, std::span<const std::byte> body) {
+      all.emplace_back(time_ns,
+                       std::string(reinterpret_cast<const char*>(body.data()), body.size()));
+    }));
+    return all;
+  }
+
+  const ScratchFolder folder;
+  const std::string path = folder / "view.mcap";
+  hal::StateImage state{{.joints = 2, .sensor_channels = {}}};
+  hal::TruthImage truth{2, 0};
+  LogFile log;
+  std::uint64_t messages = 0;
+};
+
+TEST(RobotView, WritesJointStatesFiftyTimesASecondAndTheDescriptionOnce) {
+  const View view({.urdf = "<robot/>", .base_link = "pelvis"});
+  EXPECT_EQ(view.counts(), (Counts{15, 15, 1})) << "of 0.3 s";
+  EXPECT_EQ(view.messages, 100u + 100u + 31u);
+  std::int64_t period = -1;
+  for (const auto& [time_ns, body] : view.of("/joint_states")) {
+    EXPECT_EQ(time_ns / RobotView::kPeriod_ns, ++period);
+    EXPECT_LT(time_ns % RobotView::kPeriod_ns, kCycle_ns) << "not the first cycle of its 20 ms";
+  }
+  const auto description = view.of("/robot_description");
+  EXPECT_EQ(description[0], std::pair(std::int64_t{0}, std::string("\x09\0\0\0<robot/>\0", 13)));
+}
+
+TEST(RobotView, EncodesAJointStateAsCdrHasIt) {
+  const View view({.urdf = "<robot/>"});
+  const auto [time_ns, body] = view.of("/joint_states")[1];
+  EXPECT_EQ(time_ns, 21'000'000) << "cycle 7, the first one behind 20 ms";
+  const std::string zero(8, '\0');
+  const std::string two("\x02\0\0\0\0\0\0\0", 8);                   // elements; padding to 8
+  std::string expected("\0\0\0\0\x40\x6f\x40\x01", 8);              // stamp: 0 s, 21,000,000 ns
+  expected += std::string("\x01\0\0\0\0\0\0\0", 8);                 // ""; padding to 4
+  expected += std::string("\x02\0\0\0\x04\0\0\0hip\0", 12);         // two names
+  expected += std::string("\x05\0\0\0knee\0\0\0\0", 12);            // and padding to 4
+  expected += two + std::string("\0\0\0\0\0\0\x1c\x40", 8) + zero;  // positions 7, 0
+  expected += two + zero + zero;                                    // velocities
+  expected += two + zero + zero;                                    // torques
+  EXPECT_EQ(body, expected);
+}
+
+TEST(RobotView, LeavesOutWhatNobodyKnows) {
+  EXPECT_EQ(View({.urdf = "<robot/>"}).counts(), (Counts{15, 0, 1})) << "a fixed base";
+  EXPECT_EQ(View({.urdf = "<robot/>", .base_link = "pelvis"}, false).counts(), (Counts{15, 0, 1}))
+      << "no truth";
+  EXPECT_EQ(View({}).counts(), (Counts{0, 0, 0})) << "no description";
+}
+
+TEST(RobotView, LeavesOutABaseWhosePlaceIsNoNumber) {
+  hal::TruthImage truth(2, 0);
+  truth.base_quaternion()[3] = std::numeric_limits<double>::quiet_NaN();
+  RobotView view({.urdf = "<robot/>", .base_link = "pelvis"}, {"hip", "knee"});
+  view.take_channel(3, "/tandem/truth", truth.layout());
+  view.follow(3, 0, truth.bytes(), [](auto, auto) { ADD_FAILURE() << "a message"; });
+  truth.base_quaternion()[3] = 1.0;
+  int messages = 0;
+  view.follow(3, 20'000'000, truth.bytes(), [&](auto, auto) { ++messages; });
+  EXPECT_EQ(messages, 1);
+}
+
+}  // namespace
+}  // namespace tandem::log
