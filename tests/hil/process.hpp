@@ -74,8 +74,9 @@ class Process {
   }
   [[nodiscard]] std::string output() const { return text_of(output_); }
   /// Waits until `words` stand in the output. @return false when the process ended without them,
-  /// or they did not come in `patience_s`.
-  [[nodiscard]] bool says(const std::string& words, std::int64_t patience_s = 10) const {
+  /// or they did not come in `patience_s`: a slow machine takes 10 s to start a program in
+  /// User-Mode Linux.
+  [[nodiscard]] bool says(const std::string& words, std::int64_t patience_s = 60) const {
     bool said = false;
     const auto known = [&] {
       const bool over = ended();  // before the look: what was said last is still seen
