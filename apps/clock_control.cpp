@@ -25,7 +25,7 @@ Json realtime_factor(const rt::ClockState& clock, std::uint64_t cycles) {
 }
 
 Json look(const runtime::RobotCycle& cycle) {
-  const rt::ClockState clock = cycle.clock_control().state();
+  const rt::ClockState clock = cycle.inbox().clock().state();
   const runtime::Progress& progress = cycle.progress();
   const std::int64_t time_ns = progress.time_ns.load();
   const std::uint64_t done = progress.cycles.load();
@@ -47,7 +47,7 @@ Result<Json> answer(runtime::RobotCycle& cycle, const Status& done) {
 }
 
 Result<Json> pause(runtime::RobotCycle& cycle) {
-  const Result<std::uint64_t> dropped = cycle.clock_control().pause();
+  const Result<std::uint64_t> dropped = cycle.inbox().clock().pause();
   if (!dropped) return std::unexpected(dropped.error());
   Json found = look(cycle);
   found["dropped_steps"] = *dropped;
@@ -57,13 +57,13 @@ Result<Json> pause(runtime::RobotCycle& cycle) {
 Result<Json> step(runtime::RobotCycle& cycle, const Json& request) {
   const auto cycles = request["cycles"].get<std::int64_t>();
   const auto positive = static_cast<std::uint64_t>(std::max<std::int64_t>(cycles, 0));
-  return answer(cycle, cycle.clock_control().step(positive));
+  return answer(cycle, cycle.inbox().clock().step(positive));
 }
 
 }  // namespace
 
 bool time_stands(const runtime::RobotCycle& cycle) {
-  return cycle.clock_control().state().standing;
+  return cycle.inbox().clock().state().standing;
 }
 
 void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
@@ -73,7 +73,7 @@ void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
                "simulated time stands after the cycle at work", {},
                [&cycle](const Json&) { return pause(cycle); });
   registry.add("clock.resume", ControlEffect::kChanges, "simulated time goes on at its rate", {},
-               [&cycle](const Json&) { return answer(cycle, cycle.clock_control().resume()); });
+               [&cycle](const Json&) { return answer(cycle, cycle.inbox().clock().resume()); });
   registry.add("clock.step", ControlEffect::kChanges,
                "while paused: so many cycles, then it stands again",
                {{.name = "cycles",
@@ -89,7 +89,7 @@ void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
                  .doc = "0.01 to 1000; 0: as fast as the machine goes"}},
                [&cycle](const Json& request) {
                  const auto rate = request["rate"].get<double>();
-                 return answer(cycle, cycle.clock_control().set_rate(rate));
+                 return answer(cycle, cycle.inbox().clock().set_rate(rate));
                });
 }
 

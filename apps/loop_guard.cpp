@@ -70,7 +70,7 @@ void LoopGuard::start() {
 /// First what stops the robot, then what may wait.
 void LoopGuard::on_hang(bool at_work) {
   const std::int32_t controller = composition_->controllers->at_work();
-  cycle_->requests().watchdog_stop(controller);
+  cycle_->inbox().watchdog_stop(controller);
   const std::string nodes = stop_nodes();
   if (controller >= 0) {
     where_ = fmt::format("in the controller '{}'",

@@ -51,7 +51,7 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
   using runtime::RunPhase;
   const RunPhase phase = cycle.progress().phase.load();
   Json answer = status(cycle);
-  if (cycle.requests().stop_waits()) {
+  if (cycle.inbox().stop_waits()) {
     return fail("an emergency stop waits for the loop", "let it be carried out first");
   }
   if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
@@ -62,7 +62,7 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
     return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
                 "a fault is reset while the run waits for it: tandem run --on-fault wait");
   }
-  cycle.requests().reset_faults();
+  cycle.inbox().reset_faults();
   return answer;
 }
 
@@ -82,13 +82,13 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
     if (number < 0 || number > 2) return fail("estop: \"category\" is not 0, 1 or 2");
     category = static_cast<hal::StopCategory>(number);
   }
-  const std::uint32_t number = cycle.requests().emergency_stop(category);
-  const rt::ClockState clock = cycle.clock_control().state();
+  const std::uint32_t number = cycle.inbox().emergency_stop(category);
+  const rt::ClockState clock = cycle.inbox().clock().state();
   const auto patience = stop_patience(clock);
   const auto deadline = SteadyClock::now() + patience;
   Json answer{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
   for (;;) {
-    if (const auto carried_out = cycle.requests().confirmed(number)) {
+    if (const auto carried_out = cycle.inbox().confirmed(number)) {
       answer["cycle"] = *carried_out;
       answer["category"] = hal::to_string(carried_out_category(cycle, *carried_out, category));
       return answer;
@@ -134,7 +134,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
       [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
   registry.add("run.stop", ControlEffect::kChanges, "ends the run in order", {},
                [&cycle](const Json&) -> Result<Json> {
-                 cycle.requests().end_run();
+                 cycle.inbox().end_run();
                  return Json::object();
                });
   add_controller_commands(registry, cycle.services(), robot);

@@ -24,7 +24,7 @@
 #include "hal/robot.hpp"
 #include "runtime/bumpless_transfer.hpp"
 #include "runtime/claim_guard.hpp"
-#include "runtime/loop_mailbox.hpp"
+#include "runtime/loop_request.hpp"
 
 namespace tandem::runtime {
 

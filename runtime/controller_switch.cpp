@@ -20,7 +20,7 @@ bool is_enabled(const hal::StateImage& state, std::size_t joint) noexcept TANDEM
 }
 
 LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
-  return {.refusal = why, .one = static_cast<std::int32_t>(one)};
+  return {.reason = why, .one = static_cast<std::int32_t>(one)};
 }
 
 }  // namespace
@@ -121,7 +121,7 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
     }
   }
   if (const auto conflict = find_conflict(table_, after)) {
-    return {.refusal = RejectReason::kConflict,
+    return {.reason = RejectReason::kConflict,
             .joint = static_cast<std::int32_t>(conflict->joint),
             .one = static_cast<std::int32_t>(conflict->one),
             .other = static_cast<std::int32_t>(conflict->other)};
@@ -172,13 +172,13 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish
   if (moves) {
     LoopAnswer refused{.joint = number, .one = owned_by};
     if (owned_by >= 0) {
-      refused.refusal = RejectReason::kClaimed;
+      refused.reason = RejectReason::kClaimed;
     } else if (!running) {
-      refused.refusal = RejectReason::kNotRunning;
+      refused.reason = RejectReason::kNotRunning;
     } else if (!capabilities_[joint].can(mode, interaction)) {
-      refused.refusal = RejectReason::kIncapable;
+      refused.reason = RejectReason::kIncapable;
     }
-    if (refused.refusal != RejectReason::kNone) return refused;
+    if (refused.reason != RejectReason::kNone) return refused;
   }
   Impedance& impedance = impedance_[joint];
   const Impedance before = impedance;
@@ -203,14 +203,14 @@ LoopAnswer ControllerHost::recover(std::size_t joint,
                                    const hal::CommandImage& command) noexcept TANDEM_RT {
   const auto index = static_cast<std::int32_t>(joint);
   if (owner_[joint] >= 0) {
-    return {.refusal = RejectReason::kClaimed, .joint = index, .one = owner_[joint]};
+    return {.reason = RejectReason::kClaimed, .joint = index, .one = owner_[joint]};
   }
   const hal::JointCapabilities& limit = capabilities_[joint];
   const double reference = command.position_rad()[joint];
   const bool within = reference >= limit.min_position_rad && reference <= limit.max_position_rad;
   if (command.mode()[joint] != kPositionMode)
-    return {.refusal = RejectReason::kOtherMode, .joint = index};
-  if (within || recovers_[joint] != 0) return {.refusal = RejectReason::kWithin, .joint = index};
+    return {.reason = RejectReason::kOtherMode, .joint = index};
+  if (within || recovers_[joint] != 0) return {.reason = RejectReason::kWithin, .joint = index};
   recovers_[joint] = 1;
   return {};
 }
@@ -220,7 +220,7 @@ LoopAnswer ControllerHost::may_start(ControllerSet start) const noexcept TANDEM_
     if ((start & only(slot)) == 0 || table_[slot] == nullptr) continue;
     for (const auto& claim : table_[slot]->claims) {
       if (recovers_[claim.joint] == 0) continue;
-      return {.refusal = RejectReason::kRecovering,
+      return {.reason = RejectReason::kRecovering,
               .joint = static_cast<std::int32_t>(claim.joint),
               .one = static_cast<std::int32_t>(slot)};
     }

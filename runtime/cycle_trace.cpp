@@ -1,3 +1,4 @@
+// The ring of stamps: where a cycle takes its place, and the copy that is read afterwards.
 #include "runtime/cycle_trace.hpp"
 
 #include <algorithm>
@@ -16,6 +17,17 @@ const char* to_string(Stage stage) noexcept {
     case Stage::kHandOver: return "hand over";
   }
   return "?";
+}
+
+void CycleTrace::begin(const rt::Tick& tick) noexcept TANDEM_RT {
+  if (!on()) return;
+  stamps_ = &ring_[count_++ % ring_.size()];
+  stamps_->cycle = tick.cycle;
+  stamps_->begin_ns = ended_ns_ != 0 ? ended_ns_ : tick.begin_ns;
+  stamps_->end_ns.fill(tick.begin_ns);
+  stamps_->wakeup_ns = tick.wakeup_ns;
+  stamps_->skipped = tick.skipped;
+  stamps_->late = tick.late;
 }
 
 std::vector<CycleStamps> CycleTrace::cycles() const {

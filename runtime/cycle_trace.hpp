@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/realtime.hpp"
+#include "rt/cyclic_loop.hpp"
 
 namespace tandem::runtime {
 
@@ -45,9 +46,25 @@ class CycleTrace {
   /// @param capacity  cycles; 0 traces nothing.
   explicit CycleTrace(std::size_t capacity) : ring_(capacity) {}
 
-  [[nodiscard]] bool on() const noexcept { return !ring_.empty(); }
-  /// The place of the next cycle, the oldest one's. @pre on()
-  [[nodiscard]] CycleStamps& next() noexcept TANDEM_RT { return ring_[count_++ % ring_.size()]; }
+  [[nodiscard]] bool on() const noexcept TANDEM_RT { return !ring_.empty(); }
+
+  // Without a capacity these do nothing.
+
+  /// A cycle begins: the end of its wait. It takes the oldest one's place.
+  void begin(const rt::Tick& tick) noexcept TANDEM_RT;
+  /// The end of one of its stages, at `now_ns`.
+  void mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT {
+    if (stamps_ != nullptr) stamps_->end_ns[static_cast<std::size_t>(stage)] = now_ns;
+  }
+  /// The same, now.
+  void mark(Stage stage, rt::Clock& clock) noexcept TANDEM_RT {
+    if (stamps_ != nullptr) mark(stage, clock.now_ns());
+  }
+  /// The end of its last stage.
+  void end(std::int64_t now_ns) noexcept TANDEM_RT {
+    mark(Stage::kHandOver, now_ns);
+    ended_ns_ = now_ns;
+  }
 
   /// Cycles traced, those that the ring has forgotten included.
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
@@ -58,6 +75,8 @@ class CycleTrace {
  private:
   std::vector<CycleStamps> ring_;
   std::uint64_t count_ = 0;
+  CycleStamps* stamps_ = nullptr;  // this cycle's
+  std::int64_t ended_ns_ = 0;      // when the last cycle ended; 0: there was none
 };
 
 }  // namespace tandem::runtime

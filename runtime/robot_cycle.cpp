@@ -1,72 +1,63 @@
+// The cycle, and what each of its stages does.
 #include "runtime/robot_cycle.hpp"
 
 #include "rt/scoped_realtime.hpp"
 
 namespace tandem::runtime {
 
+using hal::StopCategory;
 using log::EventKind;
 
 namespace {
 
-bool controllers_run(RunPhase phase) noexcept TANDEM_RT {
-  return phase == RunPhase::kRunning || phase == RunPhase::kRetreating;
-}
+/// The part of a cycle that may not block: the traps are armed, and the watchdog sees it at work.
+class AtWork {
+ public:
+  explicit AtWork(Heartbeat& heartbeat) noexcept : heartbeat_(&heartbeat) { heartbeat_->enter(); }
+  ~AtWork() { heartbeat_->leave(); }
+  AtWork(const AtWork&) = delete;
+  AtWork& operator=(const AtWork&) = delete;
+
+ private:
+  rt::ScopedRealtime realtime_;
+  Heartbeat* heartbeat_;
+};
 
 }  // namespace
 
-// A run's course, one cycle: everything else in this file is one of its stages.
-
 bool RobotCycle::step() noexcept {
-  if (phase_ == RunPhase::kDone) return false;
+  if (run_.in(RunPhase::kDone)) return false;
   rt::Tick tick = wait();
-  time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
-  begin_ns_ = tick.begin_ns;
-  wakeup_ns_ = tick.wakeup_ns;
-  trace_wait(tick);
   exchange(tick);
-  sense(tick);
+  {
+    const AtWork now(heartbeat_);
+    read();
+    check(tick);
+  }
   await_owner();
-  act(tick);
-  return phase_ != RunPhase::kDone;
-}
-
-void RobotCycle::sense(const rt::Tick& tick) noexcept TANDEM_RT {
-  const rt::ScopedRealtime in_cycle;
-  heartbeat_.enter();
-  read();
-  mark(Stage::kRead);
-  check(tick);
-  heartbeat_.leave();
-}
-
-void RobotCycle::act(const rt::Tick& tick) noexcept TANDEM_RT {
-  const rt::ScopedRealtime in_cycle;
-  heartbeat_.enter();
-  follow_owner();
-  take_requests();
-  mark(Stage::kCheck);
-  update(tick);
-  mark(Stage::kUpdate);
-  limit();
-  mark(Stage::kLimit);
-  write();
-  mark(Stage::kWrite);
-  hand_over();
-  requests_.confirm(time_.cycle);
-  finished_ns_ = loop_.finish();
-  mark(Stage::kHandOver, finished_ns_);
-  heartbeat_.leave();
+  {
+    const AtWork now(heartbeat_);
+    take_inbox();
+    update(tick);
+    limit();
+    write();
+    hand_over();
+  }
+  return !run_.in(RunPhase::kDone);
 }
 
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
   // Three images, and every event that one cycle can bring.
-  const std::size_t most =
-      3 + 16 + LoopMailbox::kCapacity + 3 * joint_faulted_.size() + sensor_lost_.size();
-  const bool may_wait = config_.loop.pacing == rt::Pacing::kSimulated;
-  if (may_wait && recorder_ != nullptr) recorder_->wait_for_space(most);
-  return loop_.wait();
+  const std::size_t most = 3 + 16 + Inbox::kCapacity + 3 * watch_.joints() + watch_.sensors();
+  if (config_.loop.pacing == rt::Pacing::kSimulated) log_.wait_for_space(most);
+  const rt::Tick tick = loop_.wait();
+  time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
+  begin_ns_ = tick.begin_ns;
+  wakeup_ns_ = tick.wakeup_ns;
+  trace_.begin(tick);
+  return tick;
 }
 
 /// May block until the robot has answered, which does not count as the cycle's work.
@@ -76,7 +67,7 @@ void RobotCycle::exchange(rt::Tick& tick) noexcept {
     loop_.skip(tick, missed);
     time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
   }
-  if (backend_->waits_for_bus()) mark(Stage::kExchange, loop_.exchanged());
+  if (backend_->waits_for_bus()) trace_.mark(Stage::kExchange, loop_.exchanged());
 }
 
 void RobotCycle::read() noexcept TANDEM_RT {
@@ -90,55 +81,78 @@ void RobotCycle::read() noexcept TANDEM_RT {
     if (injected.kind == hal::FaultKind::kNone) break;
     event(EventKind::kInjected, injected.joint, static_cast<std::uint32_t>(injected.kind));
   }
+  trace_.mark(Stage::kRead, *clock_);
 }
 
+/// Of the loop, the joints, the sensors, the body and the backend; then what time brings.
 void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (tick.skipped > 0) event(EventKind::kOverrun, -1, static_cast<std::uint32_t>(tick.skipped));
-  const bool stopping = phase_ == RunPhase::kFaulted || phase_ == RunPhase::kShutDown;
-  if (tick.stop && !stopping) {
-    fault({.source = FaultSource::kOverrun, .category = hal::StopCategory::kCategory1});
+  if (tick.stop && !run_.in(RunPhase::kFaulted) && !run_.in(RunPhase::kShutDown)) {
+    fault({.source = FaultSource::kOverrun, .category = StopCategory::kCategory1});
   }
-  if (phase_ != RunPhase::kBringUp && phase_ != RunPhase::kShutDown) {
-    check_joints();
-    check_sensors();
+  if (!run_.in(RunPhase::kBringUp) && !run_.in(RunPhase::kShutDown)) {
+    while (const auto found = watch_.next_joint(state_)) fault(*found);
+    while (const auto found = watch_.next_sensor(state_)) fault(*found);
   }
-  if (controllers_run(phase_)) check_fall();
+  if (run_.controllers_run() && truth_ != nullptr) {
+    if (const auto found = watch_.fall(*truth_)) fault(*found);
+  }
   check_backend(read_code_);
   advance_phase();
 }
 
-/// The run's course when nobody asks for anything.
-void RobotCycle::advance_phase() noexcept TANDEM_RT {
-  const std::uint64_t in_phase = time_.cycle - phase_began_;
-  if (phase_ == RunPhase::kBringUp) {
-    if (backend_->phase() == hal::Phase::kOperational) {
-      event(EventKind::kBringUpDone);
-      go(config_.settle_cycles > 0 ? RunPhase::kSettling : RunPhase::kRunning);
-    } else if (in_phase >= config_.bring_up_cycles) {
-      fault({.source = FaultSource::kBringUp, .category = hal::StopCategory::kCategory1});
-    }
-  } else if (phase_ == RunPhase::kSettling) {
-    if (in_phase >= config_.settle_cycles) go(RunPhase::kRunning);
-  } else if (phase_ == RunPhase::kResetting) {
-    watch_reset();
-  } else if (time_is_over(in_phase)) {
-    event(EventKind::kControllersDone);
-    go(RunPhase::kShutDown);
+/// A missed sample shows as age, a lost command as the board's own time-out, and a drive's fault
+/// as its joint's: the joint's stop category decides then. All else stops the robot.
+void RobotCycle::check_backend(Code code) noexcept TANDEM_RT {
+  if (run_.in(RunPhase::kShutDown)) return;
+  if (code == Code::kDiverged) {
+    fault({.code = static_cast<std::uint32_t>(code),
+           .source = FaultSource::kBackend,
+           .category = StopCategory::kCategory1});
+    return on(RunEvent::kEnd);  // there is nothing left to wait for
   }
+  if (run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kResetting)) return;
+  if (backend_->phase() == hal::Phase::kFault && code == Code::kOk) code = Code::kFault;
+  if (code == Code::kOk || code == Code::kTimeout || code == Code::kQueueFull) return;
+  if (code == Code::kFault && watch_.joint_in_fault()) return;
+  fault({.code = static_cast<std::uint32_t>(code),
+         .source = FaultSource::kBackend,
+         .category = StopCategory::kCategory1});
 }
 
-/// A robot that holds its joints until the end has its time go on.
-bool RobotCycle::time_is_over(std::uint64_t in_phase) const noexcept TANDEM_RT {
-  const bool holds = (phase_ == RunPhase::kFaulted || phase_ == RunPhase::kHeld) &&
-                     config_.after_stop == AfterStop::kEnd;
-  if (config_.running_cycles == 0 || (phase_ != RunPhase::kRunning && !holds)) return false;
-  return spent_ + in_phase >= config_.running_cycles;
+/// The run's course when nobody asks for anything.
+void RobotCycle::advance_phase() noexcept TANDEM_RT {
+  const bool over = run_.time_is_over(time_.cycle);
+  switch (run_.phase()) {
+    case RunPhase::kBringUp:
+      if (backend_->phase() == hal::Phase::kOperational) {
+        event(EventKind::kBringUpDone);
+        on(RunEvent::kEnabled);
+      } else if (over) {
+        fault({.source = FaultSource::kBringUp, .category = StopCategory::kCategory1});
+      }
+      break;
+    case RunPhase::kSettling:
+      if (over) on(RunEvent::kSettled);
+      break;
+    case RunPhase::kResetting: watch_reset(); break;
+    case RunPhase::kRunning:
+    case RunPhase::kFaulted:
+    case RunPhase::kHeld:
+      if (!over) break;
+      event(EventKind::kControllersDone);
+      on(RunEvent::kFinished);
+      break;
+    case RunPhase::kRetreating:  // update() looks after this one,
+    case RunPhase::kShutDown:    // and write() after this
+    case RunPhase::kDone: break;
+  }
 }
 
 void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
   stamp(command_);
   stamp(wanted_);
-  switch (phase_) {
+  switch (run_.phase()) {
     case RunPhase::kBringUp:
     case RunPhase::kResetting:
       controllers_->release(command_);  // every reference follows its joint until it is enabled
@@ -153,10 +167,10 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
       break;
-    case RunPhase::kRetreating: go_on_retreating(); break;
+    case RunPhase::kRetreating: retreat_further(); break;
     case RunPhase::kFaulted:
     case RunPhase::kShutDown:
-      if (reaction_ == hal::StopCategory::kCategory0) {
+      if (run_.latched() == StopCategory::kCategory0) {
         controllers_->release(command_);
       } else {
         controllers_->hold(state_, command_);
@@ -164,12 +178,13 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       break;
     case RunPhase::kDone: break;
   }
+  trace_.mark(Stage::kUpdate, *clock_);
 }
 
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
   if (!controlling_) {
     start_controllers();
-    fall_watch_.begin();
+    watch_.controllers_start();
   }
   controlling_ = true;
   ++ran_;
@@ -189,22 +204,26 @@ void RobotCycle::controllers_answered(Code code) noexcept TANDEM_RT {
   if (code == Code::kOk) return;
   if (code == Code::kStopped) {
     event(EventKind::kControllersDone);
-    go(RunPhase::kShutDown);
-    return;
+    return on(RunEvent::kFinished);
   }
   fault({.index = static_cast<std::int32_t>(controllers_->failed_controller()),
          .code = static_cast<std::uint32_t>(code),
          .source = FaultSource::kController,
-         .category = hal::StopCategory::kCategory1});
+         .category = StopCategory::kCategory1});
 }
 
 /// Until they have brought the robot to its posture, or their time is over.
-void RobotCycle::go_on_retreating() noexcept TANDEM_RT {
+void RobotCycle::retreat_further() noexcept TANDEM_RT {
   const Code code = controllers_->update(time_, state_, controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
   if (code != Code::kOk && code != Code::kStopped) return controllers_answered(code);
-  const bool late = time_.cycle - phase_began_ >= config_.retreat_cycles;
-  if (late || code == Code::kStopped) react(hal::StopCategory::kCategory1);
+  const bool late = run_.time_is_over(time_.cycle);
+  if (late || code == Code::kStopped) react(StopCategory::kCategory1);
+}
+
+/// The image that controllers write.
+hal::CommandImage& RobotCycle::controlled() noexcept TANDEM_RT {
+  return delay_.on() ? wanted_ : command_;
 }
 
 void RobotCycle::stamp(hal::CommandImage& command) const noexcept TANDEM_RT {
@@ -230,48 +249,47 @@ void RobotCycle::start_controllers() noexcept TANDEM_RT {
 }
 
 void RobotCycle::limit() noexcept TANDEM_RT {
-  if (limits_.apply(state_, command_) == Code::kOk) return;
+  const Code limited = limits_.apply(state_, command_);
   const auto codes = limits_.codes();
-  for (std::size_t j = 0; j < codes.size(); ++j) {
+  for (std::size_t j = 0; limited != Code::kOk && j < codes.size(); ++j) {
     if (codes[j] == Code::kOk) continue;
     const auto joint = static_cast<std::int32_t>(j);
     if (joint_limited_[j] == 0) {
       event(EventKind::kLimited, joint, static_cast<std::uint32_t>(codes[j]));
       joint_limited_[j] = 1;
     }
-    if (codes[j] == Code::kNotFinite && controllers_run(phase_)) {
+    if (codes[j] == Code::kNotFinite && run_.controllers_run()) {
       fault({.index = joint,
              .code = static_cast<std::uint32_t>(codes[j]),
              .source = FaultSource::kCommand,
-             .category = hal::StopCategory::kCategory1});
+             .category = StopCategory::kCategory1});
     }
   }
+  trace_.mark(Stage::kLimit, *clock_);
 }
 
 void RobotCycle::write() noexcept TANDEM_RT {
-  if (phase_ != RunPhase::kShutDown) {
+  if (!run_.in(RunPhase::kShutDown)) {
     check_backend(backend_->write(command_, parameters_));
-    return;
+  } else {
+    backend_->last_command(command_);
+    const bool disabled = backend_->shut_down();
+    if (disabled || run_.time_is_over(time_.cycle) || read_code_ == Code::kDiverged) {
+      event(EventKind::kShutDown);
+      on(RunEvent::kDisabled);
+    }
   }
-  backend_->last_command(command_);
-  const bool disabled = backend_->shut_down();
-  const bool too_long = time_.cycle - phase_began_ >= config_.shut_down_cycles;
-  if (!disabled && !too_long && read_code_ != Code::kDiverged) return;
-  event(EventKind::kShutDown);
-  go(RunPhase::kDone);
+  trace_.mark(Stage::kWrite, *clock_);
 }
 
+/// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
-  if (phase_ == RunPhase::kRunning) {
+  if (run_.in(RunPhase::kRunning)) {
     statistics_.take(state_, command_, truth_, limits_.counters());
   }
-  if (recorder_ != nullptr) {
-    recorder_->push(state_channel_, time_.time_ns, state_.bytes());
-    recorder_->push(command_channel_, time_.time_ns, command_.bytes());
-    if (truth_ != nullptr) recorder_->push(truth_channel_, time_.time_ns, truth_->bytes());
-    progress_.dropped.store(recorder_->dropped(), std::memory_order_relaxed);
-  }
-  progress_.phase.store(phase_, std::memory_order_relaxed);
+  log_.images(time_, state_, command_, truth_);
+  progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);
+  progress_.phase.store(run_.phase(), std::memory_order_relaxed);
   progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
   progress_.time_ns.store(time_.time_ns, std::memory_order_relaxed);
   progress_.running_cycles.store(ran_, std::memory_order_relaxed);
@@ -279,12 +297,14 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
   show_joints();
   show();
+  inbox_.confirm(time_.cycle);
+  trace_.end(loop_.finish());
 }
 
 void RobotCycle::show() noexcept TANDEM_RT {
   if (observer_ == nullptr) return;
   observer_->take({.time = time_,
-                   .phase = phase_,
+                   .phase = run_.phase(),
                    .read_code = read_code_,
                    .state = state_,
                    .command = command_,
@@ -297,36 +317,35 @@ void RobotCycle::show() noexcept TANDEM_RT {
                              .skipped = loop_.statistics().skipped}});
 }
 
-void RobotCycle::go(RunPhase next) noexcept TANDEM_RT {
+void RobotCycle::show_joints() noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    joints_[j] = {.cycle = time_.cycle,
+                  .position_rad = state_.position_rad()[j],
+                  .velocity_rad_s = state_.velocity_rad_s()[j],
+                  .torque_Nm = state_.torque_Nm()[j],
+                  .stiffness_Nm_rad = command_.stiffness_Nm_rad()[j],
+                  .damping_Nms_rad = command_.damping_Nms_rad()[j],
+                  .fault = state_.fault()[j],
+                  .age_cycles = state_.age_cycles()[j],
+                  .owner = controllers_->owner(j),
+                  .mode = command_.mode()[j],
+                  .interaction = command_.interaction()[j],
+                  .drive_mode = state_.mode()[j],
+                  .drive_state = state_.drive_state()[j]};
+  }
+  services_.show(joints_);
+}
+
+/// The next phase, if this is one. Controllers stop with it, but for a retreat, which they carry
+/// out.
+void RobotCycle::on(RunEvent event, bool holds_back) noexcept TANDEM_RT {
+  if (!run_.on(event, time_.cycle, holds_back) || run_.in(RunPhase::kRetreating)) return;
   if (controlling_) controllers_->stop();
   controlling_ = false;
-  if (phase_ == RunPhase::kRunning) spent_ += time_.cycle - phase_began_;
-  phase_ = next;
-  phase_began_ = time_.cycle;
 }
 
 void RobotCycle::event(EventKind kind, std::int32_t joint, std::uint32_t code) noexcept TANDEM_RT {
-  if (recorder_ == nullptr) return;
-  recorder_->push(log::Event{time_.cycle, time_.time_ns, code, joint, kind, {}});
-}
-
-void RobotCycle::trace_wait(const rt::Tick& tick) noexcept TANDEM_RT {
-  if (!trace_.on()) return;
-  stamps_ = &trace_.next();
-  stamps_->cycle = tick.cycle;
-  stamps_->begin_ns = finished_ns_ != 0 ? finished_ns_ : tick.begin_ns;
-  stamps_->end_ns.fill(tick.begin_ns);
-  stamps_->wakeup_ns = tick.wakeup_ns;
-  stamps_->skipped = tick.skipped;
-  stamps_->late = tick.late;
-}
-
-void RobotCycle::mark(Stage stage) noexcept TANDEM_RT {
-  if (stamps_ != nullptr) mark(stage, clock_->now_ns());
-}
-
-void RobotCycle::mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT {
-  if (stamps_ != nullptr) stamps_->end_ns[static_cast<std::size_t>(stage)] = now_ns;
+  log_.event(time_, kind, joint, code);
 }
 
 }  // namespace tandem::runtime

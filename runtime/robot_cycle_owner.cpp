@@ -8,7 +8,7 @@ namespace tandem::runtime {
 using log::EventKind;
 
 RobotCycle::~RobotCycle() {
-  if (seat_.port != nullptr) seat_.port->on_news({});
+  if (owner_.port != nullptr) owner_.port->on_news({});
 }
 
 hal::PortView RobotCycle::port_view() noexcept TANDEM_RT {
@@ -17,9 +17,9 @@ hal::PortView RobotCycle::port_view() noexcept TANDEM_RT {
     causes_[j] = told ? static_cast<std::uint8_t>(backend_->fault_cause(j)) : 0;
   }
   return {.time = time_,
-          .phase = phase_,
+          .phase = run_.phase(),
           .read_code = read_code_,
-          .reaction = reaction_,
+          .reaction = run_.latched(),
           .state = state_,
           .command = command_,
           .causes = causes_};
@@ -28,54 +28,54 @@ hal::PortView RobotCycle::port_view() noexcept TANDEM_RT {
 /// In lockstep: blocks until the owner's command for this cycle is there, or there is something
 /// else to do.
 void RobotCycle::await_owner() noexcept {
-  if (seat_.port == nullptr || !seat_.port->lockstep()) return;
+  if (owner_.port == nullptr || !owner_.port->lockstep()) return;
   const hal::PortView view = port_view();
-  seat_.port->send(view);
+  owner_.port->send(view);
   for (;;) {
-    const std::uint32_t seen = bell_.count();
-    if (bell_.ended() || requests_.pending()) break;
-    const std::int64_t until_ns = seat_.port->wait_until_ns(view);
+    const std::uint32_t seen = inbox_.bell().count();
+    if (inbox_.bell().ended() || inbox_.is_urgent()) break;
+    const std::int64_t until_ns = owner_.port->wait_until_ns(view);
     if (until_ns == 0) break;
-    bell_.wait(seen, until_ns);
+    inbox_.bell().wait(seen, until_ns);
   }
   loop_.exchanged();  // waiting is no work of the cycle's own
 }
 
 void RobotCycle::follow_owner() noexcept TANDEM_RT {
-  if (seat_.port == nullptr) return;
-  const hal::RemoteCommand wish = seat_.port->exchange(port_view());
-  seat_.controller->follow(wish);
+  if (owner_.port == nullptr) return;
+  const hal::RemoteCommand wish = owner_.port->exchange(port_view());
+  owner_.controller->follow(wish);
   if (wish.gains != nullptr) take_gains(*wish.gains);
   if (wish.stop != hal::StopCategory::kWarn) {
     fault({.source = FaultSource::kOwner, .category = wish.stop});
   }
-  if (wish.loss != hal::OwnerLoss::kNone && phase_ != RunPhase::kShutDown) {  // else it may leave
+  if (wish.loss != hal::OwnerLoss::kNone && !run_.in(RunPhase::kShutDown)) {  // else it may leave
     fault({.code = static_cast<std::uint32_t>(wish.loss),
            .source = FaultSource::kOwner,
            .category = wish.on_loss});
   }
   if (wish.reset) begin_reset();
-  seat_owner(wish.live);
-  const bool serves = phase_ == RunPhase::kRunning && has_owner();  // its controller ends the run
-  if (wish.done && wish.ends_run && !serves && phase_ != RunPhase::kShutDown) {
+  assign_owner(wish.live);
+  const bool serves = run_.in(RunPhase::kRunning) && has_owner();  // its controller ends the run
+  if (wish.done && wish.ends_run && !serves && !run_.in(RunPhase::kShutDown)) {
     event(EventKind::kStopRequested);
-    go(RunPhase::kShutDown);
+    on(RunEvent::kEnd);
   }
 }
 
 bool RobotCycle::has_owner() const noexcept TANDEM_RT {
-  return (controllers_->shown().active & only(seat_.slot)) != 0;
+  return (controllers_->shown().active & only(owner_.slot)) != 0;
 }
 
 /// Gives the robot to the owner, or takes it back: a switch of controllers.
-void RobotCycle::seat_owner(bool owned) noexcept TANDEM_RT {
+void RobotCycle::assign_owner(bool owned) noexcept TANDEM_RT {
   if (owned == has_owner()) return;
-  const ControllerSet owner = only(seat_.slot);
+  const ControllerSet owner = only(owner_.slot);
   const LoopAnswer answer =
       owned ? controllers_->switch_over(controllers_->shown().active, owner, controlling_, time_,
                                         state_, controlled())
             : controllers_->switch_over(owner, 0, controlling_, time_, state_, controlled());
-  if (answer.refusal == RejectReason::kNone && controlling_) event(EventKind::kControllersSwitched);
+  if (answer.reason == RejectReason::kNone && controlling_) event(EventKind::kControllersSwitched);
 }
 
 void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {

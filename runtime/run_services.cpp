@@ -26,14 +26,12 @@ Status errors_of(const TomlDocument& document) {
 
 }  // namespace
 
-RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
-                         const Progress& progress, const rt::ClockControl& clock,
-                         hal::ParameterImage parameters)
+RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
+                         const Progress& progress, hal::ParameterImage parameters)
     : robot_(&robot),
       host_(&host),
-      mailbox_(&mailbox),
+      inbox_(&inbox),
       progress_(&progress),
-      clock_(&clock),
       looks_(robot.joints.size()),
       gains_(std::move(parameters)) {}
 
@@ -47,7 +45,7 @@ Status RunServices::check_phase() const {
 
 /// Takes the answers that are there: frees what the loop has let go, keeps what is awaited.
 void RunServices::collect() {
-  while (const auto answer = mailbox_->take_answer()) {
+  while (const auto answer = inbox_->take_answer()) {
     const auto request = asked_.extract(answer->number);
     if (!request.empty()) free_what_left(request.mapped(), *answer);
     const auto waiter = awaited_.find(answer->number);
@@ -57,7 +55,7 @@ void RunServices::collect() {
 
 void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& answer) {
   using Kind = LoopRequest::Kind;
-  const bool done = answer.refusal == RejectReason::kNone;
+  const bool done = answer.reason == RejectReason::kNone;
   if ((request.kind == Kind::kInsert && !done) || (request.kind == Kind::kRemove && done)) {
     host_->owned()[request.slot].reset();
   } else if (request.kind == Kind::kRemove) {
@@ -67,11 +65,11 @@ void RunServices::free_what_left(const LoopRequest& request, const LoopAnswer& a
 
 Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience patience) {
   request.number = ++number_;
-  if (!mailbox_->ask(request)) {
+  if (!inbox_->ask(request)) {
     if (request.kind == LoopRequest::Kind::kInsert) host_->owned()[request.slot].reset();
     if (request.kind == LoopRequest::Kind::kRemove) host_->owned()[request.slot]->leaves = false;
     return fail(
-        "the loop has not come to the last " + std::to_string(LoopMailbox::kCapacity) + " requests",
+        "the loop has not come to the last " + std::to_string(Inbox::kCapacity) + " requests",
         "is it paused? Let it go on");
   }
   asked_[request.number] = request;
@@ -81,7 +79,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience
   while (!answer && !stands && SteadyClock::now() < deadline) {
     lock.unlock();
     std::this_thread::sleep_for(kLook);
-    stands = clock_->state().standing || progress_->phase.load() == RunPhase::kDone;
+    stands = inbox_->clock().state().standing || progress_->phase.load() == RunPhase::kDone;
     lock.lock();
     collect();
   }
@@ -95,7 +93,7 @@ Result<RequestResult> RunServices::ask(Lock& lock, LoopRequest request, Patience
     if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
     return RequestResult{};
   }
-  if (found->refusal != RejectReason::kNone) return std::unexpected(refusal(*found));
+  if (found->reason != RejectReason::kNone) return std::unexpected(refusal(*found));
   return RequestResult{.done = true, .cycle = found->cycle};
 }
 
@@ -110,7 +108,7 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
   const std::string joint =
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
   const std::string one = controller_name(answer.one);
-  switch (answer.refusal) {
+  switch (answer.reason) {
     case RejectReason::kNone: break;
     case RejectReason::kEnding:
       error.message = "the run shuts down";
@@ -306,7 +304,7 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
     }
   }
   if (const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start)) {
-    return std::unexpected(refusal({.refusal = RejectReason::kConflict,
+    return std::unexpected(refusal({.reason = RejectReason::kConflict,
                                     .joint = static_cast<std::int32_t>(conflict->joint),
                                     .one = static_cast<std::int32_t>(conflict->one),
                                     .other = static_cast<std::int32_t>(conflict->other)}));

@@ -1,6 +1,6 @@
 // What a run can be asked for while it goes on: controllers come, go and change; joints are set.
 // Start here to command a running loop from another thread.
-// Layer: runtime.  Thread: any but the loop's; the loop's part is RobotCycle::take_services().
+// Layer: runtime.  Thread: any but the loop's; the loop's part is robot_cycle_inbox.cpp.
 #pragma once
 
 #include <array>
@@ -20,9 +20,8 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
-#include "rt/clock_control.hpp"
 #include "runtime/controller_host.hpp"
-#include "runtime/loop_mailbox.hpp"
+#include "runtime/inbox.hpp"
 #include "runtime/progress.hpp"
 
 namespace tandem::runtime {
@@ -82,9 +81,8 @@ class RunServices {
   static constexpr Patience kPatience{1000};
 
   /// All outlive it.
-  RunServices(const hal::RobotConfig& robot, ControllerHost& host, LoopMailbox& mailbox,
-              const Progress& progress, const rt::ClockControl& clock,
-              hal::ParameterImage parameters);
+  RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
+              const Progress& progress, hal::ParameterImage parameters);
 
   /// Loaded controllers, in the order in which they run.
   [[nodiscard]] std::vector<ControllerStatus> controllers();
@@ -163,12 +161,11 @@ class RunServices {
 
   const hal::RobotConfig* robot_;
   ControllerHost* host_;
-  LoopMailbox* mailbox_;
+  Inbox* inbox_;
   const Progress* progress_;
-  const rt::ClockControl* clock_;
   Seqlock<JointStatus> looks_;
 
-  std::mutex mutex_;           // of all below, and of the asking side of mailbox and host
+  std::mutex mutex_;           // of all below, and of the asking side of inbox and host
   hal::ParameterImage gains_;  // as asked for last
   std::uint64_t number_ = 0;   // of the last request
   std::map<std::uint64_t, LoopRequest> asked_;                  // not answered yet

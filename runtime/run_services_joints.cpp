@@ -78,12 +78,12 @@ Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if ((active & only(slot)) == 0 || one == nullptr || one->claimed[joint] == 0) continue;
-    refused.refusal = RejectReason::kClaimed;
+    refused.reason = RejectReason::kClaimed;
     refused.one = static_cast<std::int32_t>(slot);
     return std::unexpected(refusal(refused));
   }
   if (progress_->phase.load() == RunPhase::kRunning) return {};
-  refused.refusal = RejectReason::kNotRunning;
+  refused.reason = RejectReason::kNotRunning;
   return std::unexpected(refusal(refused));
 }
 

@@ -48,14 +48,14 @@ struct AnsweredRun : ::testing::Test {
 };
 
 TEST_F(AnsweredRun, RefusesAResetAtOnceWhileTheRobotRetreats) {
-  (void)cycle->requests().emergency_stop(hal::StopCategory::kCategory2);
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory2);
   steps(1);
   ASSERT_EQ(cycle->phase(), RunPhase::kRetreating);
   const Json refused = registry.answer(R"({"do": "fault.reset"})");
   EXPECT_EQ(refused["ok"], false) << refused;
   EXPECT_EQ(refused.value("error", ""), "the robot is on its way to a safe posture");
   EXPECT_EQ(refused.value("hint", ""), "reset it when that is over");
-  EXPECT_FALSE(cycle->requests().pending()) << "nothing was asked of the loop";
+  EXPECT_FALSE(cycle->inbox().is_urgent()) << "nothing was asked of the loop";
   controller->answer = Code::kStopped;  // it is there
   steps(1);
   ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
@@ -69,7 +69,7 @@ TEST_F(AnsweredRun, RefusesAResetAtOnceWhileTheRobotRetreats) {
 TEST_F(AnsweredRun, EndsAResetThatAFaultFollowsAtOnceWithStatus1) {
   backend.latch_on_fault = true;
   const auto reset = [this](bool trips) {
-    (void)cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+    (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
     steps(1);
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
     ControlRegistry served;

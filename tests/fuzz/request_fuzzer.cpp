@@ -62,7 +62,7 @@ struct Run {
   }
   void advance() {
     if (over) return;
-    rt::ClockControl& control = cycle->clock_control();
+    rt::ClockControl& control = cycle->inbox().clock();
     const rt::ClockState state = control.state();
     if (state.paused && state.pending_steps == 0) (void)control.resume();
     over = !cycle->step();

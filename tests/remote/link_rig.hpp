@@ -115,7 +115,7 @@ class Served {
     server->close();
   }
   void end() {
-    cycle->requests().end_run();
+    cycle->inbox().end_run();
     join();
   }
   [[nodiscard]] RunPhase phase() const { return cycle->progress().phase.load(); }

@@ -148,7 +148,7 @@ void stop_for_good(Played& run) {
   const auto stopped = [&run] { return run.served.phase() == RunPhase::kFaulted || run.over(); };
   for (std::uint64_t since = run.watch.count; !run.over();) {
     if (!stopped()) {
-      run.served.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+      run.served.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
       since = run.watch.count;
     }
     if (run.watch.count > since + 10) return;
@@ -161,7 +161,7 @@ void end_by_itself(Played& run) {
   (void)run.control().set_rate(0.0);
   (void)run.control().resume();
   while (!run.over()) {
-    if (run.served.phase() == RunPhase::kFaulted) run.served.cycle->requests().reset_faults();
+    if (run.served.phase() == RunPhase::kFaulted) run.served.cycle->inbox().reset_faults();
     std::this_thread::sleep_for(milliseconds(1));
   }
 }

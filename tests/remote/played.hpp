@@ -44,7 +44,7 @@ class Played {
     return complaints_;
   }
   [[nodiscard]] bool over() const { return served.phase() == RunPhase::kDone; }
-  rt::ClockControl& control() { return served.cycle->clock_control(); }
+  rt::ClockControl& control() { return served.cycle->inbox().clock(); }
   void ask(const Deed<Ask>& one);
   /// Cycles at which it stands; empty when the run was over before.
   std::optional<std::uint64_t> stand();
@@ -97,9 +97,9 @@ inline void Played::ask(const Deed<Ask>& one) {
     case Ask::kResume: (void)control().resume(); break;
     case Ask::kStep: step(one.amount); break;
     case Ask::kRate: (void)control().set_rate(one.rate); break;
-    case Ask::kReset: served.cycle->requests().reset_faults(); break;
+    case Ask::kReset: served.cycle->inbox().reset_faults(); break;
     case Ask::kStop:
-      served.cycle->requests().emergency_stop(one.amount % 2 == 0 ? hal::StopCategory::kCategory0
+      served.cycle->inbox().emergency_stop(one.amount % 2 == 0 ? hal::StopCategory::kCategory0
                                                                   : hal::StopCategory::kCategory1);
       break;
     case Ask::kLook: (void)control().await_standing(100'000); break;

@@ -53,7 +53,7 @@ struct ServedUr5e {
     thread = std::thread([this] { cycle->run(); });
   }
   ~ServedUr5e() {
-    cycle->requests().end_run();
+    cycle->inbox().end_run();
     thread.join();
     server->close();
   }

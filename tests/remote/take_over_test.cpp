@@ -107,7 +107,7 @@ TEST(LockstepLink, AServerThatWaitsForACommandCanBeStopped) {
   client.lockstep = true;
   Owner owner(client, {});
   while (owner.cycle->progress().running_cycles.load() < 10) ASSERT_TRUE(owner.cycle->step());
-  served.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  served.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   EXPECT_TRUE(eventually([&] { return served.phase() == RunPhase::kFaulted; }));
 }
 

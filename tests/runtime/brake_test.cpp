@@ -39,7 +39,7 @@ struct BrakedArm : private Ur5e, FaultRig {
     }
     return most;
   }
-  void stop(hal::StopCategory category) { cycle->requests().emergency_stop(category); }
+  void stop(hal::StopCategory category) { cycle->inbox().emergency_stop(category); }
 };
 
 TEST(Brakes, HoldAnArmAfterCategory0ThatSinksWithoutThem) {

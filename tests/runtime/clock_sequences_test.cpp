@@ -173,7 +173,7 @@ struct Played {
       over.store(true);
     });
   }
-  rt::ClockControl& control() { return cycle->clock_control(); }
+  rt::ClockControl& control() { return cycle->inbox().clock(); }
   void ask(const Ask& one);
   /// Cycles at which it stands; empty when the run was over before.
   std::optional<std::uint64_t> pause();
@@ -200,7 +200,7 @@ void Played::ask(const Ask& one) {
     case Act::kRate: (void)control().set_rate(one.rate); break;
     case Act::kLook: EXPECT_LE(control().state().rate, rt::kFastest); break;
     case Act::kAwait: (void)control().await_standing(100'000); break;
-    case Act::kReset: cycle->requests().reset_faults(); break;
+    case Act::kReset: cycle->inbox().reset_faults(); break;
     case Act::kGains:
       (void)cycle->services().set_gains("elbow", hal::PidLoop::kPosition, {.kp = 1.0},
                                         RunServices::Patience{0});
@@ -230,7 +230,7 @@ void peers_come_and_go(const Sequence& s, Played& run) {
 /// Brings the run to its end. @return the cycles that it must have had; empty: any number.
 std::optional<std::uint64_t> end(const Sequence& s, Played& run) {
   if (s.end == End::kRunning) {
-    run.cycle->requests().end_run();
+    run.cycle->inbox().end_run();
     return std::nullopt;
   }
   const std::optional<std::uint64_t> stands_at = run.pause();
@@ -252,7 +252,7 @@ std::optional<std::uint64_t> end(const Sequence& s, Played& run) {
       EXPECT_TRUE(run.control().step(left - first));
       return s.total();
     }
-    case End::kPaused: run.cycle->requests().end_run(); break;
+    case End::kPaused: run.cycle->inbox().end_run(); break;
     case End::kSignal: rt::request_stop(); break;
     case End::kRunning: break;
   }

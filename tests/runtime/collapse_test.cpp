@@ -59,7 +59,7 @@ struct Collapse : Squat {
   }
   /// Reset, held, and what was active started again.
   void recover() {
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     for (int i = 0; i < 3000 && cycle->phase() != RunPhase::kHeld; ++i) steps(1);
     ASSERT_EQ(cycle->phase(), RunPhase::kHeld) << backend->status_text();
     EXPECT_EQ(cycle->fault_log().latched(), 0U);
@@ -80,7 +80,7 @@ void collapse(const std::string& robot, hal::StopCategory category) {
   run.run_to(RunPhase::kRunning);
   run.steps(4000);  // half way down the first squat
   const double standing_m = run.plant().q()[2], before_J = run.energy_J();
-  run.cycle->requests().emergency_stop(category);
+  run.cycle->inbox().emergency_stop(category);
   run.steps(6000);
   EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
   EXPECT_TRUE(run.finite);
@@ -102,7 +102,7 @@ struct Fall {
   Fall(hal::StopCategory category, int after) {
     run.run_to(RunPhase::kRunning);
     run.steps(after);
-    (void)run.cycle->requests().emergency_stop(category);
+    (void)run.cycle->inbox().emergency_stop(category);
     for (int i = 0; i < 9000; ++i) {
       EXPECT_TRUE(run.cycle->step());
       if (run.cycle->phase() != RunPhase::kFaulted) continue;
@@ -213,7 +213,7 @@ TEST(Collapse, OfPandaEndsAtItsEndStops) {
   run.run_to(RunPhase::kRunning);
   run.steps(2500);
   const double before_J = run.energy_J();
-  run.cycle->requests().emergency_stop(hal::StopCategory::kCategory0);
+  run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory0);
   run.steps(15000);
   EXPECT_TRUE(run.finite);
   EXPECT_LT(run.worst_rad, kPastTheEnd_rad) << run.worst;

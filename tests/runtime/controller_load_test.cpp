@@ -74,7 +74,7 @@ TEST(ControllerLoad, HasRoomForSoManyAndSaysSo) {
 TEST(ControllerLoad, OfALoopThatStandsStillWaitsAndThenIsRefused) {
   SwitchRun run;
   run.run();
-  for (std::size_t i = 0; i < LoopMailbox::kCapacity; ++i) {
+  for (std::size_t i = 0; i < Inbox::kCapacity; ++i) {
     const auto asked =
         run.change(i % 2 == 0 ? Names{"left"} : Names{}, i % 2 == 0 ? Names{} : Names{"left"});
     ASSERT_TRUE(asked) << i;

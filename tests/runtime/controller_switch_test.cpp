@@ -154,7 +154,7 @@ TEST(ControllerSwitch, BeforeTheControllersRunSetsWhoWillStart) {
 TEST(ControllerSwitch, IsRefusedOnceTheRunShutsDown) {
   SwitchRun run;
   run.run();
-  run.cycle->requests().end_run();
+  run.cycle->inbox().end_run();
   run.steps(1);
   const auto asked = run.change({"left"}, {});
   ASSERT_FALSE(asked);
@@ -168,7 +168,7 @@ TEST(ControllerSwitch, AfterAResetTheSameControllersStartAgain) {
   run.run();
   ASSERT_TRUE(run.change({"left"}, {"right"}));
   run.steps(1);
-  run.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   run.cycle->run();
   EXPECT_EQ(run.active(), Names{"right"});
   EXPECT_EQ(run.right->stops, 1);

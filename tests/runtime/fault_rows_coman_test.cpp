@@ -72,7 +72,7 @@ struct ComanRig : Squat {
   }
   /// Resets, and waits until every joint is held.
   void reset() {
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     for (int i = 0; i < 5000 && cycle->phase() != RunPhase::kHeld; ++i) (void)cycle->step();
     ASSERT_EQ(cycle->phase(), RunPhase::kHeld) << causes();
   }
@@ -126,7 +126,7 @@ TEST(FaultRow, ControllerOfComanHangs) {
       {.on_hang =
            [&](bool) {
              hung_in = rig.host.at_work();
-             rig.cycle->requests().watchdog_stop(rig.host.at_work());
+             rig.cycle->inbox().watchdog_stop(rig.host.at_work());
            },
        .on_return = [&] { back = true; },
        .on_given_up = [&] { given_up = true; }});
@@ -213,7 +213,7 @@ double retreat(ComanRig& rig) {
   rig.run_to(RunPhase::kRunning);
   const double standing_m = rig.height_m();
   rig.run();
-  (void)rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory2);
+  (void)rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory2);
   Outcome found;
   double stopped_m = 0.0;
   for (int i = 1; i <= 9000 && found.open < 0; ++i) {
@@ -312,7 +312,7 @@ TEST(FaultRow, ComanLiesAfterAnEmergencyStop) {
   rig.compose("coman", 1'000'000, nullptr);
   rig.run();
   const double standing_m = rig.height_m();
-  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   rig.steps(6000);
   ASSERT_LT(rig.height_m(), 0.7 * standing_m) << "it lies";
   EXPECT_EQ(rig.cycle->faults().size(), 1U) << "that is no further fault: " << rig.causes();

@@ -77,7 +77,7 @@ TEST(FaultRow, EmergencyStopByABoardsInput) {
 TEST(FaultRow, EmergencyStopByRequest) {
   ArmRig rig;
   rig.run();
-  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("emergency stop on request"), std::string::npos) << rig.causes();
 }
@@ -90,7 +90,7 @@ TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
   rig.inject(unplugged);
   for (int i = 0; i < 100; ++i) rig.step();
   ASSERT_EQ(rig.cycle->phase(), RunPhase::kFaulted);
-  rig.cycle->requests().reset_faults();
+  rig.cycle->inbox().reset_faults();
   for (int i = 0; i < 5000 && rig.cycle->phase() != RunPhase::kHeld; ++i) rig.step();
   ASSERT_EQ(rig.cycle->phase(), RunPhase::kHeld) << rig.causes();
   for (std::size_t b = 0; b < 3; ++b) {
@@ -99,7 +99,7 @@ TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
   const std::uint64_t ran = rig.cycle->running_cycles();
   for (int i = 0; i < 500; ++i) rig.step();
   EXPECT_EQ(rig.cycle->running_cycles(), ran) << "a reset is no start";
-  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory1);
+  rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   expect_row(rig.watch());
   EXPECT_EQ(rig.cycle->faults().at(1).text, "emergency stop on request");
 }
@@ -107,7 +107,7 @@ TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
 TEST(FaultRow, EmergencyStopOfCategory0) {
   ArmRig rig;
   rig.run();
-  rig.cycle->requests().emergency_stop(hal::StopCategory::kCategory0);
+  rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory0);
   const Outcome found = rig.watch();
   expect_row(found);
   EXPECT_EQ(found.open, found.safe) << "no braking";

@@ -74,13 +74,13 @@ struct JointRecovery : testing::Test {
   }
   void stop_at(double elbow_rad) {
     steps(100);
-    cycle->requests().emergency_stop(hal::StopCategory::kCategory0);
+    cycle->inbox().emergency_stop(hal::StopCategory::kCategory0);
     steps(5);
     backend.push(1, elbow_rad);
     steps(5);
   }
   void reset() {
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     steps(100);
     ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
   }
@@ -291,7 +291,7 @@ TEST_F(JointServices, HoldJointsAgainAfterAReset) {
   ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
   EXPECT_EQ(look(1).mode, static_cast<std::int8_t>(ControlMode::kPosition));
   EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "joints are held";
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(60);
   ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
   EXPECT_FALSE(mode("elbow", ControlMode::kTorque)) << "and so they are after the reset";

@@ -16,7 +16,7 @@ namespace tandem::runtime::test {
 /// @return how many commands its clock obeyed: the first round's, six, at least.
 inline int run_with_played_clock(RobotCycle& cycle, std::uint32_t seed) {
   std::mt19937 random(seed);
-  rt::ClockControl& clock = cycle.clock_control();
+  rt::ClockControl& clock = cycle.inbox().clock();
   EXPECT_TRUE(clock.pause());
   std::thread loop([&cycle] { cycle.run(); });
   int obeyed = 0;

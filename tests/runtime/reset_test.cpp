@@ -75,7 +75,7 @@ TEST_F(Waiting, AFaultLatchesAndTheLoopGoesOn) {
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
   EXPECT_EQ(controller->stops, 1);
   EXPECT_EQ(cycle->progress().latched.load(), 1U);
-  cycle->requests().end_run();
+  cycle->inbox().end_run();
   until(RunPhase::kDone);
   EXPECT_TRUE(cycle->faults().at(0).latched);
 }
@@ -93,7 +93,7 @@ struct Held : Waiting {
   void stop_and_reset() {
     backend->faulted_joint = 1;
     steps(50);
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     steps(1);
     until(RunPhase::kHeld);
   }
@@ -121,7 +121,7 @@ TEST_F(Held, AResetClearsAndHoldsAndNoMoreUntilControllersAreStarted) {
     EXPECT_DOUBLE_EQ(cycle->command().position_rad()[j], held[j]) << j;
   }
   EXPECT_EQ(cycle->running_cycles(), ran) << "the time in which it is held is not the run's";
-  cycle->requests().reset_faults();  // nothing is latched: no second way to go on
+  cycle->inbox().reset_faults();  // nothing is latched: no second way to go on
   EXPECT_FALSE(runs());
 
   ASSERT_TRUE(cycle->services().go_on(kNoWait));
@@ -186,7 +186,7 @@ TEST_F(Held, AJointThatOnlyWarnedIsNoReasonToMoveEither) {
   start({.settle_cycles = 10, .after_stop = AfterStop::kWait}, StopCategory::kWarn);
   backend->faulted_joint = 1;
   steps(10);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(1);
   until(RunPhase::kHeld);
   EXPECT_EQ(controller->starts, 1);
@@ -208,7 +208,7 @@ TEST_F(Waiting, AResetHoldsEveryJointThenStartsTheControllersAgain) {
   backend->faulted_joint = 1;
   steps(50);
   const int updates = controller->updates;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(1);
   EXPECT_EQ(cycle->phase(), RunPhase::kResetting);
   EXPECT_EQ(until(RunPhase::kSettling), 5);
@@ -230,7 +230,7 @@ TEST_F(Waiting, AResetWhoseCauseIsStillThereStaysLatchedAndIsTold) {
   backend->faulted_joint = 1;
   steps(10);
   backend->reset_clears = false;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kResetting);
   steps(1);
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
@@ -242,7 +242,7 @@ TEST_F(Waiting, AResetWhoseCauseIsStillThereStaysLatchedAndIsTold) {
 
 TEST_F(Waiting, AResetWhileNothingIsLatchedChangesNothing) {
   const int updates = controller->updates;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(10);
   EXPECT_EQ(controller->updates, updates + 10);
   EXPECT_EQ(controller->starts, 1);
@@ -267,7 +267,7 @@ TEST_F(Waiting, AJointThatOnlyWarnsIsResetToo) {
   steps(10);
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
   EXPECT_EQ(backend->stops, 0U);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kResetting);
   until(RunPhase::kRunning);
   EXPECT_EQ(controller->starts, 2);
@@ -280,7 +280,7 @@ TEST_F(Waiting, ASensorThatCameBackIsClearedWithoutStoppingAnything) {
   backend->lost_sensor = -1;
   steps(20);
   EXPECT_TRUE(cycle->faults().at(0).latched);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(1);
   EXPECT_FALSE(cycle->faults().at(0).latched);
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
@@ -293,19 +293,19 @@ TEST_F(Waiting, WhatTheLoopFindsByItselfUsesTheSameStop) {
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
   EXPECT_EQ(backend->latched, StopCategory::kCategory1);
   controller->answer = Code::kOk;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kRunning);
 
   controller->not_finite = true;
   until(RunPhase::kFaulted);
   controller->not_finite = false;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kRunning);
 
   backend->answer = Code::kBusOff;
   until(RunPhase::kFaulted);
   backend->answer = Code::kOk;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kRunning);
   EXPECT_EQ(cycle->faults().size(), 3U);
   EXPECT_EQ(controller->starts, 4);
@@ -325,7 +325,7 @@ TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
     steps(1);
   }
   EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kRunning);
   slow.now += 1'500'000;
   steps(1);
@@ -335,13 +335,13 @@ TEST_F(Waiting, LateCyclesCountAnewAfterAReset) {
 TEST_F(Waiting, AnEmergencyStopOnRequestStopsInTheNextCycle) {
   for (const StopCategory category : {StopCategory::kCategory0, StopCategory::kCategory1}) {
     start({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
-    cycle->requests().emergency_stop(category);
+    cycle->inbox().emergency_stop(category);
     steps(1);
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
     EXPECT_EQ(backend->latched, category);
     EXPECT_EQ(cycle->faults().at(0).text, "emergency stop on request");
     EXPECT_EQ(cycle->faults().at(0).category, category);
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     until(RunPhase::kRunning);
   }
 }
@@ -363,7 +363,7 @@ TEST_F(Waiting, AnEmergencyStopBySignalFollowsTheRobotsCategory) {
 
 TEST_F(Waiting, AnEmergencyStopEndsARunThatDoesNotWait) {
   start({});
-  cycle->requests().emergency_stop(StopCategory::kCategory0);
+  cycle->inbox().emergency_stop(StopCategory::kCategory0);
   steps(1);
   EXPECT_EQ(cycle->phase(), RunPhase::kShutDown);
   EXPECT_EQ(backend->latched, StopCategory::kCategory0);
@@ -375,7 +375,7 @@ TEST_F(Waiting, AFaultDuringBringUpEndsTheRun) {
       CycleParts{robot, *backend, *host, clock},
       CycleConfig{.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue});
   steps(5);
-  cycle->requests().emergency_stop(StopCategory::kCategory1);
+  cycle->inbox().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kDone);
   EXPECT_EQ(cycle->faults().size(), 1U);
 }
@@ -386,16 +386,16 @@ TEST_F(Waiting, EveryStepIsAnEventOfTheLog) {
   ASSERT_TRUE(recorder);
   start({.after_stop = AfterStop::kWait, .after_reset = AfterReset::kContinue},
         StopCategory::kCategory1, nullptr, recorder->get());
-  cycle->requests().emergency_stop(StopCategory::kCategory1);
+  cycle->inbox().emergency_stop(StopCategory::kCategory1);
   until(RunPhase::kFaulted);
   backend->reset_clears = false;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kResetting);
   until(RunPhase::kFaulted);
   backend->reset_clears = true;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kRunning);
-  cycle->requests().end_run();
+  cycle->inbox().end_run();
   until(RunPhase::kDone);
   (void)(*recorder)->close();
   const auto log = log::LogFile::open(folder / "a.mcap");
@@ -417,19 +417,6 @@ TEST(FaultLog, CountsWhatDoesNotFit) {
   EXPECT_EQ(log.lost(), 3U);
   log.clear(0, 5);
   EXPECT_EQ(log.latched(), FaultLog::kCapacity - 1);
-}
-
-TEST(Requests, KeepTheHardestUntilTheyAreTaken) {
-  rt::Doorbell bell;
-  Requests requests(bell);
-  requests.emergency_stop(StopCategory::kCategory1);
-  requests.emergency_stop(StopCategory::kCategory0);
-  requests.reset_faults();
-  const Requests::Pending asked = requests.take();
-  EXPECT_EQ(asked.emergency_stop, StopCategory::kCategory0);
-  EXPECT_TRUE(asked.reset);
-  EXPECT_FALSE(asked.end);
-  EXPECT_FALSE(requests.take().reset);
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ struct RetreatRun : ::testing::Test {
     for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
   }
   void stop(StopCategory category) {
-    (void)cycle->requests().emergency_stop(category);
+    (void)cycle->inbox().emergency_stop(category);
     steps(1);
   }
 
@@ -123,13 +123,13 @@ TEST_F(RetreatRun, TakesNoRequestsAndIsResetAsEveryStop) {
   stop(StopCategory::kCategory2);
   EXPECT_TRUE(cycle->services().recover("wrist", RunServices::Patience{0}));
   steps(1);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(1);
   EXPECT_EQ(cycle->phase(), RunPhase::kRetreating) << "no reset before it has stopped";
   able->answer = Code::kStopped;
   steps(1);
   able->answer = Code::kOk;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(50);
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
   ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
@@ -146,7 +146,7 @@ TEST_F(RetreatRun, LetsAllGoOnAfterAResetWithoutAnybody) {
   able->answer = Code::kStopped;
   steps(1);
   able->answer = Code::kOk;
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   steps(50);
   ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
   const int of_able = able->updates, of_other = other->updates;

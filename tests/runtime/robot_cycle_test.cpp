@@ -167,7 +167,7 @@ TEST(RobotCycle, MeasuresHowWellEachJointFollows) {
 TEST(RobotCycle, StopsInOrderOnRequest) {
   TestRun run;
   run.steps(100);
-  run.cycle->requests().end_run();
+  run.cycle->inbox().end_run();
   run.cycle->run();
   EXPECT_EQ(run.controller->stops, 1);
   EXPECT_LT(run.cycle->running_cycles(), kRunning);

@@ -97,7 +97,7 @@ TEST_F(Swing, GoesOnWithoutABumpAfterTheResetOfAFaultOfAnyCategory) {
     const double rest = cycle->state().position_rad()[0];
     ASSERT_GT(std::abs(rest - before), 0.05) << "the reference from before would be a bump";
     ASSERT_EQ(cycle->fault_log().latched(), 1U);
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     until(RunPhase::kSettling);
     EXPECT_NEAR(cycle->command().position_rad()[0], rest, 1e-4);
     EXPECT_LT(torque_step(199), kBump_Nm) << "while it is held";
@@ -114,7 +114,7 @@ TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted)
   inject(FaultKind::kEncoderUnplug, 5);
   come_to_rest();
   const double rest = cycle->state().position_rad()[0];
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kHeld);
   EXPECT_LT(torque_step(2000), kBump_Nm);
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
@@ -131,11 +131,11 @@ TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted)
 TEST_F(Swing, IsHeldBeyondItsLimitAndLedBackSlowly) {
   min_position_rad = 0.3;
   begin(StopCategory::kCategory0, AfterReset::kHold);
-  cycle->requests().emergency_stop(StopCategory::kCategory0);
+  cycle->inbox().emergency_stop(StopCategory::kCategory0);
   come_to_rest();
   const double rest = cycle->state().position_rad()[0];
   ASSERT_LT(rest, 0.1);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kHeld);
   steps(1000);
   EXPECT_NEAR(cycle->state().position_rad()[0], rest, 1e-3) << "nothing pulls it in";
@@ -159,7 +159,7 @@ TEST_F(Swing, IsCaughtInMotionWhereItIs) {
   begin(StopCategory::kCategory0);
   inject(FaultKind::kEncoderUnplug, 5);
   steps(60);
-  cycle->requests().reset_faults();
+  cycle->inbox().reset_faults();
   until(RunPhase::kSettling);
   const double way = std::abs(cycle->state().velocity_rad_s()[0]) * 2e-3 + 1e-4;
   EXPECT_NEAR(cycle->command().position_rad()[0], cycle->state().position_rad()[0], way);
@@ -177,14 +177,14 @@ TEST_F(Swing, IsStoppedByItsBoardsEmergencyInputAndNotResetWhileThatIsActive) {
     EXPECT_EQ(cycle->faults().at(0).board, "board");
     steps(1400);
     EXPECT_FALSE(powered());
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     until(RunPhase::kResetting);
     until(RunPhase::kFaulted);
     EXPECT_EQ(cycle->progress().failed_resets.load(), 1U);
     EXPECT_FALSE(powered());
     steps(2000);  // the input is inactive again
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted) << "latched";
-    cycle->requests().reset_faults();
+    cycle->inbox().reset_faults();
     until(RunPhase::kResetting);
     until(RunPhase::kRunning);
     EXPECT_FALSE(cycle->faults().at(0).latched);
@@ -193,7 +193,7 @@ TEST_F(Swing, IsStoppedByItsBoardsEmergencyInputAndNotResetWhileThatIsActive) {
 
 TEST_F(Swing, LosesItsTorqueACycleAfterAnEmergencyStopOfCategory0) {
   begin(StopCategory::kCategory1);
-  cycle->requests().emergency_stop(StopCategory::kCategory0);
+  cycle->inbox().emergency_stop(StopCategory::kCategory0);
   steps(1);
   EXPECT_TRUE(powered()) << "the command goes out with this cycle";
   steps(1);
@@ -202,7 +202,7 @@ TEST_F(Swing, LosesItsTorqueACycleAfterAnEmergencyStopOfCategory0) {
 
 TEST_F(Swing, BrakesACycleAfterAnEmergencyStopOfCategory1) {
   begin(StopCategory::kCategory1);
-  cycle->requests().emergency_stop(StopCategory::kCategory1);
+  cycle->inbox().emergency_stop(StopCategory::kCategory1);
   steps(2);
   EXPECT_EQ(backend->robot().board(0).axis(0).machine().motion(), canopen::DriveMotion::kQuickStop);
   steps(1100);

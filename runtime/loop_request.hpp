@@ -1,15 +1,10 @@
 // What another thread asks the loop to do at a cycle's boundary, and what the loop answers.
-// Layer: runtime.  Thread: the asking side one at a time (RunServices' mutex); the loop's is RT.
+// Layer: runtime.  Thread: plain data.
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 #include <limits>
-#include <optional>
-#include <type_traits>
 
-#include "base/realtime.hpp"
-#include "base/spsc_ring.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::runtime {
@@ -67,53 +62,9 @@ enum class RejectReason : std::uint32_t {
 struct LoopAnswer {
   std::uint64_t number = 0;  ///< the request's
   std::uint64_t cycle = 0;   ///< in which it was done
-  RejectReason refusal = RejectReason::kNone;
+  RejectReason reason = RejectReason::kNone;
   std::int32_t joint = -1;
   std::int32_t one = -1, other = -1;  ///< slots
-};
-
-/// Two rings. A request waits until the loop takes it, in the order in which they were made.
-class LoopMailbox {
- public:
-  static constexpr std::size_t kCapacity = 16;  ///< requests that wait
-
-  // The asking side's.
-  /// False when the loop has not taken the last kCapacity requests.
-  [[nodiscard]] bool ask(const LoopRequest& request) noexcept { return put(requests_, request); }
-  /// The next answer, if there is one.
-  [[nodiscard]] std::optional<LoopAnswer> take_answer() noexcept {
-    return take<LoopAnswer>(answers_);
-  }
-
-  // The loop's.
-  [[nodiscard]] std::optional<LoopRequest> take() noexcept TANDEM_RT {
-    return take<LoopRequest>(requests_);
-  }
-  void answer(const LoopAnswer& answer) noexcept TANDEM_RT { (void)put(answers_, answer); }
-
- private:
-  template <class T>
-  static bool put(SpscRing& ring, const T& value) noexcept TANDEM_RT {
-    static_assert(std::is_trivially_copyable_v<T>);
-    const std::span<std::byte> slot = ring.begin_push();
-    if (slot.empty()) return false;
-    std::memcpy(slot.data(), &value, sizeof value);
-    ring.end_push();
-    return true;
-  }
-  template <class T>
-  static std::optional<T> take(SpscRing& ring) noexcept TANDEM_RT {
-    const std::span<const std::byte> slot = ring.front();
-    if (slot.empty()) return std::nullopt;
-    T value;
-    std::memcpy(&value, slot.data(), sizeof value);
-    ring.pop();
-    return value;
-  }
-
-  SpscRing requests_{sizeof(LoopRequest), kCapacity};
-  // Every request that waits has room for its answer, and so have those that nobody awaits.
-  SpscRing answers_{sizeof(LoopAnswer), 8 * kCapacity};
 };
 
 }  // namespace tandem::runtime

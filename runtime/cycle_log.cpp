@@ -1,0 +1,33 @@
+// The only place where the loop meets the recorder.
+#include "runtime/cycle_log.hpp"
+
+namespace tandem::runtime {
+
+CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
+                   const hal::CommandImage& command, const hal::TruthImage* truth)
+    : recorder_(recorder) {
+  if (recorder_ == nullptr) return;
+  state_ = recorder_->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+  command_ = recorder_->add_channel("/tandem/command", "tandem/msg/Command", command.layout());
+  if (truth != nullptr) {
+    truth_ = recorder_->add_channel("/tandem/truth", "tandem/msg/Truth", truth->layout());
+  }
+  recorder_->start();
+}
+
+void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
+                     std::uint32_t code) noexcept TANDEM_RT {
+  if (recorder_ == nullptr) return;
+  recorder_->push(log::Event{time.cycle, time.time_ns, code, joint, kind, {}});
+}
+
+void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,
+                      const hal::CommandImage& command,
+                      const hal::TruthImage* truth) noexcept TANDEM_RT {
+  if (recorder_ == nullptr) return;
+  recorder_->push(state_, time.time_ns, state.bytes());
+  recorder_->push(command_, time.time_ns, command.bytes());
+  if (truth != nullptr) recorder_->push(truth_, time.time_ns, truth->bytes());
+}
+
+}  // namespace tandem::runtime

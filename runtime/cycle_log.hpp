@@ -1,0 +1,41 @@
+// A run's images and events, as the log gets them.
+// Layer: runtime.  Thread: made non-RT; the rest RT.
+#pragma once
+
+#include "base/realtime.hpp"
+#include "hal/cycle_time.hpp"
+#include "hal/image.hpp"
+#include "hal/truth.hpp"
+#include "log/recorder.hpp"
+
+namespace tandem::runtime {
+
+/// The channels of state, command and truth, and the events. Without a recorder it does nothing.
+class CycleLog {
+ public:
+  /// Adds its channels and starts the recorder. The layouts are those of the images shown.
+  /// @param recorder  null: nothing is logged. Outlives it.
+  /// @param truth     null: there is none
+  CycleLog(log::Recorder* recorder, const hal::StateImage& state, const hal::CommandImage& command,
+           const hal::TruthImage* truth);
+
+  /// For simulated time, which can wait: blocks until so many messages have room.
+  void wait_for_space(std::size_t messages) {
+    if (recorder_ != nullptr) recorder_->wait_for_space(messages);
+  }
+  /// @param joint  -1: none
+  void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
+             std::uint32_t code = 0) noexcept TANDEM_RT;
+  void images(const hal::CycleTime& time, const hal::StateImage& state,
+              const hal::CommandImage& command, const hal::TruthImage* truth) noexcept TANDEM_RT;
+  /// Messages that found no room.
+  [[nodiscard]] std::uint64_t dropped() const noexcept TANDEM_RT {
+    return recorder_ == nullptr ? 0 : recorder_->dropped();
+  }
+
+ private:
+  log::Recorder* recorder_;
+  log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0;
+};
+
+}  // namespace tandem::runtime

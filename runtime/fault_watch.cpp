@@ -1,0 +1,90 @@
+// Looks through the state image once a cycle for joints and sensors that are in fault or lost.
+#include "runtime/fault_watch.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+bool drive_in_fault(const hal::StateImage& state, std::size_t joint) noexcept TANDEM_RT {
+  const auto drive = static_cast<hal::DriveState>(state.drive_state()[joint]);
+  return drive == hal::DriveState::kFault || drive == hal::DriveState::kFaultReactionActive ||
+         state.fault()[joint] != 0;
+}
+
+}  // namespace
+
+FaultWatch::FaultWatch(const hal::RobotConfig& robot, const hal::Backend& backend,
+                       std::uint32_t lost_after_cycles, const FallLimits& fall)
+    : robot_(&robot),
+      backend_(&backend),
+      lost_after_cycles_(lost_after_cycles),
+      fall_(fall),
+      joint_told_(robot.joints.size()),
+      sensor_told_(robot.sensors.size()) {}
+
+bool FaultWatch::is_ill(const hal::StateImage& state, std::size_t joint) const noexcept TANDEM_RT {
+  return drive_in_fault(state, joint) || state.age_cycles()[joint] > lost_after_cycles_;
+}
+
+std::optional<FaultRecord> FaultWatch::next_joint(const hal::StateImage& state) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < joint_told_.size(); ++j) {
+    if (joint_told_[j] != 0 || !is_ill(state, j)) continue;
+    joint_told_[j] = 1;
+    joint_in_fault_ = true;
+    FaultRecord record{.index = static_cast<std::int32_t>(j),
+                       .code = state.age_cycles()[j],
+                       .source = FaultSource::kJointLost};
+    if (drive_in_fault(state, j)) {
+      record.source = FaultSource::kDrive;
+      record.code = state.fault()[j];
+      record.cause = backend_->fault_cause(j);
+    }
+    record.category = robot_->category_of(j, record.cause);
+    return record;
+  }
+  return std::nullopt;
+}
+
+std::optional<FaultRecord> FaultWatch::next_sensor(
+    const hal::StateImage& state) noexcept TANDEM_RT {
+  const auto ages = state.sensor_age_cycles();
+  for (std::size_t s = 0; s < ages.size(); ++s) {
+    const std::uint8_t lost = ages[s] > lost_after_cycles_ ? 1 : 0;
+    const bool is_new = lost != 0 && sensor_told_[s] == 0;
+    sensor_told_[s] = lost;
+    if (!is_new) continue;
+    return FaultRecord{.index = static_cast<std::int32_t>(s),
+                       .code = ages[s],
+                       .source = FaultSource::kSensorLost,
+                       .category = hal::StopCategory::kWarn};
+  }
+  return std::nullopt;
+}
+
+std::optional<FaultRecord> FaultWatch::fall(const hal::TruthImage& truth) noexcept TANDEM_RT {
+  const Fall found = fall_.look(truth);
+  if (found.kind == FallKind::kNone) return std::nullopt;
+  return FaultRecord{.index = found.thousandths,
+                     .code = static_cast<std::uint32_t>(found.kind),
+                     .source = FaultSource::kFall,
+                     .category = hal::StopCategory::kCategory1};
+}
+
+void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
+  joint_in_fault_ = false;
+  for (std::size_t j = 0; j < joint_told_.size(); ++j) {
+    joint_told_[j] = is_ill(state, j) ? 1 : 0;
+    joint_in_fault_ = joint_in_fault_ || joint_told_[j] != 0;
+  }
+}
+
+bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {
+  const auto index = static_cast<std::size_t>(record.index);
+  switch (record.source) {
+    case FaultSource::kDrive:
+    case FaultSource::kJointLost: return joint_told_[index] != 0;
+    case FaultSource::kSensorLost: return sensor_told_[index] != 0;
+    default: return false;
+  }
+}
+
+}  // namespace tandem::runtime

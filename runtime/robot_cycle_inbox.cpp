@@ -1,0 +1,123 @@
+// What others ask of the loop: taken, done and answered once a cycle, before its controllers.
+#include <algorithm>
+
+#include "rt/stop_signal.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::runtime {
+
+using hal::StopCategory;
+using log::EventKind;
+
+/// After everything that may change the phase: the owner, then what is urgent, then requests.
+void RobotCycle::take_inbox() noexcept TANDEM_RT {
+  follow_owner();
+  const Inbox::Urgent asked = inbox_.take_urgent();
+  if (asked.emergency_stop != StopCategory::kWarn) {
+    emergency_stop(EmergencyInput::kRequest, asked.emergency_stop);
+  }
+  if (asked.by_watchdog) {
+    // Not category 2: who hung cannot be trusted to retreat.
+    emergency_stop(EmergencyInput::kWatchdog,
+                   std::min(robot_->emergency_stop, StopCategory::kCategory1), asked.controller);
+  }
+  if (rt::take_emergency_stop()) emergency_stop(EmergencyInput::kSignal, robot_->emergency_stop);
+  if (asked.reset) begin_reset();
+  const bool end = asked.end || rt::stop_requested();
+  if (end && !run_.in(RunPhase::kShutDown)) {
+    event(EventKind::kStopRequested);
+    on(RunEvent::kEnd);
+  }
+  take_requests();
+  trace_.mark(Stage::kCheck, *clock_);
+}
+
+void RobotCycle::take_requests() noexcept TANDEM_RT {
+  for (std::size_t most = Inbox::kCapacity; most > 0; --most) {
+    const std::optional<LoopRequest> request = inbox_.take_request();
+    if (!request) return;
+    const bool ending = ends(run_.phase());
+    LoopAnswer answer = ending ? LoopAnswer{.reason = RejectReason::kEnding} : carry_out(*request);
+    if (answer.reason == RejectReason::kNone) log_request(*request);
+    answer.number = request->number;
+    answer.cycle = time_.cycle;
+    inbox_.answer(answer);
+  }
+}
+
+LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT {
+  using Kind = LoopRequest::Kind;
+  if (run_.in(RunPhase::kRetreating)) return {.reason = RejectReason::kNotEnabled};
+  switch (request.kind) {
+    case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
+    case Kind::kRemove: {
+      const LoopAnswer answer = controllers_->remove(request.slot);
+      if (answer.reason == RejectReason::kNone) {
+        held_back_ &= ~only(request.slot);
+        before_retreat_ &= ~only(request.slot);
+      }
+      return answer;
+    }
+    case Kind::kGoOn: return go_on();
+    case Kind::kSwitch:
+      if (const LoopAnswer no = controllers_->may_start(request.start);
+          no.reason != RejectReason::kNone) {
+        return no;
+      }
+      if (run_.in(RunPhase::kHeld)) return leave_hold(request.stop, request.start);
+      return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
+                                       controlled());
+    case Kind::kJoint:
+      return controllers_->set_joint(request.joint, request.wish, controlling_, state_,
+                                     controlled());
+    case Kind::kRecover:
+      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) {
+        return {.reason = RejectReason::kNotEnabled};
+      }
+      return controllers_->recover(request.joint, controlled());
+    case Kind::kGains: break;
+  }
+  parameters_.set_gains(request.joint, request.loop, request.gains);
+  return {};
+}
+
+/// From held joints to controllers: no joint jumps.
+LoopAnswer RobotCycle::leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT {
+  if (delay_.on()) {
+    delay_.fill(command_);
+    wanted_.assign(command_);
+  }
+  const LoopAnswer answer =
+      controllers_->switch_over(stop, start, true, time_, state_, controlled());
+  if (answer.reason != RejectReason::kNone) return answer;
+  held_back_ = 0;
+  on(RunEvent::kStart);
+  controlling_ = true;  // they are started
+  return answer;
+}
+
+/// Starts who was active before the reset.
+LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
+  const bool stopped = run_.in(RunPhase::kFaulted) || run_.in(RunPhase::kResetting);
+  if (stopped) return {.reason = RejectReason::kNotEnabled};
+  if (!run_.in(RunPhase::kHeld)) return {.reason = RejectReason::kNotHeld};
+  if (held_back_ == 0) return {.reason = RejectReason::kGone};
+  const LoopAnswer no = controllers_->may_start(held_back_);
+  if (no.reason != RejectReason::kNone) return no;
+  return leave_hold(0, held_back_);
+}
+
+/// In the log; what comes and goes without moving anything is not.
+void RobotCycle::log_request(const LoopRequest& request) noexcept TANDEM_RT {
+  using Kind = LoopRequest::Kind;
+  const auto joint = static_cast<std::int32_t>(request.joint);
+  if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) {
+    event(EventKind::kControllersSwitched);
+  }
+  if (request.kind == Kind::kJoint || request.kind == Kind::kRecover) {
+    event(EventKind::kJointSet, joint);
+  }
+  if (request.kind == Kind::kGains) event(EventKind::kGainsSet, joint);
+}
+
+}  // namespace tandem::runtime
