@@ -29,16 +29,20 @@ namespace tandem {
 /// What a controller may know and ask for when it is configured.
 class ControllerSetup {
  public:
-  ControllerSetup(const hal::Robot& robot_in, const tandem_kernels* kernels_in,
-                  std::int64_t period_ns_in, TomlTable parameters_in,
-                  std::span<const double> start_position_rad_in = {})
+  ControllerSetup(const hal::Robot& robot_in, hal::ParameterImage& gains_in,
+                  const tandem_kernels* kernels_in, std::int64_t period_ns_in,
+                  TomlTable parameters_in, std::span<const double> start_position_rad_in = {})
       : robot(robot_in),
+        gains(gains_in),
         kernels(kernels_in),
         period_ns(period_ns_in),
         parameters(std::move(parameters_in)),
         start_position_rad(start_position_rad_in) {}
 
-  const hal::Robot& robot;        ///< joints and their limits, sensors, sites, feet, postures
+  const hal::Robot& robot;  ///< joints and their limits, sensors, sites, feet, postures
+  /// Gains of the drives' loops, for hal::Devices; set those of claimed joints only, in start()
+  /// and update(). They outlive the controller.
+  hal::ParameterImage& gains;
   const tandem_kernels* kernels;  ///< the robot's generated model; null when it has none
   std::int64_t period_ns;         ///< the cycle's nominal period
   TomlTable parameters;           ///< [controller.parameters]; unknown keys are reported for you
@@ -109,7 +113,7 @@ class Controller {
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 5;
+inline constexpr std::uint32_t kControllerInterface = 6;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
@@ -125,8 +129,8 @@ inline constexpr std::uint32_t kControllerAbi =
     hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
              sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
              sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
-             sizeof(hal::StateImage), sizeof(hal::CommandImage), sizeof(hal::CycleTime),
-             sizeof(TomlTable), sizeof(tandem_kernels)});
+             sizeof(hal::StateImage), sizeof(hal::CommandImage), sizeof(hal::ParameterImage),
+             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

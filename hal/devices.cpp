@@ -5,9 +5,11 @@
 
 namespace tandem::hal {
 
-Devices::Devices(const Robot& robot, const StateImage& state, CommandImage& command,
-                 ParameterImage& parameters, std::int64_t period_ns)
-    : access_{state, command, parameters, {robot.joints.begin(), robot.joints.end()}, period_ns},
+Devices::Devices(const Robot& robot, ParameterImage& gains, std::int64_t period_ns)
+    : no_state_(robot.shape()),
+      no_command_(robot.shape()),
+      access_{
+          &no_state_, &no_command_, &gains, {robot.joints.begin(), robot.joints.end()}, period_ns},
       sensors_(robot.sensors),
       encoders(access_),
       modes(access_),
@@ -21,11 +23,21 @@ Devices::Devices(const Robot& robot, const StateImage& state, CommandImage& comm
       pid(access_),
       impedance(access_),
       amplifier(access_),
-      clock(state) {
+      clock(access_) {}
+
+Devices::Devices(const Robot& robot, const StateImage& state, CommandImage& command,
+                 ParameterImage& gains, std::int64_t period_ns)
+    : Devices(robot, gains, period_ns) {
+  begin(state, command);
   for (std::size_t j = 0; j < access_.joints.size(); ++j) {
     command.stiffness_Nm_rad()[j] = access_.joints[j].stiffness_Nm_rad;
     command.damping_Nms_rad()[j] = access_.joints[j].damping_Nms_rad;
   }
+}
+
+void Devices::begin(const StateImage& state, CommandImage& command) noexcept TANDEM_RT {
+  access_.state = &state;
+  access_.command = &command;
 }
 
 void Devices::advance() noexcept TANDEM_RT {
@@ -51,13 +63,13 @@ Result<std::size_t> Devices::sensor(std::string_view name, SensorType type) cons
 Result<SixAxisForceTorque> Devices::force_torque(std::string_view name) const {
   const Result<std::size_t> index = sensor(name, SensorType::kForceTorque);
   if (!index) return std::unexpected(index.error());
-  return SixAxisForceTorque(access_.state, *index, access_.period_ns);
+  return SixAxisForceTorque(access_, *index);
 }
 
 Result<Imu> Devices::imu(std::string_view name) const {
   const Result<std::size_t> index = sensor(name, SensorType::kImu);
   if (!index) return std::unexpected(index.error());
-  return Imu(access_.state, *index, access_.period_ns);
+  return Imu(access_, *index);
 }
 
 }  // namespace tandem::hal

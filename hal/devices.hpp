@@ -13,17 +13,27 @@
 
 namespace tandem::hal {
 
-/// YARP's interfaces over a robot's images, once for every backend:
-/// `devices.modes.set_control_mode(j, ControlMode::kPosition);
-///  devices.position.position_move(j, 0.5);` and, each cycle, `devices.advance()`.
+/// YARP's interfaces over a robot's images, once for every backend. In each cycle:
+///
+///   devices.begin(state, command);              // the images of this cycle
+///   devices.position.position_move(j, 0.5);     // whatever is to be done
+///   devices.advance();                          // the references of the motions under way
+///
+/// A controller makes one in its configure() and begins it in each start() and update(); its claims
+/// are the modes it may set (example 06). Before the first begin() the images are empty ones.
 class Devices {
  public:
-  /// The images outlive this. Gives every compliant joint its default impedance.
-  Devices(const Robot& robot, const StateImage& state, CommandImage& command,
-          ParameterImage& parameters, std::int64_t period_ns);
+  /// @param gains  of the drives' loops, as they are asked for: ControllerSetup::gains. Outlives
+  ///               this.
+  Devices(const Robot& robot, ParameterImage& gains, std::int64_t period_ns);
+  /// Of images that stay, and outlive this. Gives every compliant joint its default impedance.
+  Devices(const Robot& robot, const StateImage& state, CommandImage& command, ParameterImage& gains,
+          std::int64_t period_ns);
   Devices(const Devices&) = delete;
   Devices& operator=(const Devices&) = delete;
 
+  /// The images of this cycle; they stay until the next begin().
+  void begin(const StateImage& state, CommandImage& command) noexcept TANDEM_RT;
   /// Writes this cycle's references of the motions under way: after read, before the limits.
   void advance() noexcept TANDEM_RT;
   void archive(Archive& ar);
@@ -37,6 +47,8 @@ class Devices {
   [[nodiscard]] Result<Imu> imu(std::string_view name) const;
 
  private:
+  StateImage no_state_;
+  CommandImage no_command_;
   JointAccess access_;
   std::vector<Sensor> sensors_;
   [[nodiscard]] Result<std::size_t> sensor(std::string_view name, SensorType type) const;

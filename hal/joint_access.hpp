@@ -16,7 +16,7 @@ namespace tandem::hal {
 
 [[nodiscard]] inline bool in_mode(const JointAccess& io, std::size_t j,
                                   ControlMode mode) noexcept TANDEM_RT {
-  return io.command.mode()[j] == static_cast<std::int8_t>(mode);
+  return io.command->mode()[j] == static_cast<std::int8_t>(mode);
 }
 
 /// Whether `value` may be written: the rules of joint_devices.hpp.
@@ -28,12 +28,12 @@ namespace tandem::hal {
 
 /// Sets every reference of a joint to what is measured, feed-forward and offsets to zero.
 inline void seed_references(JointAccess& io, std::size_t j, ControlMode mode) noexcept TANDEM_RT {
-  const StateImage& state = io.state;
-  io.command.position_rad()[j] = state.position_rad()[j];
-  io.command.velocity_rad_s()[j] = 0.0;
-  io.command.torque_Nm()[j] = mode == ControlMode::kTorque ? state.torque_Nm()[j] : 0.0;
-  io.command.voltage_V()[j] = mode == ControlMode::kOpenLoop ? state.voltage_V()[j] : 0.0;
-  io.command.current_A()[j] = mode == ControlMode::kCurrent ? state.current_A()[j] : 0.0;
+  const StateImage& state = *io.state;
+  io.command->position_rad()[j] = state.position_rad()[j];
+  io.command->velocity_rad_s()[j] = 0.0;
+  io.command->torque_Nm()[j] = mode == ControlMode::kTorque ? state.torque_Nm()[j] : 0.0;
+  io.command->voltage_V()[j] = mode == ControlMode::kOpenLoop ? state.voltage_V()[j] : 0.0;
+  io.command->current_A()[j] = mode == ControlMode::kCurrent ? state.current_A()[j] : 0.0;
 }
 
 }  // namespace tandem::hal

@@ -17,11 +17,11 @@ class Archive;
 
 namespace tandem::hal {
 
-/// What the interfaces work on. The images outlive them.
+/// What the interfaces work on: this cycle's images.
 struct JointAccess {
-  const StateImage& state;
-  CommandImage& command;
-  ParameterImage& parameters;
+  const StateImage* state;
+  CommandImage* command;
+  ParameterImage* parameters;
   std::vector<JointCapabilities> joints;
   std::int64_t period_ns;
 };
@@ -98,6 +98,9 @@ class PositionControl {
   [[nodiscard]] double ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
   /// Brakes with the reference acceleration and stays there.
   Code stop(std::size_t j) noexcept TANDEM_RT;
+  /// Ends every motion, or the joint's, without a further reference: somebody else has the joint.
+  void abandon() noexcept TANDEM_RT;
+  void abandon(std::size_t j) noexcept TANDEM_RT;
   /// Where the motion ends; the reference itself when there is none.
   [[nodiscard]] double target_position_rad(std::size_t j) const noexcept TANDEM_RT;
 

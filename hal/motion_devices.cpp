@@ -29,7 +29,7 @@ Code PositionControl::position_move(std::size_t j, double target_rad) noexcept T
   const Code code = checked(io_, j, target_rad, limit.min_position_rad, limit.max_position_rad);
   if (code != Code::kOk) return code;
   Motion& motion = motions_[j];
-  if (motion.phase == kResting) motion.reference = {io_.command.position_rad()[j], 0.0};
+  if (motion.phase == kResting) motion.reference = {io_.command->position_rad()[j], 0.0};
   motion.target_rad = target_rad;
   motion.phase = kMoving;
   return Code::kOk;
@@ -37,7 +37,7 @@ Code PositionControl::position_move(std::size_t j, double target_rad) noexcept T
 
 Code PositionControl::relative_move(std::size_t j, double way_rad) noexcept TANDEM_RT {
   if (j >= motions_.size()) return Code::kOutOfRange;
-  return position_move(j, io_.command.position_rad()[j] + way_rad);
+  return position_move(j, io_.command->position_rad()[j] + way_rad);
 }
 
 bool PositionControl::check_motion_done(std::size_t j) const noexcept TANDEM_RT {
@@ -74,8 +74,16 @@ Code PositionControl::stop(std::size_t j) noexcept TANDEM_RT {
   return Code::kOk;
 }
 
+void PositionControl::abandon() noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < motions_.size(); ++j) abandon(j);
+}
+
+void PositionControl::abandon(std::size_t j) noexcept TANDEM_RT {
+  if (j < motions_.size()) motions_[j].phase = kResting;
+}
+
 double PositionControl::target_position_rad(std::size_t j) const noexcept TANDEM_RT {
-  if (check_motion_done(j)) return at(std::as_const(io_.command).position_rad(), j);
+  if (check_motion_done(j)) return at(std::as_const(*io_.command).position_rad(), j);
   return motions_[j].target_rad;
 }
 
@@ -97,8 +105,8 @@ void PositionControl::advance() noexcept TANDEM_RT {
       motion.target_rad = reference.position_rad;
       done = reference.velocity_rad_s == 0.0;
     }
-    io_.command.position_rad()[j] = reference.position_rad;
-    io_.command.velocity_rad_s()[j] = reference.velocity_rad_s;
+    io_.command->position_rad()[j] = reference.position_rad;
+    io_.command->velocity_rad_s()[j] = reference.velocity_rad_s;
     if (done) motion.phase = kResting;
   }
 }
@@ -139,7 +147,7 @@ void VelocityControl::advance() noexcept TANDEM_RT {
       ramp.target_rad_s = 0.0;
       continue;
     }
-    double& reference = io_.command.velocity_rad_s()[j];
+    double& reference = io_.command->velocity_rad_s()[j];
     const double change = ramp.acceleration_rad_s2 * dt;
     reference = std::clamp(ramp.target_rad_s, reference - change, reference + change);
   }

@@ -7,9 +7,7 @@
 #include <span>
 
 #include "base/realtime.hpp"
-#include "hal/backend.hpp"
-#include "hal/image.hpp"
-#include "hal/robot.hpp"
+#include "hal/joint_devices.hpp"
 
 namespace tandem::hal {
 
@@ -17,24 +15,22 @@ namespace tandem::hal {
 class AnalogSensor {
  public:
   /// @param index  of the sensor in the robot's configuration
-  AnalogSensor(const StateImage& state, std::size_t index, std::int64_t period_ns)
-      : state_(&state), index_(index), period_ns_(period_ns) {}
+  AnalogSensor(const JointAccess& access, std::size_t index) : io_(&access), index_(index) {}
   [[nodiscard]] std::span<const double> channels() const noexcept TANDEM_RT {
-    return state_->sensor_values(index_);
+    return io_->state->sensor_values(index_);
   }
   /// 0: measured in this cycle; k: the sample is k cycles old.
   [[nodiscard]] std::uint32_t age_cycles() const noexcept TANDEM_RT {
-    return state_->sensor_age_cycles()[index_];
+    return io_->state->sensor_age_cycles()[index_];
   }
   /// Nominal time at which the sample was taken.
   [[nodiscard]] std::int64_t timestamp_ns() const noexcept TANDEM_RT {
-    return state_->time_ns()[0] - age_cycles() * period_ns_;
+    return io_->state->time_ns()[0] - age_cycles() * io_->period_ns;
   }
 
  private:
-  const StateImage* state_;
+  const JointAccess* io_;
   std::size_t index_;
-  std::int64_t period_ns_;
 };
 
 /// ISixAxisForceTorque: the wrench that the side away from the base applies to the base's side,
@@ -71,13 +67,13 @@ class Imu : public AnalogSensor {
 /// The robot's time: a count of cycles, simulated or not.
 class Clock {
  public:
-  explicit Clock(const StateImage& state) : state_(&state) {}
-  [[nodiscard]] std::uint64_t cycle() const noexcept TANDEM_RT { return state_->cycle()[0]; }
+  explicit Clock(const JointAccess& access) : io_(&access) {}
+  [[nodiscard]] std::uint64_t cycle() const noexcept TANDEM_RT { return io_->state->cycle()[0]; }
   /// Nominal time since the start.
-  [[nodiscard]] std::int64_t now_ns() const noexcept TANDEM_RT { return state_->time_ns()[0]; }
+  [[nodiscard]] std::int64_t now_ns() const noexcept TANDEM_RT { return io_->state->time_ns()[0]; }
 
  private:
-  const StateImage* state_;
+  const JointAccess* io_;
 };
 
 }  // namespace tandem::hal

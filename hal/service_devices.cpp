@@ -13,23 +13,24 @@ Code PidControl::set_pid(std::size_t j, PidLoop loop, const PidGains& gains) noe
     const Code code = checked(io_, j, gain, 0.0, limit);
     if (code != Code::kOk) return code;
   }
-  io_.parameters.set_gains(j, loop, gains);
+  io_.parameters->set_gains(j, loop, gains);
   return Code::kOk;
 }
 PidGains PidControl::pid(std::size_t j, PidLoop loop) const noexcept TANDEM_RT {
   const double none = at({}, j);
-  return j < io_.joints.size() ? io_.parameters.gains(j, loop) : PidGains{none, none, none};
+  return j < io_.joints.size() ? io_.parameters->gains(j, loop) : PidGains{none, none, none};
 }
 double PidControl::error(std::size_t j, PidLoop loop) const noexcept TANDEM_RT {
-  const CommandImage& command = io_.command;
+  const CommandImage& command = *io_.command;
   switch (loop) {
-    case PidLoop::kPosition: return at(command.position_rad(), j) - at(io_.state.position_rad(), j);
+    case PidLoop::kPosition:
+      return at(command.position_rad(), j) - at(io_.state->position_rad(), j);
     case PidLoop::kVelocity:
-      return at(command.velocity_rad_s(), j) - at(io_.state.velocity_rad_s(), j);
-    case PidLoop::kTorque: return at(command.torque_Nm(), j) - at(io_.state.torque_Nm(), j);
+      return at(command.velocity_rad_s(), j) - at(io_.state->velocity_rad_s(), j);
+    case PidLoop::kTorque: return at(command.torque_Nm(), j) - at(io_.state->torque_Nm(), j);
     case PidLoop::kCurrent: break;
   }
-  return at(command.current_A(), j) - at(io_.state.current_A(), j);
+  return at(command.current_A(), j) - at(io_.state->current_A(), j);
 }
 
 Code ImpedanceControl::set_impedance(std::size_t j, const Impedance& impedance) noexcept TANDEM_RT {
@@ -39,12 +40,12 @@ Code ImpedanceControl::set_impedance(std::size_t j, const Impedance& impedance) 
   const Code damping = checked(io_, j, impedance.damping_Nms_rad, 0.0, max.damping_Nms_rad);
   if (damping != Code::kOk) return damping;
   if (!io_.joints[j].can(Capability::kCompliant)) return Code::kOutOfRange;
-  io_.command.stiffness_Nm_rad()[j] = impedance.stiffness_Nm_rad;
-  io_.command.damping_Nms_rad()[j] = impedance.damping_Nms_rad;
+  io_.command->stiffness_Nm_rad()[j] = impedance.stiffness_Nm_rad;
+  io_.command->damping_Nms_rad()[j] = impedance.damping_Nms_rad;
   return Code::kOk;
 }
 Impedance ImpedanceControl::impedance(std::size_t j) const noexcept TANDEM_RT {
-  const CommandImage& command = io_.command;
+  const CommandImage& command = *io_.command;
   return {at(command.stiffness_Nm_rad(), j), at(command.damping_Nms_rad(), j)};
 }
 Code ImpedanceControl::set_impedance_offset(std::size_t j, double Nm) noexcept TANDEM_RT {
@@ -54,12 +55,12 @@ Code ImpedanceControl::set_impedance_offset(std::size_t j, double Nm) noexcept T
   }
   const double max = io_.joints[j].max_torque_Nm;
   const Code code = checked(io_, j, Nm, -max, max);
-  if (code == Code::kOk) io_.command.torque_Nm()[j] = Nm;
+  if (code == Code::kOk) io_.command->torque_Nm()[j] = Nm;
   return code;
 }
 double ImpedanceControl::impedance_offset_Nm(std::size_t j) const noexcept TANDEM_RT {
   if (j < io_.joints.size() && in_mode(io_, j, ControlMode::kTorque)) return 0.0;
-  return at(std::as_const(io_.command).torque_Nm(), j);
+  return at(std::as_const(*io_.command).torque_Nm(), j);
 }
 Impedance ImpedanceControl::impedance_limits(std::size_t j) const noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return {at({}, j), at({}, j)};
@@ -70,12 +71,12 @@ Code AmplifierControl::enable(std::size_t j) noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return Code::kOutOfRange;
   if (!in_mode(io_, j, ControlMode::kIdle)) return Code::kOk;
   seed_references(io_, j, enabled_mode_[j]);
-  io_.command.mode()[j] = static_cast<std::int8_t>(enabled_mode_[j]);
+  io_.command->mode()[j] = static_cast<std::int8_t>(enabled_mode_[j]);
   return Code::kOk;
 }
 Code AmplifierControl::disable(std::size_t j) noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return Code::kOutOfRange;
-  std::int8_t& mode = io_.command.mode()[j];
+  std::int8_t& mode = io_.command->mode()[j];
   if (mode != static_cast<std::int8_t>(ControlMode::kIdle)) {
     enabled_mode_[j] = static_cast<ControlMode>(mode);
   }
@@ -84,31 +85,31 @@ Code AmplifierControl::disable(std::size_t j) noexcept TANDEM_RT {
 }
 DriveState AmplifierControl::status(std::size_t j) const noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return DriveState::kUnknown;
-  return static_cast<DriveState>(io_.state.drive_state()[j]);
+  return static_cast<DriveState>(io_.state->drive_state()[j]);
 }
 double AmplifierControl::current_A(std::size_t j) const noexcept TANDEM_RT {
-  return at(io_.state.current_A(), j);
+  return at(io_.state->current_A(), j);
 }
 double AmplifierControl::temperature_C(std::size_t j) const noexcept TANDEM_RT {
-  return at(io_.state.temperature_C(), j);
+  return at(io_.state->temperature_C(), j);
 }
 double AmplifierControl::max_current_A(std::size_t j) const noexcept TANDEM_RT {
   return j < io_.joints.size() ? io_.joints[j].max_current_A : at({}, j);
 }
 std::uint32_t AmplifierControl::fault(std::size_t j) const noexcept TANDEM_RT {
-  return j < io_.joints.size() ? io_.state.fault()[j] : 0;
+  return j < io_.joints.size() ? io_.state->fault()[j] : 0;
 }
 Code AmplifierControl::reset_fault(std::size_t j) noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return Code::kOutOfRange;
-  io_.command.fault_reset()[j] = 1;
+  io_.command->fault_reset()[j] = 1;
   return Code::kOk;
 }
 
 void AmplifierControl::advance() noexcept TANDEM_RT {
   for (std::size_t j = 0; j < io_.joints.size(); ++j) {
-    if (io_.command.fault_reset()[j] == 0) continue;
-    seed_references(io_, j, static_cast<ControlMode>(io_.command.mode()[j]));
-    if (io_.state.fault()[j] == 0) io_.command.fault_reset()[j] = 0;
+    if (io_.command->fault_reset()[j] == 0) continue;
+    seed_references(io_, j, static_cast<ControlMode>(io_.command->mode()[j]));
+    if (io_.state->fault()[j] == 0) io_.command->fault_reset()[j] = 0;
   }
 }
 

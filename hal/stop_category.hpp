@@ -32,9 +32,9 @@ enum class FaultCause : std::uint8_t {
   kBoardSilent,     ///< no feedback of its board
   kHeartbeatLost,   ///< of its board
   kBoardRebooted,
-  kBoardStopped,    ///< its board left NMT operational by itself
-  kBoardRefused,    ///< its board cannot be configured
-  kTwoBoards,       ///< two boards answer under its board's id
+  kBoardStopped,  ///< its board left NMT operational by itself
+  kBoardRefused,  ///< its board cannot be configured
+  kTwoBoards,     ///< two boards answer under its board's id
 };
 
 /// As the TOML has it: "category0".

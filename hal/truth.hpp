@@ -19,8 +19,7 @@ class TruthImage : public Image {
 #undef TANDEM_FIELD
 
  public:
-  TruthImage(std::size_t joints, std::size_t feet, std::size_t loops = 0,
-             std::size_t passive = 0);
+  TruthImage(std::size_t joints, std::size_t feet, std::size_t loops = 0, std::size_t passive = 0);
 
   [[nodiscard]] std::size_t joints() const noexcept { return position_rad_.count; }
   [[nodiscard]] std::size_t feet() const noexcept { return foot_position_m_.count / 3; }

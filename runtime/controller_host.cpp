@@ -11,11 +11,13 @@ ControllerHost::ControllerHost(const hal::RobotConfig& config, const tandem_kern
                                std::int64_t period_ns)
     : config_(&config),
       robot_(hal::robot_of(config)),
+      gains_(hal::initial_parameters(config)),
       kernels_(kernels),
       period_ns_(period_ns),
       capabilities_(robot_.joints.begin(), robot_.joints.end()),
       owner_(robot_.joints.size(), -1),
       recovers_(robot_.joints.size()),
+      operator_(robot_, gains_, period_ns),
       transfer_(robot_.joints.size(), period_ns),
       guard_(robot_.shape(), capabilities_) {
   for (const hal::JointCapabilities& joint : capabilities_) {
@@ -77,7 +79,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
 Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
     std::span<const double> start_rad) {
-  ControllerSetup setup(robot_, kernels_, period_ns_, std::move(parameters), start_rad);
+  ControllerSetup setup(robot_, gains_, kernels_, period_ns_, std::move(parameters), start_rad);
   const Status configured = hosted_call(name, [&] { return controller->configure(setup); });
   // Keys that it did not get to before it failed are not wrong.
   if (!configured) return std::unexpected(configured.error());
@@ -166,6 +168,7 @@ void ControllerHost::set_active(ControllerSet active) noexcept TANDEM_RT {
     for (const auto& claim : table_[slot]->claims) {
       owner_[claim.joint] = static_cast<std::int32_t>(slot);
       recovers_[claim.joint] = 0;
+      operator_.position.abandon(claim.joint);
     }
   }
   show();
@@ -206,6 +209,7 @@ Code ControllerHost::update(const hal::CycleTime& time, const hal::StateImage& s
     ends = ends && (done_ & only(slot)) != 0 && one.of_experiment;
   }
   leave_calls();
+  move_on(state, command);
   transfer_.after_update(state, command);
   show();
   return ends ? Code::kStopped : Code::kOk;
@@ -242,6 +246,7 @@ void ControllerHost::stop() noexcept TANDEM_RT {
     if (is_active(slot)) enter(*table_[slot]).stop();
   }
   leave_calls();
+  operator_.position.abandon();
   transfer_.clear();
 }
 
@@ -267,7 +272,7 @@ void ControllerHost::archive(Archive& ar) {
     one->controller->archive(ar);
     ar(one->strayed);
   }
-  ar(active_, done_, impedance_, recovers_, failed_controller_, transfer_);
+  ar(active_, done_, impedance_, recovers_, failed_controller_, transfer_, operator_, gains_);
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if (table_[slot] == nullptr) active_ &= ~only(slot);  // bytes of something else
   }

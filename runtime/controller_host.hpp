@@ -20,6 +20,7 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/devices.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "runtime/bumpless_transfer.hpp"
@@ -115,6 +116,8 @@ class ControllerHost {
   using Owned = std::array<std::unique_ptr<HostedController>, kMostControllers>;
   /// What is loaded, by slot: add()'s before the run, RunServices' while it goes on.
   [[nodiscard]] Owned& owned() noexcept { return owned_; }
+  /// Gains of the drives' loops, as they are asked for. The loop's.
+  [[nodiscard]] hal::ParameterImage& gains() noexcept { return gains_; }
 
   // The loop's, at a cycle's boundary. Each answers why it did nothing.
 
@@ -137,6 +140,11 @@ class ControllerHost {
   /// that.
   [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
 
+  /// Starts a motion of a joint that no active controller claims, in position control; one under
+  /// way goes over into it. A claim, another mode, a stop and a reset end it.
+  [[nodiscard]] LoopAnswer move(std::size_t joint, const MoveRequest& wish, bool running,
+                                const hal::StateImage& state,
+                                hal::CommandImage& command) noexcept TANDEM_RT;
   /// Lets a joint that no active controller claims come back to its limits, by lead_back(), at the
   /// speed that CommandLimits allows out there. A reset ends that.
   [[nodiscard]] LoopAnswer recover(std::size_t joint,
@@ -144,6 +152,8 @@ class ControllerHost {
 
   // The cycle.
 
+  /// Each cycle in which no controller runs and joints are held, last: the motions of move().
+  void move_on(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
   /// Each cycle in which joints are held, last: their references, toward their limits.
   void lead_back(hal::CommandImage& command) noexcept TANDEM_RT;
   /// Writes "stay where you are" for every joint: position control at the measured position.
@@ -227,6 +237,7 @@ class ControllerHost {
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it
+  hal::ParameterImage gains_;
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
   std::vector<double> start_rad_;  // of start_from()
@@ -238,6 +249,7 @@ class ControllerHost {
   std::vector<std::int32_t> owner_;     // by joint: an active one's slot, or -1
   std::vector<Impedance> impedance_;    // by joint: that a start gives it
   std::vector<std::uint8_t> recovers_;  // by joint: it is led back to its limits
+  hal::Devices operator_;               // moves joints that nobody claims
   BumplessTransfer transfer_;
   ClaimGuard guard_;
   std::optional<Stray> stray_;

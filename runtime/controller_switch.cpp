@@ -45,6 +45,7 @@ void ControllerHost::hold(const hal::StateImage& state,
 void ControllerHost::release(hal::CommandImage& command) noexcept TANDEM_RT {
   std::ranges::fill(command.mode(), static_cast<std::int8_t>(ControlMode::kIdle));
   std::ranges::fill(recovers_, std::uint8_t{0});
+  operator_.position.abandon();
 }
 
 void ControllerHost::set_modes(const HostedController& one,
@@ -197,6 +198,41 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish
     seat(joint, mode, interaction, state, command);
   }
   return {.joint = number, .one = owned_by};
+}
+
+LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish, bool running,
+                                const hal::StateImage& state,
+                                hal::CommandImage& command) noexcept TANDEM_RT {
+  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint), .one = owner_[joint]};
+  hal::PositionControl& motions = operator_.position;
+  operator_.begin(state, command);
+  if (owner_[joint] >= 0) {
+    answer.reason = RejectReason::kClaimed;
+  } else if (command.mode()[joint] != kPositionMode) {
+    answer.reason = RejectReason::kOtherMode;
+  } else if (!std::isfinite(wish.target_rad)) {
+    (void)motions.stop(joint);
+  } else if (recovers_[joint] != 0) {
+    answer.reason = RejectReason::kRecovering;
+  } else {
+    const double limit = capabilities_[joint].max_velocity_rad_s;
+    const double speed = std::isfinite(wish.speed_rad_s) ? wish.speed_rad_s : limit / 4.0;
+    const double acceleration =
+        std::isfinite(wish.acceleration_rad_s2) ? wish.acceleration_rad_s2 : speed / 0.5;
+    // From what is commanded now, a transfer's offset included.
+    if (running && motions.check_motion_done(joint)) transfer_.begin(joint, state, command);
+    const bool begun = motions.set_ref_speed(joint, speed) == Code::kOk &&
+                       motions.set_ref_acceleration(joint, acceleration) == Code::kOk &&
+                       motions.position_move(joint, wish.target_rad) == Code::kOk;
+    if (!begun) answer.reason = RejectReason::kBeyond;
+  }
+  return answer;
+}
+
+void ControllerHost::move_on(const hal::StateImage& state,
+                             hal::CommandImage& command) noexcept TANDEM_RT {
+  operator_.begin(state, command);
+  operator_.position.advance();
 }
 
 LoopAnswer ControllerHost::recover(std::size_t joint,

@@ -21,6 +21,15 @@ struct JointRequest {
   std::int32_t interaction = -1;  ///< hal::InteractionMode
 };
 
+/// Where a joint is to go, on a trapezoid of speed. NaN: hal::PositionControl's own.
+struct MoveRequest {
+  static constexpr double kDefault = std::numeric_limits<double>::quiet_NaN();
+
+  double target_rad = kDefault;  ///< NaN: it brakes, and stays where it comes to rest
+  double speed_rad_s = kDefault;
+  double acceleration_rad_s2 = kDefault;
+};
+
 struct LoopRequest {
   enum class Kind : std::uint32_t {
     kInsert,   ///< `controller` into `slot`
@@ -30,6 +39,7 @@ struct LoopRequest {
     kJoint,    ///< `wish` of `joint`
     kGains,    ///< `gains` of `joint` and `loop`
     kRecover,  ///< `joint`, back to its limits
+    kMove,     ///< `joint`, as `move` says
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -40,6 +50,7 @@ struct LoopRequest {
   HostedController* controller = nullptr;
   JointRequest wish{};
   hal::PidGains gains{};
+  MoveRequest move{};
 };
 
 /// Why the loop did not do it. Nothing has changed then.
@@ -54,6 +65,7 @@ enum class RejectReason : std::uint32_t {
   kIncapable,   ///< `joint` lacks the mode
   kWithin,      ///< `joint` is within its limits
   kOtherMode,   ///< `joint` is not in position control
+  kBeyond,      ///< a value is beyond `joint`'s limits
   kNotEnabled,  ///< nothing moves in this phase
   kNotHeld,     ///< no reset holds controllers back
   kRecovering,  ///< `joint`, which `one` claims, is on its way back to its limits

@@ -162,6 +162,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
     case RunPhase::kSettling:
     case RunPhase::kHeld:
       controllers_->hold(state_, command_);
+      controllers_->move_on(state_, command_);
       controllers_->lead_back(command_);
       break;
     case RunPhase::kRunning:
@@ -270,7 +271,7 @@ void RobotCycle::limit() noexcept TANDEM_RT {
 
 void RobotCycle::write() noexcept TANDEM_RT {
   if (!run_.in(RunPhase::kShutDown)) {
-    check_backend(backend_->write(command_, parameters_));
+    check_backend(backend_->write(command_, controllers_->gains()));
   } else {
     backend_->last_command(command_);
     const bool disabled = backend_->shut_down();

@@ -166,7 +166,6 @@ class RobotCycle {
   hal::CommandImage command_;
   hal::CommandImage wanted_;  // by the controllers, when what they want is delayed
   CommandDelay delay_;
-  hal::ParameterImage parameters_;
   hal::CommandLimits limits_;
 
   FaultWatch watch_;

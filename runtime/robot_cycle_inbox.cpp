@@ -75,9 +75,14 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
         return {.reason = RejectReason::kNotEnabled};
       }
       return controllers_->recover(request.joint, controlled());
+    case Kind::kMove:
+      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) {
+        return {.reason = RejectReason::kNotEnabled};
+      }
+      return controllers_->move(request.joint, request.move, controlling_, state_, controlled());
     case Kind::kGains: break;
   }
-  parameters_.set_gains(request.joint, request.loop, request.gains);
+  controllers_->gains().set_gains(request.joint, request.loop, request.gains);
   return {};
 }
 
@@ -114,7 +119,8 @@ void RobotCycle::log_request(const LoopRequest& request) noexcept TANDEM_RT {
   if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) {
     event(EventKind::kControllersSwitched);
   }
-  if (request.kind == Kind::kJoint || request.kind == Kind::kRecover) {
+  if (request.kind == Kind::kJoint || request.kind == Kind::kRecover ||
+      request.kind == Kind::kMove) {
     event(EventKind::kJointSet, joint);
   }
   if (request.kind == Kind::kGains) event(EventKind::kGainsSet, joint);

@@ -79,11 +79,12 @@ void RobotCycle::assign_owner(bool owned) noexcept TANDEM_RT {
 }
 
 void RobotCycle::take_gains(const hal::ParameterImage& wanted) noexcept TANDEM_RT {
-  for (std::size_t j = 0; j < parameters_.joints(); ++j) {
+  hal::ParameterImage& gains = controllers_->gains();
+  for (std::size_t j = 0; j < gains.joints(); ++j) {
     for (std::size_t i = 0; i < hal::kPidLoops; ++i) {
       const auto loop = static_cast<hal::PidLoop>(i);
-      if (wanted.gains(j, loop) == parameters_.gains(j, loop)) continue;
-      parameters_.set_gains(j, loop, wanted.gains(j, loop));
+      if (wanted.gains(j, loop) == gains.gains(j, loop)) continue;
+      gains.set_gains(j, loop, wanted.gains(j, loop));
     }
   }
 }

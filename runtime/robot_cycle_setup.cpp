@@ -20,14 +20,13 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       command_(parts.robot.shape()),
       wanted_(parts.robot.shape()),
       delay_(parts.robot.shape(), config.delay_cycles),
-      parameters_(hal::initial_parameters(parts.robot)),
       limits_(hal::robot_of(parts.robot), config.loop.period_ns),
       watch_(parts.robot, parts.backend, config.lost_after_cycles, config.fall),
       log_(parts.recorder, state_, command_, parts.truth),
       statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet(),
                   parts.truth == nullptr ? 0 : parts.truth->loops()),
       trace_(config.trace_cycles),
-      services_(parts.robot, parts.controllers, inbox_, progress_, parameters_),
+      services_(parts.robot, parts.controllers, inbox_, progress_, parts.controllers.gains()),
       joints_(parts.robot.joints.size()),
       joint_limited_(parts.robot.joints.size()),
       causes_(parts.robot.joints.size()) {
@@ -44,7 +43,6 @@ void RobotCycle::archive(Archive& ar) {
   command_.archive(ar);
   wanted_.archive(ar);
   delay_.archive(ar);
-  parameters_.archive(ar);
   limits_.archive(ar);
   watch_.archive(ar);
   statistics_.archive(ar);
@@ -72,7 +70,7 @@ Status RobotCycle::restore(std::span<const std::byte> snapshot) {
                 "load and unload, in the same order, what was loaded then");
   }
   archive(ar);
-  services_.restored(parameters_);
+  services_.restored(controllers_->gains());
   if (!backend_->archive(ar)) {
     return fail("this robot cannot be rewound", "snapshots need a simulated robot");
   }

@@ -139,8 +139,12 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.message = "is within its limits already, or on its way";
       error.hint = "tandem joint list shows where it is";
       break;
+    case RejectReason::kBeyond:
+      error.message = "cannot go there, or not at this speed";
+      error.hint = "its limits are in robot.toml";
+      break;
     case RejectReason::kOtherMode:
-      error.message = "is not in position control, which leads it back";
+      error.message = "is not in position control, which it needs for this";
       error.hint = "tandem joint set " + joint + " --mode position";
       break;
     case RejectReason::kNotEnabled:
@@ -152,8 +156,8 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.hint = "name those to start";
       break;
     case RejectReason::kRecovering:
-      error.message =
-          "is on its way back to its limits, which the controller '" + one + "' would end";
+      error.message = "is on its way back to its limits, which " +
+                      (one.empty() ? "this" : "the controller '" + one + "'") + " would end";
       error.hint = "ask again when it is inside: tandem joint list " + joint + " shows where it is";
       break;
     case RejectReason::kIncapable:

@@ -131,6 +131,36 @@ Result<RequestResult> RunServices::recover(const std::string& joint, Patience pa
              patience);
 }
 
+Result<RequestResult> RunServices::move_joint(const std::string& joint, const MoveRequest& wish,
+                                              Patience patience) {
+  Lock lock(mutex_);
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  const Result<std::size_t> index = joint_of(joint);
+  if (!index) return std::unexpected(index.error());
+  const hal::JointCapabilities& limit = host_->capabilities()[*index];
+  const double target = wish.target_rad, speed = wish.speed_rad_s;
+  if (target < limit.min_position_rad || target > limit.max_position_rad) {
+    return fail_at(
+        joint, "the target " + number(target) + " is beyond the joint's limits",
+        "give " + number(limit.min_position_rad) + " to " + number(limit.max_position_rad));
+  }
+  if (!std::isnan(speed) && !(speed > 0.0 && speed <= limit.max_velocity_rad_s)) {
+    return fail_at(joint, "the speed " + number(speed) + " is not one that the joint can go at",
+                   "give more than 0, up to " + number(limit.max_velocity_rad_s));
+  }
+  const double acceleration = wish.acceleration_rad_s2;
+  if (!std::isnan(acceleration) &&
+      !(acceleration > 0.0 && acceleration <= limit.max_acceleration_rad_s2)) {
+    return fail_at(joint, "the acceleration " + number(acceleration) + " is beyond its limit",
+                   "give more than 0, up to " + number(limit.max_acceleration_rad_s2));
+  }
+  return ask(
+      lock,
+      {.kind = LoopRequest::Kind::kMove, .joint = static_cast<std::uint32_t>(*index), .move = wish},
+      patience);
+}
+
 Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
                                              const GainsRequest& wish, Patience patience) {
   Lock lock(mutex_);

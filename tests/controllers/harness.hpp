@@ -27,7 +27,8 @@ class Harness {
         command(robot.shape()),
         loaded_(load_controller(plugin, bundled_folder())),
         document(TomlDocument::parse(parameters, "experiment.toml").value()),
-        setup(robot, kernels, time.period_ns, document.root(), start_rad) {
+        gains(hal::initial_parameters(config)),
+        setup(robot, gains, kernels, time.period_ns, document.root(), start_rad) {
     if (!loaded_) {
       ADD_FAILURE() << loaded_.error().to_string();
       return;
@@ -85,6 +86,7 @@ class Harness {
 
  public:
   TomlDocument document;
+  hal::ParameterImage gains;
   ControllerSetup setup;
   Status configured;
 };
