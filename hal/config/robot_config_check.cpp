@@ -1,3 +1,4 @@
+// robot.toml against the URDF: names that must exist, and limits that the URDF completes.
 #include <cassert>
 #include <cmath>
 #include <numbers>
