@@ -1,23 +1,19 @@
-// The drive master's stages, as a state machine that advances once per cycle, on the loop's thread:
+// The drive master's stages: a state machine that advances once per cycle, on the loop's thread.
 //
-//      +----------+  every node runs   +-----------+  every axis enabled   +----------+
-//      | kBooting |------------------->| kEnabling |---------------------->| kRunning |<---+
-//      +----------+                    +-----------+                       +----------+    |
-//           | a node is down,               | a node or an axis fails,          |          |
-//           | or a stop                     | or a stop                         |          |
-//           v                               v                                   |          |
-//      +--------------------------------------------+    a fault or a stop that |          |
-//      | kFailed: bridges open, for good            |    stops the drives       |          |
-//      +--------------------------------------------+                           v          |
-//                                                                         +----------+     |
-//              a harder reaction: the axes get its target, stage stays -->| kFaulted |-----+
-//                                                                         +----------+
-//                                               reset: no cause is left, every axis enabled again
+//   kBooting ----------------> kEnabling ----------------> kRunning <-----------+
+//      |     every node runs       |     every axis is        |                 |  reset(): no
+//      |                           |     enabled              | fault, stop()   |  cause is left,
+//      | node down, stop()         | node or axis fails,      v                 |  every axis is
+//      |                           | stop()                kFaulted ------------+  enabled again
+//      +-------------+-------------+
+//                    v                         in kFaulted a harder reaction changes the axes'
+//                 kFailed, for good            targets; the stage stays
 //
-// The reaction sets every axis' target: nothing (category 0), quick stop (category 1) or hold. An
-// axis with a fault of its own gets nothing. A fault of a "warn" joint leaves kRunning as it is;
-// recover() brings that joint, and lost nodes, back one by one. shut_down() works in every stage:
-// quick stop until the axes are off, 3 s at most, then NMT pre-operational.
+// react() gives every axis its target: nothing (category 0), quick stop (category 1) or hold; an
+// axis with a fault of its own gets nothing. A fault of a "warn" joint leaves the stage as it is.
+// recover() brings back joints that are reset and nodes that are configured anew, one by one.
+// shut_down() works in every stage: quick stop until the axes are off, 3 s at most, then NMT
+// pre-operational.
 #include <algorithm>
 
 #include "canopen/messages.hpp"
