@@ -1,3 +1,5 @@
+// Finds the one server of a service, sends a request with a number, and waits for its reply among
+// those of other clients.
 #include "dds/service_client.hpp"
 
 #include <fmt/core.h>
