@@ -1,3 +1,5 @@
+// Search path, trusted-code check, dlopen, ABI (interface version and headers), compiler, in that
+// order: no code of a library runs before its owner and mode were checked.
 #include "controllers/plugin_loader.hpp"
 
 #include <dlfcn.h>
