@@ -118,7 +118,7 @@ bool ServiceClientBase::connected() const {
 Status ServiceClientBase::find_server(Deadline deadline) const {
   while (!connected()) {
     if (SteadyClock::now() > deadline) {
-      return fail("nobody serves " + name_,
+      return fail("no process serves " + name_,
                   "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace?");
     }
     std::this_thread::sleep_for(kLookAgain);
