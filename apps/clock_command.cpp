@@ -46,7 +46,7 @@ std::string rate_text(const Json& answer) {
 }
 
 std::string state_text(const Json& answer) {
-  if (answer.value("clock", "") != "simulated") return "real time, which nobody can pause";
+  if (answer.value("clock", "") != "simulated") return "real time, which cannot be paused";
   if (!answer.value("paused", false)) return "running";
   const std::uint64_t steps = answer.value("pending_steps", std::uint64_t{0});
   if (answer.value("standing", false)) return "paused";

@@ -72,7 +72,7 @@ void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
   registry.add("clock.pause", ControlEffect::kChanges,
                "simulated time stands after the cycle at work", {},
                [&cycle](const Json&) { return pause(cycle); });
-  registry.add("clock.resume", ControlEffect::kChanges, "simulated time goes on at its rate", {},
+  registry.add("clock.resume", ControlEffect::kChanges, "simulated time continues at its rate", {},
                [&cycle](const Json&) { return answer(cycle, cycle.inbox().clock().resume()); });
   registry.add("clock.step", ControlEffect::kChanges,
                "while paused: so many cycles, then it stands again",
@@ -86,7 +86,7 @@ void add_clock_commands(ControlRegistry& registry, runtime::RobotCycle& cycle) {
                {{.name = "rate",
                  .type = ControlKey::Type::kNumber,
                  .required = true,
-                 .doc = "0.01 to 1000; 0: as fast as the machine goes"}},
+                 .doc = "0.01 to 1000; 0: as fast as possible"}},
                [&cycle](const Json& request) {
                  const auto rate = request["rate"].get<double>();
                  return answer(cycle, cycle.inbox().clock().set_rate(rate));

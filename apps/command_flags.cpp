@@ -11,13 +11,13 @@ const char kServeExamples[] = R"(Examples:
   tandem serve config/coman/squat.toml --lockstep --once        the same bits as in one process:
   tandem run config/coman/squat.toml --hal dds --lockstep
   tandem serve config/coman/robot.toml --hal can                the robot itself
-[remote] of the experiment says who may command and what follows when an owner vanishes.)";
+[remote] of the experiment: who may command, and the reaction when an owner vanishes.)";
 
 const char kRunExamples[] = R"(Examples:
   tandem run config/coman/squat.toml --report        and draw the plots
   tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
   tandem run config/coman/squat.toml --start-paused  then `tandem clock step 10`, `clock resume`
-  tandem run config/coman/squat.toml --dds --realtime      shown to ROS 2 and `tandem topic`
+  tandem run config/coman/squat.toml --dds --realtime      publish to ROS 2 and `tandem topic`
   tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
   tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
   tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
@@ -27,7 +27,7 @@ The same experiment and seed give the same bytes at every rate.)";
 const char kFaultExamples[] = R"(Examples:
   tandem fault show                                  what has been latched, and what was cleared
   tandem fault reset                                 clears and holds; exit status 1: it failed
-  tandem controller start                            then lets the controllers go on
+  tandem controller start                            then lets the controllers continue
   tandem fault show --dds --namespace left           of the run with this [dds] namespace
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
@@ -35,17 +35,17 @@ const char kEstopExamples[] = R"(Examples:
   tandem estop                                       with the category of robot.toml's [safety]
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
-Exit status: 0 the loop has carried it out (or simulated time stands, and it is next); 1 no stop
+Exit status: 0 the loop has carried it out (or simulated time is paused, and it is next); 1 no stop
 is confirmed. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
 
 const char kClockExamples[] = R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed
   tandem clock pause
-  tandem clock step 10                               ten cycles, then it stands again
+  tandem clock step 10                               ten cycles, then paused again
   tandem clock rate 0.1                              ten times slower than real time
-  tandem clock rate 0                                as fast as the machine goes
+  tandem clock rate 0                                as fast as possible
   tandem clock resume
-The results are the same bits. Only simulated time: a robot's cannot be paused, and is refused.
+The results are the same bits. Only simulated time can be paused; on a robot it is refused.
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kAskExamples[] = R"(Examples:
@@ -73,7 +73,7 @@ const char kModelBuildExamples[] = R"(Examples:
   tandem model build my_robot/robot.toml -o /tmp/my_robot.so
 Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models, or
 ~/.cache/tandem/models), where `tandem run` finds it by the robot's name and the hash of its
-files. A library that is up to date is left alone.)";
+files. A library that is up to date is not built again.)";
 
 const char kModelInfoExamples[] = R"(Examples:
   tandem model info config/walkman/robot.toml
@@ -87,7 +87,7 @@ const char kLogCsvExamples[] = R"(Examples:
   tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
 
 const char kLogDiffExamples[] = R"(Examples:
-  tandem log diff runs/a.mcap runs/b.mcap            the same to the last bit, or where they part
+  tandem log diff runs/a.mcap runs/b.mcap            equal bit by bit, or the first difference
 
 Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
 
@@ -105,13 +105,13 @@ const char kLatencyExamples[] = R"(Examples:
   tandem latency --mode turns --cpu 3                one after the other on one CPU
   tandem latency --json - --quiet | jq '.loads[].ratio'
 In mode `swap` both run at once and exchange their CPUs each slice; in `together` each keeps its
-own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. Nothing is judged.)";
+own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. The result is not judged.)";
 
 const char kDoctorExamples[] = R"(Examples:
   tandem doctor                                      kernel, CPUs, interrupts, limits, memory
   tandem doctor config/coman/robot.toml              and the CAN interfaces of its buses
   tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
-Each finding comes with the command that mends it. The exit status does not depend on them.)";
+Each finding comes with the command that fixes it. The exit status does not depend on them.)";
 
 const char kNoBuildHelp[] = "Refuse when the robot's kernels are missing, instead of building them";
 const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
@@ -124,7 +124,7 @@ const char kInjectExamples[] = R"(Examples:
   tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
   tandem inject 'kind = "bus_down"
                  bus = "left_leg"'
-Every kind and key: docs/configuration.md, scenario.toml. What follows: docs/faults.md.)";
+Every kind and key: docs/configuration.md, scenario.toml. Reactions: docs/faults.md.)";
 
 const char kEmulateExamples[] = R"(Examples:
   tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
@@ -160,7 +160,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_flag_callback(
          "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
       ->excludes(rate);
-  app.add_flag("--start-paused", o.start_paused, "Stand before the first cycle: tandem clock step");
+  app.add_flag("--start-paused", o.start_paused, "Pause before the first cycle: tandem clock step");
   app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
@@ -180,7 +180,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp);
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
-  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
+  app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
   app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
       ->check(CLI::Range(0, 232));
 }
@@ -215,7 +215,7 @@ void add_target(CLI::App& app, ControlTarget& target) {
     target.dds = true;
   });
   app.add_option("--namespace", target.name_space,
-                 "Of the process in its domain (default: that of the only one)")
+                 "Namespace of the process (default: of the only one)")
       ->needs(dds);
 }
 
@@ -224,7 +224,7 @@ void add_flags(CLI::App& app, RunOptions& o) {
   add_loop_flags(app, o);
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
       ->check(a_duration());
-  app.add_option("--hal", o.hal, "What stands for the robot (default: the experiment's, or sim)")
+  app.add_option("--hal", o.hal, "Backend: where the robot is (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can", "dds"}));
   app.add_flag(
       "--lockstep", o.lockstep,
@@ -235,12 +235,12 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_flag("--report", o.report, "Draw the report after the run");
   app.add_option("--on-fault", o.on_fault,
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
-                 "the wall clock, end else)")
+                 "the wall clock, else end)")
       ->check(CLI::IsMember({"end", "wait"}));
   CLI::Option* dds = app.add_flag_callback(
-      "--dds", [&o] { o.dds = true; }, "Show the robot to ROS 2 and `tandem topic`");
+      "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");
   app.add_flag_callback(
-         "--no-dds", [&o] { o.dds = false; }, "Do not, whatever the experiment says")
+         "--no-dds", [&o] { o.dds = false; }, "No DDS, whatever the experiment says")
       ->excludes(dds)
       ->excludes("--domain");
   app.footer(kRunExamples);
@@ -250,7 +250,7 @@ void add_flags(CLI::App& app, ServeOptions& o) {
   app.add_option("file", o.run.experiment, "Experiment or robot TOML")->required();
   add_loop_flags(app, o.run);
   app.add_option("--hal", o.run.hal,
-                 "What stands for the robot (default: the experiment's, or sim)")
+                 "Backend: where the robot is (default: the experiment's, or sim)")
       ->check(CLI::IsMember({"sim", "can"}));
   app.add_flag("--lockstep", o.run.lockstep, "Each cycle waits for its owner's command");
   app.add_flag("--once", o.run.once, "End when an owner gives the robot back");
@@ -261,7 +261,7 @@ void add_flags(CLI::App& app, FaultOptions& o) {
   app.require_subcommand(1);
   app.footer(kFaultExamples);  // its subcommands', too
   CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
-  CLI::App* reset = app.add_subcommand("reset", "Clear what is latched and go on where it stands");
+  CLI::App* reset = app.add_subcommand("reset", "Clear latched faults and hold every joint");
   for (CLI::App* one : {show, reset}) {
     add_target(*one, o.target);
     one->add_option("--json", o.json, kJsonHelp);
@@ -289,13 +289,13 @@ void add_flags(CLI::App& app, ClockOptions& o) {
     return one;
   };
   add("show", "Time, paused or not, rate, measured speed", Action::kShow);
-  add("pause", "No cycle begins any more", Action::kPause);
-  add("resume", "Time goes on at its rate", Action::kResume);
-  add("step", "While paused: so many cycles, then it stands again", Action::kStep)
+  add("pause", "Pause after the current cycle", Action::kPause);
+  add("resume", "Continue at the rate", Action::kResume);
+  add("step", "While paused: run so many cycles, then pause again", Action::kStep)
       ->add_option("cycles", o.cycles, "Cycles (default: 1)")
       ->check(CLI::Range(std::uint64_t{1}, rt::kMostSteps));
   add("rate", "Simulated seconds per wall second", Action::kRate)
-      ->add_option("rate", o.rate, "0.01 to 1000; 0: as fast as the machine goes")
+      ->add_option("rate", o.rate, "0.01 to 1000; 0: as fast as possible")
       ->required()
       ->check(is_rate());
 }
@@ -314,19 +314,20 @@ void add_flags(CLI::App& app, InjectOptions& o) {
 
 void add_flags(CLI::App& app, EmulateOptions& o) {
   app.add_option("file", o.file, "Robot or experiment TOML")->required();
-  app.add_flag("--lockstep", o.lockstep, "A step per SYNC, whatever the clock says");
+  app.add_flag("--lockstep", o.lockstep, "One step per SYNC, independent of the wall clock");
   app.add_option("--scenario", o.scenario, kScenarioHelp);
   app.add_option("--posture", o.posture,
-                 "Where it starts (default: the experiment's, or the robot's first)");
+                 "Start posture (default: the experiment's, or the robot's first)");
   app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
-  app.add_option("--period-ns", o.period_ns, "Of a step (default: the experiment's, or 1 ms)")
+  app.add_option("--period-ns", o.period_ns,
+                 "Period of a step (default: the experiment's, or 1 ms)")
       ->check(CLI::Range(10'000, 1'000'000'000));
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
   app.add_flag("--no-build", o.no_build, kNoBuildHelp);
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
-  app.add_flag("--no-socket", o.no_socket, "Take no questions while it runs")->excludes(socket);
+  app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kEmulateExamples);
@@ -361,10 +362,10 @@ void add_flags(CLI::App& app, NewOptions& o) {
   app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
   app.add_option("--like", o.like,
                  "Series elastic drives in proportion to this robot's: its name or robot.toml");
-  app.add_option("--base", o.base, "Instead of what its feet suggest")
+  app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
       ->check(CLI::IsMember({"floating", "fixed"}));
   app.add_flag("--force", o.force,
-               "Into a folder that exists; files that differ are kept as FILE~");
+               "Write into an existing folder; files that differ are kept as FILE~");
   app.add_option("--json", o.json, kJsonHelp);
   app.footer(kNewExamples);
 }
@@ -411,7 +412,7 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
   app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
       ->check(CLI::Range(50, 1'000'000));
   app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")->check(a_duration());
-  app.add_option("--mode", o.mode, "Who has which CPU when (default: swap)")
+  app.add_option("--mode", o.mode, "How the two share the CPUs (default: swap)")
       ->check(CLI::IsMember({"swap", "together", "turns"}));
   app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")
       ->check(CLI::Range(1, 1000));

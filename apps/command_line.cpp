@@ -13,8 +13,8 @@ namespace tandem::apps {
 namespace {
 
 const char kExamples[] = R"(Examples:
-  tandem run config/coman/squat.toml                 simulate, as fast as the machine goes
-  tandem run config/coman/squat.toml --realtime      at the speed of a clock
+  tandem run config/coman/squat.toml                 simulate, as fast as possible
+  tandem run config/coman/squat.toml --realtime      in real time
   tandem emulate config/coman/squat.toml --lockstep  the robot on the other end of CAN
   tandem serve config/coman/squat.toml               a robot for `tandem run X --hal dds`
   tandem check config/coman/squat.toml               read every file, move nothing
@@ -22,8 +22,8 @@ const char kExamples[] = R"(Examples:
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
-  tandem latency --load idle --duration 10           how late this machine wakes the loop up
-`tandem COMMAND --help` tells more, with examples.
+  tandem latency --load idle --duration 10           wake-up latency of this machine
+`tandem COMMAND --help` shows more, with examples.
 
 Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
 
@@ -133,7 +133,7 @@ Command parse_command_line(int argc, const char* const* argv) {
                               "Inject a fault into a running emulated or simulated robot");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
-  commands.add<LatencyOptions>("latency", "How late the loop wakes up, beside cyclictest");
+  commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
 
   try {
     app.parse(argc, argv);

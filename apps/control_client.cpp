@@ -74,10 +74,11 @@ bool owner_is_dead(const std::string& name) {
 
 Error no_answer(std::chrono::milliseconds patience) {
   return {.message = fmt::format("no answer within {:g} s", patience / 1.0s),
-          .hint = patience == kStopAnswer ? "a process that was stopped carries the stop out when "
-                                            "it goes on; until then stop the robot by its own stop "
-                                            "circuit"
-                                          : "is the process stopped, or very busy?",
+          .hint = patience == kStopAnswer
+                      ? "a process that was stopped carries the stop out when "
+                        "it continues; until then stop the robot by its own stop "
+                        "circuit"
+                      : "is the process stopped, or very busy?",
           .file = {},
           .key = {}};
 }
@@ -191,7 +192,7 @@ Result<Json> ask(const std::string& path, const Json& question) {
   const int error = connect_to(descriptor, *address, patience);
   if (error == EAGAIN) return std::unexpected(no_answer(patience));
   if (error != 0) {
-    return fail(fmt::format("nobody listens at {}: {}", path, std::strerror(error)),
+    return fail(fmt::format("no process listens at {}: {}", path, std::strerror(error)),
                 "is the process running?");
   }
   if (const Status ours = check_listener(descriptor.get(), path); !ours) {

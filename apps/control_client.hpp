@@ -39,7 +39,8 @@ inline constexpr std::chrono::milliseconds kStopAnswer{3000};
                                                       const std::string& kind);
 
 /// Sends `question` and waits for its answer.
-/// Errors: nobody listens; no answer within answer_time(); {"ok": false}, with its error and hint.
+/// Errors: no process listens; no answer within answer_time(); {"ok": false}, with its error and
+/// hint.
 [[nodiscard]] Result<Json> ask(const std::string& path, const Json& question);
 
 /// An answer's text. Errors: {"ok": false}, with its error and hint; what is no answer, which names

@@ -111,10 +111,11 @@ Status check_socket_folder(const std::string& path, std::optional<uid_t> partner
   if (!folder.empty() && !std::filesystem::exists(folder, error)) return {};
   const Status ours = check_trusted_folder(folder, partner);
   if (ours) return {};
-  return fail(fmt::format("the socket's folder {} {}: somebody else's socket could take the place of "
-                          "{}, and be told of an emergency stop instead",
-                          ours.error().file, ours.error().message, path),
-              ours.error().hint + "; or choose another folder with --socket");
+  return fail(
+      fmt::format("the socket's folder {} {}: somebody else's socket could take the place of "
+                  "{}, and receive its emergency stops",
+                  ours.error().file, ours.error().message, path),
+      ours.error().hint + "; or choose another folder with --socket");
 }
 
 std::int64_t peer_user(int descriptor) {

@@ -7,20 +7,20 @@ namespace tandem::apps {
 namespace {
 
 const char kControllerExamples[] = R"(Examples:
-  tandem controller list                             what is loaded, who is active, who has what
+  tandem controller list                             loaded controllers, active or not, their joints
   tandem controller load hold --name rest --set 'duration_s = 2.0'
   tandem controller switch --stop squat --start rest in one cycle, or not at all
-  tandem controller start                            after `fault reset`: those that were active go on
+  tandem controller start                            after `fault reset`: those active before
   tandem controller stop rest                        its joints are held where they are
   tandem controller unload rest                      and its library is closed
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kJointExamples[] = R"(Examples:
-  tandem joint list                                  every joint: who has it, mode, measurements
+  tandem joint list                                  every joint: its controller, mode, measurements
   tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
-  tandem joint recover LElbj                         outside of its limits: slowly back inside
+  tandem joint recover LElbj                         outside its limits: slowly back inside
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
@@ -59,18 +59,19 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   CLI::App* load =
       add("load", "Load a controller; it is inactive until it is started", Action::kLoad);
   load->add_option("plugin", o.plugin, "Name of a controller, or path of its library")->required();
-  load->add_option("--name", o.name, "Of the controller (default: the plugin's)");
+  load->add_option("--name", o.name, "Name of the controller (default: the plugin's)");
   load->add_option("--parameters", o.parameters, "TOML file of its [controller.parameters]")
       ->check(CLI::ExistingFile);
   load->add_option("--set", o.set, "One parameter, 'key = value'; may be repeated")
       ->allow_extra_args(false);
-  load->add_flag("--start", o.start_it, "And start it");
+  load->add_flag("--start", o.start_it, "Start it as well");
   add("unload", "Free an inactive controller", Action::kUnload)
       ->add_option("name", o.name, "Its name")
       ->required();
-  add("start", "Start controllers, all in one cycle; after a reset let them go on", Action::kStart)
+  add("start", "Start controllers, all in one cycle; after a reset let them continue",
+      Action::kStart)
       ->add_option("names", o.start, "Their names; none: those that were active before the reset");
-  add("stop", "Stop controllers; what nobody has then is held", Action::kSwitch)
+  add("stop", "Stop controllers; joints without a controller are held", Action::kSwitch)
       ->add_option("names", o.stop, "Their names")
       ->required();
   CLI::App* change =
@@ -88,7 +89,7 @@ void add_flags(CLI::App& app, JointOptions& o) {
     command->callback([&o, action] { o.action = action; });
     return command;
   };
-  CLI::App* list = add("list", "Who has each joint, what it does, what is measured", Action::kList);
+  CLI::App* list = add("list", "Controller, mode and measurements of each joint", Action::kList);
   list->add_option("joints", o.joints, "Only these");
   list->add_flag("--gains", o.gains, "The gains of its drive's loops instead");
   CLI::App* set =
@@ -100,12 +101,11 @@ void add_flags(CLI::App& app, JointOptions& o) {
       ->check(is_finite());
   set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
       ->check(is_finite());
-  add("recover", "Lead a free joint that stands outside of its limits back, slowly",
-      Action::kRecover)
+  add("recover", "Lead a free joint back inside its limits, slowly", Action::kRecover)
       ->add_option("joint", o.joint, "Its name")
       ->required();
   CLI::App* gains =
-      add("gains", "Gains of a loop in its drive; what is left out stays", Action::kGains);
+      add("gains", "Gains of a loop in its drive; those not given stay", Action::kGains);
   gains->add_option("joint", o.joint, "Its name")->required();
   gains->add_option("loop", o.loop, "position, velocity, torque, current")->required();
   gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());

@@ -70,10 +70,10 @@ std::vector<dds::FoundService> look(const dds::ServiceFinder& finder, const Cont
 Error nobody(const ControlTarget& target, const dds::Config& config) {
   const std::string where =
       target.name_space ? fmt::format(" in the namespace '{}'", *target.name_space) : "";
-  return fail(
-             fmt::format("nobody serves {} in the DDS domain {}{}", kService, config.domain, where),
-             "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace, and on "
-             "this network interface? One with DDS Security hears --dds-from alone")
+  return fail(fmt::format("no process serves {} in the DDS domain {}{}", kService, config.domain,
+                          where),
+              "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace, and on "
+              "this network interface? With DDS Security, use --dds-from")
       .error();
 }
 

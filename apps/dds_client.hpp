@@ -10,7 +10,7 @@
 namespace tandem::apps {
 
 /// Joins the domain and finds the process.
-/// Errors: Domain::open()'s; nobody serves there; several do (they are listed).
+/// Errors: Domain::open()'s; no process serves there; several do (they are listed).
 [[nodiscard]] Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& target);
 
 }  // namespace tandem::apps

@@ -146,7 +146,7 @@ void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& repl
       : latched == 0 ? "nothing is latched"
                      : fmt::format("the reset of {} is asked for{}; tandem/faults shows when it is "
                                    "through, which takes seconds. Controllers that are held back "
-                                   "then go on with tandem/start_controllers",
+                                   "then continue with tandem/start_controllers",
                                    latched, when(answer)));
 }
 

@@ -28,7 +28,7 @@ std::string mode_of(const Json& joint) {
 std::string drive_of(const Json& joint) {
   const auto age_cycles = joint.value("age_cycles", 0U);
   if (age_cycles > runtime::CycleConfig().lost_after_cycles)
-    return fmt::format("not heard for {} cycles", age_cycles);
+    return fmt::format("no feedback for {} cycles", age_cycles);
   const auto fault = joint.value("fault", 0U);
   const std::string state = joint.value("drive_state", "");
   return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);

@@ -60,7 +60,7 @@ Result<model::KernelLibrary> supply_kernels(const RobotFiles& robot, const std::
     if (!report) return std::unexpected(report.error());
     return model::load_kernels(*path, hash, variant);
   }
-  fmt::print(stderr, "{}: compiling the robot's dynamics, once: later runs find them\n", name);
+  fmt::print(stderr, "{}: compiling the robot's dynamics, once: later runs reuse them\n", name);
   const auto report = build_shown(robot, options);
   if (!report) return std::unexpected(report.error());
   if (!report->was_up_to_date) {

@@ -21,7 +21,7 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
 
 void warn_of_log(const log::Recorder& recorder) {
   fmt::print(stderr,
-             "warning: {}: nothing is logged any more: {}; the run goes on without a log (end it "
+             "warning: {}: nothing is logged any more: {}; the run continues without a log (end it "
              "with Ctrl-C or tandem ask '{{\"do\": \"run.stop\"}}', and start it again)\n",
              recorder.path(), recorder.trouble());
 }

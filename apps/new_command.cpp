@@ -52,8 +52,8 @@ std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
     file = (folder / name / "robot.toml").string();
   }
   if (!fs::is_regular_file(file, ignored)) {
-    return std::unexpected(one("there is no bundled robot '" + name + "' to take after",
-                               "give the path of its robot.toml", name));
+    return std::unexpected(
+        one("there is no bundled robot '" + name + "'", "give the path of its robot.toml", name));
   }
   auto robot = read_robot(file);
   if (!robot) return std::unexpected(robot.error());
@@ -241,14 +241,14 @@ void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
 void print_next(const std::string& folder, std::FILE* out) {
   fmt::print(out,
              "\nNext:\n  tandem run {0}/hold.toml --report\n  tandem run {0}/move.toml --report\n"
-             "Look for `guess` in {0}/robot.toml: each stands where a figure of yours belongs.\n",
+             "Look for `guess` in {0}/robot.toml: replace each by your own figure.\n",
              folder);
 }
 
 /// What can be said of the input before it is read as XML.
 Diagnostics check_input(const std::string& file) {
   if (!is_utf8(fs::path(file).filename().string())) {
-    return one("the file's name is not UTF-8, which robot.toml has to be", "rename it", file);
+    return one("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
   }
   if (fs::path(file).extension() != ".toml") return {};
   if (is_robot(file)) {

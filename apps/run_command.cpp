@@ -219,7 +219,7 @@ Exit run(Composition& c, const RunOptions& options) {
       {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
   if (!socket) return refuse(socket.error());
   if (*server != nullptr && *socket == nullptr && e.remote.trust != runtime::RemoteTrust::kDomain) {
-    return refuse(fail("without a control socket nobody can be admitted to this robot",
+    return refuse(fail("without a control socket no process can be admitted to this robot",
                        "leave out --no-socket; or [remote] trust = \"domain\" admits everybody")
                       .error());
   }

@@ -55,7 +55,7 @@ std::string where(const Part& part) {
 
 const char kSilence[] =
     "does the other process talk DDS (--dds), in this domain (--domain), "
-    "over this interface (--interface)? With DDS Security on it hears --dds-from alone";
+    "over this interface (--interface)? With DDS Security, use --dds-from";
 
 std::string qos_text(const dds::Qos& qos) {
   return fmt::format("{}, {}{}", qos.reliable ? "reliable" : "best effort",
@@ -110,7 +110,7 @@ Result<dds::TopicInfo> find_topic(const TopicOptions& options, const Part& part)
     }
     std::this_thread::sleep_for(kPoll);
   } while (SteadyClock::now() < end && !rt::stop_requested());
-  return fail(fmt::format("nobody writes {} {}", name, where(part)),
+  return fail(fmt::format("no process writes {} {}", name, where(part)),
               known.empty() ? kSilence : suggest(name, known));
 }
 

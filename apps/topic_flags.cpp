@@ -23,7 +23,7 @@ const char kTopicExamples[] = R"(Examples:
   tandem topic list                                  with somebody who publishes:
   tandem topic echo /joint_states --once             `tandem run X --dds --realtime`, or ROS 2
   tandem topic hz /tandem/state
-Each subcommand's --help tells more.)";
+Each subcommand's --help shows more.)";
 
 void add_domain(CLI::App& app, TopicOptions& o) {
   add_place(app, o.place);
@@ -44,16 +44,16 @@ void add_flags(CLI::App& app, TopicOptions& o) {
   list->callback([&o] { o.action = TopicOptions::Action::kList; });
   CLI::App* echo = app.add_subcommand("echo", "Print samples as they come");
   echo->add_option("--field", o.field, "Only this: header.stamp, position[2]");
-  CLI::Option* count =
-      echo->add_option("--count", o.count, "End after so many samples")->check(CLI::PositiveNumber);
+  CLI::Option* count = echo->add_option("--count", o.count, "End after this many samples")
+                           ->check(CLI::PositiveNumber);
   echo->add_flag_callback(
           "--once", [&o] { o.count = 1; }, "The same as --count 1")
       ->excludes(count);
   echo->footer(kEchoExamples);
   echo->callback([&o] { o.action = TopicOptions::Action::kEcho; });
   CLI::App* hz = app.add_subcommand("hz", "How often and how evenly samples come");
-  hz->add_option("--count", o.count, "End after so many samples")->check(CLI::PositiveNumber);
-  hz->add_option("--window", o.window, "Intervals that the rate is of (default: 10000)")
+  hz->add_option("--count", o.count, "End after this many samples")->check(CLI::PositiveNumber);
+  hz->add_option("--window", o.window, "Intervals used for the rate (default: 10000)")
       ->check(CLI::Range(1, 1'000'000));
   hz->footer(kHzExamples);
   hz->callback([&o] { o.action = TopicOptions::Action::kHz; });

@@ -1,3 +1,4 @@
+// Letters, digits and a few signs only, so that a name from a file cannot become a path.
 #include "base/file_name.hpp"
 
 #include <algorithm>

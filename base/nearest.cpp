@@ -1,3 +1,4 @@
+// Edit distance with transpositions; a missing unit suffix (_rad, _Nm) counts as two edits.
 #include "base/nearest.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Children by posix_spawn, without a shell: their arguments cannot become commands.
 #include "base/process.hpp"
 
 #include <fcntl.h>

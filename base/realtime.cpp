@@ -1,3 +1,4 @@
+// The names of the one-byte codes that real-time functions return.
 #include "base/realtime.hpp"
 
 namespace tandem {

@@ -1,3 +1,4 @@
+// An Error as one line, "file:line: key: message (hint)", and the order in which many are shown.
 #include "base/result.hpp"
 
 #include <algorithm>

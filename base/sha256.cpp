@@ -1,3 +1,4 @@
+// The digest of logs and kernel libraries, over OpenSSL's EVP interface.
 #include "base/sha256.hpp"
 
 #include <openssl/evp.h>

@@ -1,3 +1,5 @@
+// Every key that is read is noted; finish() reports those that nobody asked for, with the nearest
+// known name. All tables of a document collect their errors in one list.
 #include "base/toml_reader.hpp"
 
 #include <toml++/toml.h>

@@ -1,3 +1,5 @@
+// Owner and mode of a library and of every folder above it, and the SHA-256 seal at the end of a
+// kernel library's file.
 #include "base/trusted_code.hpp"
 
 #include <sys/stat.h>

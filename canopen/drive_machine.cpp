@@ -1,3 +1,5 @@
+// Transitions 0 to 16 by controlword and inputs, one per call; the stop options, the brake's
+// commands and the statusword's bits.
 #include "canopen/drive_machine.hpp"
 
 #include "base/archive.hpp"

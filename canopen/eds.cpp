@@ -1,3 +1,4 @@
+// The names of all objects, and the sections of an EDS file from a dictionary's entries.
 #include "canopen/eds.hpp"
 
 #include <array>

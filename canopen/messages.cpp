@@ -1,3 +1,5 @@
+// Bytes of each message written and read explicitly; parse functions refuse wrong identifiers and
+// lengths.
 #include "canopen/messages.hpp"
 
 #include <algorithm>

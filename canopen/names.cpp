@@ -1,3 +1,4 @@
+// The texts of SDO abort codes and of CiA 402 error codes, for messages and logs.
 #include "canopen/abort_code.hpp"
 #include "canopen/objects.hpp"
 

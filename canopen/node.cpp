@@ -1,3 +1,4 @@
+// NMT state machine, dispatch of frames by COB-ID, heartbeats both ways, error history 1003.
 #include "canopen/node.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Entries sorted by index and sub-index, found by bisection; the owner of an entry may refuse a
+// value before it is written.
 #include "canopen/object_dictionary.hpp"
 
 #include <algorithm>

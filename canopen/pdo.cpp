@@ -1,3 +1,5 @@
+// Mapping may change only while the PDO is not in use, as CiA 301 requires; synchronous RPDOs wait
+// for SYNC.
 #include "canopen/pdo.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// One transfer at a time, expedited or segmented, as a state machine on received frames and elapsed
+// time.
 #include <algorithm>
 
 #include "base/archive.hpp"

@@ -1,3 +1,5 @@
+// Answers each request frame: expedited and segmented transfers, abort codes, 500 ms time-out; no
+// block transfer.
 #include <algorithm>
 
 #include "base/archive.hpp"

@@ -1,3 +1,5 @@
+// Principal axes of a foot's contact points: a point, a line or a surface, each with what the
+// ground can fix of it.
 #include "controllers/feet.hpp"
 
 #include <Eigen/Core>

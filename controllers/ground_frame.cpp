@@ -1,3 +1,5 @@
+// The plane through all contact points by principal axes; where they leave it open, the base's z is
+// up.
 #include "controllers/ground_frame.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,5 @@
+// Marks the thread as inside a controller's library, so that an exit() there is reported by name
+// instead of ending the process silently.
 #include "controllers/hosted_call.hpp"
 
 #include <unistd.h>

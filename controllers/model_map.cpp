@@ -1,3 +1,4 @@
+// Joint names to indices of the kernels, and the passive joints' positions by closing the loops.
 #include "controllers/model_map.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The keys `joints` and `posture`, read alike by every bundled controller.
 #include "controllers/parameters.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Search path, trusted-code check, dlopen, ABI (interface version and headers), compiler, in that
+// order: no code of a library runs before its owner and mode were checked.
 #include "controllers/plugin_loader.hpp"
 
 #include <dlfcn.h>
@@ -57,7 +59,7 @@ std::string missing_hint(const std::string& name, const std::vector<std::string>
   }
   const std::string nearest = suggest(name, available_controllers(folders));
   return (nearest.empty() ? nearest : nearest + "; ") +
-         "one of your own is found in the folders of TANDEM_CONTROLLERS, or by a path with a '/'";
+         "list your own folders in TANDEM_CONTROLLERS, or name the library by a path with a '/'";
 }
 
 bool is_file(const fs::path& path) {
@@ -75,8 +77,7 @@ Result<std::string> find(const std::string& name, const std::vector<std::string>
     const fs::path path = fs::path(folder) / (name + ".so");
     if (is_file(path)) return path.string();
   }
-  return refuse(name, {}, "there is no controller '" + name + "' in " + joined(folders),
-                missing_hint(name, folders));
+  return refuse(name, {}, "no such controller in " + joined(folders), missing_hint(name, folders));
 }
 
 /// What a library of another ABI says of itself.

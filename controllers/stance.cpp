@@ -1,3 +1,5 @@
+// Newton's method with LU on a square system that make() selects from the feet's and the centre of
+// mass' equations; docs/controllers.md has the choice.
 #include "controllers/stance.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,5 @@
+// Least-squares distribution of the base's wrench over contact points that only push; points that
+// would pull are dropped, round by round.
 #include "controllers/support.hpp"
 
 #include <Eigen/Eigenvalues>

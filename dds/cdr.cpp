@@ -1,3 +1,5 @@
+// A cursor over XCDR1 bytes whose first failure sticks; lengths are checked before memory is taken,
+// because a peer wrote them.
 #include "dds/cdr.hpp"
 
 #include <fmt/core.h>

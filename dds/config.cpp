@@ -1,3 +1,4 @@
+// [dds] read strictly, and turned into Cyclone DDS' XML configuration.
 #include "dds/config.hpp"
 
 #include <fmt/core.h>

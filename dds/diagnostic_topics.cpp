@@ -1,3 +1,4 @@
+// Level and text of run, loop and every board, joint and sensor; docs/ros2.md has the thresholds.
 #include "dds/diagnostic_topics.hpp"
 
 #include <fmt/core.h>

@@ -1,3 +1,5 @@
+// Reads DDS' built-in topics of publications and subscriptions, and gives the names as ROS 2 shows
+// them.
 #include "dds/discovery.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Creates the Cyclone DDS domain from our XML, checks first that enough file descriptors are left,
+// and counts what Cyclone complains about.
 #include "dds/domain.hpp"
 
 #include <fcntl.h>

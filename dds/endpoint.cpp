@@ -1,3 +1,4 @@
+// A raw endpoint that is listed in the ROS graph for as long as it lives.
 #include "dds/endpoint.hpp"
 
 namespace tandem::dds {

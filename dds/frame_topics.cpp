@@ -1,3 +1,4 @@
+// Transforms from the joints' measured positions; the base's from the simulation's truth.
 #include "dds/frame_topics.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// Copies the images field by field into tandem_msgs, and the loop's histograms of every cycle.
 #include "dds/image_topics.hpp"
 
 namespace tandem::dds {

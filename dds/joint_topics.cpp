@@ -1,3 +1,5 @@
+// Names and interfaces are set once; each sample lends DDS the image's values in robot.toml's
+// order.
 #include "dds/joint_topics.hpp"
 
 #include <array>

@@ -1,3 +1,4 @@
+// Parses .msg and .srv text; the hash is SHA-256 of the REP-2016 description as JSON.
 #include "dds/message_definition.hpp"
 
 #include <fmt/core.h>

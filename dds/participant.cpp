@@ -1,3 +1,4 @@
+// One DDS participant per process, with its node in the ROS graph and the namespace of its topics.
 #include "dds/participant.hpp"
 
 #include <fmt/core.h>

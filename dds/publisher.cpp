@@ -1,3 +1,5 @@
+// take() copies times and due images into wait-free rings on the loop's thread; run() drains them
+// on the publisher's thread and makes the samples.
 #include "dds/publisher.hpp"
 
 #include <time.h>

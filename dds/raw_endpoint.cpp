@@ -1,3 +1,4 @@
+// Quality of service and USER_DATA (type hash) of a Cyclone DDS writer or reader.
 #include "dds/raw_endpoint.hpp"
 
 #include <memory>

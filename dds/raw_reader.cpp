@@ -1,3 +1,4 @@
+// Takes serialised samples of any type, for `tandem topic echo` and `hz`.
 #include "dds/raw_reader.hpp"
 
 #include <dds/ddsi/ddsi_serdata.h>

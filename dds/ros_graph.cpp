@@ -1,3 +1,5 @@
+// Keeps the GUIDs of this node's writers and readers, and publishes them whenever one comes or
+// goes.
 #include "dds/ros_graph.hpp"
 
 #include <fmt/core.h>

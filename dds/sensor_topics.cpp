@@ -1,3 +1,5 @@
+// A sensor is published once per sample, with the sample's own time: late ones earlier than the
+// cycle.
 #include "dds/sensor_topics.hpp"
 
 #include "dds/message_parts.hpp"

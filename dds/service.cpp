@@ -1,3 +1,5 @@
+// Topic names, quality of service and USER_DATA of a service, and which request writer and reply
+// reader belong to the same peer.
 #include "dds/service.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,5 @@
+// Finds the one server of a service, sends a request with a number, and waits for its reply among
+// those of other clients.
 #include "dds/service_client.hpp"
 
 #include <fmt/core.h>
@@ -116,7 +118,7 @@ bool ServiceClientBase::connected() const {
 Status ServiceClientBase::find_server(Deadline deadline) const {
   while (!connected()) {
     if (SteadyClock::now() > deadline) {
-      return fail("nobody serves " + name_,
+      return fail("no process serves " + name_,
                   "start one: tandem run EXPERIMENT --dds; is it in this domain and namespace?");
     }
     std::this_thread::sleep_for(kLookAgain);

@@ -1,3 +1,5 @@
+// One thread receives requests into a bounded queue and does emergency stops at once, another works
+// the rest off in order; replies wait for their reader to be discovered.
 #include "dds/service_server.hpp"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// The table of type_list.inc; a type is found by its ROS 2 name, its DDS name or its descriptor.
 #include "dds/types.hpp"
 
 #include <algorithm>

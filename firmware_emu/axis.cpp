@@ -1,3 +1,5 @@
+// One control period of an axis: sample, protections, drive machine with its brake times, joint
+// controller; and the checks of what SDOs write to its objects.
 #include "firmware_emu/axis.hpp"
 
 #include <cmath>

@@ -1,3 +1,5 @@
+// Entries, types, limits and access of an axis' objects, and their conversion to the controller's
+// SI units. docs/firmware.md has the table.
 #include "firmware_emu/axis_objects.hpp"
 
 #include <algorithm>

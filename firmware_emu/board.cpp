@@ -1,3 +1,5 @@
+// Frames to the node, then per axis: which connection is lost (SYNC, commands, heartbeat),
+// protections, controllers; emergencies and TPDOs out.
 #include "firmware_emu/board.hpp"
 
 #include <algorithm>

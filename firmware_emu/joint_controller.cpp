@@ -1,3 +1,5 @@
+// Outer loop by mode, torque limit and slope, torque loop, voltage limit; conditional integration
+// and a decaying transfer voltage. docs/firmware.md has the laws.
 #include "firmware_emu/joint_controller.hpp"
 
 #include <cmath>

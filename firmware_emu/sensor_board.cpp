@@ -1,3 +1,4 @@
+// Channels sampled at each SYNC, with seeded noise and bias.
 #include "firmware_emu/sensor_board.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Which frames a CAN bus can carry, and the snapshot of a node's unsent frames.
 #include "firmware_emu/wire.hpp"
 
 #include <algorithm>

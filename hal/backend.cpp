@@ -1,3 +1,4 @@
+// The texts of fault causes that every backend shares.
 #include "hal/backend.hpp"
 
 #include <cstdio>

@@ -1,3 +1,5 @@
+// Joint by joint, in every cycle: valid modes, then range and rate of each reference. A reference
+// departs from the value that was sent last.
 #include "hal/command_limits.hpp"
 
 #include <algorithm>

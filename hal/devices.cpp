@@ -1,3 +1,4 @@
+// Builds every device interface over one pair of images, and finds sensors by name and type.
 #include "hal/devices.hpp"
 
 #include "base/archive.hpp"

@@ -1,3 +1,5 @@
+// Layouts of the state and command images, from state_fields.inc and command_fields.inc. Fields of
+// eight bytes come first, then four, two, one: an image's bytes are also its CDR encoding.
 #include "hal/image.hpp"
 
 #include <cassert>

@@ -1,3 +1,4 @@
+// Which capability a control mode needs, and whether gains keep their bounds.
 #include "hal/joint_capabilities.hpp"
 
 #include <cstdio>

@@ -1,3 +1,4 @@
+// Thin, bounds-checked views of the images: setters write the command, getters read the state.
 #include "hal/joint_devices.hpp"
 
 #include <algorithm>

@@ -1,3 +1,6 @@
+// One step of a reference with bounded jerk. It follows exactly where the bounds allow it; else
+// bisection finds the acceleration from which it can still stop at the reference and inside the
+// range.
 #include "hal/reference_motion.hpp"
 
 #include <algorithm>

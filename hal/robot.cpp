@@ -1,3 +1,4 @@
+// Image shape, passive joints and postures of a robot, looked up by name outside the cycle.
 #include "hal/robot.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Gains, impedance and amplifiers. A fault reset stays in the command until the drive's fault is
+// gone.
 #include "hal/service_devices.hpp"
 
 #include "base/archive.hpp"

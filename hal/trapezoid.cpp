@@ -1,3 +1,5 @@
+// The velocity of the next step is the largest from which constant braking still ends at the
+// target.
 #include "hal/trapezoid.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The layout of the truth image, from truth_fields.inc.
 #include "hal/truth.hpp"
 
 #include <memory>

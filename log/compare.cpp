@@ -1,3 +1,5 @@
+// Topic by topic, message by message, byte by byte; only the first difference is decoded to a
+// signal.
 #include "log/compare.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// LZ4 and Zstandard by their libraries; a chunk that claims more content than its bytes can hold is
+// refused before memory is taken.
 #include "log/compression.hpp"
 
 #include <lz4frame.h>

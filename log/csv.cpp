@@ -1,3 +1,4 @@
+// Streams a log once; numbers are written with the fewest digits that read back the same.
 #include "log/csv.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Kinds, texts and CDR encoding of /tandem/event.
 #include "log/event.hpp"
 
 #include <cstdio>

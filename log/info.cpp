@@ -1,3 +1,4 @@
+// RunInfo to the metadata record `tandem` and back, lists as lines.
 #include "log/info.hpp"
 
 #include <cstdlib>

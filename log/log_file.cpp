@@ -1,3 +1,5 @@
+// open() reads the whole file once, for its topics and the data hash; read() streams it again for
+// the columns that are asked for.
 #include "log/log_file.hpp"
 
 #include <utility>

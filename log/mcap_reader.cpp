@@ -1,3 +1,5 @@
+// Streams records; chunks are decompressed one at a time, and a file that ends inside a chunk is
+// read up to the last whole one.
 #include "log/mcap_reader.hpp"
 
 #include <zlib.h>

@@ -1,3 +1,5 @@
+// A chunk is closed by log time or size, never by the wall clock, and written at once; summary and
+// indices follow on close().
 #include "log/mcap_writer.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,5 @@
+// push() copies into a wait-free ring on the RT thread; run() hashes, compresses and writes on the
+// recorder's thread.
 #include "log/recorder.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Encodes JointState, TFMessage and String as CDR by hand, from the images, every 20 ms.
 #include "log/robot_view.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// One line of ros2msg per field, its comment with unit and meaning; read back strictly.
 #include "log/schema.hpp"
 
 #include <charconv>

@@ -1,3 +1,4 @@
+// "position_rad.elbow", "sensor.left_foot.2": the element's joint or sensor, where it has one.
 #include "log/signal_name.hpp"
 
 namespace tandem::log {

@@ -1,3 +1,5 @@
+// Residuals c(q) and Jacobian rows A of ball, revolute and rod loops from the sites' poses; passive
+// joints by Gauss-Newton on A_p^T A_p.
 #include "model/closed_loops.hpp"
 
 #include <fmt/core.h>

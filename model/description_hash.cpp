@@ -1,3 +1,5 @@
+// SHA-256 over generator version, kernel ABI, tree and specification, with numbers in hexadecimal:
+// any change of a bit gives another hash.
 #include <fmt/format.h>
 
 #include "base/sha256.hpp"

@@ -1,3 +1,4 @@
+// The inputs and outputs of every kernel by name and shape, and a call of each with doubles.
 #include "model/dynamics.hpp"
 
 namespace tandem::model {

@@ -1,3 +1,5 @@
+// Nodes become statements in the order in which the algorithm made them, cut into parts of 500
+// operations; what a later part needs goes through the workspace.
 #include "model/emit.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Hash-consing of nodes with constant folding; signs are kept beside the nodes and move to the
+// outputs.
 #include "model/expression.hpp"
 
 #include <algorithm>

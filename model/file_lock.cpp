@@ -1,3 +1,4 @@
+// flock() on a file that stays: the system releases it when its holder ends, however that happens.
 #include "model/file_lock.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,5 @@
+// Traces every kernel, emits it, and gathers the parts into files of about equal length, with one
+// entry file per variant.
 #include "model/generate.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,5 @@
+// Stamps say which objects are up to date; stale ones are compiled in parallel, the library is
+// linked, checked by kernel_check and then renamed into place.
 #include "model/kernel_build.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,5 @@
+// dlopen() of a trusted, sealed library, then ABI, description hash and the best variant for this
+// CPU.
 #include "model/kernel_library.hpp"
 
 #include <dlfcn.h>

@@ -1,3 +1,5 @@
+// Applies the frames that align.cpp chose, drops constants below their own rounding error, and
+// regroups inertias from the tips to the base.
 #include "model/mechanism.hpp"
 
 #include <Eigen/Dense>

@@ -1,3 +1,5 @@
+// The smallest eigenvalue of the mass matrix, scaled to ones on its diagonal, in given and drawn
+// postures; an error names the joints of the motion without energy.
 #include "model/regular.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,5 @@
+// Counts nearly right angles in rpy and axis attributes, writes them exactly into the XML when
+// asked to, and bounds how far any link moves by that.
 #include "model/right_angles.hpp"
 
 #include <tinyxml2.h>

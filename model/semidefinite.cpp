@@ -1,3 +1,5 @@
+// Cholesky with diagonal pivoting, cut off at 1e-10 of the largest diagonal entry; unknowns beyond
+// the rank are 0.
 #include "model/semidefinite.hpp"
 
 #include <algorithm>

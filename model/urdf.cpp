@@ -1,3 +1,4 @@
+// Outline, topology, urdfdom, tree: each stage only when the one before found no error.
 #include "model/urdf.hpp"
 
 #include <console_bridge/console.h>

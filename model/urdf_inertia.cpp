@@ -1,3 +1,5 @@
+// Positive definiteness and triangle inequality of principal moments, link by link and body by
+// body.
 #include "model/urdf_inertia.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,5 @@
+// Follows chains of <mimic> to their leader, composing multiplier and offset, and narrows the
+// leader's limits to its followers'.
 #include "model/urdf_mimic.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// One walk over the XML: elements, attributes, finite numbers. Errors that urdfdom would not
+// report, or without a line, are found here.
 #include "model/urdf_outline.hpp"
 
 #include <tinyxml2.h>

@@ -1,3 +1,4 @@
+// [model.link.NAME] of robot.toml: mass, center of mass and inertia that replace the URDF's.
 #include "model/urdf_override.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Raises the eigenvalues of the second moments J = tr(I)/2 - I; docs/urdf.md has the rules.
 #include "model/urdf_repair.hpp"
 
 #include <Eigen/Eigenvalues>

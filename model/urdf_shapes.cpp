@@ -1,3 +1,5 @@
+// Boxes, spheres, cylinders and capsules by link; a shape without usable dimensions counts as a
+// mesh.
 #include "model/urdf_shapes.hpp"
 
 #include <tinyxml2.h>

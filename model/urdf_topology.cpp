@@ -1,3 +1,4 @@
+// Links and joints form one tree: one root, at most one parent per link, no ring.
 #include <algorithm>
 #include <map>
 

@@ -1,3 +1,5 @@
+// Searches elements and attributes for <xacro:...>, ${...} and $(...), and reports the first with
+// the number of the others.
 #include "model/urdf_xacro.hpp"
 
 #include <string_view>

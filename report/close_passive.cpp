@@ -1,3 +1,5 @@
+// Row by row, ClosedLoops::close() from the last row's solution; a loop that stays open is an
+// error.
 #include "report/close_passive.hpp"
 
 #include <fmt/core.h>

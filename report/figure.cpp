@@ -1,3 +1,4 @@
+// Curves thinned to what a plot can show, with each interval's extremes kept.
 #include "report/figure.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// One script for all figures through a pipe; names from logs are quoted in octal, because gnuplot
+// runs text between backquotes.
 #include "report/gnuplot.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,5 @@
+// Accelerations as slopes of least-squares lines through neighbouring rows; wrenches from sensors
+// or truth; then the kernel row by row.
 #include "report/inverse_dynamics.hpp"
 
 #include <Eigen/Dense>

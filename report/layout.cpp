@@ -1,3 +1,4 @@
+// Ranges and tick distances, and margins from the widths of the texts.
 #include "report/layout.hpp"
 
 #include <fmt/core.h>

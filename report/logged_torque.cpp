@@ -1,3 +1,5 @@
+// Maps a log's joints, feet and passive joints to the kernels, and subtracts what closed loops
+// carry.
 #include "report/logged_torque.hpp"
 
 #include <algorithm>

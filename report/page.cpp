@@ -1,3 +1,4 @@
+// Tables and inlined SVG with escaped texts; identifiers are made unique per figure.
 #include "report/page.hpp"
 
 #include <fmt/core.h>

@@ -1,3 +1,5 @@
+// Forward kinematics of the description's tree at four moments, projected; limbs as lines between
+// joints.
 #include "report/posture.hpp"
 
 #include <fmt/core.h>

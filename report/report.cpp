@@ -1,3 +1,5 @@
+// Reads one or two logs, aligns the start of their controllers, and writes figures, tables and
+// page.
 #include "report/report.hpp"
 
 #include <fmt/core.h>

@@ -1,3 +1,4 @@
+// Rebuilds robot and experiment from the texts inside the log, so that a log needs no other file.
 #include "report/run_data.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// Chooses the joints and feet to show, from [report] or by the motion, and makes the four figures.
 #include "report/run_figures.hpp"
 
 #include <fmt/core.h>

@@ -1,3 +1,4 @@
+// CLOCK_MONOTONIC read and slept on by absolute deadlines, so that errors do not add up.
 #include "rt/clock.hpp"
 
 #include <cerrno>

@@ -1,3 +1,5 @@
+// Requests wait under a mutex; the loop takes them between two cycles, in attend(), and sleeps on
+// the doorbell while time is paused.
 #include "rt/clock_control.hpp"
 
 #include <chrono>

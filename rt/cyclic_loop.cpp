@@ -1,3 +1,5 @@
+// The pacing of a loop: wall clock, scaled, free running or external; its overrun accounting.
+// Lateness under 1 ms of scaled time is recovered, beyond that the grid shifts.
 #include "rt/cyclic_loop.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// An atomic counter that rings by FUTEX_WAKE; the loop waits for it to change, to a deadline.
 #include "rt/doorbell.hpp"
 
 #include <linux/futex.h>

@@ -1,3 +1,4 @@
+// Bucket of a value, and back: the leading 1 bit and the bits below it, as in HdrHistogram.
 #include "rt/histogram.hpp"
 
 #include <algorithm>

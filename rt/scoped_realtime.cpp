@@ -1,3 +1,4 @@
+// The thread-local depth counter that the allocation and lock traps of tests/support read.
 #include "rt/scoped_realtime.hpp"
 
 namespace tandem::rt {

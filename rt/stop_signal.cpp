@@ -1,3 +1,5 @@
+// Signal handlers that only set atomic flags. SIGINT, SIGTERM and SIGHUP keep their default action
+// for the second time, so that a run that hangs can still be ended.
 #include "rt/stop_signal.hpp"
 
 #include <atomic>

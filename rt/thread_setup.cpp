@@ -1,3 +1,5 @@
+// Locked memory, prefaulted heap and stack, CPU affinity, scheduling policy, in that order; what
+// the system refuses goes into the report with its remedy.
 #include "rt/thread_setup.hpp"
 
 #include <alloca.h>

@@ -1,3 +1,5 @@
+// The face, rim or point of each shape that faces down, and of several shapes those within 10 mm of
+// the lowest; else the sole of the equivalent box.
 #include "scaffold/contact_points.hpp"
 
 #include <algorithm>

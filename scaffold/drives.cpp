@@ -1,3 +1,5 @@
+// Joints grouped by effort into drive sizes, motors from voltage, effort and speed, gains from
+// inertia and delay.
 #include "scaffold/drives.hpp"
 
 #include <fmt/format.h>

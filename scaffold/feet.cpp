@@ -1,3 +1,5 @@
+// Feet by the names of links at the ends of limbs, or the lowest ends; contact points, leg length
+// and the direction ahead.
 #include "scaffold/feet.hpp"
 
 #include <fmt/format.h>

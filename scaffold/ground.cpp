@@ -1,3 +1,4 @@
+// Sites and [contact] in proportion to COMAN's, by the weight on each point.
 #include "scaffold/ground.hpp"
 
 #include <cmath>

@@ -1,3 +1,5 @@
+// Cuts the tree at the root and where heavy branches part; names by feet, sides and words such as
+// head.
 #include "scaffold/limbs.hpp"
 
 #include <Eigen/Geometry>

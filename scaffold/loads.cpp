@@ -1,3 +1,5 @@
+// Smallest and largest inertia and gravity torque of each joint over 200 postures of Halton's
+// series, and limits where the description has no usable ones.
 #include "scaffold/loads.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Way-points about the posture, reduced joint by joint until no drive is overloaded and nothing
+// goes through the floor.
 #include "scaffold/moves.hpp"
 
 #include <algorithm>

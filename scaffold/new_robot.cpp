@@ -1,3 +1,5 @@
+// The steps of `tandem new` in order: description, base, posture, drives, right angles, wiring;
+// each uses the results of those before.
 #include "scaffold/new_robot.hpp"
 
 #include <fmt/format.h>

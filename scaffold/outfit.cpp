@@ -1,3 +1,4 @@
+// <sensor> elements, which urdfdom does not read, straight from the XML.
 #include "scaffold/outfit.hpp"
 
 #include <tinyxml2.h>

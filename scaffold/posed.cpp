@@ -1,3 +1,4 @@
+// Placements, Jacobians, inertias and gravity torques of a tree at q, by sums over its bodies.
 #include "scaffold/posed.hpp"
 
 #include <algorithm>

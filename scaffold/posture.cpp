@@ -1,3 +1,5 @@
+// Zero within the limits, joints turned until gravity is light, and for a fixed base the most
+// dexterous of 256 samples of Halton's series.
 #include "scaffold/posture.hpp"
 
 #include <Eigen/Dense>

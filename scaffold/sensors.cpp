@@ -1,3 +1,4 @@
+// Force/torque sensors and IMUs by <sensor> type or name, one per wrench and one per body.
 #include "scaffold/sensors.hpp"
 
 #include <algorithm>

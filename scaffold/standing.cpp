@@ -1,3 +1,5 @@
+// Damped least squares on the legs' joints for soles, centre of mass and height; knee patterns are
+// tried in order of likelihood.
 #include "scaffold/standing.hpp"
 
 #include <Eigen/Dense>

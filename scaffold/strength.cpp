@@ -1,3 +1,5 @@
+// Compares each joint's torque at the posture with limit, current and continuous current of its
+// drive.
 #include "scaffold/strength.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,5 @@
+// One bus per limb and two joints per board; a limb whose bus would be overloaded at 1 kHz is
+// split.
 #include "scaffold/wiring.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Turns robot.toml into hal::Robot: limits and gain bounds of every joint, from its actuator and
+// gains.
 #include "hal/config/capabilities.hpp"
 
 #include <algorithm>

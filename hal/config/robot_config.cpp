@@ -1,3 +1,5 @@
+// Reads the model, sites, sensors, contact, postures and safety of robot.toml, and calls the
+// readers of the other tables in the order in which tables refer to each other.
 #include "hal/config/robot_config.hpp"
 
 #include <filesystem>

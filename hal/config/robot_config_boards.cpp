@@ -1,3 +1,4 @@
+// [[bus]] and [[board]]: node ids that count up along a bus, and the seats of the listed joints.
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {

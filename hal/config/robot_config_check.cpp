@@ -1,3 +1,4 @@
+// robot.toml against the URDF: names that must exist, and limits that the URDF completes.
 #include <cassert>
 #include <cmath>
 #include <numbers>
@@ -276,7 +277,7 @@ class Completion : private Check {
     if (std::isnan(joint.rated_torque_Nm)) joint.rated_torque_Nm = joint.max_torque_Nm;
     if (joint.max_torque_Nm > 32.0 * joint.rated_torque_Nm) {
       error(joint.line, key + ".rated_torque_Nm",
-            "max_torque_Nm is more than 32 times the rated torque, the most the wire can say",
+            "max_torque_Nm is more than 32 times the rated torque, the range of the wire",
             "raise rated_torque_Nm");
     }
     check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
@@ -291,7 +292,7 @@ class Completion : private Check {
       error(joint.line, key, "the joint would need more than a second to its max_torque_Nm",
             "at least " + std::to_string(joint.max_torque_Nm));
     } else if (*joint.max_torque_rate_Nm_s > most) {
-      error(joint.line, key, "is more than the wire can say",
+      error(joint.line, key, "is beyond the range of the wire",
             "at most " + std::to_string(most) + ", 4e6 times the rated torque");
     }
   }

@@ -1,3 +1,4 @@
+// [actuator.NAME] and [gains.NAME]: motors, springs and the drives' loops.
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {

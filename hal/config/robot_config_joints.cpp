@@ -1,3 +1,4 @@
+// [[joint]]: limits, brake, encoders and reaction to faults, for one joint or for a list of them.
 #include <limits>
 
 #include "hal/config/robot_config_read.hpp"

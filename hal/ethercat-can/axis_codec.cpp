@@ -1,3 +1,5 @@
+// Scaling between SI units and CiA 402 integers, per field; rounds to the nearest and clamps. NaN
+// becomes 0.
 #include "hal/ethercat-can/axis_codec.hpp"
 
 #include <cmath>

@@ -1,3 +1,5 @@
+// Turns an axis' target (nothing, enable, follow, hold, quick stop, reset) into the controlword of
+// each cycle, and latches the first deviation of the drive from it.
 #include "hal/ethercat-can/axis_master.hpp"
 
 #include "base/archive.hpp"

@@ -1,3 +1,5 @@
+// Sums every frame's worst-case stuffed length over a cycle, and searches what would fit: a longer
+// period, a higher data bit rate, CAN FD, or more buses.
 #include "hal/ethercat-can/bus_load.hpp"
 
 #include <fmt/format.h>

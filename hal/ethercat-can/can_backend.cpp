@@ -1,3 +1,5 @@
+// exchange() sends SYNC and waits for the first TPDO of every running node, or for TIME in
+// lockstep; the drive master then works on the frames that it collected.
 #include "hal/ethercat-can/can_backend.hpp"
 
 #include <algorithm>

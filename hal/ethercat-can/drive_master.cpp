@@ -1,3 +1,5 @@
+// The cyclic part: frames in, whole samples only, state image; command image, frames out. The
+// stages from bring-up to shut-down are in drive_master_stages.cpp.
 #include "hal/ethercat-can/drive_master.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Gains that change at run time: one SDO at a time per board, until the drive has what the
+// parameter image asks for.
 #include <algorithm>
 
 #include "canopen/sdo.hpp"

@@ -1,3 +1,19 @@
+// The drive master's stages: a state machine that advances once per cycle, on the loop's thread.
+//
+//   kBooting ----------------> kEnabling ----------------> kRunning <-----------+
+//      |     every node runs       |     every axis is        |                 |  reset(): no
+//      |                           |     enabled              | fault, stop()   |  cause is left,
+//      | node down, stop()         | node or axis fails,      v                 |  every axis is
+//      |                           | stop()                kFaulted ------------+  enabled again
+//      +-------------+-------------+
+//                    v                         in kFaulted a harder reaction changes the axes'
+//                 kFailed, for good            targets; the stage stays
+//
+// react() gives every axis its target: nothing (category 0), quick stop (category 1) or hold; an
+// axis with a fault of its own gets nothing. A fault of a "warn" joint leaves the stage as it is.
+// recover() brings back joints that are reset and nodes that are configured anew, one by one.
+// shut_down() works in every stage: quick stop until the axes are off, 3 s at most, then NMT
+// pre-operational.
 #include <algorithm>
 
 #include "canopen/messages.hpp"

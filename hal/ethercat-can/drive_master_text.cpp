@@ -1,3 +1,4 @@
+// The texts of bring-up, faults and warnings. They allocate, so the cycle does not call them.
 #include <algorithm>
 
 #include <fmt/format.h>

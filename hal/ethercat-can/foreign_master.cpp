@@ -1,3 +1,4 @@
+// Listens for SYNC, NMT commands and the heartbeat of node 127, which only a master sends.
 #include "hal/ethercat-can/foreign_master.hpp"
 
 #include <fmt/format.h>

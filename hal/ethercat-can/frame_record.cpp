@@ -1,3 +1,5 @@
+// The watched bus copies each frame into a wait-free ring on the RT thread; a writer thread makes
+// candump lines of them.
 #include "hal/ethercat-can/frame_record.hpp"
 
 #include <fmt/format.h>

@@ -1,3 +1,5 @@
+// Bit counts of ISO 11898-1:2015: dynamic stuffing of a classic frame and of FD's arbitration
+// phase, fixed stuff bits in FD's CRC field.
 #include "hal/ethercat-can/frame_time.hpp"
 
 namespace tandem::hal::can {

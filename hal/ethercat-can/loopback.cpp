@@ -1,3 +1,4 @@
+// Two bounded first-in-first-out queues, one per direction; what finds a queue full is refused.
 #include "hal/ethercat-can/loopback.hpp"
 
 #include <algorithm>

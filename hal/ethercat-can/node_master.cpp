@@ -1,3 +1,5 @@
+// One node's stages: wait for boot-up, configure by SDO, ready, starting, running; down with an
+// error that says why. docs/wire.md lists the frames.
 #include "hal/ethercat-can/node_master.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Packs the blocks of axes and channels into PDOs: up to 64 bytes with several axes on CAN FD,
+// eight bytes with one axis on classic CAN.
 #include "hal/ethercat-can/pdo_layout.hpp"
 
 #include <algorithm>

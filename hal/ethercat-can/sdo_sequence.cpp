@@ -1,3 +1,5 @@
+// The configuration of a node as a list of SDO steps: identity checks, PDO mapping, scales, gains,
+// limits, protections, heartbeats.
 #include "hal/ethercat-can/sdo_sequence.hpp"
 
 #include <algorithm>

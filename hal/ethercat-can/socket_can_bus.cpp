@@ -1,3 +1,5 @@
+// sendmmsg and recvmmsg on a raw, non-blocking socket; error frames and errno lead to the bus'
+// state, which recovers by itself.
 #include "hal/ethercat-can/socket_can_bus.hpp"
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// Lengths that CAN cannot have, remote and 29-bit frames are refused here, in both directions.
 #include "hal/ethercat-can/socket_frame.hpp"
 
 #include <linux/can/error.h>

@@ -1,3 +1,5 @@
+// The lowest identifier among the queues' heads wins the bus and is not interrupted; each frame
+// takes its exact stuffed length.
 #include "hal/ethercat-can/wire_model.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Acquiring the lease takes a mutex, on DDS threads; the loop only reads and clears the atomic
+// owner.
 #include "hal/remote/lease.hpp"
 
 namespace tandem::remote {

@@ -1,3 +1,5 @@
+// Compares the two ends' robots joint by joint, and checks that a command has valid modes and
+// finite numbers.
 #include "hal/remote/link.hpp"
 
 #include <algorithm>

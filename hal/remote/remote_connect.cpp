@@ -283,7 +283,7 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
 std::string RemoteBackend::status_text() const {
   const std::lock_guard lock(mutex_);
   if (gone_) {
-    return "the server has not been heard for " + seconds(config_.server_timeout_s);
+    return "no message from the server for " + seconds(config_.server_timeout_s);
   }
   if (ending_ || hal::ends(static_cast<hal::RunPhase>(phase_.load()))) {
     return "the server's run is over";

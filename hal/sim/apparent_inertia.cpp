@@ -1,3 +1,5 @@
+// The mass matrix and its Cholesky factor in a fixed, low-discrepancy sequence of postures: a joint
+// is lightest with all others free, 1 / (M^-1)_ii, and heaviest with them locked, M_ii.
 #include "hal/sim/apparent_inertia.hpp"
 
 #include <algorithm>

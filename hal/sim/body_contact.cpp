@@ -1,3 +1,5 @@
+// Points are tested only when a bound on the distance travelled has used up the clearance. Their
+// forces are summed from the tips to the base, without a Jacobian.
 #include "hal/sim/body_contact.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Sums the law of ground_law.hpp over every sole's points into one wrench in the site's axes.
 #include "hal/sim/contact.hpp"
 
 #include "hal/sim/ground_law.hpp"

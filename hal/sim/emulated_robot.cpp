@@ -1,3 +1,5 @@
+// Creates plant, boards and sensor nodes from robot.toml, and makes one step: plant to the time of
+// SYNC, frames in, boards at their control periods, answers out.
 #include "hal/sim/emulated_robot.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The step's frames when [sim] bus_timing is on: each takes its time in a WireModel per bus.
 #include <algorithm>
 
 #include "hal/sim/emulated_robot.hpp"

@@ -1,3 +1,5 @@
+// A step is due when SYNC is on every bus, or in real time half a period after the first SYNC, or a
+// period and a half after the last step. TIME ends the answers in lockstep.
 #include "hal/sim/emulator.hpp"
 
 #include <algorithm>

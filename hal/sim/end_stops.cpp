@@ -1,3 +1,5 @@
+// One-sided spring and damper at both ends of every joint, as stiff as its inertia lets the
+// sub-step integrate.
 #include "hal/sim/end_stops.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// A fixed number of slots, each a fault with its own random generator; held frames wait in a fixed
+// pool. Nothing allocates while frames pass.
 #include "hal/sim/fault_injection.hpp"
 
 #include <algorithm>

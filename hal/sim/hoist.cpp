@@ -1,3 +1,5 @@
+// A 6-D spring and damper at 40 Hz, critically damped, with the initial load as feed-forward; its
+// share fades to 0 along a minimum-jerk profile.
 #include "hal/sim/hoist.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Every 10 ms a unit torque on each watched joint gives its apparent inertia, and that the number
+// of halvings of the sub-step.
 #include "hal/sim/light_joints.hpp"
 
 #include <algorithm>

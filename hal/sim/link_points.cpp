@@ -1,3 +1,5 @@
+// Corners and rims of collision shapes, else the corners of the homogeneous box with the link's
+// mass and inertia.
 #include "hal/sim/link_points.hpp"
 
 #include <Eigen/Eigenvalues>

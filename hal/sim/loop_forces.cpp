@@ -1,3 +1,5 @@
+// M is factorised by Cholesky once per position; A M^-1 A^T by SemidefiniteSolver, since equations
+// may be redundant.
 #include "hal/sim/loop_forces.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Creates the plant: joints mapped by name, loops closed, springs and hoist loaded so that it
+// starts at rest. How it advances is in plant_step.cpp.
 #include "hal/sim/plant.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Reads [[fault]] tables strictly, names resolved to indices of the robot; a line of words becomes
+// such a table first.
 #include "hal/sim/scenario.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Force/torque from the kernels' sensor wrenches, IMU from the site's pose, twist and acceleration
+// less gravity.
 #include "hal/sim/sensors.hpp"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// robot.toml to the set-ups of firmware_emu and to the model's specification: gains, limits,
+// protections, noise seeds.
 #include "hal/sim/setup.hpp"
 
 #include <algorithm>

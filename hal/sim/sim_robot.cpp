@@ -1,3 +1,5 @@
+// One cycle in process: SYNC goes out behind the commands, the emulated robot makes one step, and
+// the master decodes its answers. Faults are injected between two steps.
 #include "hal/sim/sim_robot.hpp"
 
 #include <cstring>

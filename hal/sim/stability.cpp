@@ -1,3 +1,5 @@
+// Linearises springs, dampers and ground at the start posture, and bisects for the step u at which
+// the largest eigenvalue of M^-1 (u^2 K + u D) is 1.
 #include "hal/sim/stability.hpp"
 
 #include <Eigen/Dense>

@@ -1,3 +1,4 @@
+// Copies base, joints, feet and loop errors of the plant into the truth image, once per cycle.
 #include "hal/sim/truth.hpp"
 
 #include <algorithm>

@@ -399,7 +399,7 @@ TEST_F(DdsCommands, AStopAsksNobodyForAdmission) {
 TEST_F(DdsCommands, AreForOneOfSeveralRuns) {
   const Outcome none = over_dds("controller list");
   EXPECT_EQ(none.status, 2);
-  EXPECT_NE(none.err.find("nobody serves tandem/ask in the DDS domain"), std::string::npos)
+  EXPECT_NE(none.err.find("no process serves tandem/ask in the DDS domain"), std::string::npos)
       << none.err;
   EXPECT_NE(none.err.find("--dds"), std::string::npos) << none.err;
   write_text(folder_ / "hold.toml",

@@ -22,7 +22,7 @@ TEST_F(Faults, AreShownAndResetWhileTheRunWaits) {
   EXPECT_NE(reset.out.find("every joint is enabled where it is"), std::string::npos) << reset.out;
   EXPECT_NE(reset.out.find("cleared at"), std::string::npos) << reset.out;
   EXPECT_NE(reset.out.find("phase held, 0 latched"), std::string::npos) << reset.out;
-  EXPECT_NE(reset.out.find("held: `tandem controller start` lets the controllers go on"),
+  EXPECT_NE(reset.out.find("held: `tandem controller start` lets the controllers continue"),
             std::string::npos)
       << reset.out;
   const auto ran = [this] {
@@ -101,7 +101,7 @@ TEST_F(Faults, OfABoardLeaveNoFiguresThatLookLive) {
   until(R"("phase": "faulted")");
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   const Outcome list = to_run("joint list joint1");
-  EXPECT_NE(list.out.find("not heard for "), std::string::npos) << list.out;
+  EXPECT_NE(list.out.find("no feedback for "), std::string::npos) << list.out;
   EXPECT_EQ(to_run("controller start").status, 2);
   EXPECT_NE(to_run("controller start").err.find("tandem fault reset, then ask again"),
             std::string::npos);
@@ -175,7 +175,7 @@ TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
 TEST_F(Faults, OfNoRunAreAnError) {
   const Outcome outcome = to_run("fault show");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("nobody listens"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("no process listens"), std::string::npos) << outcome.err;
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ TEST_F(Serve, AnotherUserOfTheMachineMovesNothing) {
 TEST_F(Serve, WithoutASocketNobodyCouldBeAdmitted) {
   const Outcome outcome = tandem("serve trajectory.toml --no-socket --no-log");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("nobody can be admitted to this robot (leave out --no-socket"),
+  EXPECT_NE(outcome.err.find("no process can be admitted to this robot (leave out --no-socket"),
             std::string::npos)
       << outcome.err;
 }
@@ -144,7 +144,7 @@ TEST_F(Serve, AServerThatIsKilledEndsItsOwnerInAFault) {
   })) << read_text(folder_ / "owner.err");
   ASSERT_EQ(::kill(server, SIGKILL), 0);
   EXPECT_TRUE(ended(owner));
-  EXPECT_NE(read_text(folder_ / "owner.err").find("the server has not been heard for"),
+  EXPECT_NE(read_text(folder_ / "owner.err").find("no message from the server for"),
             std::string::npos)
       << read_text(folder_ / "owner.err");
 }

@@ -111,7 +111,7 @@ TEST_F(Stops, CannotBeToldToAnImpostorInAFolderThatIsOpen) {
   EXPECT_EQ(run.err,
             "error: the socket's folder " + open.string() +
                 " may be changed by everybody (its mode is 777): somebody else's socket could take "
-                "the place of open/s.sock, and be told of an emergency stop instead (give it to "
+                "the place of open/s.sock, and receive its emergency stops (give it to "
                 "this user, and take the right to write from others: chmod go-w " +
                 open.string() + "; or choose another folder with --socket)\n");
 }

@@ -109,7 +109,7 @@ TEST_F(Topic, ErrorsNameTheNearestTopicAndField) {
   (void)listed_with("/tandem/state");
   const Outcome wrong = topic("echo /joint_state --once --wait 2");
   EXPECT_EQ(wrong.status, 2);
-  EXPECT_NE(wrong.err.find("nobody writes /joint_state"), std::string::npos) << wrong.err;
+  EXPECT_NE(wrong.err.find("no process writes /joint_state"), std::string::npos) << wrong.err;
   EXPECT_NE(wrong.err.find("did you mean '/joint_states'?"), std::string::npos) << wrong.err;
   const Outcome field = topic("echo /joint_states --once --field positions");
   EXPECT_EQ(field.status, 2);

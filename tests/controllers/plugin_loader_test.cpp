@@ -24,12 +24,11 @@ TEST(PluginLoader, OpensALibraryByItsPath) {
 TEST(PluginLoader, NamesTheFoldersSearchedAndTheNearestController) {
   const auto loaded = load_controller("hodl", test::bundled_folder());
   ASSERT_FALSE(loaded.has_value());
-  EXPECT_EQ(loaded.error().message,
-            "there is no controller 'hodl' in " + test::bundled_folder()[0]);
+  EXPECT_EQ(loaded.error().message, "no such controller in " + test::bundled_folder()[0]);
   EXPECT_EQ(
       loaded.error().hint,
-      "did you mean 'hold'?; one of your own is found in the folders of TANDEM_CONTROLLERS, or by "
-      "a path with a '/'");
+      "did you mean 'hold'?; list your own folders in TANDEM_CONTROLLERS, or name the library "
+      "by a path with a '/'");
 }
 
 TEST(PluginLoader, SaysHowABundledControllerIsBuilt) {

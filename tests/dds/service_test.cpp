@@ -113,7 +113,7 @@ TEST_F(Services, KeepClientsApartThatAskAtOnce) {
 TEST_F(Services, ThatNobodyServesAreAnErrorThatSaysWhatToStart) {
   Client client = client_of(*client_side, "nothing");
   const std::string error = call(client, milliseconds(50));
-  EXPECT_NE(error.find("nobody serves /nothing"), std::string::npos) << error;
+  EXPECT_NE(error.find("no process serves /nothing"), std::string::npos) << error;
   EXPECT_NE(error.find("--dds"), std::string::npos) << error;
 }
 
@@ -150,7 +150,7 @@ TEST_F(Services, ThatGoAwayInACallAreAnError) {
   server.reset();
   const std::string text = answer.get();
   EXPECT_TRUE(text == "2" || text.find("went away") != std::string::npos) << text;
-  EXPECT_NE(call(client, milliseconds(50)).find("nobody serves"), std::string::npos);
+  EXPECT_NE(call(client, milliseconds(50)).find("no process serves"), std::string::npos);
 }
 
 TEST_F(Services, OfTwoProcessesAreNotAsked) {

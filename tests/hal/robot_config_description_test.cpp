@@ -232,7 +232,7 @@ TEST_F(Completed, RefusesATorqueRateThatControlsNothingOrThatTheWireCannotSay) {
             std::string::npos)
       << errors;
   read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nmax_torque_rate_Nm_s = 1e9"));
-  EXPECT_NE(errors.find("max_torque_rate_Nm_s: is more than the wire can say"), std::string::npos)
+  EXPECT_NE(errors.find("max_torque_rate_Nm_s: is beyond the range of the wire"), std::string::npos)
       << errors;
   read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nmax_torque_rate_Nm_s = 80"));
   EXPECT_EQ(errors, "");

@@ -15,7 +15,7 @@ using canopen::DriveMotion;
 using hal::FaultKind;
 using sim::Fault;
 
-/// The page's line of the running test, cell by cell: what | noticed by | reaction | noticed |
+/// The page's line of the running test, cell by cell: fault | detected by | reaction | detected |
 /// safe | test.
 inline std::vector<std::string> row_of_this_test() {
   const std::string name = std::string("`FaultRow.") +
