@@ -3,7 +3,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# All that a plugin may see: controllers/controller.hpp and what it includes. The loader refuses a
+# All that a plugin may see: controllers/controller.hpp, hal/devices.hpp and what they include. The loader refuses a
 # plugin of another version of them (kControllerInterface).
 set(TANDEM_PLUGIN_HEADERS
   base/archive.hpp
@@ -13,10 +13,15 @@ set(TANDEM_PLUGIN_HEADERS
   controllers/controller.hpp
   hal/command_fields.inc
   hal/cycle_time.hpp
+  hal/devices.hpp
   hal/image.hpp
   hal/joint_capabilities.hpp
+  hal/joint_devices.hpp
   hal/robot.hpp
+  hal/sensor_devices.hpp
+  hal/service_devices.hpp
   hal/state_fields.inc
+  hal/trapezoid.hpp
   model/kernels.h
   model/loop_spec.hpp)
 

@@ -7,9 +7,9 @@ set(strange "${WORK}/a strange folder")
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix}
   OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 
-# All headers that it lays down, and what the one for plugins includes.
+# All headers that it lays down, and what the two for plugins include.
 file(GLOB_RECURSE installed RELATIVE ${prefix}/include/tandem ${prefix}/include/*)
-set(wanted controllers/controller.hpp)
+set(wanted controllers/controller.hpp hal/devices.hpp)
 foreach(header IN LISTS installed)
   file(STRINGS ${prefix}/include/tandem/${header} lines REGEX "#include \"")
   foreach(line IN LISTS lines)
