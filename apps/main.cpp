@@ -1,7 +1,7 @@
 #include <string_view>
 
-#include "apps/commands.hpp"
-#include "apps/console.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/text/console.hpp"
 
 namespace {
 
