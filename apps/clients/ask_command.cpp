@@ -1,7 +1,7 @@
 #include <fmt/core.h>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/json_reader.hpp"
 

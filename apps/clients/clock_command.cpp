@@ -4,8 +4,8 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 

@@ -15,8 +15,9 @@
 #include <string_view>
 
 #include "apps/clients/dds_client.hpp"
+#include "apps/control/control_registry.hpp"
 #include "apps/text/json_reader.hpp"
-#include "apps/transport/control_socket.hpp"
+#include "apps/transport/control_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -122,27 +123,6 @@ class SocketClient : public ControlClient {
 
 std::chrono::milliseconds answer_time(const Json& question) {
   return question.value("do", "") == "estop" ? kStopAnswer : 5000ms;
-}
-
-Result<sockaddr_un> control_address(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.empty()) return fail("the socket's path is empty", "name a file with --socket");
-  if (path.size() >= sizeof address.sun_path) {
-    return fail(fmt::format("the socket's path has {} bytes, {} are possible: {}", path.size(),
-                            sizeof address.sun_path - 1, path),
-                "choose a shorter one with --socket");
-  }
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  return address;
-}
-
-bool control_socket_alive(const std::string& path) {
-  const Result<sockaddr_un> address = control_address(path);
-  if (!address) return false;
-  const Descriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  const int error = connect_to(descriptor, *address, 0ms);  // it does not block
-  return error == 0 || error == EAGAIN;  // EAGAIN: it listens, and others wait before us
 }
 
 std::vector<std::string> running_control_sockets(const std::string& kind) {

@@ -2,8 +2,6 @@
 // Layer: apps/clients.  Thread: any, non-RT.
 #pragma once
 
-#include <sys/un.h>
-
 #include <chrono>
 #include <memory>
 #include <string>
@@ -16,17 +14,8 @@
 
 namespace tandem::apps {
 
-/// How long an emergency stop waits for its answer: who asks has to know soon that nothing stops
-/// the robot. More than the longest time in which a run looks for the loop's confirmation.
-inline constexpr std::chrono::milliseconds kStopAnswer{3000};
 /// How long ask() waits for the answer to `question`: kStopAnswer, or 5 s.
 [[nodiscard]] std::chrono::milliseconds answer_time(const Json& question);
-
-/// The socket's address. Errors: a path that is empty, or longer than the 107 bytes of one.
-[[nodiscard]] Result<sockaddr_un> control_address(const std::string& path);
-
-/// True when a process listens at `path`.
-[[nodiscard]] bool control_socket_alive(const std::string& path);
 
 /// The sockets of this user's running processes, in the order of their names. Files that dead
 /// processes left are removed.

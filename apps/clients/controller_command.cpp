@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "apps/clients/dds_config.hpp"
-#include "apps/transport/dds_admission.hpp"
+#include "dds/service.hpp"
 #include "dds/service_client.hpp"
 
 namespace tandem::apps {
@@ -91,6 +91,11 @@ Error several(const std::vector<dds::FoundService>& found, const dds::Config& co
 }
 
 }  // namespace
+
+void have_admitted(const dds::Participant& participant) {
+  const Json question{{"do", "dds.admit"}, {"participant", dds::to_text(dds::id_of(participant))}};
+  for (const std::string& socket : running_control_sockets("run")) (void)ask(socket, question);
+}
 
 Result<std::unique_ptr<ControlClient>> open_dds_client(const ControlTarget& asked) {
   const Result<dds::Config> config = dds_config(asked.place);

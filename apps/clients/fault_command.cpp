@@ -4,9 +4,9 @@
 #include <chrono>
 #include <thread>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
 #include "apps/control/fault_table.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {
@@ -22,7 +22,7 @@ const char kAsked[] =
     "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
     "fault show)";
 
-void print_answer(const Json& answer) {
+void print_latched(const Json& answer) {
   fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
   print_faults(answer.value("faults", Json::array()), stdout);
 }
@@ -30,7 +30,7 @@ void print_answer(const Json& answer) {
 Exit show(const FaultOptions& options) {
   const Result<Json> answer = ask(options.target, "run", {{"do", "fault.show"}});
   if (!answer) return refuse(answer.error());
-  if (options.json != "-") print_answer(*answer);
+  if (options.json != "-") print_latched(*answer);
   if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
@@ -100,7 +100,7 @@ Exit reset(const FaultOptions& options) {
     if (nothing) fmt::print("nothing is latched\n");
     if (kept) fmt::print("{}\n", kAsked);
     if (done) fmt::print("reset: every joint is enabled where it is\n");
-    if (!nothing) print_answer(answer);
+    if (!nothing) print_latched(answer);
     if (done && held) fmt::print("held: `tandem controller start` lets the controllers go on\n");
   }
   if (!nothing && !kept && !done) {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "base/nearest.hpp"
 #include "runtime/robot_cycle.hpp"

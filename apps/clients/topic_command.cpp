@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <thread>
 
+#include "apps/clients/commands.hpp"
 #include "apps/clients/dds_config.hpp"
 #include "apps/clients/topic_print.hpp"
 #include "apps/clients/topic_rate.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "base/nearest.hpp"
 #include "dds/discovery.hpp"

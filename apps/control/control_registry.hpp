@@ -2,6 +2,7 @@
 // Layer: apps/control.  Thread: filled before it is served; then any, one thing at a time.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -28,6 +29,9 @@ enum class ControlEffect : std::uint8_t {
 /// Longest question [bytes].
 inline constexpr std::size_t kMaxQuestion = 256 * 1024;
 
+/// How long an emergency stop waits for its answer: who asks has to know soon that nothing stops
+/// the robot. More than the longest time in which a run looks for the loop's confirmation.
+inline constexpr std::chrono::milliseconds kStopAnswer{3000};
 /// A key of a command's request, beside "do".
 struct ControlKey {
   enum class Type : std::uint8_t {

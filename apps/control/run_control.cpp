@@ -6,7 +6,6 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/clients/control_client.hpp"
 #include "apps/control/clock_control.hpp"
 #include "apps/control/controller_control.hpp"
 #include "apps/control/fault_table.hpp"

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "apps/machine/commands.hpp"
 #include "apps/machine/doctor.hpp"
 #include "apps/robot/robot_files.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 

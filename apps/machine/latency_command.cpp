@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "apps/machine/child_process.hpp"
+#include "apps/machine/commands.hpp"
 #include "apps/machine/latency_measure.hpp"
 #include "apps/machine/latency_report.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
 #include "base/process.hpp"
 #include "rt/cpu_latency.hpp"

@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/clients/dds_client.hpp"
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
-#include "apps/transport/dds_admission.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"

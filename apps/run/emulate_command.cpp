@@ -2,7 +2,6 @@
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/can_sockets.hpp"
-#include "apps/control/inject.hpp"
 #include "apps/robot/kernel_supply.hpp"
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/robot_files.hpp"
@@ -10,6 +9,7 @@
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/errands.hpp"
+#include "apps/run/inject.hpp"
 #include "apps/text/console.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/counted.hpp"

@@ -7,7 +7,6 @@
 #include <array>
 #include <thread>
 
-#include "apps/command_line/command_line.hpp"
 #include "apps/text/console.hpp"
 #include "canopen/messages.hpp"
 

@@ -4,24 +4,24 @@
 #include <algorithm>
 #include <optional>
 
-#include "apps/control/inject.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
 #include "apps/run/composition.hpp"
 #include "apps/run/dds_run.hpp"
+#include "apps/run/inject.hpp"
 #include "apps/run/loop_guard.hpp"
 #include "apps/run/loop_thread.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_log.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/text/console.hpp"
+#include "apps/tools/draw_report.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
-#include "report/report.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
@@ -111,7 +111,7 @@ Status check_pace(const Composition& c, const RunOptions& options) {
 /// Draws the report and prints where it is; a report that cannot be drawn is no fault of the run.
 void add_report(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
   if (!options.report || !summary.log) return;
-  const auto files = draw_report({.log = summary.log->path, .other = {}, .output = {}, .json = {}});
+  const auto files = draw_report(summary.log->path, {}, {});
   if (!files) {
     print_errors({files.error()});
     return;

@@ -5,8 +5,8 @@
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/robot/wrong_kind.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
 #include "apps/tools/eds_files.hpp"
 
 namespace tandem::apps {

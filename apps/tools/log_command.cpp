@@ -4,8 +4,8 @@
 #include <fstream>
 #include <iostream>
 
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
 #include "base/counted.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"

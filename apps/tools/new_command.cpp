@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "apps/robot/robot_files.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
 #include "base/utf8.hpp"

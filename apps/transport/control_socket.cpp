@@ -5,17 +5,14 @@
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
-#include "apps/clients/control_client.hpp"
-#include "base/trusted_code.hpp"
+#include "apps/transport/control_path.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -34,14 +31,10 @@ std::string refused(const std::string& error, const std::string& hint) {
 
 std::string reason() { return std::strerror(errno); }
 
-std::string folder_of(const std::string& path) {
-  return std::filesystem::path(path).parent_path().string();
-}
-
 /// The folder of the default paths is made when it is missing. Refused is one that others may
 /// change.
 Status prepare_folder(const std::string& path) {
-  const std::string folder = folder_of(path);
+  const std::string folder = std::filesystem::path(path).parent_path().string();
   if (folder != control_folder()) return check_socket_folder(path);
   if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
     return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
@@ -81,55 +74,6 @@ struct ControlSocket::Client {
   bool ending = false;   // nothing more is read: closed when its answers are out
   bool gone = false;
 };
-
-std::string control_folder() {
-  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
-  std::error_code error;
-  if (runtime != nullptr && std::filesystem::is_directory(runtime, error)) {
-    return (std::filesystem::path(runtime) / "tandem").string();
-  }
-  return fmt::format("/tmp/tandem-{}", ::geteuid());
-}
-
-Status check_private_folder(const std::string& folder) {
-  struct stat found {};
-  if (::lstat(folder.c_str(), &found) != 0) {
-    return fail(fmt::format("cannot look at {}: {}", folder, reason()),
-                "choose another place with --socket");
-  }
-  if (S_ISDIR(found.st_mode) && found.st_uid == ::geteuid() && (found.st_mode & 0077) == 0) {
-    return {};
-  }
-  return fail(
-      fmt::format("{} is no folder of this user alone (its owner is user {}, its mode {:o})",
-                  folder, found.st_uid, found.st_mode & 07777),
-      "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
-}
-
-Status check_socket_folder(const std::string& path, std::optional<uid_t> partner) {
-  const std::string folder = folder_of(path);
-  if (folder == control_folder()) return check_private_folder(folder);
-  std::error_code error;
-  if (!folder.empty() && !std::filesystem::exists(folder, error)) return {};
-  const Status ours = check_trusted_folder(folder, partner);
-  if (ours) return {};
-  return fail(
-      fmt::format("the socket's folder {} {}: somebody else's socket could take the place of "
-                  "{}, and be told of an emergency stop instead",
-                  ours.error().file, ours.error().message, path),
-      ours.error().hint + "; or choose another folder with --socket");
-}
-
-std::int64_t peer_user(int descriptor) {
-  ucred peer{};
-  socklen_t size = sizeof peer;
-  const bool known = ::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
-  return known ? static_cast<std::int64_t>(peer.uid) : -1;
-}
-
-std::string default_control_path(const std::string& kind) {
-  return fmt::format("{}/{}-{}.sock", control_folder(), kind, ::getpid());
-}
 
 ControlSocket::ControlSocket(std::string path, const ControlRegistry& registry)
     : path_(std::move(path)), registry_(&registry) {}

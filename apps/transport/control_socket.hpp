@@ -10,7 +10,6 @@
 #include <deque>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -29,23 +28,6 @@ inline constexpr std::size_t kMaxControlClients = 16;
 /// Questions that wait for one that is at work, those of clients that have gone included. One more
 /// is refused.
 inline constexpr std::size_t kMaxControlWaiting = 64;
-
-/// The folder of every socket of this user: $XDG_RUNTIME_DIR/tandem, or /tmp/tandem-<uid> where
-/// there is no such folder.
-[[nodiscard]] std::string control_folder();
-/// Whether `folder` is a folder that this user alone may change: in any other one somebody else may
-/// have put a socket of theirs. Errors: it is not, with its owner; it is not there.
-[[nodiscard]] Status check_private_folder(const std::string& folder);
-/// Whether nobody else could have put a socket of theirs at `path`: check_private_folder() of the
-/// default folder, check_trusted_folder() of any other. A folder that is not there is nobody's.
-/// @param partner  who listens, and may own the folder; empty: this user is to listen
-[[nodiscard]] Status check_socket_folder(const std::string& path,
-                                         std::optional<uid_t> partner = {});
-/// The user at the other end of a connection of AF_UNIX.  @return -1: unknown
-[[nodiscard]] std::int64_t peer_user(int descriptor);
-/// "<control_folder()>/<kind>-<pid>.sock" of this process.
-/// @param kind  the command that runs: "run", "emulate"
-[[nodiscard]] std::string default_control_path(const std::string& kind);
 
 /// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
 /// or leaves undone reaches the process: a client that sends a line that is too long, that does

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "apps/clients/control_client.hpp"
-
 namespace tandem::apps {
 
 bool DdsAdmission::admits(const std::optional<dds::ParticipantId>& writer) const {
@@ -37,11 +35,6 @@ void DdsAdmission::add_to(ControlRegistry& registry) {
                  admit(*participant);
                  return Json{{"participant", dds::to_text(*participant)}};
                });
-}
-
-void have_admitted(const dds::Participant& participant) {
-  const Json question{{"do", "dds.admit"}, {"participant", dds::to_text(dds::id_of(participant))}};
-  for (const std::string& socket : running_control_sockets("run")) (void)ask(socket, question);
 }
 
 }  // namespace tandem::apps

@@ -34,8 +34,4 @@ class DdsAdmission {
   std::vector<dds::ParticipantId> admitted_;
 };
 
-/// Has this participant admitted by every process of this user on this machine; those that are not
-/// on DDS, or do not answer, are passed over.
-void have_admitted(const dds::Participant& participant);
-
 }  // namespace tandem::apps

@@ -17,6 +17,7 @@
 #include "apps/clients/control_client.hpp"
 #include "apps/control/remote_gate.hpp"
 #include "apps/control/run_control.hpp"
+#include "apps/transport/control_path.hpp"
 #include "apps/transport/control_socket.hpp"
 
 namespace tandem::apps {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
+#include "apps/clients/commands.hpp"
 #include "apps/control/run_control.hpp"
-#include "apps/run/commands.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"

@@ -1,5 +1,5 @@
 // Faults into a running robot: the command's handler, whatever robot it is for.
-// Layer: apps/control.  Thread: main; the handler runs on the serving thread.
+// Layer: apps/run.  Thread: main; the handler runs on the serving thread.
 #pragma once
 
 #include <functional>
