@@ -1,7 +1,10 @@
 #include <string_view>
 
-#include "apps/commands.hpp"
-#include "apps/console.hpp"
+#include "apps/clients/commands.hpp"
+#include "apps/machine/commands.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
 
 namespace {
 

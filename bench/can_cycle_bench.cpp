@@ -12,7 +12,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "apps/can_sockets.hpp"
+#include "apps/can/can_sockets.hpp"
 #include "bench/fake_can_kernel.hpp"
 #include "bench/rig.hpp"
 #include "hal/ethercat-can/can_backend.hpp"

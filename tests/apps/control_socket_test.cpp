@@ -14,10 +14,11 @@
 #include <functional>
 #include <thread>
 
-#include "apps/control_client.hpp"
-#include "apps/control_socket.hpp"
-#include "apps/remote_gate.hpp"
-#include "apps/run_control.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/control/remote_gate.hpp"
+#include "apps/control/run_control.hpp"
+#include "apps/transport/control_path.hpp"
+#include "apps/transport/control_socket.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -166,7 +167,8 @@ TEST(RemoteGate, LetsNoCodeInUnlessAskedForAndThenByNameOnly) {
 
 TEST(RemoteGate, RefusesChangesOfControllersAndJointsWhileSomebodyOwnsTheRobot) {
   std::string owner;
-  const auto gate = remote_gate({.command = runtime::RemoteCommand::kLocal}, [&owner] { return owner; });
+  const auto gate =
+      remote_gate({.command = runtime::RemoteCommand::kLocal}, [&owner] { return owner; });
   EXPECT_TRUE(gate("controller.stop", ControlEffect::kChanges, {}));
   owner = "squat on robot-pc";
   for (const char* name : {"controller.stop", "joint.set"}) {
@@ -426,8 +428,8 @@ TEST_F(Socket, OfADeadProcessIsRemovedByWhoLooks) {
 /// Runs `work` as user `uid` in a process of its own.  @return what `work` returned, -1 on failure
 int as_user(uid_t uid, const std::function<int()>& work) {
   const pid_t child = ::fork();
-  if (child == 0) ::_exit(::setresgid(uid, uid, uid) == 0 && ::setresuid(uid, uid, uid) == 0
-                              ? work() : 111);
+  if (child == 0)
+    ::_exit(::setresgid(uid, uid, uid) == 0 && ::setresuid(uid, uid, uid) == 0 ? work() : 111);
   int status = 0;
   ::waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
@@ -496,14 +498,15 @@ TEST_F(Socket, LiesInNoFolderThatOthersMayChange) {
   const std::string where = open_folder + "/s.sock";
   const auto served = open(where);
   ASSERT_EQ(::chmod(open_folder.c_str(), 0777), 0);
-  const std::string named = "the socket's folder " + open_folder +
-                            " may be changed by everybody (its mode is 777): ";
+  const std::string named =
+      "the socket's folder " + open_folder + " may be changed by everybody (its mode is 777): ";
   const auto told = ask(where, {{"do", "help"}});
   ASSERT_FALSE(told.has_value());
   EXPECT_EQ(told.error().message.find(named), 0U) << told.error().to_string();
   for (const std::string& path : {open_folder + "/t.sock", inner + "/t.sock"}) {
     EXPECT_EQ(refusal(path).find(named), 0U) << refusal(path);
-    EXPECT_NE(refusal(path).find("chmod go-w " + open_folder + "; or choose another folder with "
+    EXPECT_NE(refusal(path).find("chmod go-w " + open_folder +
+                                 "; or choose another folder with "
                                  "--socket"),
               std::string::npos);
   }

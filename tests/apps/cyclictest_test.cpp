@@ -1,5 +1,5 @@
 // cyclictest's histogram, read from the JSON that its version 2.40 writes.
-#include "apps/cyclictest.hpp"
+#include "apps/machine/cyclictest.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A run's services over DDS do what its registry's commands do, and no more than [remote] allows.
-#include "apps/dds_services.hpp"
+#include "apps/transport/dds_services.hpp"
 
 #include <sys/socket.h>
 #include <sys/stat.h>

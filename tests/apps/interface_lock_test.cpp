@@ -1,5 +1,5 @@
 // One process per end of an interface.
-#include "apps/interface_lock.hpp"
+#include "apps/can/interface_lock.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -21,9 +21,9 @@ TEST(InterfaceLock, IsRefusedToASecondMasterWithTheFirstOnesProcess) {
     ASSERT_FALSE(second);
     EXPECT_TRUE(second.error().message.starts_with(own_name() + " has its master already: "));
     if (time > 0) continue;
-    EXPECT_EQ(second.error().message,
-              own_name() + " has its master already: process " + std::to_string(::getpid()) +
-                  " of user " + std::to_string(::geteuid()));
+    EXPECT_EQ(second.error().message, own_name() + " has its master already: process " +
+                                          std::to_string(::getpid()) + " of user " +
+                                          std::to_string(::geteuid()));
   }
 }
 

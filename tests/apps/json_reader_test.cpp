@@ -1,10 +1,10 @@
 // JSON from strangers: whatever it holds, an object or an error.
-#include "apps/json_reader.hpp"
+#include "apps/text/json_reader.hpp"
 
 #include <gtest/gtest.h>
 
-#include "apps/control_client.hpp"
-#include "apps/control_registry.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/control/control_registry.hpp"
 
 namespace tandem::apps {
 namespace {

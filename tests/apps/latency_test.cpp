@@ -1,6 +1,6 @@
 // `tandem latency` end to end, and what its figures must hold. Never a time.
-#include "apps/latency_measure.hpp"
-#include "apps/latency_report.hpp"
+#include "apps/machine/latency_measure.hpp"
+#include "apps/machine/latency_report.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/doctor.hpp"
-#include "apps/machine.hpp"
+#include "apps/machine/doctor.hpp"
+#include "apps/machine/machine.hpp"
 
 namespace tandem::apps {
 

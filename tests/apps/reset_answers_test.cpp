@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "apps/commands.hpp"
-#include "apps/control_socket.hpp"
-#include "apps/run_control.hpp"
+#include "apps/clients/commands.hpp"
+#include "apps/control/run_control.hpp"
+#include "apps/transport/control_socket.hpp"
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/hal/fake_backend.hpp"

@@ -1,5 +1,5 @@
 // Round trips of nodes as a run's summary tells them.
-#include "apps/round_trips.hpp"
+#include "apps/can/round_trips.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/control_socket.hpp"
+#include "apps/transport/control_path.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/support/dds_domain.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "apps/topic_print.hpp"
-#include "apps/topic_rate.hpp"
+#include "apps/clients/topic_print.hpp"
+#include "apps/clients/topic_rate.hpp"
 
 namespace tandem::apps {
 namespace {

@@ -15,16 +15,16 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/control_registry.hpp"
-#include "apps/dds_service_types.hpp"
-#include "apps/json_reader.hpp"
-#include "apps/remote_gate.hpp"
-#include "apps/run_control.hpp"
+#include "apps/control/control_registry.hpp"
+#include "apps/control/dds_service_types.hpp"
+#include "apps/control/remote_gate.hpp"
+#include "apps/control/run_control.hpp"
+#include "apps/text/json_reader.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "tests/fuzz/require.hpp"
 #include "tests/hal/fake_backend.hpp"
 #include "tests/runtime/first_order_robot.hpp"
 #include "tests/runtime/test_controllers.hpp"
-#include "tests/fuzz/require.hpp"
 
 namespace {
 
@@ -33,7 +33,6 @@ using fuzz::require;
 using namespace tandem::apps;
 
 constexpr std::size_t kMostQuestions = 16;
-
 
 /// Time passes by sleeping for it.
 class PatientClock final : public rt::Clock {
@@ -179,8 +178,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const auto kOpen = load_controller("hold", controller_folders());  // stays open
   require(kOpen.has_value());
   const unsigned way = data[0];
-  std::vector<std::string> lines =
-      lines_of({reinterpret_cast<const char*>(data) + 1, size - 1});
+  std::vector<std::string> lines = lines_of({reinterpret_cast<const char*>(data) + 1, size - 1});
   Run run;
   waited_for = &run;
   if ((way & 4) == 0) {

@@ -1,0 +1,93 @@
+#include "apps/can/bus_table.hpp"
+
+#include <fmt/core.h>
+
+#include "hal/ethercat-can/bus_load.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using hal::can::BusLoad;
+using hal::can::BusLoadRow;
+
+constexpr double kMega = 1e6;
+
+const char* kind_name(BusLoadRow::Kind kind) {
+  switch (kind) {
+    case BusLoadRow::Kind::kUrgent: return "urgent";
+    case BusLoadRow::Kind::kMean: return "mean";
+    case BusLoadRow::Kind::kOnChange: return "on_change";
+  }
+  return "";
+}
+
+std::string rates(const BusLoad& load) {
+  const double nominal = static_cast<double>(load.rates.nominal) / kMega;
+  return load.fd ? fmt::format("CAN FD, {:g} and {:g} Mbit/s", nominal,
+                               static_cast<double>(load.rates.data) / kMega)
+                 : fmt::format("classic CAN, {:g} Mbit/s", nominal);
+}
+
+std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
+
+void print(const BusLoad& load, std::FILE* out) {
+  fmt::print(out, "bus {} ({}), worst case in a cycle of {:g} us\n", load.bus, rates(load),
+             load.period_us());
+  Table table({"", "frames", "bits", "us", "load"});
+  for (const BusLoadRow& row : load.rows) {
+    const bool counts = row.kind != BusLoadRow::Kind::kOnChange;
+    table.add({row.what + (counts ? "" : ", if all changed"), fmt::format("{:.2f}", row.frames),
+               fmt::format("{:.0f}", row.bits), fmt::format("{:.1f}", row.time_us),
+               (counts ? "" : "+ ") + percent(row.time_us / load.period_us())});
+  }
+  table.add({"urgent", "", "", fmt::format("{:.1f}", load.urgent_us),
+             percent(load.urgent_us / load.period_us()) + " of 100 %"});
+  table.add({"all", "", "", fmt::format("{:.1f}", load.load * load.period_us()),
+             fmt::format("{} of {:g} %", percent(load.load), 100.0 * load.max_load)});
+  table.print(out);
+  fmt::print(out, "{}\n\n", load.fits() ? "fits" : "does not fit; " + load.remedy);
+}
+
+Json to_json(const BusLoad& load) {
+  Json rows = Json::array();
+  for (const BusLoadRow& row : load.rows) {
+    rows.push_back({{"what", row.what},
+                    {"kind", kind_name(row.kind)},
+                    {"frames", row.frames},
+                    {"bits", row.bits},
+                    {"time_us", row.time_us},
+                    {"load", row.time_us / load.period_us()}});
+  }
+  return {{"bus", load.bus},
+          {"fd", load.fd},
+          {"bitrate", load.rates.nominal},
+          {"data_bitrate", load.rates.data},
+          {"period_us", load.period_us()},
+          {"rows", rows},
+          {"urgent_us", load.urgent_us},
+          {"load", load.load},
+          {"load_if_all_changed", load.most_load},
+          {"max_load", load.max_load},
+          {"ok", load.fits()},
+          {"remedy", load.remedy}};
+}
+
+}  // namespace
+
+Diagnostics show_buses(const hal::RobotConfig& robot, std::int64_t period_ns, std::FILE* out,
+                       Json& json) {
+  json = Json::array();
+  const auto loads = hal::can::bus_loads(robot, period_ns);
+  if (!loads) {
+    Error error = loads.error();
+    error.file = robot.file;
+    return {error};
+  }
+  for (const BusLoad& load : *loads) {
+    print(load, out);
+    json.push_back(to_json(load));
+  }
+  return {};
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,40 @@
+// Tells of buses that are not well while a process runs, and what has passed on them at its end.
+// Layer: apps/can.  Thread: main, beside the one that the buses belong to.
+#pragma once
+
+#include <chrono>
+#include <cstdio>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/text/console.hpp"
+#include "hal/ethercat-can/socket_can_bus.hpp"
+
+namespace tandem::apps {
+
+/// One line when a bus' state changes, once a second at most for each bus.
+class BusWatch {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  BusWatch(std::span<hal::can::SocketCanBus* const> buses, std::FILE* out);
+  /// Prints what has changed. No system call while nothing has.
+  void look();
+
+ private:
+  struct Told {
+    std::string text;  ///< empty: well
+    Clock::time_point next{};
+  };
+  std::span<hal::can::SocketCanBus* const> buses_;
+  std::FILE* out_;
+  std::vector<Told> told_;
+};
+
+/// docs/json.md. For when the buses' thread has ended, as bus_facts().
+[[nodiscard]] Json buses_json(std::span<hal::can::SocketCanBus* const> buses);
+/// A line for every bus that lost frames or was not well.
+void add_bus_facts(std::span<hal::can::SocketCanBus* const> buses, Facts& facts);
+
+}  // namespace tandem::apps

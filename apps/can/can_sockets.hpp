@@ -1,0 +1,58 @@
+// The SocketCAN interfaces of a robot's buses, for both ends of the wire.
+// Layer: apps/can.  Thread: open main; waiting the loop's or the emulator's.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/can/interface_lock.hpp"
+#include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
+#include "hal/ethercat-can/frame_wait.hpp"
+#include "hal/ethercat-can/socket_can_bus.hpp"
+
+namespace tandem::apps {
+
+/// One socket per [[bus]], in robot.toml's order, and the wait for all of them.
+class CanSockets final : public hal::can::FrameWait {
+ public:
+  /// Locks the interface of every bus for this side, and opens it.
+  /// @param stamps  take the times of frames: nobody asks for them in lockstep
+  /// Errors: all of them, each with its bus.
+  [[nodiscard]] static std::expected<std::unique_ptr<CanSockets>, Diagnostics> open(
+      const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps);
+
+  [[nodiscard]] std::span<hal::can::Bus* const> buses() const noexcept { return ends_; }
+  [[nodiscard]] std::span<hal::can::SocketCanBus* const> sockets() const noexcept {
+    return waited_;
+  }
+
+  [[nodiscard]] std::int64_t now_ns() noexcept override;
+  void wait(std::int64_t at_most_ns, int bus) noexcept override;
+  /// After SIGINT or SIGTERM.
+  [[nodiscard]] bool stopping() const noexcept override;
+
+ private:
+  CanSockets() = default;
+
+  std::vector<InterfaceLock> locks_;  // of distinct interfaces
+  std::vector<std::unique_ptr<hal::can::SocketCanBus>> sockets_;
+  std::vector<hal::can::SocketCanBus*> waited_;
+  std::vector<hal::can::Bus*> ends_;
+};
+
+/// Listens on every interface for a while, before anything is sent: a second master would reset the
+/// nodes and take the torque from the robot that the first one moves.
+/// @param period_ns  of the loop
+/// Errors: a bus on which another master is at work; one that cannot be opened.
+[[nodiscard]] Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t period_ns);
+
+/// Puts the interfaces of the command line in the place of robot.toml's: "can0=vcan0".
+/// Errors: no such form, an interface that no bus has (the nearest is suggested).
+[[nodiscard]] Status replace_interfaces(hal::RobotConfig& robot,
+                                        std::span<const std::string> replacements);
+
+}  // namespace tandem::apps

@@ -1,0 +1,30 @@
+// One process per end of an interface: a lock that goes with the process.
+// Layer: apps/can.  Thread: main.
+#pragma once
+
+#include <string>
+
+#include "base/result.hpp"
+#include "hal/ethercat-can/socket_can_bus.hpp"
+
+namespace tandem::apps {
+
+/// An abstract Unix socket that bears the interface's name: there is one of a name in a network
+/// namespace, as there is one interface, whoever asks. The kernel takes it away with the process,
+/// however that ends. Nobody is served there.
+class InterfaceLock {
+ public:
+  /// @param side  kMaster or kBoards: one process each
+  /// Errors: another process has it, with its number and user.
+  [[nodiscard]] static Result<InterfaceLock> take(const std::string& interface,
+                                                  hal::can::SocketSide side);
+  ~InterfaceLock();
+  InterfaceLock(InterfaceLock&& other) noexcept;
+  InterfaceLock& operator=(InterfaceLock&&) = delete;
+
+ private:
+  explicit InterfaceLock(int socket) : socket_(socket) {}
+  int socket_;
+};
+
+}  // namespace tandem::apps

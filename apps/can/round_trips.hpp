@@ -1,0 +1,24 @@
+// How long each node's answers to commands took, for a run's summary.
+// Layer: apps/can.  Thread: main.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <span>
+
+#include "apps/text/console.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+#include "rt/histogram.hpp"
+
+namespace tandem::apps {
+
+/// Percentiles of RoundTrip::cycles, in cycles; all 0 when no echo came.
+[[nodiscard]] rt::Percentiles cycles_of(const hal::can::RoundTrip& trip);
+
+/// docs/json.md
+[[nodiscard]] Json round_trips_json(std::span<const hal::can::RoundTrip> trips);
+
+/// The nodes whose slowest answers are the slowest, five at most; nothing when no echo came.
+void print_slowest_nodes(std::span<const hal::can::RoundTrip> trips, std::FILE* out);
+
+}  // namespace tandem::apps

@@ -1,0 +1,92 @@
+// tandem clock show|pause|resume|step|rate: what it asks a running process, and its answer.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+
+#include "apps/clients/commands.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/text/console.hpp"
+#include "base/counted.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Json question_of(const ClockOptions& options) {
+  switch (options.action) {
+    case ClockOptions::Action::kShow: return {{"do", "clock.show"}};
+    case ClockOptions::Action::kPause: return {{"do", "clock.pause"}};
+    case ClockOptions::Action::kResume: return {{"do", "clock.resume"}};
+    case ClockOptions::Action::kStep: return {{"do", "clock.step"}, {"cycles", options.cycles}};
+    case ClockOptions::Action::kRate: return {{"do", "clock.rate"}, {"rate", options.rate}};
+  }
+  return {};
+}
+
+/// What the clock shows once it stands; before that, when somebody lets it go on or the run ends.
+Result<Json> wait_until_it_stands(ControlClient& run, std::FILE* out) {
+  StatusLine line(out);
+  for (;;) {
+    Result<Json> now = run.ask({{"do", "clock.show"}});
+    if (!now || now->value("standing", true) || !now->value("paused", false) ||
+        now->value("phase", "") == "done") {
+      return now;
+    }
+    if (line.due()) {
+      line.show(fmt::format("{:.3f} s, {} to go", now->value("time_s", 0.0),
+                            counted(now->value("pending_steps", std::uint64_t{0}), "cycle")));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+std::string rate_text(const Json& answer) {
+  const double rate = answer.value("rate", 0.0);
+  return rate > 0.0 ? fmt::format("{:g} x real time", rate) : "free running";
+}
+
+std::string state_text(const Json& answer) {
+  if (answer.value("clock", "") != "simulated") return "real time, which cannot be paused";
+  if (!answer.value("paused", false)) return "running";
+  const std::uint64_t steps = answer.value("pending_steps", std::uint64_t{0});
+  if (answer.value("standing", false)) return "paused";
+  return steps > 0 ? "paused, " + counted(steps, "cycle") + " to go" : "paused after this cycle";
+}
+
+void print_answer(const Json& answer) {
+  Facts facts;
+  facts.add("time", fmt::format("{:.6f} s", answer.value("time_s", 0.0)));
+  facts.add("cycles", std::to_string(answer.value("cycles", std::uint64_t{0})));
+  facts.add("phase", answer.value("phase", "?"));
+  facts.add("clock", state_text(answer));
+  facts.add("rate", rate_text(answer));
+  const Json& factor = answer["realtime_factor"];
+  facts.add("measured",
+            factor.is_number() ? fmt::format("{:.3g} x real time", factor.get<double>()) : "-");
+  facts.print(stdout);
+}
+
+Result<Json> carry_out(const ClockOptions& options) {
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return std::unexpected(run.error());
+  Result<Json> answer = (*run)->ask(question_of(options));
+  const bool waits = options.action == ClockOptions::Action::kPause ||
+                     options.action == ClockOptions::Action::kStep;
+  if (!answer || !waits) return answer;
+  Result<Json> stands = wait_until_it_stands(**run, human_output(options.json));
+  if (!stands) return fail("the run ended before its clock stood still", "its own output says why");
+  if (answer->contains("dropped_steps")) (*stands)["dropped_steps"] = (*answer)["dropped_steps"];
+  return stands;
+}
+
+}  // namespace
+
+Exit clock_command(const ClockOptions& options) {
+  const Result<Json> answer = carry_out(options);
+  if (!answer) return refuse(answer.error());
+  if (options.json != "-") print_answer(*answer);
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

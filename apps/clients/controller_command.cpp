@@ -1,0 +1,107 @@
+// tandem controller: what it asks a running run, and its answer.
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "apps/clients/commands.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/text/console.hpp"
+
+namespace tandem::apps {
+namespace {
+
+void print_list(const Json& controllers) {
+  Table table({"controller", "state", "joints", "plugin"});
+  table.align_left();
+  for (const Json& one : controllers) {
+    const bool active = one.value("active", false);
+    const char* state = !active ? "inactive" : one.value("finished", false) ? "done" : "active";
+    std::vector<std::string> joints;
+    for (const Json& claim : one["claims"]) joints.push_back(claim.value("joint", ""));
+    const std::size_t count = joints.size();
+    if (count > 4) joints.resize(3);
+    std::string text = fmt::format("{}", fmt::join(joints, ", "));
+    if (count > joints.size()) text += fmt::format(" and {} more", count - joints.size());
+    table.add({one.value("name", ""), state, text,
+               std::filesystem::path(one.value("plugin", "")).filename().string()});
+  }
+  table.print(stdout);
+}
+
+/// "done in cycle 1200; active: squat".
+void print_done(const Json& answer) {
+  const std::vector<std::string> active =
+      answer.value("active", Json::array()).get<std::vector<std::string>>();
+  const std::string names = active.empty() ? "none" : fmt::format("{}", fmt::join(active, ", "));
+  if (answer.value("done", false)) {
+    fmt::print("done in cycle {}; active: {}\n", answer.value("cycle", 0), names);
+  } else {
+    fmt::print("{}; active so far: {}\n", answer.value("note", ""), names);
+  }
+}
+
+Result<std::string> parameters_of(const ControllerOptions& options) {
+  std::ostringstream text;
+  if (!options.parameters.empty()) {
+    std::ifstream file(options.parameters);
+    text << file.rdbuf();
+    if (!file) return fail("cannot read " + options.parameters, "is it a file?");
+    text << '\n';
+  }
+  for (const std::string& line : options.set) text << line << '\n';
+  return text.str();
+}
+
+Result<Json> load_question(const ControllerOptions& options) {
+  const Result<std::string> parameters = parameters_of(options);
+  if (!parameters) return std::unexpected(parameters.error());
+  const bool path = options.plugin.find('/') != std::string::npos;
+  Json question{
+      {"do", "controller.load"},
+      {"plugin", path ? std::filesystem::absolute(options.plugin).string() : options.plugin}};
+  if (!options.name.empty()) question["name"] = options.name;
+  if (!parameters->empty()) question["parameters"] = *parameters;
+  return question;
+}
+
+Result<Json> question_of(const ControllerOptions& options) {
+  switch (options.action) {
+    case ControllerOptions::Action::kList: return Json{{"do", "controller.list"}};
+    case ControllerOptions::Action::kLoad: return load_question(options);
+    case ControllerOptions::Action::kUnload:
+      return Json{{"do", "controller.unload"}, {"name", options.name}};
+    case ControllerOptions::Action::kStart:
+      if (options.start.empty()) return Json{{"do", "controller.start"}};
+      break;
+    case ControllerOptions::Action::kSwitch: break;
+  }
+  return Json{{"do", "controller.switch"}, {"stop", options.stop}, {"start", options.start}};
+}
+
+}  // namespace
+
+Exit controller_command(const ControllerOptions& options) {
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refuse(run.error());
+  const Result<Json> question = question_of(options);
+  if (!question) return refuse(question.error());
+  Result<Json> answer = (*run)->ask(*question);
+  if (answer && options.start_it) {
+    answer = (*run)->ask({{"do", "controller.start"}, {"name", answer->value("name", "")}});
+  }
+  if (!answer) return refuse(answer.error());
+  if (options.json != "-") {
+    if (options.action == ControllerOptions::Action::kList) {
+      print_list((*answer)["controllers"]);
+    } else {
+      print_done(*answer);
+    }
+  }
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,28 @@
+#include "apps/clients/dds_config.hpp"
+
+namespace tandem::apps {
+
+Result<dds::Config> dds_config(const DdsPlace& place) {
+  dds::Config config;
+  if (place.from.empty()) {
+    config.domain = place.domain;
+    config.interfaces = place.interfaces;
+  } else {
+    const Result<TomlDocument> document = TomlDocument::load(place.from);
+    if (!document) return std::unexpected(document.error());
+    TomlTable root = document->root();
+    if (!root.has("dds")) {
+      return std::unexpected(Error{.message = "there is no table [dds] in this file",
+                                   .hint = "name the experiment that the other process runs, or a "
+                                           "file with its [dds]",
+                                   .file = place.from,
+                                   .key = {}});
+    }
+    config = dds::read_config(root.table("dds"), document->folder());
+    if (!document->diagnostics().empty()) return std::unexpected(document->diagnostics().front());
+  }
+  config.enabled = true;
+  return config;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,138 @@
+// tandem fault show|reset and tandem estop: what they ask a running process, and its answer.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <thread>
+
+#include "apps/clients/commands.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/control/fault_table.hpp"
+#include "apps/text/console.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+/// A board that is configured anew takes some seconds.
+constexpr std::chrono::seconds kResetTime{30};
+
+const char kKept[] = "simulated time stands: it is done in the next cycle (tandem clock resume)";
+const char kAsked[] =
+    "simulated time stands: it is asked for in the next cycle (tandem clock resume, then tandem "
+    "fault show)";
+
+void print_latched(const Json& answer) {
+  fmt::print("phase {}, {} latched\n", answer.value("phase", "?"), answer.value("latched", 0));
+  print_faults(answer.value("faults", Json::array()), stdout);
+}
+
+Exit show(const FaultOptions& options) {
+  const Result<Json> answer = ask(options.target, "run", {{"do", "fault.show"}});
+  if (!answer) return refuse(answer.error());
+  if (options.json != "-") print_latched(*answer);
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+  return Exit::kDone;
+}
+
+/// "RKneeSag: position sensor (error code 0x7300); …": what is latched.
+std::string causes_of(const Json& answer) {
+  std::string causes;
+  for (const Json& fault : answer.value("faults", Json::array())) {
+    if (!fault.value("latched", false)) continue;
+    const std::string joint = fault.value("joint", "");
+    causes += (causes.empty() ? "" : "; ") + (joint.empty() ? "" : joint + ": ") +
+              fault.value("cause", "?");
+  }
+  return causes;
+}
+
+Error faulted_again(const Json& answer) {
+  return {.message = fmt::format("the reset succeeded, and a fault followed at once ({})",
+                                 causes_of(answer)),
+          .hint = "reset a robot that lies or hangs still, then `tandem fault reset` again",
+          .file = {},
+          .key = {}};
+}
+
+/// Why a reset did not succeed, with the joints whose faults are latched.
+Error failed_reset(const Json& answer, bool through) {
+  const std::string why = through ? "a cause is still there"
+                                  : fmt::format("not through after {} s, in the phase {}",
+                                                kResetTime.count(), answer.value("phase", "?"));
+  return {
+      .message = fmt::format("the reset failed, {} ({}): nothing moves", why, causes_of(answer)),
+      .hint = "remove the cause, then `tandem fault reset` again",
+      .file = {},
+      .key = {}};
+}
+
+/// The run's answer once a reset is through; the last one when it takes too long.
+Result<Json> wait_for_reset(ControlClient& run, const Json& before) {
+  const auto deadline = SteadyClock::now() + kResetTime;
+  for (;;) {
+    Result<Json> now = run.ask({{"do", "fault.show"}});
+    if (!now) return now;
+    const bool counted = now->value("resets", 0) > before.value("resets", 0) ||
+                         now->value("failed_resets", 0) > before.value("failed_resets", 0);
+    const bool through = counted && now->value("phase", "") != "resetting";
+    if (through || SteadyClock::now() > deadline) return now;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+Exit reset(const FaultOptions& options) {
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refuse(run.error());
+  const Result<Json> asked = (*run)->ask({{"do", "fault.reset"}});
+  if (!asked) return refuse(asked.error());
+  Json answer = *asked;
+  const bool nothing = asked->value("latched", 0) == 0;
+  const bool kept = !nothing && asked->value("paused", false);
+  if (!nothing && !kept) {
+    const Result<Json> through = wait_for_reset(**run, *asked);
+    if (!through) return refuse(through.error());
+    answer = *through;
+  }
+  const bool done = answer.value("resets", 0) > asked->value("resets", 0);
+  const bool held = answer.value("phase", "") == "held";
+  if (options.json != "-") {
+    if (nothing) fmt::print("nothing is latched\n");
+    if (kept) fmt::print("{}\n", kAsked);
+    if (done) fmt::print("reset: every joint is enabled where it is\n");
+    if (!nothing) print_latched(answer);
+    if (done && held) fmt::print("held: `tandem controller start` lets the controllers continue\n");
+  }
+  if (!nothing && !kept && !done) {
+    const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
+    print_errors({failed_reset(answer, through)});
+  }
+  const bool again = done && answer.value("latched", 0) > 0;
+  if (again) print_errors({faulted_again(answer)});
+  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
+  return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
+}
+
+}  // namespace
+
+Exit fault_command(const FaultOptions& options) {
+  return options.action == FaultOptions::Action::kShow ? show(options) : reset(options);
+}
+
+Exit estop_command(const EstopOptions& options) {
+  Json question{{"do", "estop"}};
+  if (options.category) question["category"] = *options.category;
+  const Result<Json> answer = ask(options.target, "run", question);
+  if (!answer) {
+    print_errors({answer.error()});
+    return Exit::kFault;
+  }
+  const std::string category = answer->value("category", "?");
+  const bool no_retreat = options.category == 2 && category == "category1";
+  fmt::print("emergency stop, {}{}\n", category,
+             no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
+  if (answer->value("paused", false)) fmt::print("{}\n", kKept);
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,51 @@
+// How often and how evenly samples arrive: what `tandem topic hz` shows.
+// Layer: apps/clients.  Thread: main.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "apps/text/console.hpp"
+#include "rt/histogram.hpp"
+
+namespace tandem::apps {
+
+/// Arrivals of one topic's samples.
+class TopicRate {
+ public:
+  /// @param window  the newest intervals that rate, min, max and deviation are of; at least 1
+  explicit TopicRate(std::size_t window) : window_(window) {}
+
+  /// @param cycle  of the loop, where the sample tells it
+  void arrived(std::int64_t time_ns, std::optional<std::uint64_t> cycle);
+
+  [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  /// Samples that were sent but did not come, as the cycles' numbers tell; empty where there are
+  /// none. Correct when the topic's rate is constant.
+  [[nodiscard]] std::optional<std::uint64_t> lost() const;
+
+  /// "99.98 Hz, min 9.1 ms, …"
+  [[nodiscard]] std::string line() const;
+  /// docs/json.md
+  [[nodiscard]] Json json() const;
+  void add_to(Facts& facts) const;
+
+ private:
+  struct Figures {
+    double rate_Hz = 0.0, min_s = 0.0, max_s = 0.0, deviation_s = 0.0;
+  };
+  [[nodiscard]] Figures figures() const;
+
+  std::size_t window_;
+  std::uint64_t samples_ = 0;
+  std::int64_t last_ns_ = 0;
+  std::deque<std::int64_t> intervals_ns_;
+  rt::Histogram all_;  // intervals
+  std::optional<std::uint64_t> first_cycle_, last_cycle_;
+  std::uint64_t step_ = 0;  // the smallest between two cycles
+  std::uint64_t told_ = 0;  // samples with a cycle, since the numbers began anew
+};
+
+}  // namespace tandem::apps

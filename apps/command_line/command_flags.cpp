@@ -1,0 +1,446 @@
+#include "apps/command_line/command_flags.hpp"
+
+#include "rt/clock_control.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char kServeExamples[] = R"(Examples:
+  tandem serve config/coman/squat.toml                          in one terminal, and in another
+  tandem run config/coman/squat.toml --hal dds                  in real time: serve --realtime
+  tandem serve config/coman/squat.toml --lockstep --once        the same bits as in one process:
+  tandem run config/coman/squat.toml --hal dds --lockstep
+  tandem serve config/coman/robot.toml --hal can                the robot itself
+[remote] of the experiment: who may command, and the reaction when an owner vanishes.)";
+
+const char kRunExamples[] = R"(Examples:
+  tandem run config/coman/squat.toml --report        and draw the plots
+  tandem run config/coman/squat.toml --rate 0.1      ten times slower than real time
+  tandem run config/coman/squat.toml --start-paused  then `tandem clock step 10`, `clock resume`
+  tandem run config/coman/squat.toml --dds --realtime      publish to ROS 2 and `tandem topic`
+  tandem run config/coman/squat.toml --hal dds       the robot of `tandem serve`
+  tandem run config/coman/squat.toml --seed 7 --log /tmp/runs
+  tandem run config/coman/squat.toml --json - --quiet | jq .realtime_factor
+  tandem run config/coman/squat.toml --trace squat.json    open it on https://ui.perfetto.dev
+The same experiment and seed give the same bytes at every rate.)";
+
+const char kFaultExamples[] = R"(Examples:
+  tandem fault show                                  what has been latched, and what was cleared
+  tandem fault reset                                 clears and holds; exit status 1: it failed
+  tandem controller start                            then lets the controllers continue
+  tandem fault show --dds --namespace left           of the run with this [dds] namespace
+Without --socket or --dds it is the only `tandem run` of this user.)";
+
+const char kEstopExamples[] = R"(Examples:
+  tandem estop                                       with the category of robot.toml's [safety]
+  tandem estop --category 0                          take the torque away at once
+  tandem estop --category 2                          a safe posture first, where a controller has one
+Exit status: 0 the loop has carried it out (or simulated time is paused, and it is next); 1 no stop
+is confirmed. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
+
+const char kClockExamples[] = R"(Examples:
+  tandem clock show                                  time, paused or not, rate, measured speed
+  tandem clock pause
+  tandem clock step 10                               ten cycles, then paused again
+  tandem clock rate 0.1                              ten times slower than real time
+  tandem clock rate 0                                as fast as possible
+  tandem clock resume
+The results are the same bits. Only simulated time can be paused; on a robot it is refused.
+Without --socket or --dds it is the only `tandem run` of this user.)";
+
+const char kAskExamples[] = R"(Examples:
+  tandem ask '{"do": "help"}'                        what the running process can be asked
+  tandem ask '{"do": "status"}' --socket /tmp/run.sock
+  tandem ask '{"do": "status"}' --dds --domain 7     of the only run in that DDS domain
+Without --socket or --dds it is the only running process of this user.)";
+
+const char kCheckExamples[] = R"(Examples:
+  tandem check config/coman/squat.toml               an experiment: robot, description, plugins
+  tandem check config/coman/robot.toml               a robot by itself
+  tandem check --bus config/coman/squat.toml         the load of every bus, worst case
+  tandem check my_robot.toml --repair                what inertia = "repair" would make of it
+  tandem check my_robot.toml --json -                errors with file, line, key and hint)";
+
+const char kNewExamples[] = R"(Examples:
+  tandem new my_robot.urdf                           writes my_robot/, then
+  tandem run my_robot/hold.toml                      the robot holds a posture, or stands
+  tandem new my_robot.urdf --like coman -o soft      springs and ground in proportion to COMAN's
+  tandem new my_robot.urdf --base fixed --force
+Every figure that is guessed is marked so in robot.toml. Rules: docs/robots.md.)";
+
+const char kModelBuildExamples[] = R"(Examples:
+  tandem model build config/coman/robot.toml
+  tandem model build my_robot/robot.toml -o /tmp/my_robot.so
+Without -o the library goes to the cache folder ($XDG_CACHE_HOME/tandem/models, or
+~/.cache/tandem/models), where `tandem run` finds it by the robot's name and the hash of its
+files. A library that is up to date is not built again.)";
+
+const char kModelInfoExamples[] = R"(Examples:
+  tandem model info config/walkman/robot.toml
+  tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
+
+const char kLogInfoExamples[] = R"(Examples:
+  tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest)";
+
+const char kLogCsvExamples[] = R"(Examples:
+  tandem log csv runs/coman-squat-001.mcap > state.csv
+  tandem log csv runs/coman-squat-001.mcap --topic command --every 10 -o ref.csv)";
+
+const char kLogDiffExamples[] = R"(Examples:
+  tandem log diff runs/a.mcap runs/b.mcap            equal bit by bit, or the first difference
+
+Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
+
+const char kEdsExamples[] = R"(Examples:
+  tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
+  tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for)";
+
+const char kReportExamples[] = R"(Examples:
+  tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
+  tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
+
+const char kLatencyExamples[] = R"(Examples:
+  tandem latency                                     ours beside cyclictest, idle, then under load
+  tandem latency --load idle --duration 60 --cpu 2,3
+  tandem latency --mode turns --cpu 3                one after the other on one CPU
+  tandem latency --json - --quiet | jq '.loads[].ratio'
+In mode `swap` both run at once and exchange their CPUs each slice; in `together` each keeps its
+own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. The result is not judged.)";
+
+const char kDoctorExamples[] = R"(Examples:
+  tandem doctor                                      kernel, CPUs, interrupts, limits, memory
+  tandem doctor config/coman/robot.toml              and the CAN interfaces of its buses
+  tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
+Each finding comes with the command that fixes it. The exit status does not depend on them.)";
+
+const char kNoBuildHelp[] = "Refuse when the robot's kernels are missing, instead of building them";
+const char kInterfaceHelp[] = "Another interface than robot.toml's: can0=vcan0; may be repeated";
+
+const char kScenarioHelp[] = "Faults to inject: TOML (docs/configuration.md, scenario.toml)";
+
+const char kInjectExamples[] = R"(Examples:
+  tandem inject kind=board_kill board=left_leg_1 for_s=0.5
+  tandem inject kind=encoder_jump joint=LKneeSag rad=0.05
+  tandem inject kind=frame_drop board=left_arm_1 direction=to_master probability=0.01
+  tandem inject 'kind = "bus_down"
+                 bus = "left_leg"'
+Every kind and key: docs/configuration.md, scenario.toml. Reactions: docs/faults.md.)";
+
+const char kEmulateExamples[] = R"(Examples:
+  tandem emulate config/coman/squat.toml --lockstep        in one terminal, and in another
+  tandem run config/coman/squat.toml --hal can --lockstep  the same bits as without --hal can
+  tandem emulate config/coman/robot.toml                   in real time, for `run --hal can`
+Interfaces without hardware:
+  ip link add can0 type vcan && ip link set can0 mtu 72 up)";
+
+CLI::Validator is_rate() {
+  const auto check = [](const std::string& text) -> std::string {
+    double rate = -1.0;
+    if (CLI::detail::lexical_cast(text, rate) && rt::check_rate(rate)) return "";
+    return "'" + text + "' is neither 0 nor from 0.01 to 1000";
+  };
+  return {check, "0, 0.01 to 1000"};
+}
+
+CLI::Validator a_duration() {
+  const auto check = [](const std::string& text) -> std::string {
+    double duration_s = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, duration_s);
+    if (number && duration_s > 0.0 && duration_s <= 1e6) return "";
+    return "'" + text + "' is no number of seconds above 0, and up to 1000000";
+  };
+  return {check, "above 0, to 1e6"};
+}
+
+/// What `run` and `serve` share.
+void add_loop_flags(CLI::App& app, RunOptions& o) {
+  CLI::Option* rate = app.add_option("--rate", o.rate,
+                                     "Simulated seconds per wall second; 0: free running (default)")
+                          ->check(is_rate());
+  app.add_flag_callback(
+         "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
+      ->excludes(rate);
+  app.add_flag("--start-paused", o.start_paused, "Pause before the first cycle: tandem clock step");
+  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--record-frames", o.record_frames,
+                 "CAN: write every frame to this file, as candump -L does");
+  app.add_option("--scenario", o.scenario, kScenarioHelp);
+  CLI::Option* log =
+      app.add_option("--log", o.log_folder, "Folder of the log, instead of the experiment's");
+  app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
+  app.add_option("--kernel-variant", o.kernel_variant,
+                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  app.add_flag("--no-build", o.no_build, kNoBuildHelp);
+  CLI::Option* trace =
+      app.add_option("--trace", o.trace, "Write the last cycles' stages for ui.perfetto.dev");
+  app.add_option("--trace-cycles", o.trace_cycles, "Cycles that the trace holds (default: 10000)")
+      ->needs(trace)
+      ->check(CLI::Range(1, 1'000'000));
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
+  app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
+  app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
+      ->check(CLI::Range(0, 232));
+}
+
+}  // namespace
+
+CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds) {
+  CLI::Option* domain =
+      app.add_option("--domain", place.domain, "DDS domain, ROS_DOMAIN_ID (default: 0)")
+          ->check(CLI::Range(0, 232));
+  CLI::Option* interface = app.add_option("--interface", place.interfaces,
+                                          "Network interface of DDS (default: lo); may be repeated")
+                               ->allow_extra_args(false);
+  CLI::Option* from =
+      app.add_option("--dds-from", place.from,
+                     "Domain, interfaces, peers and DDS Security as [dds] of this TOML has them")
+          ->excludes(domain)
+          ->excludes(interface);
+  if (dds != nullptr) {
+    domain->needs(dds);
+    interface->needs(dds);
+  }
+  return from;
+}
+
+void add_target(CLI::App& app, ControlTarget& target) {
+  CLI::Option* socket = app.add_option("--socket", target.socket, kSocketHelp);
+  CLI::Option* dds =
+      app.add_flag("--dds", target.dds, "Ask over DDS instead: the service tandem/ask")
+          ->excludes(socket);
+  add_place(app, target.place, dds)->excludes(socket)->each([&target](const std::string&) {
+    target.dds = true;
+  });
+  app.add_option("--namespace", target.name_space,
+                 "Namespace of the process (default: of the only one)")
+      ->needs(dds);
+}
+
+void add_flags(CLI::App& app, RunOptions& o) {
+  app.add_option("experiment", o.experiment, "Experiment TOML")->required();
+  add_loop_flags(app, o);
+  app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
+      ->check(a_duration());
+  app.add_option("--hal", o.hal, "Backend: where the robot is (default: the experiment's, or sim)")
+      ->check(CLI::IsMember({"sim", "can", "dds"}));
+  app.add_flag(
+      "--lockstep", o.lockstep,
+      "CAN, DDS: wait for `tandem emulate --lockstep` or `serve --lockstep`, at any speed");
+  app.add_option("--delay-cycles", o.delay_cycles,
+                 "Whole cycles between controllers and limits (default: the experiment's, or 0)")
+      ->check(CLI::Range(0, 1000));
+  app.add_flag("--report", o.report, "Draw the report after the run");
+  app.add_option("--on-fault", o.on_fault,
+                 "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
+                 "the wall clock, else end)")
+      ->check(CLI::IsMember({"end", "wait"}));
+  CLI::Option* dds = app.add_flag_callback(
+      "--dds", [&o] { o.dds = true; }, "Publish the robot to ROS 2 and `tandem topic`");
+  app.add_flag_callback(
+         "--no-dds", [&o] { o.dds = false; }, "No DDS, whatever the experiment says")
+      ->excludes(dds)
+      ->excludes("--domain");
+  app.footer(kRunExamples);
+}
+
+void add_flags(CLI::App& app, ServeOptions& o) {
+  app.add_option("file", o.run.experiment, "Experiment or robot TOML")->required();
+  add_loop_flags(app, o.run);
+  app.add_option("--hal", o.run.hal,
+                 "Backend: where the robot is (default: the experiment's, or sim)")
+      ->check(CLI::IsMember({"sim", "can"}));
+  app.add_flag("--lockstep", o.run.lockstep, "Each cycle waits for its owner's command");
+  app.add_flag("--once", o.run.once, "End when an owner gives the robot back");
+  app.footer(kServeExamples);
+}
+
+void add_flags(CLI::App& app, FaultOptions& o) {
+  app.require_subcommand(1);
+  app.footer(kFaultExamples);  // its subcommands', too
+  CLI::App* show = app.add_subcommand("show", "Every fault of the run: latched, or cleared when");
+  CLI::App* reset = app.add_subcommand("reset", "Clear latched faults and hold every joint");
+  for (CLI::App* one : {show, reset}) {
+    add_target(*one, o.target);
+    one->add_option("--json", o.json, kJsonHelp);
+  }
+  show->callback([&o] { o.action = FaultOptions::Action::kShow; });
+  reset->callback([&o] { o.action = FaultOptions::Action::kReset; });
+}
+
+void add_flags(CLI::App& app, EstopOptions& o) {
+  app.add_option("--category", o.category, "0, 1 or 2, instead of the robot's [safety]")
+      ->check(CLI::IsMember({0, 1, 2}));
+  add_target(app, o.target);
+  app.footer(kEstopExamples);
+}
+
+void add_flags(CLI::App& app, ClockOptions& o) {
+  using Action = ClockOptions::Action;
+  app.require_subcommand(1);
+  app.footer(kClockExamples);  // its subcommands', too
+  const auto add = [&](const char* name, const char* doc, Action action) {
+    CLI::App* one = app.add_subcommand(name, doc);
+    add_target(*one, o.target);
+    one->add_option("--json", o.json, kJsonHelp);
+    one->callback([&o, action] { o.action = action; });
+    return one;
+  };
+  add("show", "Time, paused or not, rate, measured speed", Action::kShow);
+  add("pause", "Pause after the current cycle", Action::kPause);
+  add("resume", "Continue at the rate", Action::kResume);
+  add("step", "While paused: run so many cycles, then pause again", Action::kStep)
+      ->add_option("cycles", o.cycles, "Cycles (default: 1)")
+      ->check(CLI::Range(std::uint64_t{1}, rt::kMostSteps));
+  add("rate", "Simulated seconds per wall second", Action::kRate)
+      ->add_option("rate", o.rate, "0.01 to 1000; 0: as fast as possible")
+      ->required()
+      ->check(is_rate());
+}
+
+void add_flags(CLI::App& app, AskOptions& o) {
+  app.add_option("question", o.question, "JSON object, \"do\" names the command")->required();
+  add_target(app, o.target);
+  app.footer(kAskExamples);
+}
+
+void add_flags(CLI::App& app, InjectOptions& o) {
+  app.add_option("fault", o.fault, "key=value words, or TOML")->required();
+  add_target(app, o.target);
+  app.footer(kInjectExamples);
+}
+
+void add_flags(CLI::App& app, EmulateOptions& o) {
+  app.add_option("file", o.file, "Robot or experiment TOML")->required();
+  app.add_flag("--lockstep", o.lockstep, "One step per SYNC, independent of the wall clock");
+  app.add_option("--scenario", o.scenario, kScenarioHelp);
+  app.add_option("--posture", o.posture,
+                 "Start posture (default: the experiment's, or the robot's first)");
+  app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
+  app.add_option("--period-ns", o.period_ns,
+                 "Period of a step (default: the experiment's, or 1 ms)")
+      ->check(CLI::Range(10'000, 1'000'000'000));
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
+  app.add_option("--kernel-variant", o.kernel_variant,
+                 "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
+  app.add_flag("--no-build", o.no_build, kNoBuildHelp);
+  CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
+  app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kEmulateExamples);
+}
+
+void add_flags(CLI::App& app, CheckOptions& o) {
+  app.add_option("file", o.file, "Experiment or robot TOML")->required();
+  app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
+  app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kCheckExamples);
+}
+
+void add_flags(CLI::App& app, ModelOptions& o) {
+  app.require_subcommand(1);
+  CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
+  build->add_option("robot", o.robot, "Robot TOML")->required();
+  build->add_option("-o,--output", o.output, "Shared library to write");
+  build->add_flag("--force", o.force, "Build even when the library is up to date");
+  build->footer(kModelBuildExamples);
+  build->callback([&o] { o.action = ModelOptions::Action::kBuild; });
+  CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
+  info->add_option("robot", o.robot, "Robot TOML")->required();
+  info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
+  info->add_option("--json", o.json, kJsonHelp);
+  info->footer(kModelInfoExamples);
+  info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
+}
+
+void add_flags(CLI::App& app, NewOptions& o) {
+  app.add_option("urdf", o.urdf, "Robot description (URDF; expand xacro first)")->required();
+  app.add_option("-o,--output", o.output, "Folder to write (default: the description's name)");
+  app.add_option("--like", o.like,
+                 "Series elastic drives in proportion to this robot's: its name or robot.toml");
+  app.add_option("--base", o.base, "Kind of base (default: floating if it has feet)")
+      ->check(CLI::IsMember({"floating", "fixed"}));
+  app.add_flag("--force", o.force,
+               "Write into an existing folder; files that differ are kept as FILE~");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kNewExamples);
+}
+
+void add_flags(CLI::App& app, LogOptions& o) {
+  app.require_subcommand(1);
+  CLI::App* info = app.add_subcommand("info", "What a log holds");
+  info->add_option("log", o.log, "MCAP file")->required();
+  info->add_option("--json", o.json, kJsonHelp);
+  info->footer(kLogInfoExamples);
+  info->callback([&o] { o.action = LogOptions::Action::kInfo; });
+  CLI::App* csv = app.add_subcommand("csv", "One topic as comma-separated values");
+  csv->add_option("log", o.log, "MCAP file")->required();
+  csv->add_option("--topic", o.topic, "Topic to write (default: the state)");
+  csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")->delimiter(',');
+  csv->add_option("--every", o.every, "Write each n-th message")->check(CLI::PositiveNumber);
+  csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
+  csv->footer(kLogCsvExamples);
+  csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
+  CLI::App* diff = app.add_subcommand("diff", "Compare two runs bit by bit");
+  diff->add_option("log", o.log, "MCAP file")->required();
+  diff->add_option("other", o.other, "MCAP file")->required();
+  diff->add_option("--json", o.json, kJsonHelp);
+  diff->footer(kLogDiffExamples);
+  diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
+}
+
+void add_flags(CLI::App& app, EdsOptions& o) {
+  app.add_option("robot", o.robot, "Robot TOML")->required();
+  app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kEdsExamples);
+}
+
+void add_flags(CLI::App& app, ReportOptions& o) {
+  app.add_option("log", o.log, "MCAP file")->required();
+  app.add_option("other", o.other, "A second log, laid over the first");
+  app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kReportExamples);
+}
+
+void add_flags(CLI::App& app, LatencyOptions& o) {
+  app.add_option("--period-us", o.period_us, "Period of both loops (default: 1000)")
+      ->check(CLI::Range(50, 1'000'000));
+  app.add_option("--duration", o.duration_s, "Seconds per load (default: 30)")->check(a_duration());
+  app.add_option("--mode", o.mode, "How the two share the CPUs (default: swap)")
+      ->check(CLI::IsMember({"swap", "together", "turns"}));
+  app.add_option("--slices", o.slices, "Parts of the duration, for swap and turns (default: 10)")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--cpu", o.cpus, "CPUs: ours,cyclictest's (default: the first two)")
+      ->delimiter(',')
+      ->expected(1, 2)
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--policy", o.policy, "Scheduling of both (default: fifo)")
+      ->check(CLI::IsMember({"fifo", "rr", "other"}));
+  app.add_option("--priority", o.priority, "Real-time priority of both (default: 80)")
+      ->check(CLI::Range(1, 99));
+  CLI::Option* load = app.add_option("--load", o.load,
+                                     "idle, stress, both (default: both if stress-ng is installed)")
+                          ->check(CLI::IsMember({"idle", "stress", "both"}));
+  app.add_flag_callback(
+         "--stress", [&o] { o.load = "stress"; }, "The same as --load stress")
+      ->excludes(load);
+  app.add_option("-o,--output", o.output, "Folder of page and plots (default: runs/latency)");
+  app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kLatencyExamples);
+}
+
+void add_flags(CLI::App& app, DoctorOptions& o) {
+  app.add_option("robot", o.robot, "Robot TOML, to look at the CAN interfaces of its buses");
+  app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
+  app.add_option("--json", o.json, kJsonHelp);
+  app.footer(kDoctorExamples);
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,45 @@
+// The flags, arguments and help of each command of `tandem`.
+// Layer: apps/command_line.  Thread: main.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "apps/command_line/command_line.hpp"
+
+namespace tandem::apps {
+
+// Help of what several commands have.
+inline constexpr char kJsonHelp[] =
+    "Write the result as JSON (docs/json.md); '-' is standard output";
+inline constexpr char kSocketHelp[] =
+    "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
+
+/// The flags that say which running process is asked, and by which way.
+void add_target(CLI::App& app, ControlTarget& target);
+/// --domain, --interface, --dds-from.
+/// @param dds  the flag that the first two need; null: none.  @return --dds-from
+CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds = nullptr);
+
+/// Each adds its command's flags and examples to `app`, which writes what is given to `o`: that
+/// has to outlive the parsing.
+void add_flags(CLI::App& app, RunOptions& o);
+void add_flags(CLI::App& app, ServeOptions& o);
+void add_flags(CLI::App& app, FaultOptions& o);
+void add_flags(CLI::App& app, EstopOptions& o);
+void add_flags(CLI::App& app, ClockOptions& o);
+void add_flags(CLI::App& app, AskOptions& o);
+void add_flags(CLI::App& app, InjectOptions& o);
+void add_flags(CLI::App& app, ControllerOptions& o);
+void add_flags(CLI::App& app, JointOptions& o);
+void add_flags(CLI::App& app, EmulateOptions& o);
+void add_flags(CLI::App& app, CheckOptions& o);
+void add_flags(CLI::App& app, ModelOptions& o);
+void add_flags(CLI::App& app, NewOptions& o);
+void add_flags(CLI::App& app, LogOptions& o);
+void add_flags(CLI::App& app, EdsOptions& o);
+void add_flags(CLI::App& app, ReportOptions& o);
+void add_flags(CLI::App& app, LatencyOptions& o);
+void add_flags(CLI::App& app, DoctorOptions& o);
+void add_flags(CLI::App& app, TopicOptions& o);
+
+}  // namespace tandem::apps

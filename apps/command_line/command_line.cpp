@@ -1,0 +1,148 @@
+#include "apps/command_line/command_line.hpp"
+
+#include <fmt/core.h>
+
+#include <functional>
+#include <memory>
+
+#include "apps/command_line/command_flags.hpp"
+#include "apps/text/console.hpp"
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char kExamples[] = R"(Examples:
+  tandem run config/coman/squat.toml                 simulate, as fast as possible
+  tandem run config/coman/squat.toml --realtime      in real time
+  tandem emulate config/coman/squat.toml --lockstep  the robot on the other end of CAN
+  tandem serve config/coman/squat.toml               a robot for `tandem run X --hal dds`
+  tandem check config/coman/squat.toml               read every file, move nothing
+  tandem report runs/coman-squat-001.mcap            draw the plots of a run
+  tandem log csv runs/coman-squat-001.mcap --fields position_rad
+  tandem model info config/coman/robot.toml          joints, mass, operation counts
+  tandem doctor                                      is this machine fit for real time?
+  tandem latency --load idle --duration 10           wake-up latency of this machine
+`tandem COMMAND --help` shows more, with examples.
+
+Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
+
+/// The innermost subcommand that was named.
+const CLI::App& innermost(const CLI::App& app) {
+  const std::vector<CLI::App*> named = app.get_subcommands();
+  return named.empty() ? app : innermost(*named.front());
+}
+
+std::vector<std::string> flags_of(const CLI::App& app) {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
+  }
+  return flags;
+}
+
+std::vector<std::string> subcommands_of(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(sub->get_name());
+  }
+  return names;
+}
+
+/// The message for words that fit nowhere, with the nearest that would.
+std::string unknown_word(const CLI::App& app, const std::string& word) {
+  const bool flag = word.starts_with('-');
+  const std::vector<std::string> known = flag ? flags_of(app) : subcommands_of(app);
+  const std::string name = word.substr(0, word.find('='));
+  if (!flag && known.empty()) return fmt::format("'{}' is one argument too many", word);
+  return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name, suggest(name, known));
+}
+
+/// "tandem model build": as typed, for the pointer to its help.
+std::string path_of(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
+}
+
+Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = innermost(app);
+  const std::vector<std::string> unknown = app.remaining(true);
+  const std::string message =
+      unknown.empty() ? std::string(error.what()) : unknown_word(command, unknown.front());
+  fmt::print(stderr, "tandem: {}\nTry `{} --help`.\n", message, path_of(command));
+  remember_error(
+      {.message = message, .hint = "try `" + path_of(command) + " --help`", .file = {}, .key = {}});
+  return Exit::kUsage;
+}
+
+/// The subcommands with their options; the one that was named, once the line is parsed.
+class Subcommands {
+ public:
+  explicit Subcommands(CLI::App& app) : app_(app) {}
+
+  template <class Options>
+  void add(const char* name, const char* doc) {
+    const auto options = std::make_shared<Options>();
+    CLI::App* command = app_.add_subcommand(name, doc);
+    add_flags(*command, *options);
+    choices_.push_back([command, options]() -> std::optional<Command> {
+      if (!command->parsed()) return std::nullopt;
+      return *options;
+    });
+  }
+  [[nodiscard]] Command chosen() const {
+    for (const auto& choice : choices_) {
+      if (auto command = choice()) return std::move(*command);
+    }
+    return Exit::kUsage;
+  }
+
+ private:
+  CLI::App& app_;
+  std::vector<std::function<std::optional<Command>()>> choices_;
+};
+
+}  // namespace
+
+Command parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"Tandem: one controller, simulated robot and real robot in tandem.", "tandem"};
+  app.footer(kExamples);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
+  app.get_formatter()->column_width(34);
+
+  Subcommands commands(app);
+  commands.add<RunOptions>("run", "Run an experiment");
+  commands.add<ServeOptions>("serve", "Run a robot for controllers in other processes");
+  commands.add<EmulateOptions>("emulate",
+                               "The robot on the other end of CAN: boards' firmware and plant");
+  commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
+  commands.add<ReportOptions>("report", "Draw the plots of a log, or of two");
+  commands.add<LogOptions>("log", "Logs: info, csv, diff");
+  commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
+  commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
+  commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
+  commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
+  commands.add<EstopOptions>("estop", "Emergency stop of a running run");
+  commands.add<ControllerOptions>(
+      "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
+  commands.add<JointOptions>("joint", "Joints of a running run: list, set, gains");
+  commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
+  commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
+  commands.add<InjectOptions>("inject",
+                              "Inject a fault into a running emulated or simulated robot");
+  commands.add<AskOptions>("ask", "Ask a running process, in JSON");
+  commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
+  commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) return report_usage_error(app, error);
+    app.exit(error);  // prints help or version
+    return Exit::kDone;
+  }
+  return commands.chosen();
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,241 @@
+// The command line of `tandem`, read into plain options. `tandem --help` is its documentation.
+// Layer: apps/command_line.  Thread: main.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "apps/command_line/control_target.hpp"
+#include "apps/command_line/dds_place.hpp"
+#include "apps/text/console.hpp"
+
+namespace tandem::apps {
+
+/// tandem run EXPERIMENT
+struct RunOptions {
+  std::string experiment;
+  std::optional<double> rate;         ///< 1: real time, 0: as fast as it goes; else as [clock]
+  bool start_paused = false;          ///< true: whatever the experiment says
+  std::optional<std::uint64_t> seed;  ///< instead of the experiment's
+  std::optional<double> duration_s;   ///< instead of the experiment's
+  std::string log_folder;             ///< empty: the experiment's
+  std::string scenario;               ///< TOML of faults to inject; empty: none
+  bool no_log = false;
+  std::string kernel_variant;  ///< empty: the best that this CPU runs
+  bool no_build = false;       ///< missing kernels are an error
+  std::string hal;             ///< "sim", "can", "dds"; empty: the experiment's
+  bool lockstep = false;       ///< CAN, DDS: wait for the other end; serve: for an owner
+  std::optional<std::uint32_t> delay_cycles;  ///< instead of the experiment's
+  bool serves = false;                        ///< `tandem serve`: no controllers but an owner's
+  bool once = false;                          ///< ends when an owner gives the robot back
+  std::vector<std::string> interfaces;        ///< "can0=vcan0"
+  std::string record_frames;                  ///< file of the bus' frames; empty: none
+  bool report = false;                        ///< draw the report after the run
+  std::string trace;                          ///< file of trace events; empty: none
+  std::size_t trace_cycles = 10'000;          ///< the last that `trace` holds
+  bool quiet = false;                         ///< neither progress nor table
+  std::string json;                           ///< file, "-" for standard output, empty for none
+  std::string socket;  ///< of the run's control; empty: default_control_path("run")
+  bool no_socket = false;
+  std::string on_fault;       ///< "end", "wait"; empty: the experiment's
+  std::optional<bool> dds;    ///< instead of the experiment's
+  std::optional<int> domain;  ///< of DDS, instead of the experiment's
+};
+
+/// tandem serve EXPERIMENT|ROBOT
+struct ServeOptions {
+  RunOptions run;  ///< with what fits to it
+};
+
+/// tandem fault show|reset
+struct FaultOptions {
+  enum class Action : std::uint8_t { kShow, kReset } action = Action::kShow;
+  ControlTarget target;
+  std::string json;
+};
+
+/// tandem estop
+struct EstopOptions {
+  std::optional<int> category;  ///< 0, 1; empty: the robot's
+  ControlTarget target;
+};
+
+/// tandem controller list|load|unload|start|stop|switch
+struct ControllerOptions {
+  enum class Action : std::uint8_t {
+    kList,
+    kLoad,
+    kUnload,
+    kStart,
+    kSwitch
+  } action = Action::kList;
+  std::string plugin;              ///< load: name or path
+  std::string name;                ///< load, unload; empty: the plugin's
+  std::string parameters;          ///< load: TOML file; empty: none
+  std::vector<std::string> set;    ///< load: lines of TOML, after those of the file
+  std::vector<std::string> start;  ///< start, switch; load --start
+  std::vector<std::string> stop;   ///< stop, switch
+  bool start_it = false;           ///< load: start it, too
+  ControlTarget target;
+  std::string json;
+};
+
+/// tandem joint list|set|gains
+struct JointOptions {
+  enum class Action : std::uint8_t { kList, kSet, kRecover, kGains } action = Action::kList;
+  std::vector<std::string> joints;  ///< list: only these; empty: all
+  bool gains = false;               ///< list: the gains instead of what is measured
+  std::string joint;                ///< set, recover, gains
+  std::string mode, interaction;    ///< empty: as it is
+  std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
+  std::string loop;
+  std::optional<double> kp, ki, kd;
+  ControlTarget target;
+  std::string json;
+};
+
+/// tandem clock show|pause|resume|step|rate
+struct ClockOptions {
+  enum class Action : std::uint8_t { kShow, kPause, kResume, kStep, kRate } action = Action::kShow;
+  std::uint64_t cycles = 1;  ///< step
+  double rate = 0.0;         ///< rate; 0: as fast as it goes
+  ControlTarget target;
+  std::string json;
+};
+
+/// tandem ask QUESTION
+struct AskOptions {
+  std::string question;  ///< JSON
+  ControlTarget target;
+};
+
+/// tandem inject FAULT
+struct InjectOptions {
+  std::vector<std::string> fault;  ///< key=value words, or TOML
+  ControlTarget target;
+};
+
+/// tandem check FILE
+struct CheckOptions {
+  std::string file;     ///< an experiment or a robot
+  bool bus = false;     ///< show the load of every bus
+  bool repair = false;  ///< of a robot: as if it said inertia = "repair"
+  std::string json;
+};
+
+/// tandem emulate ROBOT|EXPERIMENT
+struct EmulateOptions {
+  std::string file;                       ///< a robot, or an experiment for posture, seed and [sim]
+  std::optional<std::string> posture;     ///< instead of the experiment's
+  std::optional<std::uint64_t> seed;      ///< instead of the experiment's
+  std::optional<std::int64_t> period_ns;  ///< instead of the experiment's
+  bool lockstep = false;                  ///< a step per SYNC, whatever the clock says
+  std::string scenario;                   ///< TOML of faults to inject; empty: none
+  std::vector<std::string> interfaces;    ///< "can0=vcan0"
+  std::string kernel_variant;             ///< empty: the best that this CPU runs
+  bool no_build = false;                  ///< missing kernels are an error
+  std::string socket;                     ///< of the control socket; empty: the default path
+  bool no_socket = false;
+  bool quiet = false;  ///< neither progress nor table
+  std::string json;
+};
+
+/// tandem model build|info ROBOT
+struct ModelOptions {
+  enum class Action : std::uint8_t { kBuild, kInfo } action = Action::kBuild;
+  std::string robot;   ///< robot.toml
+  std::string output;  ///< library; empty: beside `tandem` or in the cache
+  std::string kernel_variant;
+  bool force = false;
+  std::string json;
+};
+
+/// tandem new URDF
+struct NewOptions {
+  std::string urdf;
+  std::string output;  ///< folder; empty: the description's name, here
+  std::string like;    ///< a bundled robot or a robot.toml; empty: rigid drives
+  std::string base;    ///< "floating", "fixed"; empty: found out
+  bool force = false;  ///< write into a folder that exists
+  std::string json;
+};
+
+/// tandem log info|csv|diff LOG [LOG_B]
+struct LogOptions {
+  enum class Action : std::uint8_t { kInfo, kCsv, kDiff } action = Action::kInfo;
+  std::string log;
+  std::string other;                ///< diff: the log that `log` is compared with
+  std::string topic;                ///< empty: the state
+  std::vector<std::string> fields;  ///< empty: all
+  std::size_t every = 1;            ///< n: each n-th message
+  std::string output;               ///< empty: standard output
+  std::string json;
+};
+
+/// tandem eds ROBOT
+struct EdsOptions {
+  std::string robot;           ///< robot.toml
+  std::string output = "eds";  ///< folder
+  std::string json;
+};
+
+/// tandem report LOG [LOG_B]
+struct ReportOptions {
+  std::string log;
+  std::string other;   ///< laid over `log`; may be empty
+  std::string output;  ///< folder; empty: beside the log
+  std::string json;
+};
+
+/// tandem latency
+struct LatencyOptions {
+  std::int64_t period_us = 1000;
+  double duration_s = 30.0;   ///< per load
+  std::string mode = "swap";  ///< swap, together, turns
+  int slices = 10;
+  std::vector<int> cpus;        ///< empty: the first two that may be used
+  std::string policy = "fifo";  ///< fifo, rr, other
+  int priority = 80;
+  std::string load;  ///< idle, stress, both; empty: both with stress-ng, else idle
+  std::string output = "runs/latency";  ///< folder of plots and page
+  bool quiet = false;
+  std::string json;
+};
+
+/// tandem doctor [ROBOT]
+struct DoctorOptions {
+  std::string robot;       ///< robot.toml, whose CAN interfaces are looked at; may be empty
+  std::string root = "/";  ///< of the files that are read
+  std::string json;
+};
+
+/// tandem topic list|echo|hz
+struct TopicOptions {
+  enum class Action : std::uint8_t { kList, kEcho, kHz } action = Action::kList;
+  std::string topic;  ///< echo, hz: "/joint_states"
+  DdsPlace place;
+  std::optional<double> wait_s;        ///< for discovery; empty: 1 (list), 5 (echo, hz)
+  std::optional<std::uint64_t> count;  ///< echo, hz: samples, then it ends
+  std::string field;                   ///< echo: "position[2]"; empty: all
+  bool all = false;                    ///< list: not only ROS 2's topics
+  std::size_t window = 10'000;         ///< hz: intervals that the rate is of
+  std::string json;
+};
+
+/// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
+// clang-format off: one a line, so that additions meet without conflict
+using Command =
+    std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
+                 ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
+                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
+                 DoctorOptions, EmulateOptions, TopicOptions>;
+// clang-format on
+
+/// Prints help and version on standard output, usage errors on standard error: with the nearest
+/// flag or subcommand for one that does not exist.
+[[nodiscard]] Command parse_command_line(int argc, const char* const* argv);
+
+}  // namespace tandem::apps

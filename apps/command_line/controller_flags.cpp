@@ -1,0 +1,116 @@
+// Flags of the commands that change a running run: tandem controller, tandem joint.
+#include <cmath>
+
+#include "apps/command_line/command_flags.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char kControllerExamples[] = R"(Examples:
+  tandem controller list                             loaded controllers, active or not, their joints
+  tandem controller load hold --name rest --set 'duration_s = 2.0'
+  tandem controller switch --stop squat --start rest in one cycle, or not at all
+  tandem controller start                            after `fault reset`: those active before
+  tandem controller stop rest                        its joints are held where they are
+  tandem controller unload rest                      and its library is closed
+Without --socket or --dds it is the only `tandem run` of this user.)";
+
+const char kJointExamples[] = R"(Examples:
+  tandem joint list                                  every joint: its controller, mode, measurements
+  tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
+  tandem joint set LElbj --mode torque               a joint that no active controller claims
+  tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
+  tandem joint recover LElbj                         outside its limits: slowly back inside
+  tandem joint gains LElbj position --kp 150         to its drive, by SDO
+Without --socket or --dds it is the only `tandem run` of this user.)";
+
+CLI::Validator is_finite() {
+  const auto check = [](const std::string& text) -> std::string {
+    double number = 0.0;
+    if (CLI::detail::lexical_cast(text, number) && std::isfinite(number)) return "";
+    return "'" + text + "' is no finite number";
+  };
+  return {check, ""};
+}
+
+/// What every subcommand has.
+template <class Options>
+CLI::App* add_command(CLI::App& app, const char* name, const char* doc, const char* examples,
+                      Options& o) {
+  CLI::App* command = app.add_subcommand(name, doc);
+  add_target(*command, o.target);
+  command->add_option("--json", o.json, kJsonHelp);
+  command->footer(examples);
+  return command;
+}
+
+}  // namespace
+
+void add_flags(CLI::App& app, ControllerOptions& o) {
+  using Action = ControllerOptions::Action;
+  app.require_subcommand(1);
+  app.footer(kControllerExamples);
+  const auto add = [&](const char* name, const char* doc, Action action) {
+    CLI::App* command = add_command(app, name, doc, kControllerExamples, o);
+    command->callback([&o, action] { o.action = action; });
+    return command;
+  };
+  add("list", "What is loaded: active or not, and the joints it claims", Action::kList);
+  CLI::App* load =
+      add("load", "Load a controller; it is inactive until it is started", Action::kLoad);
+  load->add_option("plugin", o.plugin, "Name of a controller, or path of its library")->required();
+  load->add_option("--name", o.name, "Name of the controller (default: the plugin's)");
+  load->add_option("--parameters", o.parameters, "TOML file of its [controller.parameters]")
+      ->check(CLI::ExistingFile);
+  load->add_option("--set", o.set, "One parameter, 'key = value'; may be repeated")
+      ->allow_extra_args(false);
+  load->add_flag("--start", o.start_it, "Start it as well");
+  add("unload", "Free an inactive controller", Action::kUnload)
+      ->add_option("name", o.name, "Its name")
+      ->required();
+  add("start", "Start controllers, all in one cycle; after a reset let them continue",
+      Action::kStart)
+      ->add_option("names", o.start, "Their names; none: those that were active before the reset");
+  add("stop", "Stop controllers; joints without a controller are held", Action::kSwitch)
+      ->add_option("names", o.stop, "Their names")
+      ->required();
+  CLI::App* change =
+      add("switch", "Stop some and start others in one cycle, all or none", Action::kSwitch);
+  change->add_option("--stop", o.stop, "Controllers to stop, by comma")->delimiter(',');
+  change->add_option("--start", o.start, "Controllers to start, by comma")->delimiter(',');
+}
+
+void add_flags(CLI::App& app, JointOptions& o) {
+  using Action = JointOptions::Action;
+  app.require_subcommand(1);
+  app.footer(kJointExamples);
+  const auto add = [&](const char* name, const char* doc, Action action) {
+    CLI::App* command = add_command(app, name, doc, kJointExamples, o);
+    command->callback([&o, action] { o.action = action; });
+    return command;
+  };
+  CLI::App* list = add("list", "Controller, mode and measurements of each joint", Action::kList);
+  list->add_option("joints", o.joints, "Only these");
+  list->add_flag("--gains", o.gains, "The gains of its drive's loops instead");
+  CLI::App* set =
+      add("set", "Mode and interaction of a free joint, impedance of any", Action::kSet);
+  set->add_option("joint", o.joint, "Its name")->required();
+  set->add_option("--mode", o.mode, "idle, position, velocity, torque, open_loop, current");
+  set->add_option("--interaction", o.interaction, "stiff, compliant");
+  set->add_option("--stiffness", o.stiffness_Nm_rad, "Of the virtual spring [Nm/rad]")
+      ->check(is_finite());
+  set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
+      ->check(is_finite());
+  add("recover", "Lead a free joint back inside its limits, slowly", Action::kRecover)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
+  CLI::App* gains =
+      add("gains", "Gains of a loop in its drive; those not given stay", Action::kGains);
+  gains->add_option("joint", o.joint, "Its name")->required();
+  gains->add_option("loop", o.loop, "position, velocity, torque, current")->required();
+  gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());
+  gains->add_option("--ki", o.ki)->check(is_finite());
+  gains->add_option("--kd", o.kd)->check(is_finite());
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,17 @@
+// Where a command that talks DDS by itself takes part: part of the command line's options.
+// Layer: apps/command_line.  Thread: main.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tandem::apps {
+
+struct DdsPlace {
+  int domain = 0;
+  std::vector<std::string> interfaces{"lo"};  ///< network interfaces
+  std::string
+      from;  ///< TOML with the [dds] table that says all of it, with DDS Security; empty: none
+};
+
+}  // namespace tandem::apps

@@ -1,0 +1,142 @@
+#include "apps/control/controller_control.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/text/toml_text.hpp"
+#include "controllers/plugin_loader.hpp"
+#include "runtime/owner_controller.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using runtime::RunServices;
+using Names = std::vector<std::string>;
+
+const ControlKey kName{.name = "name", .required = true, .doc = "of a loaded controller"};
+
+ControlKey names_key(const char* name, const char* doc) {
+  return {.name = name, .type = ControlKey::Type::kTexts, .doc = doc};
+}
+
+Json list(RunServices& services, const hal::RobotConfig& robot) {
+  Json all = Json::array();
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    Json claims = Json::array();
+    for (const auto& claim : one.claims) {
+      claims.push_back({{"joint", robot.joints[claim.joint].name},
+                        {"mode", hal::to_string(claim.mode)},
+                        {"interaction", hal::to_string(claim.interaction)}});
+    }
+    all.push_back({{"name", one.name},
+                   {"plugin", one.plugin},
+                   {"active", one.active},
+                   {"finished", one.done},
+                   {"of_experiment", one.of_experiment},
+                   {"claims", std::move(claims)}});
+  }
+  return all;
+}
+
+/// What was done, and who is active now.
+Result<Json> tell(RunServices& services, const Result<runtime::RequestResult>& asked) {
+  if (!asked) return std::unexpected(asked.error());
+  Json answer = asked_json(*asked);
+  answer["active"] = Json::array();
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (one.active) answer["active"].push_back(one.name);
+  }
+  return answer;
+}
+
+/// A switch that an operator asks for. The owner in another process comes and goes with its lease.
+Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Names& start) {
+  for (const runtime::ControllerStatus& one : services.controllers()) {
+    if (one.name != runtime::kOwnerController || !one.plugin.empty()) continue;
+    const auto named = std::ranges::count(stop, one.name) + std::ranges::count(start, one.name);
+    if (named == 0) continue;
+    return fail("'" + one.name + "' is the owner in another process: it comes and goes by itself",
+                "end the owner's run; `tandem estop` stops the robot whoever has it");
+  }
+  return tell(services, services.switch_controllers(stop, start));
+}
+
+Result<TomlDocument> parameters_of(const Json& request) {
+  const auto found = request.find("parameters");
+  if (found == request.end()) return TomlDocument::parse("", "parameters");
+  const Result<std::string> text =
+      found->is_string() ? Result<std::string>(found->get<std::string>()) : toml_of(*found);
+  if (!text) return std::unexpected(text.error());
+  auto document = TomlDocument::parse(*text, "parameters");
+  if (document) return document;
+  const Error& error = document.error();
+  return fail("parameters:" + std::to_string(error.line) + ": " + error.message, error.hint);
+}
+
+Result<Json> load(RunServices& services, const Json& request) {
+  const auto plugin = request["plugin"].get<std::string>();
+  const std::string name = request.value("name", std::filesystem::path(plugin).stem().string());
+  const auto parameters = parameters_of(request);
+  if (!parameters) return std::unexpected(parameters.error());
+  auto loaded = load_controller(plugin, controller_folders());
+  if (!loaded) return std::unexpected(loaded.error());
+  Json what{{"name", name}, {"doc", loaded->plugin().doc}};
+  auto answer = tell(services, services.load(name, std::move(*loaded), *parameters));
+  if (answer) answer->update(what);
+  return answer;
+}
+
+Names names_of(const Json& request, const char* key) {
+  return request.contains(key) ? request[key].get<Names>() : Names{};
+}
+
+}  // namespace
+
+Json asked_json(const runtime::RequestResult& asked) {
+  if (asked.done) return {{"done", true}, {"cycle", asked.cycle}};
+  return {{"done", false}, {"note", "asked for; it will happen in the loop's next cycle"}};
+}
+
+void add_controller_commands(ControlRegistry& registry, RunServices& services,
+                             const hal::RobotConfig& robot) {
+  registry.add("controller.list", ControlEffect::kReads, "every loaded controller and its claims",
+               {}, [&services, &robot](const Json&) -> Result<Json> {
+                 return Json{{"controllers", list(services, robot)}};
+               });
+  registry.add("controller.load", ControlEffect::kChanges, "loads a controller, inactive",
+               {{.name = "plugin", .required = true, .doc = "its name, or the path of its library"},
+                {.name = "name", .doc = "default: the plugin's"},
+                {.name = "parameters",
+                 .type = ControlKey::Type::kTextOrObject,
+                 .doc = "[controller.parameters]: TOML, or an object"}},
+               [&services](const Json& request) { return load(services, request); });
+  registry.add("controller.unload", ControlEffect::kChanges, "frees an inactive controller",
+               {kName}, [&services](const Json& request) {
+                 return tell(services, services.unload(request["name"].get<std::string>()));
+               });
+  registry.add("controller.start", ControlEffect::kChanges,
+               "starts a controller, or all that a reset holds back",
+               {{.name = "name",
+                 .doc = "of a loaded controller; else those that were active before "
+                        "the reset"}},
+               [&services](const Json& request) {
+                 if (!request.contains("name")) return tell(services, services.go_on());
+                 const Names names{request["name"].get<std::string>()};
+                 return switch_by_hand(services, {}, names);
+               });
+  registry.add("controller.stop", ControlEffect::kChanges,
+               "stops a controller; its joints are held", {kName},
+               [&services](const Json& request) {
+                 const Names names{request["name"].get<std::string>()};
+                 return switch_by_hand(services, names, {});
+               });
+  registry.add("controller.switch", ControlEffect::kChanges,
+               "stops some and starts others in one cycle, all or none",
+               {names_key("stop", "controllers to stop"), names_key("start", "and to start")},
+               [&services](const Json& request) {
+                 return switch_by_hand(services, names_of(request, "stop"),
+                                       names_of(request, "start"));
+               });
+}
+
+}  // namespace tandem::apps

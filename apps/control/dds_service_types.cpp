@@ -1,0 +1,193 @@
+#include "apps/control/dds_service_types.hpp"
+
+#include <fmt/core.h>
+
+#include <span>
+
+namespace tandem::apps {
+namespace {
+
+using namespace dds::tandem_msgs;
+using dds::ReplyMemory;
+
+/// An empty text says nothing.
+void add_text(Json& question, const char* key, const char* text) {
+  if (*text != '\0') question[key] = text;
+}
+
+/// So does an empty sequence.
+void add_number(Json& question, const char* key, const dds_sequence_double& value) {
+  if (value._length > 0) question[key] = value._buffer[0];
+}
+
+Json texts(const dds_sequence_string& sequence) {
+  Json list = Json::array();
+  for (const char* text : std::span(sequence._buffer, sequence._length)) list.push_back(text);
+  return list;
+}
+
+char* text_of(const Json& object, const char* key, ReplyMemory& memory) {
+  return memory.text(object.value(key, std::string()));
+}
+
+const Json& list_of(const Json& answer, const char* key) {
+  static const Json kEmpty = Json::array();
+  const auto found = answer.find(key);
+  return found != answer.end() && found->is_array() ? *found : kEmpty;
+}
+
+/// Room for a list's elements in `sequence`, of the sequence's own type.
+template <class Sequence>
+auto room(Sequence& sequence, const Json& list, ReplyMemory& memory) {
+  using Element = std::remove_pointer_t<decltype(sequence._buffer)>;
+  sequence._buffer = memory.array<Element>(list.size());
+  sequence._length = sequence._maximum = static_cast<std::uint32_t>(list.size());
+  return std::span(sequence._buffer, list.size());
+}
+
+/// What is asked of a loop whose time stands waits.
+const char* when(const Json& answer) {
+  return answer.value("paused", false) ? ", in the next cycle: simulated time stands" : "";
+}
+
+void fill_controller(const Json& from, tandem_msgs_msg_dds__Controller_& to, ReplyMemory& memory) {
+  to.name = text_of(from, "name", memory);
+  to.plugin = text_of(from, "plugin", memory);
+  to.active = from.value("active", false);
+  to.finished = from.value("finished", false);
+  to.of_experiment = from.value("of_experiment", false);
+  const Json& claims = list_of(from, "claims");
+  const auto room_for = room(to.claims, claims, memory);
+  for (std::size_t i = 0; i < claims.size(); ++i) {
+    room_for[i].joint = text_of(claims[i], "joint", memory);
+    room_for[i].mode = text_of(claims[i], "mode", memory);
+    room_for[i].interaction = text_of(claims[i], "interaction", memory);
+  }
+}
+
+}  // namespace
+
+Json emergency_stop_question(const dds::std_srvs::Trigger_Request&) { return {{"do", "estop"}}; }
+
+Json clear_faults_question(const dds::std_srvs::Trigger_Request&) {
+  return {{"do", "fault.reset"}};
+}
+
+/// Those that a reset holds back.
+Json start_controllers_question(const dds::std_srvs::Trigger_Request&) {
+  return {{"do", "controller.start"}};
+}
+
+Json list_controllers_question(const ListControllers_Request&) {
+  return {{"do", "controller.list"}};
+}
+
+Json load_controller_question(const LoadController_Request& request) {
+  Json question{{"do", "controller.load"}, {"plugin", request.plugin}};
+  add_text(question, "name", request.name);
+  add_text(question, "parameters", request.parameters);
+  return question;
+}
+
+Json unload_controller_question(const UnloadController_Request& request) {
+  return {{"do", "controller.unload"}, {"name", request.name}};
+}
+
+Json switch_controllers_question(const SwitchControllers_Request& request) {
+  return {
+      {"do", "controller.switch"}, {"stop", texts(request.stop)}, {"start", texts(request.start)}};
+}
+
+Json set_joint_question(const SetJoint_Request& request) {
+  Json question{{"do", "joint.set"}, {"joint", request.joint}};
+  add_text(question, "mode", request.mode);
+  add_text(question, "interaction", request.interaction);
+  add_number(question, "stiffness_Nm_rad", request.stiffness_nm_rad);
+  add_number(question, "damping_Nms_rad", request.damping_nms_rad);
+  return question;
+}
+
+Json set_gains_question(const SetGains_Request& request) {
+  Json question{{"do", "joint.gains"}, {"joint", request.joint}, {"loop", request.loop}};
+  add_number(question, "kp", request.kp);
+  add_number(question, "ki", request.ki);
+  add_number(question, "kd", request.kd);
+  return question;
+}
+
+Json clock_question(const Clock_Request& request) {
+  const std::string action = request.action;
+  Json question{{"do", "clock." + (action.empty() ? "show" : action)}};
+  if (action == "step") question["cycles"] = request.cycles;
+  if (action == "rate") question["rate"] = request.rate;
+  return question;
+}
+
+std::string message_of(const Json& answer) {
+  if (answer.value("ok", false)) return answer.value("note", std::string());
+  const std::string hint = answer.value("hint", std::string());
+  return answer.value("error", std::string()) + (hint.empty() ? "" : " (" + hint + ")");
+}
+
+void fill_emergency_stop(const Json& answer, dds::std_srvs::Trigger_Response& reply,
+                         ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  const std::string category = answer.value("category", std::string());
+  reply.message = memory.text(reply.success ? "emergency stop, " + category + when(answer)
+                                            : message_of(answer));
+}
+
+void fill_clear_faults(const Json& answer, dds::std_srvs::Trigger_Response& reply,
+                       ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  const int latched = answer.value("latched", 0);
+  reply.message = memory.text(
+      !reply.success ? message_of(answer)
+      : latched == 0 ? "nothing is latched"
+                     : fmt::format("the reset of {} is asked for{}; tandem/faults shows when it is "
+                                   "through, which takes seconds. Controllers that are held back "
+                                   "then continue with tandem/start_controllers",
+                                   latched, when(answer)));
+}
+
+void fill_start_controllers(const Json& answer, dds::std_srvs::Trigger_Response& reply,
+                            ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  std::string names;
+  for (const Json& name : list_of(answer, "active")) {
+    names += (names.empty() ? "active: " : ", ") + name.get<std::string>();
+  }
+  const std::string note = message_of(answer);
+  reply.message = memory.text(note.empty() ? names : note);
+}
+
+void fill_controllers(const Json& answer, ListControllers_Response& reply, ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  reply.message = memory.text(message_of(answer));
+  const Json& controllers = list_of(answer, "controllers");
+  const auto room_for = room(reply.controllers, controllers, memory);
+  for (std::size_t i = 0; i < controllers.size(); ++i) {
+    fill_controller(controllers[i], room_for[i], memory);
+  }
+}
+
+void fill_active(const Json& answer, dds_sequence_string& sequence, ReplyMemory& memory) {
+  const Json& active = list_of(answer, "active");
+  const auto room_for = room(sequence, active, memory);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    room_for[i] = memory.text(active[i].get<std::string>());
+  }
+}
+
+void fill_clock(const Json& answer, Clock_Response& reply, ReplyMemory& memory) {
+  reply.success = answer.value("ok", false);
+  reply.message = memory.text(message_of(answer));
+  reply.time_s = answer.value("time_s", 0.0);
+  reply.cycles = answer.value("cycles", std::uint64_t{0});
+  reply.paused = answer.value("paused", false);
+  reply.standing = answer.value("standing", false);
+  reply.pending_steps = answer.value("pending_steps", std::uint64_t{0});
+  reply.rate = answer.value("rate", 0.0);
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,52 @@
+#include "apps/control/fault_table.hpp"
+
+#include <fmt/core.h>
+
+namespace tandem::apps {
+namespace {
+
+const char* reaction(hal::StopCategory category) {
+  switch (category) {
+    case hal::StopCategory::kCategory0: return "torque off";
+    case hal::StopCategory::kCategory1: return "stop, torque off";
+    case hal::StopCategory::kCategory2: return "safe posture, stop, torque off";
+    case hal::StopCategory::kHold: return "every joint held";
+    case hal::StopCategory::kWarn: return "reported";
+  }
+  return "?";
+}
+
+}  // namespace
+
+Json faults_json(const std::vector<runtime::Fault>& faults) {
+  Json list = Json::array();
+  for (const runtime::Fault& fault : faults) {
+    list.push_back({{"time_s", fault.time_s},
+                    {"cycle", fault.cycle},
+                    {"joint", fault.joint},
+                    {"board", fault.board},
+                    {"cause", fault.text},
+                    {"category", hal::to_string(fault.category)},
+                    {"reaction", reaction(fault.category)},
+                    {"latched", fault.latched},
+                    {"cleared_s", fault.latched ? Json(nullptr) : Json(fault.cleared_s)}});
+  }
+  return list;
+}
+
+void print_faults(const Json& faults, std::FILE* out) {
+  if (faults.empty()) return;
+  // Within 100 columns: the category is that of the reaction, and in the JSON.
+  Table table({"fault at", "joint", "board", "cause", "reaction", "state"});
+  table.align_left();
+  for (const Json& fault : faults) {
+    const bool latched = fault.value("latched", true);
+    table.add({fmt::format("{:.3f} s", fault.value("time_s", 0.0)), fault.value("joint", ""),
+               fault.value("board", ""), fault.value("cause", ""), fault.value("reaction", ""),
+               latched ? std::string("latched")
+                       : fmt::format("cleared at {:.3f} s", fault["cleared_s"].get<double>())});
+  }
+  table.print(out);
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,151 @@
+#include "apps/control/joint_control.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+
+#include "apps/control/controller_control.hpp"
+#include "base/nearest.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using hal::ControlMode;
+using hal::InteractionMode;
+using runtime::RunServices;
+
+constexpr std::array kModes{ControlMode::kIdle,   ControlMode::kPosition, ControlMode::kVelocity,
+                            ControlMode::kTorque, ControlMode::kOpenLoop, ControlMode::kCurrent};
+constexpr std::array kInteractions{InteractionMode::kStiff, InteractionMode::kCompliant};
+constexpr std::array kLoops{hal::PidLoop::kPosition, hal::PidLoop::kVelocity, hal::PidLoop::kTorque,
+                            hal::PidLoop::kCurrent};
+
+/// The value of `known` that `request[key]` names.
+template <class Enum, std::size_t N>
+Result<Enum> choice(const Json& request, const char* key, const std::array<Enum, N>& known) {
+  const auto wanted = request[key].get<std::string>();
+  std::vector<std::string> names;
+  for (const Enum value : known) {
+    names.emplace_back(hal::to_string(value));
+    if (names.back() == wanted) return value;
+  }
+  return fail(fmt::format("\"{}\": there is no '{}'", key, wanted), suggest(wanted, names));
+}
+
+Json joint_json(const runtime::JointInfo& joint) {
+  const runtime::JointStatus& look = joint.look;
+  Json gains = Json::object();
+  for (const hal::PidLoop loop : kLoops) {
+    const hal::PidGains& of = joint.gains[static_cast<std::size_t>(loop)];
+    gains[hal::to_string(loop)] = {{"kp", of.kp}, {"ki", of.ki}, {"kd", of.kd}};
+  }
+  return {{"joint", joint.name},
+          {"controller", joint.owner},
+          {"mode", hal::to_string(static_cast<ControlMode>(look.mode))},
+          {"interaction", hal::to_string(static_cast<InteractionMode>(look.interaction))},
+          {"mode_in_force", hal::to_string(static_cast<ControlMode>(look.drive_mode))},
+          {"position_rad", look.position_rad},
+          {"velocity_rad_s", look.velocity_rad_s},
+          {"torque_Nm", look.torque_Nm},
+          {"stiffness_Nm_rad", look.stiffness_Nm_rad},
+          {"damping_Nms_rad", look.damping_Nms_rad},
+          {"drive_state", hal::to_string(static_cast<hal::DriveState>(look.drive_state))},
+          {"fault", look.fault},
+          {"age_cycles", look.age_cycles},
+          {"gains", std::move(gains)}};
+}
+
+Json list(RunServices& services) {
+  Json all = Json::array();
+  std::uint64_t cycle = 0;
+  for (const runtime::JointInfo& joint : services.joints()) {
+    cycle = joint.look.cycle;
+    all.push_back(joint_json(joint));
+  }
+  return {{"cycle", cycle}, {"joints", std::move(all)}};
+}
+
+/// What was done, and what the joint is now. A controller's own joints are its own.
+Result<Json> tell(RunServices& services, const std::string& name,
+                  const Result<runtime::RequestResult>& asked) {
+  if (!asked) return std::unexpected(asked.error());
+  Json answer = asked_json(*asked);
+  for (const runtime::JointInfo& joint : services.joints()) {
+    if (joint.name != name) continue;
+    answer.update(joint_json(joint));
+    if (!joint.owner.empty() && asked->done) {
+      answer["note"] = fmt::format(
+          "the controller '{}' has the joint: what it writes each cycle goes first", joint.owner);
+    }
+  }
+  return answer;
+}
+
+Result<Json> set(RunServices& services, const Json& request) {
+  const auto joint = request["joint"].get<std::string>();
+  if (request.size() == 2) return fail("joint.set: nothing is to be set", "name a value");
+  runtime::JointRequest wish;
+  if (request.contains("mode")) {
+    const auto mode = choice(request, "mode", kModes);
+    if (!mode) return std::unexpected(mode.error());
+    wish.mode = static_cast<std::int32_t>(*mode);
+  }
+  if (request.contains("interaction")) {
+    const auto interaction = choice(request, "interaction", kInteractions);
+    if (!interaction) return std::unexpected(interaction.error());
+    wish.interaction = static_cast<std::int32_t>(*interaction);
+  }
+  wish.stiffness_Nm_rad = request.value("stiffness_Nm_rad", wish.stiffness_Nm_rad);
+  wish.damping_Nms_rad = request.value("damping_Nms_rad", wish.damping_Nms_rad);
+  return tell(services, joint, services.set_joint(joint, wish));
+}
+
+Result<Json> set_gains(RunServices& services, const Json& request) {
+  const auto joint = request["joint"].get<std::string>();
+  const auto loop = choice(request, "loop", kLoops);
+  if (!loop) return std::unexpected(loop.error());
+  runtime::GainsRequest wish;
+  if (request.contains("kp")) wish.kp = request["kp"].get<double>();
+  if (request.contains("ki")) wish.ki = request["ki"].get<double>();
+  if (request.contains("kd")) wish.kd = request["kd"].get<double>();
+  if (!wish.kp && !wish.ki && !wish.kd) {
+    return fail("joint.gains: nothing is to be set", "give kp, ki or kd");
+  }
+  auto answer = tell(services, joint, services.set_gains(joint, *loop, wish));
+  if (answer && answer->value("done", false)) answer->erase("note");  // gains are nobody's
+  return answer;
+}
+
+}  // namespace
+
+void add_joint_commands(ControlRegistry& registry, RunServices& services) {
+  using Type = ControlKey::Type;
+  const ControlKey joint{.name = "joint", .required = true, .doc = "its name"};
+  registry.add("joint.list", ControlEffect::kReads,
+               "every joint: who has it, what it does, what is measured", {},
+               [&services](const Json&) -> Result<Json> { return list(services); });
+  registry.add("joint.set", ControlEffect::kChanges,
+               "mode and interaction of a joint that no active controller claims, impedance of any",
+               {joint,
+                {.name = "mode", .doc = "idle, position, velocity, torque, open_loop, current"},
+                {.name = "interaction", .doc = "stiff, compliant"},
+                {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
+                {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
+               [&services](const Json& request) { return set(services, request); });
+  registry.add("joint.recover", ControlEffect::kChanges,
+               "leads a joint that stands outside its limits back, at a twentieth of its velocity",
+               {joint}, [&services](const Json& request) {
+                 const auto name = request["joint"].get<std::string>();
+                 return tell(services, name, services.recover(name));
+               });
+  registry.add("joint.gains", ControlEffect::kChanges, "gains of a loop in a joint's drive, by SDO",
+               {joint,
+                {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},
+                {.name = "kp", .type = Type::kNumber, .doc = "as in [gains]; it stays if left out"},
+                {.name = "ki", .type = Type::kNumber, .doc = "the same"},
+                {.name = "kd", .type = Type::kNumber, .doc = "the same"}},
+               [&services](const Json& request) { return set_gains(services, request); });
+}
+
+}  // namespace tandem::apps

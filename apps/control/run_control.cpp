@@ -1,0 +1,144 @@
+#include "apps/control/run_control.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "apps/control/clock_control.hpp"
+#include "apps/control/controller_control.hpp"
+#include "apps/control/fault_table.hpp"
+#include "apps/control/joint_control.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::microseconds kLook{200};  // between two looks for a confirmation
+
+/// How long a stop may take to be confirmed. What is simulated may be slow without being stuck.
+std::chrono::nanoseconds stop_patience(const rt::ClockState& clock) {
+  constexpr std::chrono::nanoseconds kOnRobot = std::chrono::milliseconds(100);
+  constexpr std::chrono::nanoseconds kElsewhere = std::chrono::seconds(1);
+  constexpr std::chrono::nanoseconds kMost = kStopAnswer - std::chrono::milliseconds(500);
+  constexpr double kCycles = 10.0;
+  const double rate = clock.rate > 0.0 ? clock.rate : 1.0;
+  const double cycles_ns = kCycles * static_cast<double>(clock.period_ns) / rate;
+  if (cycles_ns >= static_cast<double>(kMost.count())) return kMost;
+  const bool on_robot = clock.pacing == rt::Pacing::kWallClock;
+  const std::chrono::nanoseconds cycles(static_cast<std::int64_t>(cycles_ns));
+  return std::min(kMost, cycles + (on_robot ? kOnRobot : kElsewhere));
+}
+
+Json status(const runtime::RobotCycle& cycle) {
+  const runtime::Progress& progress = cycle.progress();
+  return {{"phase", runtime::to_string(progress.phase.load())},
+          {"paused", time_stands(cycle)},
+          {"cycles", progress.cycles.load()},
+          {"running_cycles", progress.running_cycles.load()},
+          {"total_cycles", progress.total_cycles.load()},
+          {"overruns", progress.overruns.load()},
+          {"dropped", progress.dropped.load()},
+          {"latched", progress.latched.load()},
+          {"resets", progress.resets.load()},
+          {"failed_resets", progress.failed_resets.load()}};
+}
+
+Result<Json> reset(runtime::RobotCycle& cycle) {
+  using runtime::RunPhase;
+  const RunPhase phase = cycle.progress().phase.load();
+  Json answer = status(cycle);
+  if (cycle.inbox().stop_waits()) {
+    return fail("an emergency stop waits for the loop", "let it be carried out first");
+  }
+  if (cycle.progress().latched.load() == 0) return answer;  // nothing to do is no error
+  if (phase == RunPhase::kRetreating) {
+    return fail("the robot is on its way to a safe posture", "reset it when that is over");
+  }
+  if (phase == RunPhase::kBringUp || phase == RunPhase::kShutDown || phase == RunPhase::kDone) {
+    return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
+                "a fault is reset while the run waits for it: tandem run --on-fault wait");
+  }
+  cycle.inbox().reset_faults();
+  return answer;
+}
+
+/// Category 2 is category 1 where no controller can retreat: the loop's own record tells.
+hal::StopCategory carried_out_category(const runtime::RobotCycle& cycle, std::uint64_t at_cycle,
+                                       hal::StopCategory asked) {
+  if (asked != hal::StopCategory::kCategory2) return asked;
+  for (const runtime::Fault& fault : cycle.faults()) {
+    if (fault.cycle == at_cycle && fault.category == asked) return asked;
+  }
+  return hal::StopCategory::kCategory1;
+}
+
+Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCategory category) {
+  if (request.contains("category")) {
+    const auto number = request["category"].get<std::int64_t>();
+    if (number < 0 || number > 2) return fail("estop: \"category\" is not 0, 1 or 2");
+    category = static_cast<hal::StopCategory>(number);
+  }
+  const std::uint32_t number = cycle.inbox().emergency_stop(category);
+  const rt::ClockState clock = cycle.inbox().clock().state();
+  const auto patience = stop_patience(clock);
+  const auto deadline = SteadyClock::now() + patience;
+  Json answer{{"category", hal::to_string(category)}, {"paused", false}, {"confirmed", true}};
+  for (;;) {
+    if (const auto carried_out = cycle.inbox().confirmed(number)) {
+      answer["cycle"] = *carried_out;
+      answer["category"] = hal::to_string(carried_out_category(cycle, *carried_out, category));
+      return answer;
+    }
+    if (time_stands(cycle)) {  // the loop waits, and nothing moves until it has seen the stop
+      answer["paused"] = true;
+      answer["confirmed"] = false;
+      return answer;
+    }
+    if (cycle.progress().phase.load() == runtime::RunPhase::kDone) {
+      return fail("the run is over: its loop stops nothing any more");
+    }
+    if (SteadyClock::now() > deadline) break;
+    std::this_thread::sleep_for(kLook);
+  }
+  return fail(fmt::format("the emergency stop is latched, but not confirmed by the loop within "
+                          "{:.3g} s: the loop hangs, or is very slow",
+                          std::chrono::duration<double>(patience).count()),
+              "stop the robot by its own stop circuit");
+}
+
+}  // namespace
+
+void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
+                      const hal::RobotConfig& robot) {
+  registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
+               [&cycle](const Json&) -> Result<Json> { return status(cycle); });
+  registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
+               {}, [&cycle](const Json&) -> Result<Json> {
+                 Json answer = status(cycle);
+                 answer["faults"] = faults_json(cycle.faults());
+                 answer["lost"] = cycle.fault_log().lost();
+                 return answer;
+               });
+  registry.add("fault.reset", ControlEffect::kChanges,
+               "clears what is latched; resets or failed_resets counts on when done", {},
+               [&cycle](const Json&) { return reset(cycle); });
+  registry.add(
+      "estop", ControlEffect::kStops, "emergency stop, latched; waits until the loop confirms it",
+      {{.name = "category",
+        .type = ControlKey::Type::kInteger,
+        .doc = "0, 1 or 2; else what robot.toml's [safety] says"}},
+      [&cycle, &robot](const Json& request) { return stop(cycle, request, robot.emergency_stop); });
+  registry.add("run.stop", ControlEffect::kChanges, "ends the run in order", {},
+               [&cycle](const Json&) -> Result<Json> {
+                 cycle.inbox().end_run();
+                 return Json::object();
+               });
+  add_controller_commands(registry, cycle.services(), robot);
+  add_joint_commands(registry, cycle.services());
+  add_clock_commands(registry, cycle);
+}
+
+}  // namespace tandem::apps

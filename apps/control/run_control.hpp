@@ -1,0 +1,15 @@
+// What a running `tandem run` can be asked for.
+// Layer: apps/control.  Thread: main; the handlers run on the serving thread.
+#pragma once
+
+#include "apps/control/control_registry.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+/// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
+/// controllers, joints and clock. Cycle and robot outlive the registry.
+void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
+                      const hal::RobotConfig& robot);
+
+}  // namespace tandem::apps

@@ -1,0 +1,86 @@
+#include "apps/robot/kernel_store.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "base/file_name.hpp"
+#include "model/generate.hpp"
+#include "model/kernel_build.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// In one folder: ROBOT-HASH_kernels.so, else ROBOT_kernels.so.
+std::vector<std::string> candidates(const std::string& folder, const std::string& robot,
+                                    const std::string& hash) {
+  return {model::library_path(folder, robot + "-" + hash.substr(0, kHashDigits)),
+          model::library_path(folder, robot)};
+}
+
+Result<model::KernelLibrary> find(const std::string& robot, const std::string& hash,
+                                  const std::string& variant, const std::string& mend) {
+  if (const std::string problem = file_name_problem(robot); !problem.empty()) {
+    return fail("the robot's name '" + robot + "' " + problem, "give it another name");
+  }
+  Result<model::KernelLibrary> last =
+      fail("there is no kernel library of '" + robot + "' as its files describe it", mend);
+  for (const std::string& folder : model_folders()) {
+    for (const std::string& path : candidates(folder, robot, hash)) {
+      std::error_code ignored;
+      if (!fs::exists(path, ignored)) continue;
+      Result<model::KernelLibrary> library = model::load_kernels(path, hash, variant);
+      if (library) return library;
+      last = std::move(library);
+      if (last.error().hint.starts_with("run: tandem model build")) last.error().hint = mend;
+    }
+  }
+  return last;
+}
+
+}  // namespace
+
+Result<std::string> user_model_folder() {
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  if (cache != nullptr && *cache == '/') return std::string(cache) + "/tandem/models";
+  const char* home = std::getenv("HOME");
+  if (home != nullptr && *home == '/') return std::string(home) + "/.cache/tandem/models";
+  // A folder that everybody may write to is no place for code that is loaded.
+  return fail("there is no folder for kernel libraries: neither HOME nor XDG_CACHE_HOME is set",
+              "set one of them to an absolute path, or name the library with -o");
+}
+
+Result<std::string> user_library(const std::string& robot, const std::string& hash) {
+  if (const std::string problem = file_name_problem(robot); !problem.empty()) {
+    return fail("the robot's name '" + robot + "' " + problem, "give it another name");
+  }
+  const Result<std::string> folder = user_model_folder();
+  if (!folder) return std::unexpected(folder.error());
+  return candidates(*folder, robot, hash).front();
+}
+
+std::vector<std::string> model_folders() {
+  std::vector<std::string> folders;
+  std::error_code problem;
+  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
+  if (!problem) {
+    const fs::path root = program.parent_path().parent_path();
+    folders.push_back((root / "lib/models").string());
+    folders.push_back((root / "lib/tandem/models").string());
+  }
+  if (const Result<std::string> own = user_model_folder()) folders.push_back(*own);
+  return folders;
+}
+
+Result<model::KernelLibrary> find_kernels(const RobotFiles& robot, const std::string& variant) {
+  return find(robot.config.name, model::description_hash(robot.tree, robot.spec), variant,
+              "run: tandem model build " + robot.config.file);
+}
+
+Result<model::KernelLibrary> find_kernels(const std::string& robot, const std::string& hash,
+                                          const std::string& variant) {
+  return find(robot, hash, variant, "make it with `tandem model build`");
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,77 @@
+#include "apps/robot/robot_files.hpp"
+
+#include <fstream>
+#include <sstream>
+
+#include "apps/robot/loop_facts.hpp"
+#include "hal/sim/setup.hpp"
+#include "model/regular.hpp"
+#include "runtime/experiment.hpp"
+
+namespace tandem::apps {
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+namespace {
+
+/// The postures as states of the tree.
+std::vector<model::NamedPosition> positions_of(const hal::RobotConfig& robot,
+                                               const model::Tree& tree) {
+  std::vector<model::NamedPosition> all;
+  for (const hal::PostureConfig& posture : robot.postures) {
+    model::NamedPosition one{"in the posture '" + posture.name + "'",
+                             std::vector<double>(tree.joints.size(), 0.0)};
+    for (std::size_t i = 0; i < robot.joints.size(); ++i) {
+      const int joint = tree.joint_index(robot.joints[i].name);
+      if (joint >= 0) one.position[static_cast<std::size_t>(joint)] = posture.position_rad[i];
+    }
+    all.push_back(std::move(one));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
+  auto description = runtime::complete_robot(config);
+  if (!description) return std::unexpected(description.error());
+  if (Diagnostics errors = check_loop_bodies(config, description->tree); !errors.empty()) {
+    return std::unexpected(std::move(errors));
+  }
+  model::ModelSpec spec = sim::model_spec(config);
+  const Status regular =
+      model::check_regular(description->tree, spec, positions_of(config, description->tree));
+  if (!regular) {
+    Error error = regular.error();
+    if (error.file.empty()) error.file = config.file;
+    return std::unexpected(Diagnostics{std::move(error)});
+  }
+  if (config.model.floating_base && config.contact.feet.empty()) {
+    Error falls;
+    falls.message = "the base floats and there is no [contact]: the simulated robot falls for ever";
+    falls.hint = "add [contact] with the robot's feet, or base = \"fixed\"";
+    falls.file = config.file;
+    falls.key = "model.base";
+    description->warnings.push_back(std::move(falls));
+  }
+  return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
+                    description->right_angles, std::move(description->warnings)};
+}
+
+std::expected<RobotFiles, Diagnostics> read_robot(const std::string& file, bool repair) {
+  auto robot = runtime::read_robot(file, repair);
+  if (!robot) return std::unexpected(robot.error());
+  return with_description(std::move(robot->config));
+}
+
+bool is_robot(const std::string& file) {
+  const Result<TomlDocument> document = TomlDocument::load(file);
+  return document && document->root().has("model");
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,27 @@
+// Whether the joints can carry the robot where it starts.
+// Layer: apps/robot.  Thread: main.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "apps/robot/robot_files.hpp"
+
+namespace tandem::apps {
+
+/// The joints that cannot give the torque that gravity asks of them at rest in a posture: their
+/// max_torque_Nm, or what current and voltage leave of it, is less. Not asked of the joints between
+/// the base and a foot, for what the ground carries is not known, nor of closed loops.
+///
+/// @param posture  empty: every joint at 0
+/// @return  one warning for all of them, at the line of the weakest; nothing when all are strong
+///          enough or the posture is unknown
+[[nodiscard]] std::optional<Error> too_weak_at(const RobotFiles& robot, const std::string& posture);
+
+/// Gravity with z > 0: legal, and nearly always a slip of sign.
+[[nodiscard]] std::optional<Error> upward_gravity(const hal::RobotConfig& robot);
+
+/// Both, of the posture that a run starts in.
+[[nodiscard]] Diagnostics start_warnings(const RobotFiles& robot, const std::string& posture);
+
+}  // namespace tandem::apps

@@ -1,0 +1,187 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "apps/can/bus_table.hpp"
+#include "apps/robot/loop_facts.hpp"
+#include "apps/robot/start_height.hpp"
+#include "apps/robot/start_torque.hpp"
+#include "apps/robot/wrong_kind.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/run/composition.hpp"
+#include "apps/text/console.hpp"
+#include "base/counted.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
+#include "hal/ethercat-can/pdo_layout.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char* backend_text(runtime::BackendKind backend) {
+  switch (backend) {
+    case runtime::BackendKind::kSim: break;
+    case runtime::BackendKind::kCan:
+      return "can: drive master here, boards on SocketCAN interfaces";
+    case runtime::BackendKind::kDds: return "dds: the robot of another process (tandem serve)";
+  }
+  return "sim: drive master, frames, boards' firmware and plant in this process";
+}
+
+void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
+  facts.add("robot", fmt::format("{} ({})", robot.name, robot.file));
+  facts.add("description", robot.model.urdf);
+  facts.add("base", robot.model.floating_base ? "floating" : "fixed");
+  facts.add("joints",
+            fmt::format("{} on {}", robot.joints.size(), counted(robot.boards.size(), "board")));
+  facts.add("sensors", std::to_string(robot.sensors.size()));
+  for (const hal::BusConfig& bus : robot.buses) {
+    std::size_t nodes = 0;
+    for (const hal::BoardConfig& board : robot.boards) nodes += board.bus == bus.name ? 1 : 0;
+    for (const hal::SensorConfig& sensor : robot.sensors) nodes += sensor.bus == bus.name ? 1 : 0;
+    facts.add("bus " + bus.name,
+              fmt::format("{}, {}", counted(nodes, "node"), bus.fd ? "CAN FD" : "CAN"));
+  }
+}
+
+void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& robot, Facts& facts) {
+  if (kernels.get() != nullptr) {
+    facts.add("kernels", fmt::format("{} ({})", kernels.path(), kernels->variant));
+  } else {
+    facts.add("kernels", "none yet: `tandem run` builds them, and so does");
+    facts.add("", "tandem model build " + robot);
+  }
+}
+
+/// What a run would do.
+void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
+  const runtime::Experiment& e = c.experiment;
+  const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
+  Facts facts;
+  add_robot_facts(e.robot, facts);
+  add_kernel_facts(c.kernels, e.robot.file, facts);
+  add_loop_facts(e.robot, loops, facts);
+  facts.add("backend", backend_text(e.hal.backend));
+  facts.add("start", e.posture.empty() ? "every joint at 0" : "posture " + e.posture);
+  for (const ControllerNote& note : c.notes) {
+    facts.add("controller " + note.name, note.doc + (note.active ? "" : " Inactive at first."));
+  }
+  if (c.controllers == nullptr) {
+    facts.add("", "their parameters and claims are checked when there are kernels");
+  }
+  facts.add("loop", fmt::format("{:.3g} kHz, {}, {:.3f} s after bring-up", 1e-3 / period_s,
+                                counted(e.cycles(), "cycle"), e.duration_s));
+  facts.add("integrator",
+            fmt::format("{}, {} us steps",
+                        e.sim.integrator == sim::Integrator::kRungeKutta4 ? "Runge-Kutta 4"
+                                                                          : "semi-implicit Euler",
+                        static_cast<double>(e.sim.substep_ns) * 1e-3));
+  facts.add("seed", std::to_string(e.seed));
+  facts.add("log", e.log.folder + "/");
+  fmt::print(out, "{} is right. It would run:\n", e.file);
+  facts.print(out);
+}
+
+void print_robot(const RobotFiles& robot, const model::KernelLibrary& kernels,
+                 const LoopStudy& loops, bool warned, std::FILE* out) {
+  Facts facts;
+  add_robot_facts(robot.config, facts);
+  add_kernel_facts(kernels, robot.config.file, facts);
+  add_loop_facts(robot.config, loops, facts);
+  if (robot.config.model.repair_inertia) {
+    const auto repaired = std::ranges::count(robot.warnings, model::kRepaired, &Error::hint);
+    facts.add("inertias", fmt::format("{} repaired", repaired));
+  }
+  fmt::print(out, "{} {}.\n", robot.config.file,
+             warned ? "can be used; look at the warnings" : "is right");
+  facts.print(out);
+}
+
+/// What `--bus` shows, before anything is refused: a robot's own file has no period.
+Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out, Json& json) {
+  constexpr std::int64_t kPeriodNs = 1'000'000;
+  if (!robot_only) {
+    const auto experiment = runtime::read_experiment(file);
+    if (!experiment) return {};  // composing tells of it
+    return show_buses(experiment->robot, experiment->loop.period_ns, out, json);
+  }
+  const auto robot = read_robot(file);
+  if (!robot) return {};
+  Diagnostics errors = show_buses(robot->config, kPeriodNs, out, json);
+  if (!errors.empty()) return errors;
+  return hal::can::check_bus_load(robot->config, kPeriodNs);
+}
+
+/// What may be meant, of a robot by itself: a posture need not be one to start from.
+Diagnostics warnings_of(const RobotFiles& robot) {
+  Diagnostics warnings = robot.warnings;
+  for (const hal::PostureConfig& posture : robot.config.postures) {
+    if (auto error = wrong_start_height(robot, posture.name)) warnings.push_back(std::move(*error));
+    if (auto error = too_weak_at(robot, posture.name)) warnings.push_back(std::move(*error));
+    const Diagnostics buried = buried_links(robot, posture.name);
+    warnings.insert(warnings.end(), buried.begin(), buried.end());
+  }
+  if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
+  return warnings;
+}
+
+Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
+                        Json& json) {
+  const auto robot = read_robot(options.file, options.repair);
+  if (!robot) return robot.error();
+  if (const auto layout = hal::can::make_pdo_layout(robot->config); !layout) {
+    return {layout.error()};
+  }
+  warnings = warnings_of(*robot);
+  print_warnings(warnings);
+  const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
+  add_loop_json(robot->config, loops, json);
+  if (!loops.errors.empty()) return loops.errors;
+  const auto kernels = supply_kernels(*robot, {}, MissingKernels::kTolerate);
+  if (!kernels) return {kernels.error()};
+  print_robot(*robot, *kernels, loops, !warnings.empty(), out);
+  json["kernels"] = kernels->path();
+  return {};
+}
+
+Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagnostics& warnings,
+                             Json& json) {
+  const auto composition = compose(options.file, {.missing_kernels = MissingKernels::kTolerate});
+  if (!composition) return composition.error();
+  warnings = (*composition)->experiment.warnings;
+  warnings.insert(warnings.end(), (*composition)->warnings.begin(), (*composition)->warnings.end());
+  print_warnings(warnings);
+  const runtime::Experiment& e = (*composition)->experiment;
+  const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});
+  add_loop_json(e.robot, loops, json);
+  print_plan(**composition, loops, out);
+  json["kernels"] = (*composition)->kernels.path();
+  return {};
+}
+
+}  // namespace
+
+Exit check_command(const CheckOptions& options) {
+  std::FILE* out = human_output(options.json);
+  const bool robot_only = is_robot(options.file);
+  Json json{{"ok", true}, {"errors", Json::array()}};
+  Diagnostics errors, warnings;
+  const auto wrong = options.repair
+                         ? wrong_kind(options.file, Takes::kRobot, "tandem check --repair")
+                         : wrong_kind(options.file, Takes::kEither, "tandem check");
+  if (wrong) errors.push_back(*wrong);
+  if (errors.empty() && options.bus)
+    errors = check_buses(options.file, robot_only, out, json["buses"]);
+  if (errors.empty()) {
+    errors = robot_only ? check_robot(options, out, warnings, json)
+                        : check_experiment(options, out, warnings, json);
+  }
+  print_errors(errors);
+  json["ok"] = errors.empty();
+  json["errors"] = errors_json(errors);
+  json["warnings"] = errors_json(warnings);
+  if (const Status written = write_json(options.json, json); !written)
+    return refuse(written.error());
+  return errors.empty() ? Exit::kDone : Exit::kUsage;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,19 @@
+// The commands of `tandem` that run a robot, or stop right before that. Each prints for people,
+// writes JSON when asked, and answers the exit status.
+// Layer: apps/run.  Thread: main.
+#pragma once
+
+#include "apps/command_line/command_line.hpp"
+
+namespace tandem::apps {
+
+/// Reads every file first, and runs only when all is right.
+[[nodiscard]] Exit run_command(const RunOptions& options);
+/// Runs a robot without controllers of its own, for owners in other processes.
+[[nodiscard]] Exit serve_command(const ServeOptions& options);
+/// The robot on the other end of the wire, until it is asked to stop.
+[[nodiscard]] Exit emulate_command(const EmulateOptions& options);
+/// Reads every file, says what a run would do, moves nothing.
+[[nodiscard]] Exit check_command(const CheckOptions& options);
+
+}  // namespace tandem::apps

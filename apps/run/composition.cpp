@@ -1,0 +1,348 @@
+#include "apps/run/composition.hpp"
+
+#include <fmt/core.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/clients/dds_client.hpp"
+#include "apps/robot/loop_facts.hpp"
+#include "apps/robot/start_height.hpp"
+#include "apps/robot/start_torque.hpp"
+#include "controllers/plugin_loader.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
+#include "hal/ethercat-can/can_backend.hpp"
+#include "hal/sim/scenario.hpp"
+#include "rt/stop_signal.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// Errors of several stages, so that one reading finds as many as it can.
+class Collector {
+ public:
+  void add(Error error, const std::string& file, int line) {
+    if (error.file.empty()) {
+      error.file = file;
+      error.line = line;
+    }
+    errors_.push_back(std::move(error));
+  }
+  void add(const Diagnostics& errors) {
+    errors_.insert(errors_.end(), errors.begin(), errors.end());
+  }
+  [[nodiscard]] bool empty() const { return errors_.empty(); }
+  [[nodiscard]] std::unexpected<Diagnostics> give() { return std::unexpected(std::move(errors_)); }
+
+ private:
+  Diagnostics errors_;
+};
+
+/// A plugin's path is relative to the experiment's file; its bare name is looked for.
+std::string plugin_path(const runtime::Experiment& e, const std::string& plugin) {
+  if (!plugin.contains('/')) return plugin;
+  // Absolute, so that "./x.so" beside a file of the working directory does not become a name.
+  const std::filesystem::path folder = std::filesystem::absolute(e.document.folder());
+  return (folder / plugin).lexically_normal().string();
+}
+
+void add_controllers(Composition& c, Collector& errors) {
+  const std::vector<std::string> folders = controller_folders();
+  for (const runtime::ControllerSpec& spec : c.experiment.controllers) {
+    Result<LoadedController> loaded =
+        load_controller(plugin_path(c.experiment, spec.plugin), folders);
+    const int line = spec.parameters.line();
+    const std::string key = "controller." + spec.name;
+    if (!loaded) {  // of a library; the line that names it is in the experiment
+      Error error = loaded.error();
+      if (!error.file.empty()) error.message = error.file + ": " + error.message;
+      error.file.clear();
+      error.key = key;
+      errors.add(std::move(error), c.experiment.file, line);
+      continue;
+    }
+    const std::string doc = loaded->plugin().doc;
+    const bool retreats = (*loaded)->can_retreat();
+    if (c.controllers != nullptr) {  // without kernels: only that it can be loaded
+      const Status added =
+          c.controllers->add(spec.name, std::move(*loaded), spec.parameters, spec.active);
+      if (!added) {
+        Error error = added.error();
+        error.key = key + (error.key.empty() ? "" : ": " + error.key);
+        errors.add(std::move(error), c.experiment.file, line);
+        continue;
+      }
+    }
+    c.notes.push_back({spec.name, doc, spec.active, retreats});
+  }
+  errors.add(c.experiment.document.diagnostics());
+}
+
+/// Stops of category 2 that robot.toml asks for, and that no controller can carry out.
+std::optional<Error> no_retreat(const Composition& c) {
+  using hal::StopCategory;
+  const hal::RobotConfig& robot = c.experiment.robot;
+  if (std::ranges::any_of(c.notes, &ControllerNote::retreats)) return std::nullopt;
+  std::vector<std::pair<int, std::string>> keys;  // by line
+  if (robot.emergency_stop == StopCategory::kCategory2) {
+    keys.emplace_back(robot.emergency_stop_line, "safety.emergency_stop");
+  }
+  for (const hal::JointConfig& joint : robot.joints) {
+    if (joint.on_fault != StopCategory::kCategory2) continue;
+    keys.emplace_back(joint.on_fault_line, "joint." + joint.name + ".on_fault");
+  }
+  if (keys.empty()) return std::nullopt;
+  std::ranges::sort(keys);
+  const std::string more =
+      keys.size() == 1 ? "" : fmt::format(", and so will {} more", keys.size() - 1);
+  return Error{.message = fmt::format("\"category2\" will be category 1{}: no controller of {} can "
+                                      "bring the robot to a safe posture",
+                                      more, c.experiment.file),
+               .hint =
+                   "add a controller that can retreat, such as squat, or say \"category1\" "
+                   "(docs/safety.md)",
+               .file = robot.file,
+               .line = keys.front().first,
+               .key = keys.front().second};
+}
+
+/// Where the joints stand when the run starts, as far as the experiment says.
+std::vector<double> start_of(const runtime::Experiment& e) {
+  if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
+  if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
+  if (e.hal.backend == runtime::BackendKind::kCan) return {};
+  return std::vector<double>(e.robot.joints.size(), 0.0);
+}
+
+/// The robot's kernels, and the host of controllers. They are built after all that can be checked
+/// without them, for it takes a while.
+/// @return false: there are errors, and no more to find
+bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overrides,
+                 Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  const bool builds = overrides.missing_kernels != MissingKernels::kRefuse;
+  auto kernels = supply_kernels(robot, e.kernel_variant,
+                                builds ? MissingKernels::kTolerate : MissingKernels::kRefuse);
+  if (kernels && kernels->get() == nullptr &&
+      overrides.missing_kernels != MissingKernels::kTolerate) {
+    if (!overrides.serves) add_controllers(c, errors);
+    if (!errors.empty()) return false;
+    c.notes.clear();
+    kernels = supply_kernels(robot, e.kernel_variant, overrides.missing_kernels);
+  }
+  if (!kernels) {
+    errors.add(kernels.error(), e.robot.file, 0);
+    return true;
+  }
+  c.kernels = std::move(*kernels);
+  if (c.kernels.get() == nullptr) return true;
+  c.controllers =
+      std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
+  c.controllers->start_from(start_of(e));
+  return true;
+}
+
+/// What to serve: an experiment, or a robot in the first of its postures.
+std::expected<runtime::Experiment, Diagnostics> read_served(const std::string& file) {
+  if (!is_robot(file)) return runtime::read_experiment(file);
+  auto robot = read_robot(file);
+  if (!robot) return std::unexpected(robot.error());
+  std::string text = "robot = \"robot.toml\"\nduration_s = 1.0\n";  // is not followed
+  if (!robot->config.postures.empty()) {
+    text += "posture = \"" + robot->config.postures.front().name + "\"\n";
+  }
+  text += "[[controller]]\nplugin = \"hold\"\n";
+  auto experiment = runtime::parse_experiment(text, file, robot->config);
+  if (experiment) experiment->robot_file = file;
+  return experiment;
+}
+
+/// Without controllers and without an end; DDS is what it is for.
+void serve_only(runtime::Experiment& e, bool lockstep) {
+  e.controllers.clear();
+  e.duration_s = 0.0;
+  e.hal.delay_cycles = 0;  // the owner's is in its commands
+  e.dds.enabled = true;
+  e.remote.command = e.remote.command.value_or(runtime::RemoteCommand::kLocal);
+  e.remote.lockstep = e.remote.lockstep || lockstep;
+}
+
+/// The controller that an owner in another process is.
+void add_owner(Composition& c, Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  const auto command = e.remote.command.value_or(runtime::RemoteCommand::kOff);
+  const bool may = command != runtime::RemoteCommand::kOff && e.dds.enabled;
+  if (!may || c.controllers == nullptr || e.hal.backend == runtime::BackendKind::kDds) return;
+  auto owner = std::make_shared<runtime::OwnerController>();
+  c.owner_slot = c.controllers->size();
+  const auto nothing = TomlDocument::parse("", e.file);
+  const Status added = c.controllers->add(runtime::kOwnerController, owner, nothing->root(), false);
+  if (!added) return errors.add(added.error(), e.file, 0);
+  c.owner = std::move(owner);
+}
+
+}  // namespace
+
+std::string hal_name(const runtime::HalOptions& hal) {
+  if (hal.backend == runtime::BackendKind::kSim) return "sim";
+  const std::string name = hal.backend == runtime::BackendKind::kCan ? "can" : "dds";
+  return hal.lockstep ? name + " lockstep" : name;
+}
+
+std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
+                                                                 const Overrides& overrides) {
+  auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
+  if (!experiment) return std::unexpected(experiment.error());
+  auto c = std::make_unique<Composition>();
+  runtime::Experiment& e = c->experiment;
+  e = std::move(*experiment);
+  e.seed = overrides.seed.value_or(e.seed);
+  e.duration_s = overrides.duration_s.value_or(e.duration_s);
+  if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
+  e.hal.backend = overrides.backend.value_or(e.hal.backend);
+  e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
+  e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
+  e.dds.domain = overrides.domain.value_or(e.dds.domain);
+  e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
+  Collector errors;
+  if (e.cycles() == 0) {
+    errors.add({.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
+                .hint = fmt::format("run for {} s or longer",
+                                    static_cast<double>(e.loop.period_ns) * 1e-9),
+                .file = {},
+                .key = "duration_s"},
+               e.file, 0);
+    return errors.give();
+  }
+  if (overrides.serves) serve_only(e, overrides.lockstep);
+  if (overrides.serves && e.hal.backend == runtime::BackendKind::kDds) {
+    errors.add({.message = "a robot of another process cannot be served once more",
+                .hint = "add --hal sim or --hal can",
+                .file = {},
+                .key = "hal.backend"},
+               e.file, 0);
+    return errors.give();
+  }
+  const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
+  if (is_remote) {
+    e.dds.enabled = false;  // the robot is the server's to show
+    e.hal.settle_s = 0.0;   // bring-up and settling are the server's
+  }
+
+  if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
+    return std::unexpected(Diagnostics{done.error()});
+  }
+  const auto robot = with_description(e.robot);
+  if (!robot) return std::unexpected(robot.error());
+  c->tree = robot->tree;
+  e.tree = std::make_shared<const model::Tree>(robot->tree);
+  if (e.hal.backend == runtime::BackendKind::kSim) {
+    if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
+    c->warnings = buried_links(*robot, e.posture);
+    errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
+  }
+  if (!is_remote)
+    std::ranges::move(start_warnings(*robot, e.posture), std::back_inserter(c->warnings));
+  errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
+  if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
+  if (!overrides.serves) add_controllers(*c, errors);
+  add_owner(*c, errors);
+  if (!errors.empty()) return errors.give();
+  if (auto warning = no_retreat(*c)) c->warnings.push_back(std::move(*warning));
+  if (c->kernels.get() == nullptr) return c;
+  if (e.hal.backend != runtime::BackendKind::kSim) {
+    if (overrides.scenario.empty()) return c;
+    errors.add({.message = "faults are injected on the other end of the wire",
+                .hint = is_remote ? "give --scenario to `tandem serve`"
+                                  : "give --scenario to `tandem emulate`",
+                .file = overrides.scenario,
+                .key = {}},
+               overrides.scenario, 0);
+    return errors.give();
+  }
+
+  sim::SimRobotConfig sim = e.sim_robot_config();
+  if (!overrides.scenario.empty()) {
+    auto faults = sim::read_scenario(overrides.scenario, e.robot, e.loop.period_ns);
+    if (!faults) return std::unexpected(faults.error());
+    sim.faults = std::move(*faults);
+  }
+  auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), sim);
+  if (!backend) {
+    const bool of_experiment = backend.error().key == "sim.substep_ns";
+    const int line = e.document.root().table_or_empty("sim").line("substep_ns");
+    errors.add(backend.error(), of_experiment ? e.file : e.robot.file, of_experiment ? line : 0);
+    return errors.give();
+  }
+  c->sim = backend->get();
+  c->master = &c->sim->master();
+  c->backend = std::move(*backend);
+  return c;
+}
+
+namespace {
+
+/// The robot of a server in the experiment's domain.
+Diagnostics connect_remote(Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  auto domain = dds::Domain::open(e.dds);
+  if (!domain) return {domain.error()};
+  auto participant = dds::Participant::open(std::move(*domain), "tandem_owner");
+  if (!participant) return {participant.error()};
+  c.participant = std::move(*participant);
+  auto backend = remote::RemoteBackend::connect(
+      *c.participant, e.robot,
+      remote::identity_of(e.robot, c.kernels->description_hash, e.loop.period_ns),
+      {.name = fmt::format("tandem run {}, process {}",
+                           std::filesystem::path(e.file).filename().string(), ::getpid()),
+       .lockstep = e.hal.lockstep,
+       .before_asking = [&c] { have_admitted(*c.participant); },
+       .interrupted = [] { return rt::stop_requested(); },
+       .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});
+  if (!backend) return {backend.error()};
+  c.remote = backend->get();
+  c.backend = std::move(*backend);
+  return {};
+}
+
+}  // namespace
+
+Diagnostics connect(Composition& c, const std::string& record_frames) {
+  const runtime::Experiment& e = c.experiment;
+  if (e.hal.backend == runtime::BackendKind::kDds && record_frames.empty()) {
+    return connect_remote(c);
+  }
+  if (e.hal.backend != runtime::BackendKind::kCan) {
+    if (record_frames.empty()) return {};
+    return {fail("--record-frames: a robot in this process has no bus to record",
+                 "add --hal can, and start tandem emulate")
+                .error()};
+  }
+  auto sockets = CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep);
+  if (!sockets) return sockets.error();
+  if (Diagnostics others = listen_for_masters(e.robot, e.loop.period_ns); !others.empty()) {
+    return others;
+  }
+  c.sockets = std::move(*sockets);
+  const auto ends = c.sockets->buses();
+  std::vector<hal::can::Bus*> buses(ends.begin(), ends.end());
+  if (!record_frames.empty()) {
+    auto record = hal::can::FrameRecord::open(record_frames);
+    if (!record) return {record.error()};
+    c.frames = std::move(*record);
+    for (std::size_t b = 0; b < buses.size(); ++b) {
+      buses[b] = &c.frames->watch(*buses[b], e.robot.buses[b].interface);
+    }
+  }
+  auto backend = hal::can::CanBackend::create(
+      e.robot, buses, *c.sockets,
+      {.lockstep = e.hal.lockstep, .answer_window = e.hal.answer_window});
+  if (!backend) return {backend.error()};
+  c.master = &(*backend)->master();
+  c.backend = std::move(*backend);
+  return {};
+}
+
+}  // namespace tandem::apps

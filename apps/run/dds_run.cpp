@@ -1,0 +1,61 @@
+#include "apps/run/dds_run.hpp"
+
+#include <random>
+
+#include "apps/robot/robot_files.hpp"
+
+namespace tandem::apps {
+namespace {
+
+std::uint64_t draw_run() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32) | device();
+}
+
+std::vector<dds::FaultEntry> entries(const std::vector<runtime::Fault>& faults) {
+  std::vector<dds::FaultEntry> all;
+  for (const runtime::Fault& fault : faults) {
+    all.push_back({fault.cycle, fault.time_s, fault.joint, fault.board, fault.text, fault.category,
+                   fault.latched, fault.cleared_s});
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::string& node,
+                                             const hal::TruthImage* truth) {
+  const runtime::Experiment& e = c.experiment;
+  if (!e.dds.enabled) return nullptr;
+  auto domain = dds::Domain::open(e.dds);
+  if (!domain) return std::unexpected(domain.error());
+  auto participant = dds::Participant::open(std::move(*domain), node);
+  if (!participant) return std::unexpected(participant.error());
+  auto publisher = dds::Publisher::create(
+      **participant, {.robot = e.robot,
+                      .tree = c.tree,
+                      .urdf = text_of(e.robot.model.urdf),
+                      .hal = hal_name(e.hal),
+                      .version = TANDEM_VERSION,
+                      .description_hash = c.kernels->description_hash,
+                      .period_ns = e.loop.period_ns,
+                      .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
+                      .truth = truth,
+                      .run = draw_run()});
+  if (!publisher) return std::unexpected(publisher.error());
+  return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));
+}
+
+void DdsRun::start(const runtime::RobotCycle& cycle) {
+  publisher_->start({.version =
+                         [&cycle] {
+                           const runtime::FaultLog& log = cycle.fault_log();
+                           return log.size() + log.lost() + (log.size() - log.latched());
+                         },
+                     .faults = [&cycle] { return entries(cycle.faults()); },
+                     .lost = [&cycle] { return cycle.fault_log().lost(); }});
+}
+
+DdsResult DdsRun::finish() { return {participant_->config().domain, publisher_->stop()}; }
+
+}  // namespace tandem::apps

@@ -1,0 +1,259 @@
+#include <fmt/core.h>
+
+#include "apps/can/bus_watch.hpp"
+#include "apps/can/can_sockets.hpp"
+#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/loop_facts.hpp"
+#include "apps/robot/robot_files.hpp"
+#include "apps/robot/start_height.hpp"
+#include "apps/robot/wrong_kind.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/run/errands.hpp"
+#include "apps/run/inject.hpp"
+#include "apps/text/console.hpp"
+#include "apps/transport/control_socket.hpp"
+#include "base/counted.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
+#include "hal/sim/emulator.hpp"
+#include "hal/sim/scenario.hpp"
+#include "rt/stop_signal.hpp"
+#include "rt/thread_setup.hpp"
+#include "runtime/experiment.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// What is emulated, from a robot's file or an experiment's.
+struct Subject {
+  hal::RobotConfig robot;
+  sim::SimRobotConfig sim;
+  rt::ThreadConfig thread;
+};
+
+/// A robot by itself starts in the first of its postures; an experiment says all.
+std::expected<Subject, Diagnostics> read_subject(const EmulateOptions& options) {
+  if (auto wrong = wrong_kind(options.file, Takes::kEither, "tandem emulate")) {
+    return std::unexpected(Diagnostics{std::move(*wrong)});
+  }
+  Subject subject;
+  if (is_robot(options.file)) {
+    auto robot = read_robot(options.file);
+    if (!robot) return std::unexpected(robot.error());
+    subject.robot = std::move(robot->config);
+    if (!subject.robot.postures.empty()) subject.sim.posture = subject.robot.postures[0].name;
+    subject.thread = {.policy = rt::SchedulingPolicy::kOther, .lock_memory = false};
+  } else {
+    auto experiment = runtime::read_experiment(options.file);
+    if (!experiment) return std::unexpected(experiment.error());
+    subject.sim = experiment->sim_robot_config();
+    subject.thread = experiment->thread;
+    subject.robot = std::move(experiment->robot);
+  }
+  subject.sim.posture = options.posture.value_or(subject.sim.posture);
+  subject.sim.seed = options.seed.value_or(subject.sim.seed);
+  subject.sim.period_ns = options.period_ns.value_or(subject.sim.period_ns);
+  if (Status done = replace_interfaces(subject.robot, options.interfaces); !done) {
+    return std::unexpected(Diagnostics{done.error()});
+  }
+  if (!options.scenario.empty()) {
+    auto faults = sim::read_scenario(options.scenario, subject.robot, subject.sim.period_ns);
+    if (!faults) return std::unexpected(faults.error());
+    subject.sim.faults = std::move(*faults);
+  }
+  return subject;
+}
+
+/// All that emulating needs; nothing is sent before it is complete.
+struct Emulation {
+  Subject subject;
+  model::KernelLibrary kernels;
+  std::unique_ptr<sim::EmulatedRobot> robot;
+  std::unique_ptr<CanSockets> sockets;
+  std::unique_ptr<sim::Emulator> emulator;
+  std::uint64_t injected = 0;  ///< faults that have begun
+};
+
+Diagnostics in_file(Error error, const std::string& file) {
+  if (error.file.empty()) error.file = file;
+  return {std::move(error)};
+}
+
+std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
+    const EmulateOptions& options) {
+  auto e = std::make_unique<Emulation>();
+  auto subject = read_subject(options);
+  if (!subject) return std::unexpected(subject.error());
+  e->subject = std::move(*subject);
+  const hal::RobotConfig& robot = e->subject.robot;
+  const std::int64_t period_ns = e->subject.sim.period_ns;
+  if (Diagnostics errors = hal::can::check_bus_load(robot, period_ns); !errors.empty()) {
+    return std::unexpected(std::move(errors));
+  }
+  const auto description = with_description(robot);
+  if (!description) return std::unexpected(description.error());
+  if (auto error = wrong_start_height(*description, e->subject.sim.posture)) {
+    return std::unexpected(Diagnostics{std::move(*error)});
+  }
+  const std::string& posture = e->subject.sim.posture;
+  if (LoopStudy loops = study_loops(robot, description->tree, {&posture, 1});
+      !loops.errors.empty()) {
+    return std::unexpected(std::move(loops.errors));
+  }
+  auto kernels = supply_kernels(*description, options.kernel_variant,
+                                missing_kernels(options.no_build, options.quiet));
+  if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
+  e->kernels = std::move(*kernels);
+  e->subject.sim.tree = std::make_shared<const model::Tree>(description->tree);
+  auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
+  if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
+  e->robot = std::move(*emulated);
+  auto sockets = CanSockets::open(robot, hal::can::SocketSide::kBoards, false);
+  if (!sockets) return std::unexpected(sockets.error());
+  e->sockets = std::move(*sockets);
+  e->emulator = std::make_unique<sim::Emulator>(
+      *e->robot, e->sockets->buses(), *e->sockets,
+      sim::EmulatorConfig{e->subject.sim.period_ns, options.lockstep});
+  return e;
+}
+
+std::string interfaces_of(const hal::RobotConfig& robot) {
+  std::string names;
+  for (const hal::BusConfig& bus : robot.buses) {
+    names += (names.empty() ? "" : ", ") + bus.interface;
+  }
+  return names;
+}
+
+/// How each board stopped without SYNC.
+Json boards_json(const Emulation& e) {
+  const std::vector<sim::BoardStop>& stops = e.emulator->statistics().boards;
+  Json list = Json::array();
+  for (std::size_t b = 0; b < stops.size(); ++b) {
+    list.push_back({{"name", e.subject.robot.boards[b].name},
+                    {"silent_steps", stops[b].silent_steps},
+                    {"safe_after_steps", stops[b].safe_after_steps},
+                    {"open_after_steps", stops[b].open_after_steps}});
+  }
+  return list;
+}
+
+Json summary_json(const Emulation& e, bool lockstep) {
+  const sim::EmulatorStatistics& s = e.emulator->statistics();
+  Json json;
+  json["robot"] = e.subject.robot.name;
+  json["lockstep"] = lockstep;
+  json["steps"] = s.steps;
+  json["steps_without_sync"] = s.steps_without_sync;
+  json["slipped"] = s.slipped;
+  json["sim_seconds"] = static_cast<double>(e.emulator->time_ns()) * 1e-9;
+  json["silent_steps"] = s.silent_steps;
+  json["safe_after_steps"] = s.safe_after_steps;
+  json["open_after_steps"] = s.open_after_steps;
+  json["boards"] = boards_json(e);
+  json["injected"] = e.injected;
+  json["frames_in"] = s.frames_in;
+  json["frames_out"] = s.frames_out;
+  json["frames_lost"] = s.frames_lost;
+  json["buses"] = buses_json(e.sockets->sockets());
+  json["all_enabled"] = e.robot->all_enabled();
+  json["diverged"] = e.robot->plant().diverged();
+  return json;
+}
+
+void print_summary(const Emulation& e, std::FILE* out) {
+  const sim::EmulatorStatistics& s = e.emulator->statistics();
+  Facts facts;
+  facts.add("simulated", fmt::format("{:.3f} s in {} steps, {} of them without SYNC, {} slipped",
+                                     static_cast<double>(e.emulator->time_ns()) * 1e-9, s.steps,
+                                     s.steps_without_sync, s.slipped));
+  facts.add("frames",
+            fmt::format("{} in, {} out, {} lost", s.frames_in, s.frames_out, s.frames_lost));
+  add_bus_facts(e.sockets->sockets(), facts);
+  if (e.robot->plant().diverged()) {
+    facts.add("the simulation diverged", e.robot->plant().diverged_text());
+  }
+  if (s.silent_steps > 0) {
+    facts.add("without SYNC at the end",
+              fmt::format("{} steps; no motor drove after {}, every bridge was open after {}",
+                          s.silent_steps, s.safe_after_steps, s.open_after_steps));
+  }
+  facts.print(out);
+}
+
+/// Faults that have begun since.
+void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
+  while (const sim::Fault* fault = e.robot->next_begun_fault()) {
+    ++e.injected;
+    if (quiet) continue;
+    const std::int32_t joint = e.robot->joint_of(*fault);
+    const auto& joints = e.subject.robot.joints;
+    fmt::print(out, "{:.3f} s: injected {}{}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
+               to_string(fault->kind),
+               joint < 0 ? "" : " of " + joints[static_cast<std::size_t>(joint)].name);
+    std::fflush(out);
+  }
+}
+
+/// Emulates until it is asked to stop, or the plant diverges.
+void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
+  constexpr std::int64_t kPatienceNs = 100'000'000;
+  StatusLine line(out);
+  BusWatch buses(e.sockets->sockets(), stderr);
+  while (!rt::stop_requested()) {
+    if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
+    errands.do_all();
+    tell_injected(e, out, quiet);
+    if (!quiet) buses.look();
+    if (quiet || !line.due()) continue;
+    const sim::EmulatorStatistics& s = e.emulator->statistics();
+    line.show(fmt::format("{:.1f} s simulated, {} steps ({} without SYNC), {}",
+                          static_cast<double>(e.emulator->time_ns()) * 1e-9, s.steps,
+                          s.steps_without_sync,
+                          e.robot->all_enabled() ? "all axes enabled" : "not all axes enabled"));
+  }
+}
+
+}  // namespace
+
+Exit emulate_command(const EmulateOptions& options) {
+  outlive_readers();
+  std::FILE* out = human_output(options.json);
+  if (const Status writable = check_writable(options.json); !writable)
+    return refuse(writable.error());
+  const auto composed = compose_emulation(options);
+  if (!composed) return refuse(composed.error());
+  Emulation& e = **composed;
+  rt::install_stop_signals();
+  const rt::ThreadReport report = rt::set_up_thread(e.subject.thread);
+  if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
+  if (!options.quiet) {
+    fmt::print(out, "{}: {} and {} on {}, {}; Ctrl-C ends it\n", e.subject.robot.name,
+               counted(e.subject.robot.boards.size(), "board"),
+               counted(e.subject.robot.sensors.size(), "sensor"), interfaces_of(e.subject.robot),
+               options.lockstep ? "a step per SYNC" : "in real time");
+    std::fflush(out);
+  }
+  Errands errands;
+  ControlRegistry commands;
+  commands.add(
+      "status", ControlEffect::kReads, "steps, frames and simulated time so far", {},
+      [&](const Json&) { return errands.ask([&] { return summary_json(e, options.lockstep); }); });
+  add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
+    const auto done = errands.ask([&]() -> Result<Json> {
+      if (Status added = injected(e.robot->inject(fault)); !added) {
+        return std::unexpected(added.error());
+      }
+      return Json::object();
+    });
+    return done ? Status() : Status(std::unexpected(done.error()));
+  });
+  const auto socket =
+      serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
+  emulate(e, errands, out, options.quiet);
+  if (!options.quiet) print_summary(e, out);
+  if (const Status written = write_json(options.json, summary_json(e, options.lockstep)); !written)
+    return refuse(written.error());
+  return e.robot->plant().diverged() ? Exit::kFault : Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,22 @@
+// Faults into a running robot: the command's handler, whatever robot it is for.
+// Layer: apps/run.  Thread: main; the handler runs on the serving thread.
+#pragma once
+
+#include <functional>
+
+#include "apps/control/control_registry.hpp"
+#include "hal/config/robot_config.hpp"
+#include "hal/sim/fault_injection.hpp"
+
+namespace tandem::apps {
+
+/// Adds "inject" to `registry`: reads {"scenario": TOML text} for `robot`, which outlives the
+/// registry, and hands each of its faults to `add`.
+/// @param add  answers an error when the fault cannot be added
+void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::int64_t period_ns,
+                std::function<Status(const sim::Fault&)> add);
+
+/// What the codes of EmulatedRobot::inject() mean.
+[[nodiscard]] Status injected(Code code);
+
+}  // namespace tandem::apps

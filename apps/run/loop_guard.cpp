@@ -1,0 +1,110 @@
+#include "apps/run/loop_guard.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <thread>
+
+#include "apps/text/console.hpp"
+#include "canopen/messages.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using hal::can::SocketCanBus;
+using std::chrono::nanoseconds;
+
+constexpr double kOnRobot_s = 0.5, kSimulated_s = 5.0;
+constexpr int kSendTries = 5;
+constexpr std::chrono::milliseconds kSendPause{10};
+
+nanoseconds seconds(double value_s) {
+  return nanoseconds(static_cast<std::int64_t>(value_s * 1e9));
+}
+
+/// A line on standard error. One whose reader is stuck must not hold up the end of the process.
+void say(const std::string& line) {
+  const std::string text = (is_terminal(stderr) ? "\r\x1b[K" : "") + line + "\n";
+  pollfd free{STDERR_FILENO, POLLOUT, 0};
+  if (::poll(&free, 1, 100) == 1) (void)!::write(STDERR_FILENO, text.data(), text.size());
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LoopGuard>> LoopGuard::open(const Composition& composition,
+                                                   runtime::RobotCycle& cycle) {
+  std::unique_ptr<LoopGuard> guard(new LoopGuard(composition, cycle));
+  for (const SocketCanBus* bus : composition.can_buses()) {
+    auto sender = SocketCanBus::open({.interface = bus->interface(),
+                                      .fd = false,
+                                      .side = hal::can::SocketSide::kSender,
+                                      .receive_queue = 1,
+                                      .stamps = false,
+                                      .send_queue = 4});
+    if (!sender) return std::unexpected(sender.error());
+    guard->buses_.push_back(std::move(*sender));
+  }
+  guard->start();
+  return guard;
+}
+
+void LoopGuard::start() {
+  const rt::LoopConfig& loop = composition_->experiment.loop;
+  const bool on_robot = loop.pacing == rt::Pacing::kWallClock;
+  limit_s_ = composition_->experiment.watchdog_s.value_or(on_robot ? kOnRobot_s : kSimulated_s);
+  const nanoseconds limit = seconds(limit_s_);
+  watchdog_ = std::make_unique<runtime::LoopWatchdog>(
+      cycle_->heartbeat(),
+      runtime::WatchdogConfig{
+          .limit = limit,
+          .wait_limit = on_robot ? limit + nanoseconds(loop.period_ns) : nanoseconds{},
+          .grace = kGrace},
+      runtime::LoopWatchdog::Hooks{
+          .on_hang = [this](bool at_work) { on_hang(at_work); },
+          .on_return = [] { say("note: the loop cycles again; the run ends in order"); },
+          .on_given_up = [this] { on_given_up(); }});
+}
+
+/// First what stops the robot, then what may wait.
+void LoopGuard::on_hang(bool at_work) {
+  const std::int32_t controller = composition_->controllers->at_work();
+  cycle_->inbox().watchdog_stop(controller);
+  const std::string nodes = stop_nodes();
+  if (controller >= 0) {
+    where_ = fmt::format("in the controller '{}'",
+                         composition_->controllers->name(static_cast<std::size_t>(controller)));
+  } else {
+    where_ = at_work ? "in its cycle, in no controller" : "between two cycles, in no controller";
+  }
+  say(
+      fmt::format("fault: the loop hangs: no cycle for {:g} s, it is {}. The emergency stop is "
+                  "latched{}; the process ends in {} s if the loop does not come back",
+                  limit_s_, where_, nodes, kGrace.count()));
+}
+
+std::string LoopGuard::stop_nodes() {
+  const std::array<canopen::Frame, 1> stop{canopen::make_nmt(canopen::NmtCommand::kStop, 0)};
+  std::string sent, refused;
+  for (const auto& bus : buses_) {
+    bool taken = bus->send(stop) == 1;
+    for (int i = 1; !taken && i < kSendTries; ++i) {
+      std::this_thread::sleep_for(kSendPause);
+      taken = bus->send(stop) == 1;
+    }
+    std::string& list = taken ? sent : refused;
+    list += (list.empty() ? "" : ", ") + bus->interface();
+  }
+  return (sent.empty() ? "" : "; NMT stop is sent on " + sent) +
+         (refused.empty() ? "" : "; NMT stop could not be sent on " + refused);
+}
+
+void LoopGuard::on_given_up() {
+  gave_up_.store(true, std::memory_order_release);
+  std::this_thread::sleep_for(kLastWords);
+  say("fault: the process could not end in order");
+  ::_exit(static_cast<int>(Exit::kFault));
+}
+
+}  // namespace tandem::apps

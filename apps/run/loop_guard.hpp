@@ -1,0 +1,55 @@
+// The watchdog of a run: what it does to the robot and to the process when the loop hangs.
+// Layer: apps/run.  Thread: main; the watchdog's own.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/run/composition.hpp"
+#include "base/result.hpp"
+#include "runtime/loop_watchdog.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+/// Watches the loop from its first cycle on. When that does not come back from a cycle within
+/// [faults] watchdog_s, and in real time when it does not begin one either, then
+/// 1. the emergency stop and the end of the run are latched: a loop that comes back carries them
+///    out first, and the run ends in order;
+/// 2. every node of a CAN robot gets NMT stop, by sockets that the loop does not use;
+/// 3. standard error says in which controller the loop is.
+/// A loop that is not back after kGrace is given up: gave_up(). Whoever owns the run then has
+/// kLastWords for the log, and ends the process; after that the guard does so, with status 1.
+class LoopGuard {
+ public:
+  static constexpr std::chrono::seconds kGrace{2};
+  static constexpr std::chrono::seconds kLastWords{3};
+
+  /// Both outlive it. Errors: SocketCanBus::open()'s.
+  [[nodiscard]] static Result<std::unique_ptr<LoopGuard>> open(const Composition& composition,
+                                                               runtime::RobotCycle& cycle);
+
+  [[nodiscard]] bool gave_up() const noexcept { return gave_up_.load(std::memory_order_acquire); }
+  /// Where the loop hung last: "in the controller 'squat'". For when it gave up.
+  [[nodiscard]] const std::string& where() const noexcept { return where_; }
+
+ private:
+  LoopGuard(const Composition& composition, runtime::RobotCycle& cycle)
+      : composition_(&composition), cycle_(&cycle) {}
+  void start();
+  void on_hang(bool at_work);
+  void on_given_up();
+  [[nodiscard]] std::string stop_nodes();
+
+  const Composition* composition_;
+  runtime::RobotCycle* cycle_;
+  std::vector<std::unique_ptr<hal::can::SocketCanBus>> buses_;
+  double limit_s_ = 0.0;
+  std::string where_;
+  std::atomic<bool> gave_up_{false};
+  std::unique_ptr<runtime::LoopWatchdog> watchdog_;  // last: its thread uses the others
+};
+
+}  // namespace tandem::apps

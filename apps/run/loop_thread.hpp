@@ -1,0 +1,41 @@
+// The loop on its own thread, and how long its controllers took.
+// Layer: apps/run.  Thread: made, watched and joined by main.
+#pragma once
+
+#include <atomic>
+#include <cstdio>
+#include <thread>
+
+#include "apps/run/composition.hpp"
+#include "apps/run/loop_guard.hpp"
+#include "rt/thread_setup.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+class LoopThread {
+ public:
+  LoopThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
+      : thread_([this, &cycle, config] { run(cycle, config); }) {}
+  [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
+  void join() { thread_.join(); }
+  // For when it has joined.
+  [[nodiscard]] double wall_s() const { return wall_s_; }
+  [[nodiscard]] const rt::ThreadReport& report() const { return report_; }
+
+ private:
+  void run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config);
+
+  double wall_s_ = 0.0;
+  rt::ThreadReport report_;
+  std::atomic<bool> done_{false};
+  std::thread thread_;  // last: it uses the others
+};
+
+/// Shows progress and the buses' states until the loop is done, or given up; with `quiet` it only
+/// waits. Either way it warns when the log is lost.
+/// @param recorder  null: nothing is logged
+void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
+           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool quiet);
+
+}  // namespace tandem::apps

@@ -1,0 +1,33 @@
+// The network proxy in a run: the port for owners in other processes, and what became of it.
+// Layer: apps/run.  Thread: main.
+#pragma once
+
+#include <cstdio>
+#include <memory>
+
+#include "apps/run/composition.hpp"
+#include "apps/run/dds_run.hpp"
+#include "apps/text/console.hpp"
+#include "apps/transport/dds_admission.hpp"
+#include "hal/remote/server.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+/// The end at which owners ask; null when [remote] allows none.
+/// @param once       the run ends when an owner gives the robot back
+/// @param admission  of owners; outlives the server
+/// Errors: Server::open()'s; lockstep in real time.
+[[nodiscard]] Result<std::unique_ptr<remote::Server>> open_server(const Composition& composition,
+                                                                  DdsRun* dds, bool once,
+                                                                  const DdsAdmission& admission);
+
+/// What the server tells of the run's faults.
+void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle);
+
+// Results, of either end; null: there is none.
+[[nodiscard]] Json remote_json(const remote::Server* server, const remote::RemoteBackend* client);
+void add_remote_facts(const remote::Server* server, const remote::RemoteBackend* client,
+                      Facts& facts);
+
+}  // namespace tandem::apps

@@ -1,0 +1,321 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "apps/control/remote_gate.hpp"
+#include "apps/control/run_control.hpp"
+#include "apps/robot/wrong_kind.hpp"
+#include "apps/run/commands.hpp"
+#include "apps/run/composition.hpp"
+#include "apps/run/dds_run.hpp"
+#include "apps/run/inject.hpp"
+#include "apps/run/loop_guard.hpp"
+#include "apps/run/loop_thread.hpp"
+#include "apps/run/remote_link.hpp"
+#include "apps/run/run_log.hpp"
+#include "apps/run/run_summary.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/draw_report.hpp"
+#include "apps/transport/control_socket.hpp"
+#include "apps/transport/dds_admission.hpp"
+#include "apps/transport/dds_services.hpp"
+#include "base/counted.hpp"
+#include "rt/clock.hpp"
+#include "rt/cpu_latency.hpp"
+#include "rt/stop_signal.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "runtime/trace_file.hpp"
+
+namespace tandem::apps {
+namespace {
+
+std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
+                                     const std::optional<log::RecordingResult>& log) {
+  std::vector<std::string> texts;
+  for (const runtime::Fault& fault : cycle.faults()) {
+    if (!fault.latched) continue;
+    texts.push_back(fmt::format("{:.3f} s: {}{}{}", fault.time_s, fault.joint,
+                                fault.joint.empty() ? "" : ": ", fault.text));
+  }
+  if (log && !log->error.empty()) {
+    texts.push_back(
+        fmt::format("the log lost {}: {}", counted(log->failed, "message"), log->error));
+  }
+  return texts;
+}
+
+runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
+  runtime::Experiment& e = c.experiment;
+  const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
+  e.loop.pacing = rt::Pacing::kSimulated;
+  if (c.backend->pace() == hal::Pace::kWallClock) e.loop.pacing = rt::Pacing::kWallClock;
+  if (c.backend->pace() == hal::Pace::kBus) e.loop.pacing = rt::Pacing::kExternal;
+  e.loop.rate = options.rate.value_or(simulated ? e.loop.rate : 0.0);
+  e.loop.start_paused = simulated && (options.start_paused || e.loop.start_paused);
+  runtime::CycleConfig config;
+  config.loop = e.loop;
+  config.running_cycles = e.cycles();
+  config.settle_cycles = e.settle_cycles();
+  config.delay_cycles = e.hal.delay_cycles;
+  const bool waits = options.serves || e.loop.pacing == rt::Pacing::kWallClock;
+  config.after_stop = waits ? runtime::AfterStop::kWait : runtime::AfterStop::kEnd;
+  if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
+  if (e.after_stop) config.after_stop = *e.after_stop;
+  if (options.on_fault == "end") config.after_stop = runtime::AfterStop::kEnd;
+  if (options.on_fault == "wait") config.after_stop = runtime::AfterStop::kWait;
+  config.after_reset = e.after_reset;
+  config.on_stray = e.on_stray;
+  config.retreat_cycles =
+      static_cast<std::uint64_t>(e.retreat_s * 1e9 / static_cast<double>(e.loop.period_ns));
+  config.fall = e.fall_limits();
+  config.trace_cycles = options.trace.empty() ? 0 : options.trace_cycles;
+  return config;
+}
+
+std::string pace_text(const Composition& c) {
+  const runtime::HalOptions& hal = c.experiment.hal;
+  std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
+  if (hal.backend == runtime::BackendKind::kDds) where = "over DDS, ";
+  if (c.backend->pace() == hal::Pace::kBus) return where + "at the server's pace";
+  if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
+  const std::string how = hal.lockstep && !where.empty() ? "in lockstep, " : "";
+  const rt::LoopConfig& loop = c.experiment.loop;
+  return where + how + (loop.rate > 0.0 ? fmt::format("rate {:g}", loop.rate) : "free running") +
+         (loop.start_paused ? ", paused: tandem clock resume" : "");
+}
+
+std::string length_text(const runtime::Experiment& e) {
+  if (e.cycles() == 0) return "until it is stopped";
+  return fmt::format("{:.3f} s", static_cast<double>(e.cycles() * e.loop.period_ns) * 1e-9);
+}
+
+std::string served_text(const runtime::Experiment& e) {
+  return fmt::format("served in DDS domain {}, {}", e.dds.domain,
+                     e.remote.lockstep ? "in lockstep, " : "");
+}
+
+/// Boards have clocks of their own.
+Status check_pace(const Composition& c, const RunOptions& options) {
+  if (c.backend->pace() == hal::Pace::kSimulatedClock) return {};
+  if (options.start_paused) {
+    return fail("boards on a bus keep real time, which cannot be paused",
+                "leave --start-paused out, or add --lockstep for emulated boards");
+  }
+  if (options.rate.value_or(1.0) == 1.0) return {};
+  return fail("boards on a bus keep real time, so --rate cannot be other than 1",
+              "leave --rate out, or add --lockstep for emulated boards");
+}
+
+/// Draws the report and prints where it is; a report that cannot be drawn is no fault of the run.
+void add_report(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
+  if (!options.report || !summary.log) return;
+  const auto files = draw_report(summary.log->path, {}, {});
+  if (!files) {
+    print_errors({files.error()});
+    return;
+  }
+  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  if (options.quiet) return;
+  Facts facts;
+  facts.add("report", files->page);
+  facts.add("plots", files->images.back());
+  facts.print(out);
+}
+
+/// Writes what --trace asks for, and says how much of the run it is.
+Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
+  if (options.trace.empty()) return {};
+  const runtime::RobotCycle& cycle = summary.cycle;
+  const Status written = runtime::write_trace(
+      options.trace, summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
+  if (!written || options.quiet) return written;
+  const std::uint64_t all = cycle.trace().count();
+  Facts facts;
+  facts.add(
+      "trace",
+      fmt::format("{} (the last {} of {} cycles; open it on https://ui.perfetto.dev)",
+                  options.trace, std::min<std::uint64_t>(all, cycle.trace().capacity()), all));
+  facts.print(out);
+  return {};
+}
+
+/// Null without DDS.
+Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlRegistry& commands,
+                                                   const runtime::RemoteOptions& remote,
+                                                   const remote::Server* server,
+                                                   const DdsAdmission& admission) {
+  if (run == nullptr) return nullptr;
+  const auto owner = [server] {
+    const bool owned = server != nullptr && server->lease().owner() != 0;
+    return owned ? server->lease().name() : std::string();
+  };
+  return DdsServices::open(run->participant(), commands, remote_gate(remote, owner), admission);
+}
+
+/// The loop was given up. Its thread is still there, and may go on at any time: what it uses stays.
+[[noreturn]] void end_without_loop(const LoopGuard& guard, const RunOptions& options,
+                                   Composition& c, log::Recorder* recorder,
+                                   std::unique_ptr<ControlSocket>& socket) {
+  const std::string fault = "the loop hung " + guard.where() + " and did not come back";
+  std::string log;
+  if (recorder != nullptr) log = recorder->close({{"ended", fault}}).path;
+  if (c.frames != nullptr) (void)c.frames->close();
+  remember_error({.message = fault, .hint = {}, .file = {}, .key = {}});
+  write_failure(options.json);
+  socket.reset();
+  fmt::print(stderr, "fault: {}{}\n", fault, log.empty() ? "" : "; the log up to then is " + log);
+  std::fflush(nullptr);
+  ::_exit(static_cast<int>(Exit::kFault));
+}
+
+Exit run(Composition& c, const RunOptions& options) {
+  std::FILE* out = human_output(options.json);
+  runtime::Experiment& e = c.experiment;
+  const runtime::CycleConfig config = cycle_config(c, options);
+  const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
+  const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
+  const auto dds = DdsRun::open(c, options.serves ? "tandem_serve" : "tandem_run", truth);
+  if (!dds) return refuse(dds.error());
+  std::unique_ptr<log::Recorder> recorder;
+  if (!options.no_log) {
+    auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
+    if (!opened) return refuse(opened.error());
+    recorder = std::move(*opened);
+  }
+  DdsAdmission admission(e.remote.trust == runtime::RemoteTrust::kDomain);
+  const auto server = open_server(c, dds->get(), options.once, admission);
+  if (!server) return refuse(server.error());
+  rt::WallClock clock;
+  runtime::RobotCycle cycle({.robot = e.robot,
+                             .backend = *c.backend,
+                             .controllers = *c.controllers,
+                             .clock = clock,
+                             .recorder = recorder.get(),
+                             .truth = truth,
+                             .observer = *dds == nullptr ? nullptr : &(*dds)->tap(),
+                             .owner = {server->get(), c.owner.get(), c.owner_slot}},
+                            config);
+  if (*server != nullptr) tell_faults(**server, cycle);
+  if (!options.quiet) {
+    fmt::print(out, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
+               counted(e.robot.joints.size(), "joint"), length_text(e),
+               1e6 / static_cast<double>(e.loop.period_ns), options.serves ? served_text(e) : "",
+               pace_text(c));
+  }
+  ControlRegistry commands;
+  add_run_commands(commands, cycle, e.robot);
+  if (*dds != nullptr) admission.add_to(commands);
+  if (c.sim != nullptr) {
+    add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
+      if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
+      return injected(c.sim->post(fault) ? Code::kOk : Code::kQueueFull);
+    });
+  }
+  const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
+  auto socket = serve(
+      commands,
+      {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
+  if (!socket) return refuse(socket.error());
+  if (*server != nullptr && *socket == nullptr && e.remote.trust != runtime::RemoteTrust::kDomain) {
+    return refuse(fail("without a control socket no process can be admitted to this robot",
+                       "leave out --no-socket; or [remote] trust = \"domain\" admits everybody")
+                      .error());
+  }
+  const auto services = open_services(dds->get(), commands, e.remote, server->get(), admission);
+  if (!services) return refuse(services.error());
+  rt::install_stop_signals();
+  rt::install_emergency_signal();
+  std::optional<rt::NoCpuSleep> awake;
+  if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
+  if (*dds != nullptr) (*dds)->start(cycle);
+  auto guard = LoopGuard::open(c, cycle);
+  if (!guard) return refuse(guard.error());
+  LoopThread loop(cycle, e.thread);
+  watch(cycle, loop, c, **guard, recorder.get(), out, options.quiet);
+  if ((*guard)->gave_up()) end_without_loop(**guard, options, c, recorder.get(), *socket);
+  loop.join();
+  guard->reset();
+  if (*server != nullptr) (*server)->close();
+  if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
+
+  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}, {}};
+  summary.server = server->get();
+  if (*dds != nullptr) summary.dds = (*dds)->finish();
+  if (*services != nullptr) summary.dds->services = (*services)->counts();
+  if (recorder != nullptr) summary.log = recorder->close();
+  if (c.frames != nullptr) summary.frames = c.frames->close();
+  summary.faults = fault_texts(cycle, summary.log);
+  if (!options.quiet) {
+    fmt::print(out, "\n");
+    summary.print(out);
+  }
+  if (c.master != nullptr) {
+    for (const std::string& warning : c.master->warnings()) {
+      fmt::print(stderr, "warning: {}\n", warning);
+    }
+  }
+  for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
+  add_report(options, summary, out);
+  if (const Status traced = add_trace(options, summary, out); !traced)
+    return refuse(traced.error());
+  if (const Status written = write_json(options.json, summary.json()); !written)
+    return refuse(written.error());
+  return summary.faults.empty() ? Exit::kDone : Exit::kFault;
+}
+
+/// What is simulated is then not quite what the description says. `tandem check` has the details.
+void warn_of_inertias(const runtime::Experiment& e) {
+  std::vector<std::string> links;
+  for (const Error& warning : e.warnings) {
+    if (warning.key.starts_with("link ")) links.push_back(warning.key.substr(5));
+  }
+  if (links.empty()) return;
+  fmt::print(stderr, "warning: {}: no body can have the inertia of {} (`tandem check {}`)\n",
+             e.robot.model.urdf, fmt::join(links, ", "), e.robot.file);
+}
+
+}  // namespace
+
+Exit run_command(const RunOptions& options) {
+  for (const std::string& file : {options.json, options.trace}) {
+    if (const Status writable = check_writable(file); !writable) return refuse(writable.error());
+  }
+  const auto wrong = options.serves
+                         ? wrong_kind(options.experiment, Takes::kEither, "tandem serve")
+                         : wrong_kind(options.experiment, Takes::kExperiment, "tandem run");
+  if (wrong) return refuse(*wrong);
+  Overrides overrides{.seed = options.seed,
+                      .duration_s = options.duration_s,
+                      .kernel_variant = options.kernel_variant,
+                      .missing_kernels = missing_kernels(options.no_build, options.quiet),
+                      .lockstep = options.lockstep,
+                      .interfaces = options.interfaces,
+                      .scenario = options.scenario,
+                      .delay_cycles = options.delay_cycles,
+                      .serves = options.serves,
+                      .dds = options.dds,
+                      .domain = options.domain};
+  if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
+  if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
+  if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
+  const auto composition = compose(options.experiment, overrides);
+  if (!composition) return refuse(composition.error());
+  warn_of_inertias((*composition)->experiment);
+  print_warnings((*composition)->warnings);
+  rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
+  outlive_readers();
+  if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
+    return refuse(errors);
+  if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
+  return run(**composition, options);
+}
+
+Exit serve_command(const ServeOptions& options) {
+  RunOptions run = options.run;
+  run.serves = true;
+  return run_command(run);
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,133 @@
+#include "apps/run/run_log.hpp"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+log::RunInfo info_of(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  log::RunInfo info;
+  info.version = TANDEM_VERSION;
+  info.robot = e.robot.name;
+  info.hal = hal_name(e.hal);
+  for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
+  for (const hal::SensorConfig& sensor : e.robot.sensors) {
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  }
+  info.seed = e.seed;
+  info.period_ns = e.loop.period_ns;
+  info.kernel_variant = c.kernels->variant;
+  info.description_hash = c.kernels->description_hash;
+  for (const std::string& file : {e.file, e.robot.file, e.robot.model.urdf}) {
+    info.configuration.emplace_back(file, text_of(file));
+  }
+  return info;
+}
+
+/// Bytes that the run will write at most: what is compressed takes less.
+std::uint64_t bytes_needed(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  constexpr std::uint64_t kMessageOverhead = 64;
+  constexpr std::uint64_t kFixed = 1'000'000;
+  std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
+                              hal::CommandImage(e.robot.shape()).bytes().size();
+  if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
+  // Joint states and the base's frame, for viewers: three numbers and a name of each joint.
+  const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
+  const auto cycles_per_view =
+      std::max<std::int64_t>(1, log::RobotView::kPeriod_ns / e.loop.period_ns);
+  const std::uint64_t views = e.cycles() / static_cast<std::uint64_t>(cycles_per_view) + 1;
+  const std::uint64_t whole =
+      e.cycles() * (cycle_bytes + 3 * kMessageOverhead) + views * view_bytes + kFixed;
+  switch (e.log.compression) {
+    case runtime::LogCompression::kNone: return whole;
+    case runtime::LogCompression::kLz4: return whole / 2;  // a third and more of a robot that moves
+    case runtime::LogCompression::kZstd: return whole / 3;
+  }
+  return whole;
+}
+
+Error folder_error(const std::string& folder, std::string message) {
+  return {.message = std::move(message),
+          .hint = "choose another folder with --log, or run with --no-log",
+          .file = folder,
+          .key = {}};
+}
+
+Status check_folder(const std::string& folder, std::uint64_t needed) {
+  std::error_code problem;
+  fs::create_directories(folder, problem);
+  if (problem) {
+    return std::unexpected(
+        folder_error(folder, "cannot make the log's folder: " + problem.message()));
+  }
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    return std::unexpected(folder_error(
+        folder, std::string("cannot write into the log's folder: ") + std::strerror(errno)));
+  }
+  struct statvfs disk {};
+  if (statvfs(folder.c_str(), &disk) != 0) return {};
+  const std::uint64_t room = static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize;
+  if (room >= needed) return {};
+  return std::unexpected(folder_error(
+      folder, fmt::format("the disk is too full for the log: it has {:.1f} MB, the run may need "
+                          "{:.1f} MB",
+                          static_cast<double>(room) * 1e-6, static_cast<double>(needed) * 1e-6)));
+}
+
+/// The first free name, taken by an empty file: of two runs that begin at once each has its own.
+Result<std::string> claim_path(const std::string& folder, const std::string& name) {
+  for (int number = 1;; ++number) {
+    std::string path = fmt::format("{}/{}-{:03d}.mcap", folder, name, number);
+    const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (file >= 0) {
+      ::close(file);
+      return path;
+    }
+    if (errno != EEXIST) {
+      return std::unexpected(
+          folder_error(path, std::string("cannot make the log: ") + std::strerror(errno)));
+    }
+  }
+}
+
+log::RecorderOptions recorder_options(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  log::RecorderOptions options;
+  options.viewed.urdf = text_of(e.robot.model.urdf);
+  if (c.tree.floating_base) options.viewed.base_link = c.tree.links.front().name;
+  switch (e.log.compression) {
+    case runtime::LogCompression::kNone:
+      options.writer.compression = log::Compression::kNone;
+      break;
+    case runtime::LogCompression::kLz4: options.writer.compression = log::Compression::kLz4; break;
+    case runtime::LogCompression::kZstd:
+      options.writer.compression = log::Compression::kZstd;
+      break;
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<log::Recorder>> open_log(const Composition& c, const std::string& folder) {
+  if (const Status s = check_folder(folder, bytes_needed(c)); !s) return std::unexpected(s.error());
+  const std::string name =
+      c.experiment.robot.name + "-" + fs::path(c.experiment.file).stem().string();
+  const Result<std::string> path = claim_path(folder, name);
+  if (!path) return std::unexpected(path.error());
+  return log::Recorder::open(*path, info_of(c), recorder_options(c));
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,261 @@
+#include "apps/run/run_summary.hpp"
+
+#include <fmt/core.h>
+
+#include "apps/control/fault_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "apps/can/bus_watch.hpp"
+#include "apps/can/round_trips.hpp"
+#include "apps/run/remote_link.hpp"
+#include "base/counted.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kMillimetres = 1e3;
+constexpr std::size_t kJointsShown = 5;
+
+double weight_N(const tandem_kernels& k) {
+  const double* g = k.gravity_m_s2;
+  return k.mass_kg * std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+}
+
+Json log_json(const std::optional<log::RecordingResult>& log) {
+  if (!log) return nullptr;
+  return {{"path", log->path},
+          {"messages", log->messages},
+          {"dropped", log->dropped},
+          {"data_sha256", log->data_sha256}};
+}
+
+Json frames_json(const std::optional<hal::can::FrameRecord::Result>& frames) {
+  if (!frames) return nullptr;
+  return {{"path", frames->path}, {"frames", frames->frames}, {"lost", frames->lost}};
+}
+
+Json dds_json(const std::optional<DdsResult>& dds) {
+  if (!dds) return nullptr;
+  return {{"domain", dds->domain},
+          {"samples", dds->counts.sent},
+          {"refused", dds->counts.refused},
+          {"dropped", dds->counts.dropped},
+          {"requests", dds->services.requests},
+          {"requests_dropped", dds->services.dropped},
+          {"replies", dds->services.replies},
+          {"replies_unclaimed", dds->services.unclaimed}};
+}
+
+Json ground_json(const std::optional<runtime::GroundFigures>& ground) {
+  if (!ground) return nullptr;
+  return {{"weight_N", ground->weight_N},
+          {"mean_vertical_force_N", ground->mean_vertical_force_N},
+          {"max_foot_slip_m", ground->max_foot_slip_m}};
+}
+
+Json base_json(const std::optional<runtime::BaseFigures>& base) {
+  if (!base) return nullptr;
+  return {{"min_height_m", base->min_height_m},
+          {"max_height_m", base->max_height_m},
+          {"final_tilt_rad", base->final_tilt_rad}};
+}
+
+Json loops_json(const hal::RobotConfig& robot, const std::vector<runtime::LoopFigures>& loops) {
+  Json json = Json::object();
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    json[robot.loops[l].name] = {{"max_position_error_m", loops[l].max_position_error_m},
+                                 {"max_velocity_error_m_s", loops[l].max_velocity_error_m_s}};
+  }
+  return json;
+}
+
+void print_loops(const RunSummary& s, std::FILE* out) {
+  const std::vector<runtime::LoopFigures>& loops = s.cycle.statistics().loops();
+  if (loops.empty()) return;
+  Table table({"closed loops", "open at most [m]", "opening at most [m/s]"});
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    table.add({s.composition.experiment.robot.loops[l].name,
+               fmt::format("{:.1e}", loops[l].max_position_error_m),
+               fmt::format("{:.1e}", loops[l].max_velocity_error_m_s)});
+  }
+  fmt::print(out, "\n");
+  table.print(out);
+}
+
+std::string microseconds(const rt::Percentiles& p) {
+  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
+  return fmt::format("{:.1f} / {:.1f} / {:.1f} / {:.1f} us", us(p.p50), us(p.p99), us(p.p999),
+                     us(p.max));
+}
+
+/// Whether a joint's positions are metres.
+bool slides(const model::Tree& tree, const std::string& joint) {
+  const int index = tree.joint_index(joint);
+  return index >= 0 &&
+         tree.joints[static_cast<std::size_t>(index)].type == model::JointType::kPrismatic;
+}
+
+void print_worst_joints(const RunSummary& s, std::FILE* out) {
+  struct Row {
+    std::string joint;
+    bool slides = false;
+    runtime::TrackingError error;
+  };
+  std::vector<Row> rows;
+  const auto tracking = s.cycle.statistics().tracking();
+  for (std::size_t i = 0; i < tracking.size(); ++i) {
+    const std::string& joint = s.composition.experiment.robot.joints[i].name;
+    rows.push_back({joint, slides(s.composition.tree, joint), tracking[i]});
+  }
+  if (rows.empty()) return;
+  std::ranges::stable_sort(rows, std::ranges::greater{},
+                           [](const Row& r) { return r.error.rms_rad; });
+  rows.resize(std::min(kJointsShown, rows.size()));
+  const bool any_slides = std::ranges::any_of(rows, &Row::slides);
+  const bool mixed = any_slides && !std::ranges::all_of(rows, &Row::slides);
+  const char* unit = mixed ? "" : (any_slides ? " [mm]" : " [deg]");
+  Table table({"worst joints", fmt::format("rms{}", unit), fmt::format("max{}", unit)});
+  for (const Row& row : rows) {
+    const double factor = row.slides ? kMillimetres : kDegrees;
+    const char* own = !mixed ? "" : (row.slides ? " mm" : " deg");
+    table.add({row.joint, fmt::format("{:.3f}{}", row.error.rms_rad * factor, own),
+               fmt::format("{:.3f}{}", row.error.max_rad * factor, own)});
+  }
+  table.print(out);
+}
+
+/// A motion that was not the one that was asked for looks like one that was followed well.
+void add_limited(const RunSummary& s, Facts& facts) {
+  const std::vector<std::uint64_t> limited = s.cycle.statistics().limited_cycles();
+  const auto most = std::ranges::max_element(limited);
+  if (most == limited.end() || *most == 0) return;
+  const auto joints = limited.size() - static_cast<std::size_t>(std::ranges::count(limited, 0U));
+  facts.add("commands limited",
+            fmt::format("{} in {} of {}{}",
+                        s.composition.experiment.robot
+                            .joints[static_cast<std::size_t>(most - limited.begin())]
+                            .name,
+                        *most, counted(s.cycle.running_cycles(), "cycle"),
+                        joints > 1 ? fmt::format(", {} more joints", joints - 1) : ""));
+}
+
+}  // namespace
+
+double RunSummary::sim_s() const {
+  const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
+  return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
+}
+
+Json RunSummary::json() const {
+  const runtime::Experiment& e = composition.experiment;
+  const rt::LoopStatistics& loop = cycle.loop();
+  Json json;
+  json["robot"] = e.robot.name;
+  json["hal"] = hal_name(e.hal);
+  json["seed"] = e.seed;
+  json["cycles"] = cycle.running_cycles();
+  json["period_ns"] = e.loop.period_ns;
+  json["sim_seconds"] = sim_s();
+  json["wall_seconds"] = wall_s;
+  json["realtime_factor"] = wall_s > 0.0 ? Json(sim_s() / wall_s) : Json(nullptr);
+  json["overruns"] = loop.overruns;
+  json["skipped"] = loop.skipped;
+  json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());
+  json["bus_ns"] = composition.backend->waits_for_bus() ? percentiles_json(loop.bus.percentiles())
+                                                        : Json(nullptr);
+  json["cycle_ns"] = percentiles_json(loop.work.percentiles());
+  json["log"] = log_json(log);
+  json["frames"] = frames_json(frames);
+  json["dds"] = dds_json(dds);
+  json["buses"] = buses_json(composition.can_buses());
+  json["joints"] = Json::object();
+  const auto tracking = cycle.statistics().tracking();
+  const auto limited = cycle.statistics().limited_cycles();
+  for (std::size_t i = 0; i < tracking.size(); ++i) {
+    json["joints"][e.robot.joints[i].name] = {{"rms_tracking_error_rad", tracking[i].rms_rad},
+                                              {"max_tracking_error_rad", tracking[i].max_rad},
+                                              {"limited_cycles", limited[i]}};
+  }
+  json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
+  json["loops"] = loops_json(e.robot, cycle.statistics().loops());
+  json["base"] = base_json(cycle.statistics().base());
+  const hal::can::DriveMaster* master = composition.master;
+  json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
+  json["remote"] = remote_json(server, composition.remote);
+  json["faults"] = faults;
+  json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
+  json["fault_log"] = faults_json(cycle.faults());
+  json["kernel_variant"] = composition.kernels->variant;
+  return json;
+}
+
+void RunSummary::print(std::FILE* out) const {
+  print_worst_joints(*this, out);
+  print_loops(*this, out);
+  if (!cycle.faults().empty()) fmt::print(out, "\n");
+  print_faults(faults_json(cycle.faults()), out);
+  fmt::print(out, "\n");
+  if (composition.master != nullptr && composition.backend->waits_for_bus()) {
+    print_slowest_nodes(composition.master->round_trips(), out);
+    fmt::print(out, "\n");
+  }
+  Facts facts;
+  add_limited(*this, facts);
+  if (const auto ground = cycle.statistics().ground(weight_N(*composition.kernels))) {
+    facts.add("force on the ground",
+              fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",
+                          ground->mean_vertical_force_N, ground->weight_N,
+                          100.0 * (ground->mean_vertical_force_N / ground->weight_N - 1.0)));
+    facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
+  }
+  if (const auto base = cycle.statistics().base()) {
+    facts.add("base height",
+              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
+                          base->max_height_m, base->final_tilt_rad * kDegrees));
+  }
+  const rt::LoopStatistics& loop = cycle.loop();
+  const bool wall_clock = composition.experiment.loop.pacing != rt::Pacing::kSimulated;
+  if (wall_clock) {
+    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", wall_s,
+                                 counted(cycle.running_cycles(), "cycle"), loop.skipped));
+  } else {
+    facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
+                                       wall_s > 0.0 ? sim_s() / wall_s : 0.0));
+  }
+  facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().work.percentiles()));
+  if (composition.backend->waits_for_bus()) {
+    facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
+  }
+  const bool woken = loop.wakeup.count() > 0;  // not by a server's cycles
+  if (woken) facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
+  if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
+  add_remote_facts(server, composition.remote, facts);
+  facts.add("kernels", composition.kernels->variant);
+  if (log) {
+    facts.add("log",
+              fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
+                          log->dropped, static_cast<double>(log->bytes) * 1e-6));
+  }
+  if (dds) {
+    facts.add("DDS",
+              fmt::format("domain {}: {} samples, {} refused; {} cycles dropped", dds->domain,
+                          dds->counts.sent, dds->counts.refused, dds->counts.dropped));
+    if (dds->services.requests > 0) {
+      facts.add("requests over DDS",
+                fmt::format("{}, {} dropped", dds->services.requests, dds->services.dropped));
+    }
+  }
+  add_bus_facts(composition.can_buses(), facts);
+  if (frames) {
+    const std::string trouble = frames->error.empty() ? "" : "; " + frames->error;
+    facts.add("frames", fmt::format("{} ({} frames, {} lost{})", frames->path, frames->frames,
+                                    frames->lost, trouble));
+  }
+  facts.print(out);
+}
+
+}  // namespace tandem::apps

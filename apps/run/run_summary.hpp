@@ -1,0 +1,35 @@
+// What a run amounts to: for the JSON file and for the table at its end.
+// Layer: apps/run.  Thread: main.
+#pragma once
+
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/run/composition.hpp"
+#include "apps/run/dds_run.hpp"
+#include "apps/text/console.hpp"
+#include "hal/remote/server.hpp"
+#include "log/recorder.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::apps {
+
+struct RunSummary {
+  const Composition& composition;
+  const runtime::RobotCycle& cycle;
+  double wall_s = 0.0;                                  ///< while controllers ran
+  std::optional<log::RecordingResult> log;              ///< empty: nothing was logged
+  std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
+  std::vector<std::string> faults;                      ///< the log's trouble included
+  std::optional<DdsResult> dds;                         ///< empty: it was off
+  const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
+
+  [[nodiscard]] double sim_s() const;
+  /// docs/json.md
+  [[nodiscard]] Json json() const;
+  void print(std::FILE* out) const;
+};
+
+}  // namespace tandem::apps

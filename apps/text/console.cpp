@@ -1,0 +1,297 @@
+#include "apps/text/console.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "rt/stop_signal.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Diagnostics reported;      // by print_errors(), for write_failure()
+bool has_written = false;  // by write_json()
+
+/// Columns that a UTF-8 text takes: bytes that do not continue a character.
+std::size_t width(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+std::string left(const std::string& text, std::size_t columns) {
+  return text + std::string(columns - std::min(columns, width(text)), ' ');
+}
+
+std::string right(const std::string& text, std::size_t columns) {
+  return std::string(columns - std::min(columns, width(text)), ' ') + text;
+}
+
+Error json_error(const std::string& file) {
+  return {.message = std::string("cannot write the JSON: ") + std::strerror(errno),
+          .hint = "name a file in a folder that exists and can be written",
+          .file = file,
+          .key = {}};
+}
+
+/// Whether a file is there whose text is no JSON of ours: a description, a robot, a log.
+bool holds_something_else(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return false;
+  std::ifstream in(file, std::ios::binary);
+  std::string begins(2, ' ');
+  in >> begins[0] >> begins[1];
+  if (begins[0] == ' ') return false;  // empty
+  return begins[0] != '{' && begins != "[{" && begins != "[]";
+}
+
+/// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
+ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
+  const int fd = static_cast<int>(reinterpret_cast<std::intptr_t>(cookie));
+  for (std::size_t done = 0; done < size;) {
+    const ssize_t count = ::write(fd, text + done, size - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      rt::request_stop();
+      break;
+    }
+    done += static_cast<std::size_t>(count);
+  }
+  return static_cast<ssize_t>(size);
+}
+
+/// A stream on a descriptor that never fails; the program's, so it is not closed.
+std::FILE* lasting(int fd, int buffering) {
+  void* cookie = reinterpret_cast<void*>(static_cast<std::intptr_t>(fd));
+  std::FILE* stream = ::fopencookie(cookie, "w", {nullptr, &write_or_lose, nullptr, nullptr});
+  if (stream == nullptr) return fd == STDERR_FILENO ? stderr : stdout;
+  std::setvbuf(stream, nullptr, buffering, BUFSIZ);
+  return stream;
+}
+
+}  // namespace
+
+std::FILE* human_output(const std::string& json_file) { return json_file == "-" ? stderr : stdout; }
+
+bool is_terminal(std::FILE* out) {
+  if (out == stdout) return ::isatty(STDOUT_FILENO) != 0;
+  if (out == stderr) return ::isatty(STDERR_FILENO) != 0;
+  return ::isatty(::fileno(out)) != 0;
+}
+
+void outlive_readers() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::fflush(stdout);
+  stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
+  stderr = lasting(STDERR_FILENO, _IONBF);
+}
+
+Status write_file(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.close();
+  if (out) return {};
+  return std::unexpected(
+      Error{"the file cannot be written", "choose another folder with -o", file.string(), 0, {}});
+}
+
+Status check_overwrites(const std::string& file, std::string_view begins, const std::string& what) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) return {};
+  std::string start(begins.size(), '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (in.gcount() == 0 || start == begins) return {};
+  return std::unexpected(Error{"this file is there, and it is no " + what + ": it would be lost",
+                               "name another file, or remove it first",
+                               file,
+                               0,
+                               {}});
+}
+
+Status check_writable(const std::string& file) {
+  if (file.empty() || file == "-") return {};
+  if (holds_something_else(file)) {
+    return std::unexpected(Error{"this file is there, and it is no JSON: it would be lost",
+                                 "name another file, or remove it first",
+                                 file,
+                                 0,
+                                 {}});
+  }
+  errno = 0;
+  const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
+  return out ? Status{} : std::unexpected(json_error(file));
+}
+
+std::string json_text(const Json& value, int indent) {
+  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+Status write_json(const std::string& file, const Json& value) {
+  if (file.empty()) return {};
+  if (Status writable = check_writable(file); !writable) return writable;
+  has_written = true;
+  const std::string text = json_text(value, 2) + "\n";
+  if (file == "-") {
+    fmt::print("{}", text);
+    std::fflush(stdout);
+    return {};
+  }
+  errno = 0;
+  std::ofstream out(file, std::ios::binary);
+  out << text << std::flush;
+  return out ? Status{} : std::unexpected(json_error(file));
+}
+
+Json errors_json(const Diagnostics& errors) {
+  Json list = Json::array();
+  for (const Error& error : errors) {
+    list.push_back({{"file", error.file},
+                    {"line", error.line},
+                    {"key", error.key},
+                    {"message", error.message},
+                    {"hint", error.hint}});
+  }
+  return list;
+}
+
+void remember_error(Error error) { reported.push_back(std::move(error)); }
+
+void write_failure(const std::string& file) {
+  if (has_written) return;
+  (void)write_json(file, {{"ok", false}, {"errors", errors_json(reported)}});
+}
+
+Json percentiles_json(const rt::Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p999", p.p999}, {"max", p.max}};
+}
+
+void print_errors(const Diagnostics& errors) {
+  reported.insert(reported.end(), errors.begin(), errors.end());
+  for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
+}
+
+Exit refuse(const Diagnostics& errors) {
+  print_errors(errors);
+  return Exit::kUsage;
+}
+
+Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
+
+void print_warnings(const Diagnostics& warnings) {
+  for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
+}
+
+void Table::print(std::FILE* out) const {
+  std::vector<std::size_t> columns;
+  for (const auto& row : rows_) {
+    columns.resize(std::max(columns.size(), row.size()), 0);
+    for (std::size_t i = 0; i < row.size(); ++i) columns[i] = std::max(columns[i], width(row[i]));
+  }
+  for (std::size_t r = 0; r < rows_.size(); ++r) {
+    if (rows_[r].empty()) continue;
+    std::string line;
+    for (std::size_t i = 0; i < rows_[r].size(); ++i) {
+      const std::string& cell = rows_[r][i];
+      line += "  " + (i == 0 || left_ ? left(cell, columns[i]) : right(cell, columns[i]));
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    fmt::print(out, "{}\n", line);
+    if (r > 0) continue;
+    std::size_t rule = 0;
+    for (const std::size_t column : columns) rule += column + 2;
+    std::string dashes;
+    for (std::size_t i = 2; i < rule; ++i) dashes += "─";
+    fmt::print(out, "  {}\n", dashes);
+  }
+}
+
+void Facts::print(std::FILE* out) const {
+  std::size_t column = 0;
+  for (const auto& [name, value] : facts_) column = std::max(column, width(name));
+  for (const auto& [name, value] : facts_) {
+    fmt::print(out, "  {}  {}\n", left(name, column), value);
+  }
+}
+
+StatusLine::StatusLine(std::FILE* out)
+    : out_(out), terminal_(is_terminal(out)), next_(std::chrono::steady_clock::now()) {}
+
+StatusLine::~StatusLine() {
+  if (drawn_) fmt::print(out_, "\n");
+}
+
+bool StatusLine::due() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return false;
+  next_ = now + std::chrono::seconds(terminal_ ? 1 : 10);
+  return true;
+}
+
+void StatusLine::show(const std::string& text) {
+  fmt::print(out_, "{}  {}{}", terminal_ ? "\r" : "", text, terminal_ ? "\033[K" : "\n");
+  std::fflush(out_);
+  drawn_ = terminal_;
+}
+
+Progress::Progress(std::FILE* out, double total_s)
+    : out_(out),
+      total_s_(total_s),
+      terminal_(is_terminal(out)),
+      started_(std::chrono::steady_clock::now()),
+      next_(started_) {}
+
+void Progress::update(double done_s, const std::string& note) {
+  if (total_s_ <= 0.0) return update_endless(done_s, note);
+  const double share = std::clamp(done_s / total_s_, 0.0, 1.0);
+  if (!terminal_) {
+    const int tenth = static_cast<int>(share * 10.0 + 1e-9);
+    if (tenth <= tenth_) return;
+    tenth_ = tenth;
+    fmt::print(out_, "  {:3d} %  {:6.2f} of {:.2f} s  {}\n", tenth * 10, done_s, total_s_, note);
+    std::fflush(out_);
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_ && share < 1.0) return;
+  next_ = now + std::chrono::milliseconds(50);
+  constexpr int kCells = 30;
+  const int full = static_cast<int>(share * kCells);
+  std::string bar;
+  for (int i = 0; i < kCells; ++i) bar += i < full ? "█" : "░";
+  const double wall_s = std::chrono::duration<double>(now - started_).count();
+  fmt::print(out_, "\r  {} {:6.2f} / {:.2f} s  {:5.1f} s elapsed  {}\033[K", bar, done_s, total_s_,
+             wall_s, note);
+  std::fflush(out_);
+  drawn_ = true;
+}
+
+void Progress::update_endless(double done_s, const std::string& note) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool news = !noted_ || *noted_ != note;
+  noted_ = note;
+  if (!terminal_) {
+    if (news) fmt::print(out_, "  {:8.2f} s  {}\n", done_s, note.empty() ? "running" : note);
+    std::fflush(out_);
+    return;
+  }
+  if (now < next_ && !news) return;
+  next_ = now + std::chrono::milliseconds(50);
+  const double wall_s = std::chrono::duration<double>(now - started_).count();
+  fmt::print(out_, "\r  {:8.2f} s  {:5.1f} s elapsed  {}\033[K", done_s, wall_s, note);
+  std::fflush(out_);
+  drawn_ = true;
+}
+
+void Progress::finish() {
+  if (drawn_) fmt::print(out_, "\n");
+  drawn_ = false;
+}
+
+}  // namespace tandem::apps

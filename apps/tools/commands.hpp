@@ -1,0 +1,18 @@
+// The commands of `tandem` that work on files. Each prints for people, writes JSON when
+// asked, and answers the exit status.
+// Layer: apps/tools.  Thread: main.
+#pragma once
+
+#include "apps/command_line/command_line.hpp"
+
+namespace tandem::apps {
+
+[[nodiscard]] Exit model_command(const ModelOptions& options);
+/// Writes a robot's folder from its description: robot.toml, hold.toml, move.toml.
+[[nodiscard]] Exit new_command(const NewOptions& options);
+[[nodiscard]] Exit log_command(const LogOptions& options);
+/// Writes a data sheet per type of board and sensor.
+[[nodiscard]] Exit eds_command(const EdsOptions& options);
+[[nodiscard]] Exit report_command(const ReportOptions& options);
+
+}  // namespace tandem::apps

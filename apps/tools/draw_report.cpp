@@ -1,0 +1,36 @@
+#include "apps/tools/draw_report.hpp"
+
+#include <filesystem>
+
+#include "apps/robot/kernel_store.hpp"
+#include "hal/ethercat-can/drive_master.hpp"
+
+namespace tandem::apps {
+namespace {
+
+/// "runs/coman-squat-001.mcap" -> "runs/coman-squat-001"; with another log beside it
+/// "runs/coman-squat-001-and-coman-squat-002", so that the report of the first alone stays.
+std::string default_folder(const std::string& log, const std::string& other) {
+  std::filesystem::path folder = log;
+  folder.replace_extension();
+  if (!other.empty())
+    return folder.string() + "-and-" + std::filesystem::path(other).stem().string();
+  return folder.string() == log ? log + ".report" : folder.string();
+}
+
+}  // namespace
+
+Result<report::ReportFiles> draw_report(const std::string& log, const std::string& other,
+                                        const std::string& output) {
+  model::KernelLibrary kernels;  // lives as long as the drawing needs it
+  const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
+    auto found = find_kernels(run.info.robot, run.info.description_hash, {});
+    if (!found) return nullptr;
+    kernels = std::move(*found);
+    return kernels.get();
+  };
+  const std::string folder = output.empty() ? default_folder(log, other) : output;
+  return report::make_report(log, other, folder, find, hal::can::DriveMaster::error_text);
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,171 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "base/counted.hpp"
+#include "log/compare.hpp"
+#include "log/csv.hpp"
+#include "log/log_file.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Json topic_json(const log::Topic& topic) {
+  Json fields = Json::array();
+  for (const hal::Field& field : topic.layout.fields()) fields.push_back(field.name);
+  return {{"messages", topic.messages}, {"schema", topic.type}, {"fields", fields}};
+}
+
+Json info_json(const log::LogFile& file) {
+  Json json;
+  json["path"] = file.path();
+  json["complete"] = !file.truncated();
+  std::int64_t start_ns = 0;
+  std::int64_t end_ns = 0;
+  for (const log::Topic& topic : file.topics()) {
+    if (topic.messages == 0) continue;
+    start_ns = std::min(start_ns, topic.first_ns);
+    end_ns = std::max(end_ns, topic.last_ns);
+  }
+  json["start_ns"] = start_ns;
+  json["end_ns"] = end_ns;
+  json["messages"] = file.messages();
+  json["data_sha256"] = file.data_sha256();
+  json["metadata"] = Json::object();
+  for (const auto& [key, value] : log::to_map(file.info())) json["metadata"][key] = value;
+  for (const auto& [key, value] : file.result()) json["metadata"][key] = value;
+  json["topics"] = Json::object();
+  for (const log::Topic& topic : file.topics()) json["topics"][topic.name] = topic_json(topic);
+  return json;
+}
+
+void print_info(const log::LogFile& file, std::FILE* out) {
+  const log::RunInfo& info = file.info();
+  fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (its run was killed)" : "");
+  Facts facts;
+  facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
+                                 counted(info.sensors.size(), "sensor")));
+  facts.add("backend", info.hal);
+  facts.add("seed", std::to_string(info.seed));
+  facts.add("period", fmt::format("{} us", static_cast<double>(info.period_ns) / 1e3));
+  facts.add("kernels", info.kernel_variant);
+  facts.add("written by", "tandem " + info.version);
+  for (const auto& [key, value] : file.result()) {
+    if (key != "data_sha256") facts.add(key, value);  // computed anew below
+  }
+  facts.add("data sha256", file.data_sha256());
+  facts.print(out);
+  Table table({"topic", "messages", "from [s]", "to [s]", "fields"});
+  for (const log::Topic& topic : file.topics()) {
+    table.add({topic.name, std::to_string(topic.messages),
+               fmt::format("{:.3f}", static_cast<double>(topic.first_ns) * 1e-9),
+               fmt::format("{:.3f}", static_cast<double>(topic.last_ns) * 1e-9),
+               std::to_string(topic.layout.fields().size())});
+  }
+  fmt::print(out, "\n");
+  table.print(out);
+}
+
+/// "state" and "/tandem/state" name the same topic.
+std::string full_topic(const std::string& name) {
+  if (name.empty()) return "/tandem/state";
+  return name.starts_with('/') ? name : "/tandem/" + name;
+}
+
+Status write_csv(const log::LogFile& file, const LogOptions& options) {
+  const std::string topic = full_topic(options.topic);
+  if (options.output.empty()) {
+    return log::write_csv(file, topic, options.every, std::cout, options.fields);
+  }
+  std::error_code ignored;
+  if (std::filesystem::equivalent(options.output, options.log, ignored)) {
+    return std::unexpected(
+        Error{"this is the log itself", "name another file with -o", options.output, 0, {}});
+  }
+  if (Status lost = check_overwrites(options.output, "time_s", "table of Tandem's"); !lost) {
+    return lost;
+  }
+  std::ofstream out(options.output, std::ios::binary);
+  if (!out) {
+    return std::unexpected(Error{
+        "cannot write this file", "name a file in a folder that exists", options.output, 0, {}});
+  }
+  return log::write_csv(file, topic, options.every, out, options.fields);
+}
+
+Json comparison_json(const log::Comparison& comparison) {
+  Json json{{"equal", comparison.equal()}, {"topics", Json::object()}};
+  for (const log::TopicComparison& topic : comparison.topics) {
+    Json one{{"equal", topic.equal()}, {"messages", {topic.messages_a, topic.messages_b}}};
+    if (topic.first) {
+      one["first"] = {{"message", topic.first->message},
+                      {"time_ns", topic.first->time_ns},
+                      {"signal", topic.first->signal},
+                      {"values", {topic.first->a, topic.first->b}}};
+    }
+    json["topics"][topic.topic] = one;
+  }
+  json["only"] = {comparison.only_a, comparison.only_b};
+  return json;
+}
+
+void print_comparison(const log::Comparison& comparison, std::FILE* out) {
+  Table table({"topic", "messages", "", "first difference"});
+  for (const log::TopicComparison& topic : comparison.topics) {
+    std::string where = topic.equal() ? "none" : "one log is shorter";
+    if (topic.first) {
+      where = fmt::format("message {} at {:.6f} s: {} is {} and {}", topic.first->message,
+                          static_cast<double>(topic.first->time_ns) * 1e-9, topic.first->signal,
+                          topic.first->a, topic.first->b);
+    }
+    table.add(
+        {topic.topic, std::to_string(topic.messages_a), std::to_string(topic.messages_b), where});
+  }
+  table.print(out);
+  for (const std::string& topic : comparison.only_a) {
+    fmt::print(out, "only the first log has {}\n", topic);
+  }
+  for (const std::string& topic : comparison.only_b) {
+    fmt::print(out, "only the second log has {}\n", topic);
+  }
+  fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
+}
+
+Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
+  const Result<log::LogFile> other = log::LogFile::open(options.other);
+  if (!other) return std::unexpected(other.error());
+  const Result<log::Comparison> comparison = log::compare(file, *other);
+  if (!comparison) return std::unexpected(comparison.error());
+  print_comparison(*comparison, human_output(options.json));
+  const Status written = write_json(options.json, comparison_json(*comparison));
+  if (!written) return std::unexpected(written.error());
+  return comparison->equal() ? Exit::kDone : Exit::kFault;
+}
+
+}  // namespace
+
+Exit log_command(const LogOptions& options) {
+  const Result<log::LogFile> file = log::LogFile::open(options.log);
+  Status done;
+  Exit exit = Exit::kDone;
+  if (!file) {
+    done = std::unexpected(file.error());
+  } else if (options.action == LogOptions::Action::kCsv) {
+    done = write_csv(*file, options);
+  } else if (options.action == LogOptions::Action::kDiff) {
+    const Result<Exit> compared = diff(*file, options);
+    if (compared) exit = *compared;
+    if (!compared) done = std::unexpected(compared.error());
+  } else {
+    print_info(*file, human_output(options.json));
+    done = write_json(options.json, info_json(*file));
+  }
+  if (done) return exit;
+  return refuse(done.error());
+}
+
+}  // namespace tandem::apps

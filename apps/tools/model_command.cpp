@@ -1,0 +1,100 @@
+#include <fmt/core.h>
+
+#include "apps/robot/kernel_store.hpp"
+#include "apps/robot/kernel_supply.hpp"
+#include "apps/robot/robot_files.hpp"
+#include "apps/robot/wrong_kind.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "apps/tools/kernel_sizes.hpp"
+#include "apps/tools/right_angles.hpp"
+#include "base/counted.hpp"
+
+namespace tandem::apps {
+namespace {
+
+Status build(const RobotFiles& robot, const ModelOptions& options) {
+  model::BuildOptions build;
+  build.library = options.output;
+  if (options.output.empty()) {
+    auto path = user_library(robot.config.name, model::description_hash(robot.tree, robot.spec));
+    if (!path) return std::unexpected(path.error());
+    build.library = std::move(*path);
+  }
+  if (Status lost = check_overwrites(build.library,
+                                     "\x7F"
+                                     "ELF",
+                                     "library");
+      !lost)
+    return lost;
+  build.force = options.force;
+  const Result<model::BuildReport> report = build_shown(robot, build);
+  if (!report) return std::unexpected(report.error());
+  if (report->was_up_to_date) {
+    fmt::print("{}: kernels are up to date ({})\n", robot.config.name, report->library);
+  } else {
+    fmt::print("{}: {} compiled in {:.1f} s: {}\n", robot.config.name,
+               counted(report->compiled, "file"), report->seconds, report->library);
+  }
+  return {};
+}
+
+Json kernel_json(const tandem_kernel_count& count, std::uint64_t text_bytes) {
+  return {{"add", count.add},   {"mul", count.mul},       {"div", count.div},
+          {"sqrt", count.sqrt}, {"sincos", count.sincos}, {"text_bytes", text_bytes}};
+}
+
+Status info(const RobotFiles& robot, const ModelOptions& options) {
+  const auto library = find_kernels(robot, options.kernel_variant);
+  if (!library) return std::unexpected(library.error());
+  const tandem_kernels& k = **library;
+  auto bytes = kernel_text_bytes(library->path(), k.variant);
+  if (!bytes) return std::unexpected(bytes.error());
+
+  std::FILE* out = human_output(options.json);
+  Facts facts;
+  facts.add("robot",
+            fmt::format("{}, {} base", k.robot, k.floating_base != 0 ? "floating" : "fixed"));
+  facts.add("joints", fmt::format("{} (nv {}, nq {})", k.joints, k.nv, k.nq));
+  facts.add("mass", fmt::format("{:.3f} kg", k.mass_kg));
+  facts.add("sites, sensors",
+            fmt::format("{}, {}", robot.config.model.sites.size(), robot.config.sensors.size()));
+  facts.add("kernels", fmt::format("{} ({})", library->path(), k.variant));
+  facts.add("made from", fmt::format("{:.16}…", k.description_hash));
+  Json json{{"robot", k.robot},
+            {"joints", k.joints},
+            {"nv", k.nv},
+            {"mass_kg", k.mass_kg},
+            {"kernel_variant", k.variant},
+            {"description_hash", k.description_hash},
+            {"library", library->path()},
+            {"kernels", Json::object()}};
+  if (Status status = add_right_angles(robot, facts, json); !status) return status;
+  facts.print(out);
+  fmt::print(out, "\n");
+  Table table({"kernel", "add", "mul", "div", "sqrt", "sincos", "code [bytes]"});
+  for (std::uint32_t i = 0; i < k.kernel_count; ++i) {
+    const tandem_kernel_count& c = k.counts[i];
+    const std::uint64_t text_bytes = (*bytes)[c.kernel];
+    table.add({c.kernel, std::to_string(c.add), std::to_string(c.mul), std::to_string(c.div),
+               std::to_string(c.sqrt), std::to_string(c.sincos), std::to_string(text_bytes)});
+    json["kernels"][c.kernel] = kernel_json(c, text_bytes);
+  }
+  table.print(out);
+  return write_json(options.json, json);
+}
+
+}  // namespace
+
+Exit model_command(const ModelOptions& options) {
+  const bool builds = options.action == ModelOptions::Action::kBuild;
+  const char* command = builds ? "tandem model build" : "tandem model info";
+  if (const auto wrong = wrong_kind(options.robot, Takes::kRobot, command)) return refuse(*wrong);
+  const auto robot = read_robot(options.robot);
+  if (!robot) return refuse(robot.error());
+  const Status done = builds ? build(*robot, options) : info(*robot, options);
+  if (done) return Exit::kDone;
+  return refuse(done.error());
+}
+
+}  // namespace tandem::apps

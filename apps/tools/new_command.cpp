@@ -1,0 +1,323 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "apps/robot/robot_files.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "apps/tools/right_angles.hpp"
+#include "base/counted.hpp"
+#include "base/utf8.hpp"
+#include "hal/ethercat-can/bus_load.hpp"
+#include "model/tree.hpp"
+#include "scaffold/new_robot.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kPeriod_ns = 1'000'000;
+
+Diagnostics one(std::string message, std::string hint, std::string file) {
+  return {Error{std::move(message), std::move(hint), std::move(file), 0, {}}};
+}
+
+/// A name for files and TOML: letters, digits, '_' and '-'.
+std::string plain_name(std::string name) {
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; }, '_');
+  return name.empty() ? "robot" : name;
+}
+
+/// Where bundled robots stand: beside the working directory, the build, or an installation.
+std::vector<fs::path> robot_folders() {
+  std::error_code problem;
+  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
+  const fs::path root = program.parent_path().parent_path();
+  return {"config", root.parent_path().parent_path() / "config", root / "share/tandem/config"};
+}
+
+/// The robot that --like names: a file, or the folder of a bundled one.
+std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
+  std::error_code ignored;
+  std::string file = name;
+  for (const fs::path& folder : robot_folders()) {
+    if (fs::is_regular_file(file, ignored)) break;
+    file = (folder / name / "robot.toml").string();
+  }
+  if (!fs::is_regular_file(file, ignored)) {
+    return std::unexpected(
+        one("there is no bundled robot '" + name + "'", "give the path of its robot.toml", name));
+  }
+  auto robot = read_robot(file);
+  if (!robot) return std::unexpected(robot.error());
+  return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
+}
+
+/// Writes everything into a folder beside the one that is asked for, reads it back as `tandem
+/// run` would, and puts it in place: what is wrong leaves nothing behind.
+class Folder {
+ public:
+  explicit Folder(fs::path final) : final_(std::move(final)) {
+    draft_ = final_.string() + ".new-" + std::to_string(getpid());
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(draft_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  Diagnostics write(const scaffold::NewRobot& robot, const std::string& urdf) {
+    std::error_code problem;
+    fs::create_directories(draft_, problem);
+    if (problem) {
+      return one("the folder cannot be made: " + problem.message(), "choose another folder with -o",
+                 final_.string());
+    }
+    const std::string copy = fs::path(urdf).filename().string();
+    for (const auto& [name, text] :
+         {std::pair{copy, text_of(urdf)},
+          {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
+          {std::string("hold.toml"), scaffold::hold_text(robot)},
+          {std::string("move.toml"), scaffold::move_text(robot)}}) {
+      if (Status written = write_file(draft_ / name, text); !written) {
+        return in_place({written.error()});
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::expected<RobotFiles, Diagnostics> check() const {
+    auto robot = read_robot((draft_ / "robot.toml").string());
+    if (!robot) return std::unexpected(in_place(robot.error()));
+    Diagnostics errors = hal::can::check_bus_load(robot->config, kPeriod_ns);
+    if (!errors.empty()) return std::unexpected(in_place(std::move(errors)));
+    return robot;
+  }
+
+  /// What was there and is not what is written now stays beside it, as FILE~.
+  Status place() {
+    std::error_code problem;
+    fs::create_directories(final_, problem);
+    for (const auto& entry : fs::directory_iterator(draft_)) {
+      const fs::path file = final_ / entry.path().filename();
+      if (Status kept = keep(file, entry.path()); !kept) return kept;
+      fs::rename(entry.path(), file, problem);
+      if (problem) return failed(file, problem);
+    }
+    std::ranges::sort(kept_);
+    return {};
+  }
+
+  /// Files that place() has kept, as (name, name of the copy).
+  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& kept() const {
+    return kept_;
+  }
+
+ private:
+  static Status failed(const fs::path& file, const std::error_code& problem) {
+    return std::unexpected(Error{"the file cannot be written: " + problem.message(),
+                                 "choose another folder with -o",
+                                 file.string(),
+                                 0,
+                                 {}});
+  }
+
+  Status keep(const fs::path& old, const fs::path& next) {
+    std::error_code problem;
+    if (!fs::exists(fs::symlink_status(old, problem))) return {};
+    if (fs::is_regular_file(old, problem) && text_of(old.string()) == text_of(next.string())) {
+      return {};
+    }
+    fs::path copy = old.string() + "~";
+    for (int i = 2; fs::exists(fs::symlink_status(copy, problem)); ++i) {
+      copy = old.string() + "~" + std::to_string(i);
+    }
+    fs::rename(old, copy, problem);
+    if (problem) return failed(copy, problem);
+    kept_.emplace_back(old.filename().string(), copy.filename().string());
+    return {};
+  }
+
+  /// The draft is gone when the reader sees the message: it names the files that were meant.
+  [[nodiscard]] Diagnostics in_place(Diagnostics errors) const {
+    for (Error& error : errors) {
+      const fs::path file(error.file);
+      if (file.parent_path() == draft_) error.file = (final_ / file.filename()).string();
+    }
+    return errors;
+  }
+
+  fs::path final_, draft_;
+  std::vector<std::pair<std::string, std::string>> kept_;
+};
+
+Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
+  Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
+  for (const scaffold::Foot& foot : robot.feet) feet.push_back(foot.name);
+  for (const scaffold::FoundSensor& sensor : robot.sensors) sensors.push_back(sensor.config.name);
+  for (const scaffold::DriveSize& drive : robot.drives) drives.push_back(drive.actuator.name);
+  return {{"folder", folder},
+          {"robot", robot.config.name},
+          {"joints", robot.config.joints.size()},
+          {"mass_kg", robot.mass_kg},
+          {"base", robot.config.model.floating_base ? "floating" : "fixed"},
+          {"base_height_m", robot.stands_m},
+          {"feet", feet},
+          {"sensors", sensors},
+          {"drives", drives},
+          {"boards", robot.config.boards.size()},
+          {"kept", Json::object()},
+          {"warnings", errors_json(robot.warnings)}};
+}
+
+/// The limit that every joint of a kind has, when it is a round one (1, 20, 500): such figures come
+/// with exporters, and not from a data sheet. 0: there is none.
+double common_limit(const model::Tree& tree, double model::Joint::*limit) {
+  constexpr std::size_t kFewest = 4;
+  std::size_t count = 0;
+  double common = 0.0;
+  for (const model::Joint& joint : tree.joints) {
+    if (joint.follows() || joint.type == model::JointType::kPrismatic) continue;
+    if (count++ == 0) common = joint.*limit;
+    if (!(joint.*limit == common)) return 0.0;
+  }
+  if (count < kFewest || !(common > 0.0) || !std::isfinite(common)) return 0.0;
+  const double power = std::pow(10.0, std::floor(std::log10(common)));
+  const double digit = common / power;
+  return std::abs(digit - std::round(digit)) < 1e-9 ? common : 0.0;
+}
+
+void add_placeholders(const model::Tree& tree, Facts& facts) {
+  const double velocity = common_limit(tree, &model::Joint::velocity);
+  const double effort = common_limit(tree, &model::Joint::effort);
+  if (velocity == 0.0 && effort == 0.0) return;
+  std::string what = velocity == 0.0 ? "" : fmt::format("{:g} rad/s", velocity);
+  if (effort != 0.0) what += (what.empty() ? "" : " and ") + fmt::format("{:g} Nm", effort);
+  facts.add("limits", fmt::format("every joint has {}: likely a placeholder of the description; "
+                                  "give each [[joint]] its own",
+                                  what));
+}
+
+void add_facts(const scaffold::NewRobot& robot, Facts& facts) {
+  facts.add("robot", fmt::format("{}: {}, {:.2f} kg", robot.config.name,
+                                 counted(robot.config.joints.size(), "joint"), robot.mass_kg));
+  for (const std::string& remark : robot.remarks) facts.add("", remark);
+  for (std::size_t f = 0; f < robot.feet.size(); ++f) {
+    const scaffold::Foot& foot = robot.feet[f];
+    facts.add("foot " + foot.name, fmt::format("{}, {}{}", robot.tree.links[foot.link].name,
+                                               counted(foot.points.size(), "contact point"),
+                                               foot.guess.empty() ? "" : " (guess)"));
+  }
+  if (robot.stands_m > 0.0) facts.add("stands", fmt::format("root at {:.3f} m", robot.stands_m));
+  for (const scaffold::FoundSensor& sensor : robot.sensors) {
+    const bool wrench = sensor.config.type == hal::SensorType::kForceTorque;
+    facts.add("sensor " + sensor.config.name,
+              (wrench ? "force/torque at " + sensor.config.joint : "IMU at " + sensor.config.link) +
+                  (sensor.guess.empty() ? "" : " (guess)"));
+  }
+  add_placeholders(robot.tree, facts);
+  for (const scaffold::DriveSize& drive : robot.drives) {
+    facts.add("drive " + drive.actuator.name,
+              fmt::format("{}, {}", counted(drive.joints.size(), "joint"), drive.remark));
+  }
+  if (const auto loads = hal::can::bus_loads(robot.config, kPeriod_ns)) {
+    for (const hal::can::BusLoad& load : *loads) {
+      const auto boards = std::ranges::count(robot.config.boards, load.bus, &hal::BoardConfig::bus);
+      facts.add("bus " + load.bus, fmt::format("{}, load {:.0f} %",
+                                               counted(static_cast<std::uint64_t>(boards), "board"),
+                                               100.0 * load.load));
+    }
+  }
+}
+
+void print_next(const std::string& folder, std::FILE* out) {
+  fmt::print(out,
+             "\nNext:\n  tandem run {0}/hold.toml --report\n  tandem run {0}/move.toml --report\n"
+             "Look for `guess` in {0}/robot.toml: replace each by your own figure.\n",
+             folder);
+}
+
+/// What can be said of the input before it is read as XML.
+Diagnostics check_input(const std::string& file) {
+  if (!is_utf8(fs::path(file).filename().string())) {
+    return one("the file's name is not UTF-8, which robot.toml must be", "rename it", file);
+  }
+  if (fs::path(file).extension() != ".toml") return {};
+  if (is_robot(file)) {
+    return one("this is a robot.toml already: `tandem new` makes one, from a URDF",
+               "`tandem check " + file +
+                   "` reads it, `tandem run` takes the experiments beside "
+                   "it; or name the URDF that a new folder is to be made from",
+               file);
+  }
+  return one("this is a TOML file: `tandem new` starts from a URDF",
+             "`tandem run " + file + "` runs an experiment", file);
+}
+
+Diagnostics run(const NewOptions& options) {
+  std::error_code ignored;
+  const std::string name = plain_name(fs::path(options.urdf).stem().string());
+  const std::string folder = options.output.empty() ? name : options.output;
+  if (Diagnostics wrong = check_input(options.urdf); !wrong.empty()) return wrong;
+  const bool exists = fs::exists(folder, ignored);
+  if (exists && !fs::is_directory(folder, ignored)) {
+    return one("this is a file, and the robot needs a folder", "give another one with -o", folder);
+  }
+  if (exists && !options.force) {
+    return one("this exists already",
+               "give another folder with -o; or --force, which keeps files that differ as FILE~",
+               folder);
+  }
+  std::optional<scaffold::Like> like;
+  if (!options.like.empty()) {
+    auto read = read_like(options.like);
+    if (!read) return read.error();
+    like = std::move(*read);
+  }
+  scaffold::Request request;
+  request.urdf = options.urdf;
+  request.name = plain_name(fs::path(folder).lexically_normal().filename().string());
+  request.base = options.base == "floating" ? scaffold::Base::kFloating
+                 : options.base == "fixed"  ? scaffold::Base::kFixed
+                                            : scaffold::Base::kAuto;
+  request.like = like ? &*like : nullptr;
+  const auto robot = scaffold::make_robot(request);
+  if (!robot) return robot.error();
+  Folder files{fs::path(folder)};
+  if (Diagnostics errors = files.write(*robot, options.urdf); !errors.empty()) return errors;
+  const auto written = files.check();
+  if (!written) return written.error();
+  Facts facts;
+  add_facts(*robot, facts);
+  Json json = to_json(*robot, folder);
+  if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
+  if (Status placed = files.place(); !placed) return {placed.error()};
+  print_warnings(robot->warnings);
+  std::FILE* const out = human_output(options.json);
+  for (const auto& [old, copy] : files.kept()) {
+    facts.add("kept", fmt::format("{} that was there is {} now", old, copy));
+    json["kept"][old] = copy;
+  }
+  facts.print(out);
+  print_next(folder, out);
+  if (Status saved = write_json(options.json, json); !saved) return {saved.error()};
+  return {};
+}
+
+}  // namespace
+
+Exit new_command(const NewOptions& options) {
+  const Diagnostics errors = run(options);
+  print_errors(errors);
+  return errors.empty() ? Exit::kDone : Exit::kUsage;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,25 @@
+// tandem report: what it draws, and where.
+#include <fmt/core.h>
+
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "apps/tools/draw_report.hpp"
+
+namespace tandem::apps {
+
+Exit report_command(const ReportOptions& options) {
+  const auto files = draw_report(options.log, options.other, options.output);
+  if (!files) return refuse(files.error());
+  std::FILE* out = human_output(options.json);
+  for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);
+  Facts facts;
+  facts.add("report", files->page);
+  for (const std::string& image : files->images) facts.add("image", image);
+  facts.print(out);
+  const Json json{{"report", files->page}, {"images", files->images}};
+  if (const Status written = write_json(options.json, json); !written)
+    return refuse(written.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

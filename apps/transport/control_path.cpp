@@ -1,0 +1,90 @@
+#include "apps/transport/control_path.hpp"
+
+#include <fmt/core.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "base/trusted_code.hpp"
+
+namespace tandem::apps {
+
+std::string control_folder() {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  std::error_code error;
+  if (runtime != nullptr && std::filesystem::is_directory(runtime, error)) {
+    return (std::filesystem::path(runtime) / "tandem").string();
+  }
+  return fmt::format("/tmp/tandem-{}", ::geteuid());
+}
+
+Status check_private_folder(const std::string& folder) {
+  struct stat found {};
+  if (::lstat(folder.c_str(), &found) != 0) {
+    return fail(fmt::format("cannot look at {}: {}", folder, std::strerror(errno)),
+                "choose another place with --socket");
+  }
+  if (S_ISDIR(found.st_mode) && found.st_uid == ::geteuid() && (found.st_mode & 0077) == 0) {
+    return {};
+  }
+  return fail(
+      fmt::format("{} is no folder of this user alone (its owner is user {}, its mode {:o})",
+                  folder, found.st_uid, found.st_mode & 07777),
+      "remove it, set XDG_RUNTIME_DIR, or choose another place with --socket");
+}
+
+Status check_socket_folder(const std::string& path, std::optional<uid_t> partner) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  if (folder == control_folder()) return check_private_folder(folder);
+  std::error_code error;
+  if (!folder.empty() && !std::filesystem::exists(folder, error)) return {};
+  const Status ours = check_trusted_folder(folder, partner);
+  if (ours) return {};
+  return fail(
+      fmt::format("the socket's folder {} {}: somebody else's socket could take the place of "
+                  "{}, and receive its emergency stops",
+                  ours.error().file, ours.error().message, path),
+      ours.error().hint + "; or choose another folder with --socket");
+}
+
+std::int64_t peer_user(int descriptor) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  const bool known = ::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  return known ? static_cast<std::int64_t>(peer.uid) : -1;
+}
+
+std::string default_control_path(const std::string& kind) {
+  return fmt::format("{}/{}-{}.sock", control_folder(), kind, ::getpid());
+}
+
+Result<sockaddr_un> control_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty()) return fail("the socket's path is empty", "name a file with --socket");
+  if (path.size() >= sizeof address.sun_path) {
+    return fail(fmt::format("the socket's path has {} bytes, {} are possible: {}", path.size(),
+                            sizeof address.sun_path - 1, path),
+                "choose a shorter one with --socket");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  return address;
+}
+
+bool control_socket_alive(const std::string& path) {
+  const Result<sockaddr_un> address = control_address(path);
+  if (!address) return false;
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0) return false;
+  const auto* raw = reinterpret_cast<const sockaddr*>(&*address);
+  const int error = ::connect(fd, raw, sizeof *address) == 0 ? 0 : errno;
+  ::close(fd);
+  return error == 0 || error == EAGAIN;  // EAGAIN: it listens, and others wait before us
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,308 @@
+#include "apps/transport/control_socket.hpp"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "apps/transport/control_path.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr mode_t kFolderMode = 0700;
+constexpr mode_t kSocketMode = 0600;
+
+void wake(int eventfd) {
+  const std::uint64_t one = 1;
+  (void)!::write(eventfd, &one, sizeof one);
+}
+
+std::string refused(const std::string& error, const std::string& hint) {
+  return json_text({{"ok", false}, {"error", error}, {"hint", hint}});
+}
+
+std::string reason() { return std::strerror(errno); }
+
+/// The folder of the default paths is made when it is missing. Refused is one that others may
+/// change.
+Status prepare_folder(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  if (folder != control_folder()) return check_socket_folder(path);
+  if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
+    return fail(fmt::format("cannot make the folder {}: {}", folder, reason()),
+                "choose another place with --socket");
+  }
+  return check_socket_folder(path);
+}
+
+/// Removes the socket of a dead process; what is anything else stays.
+Status clear_way(const std::string& path) {
+  struct stat found {};
+  if (::lstat(path.c_str(), &found) != 0) return {};
+  if (!S_ISSOCK(found.st_mode)) {
+    return fail(path + " is there, and no socket", "choose another place with --socket");
+  }
+  if (control_socket_alive(path)) {
+    return fail("another process listens at " + path, "choose another place with --socket");
+  }
+  if (::unlink(path.c_str()) == 0) return {};
+  return fail(fmt::format("cannot remove the stale socket {}: {}", path, reason()),
+              "remove it, or choose another place with --socket");
+}
+
+}  // namespace
+
+struct ControlSocket::Client {
+  Client(int descriptor, std::uint64_t its_number) : fd(descriptor), number(its_number) {}
+  ~Client() { ::close(fd); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  int fd;
+  std::uint64_t number;
+  std::string in, out;
+  std::uint64_t last_turn = 0;
+  bool waiting = false;  // the second thread has a question of this one
+  bool ending = false;   // nothing more is read: closed when its answers are out
+  bool gone = false;
+};
+
+ControlSocket::ControlSocket(std::string path, const ControlRegistry& registry)
+    : path_(std::move(path)), registry_(&registry) {}
+
+Result<std::unique_ptr<ControlSocket>> ControlSocket::open(const std::string& path,
+                                                           const ControlRegistry& registry) {
+  std::unique_ptr<ControlSocket> socket(new ControlSocket(path, registry));
+  if (Status listening = socket->listen(); !listening) {
+    return std::unexpected(listening.error());
+  }
+  socket->thread_ = std::thread([raw = socket.get()] { raw->serve(); });
+  socket->worker_ = std::thread([raw = socket.get()] { raw->work(); });
+  return socket;
+}
+
+Status ControlSocket::listen() {
+  const Result<sockaddr_un> address = control_address(path_);
+  if (!address) return std::unexpected(address.error());
+  if (Status ready = prepare_folder(path_); !ready) return ready;
+  if (Status clear = clear_way(path_); !clear) return clear;
+  listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  wake_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  struct stat made {};
+  // Nobody can connect before listen(), so the mode is right for the first who can.
+  const bool listens =
+      listener_ >= 0 && wake_ >= 0 && done_ >= 0 &&
+      ::bind(listener_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
+      ::chmod(path_.c_str(), kSocketMode) == 0 && ::stat(path_.c_str(), &made) == 0 &&
+      ::listen(listener_, static_cast<int>(kMaxControlClients)) == 0;
+  if (!listens) {
+    return fail(fmt::format("cannot listen at {}: {}", path_, reason()),
+                "choose another place with --socket");
+  }
+  device_ = made.st_dev;
+  inode_ = made.st_ino;
+  return {};
+}
+
+ControlSocket::~ControlSocket() {
+  {
+    const std::scoped_lock lock(mutex_);
+    ending_ = true;
+  }
+  more_.notify_all();
+  wake(wake_);
+  if (thread_.joinable()) thread_.join();
+  if (worker_.joinable()) worker_.join();
+  struct stat found {};
+  const bool ours = inode_ != 0 && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == device_ &&
+                    found.st_ino == inode_;
+  if (ours) ::unlink(path_.c_str());
+  if (listener_ >= 0) ::close(listener_);
+  if (wake_ >= 0) ::close(wake_);
+  if (done_ >= 0) ::close(done_);
+}
+
+void ControlSocket::serve() {
+  std::vector<pollfd> watched;
+  for (;;) {
+    watched.assign({{wake_, POLLIN, 0}, {done_, POLLIN, 0}, {listener_, POLLIN, 0}});
+    const std::size_t first = watched.size();
+    for (const auto& client : clients_) {
+      // A client with answers to come is not asked for more: it takes them first.
+      const short asking = client->waiting ? 0 : POLLIN;
+      const short events = client->out.empty() ? asking : POLLOUT;
+      watched.push_back({client->fd, events, 0});
+    }
+    if (::poll(watched.data(), watched.size(), -1) < 0) {
+      if (errno == EINTR) continue;
+      return;
+    }
+    if (watched[0].revents != 0) return;
+    for (std::size_t i = 0; first + i < watched.size(); ++i) {
+      const short happened = watched[first + i].revents;
+      if (happened == 0) continue;
+      Client& client = *clients_[i];
+      client.last_turn = ++turn_;
+      if ((happened & POLLIN) != 0) {
+        take(client);
+      } else if ((happened & POLLOUT) != 0) {
+        flush(client);
+        answer_lines(client);
+      } else {
+        client.gone = true;
+      }
+    }
+    std::erase_if(clients_, [](const auto& one) { return one->gone; });
+    if (watched[1].revents != 0) deliver();
+    if (watched[2].revents != 0) accept();
+  }
+}
+
+void ControlSocket::accept() {
+  const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) return;
+  // The socket's mode keeps others out already: this holds where a folder's or a copy's does not.
+  if (const std::int64_t user = peer_user(fd); user != ::geteuid() && user != 0) {
+    ::close(fd);
+    return;
+  }
+  if (clients_.size() == kMaxControlClients) {
+    clients_.erase(std::ranges::min_element(clients_, {},
+                                            [](const auto& client) { return client->last_turn; }));
+  }
+  clients_.push_back(std::make_unique<Client>(fd, ++newest_));
+  clients_.back()->last_turn = ++turn_;
+}
+
+void ControlSocket::take(Client& client) {
+  char bytes[4096];
+  const ssize_t count = ::recv(client.fd, bytes, sizeof bytes, 0);
+  if (count > 0) {
+    client.in.append(bytes, static_cast<std::size_t>(count));
+    answer_lines(client);
+  } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
+    client.gone = true;
+  }
+}
+
+/// Answers what is there, line by line, as long as the client takes the answers. What may take long
+/// goes to the second thread, and the rest waits for it.
+void ControlSocket::answer_lines(Client& client) {
+  while (!client.gone && !client.ending && !client.waiting && client.out.empty()) {
+    const std::size_t end = client.in.find('\n');
+    const std::size_t length = end == std::string::npos ? client.in.size() : end + 1;
+    if (length > kMaxControlLine) {
+      client.out = refused(fmt::format("a line of more than {} bytes", kMaxControlLine),
+                           "send shorter ones");
+      client.ending = true;
+    } else if (end == std::string::npos) {
+      return;
+    } else {
+      std::string question = client.in.substr(0, end);
+      client.in.erase(0, length);
+      if (registry_->stops(question)) {
+        client.out = answer_to(question);
+      } else if (hand_over(client, std::move(question))) {
+        return;
+      } else {
+        client.out = refused("too many questions at once", "ask again");
+      }
+    }
+    client.out += '\n';
+    flush(client);
+  }
+}
+
+/// @return false when there is no room: clients that left theirs and went can fill it
+bool ControlSocket::hand_over(Client& client, std::string question) {
+  const std::scoped_lock lock(mutex_);
+  if (questions_.size() == kMaxControlWaiting) return false;
+  questions_.push_back({client.number, std::move(question)});
+  client.waiting = true;
+  more_.notify_one();
+  return true;
+}
+
+std::string ControlSocket::answer_to(std::string_view question) const {
+  return json_text(registry_->answer(question));
+}
+
+/// The second thread: one question after the other, so that the first is free for a stop.
+void ControlSocket::work() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    more_.wait(lock, [this] { return ending_ || !questions_.empty(); });
+    if (ending_) return;
+    Errand errand = std::move(questions_.front());
+    questions_.pop_front();
+    lock.unlock();
+    errand.text = answer_to(errand.text);
+    lock.lock();
+    answers_.push_back(std::move(errand));
+    wake(done_);
+  }
+}
+
+/// Hands the second thread's answers to the clients that are still there.
+void ControlSocket::deliver() {
+  std::uint64_t count = 0;
+  (void)!::read(done_, &count, sizeof count);
+  std::vector<Errand> answers;
+  {
+    const std::scoped_lock lock(mutex_);
+    answers.swap(answers_);
+  }
+  for (Errand& answer : answers) {
+    const auto found = std::ranges::find(clients_, answer.client, &Client::number);
+    if (found == clients_.end()) continue;
+    Client& client = **found;
+    client.waiting = false;
+    client.last_turn = ++turn_;
+    client.out = std::move(answer.text) + '\n';
+    flush(client);
+    answer_lines(client);
+  }
+  std::erase_if(clients_, [](const auto& one) { return one->gone; });
+}
+
+void ControlSocket::flush(Client& client) {
+  while (!client.out.empty()) {
+    const ssize_t count = ::send(client.fd, client.out.data(), client.out.size(), MSG_NOSIGNAL);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      client.gone = errno != EAGAIN;
+      return;
+    }
+    client.out.erase(0, static_cast<std::size_t>(count));
+  }
+  if (client.ending) client.gone = true;
+}
+
+Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
+                                             const ControlSocketOptions& options) {
+  if (!options.wanted) return nullptr;
+  const std::string& path = options.path;
+  if (!path.empty()) {
+    if (const Status ours = check_socket_folder(path); !ours) return std::unexpected(ours.error());
+  }
+  auto socket =
+      ControlSocket::open(path.empty() ? default_control_path(options.kind) : path, registry);
+  if (socket) return socket;
+  if (options.needed) {
+    return fail("`tandem estop` would not reach this robot: " + socket.error().message,
+                socket.error().hint);
+  }
+  fmt::print(stderr, "note: no control socket: {}\n", socket.error().to_string());
+  return nullptr;
+}
+
+}  // namespace tandem::apps

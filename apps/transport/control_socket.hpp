@@ -1,0 +1,106 @@
+// The Unix-domain socket of a running process: a line of JSON in, a line of JSON out.
+// Layer: apps/transport.  Thread: open/close main; one of its own talks and stops, another works.
+#pragma once
+
+#include <sys/types.h>
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "apps/control/control_registry.hpp"
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// Longest question [bytes], its end of line included.
+inline constexpr std::size_t kMaxControlLine = kMaxQuestion + 1;
+/// Clients at once. A further one takes the place of the one that has been quiet the longest, so
+/// that an emergency stop always finds its way in.
+inline constexpr std::size_t kMaxControlClients = 16;
+/// Questions that wait for one that is at work, those of clients that have gone included. One more
+/// is refused.
+inline constexpr std::size_t kMaxControlWaiting = 64;
+
+/// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
+/// or leaves undone reaches the process: a client that sends a line that is too long, that does
+/// not read its answers, or that is gone, is closed. A client's questions are answered in order; a
+/// command that stops the robot waits for no other client's.
+class ControlSocket {
+ public:
+  /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
+  /// process is replaced.
+  /// @param registry  complete; outlives the socket
+  /// Errors: a path that is too long; a folder that is missing, another user's or one that others
+  /// may change; a file that is
+  /// no socket; a process that listens there.
+  [[nodiscard]] static Result<std::unique_ptr<ControlSocket>> open(const std::string& path,
+                                                                   const ControlRegistry& registry);
+  ~ControlSocket();
+  ControlSocket(const ControlSocket&) = delete;
+  ControlSocket& operator=(const ControlSocket&) = delete;
+
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+ private:
+  struct Client;
+  /// A question for the second thread, or its answer.
+  struct Errand {
+    std::uint64_t client;
+    std::string text;
+  };
+  ControlSocket(std::string path, const ControlRegistry& registry);
+  Status listen();
+  void serve();
+  void accept();
+  void take(Client& client);
+  void answer_lines(Client& client);
+  static void flush(Client& client);
+  bool hand_over(Client& client, std::string question);
+  [[nodiscard]] std::string answer_to(std::string_view question) const;
+  void work();
+  void deliver();
+
+  std::string path_;
+  const ControlRegistry* registry_;
+  int listener_ = -1;
+  int wake_ = -1;  // eventfd: the destructor's word to the thread
+  dev_t device_ = 0;
+  ino_t inode_ = 0;
+  std::uint64_t turn_ = 0;    // counts what clients do, to know who has been quiet
+  std::uint64_t newest_ = 0;  // client's number
+  std::vector<std::unique_ptr<Client>> clients_;
+
+  int done_ = -1;  // eventfd: the second thread's word to the first, "answers_ has some"
+  std::mutex mutex_;
+  std::condition_variable more_;
+  std::deque<Errand> questions_;
+  std::vector<Errand> answers_;
+  bool ending_ = false;
+
+  std::thread thread_;
+  std::thread worker_;
+};
+
+/// How a process takes questions over a socket.
+struct ControlSocketOptions {
+  std::string path;     ///< empty: the default one of `kind`
+  std::string kind;     ///< "run", "emulate"
+  bool wanted = true;   ///< false: none is opened
+  bool needed = false;  ///< a robot moves: without a way to stop it nothing starts
+};
+
+/// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
+/// which is said on standard error. Errors: a socket that is needed and cannot be opened; a path
+/// that was named in a folder that others may change.
+[[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
+                                                           const ControlSocketOptions& options);
+
+}  // namespace tandem::apps
