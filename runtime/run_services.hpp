@@ -46,7 +46,9 @@ struct ControllerStatus {
 struct JointStatus {
   std::uint64_t cycle = 0;
   double position_rad = 0.0, velocity_rad_s = 0.0, torque_Nm = 0.0;  ///< measured
-  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;              ///< commanded
+  double acceleration_rad_s2 = 0.0, motor_position_rad = 0.0;    ///< the motor's on the link side
+  double current_A = 0.0, voltage_V = 0.0, temperature_C = 0.0;  ///< of the motor
+  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;          ///< commanded
   std::uint32_t fault = 0;       ///< 0, or the drive's CiA 402 error code
   std::uint32_t age_cycles = 0;  ///< of the sample
   std::int32_t owner = -1;       ///< slot of the active controller that claims it

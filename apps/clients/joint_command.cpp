@@ -2,6 +2,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <tuple>
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
@@ -46,6 +50,16 @@ void print_joints(const Json& joints) {
   table.print(stdout);
 }
 
+void print_drives(const Json& joints) {
+  Table table({"joint", "motor [rad]", "current [A]", "voltage [V]", "winding [degC]", "drive"});
+  for (const Json& joint : joints) {
+    table.add({joint.value("joint", ""), number(joint, "motor_position_rad"),
+               number(joint, "current_A"), number(joint, "voltage_V"),
+               number(joint, "temperature_C"), drive_of(joint)});
+  }
+  table.print(stdout);
+}
+
 void print_gains(const Json& joints) {
   Table table({"joint", "loop", "kp", "ki", "kd"});
   for (const Json& joint : joints) {
@@ -73,11 +87,50 @@ Result<Json> only(const Json& joints, const std::vector<std::string>& wanted) {
   return some;
 }
 
-Json question_of(const JointOptions& o) {
+struct Unit {
+  const char* name;
+  double si;         ///< one of it, in SI units
+  const char* kind;  ///< for the run, which knows whether the joint turns or slides
+};
+
+/// Adds `text`, such as "30deg" with `per` "" or "20deg/s" with `per` "/s", to the question.
+Status add_quantity(Json& question, const char* key, const char* flag, const std::string& text,
+                    const std::string& per) {
+  if (text.empty()) return {};
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const std::string unit(end, text.data() + text.size());
+  const auto wrong = [&] {
+    return fail_at(
+        flag, fmt::format("'{}' is no number with a unit", text),
+        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 0.02m{0}, or a number in SI units", per));
+  };
+  if (error != std::errc() || !std::isfinite(number)) return wrong();
+  question[key] = number;
+  if (unit.empty()) return {};
+  for (const Unit& known : {Unit{"deg", std::numbers::pi / 180.0, "angle"},
+                            {"rad", 1.0, "angle"},
+                            {"mm", 1e-3, "length"},
+                            {"m", 1.0, "length"}}) {
+    if (unit != known.name + per) continue;
+    question[key] = number * known.si;
+    if (question.value("unit", known.kind) != known.kind) {
+      return fail_at(flag, fmt::format("'{}' is of another kind than the other values", text),
+                     "give angles or lengths, not both");
+    }
+    question["unit"] = known.kind;
+    return {};
+  }
+  return wrong();
+}
+
+Result<Json> question_of(const JointOptions& o) {
   Json question{{"do", "joint.list"}};
   switch (o.action) {
     case JointOptions::Action::kList: return question;
     case JointOptions::Action::kSet: question["do"] = "joint.set"; break;
+    case JointOptions::Action::kMove: question["do"] = "joint.move"; break;
+    case JointOptions::Action::kStop: question["do"] = "joint.stop"; break;
     case JointOptions::Action::kRecover: question["do"] = "joint.recover"; break;
     case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
   }
@@ -90,18 +143,38 @@ Json question_of(const JointOptions& o) {
   if (o.kp) question["kp"] = *o.kp;
   if (o.ki) question["ki"] = *o.ki;
   if (o.kd) question["kd"] = *o.kd;
+  for (const auto& [key, flag, text, per] :
+       {std::tuple{"target_rad", "--to", &o.to, ""},
+        {"speed_rad_s", "--speed", &o.speed, "/s"},
+        {"acceleration_rad_s2", "--acceleration", &o.acceleration, "/s2"}}) {
+    if (Status added = add_quantity(question, key, flag, *text, per); !added) {
+      return std::unexpected(added.error());
+    }
+  }
   return question;
 }
 
 void print_answer(const JointOptions& options, const Json& answer) {
   if (answer.contains("joints")) {
-    options.gains ? print_gains(answer["joints"]) : print_joints(answer["joints"]);
+    const Json& joints = answer["joints"];
+    options.gains    ? print_gains(joints)
+    : options.drives ? print_drives(joints)
+                     : print_joints(joints);
     return;
   }
   if (answer.value("done", false)) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
   if (answer.contains("note")) fmt::print("{}\n", answer.value("note", ""));
   if (options.action == JointOptions::Action::kGains) {
     print_gains(Json::array({answer}));
+    return;
+  }
+  if (options.action == JointOptions::Action::kMove) {
+    fmt::print("{} moves from {} to {}: tandem joint list {}\n", options.joint,
+               number(answer, "position_rad"), options.to, options.joint);
+    return;
+  }
+  if (options.action == JointOptions::Action::kStop) {
+    fmt::print("{} brakes, and stays where it comes to rest\n", options.joint);
     return;
   }
   if (options.action == JointOptions::Action::kRecover) {
@@ -119,7 +192,9 @@ void print_answer(const JointOptions& options, const Json& answer) {
 }  // namespace
 
 Exit joint_command(const JointOptions& options) {
-  Result<Json> answer = ask(options.target, "run", question_of(options));
+  const Result<Json> question = question_of(options);
+  if (!question) return refuse(question.error());
+  Result<Json> answer = ask(options.target, "run", *question);
   if (!answer) return refuse(answer.error());
   if (answer->contains("joints")) {
     const Result<Json> some = only((*answer)["joints"], options.joints);

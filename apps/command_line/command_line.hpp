@@ -85,11 +85,20 @@ struct ControllerOptions {
 
 /// tandem joint list|set|gains
 struct JointOptions {
-  enum class Action : std::uint8_t { kList, kSet, kRecover, kGains } action = Action::kList;
-  std::vector<std::string> joints;  ///< list: only these; empty: all
-  bool gains = false;               ///< list: the gains instead of what is measured
-  std::string joint;                ///< set, recover, gains
-  std::string mode, interaction;    ///< empty: as it is
+  enum class Action : std::uint8_t {
+    kList,
+    kSet,
+    kMove,
+    kStop,
+    kRecover,
+    kGains
+  } action = Action::kList;
+  std::vector<std::string> joints;      ///< list: only these; empty: all
+  bool gains = false;                   ///< list: the gains instead of what is measured
+  bool drives = false;                  ///< list: motors and drives instead of joints
+  std::string joint;                    ///< all but list
+  std::string to, speed, acceleration;  ///< move: numbers with or without a unit; empty: default
+  std::string mode, interaction;        ///< empty: as it is
   std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
   std::string loop;
   std::optional<double> kp, ki, kd;

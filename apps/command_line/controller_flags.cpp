@@ -20,6 +20,7 @@ const char kJointExamples[] = R"(Examples:
   tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
+  tandem joint move LElbj --to 30deg --speed 20deg/s a free joint to a place, and `joint stop LElbj`
   tandem joint recover LElbj                         outside its limits: slowly back inside
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
 Without --socket or --dds it is the only `tandem run` of this user.)";
@@ -91,7 +92,8 @@ void add_flags(CLI::App& app, JointOptions& o) {
   };
   CLI::App* list = add("list", "Controller, mode and measurements of each joint", Action::kList);
   list->add_option("joints", o.joints, "Only these");
-  list->add_flag("--gains", o.gains, "The gains of its drive's loops instead");
+  list->add_flag("--drives", o.drives, "Motor position, current, voltage and winding instead")
+      ->excludes(list->add_flag("--gains", o.gains, "The gains of its drive's loops instead"));
   CLI::App* set =
       add("set", "Mode and interaction of a free joint, impedance of any", Action::kSet);
   set->add_option("joint", o.joint, "Its name")->required();
@@ -101,6 +103,16 @@ void add_flags(CLI::App& app, JointOptions& o) {
       ->check(is_finite());
   set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
       ->check(is_finite());
+  CLI::App* move = add("move", "Lead a free joint to a place, at a steady speed", Action::kMove);
+  move->add_option("joint", o.joint, "Its name")->required();
+  move->add_option("--to", o.to, "30deg, 0.5rad or 0.5; of a slide 20mm, 0.02m or 0.02")
+      ->required();
+  move->add_option("--speed", o.speed, "20deg/s, 0.3 (default: a quarter of the joint's limit)");
+  move->add_option("--acceleration", o.acceleration,
+                   "40deg/s2, 0.6 (default: reaches the speed in half a second)");
+  add("stop", "Brake a joint that `joint move` leads", Action::kStop)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
   add("recover", "Lead a free joint back inside its limits, slowly", Action::kRecover)
       ->add_option("joint", o.joint, "Its name")
       ->required();

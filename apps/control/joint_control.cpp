@@ -48,6 +48,11 @@ Json joint_json(const runtime::JointInfo& joint) {
           {"position_rad", look.position_rad},
           {"velocity_rad_s", look.velocity_rad_s},
           {"torque_Nm", look.torque_Nm},
+          {"acceleration_rad_s2", look.acceleration_rad_s2},
+          {"motor_position_rad", look.motor_position_rad},
+          {"current_A", look.current_A},
+          {"voltage_V", look.voltage_V},
+          {"temperature_C", look.temperature_C},
           {"stiffness_Nm_rad", look.stiffness_Nm_rad},
           {"damping_Nms_rad", look.damping_Nms_rad},
           {"drive_state", hal::to_string(static_cast<hal::DriveState>(look.drive_state))},
@@ -101,6 +106,23 @@ Result<Json> set(RunServices& services, const Json& request) {
   return tell(services, joint, services.set_joint(joint, wish));
 }
 
+Result<Json> move(RunServices& services, const Json& request,
+                  const std::vector<std::string>& slides) {
+  const auto joint = request["joint"].get<std::string>();
+  if (request.contains("unit")) {
+    const auto unit = request["unit"].get<std::string>();
+    const bool is_slide = std::ranges::find(slides, joint) != slides.end();
+    if (unit != (is_slide ? "length" : "angle")) {
+      return fail_at(joint, fmt::format("this joint {}", is_slide ? "slides" : "turns"),
+                     is_slide ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
+    }
+  }
+  runtime::MoveRequest wish{.target_rad = request["target_rad"].get<double>()};
+  wish.speed_rad_s = request.value("speed_rad_s", wish.speed_rad_s);
+  wish.acceleration_rad_s2 = request.value("acceleration_rad_s2", wish.acceleration_rad_s2);
+  return tell(services, joint, services.move_joint(joint, wish));
+}
+
 Result<Json> set_gains(RunServices& services, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   const auto loop = choice(request, "loop", kLoops);
@@ -119,7 +141,8 @@ Result<Json> set_gains(RunServices& services, const Json& request) {
 
 }  // namespace
 
-void add_joint_commands(ControlRegistry& registry, RunServices& services) {
+void add_joint_commands(ControlRegistry& registry, RunServices& services,
+                        std::vector<std::string> slides) {
   using Type = ControlKey::Type;
   const ControlKey joint{.name = "joint", .required = true, .doc = "its name"};
   registry.add("joint.list", ControlEffect::kReads,
@@ -133,6 +156,24 @@ void add_joint_commands(ControlRegistry& registry, RunServices& services) {
                 {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
                 {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
                [&services](const Json& request) { return set(services, request); });
+  registry.add(
+      "joint.move", ControlEffect::kChanges,
+      "moves a joint that no active controller claims, on a trapezoid of speed",
+      {joint,
+       {.name = "target_rad", .type = Type::kNumber, .required = true, .doc = "m of a slide"},
+       {.name = "speed_rad_s", .type = Type::kNumber, .doc = "else a quarter of its limit"},
+       {.name = "acceleration_rad_s2",
+        .type = Type::kNumber,
+        .doc = "else it reaches the speed in half a second"},
+       {.name = "unit", .doc = "angle, length: what the joint has to be"}},
+      [&services, slides = std::move(slides)](const Json& request) {
+        return move(services, request, slides);
+      });
+  registry.add("joint.stop", ControlEffect::kChanges, "brakes a joint that joint.move leads",
+               {joint}, [&services](const Json& request) {
+                 const auto name = request["joint"].get<std::string>();
+                 return tell(services, name, services.move_joint(name, {}));
+               });
   registry.add("joint.recover", ControlEffect::kChanges,
                "leads a joint that stands outside its limits back, at a twentieth of its velocity",
                {joint}, [&services](const Json& request) {

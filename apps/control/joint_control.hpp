@@ -7,7 +7,10 @@
 
 namespace tandem::apps {
 
-/// Adds "joint.list", "joint.set" and "joint.gains". The services outlive the registry.
-void add_joint_commands(ControlRegistry& registry, runtime::RunServices& services);
+/// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.recover" and "joint.gains".
+/// The services outlive the registry.
+/// @param slides  names of the joints that slide
+void add_joint_commands(ControlRegistry& registry, runtime::RunServices& services,
+                        std::vector<std::string> slides);
 
 }  // namespace tandem::apps

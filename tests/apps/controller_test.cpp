@@ -1,5 +1,8 @@
 // `tandem controller` and `tandem joint` against a running `tandem run`.
+#include <cmath>
+
 #include "tests/apps/running.hpp"
+#include "tests/support/eventually.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -109,6 +112,33 @@ TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
   expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
   expect(refused("joint set joint2"), "nothing is to be set");
   expect(to_run("joint list joint1").out, "joint1           -  velocity");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, JointsAreMovedWhenNobodyHasThem) {
+  begin("");
+  expect(refused("joint move joint1 --to 30deg"), "joint1: is claimed by the controller 'hold'");
+  EXPECT_EQ(to_run("controller stop hold").status, 0);
+  expect(to_run("joint move joint1 --to 30deg --speed 200deg/s --acceleration 1000deg/s2").out,
+         "joint1 moves from ");
+  double position_rad = 0.0;
+  EXPECT_TRUE(test::eventually([&] {
+    position_rad = asked("joint list joint1")["joints"][0]["position_rad"];
+    return std::abs(position_rad - 0.5236) < 0.02;
+  })) << position_rad;
+  EXPECT_EQ(to_run("joint move joint1 --to -1 --speed 0.01").status, 0) << "radians";
+  EXPECT_EQ(to_run("joint stop joint1").status, 0);
+  position_rad = asked("joint list joint1")["joints"][0]["position_rad"];
+  EXPECT_NEAR(position_rad, 0.5236, 0.1) << "it had only just begun";
+  expect(to_run("joint list joint1 --drives").out, "winding [degC]");
+  expect(refused("joint move joint1 --to 400deg"), "joint1: the target 6.98132 is beyond");
+  expect(refused("joint move joint1 --to 20mm"), "joint1: this joint turns");
+  expect(refused("joint move joint1 --to 30deg --speed 1m/s"),
+         "--speed: '1m/s' is of another kind");
+  for (const char* words : {"--to 30°", "--to deg", "--to nan", "--to inf", "--to 1e999",
+                            "--to 30deg --speed 20deg", "--to 30deg/s"}) {
+    expect(refused(std::string("joint move joint1 ") + words), "is no number with a unit");
+  }
   EXPECT_EQ(end(), 0);
 }
 
