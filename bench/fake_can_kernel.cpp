@@ -15,6 +15,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "base/clock_ns.hpp"
 #include "canopen/objects.hpp"
 #include "hal/ethercat-can/socket_frame.hpp"
 
@@ -25,12 +26,6 @@ FakeCanKernel* active_kernel = nullptr;
 
 constexpr int kFirstDescriptor = 1'000'000;  // beyond any real one
 constexpr std::size_t kRoom = 1024;          // frames of a bus in one cycle
-
-std::int64_t clock_ns(clockid_t clock) noexcept {
-  timespec now{};
-  ::clock_gettime(clock, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
 
 /// Takes the time from its construction to its end as the kernel's.
 class Inside {

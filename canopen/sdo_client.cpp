@@ -15,7 +15,6 @@ constexpr std::uint8_t kUploadSegmentAnswer = 0;
 constexpr std::uint8_t kDownloadSegmentAnswer = 1;
 constexpr std::uint8_t kInitiateUploadAnswer = 2;
 constexpr std::uint8_t kInitiateDownloadAnswer = 3;
-constexpr std::size_t kExpeditedBytes = 4;
 
 }  // namespace
 
@@ -158,18 +157,11 @@ void SdoClient::fail(AbortCode code, FrameSink& out) noexcept {
 }
 
 Frame SdoClient::request(std::uint8_t command) const noexcept {
-  Frame frame;
-  frame.id = cob::kSdoRequest + static_cast<std::uint32_t>(node_);
-  frame.length = kClassicFrameBytes;
-  frame.data[0] = command;
-  return frame;
+  return sdo_frame(cob::kSdoRequest, node_, command);
 }
 
 Frame SdoClient::initiate_request(std::uint8_t command) const noexcept {
-  Frame frame = request(command);
-  put(&frame.data[1], index_);
-  frame.data[3] = sub_;
-  return frame;
+  return sdo_frame(cob::kSdoRequest, node_, command, index_, sub_);
 }
 
 void SdoClient::archive(Archive& ar) {

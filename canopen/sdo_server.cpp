@@ -130,18 +130,11 @@ void SdoServer::abort(AbortCode code, FrameSink& out) noexcept {
 }
 
 Frame SdoServer::response(std::uint8_t command) const noexcept {
-  Frame frame;
-  frame.id = cob::kSdoResponse + static_cast<std::uint32_t>(node_);
-  frame.length = kClassicFrameBytes;
-  frame.data[0] = command;
-  return frame;
+  return sdo_frame(cob::kSdoResponse, node_, command);
 }
 
 Frame SdoServer::initiate_response(std::uint8_t command) const noexcept {
-  Frame frame = response(command);
-  put(&frame.data[1], index_);
-  frame.data[3] = sub_;
-  return frame;
+  return sdo_frame(cob::kSdoResponse, node_, command, index_, sub_);
 }
 
 void SdoServer::archive(Archive& ar) {

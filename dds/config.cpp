@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <regex>
 
+#include "base/quoting.hpp"
+
 namespace tandem::dds {
 namespace {
 
@@ -53,20 +55,6 @@ void read_every(TomlTable table, Config& config) {
   table.finish();
 }
 
-std::string text_of(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
-
 #ifdef TANDEM_DDS_SECURITY_FOLDER
 constexpr std::string_view kPluginFolder = TANDEM_DDS_SECURITY_FOLDER;
 #else
@@ -102,9 +90,10 @@ std::string security_xml(const SecurityConfig& s) {
   <Cryptographic>{}</Cryptographic>
 </Security>
 )",
-      plugin_xml("auth", "authentication"), text_of(s.identity_ca), text_of(s.identity_certificate),
-      text_of(s.private_key), plugin_xml("ac", "access_control"), text_of(s.permissions_ca),
-      text_of(s.governance), text_of(s.permissions), plugin_xml("crypto", "crypto"));
+      plugin_xml("auth", "authentication"), xml_text(s.identity_ca),
+      xml_text(s.identity_certificate), xml_text(s.private_key), plugin_xml("ac", "access_control"),
+      xml_text(s.permissions_ca), xml_text(s.governance), xml_text(s.permissions),
+      plugin_xml("crypto", "crypto"));
 }
 
 }  // namespace
@@ -146,7 +135,7 @@ std::string to_xml(const Config& config) {
   std::string interfaces, peers;
   for (const std::string& name : config.interfaces) {
     const bool multicast = name != "lo";
-    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", text_of(name),
+    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", xml_text(name),
                               multicast ? "default" : "false");
   }
   std::vector<std::string> addresses = config.peers;
@@ -154,7 +143,7 @@ std::string to_xml(const Config& config) {
     addresses.insert(addresses.begin(), "127.0.0.1");
   }
   for (const std::string& peer : addresses) {
-    peers += fmt::format("<Peer Address=\"{}\"/>", text_of(peer));
+    peers += fmt::format("<Peer Address=\"{}\"/>", xml_text(peer));
   }
   return fmt::format(
       R"(<CycloneDDS><Domain>

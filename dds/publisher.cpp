@@ -2,12 +2,12 @@
 // on the publisher's thread and makes the samples.
 #include "dds/publisher.hpp"
 
-#include <time.h>
 #include <algorithm>
 #include <cstring>
 #include <limits>
 #include <set>
 
+#include "base/clock_ns.hpp"
 #include "dds/diagnostic_topics.hpp"
 #include "dds/frame_topics.hpp"
 #include "dds/image_topics.hpp"
@@ -35,19 +35,13 @@ constexpr std::uint32_t kNeedsTruth = bit(Topic::kTf) | bit(Topic::kOdom);
 
 constexpr std::size_t aligned(std::size_t bytes) { return (bytes + 15) / 16 * 16; }
 
-std::int64_t read_clock(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
-
 /// CLOCK_REALTIME less CLOCK_MONOTONIC, the reading that was disturbed least.
 std::int64_t wall_less_monotonic() {
   std::int64_t offset = 0, best = std::numeric_limits<std::int64_t>::max();
   for (int i = 0; i < 5; ++i) {
-    const std::int64_t before = read_clock(CLOCK_MONOTONIC);
-    const std::int64_t wall = read_clock(CLOCK_REALTIME);
-    const std::int64_t took = read_clock(CLOCK_MONOTONIC) - before;
+    const std::int64_t before = clock_ns(CLOCK_MONOTONIC);
+    const std::int64_t wall = clock_ns(CLOCK_REALTIME);
+    const std::int64_t took = clock_ns(CLOCK_MONOTONIC) - before;
     if (took >= best) continue;
     best = took;
     offset = wall - before - took / 2;
@@ -142,7 +136,7 @@ void Publisher::start(FaultSource faults) {
   fault_source_ = std::move(faults);
   wall_offset_ns_ = wall_less_monotonic();
   offset_due_ = SteadyClock::now() + kOffsetGood;
-  for (const auto& group : groups_) group->begin(simulated_time_ ? 0 : read_clock(CLOCK_REALTIME));
+  for (const auto& group : groups_) group->begin(simulated_time_ ? 0 : clock_ns(CLOCK_REALTIME));
   if (simulated_time_) publish_clock();
   thread_ = std::thread([this] { run(); });
 }

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "base/quoting.hpp"
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
 
@@ -25,18 +26,9 @@ constexpr std::uint32_t kMostMassMatrixOperations = 40'000;
 constexpr std::string_view kBanner =
     "// Made by `tandem model build`: change the robot's description instead.\n";
 
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + "\"";
-}
-
 std::string name_table(const std::string& name, const std::vector<std::string>& values) {
   std::string text = fmt::format("const char* const {}[] = {{", name);
-  for (const std::string& value : values) text += quoted(value) + ", ";
+  for (const std::string& value : values) text += quoted_text(value) + ", ";
   return text + "nullptr};\n";
 }
 
@@ -61,7 +53,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
           count_table(result.counts) + "\n}  // namespace\n\n";
   text += "extern const tandem_kernels table = {\n";
   text += fmt::format("    TANDEM_KERNELS_ABI, {}, {},\n    \"{}\",\n    TANDEM_VARIANT_NAME,\n",
-                      m.floating_base ? 1 : 0, quoted(result.robot), result.hash);
+                      m.floating_base ? 1 : 0, quoted_text(result.robot), result.hash);
   text += fmt::format("    {}, {}, {}, {}, {}, {},\n", m.kernel_nq(), m.kernel_nv(), m.coordinates,
                       m.sites.size(), m.wrenches, m.sensors.size());
   text += "    joints, sites, wrenches, sensors,\n";

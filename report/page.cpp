@@ -8,6 +8,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/quoting.hpp"
+
 namespace tandem::report {
 namespace {
 
@@ -34,20 +36,6 @@ th { color: var(--soft); font-weight: 600; }
 @media (max-width: 560px) { .figures { grid-template-columns: 1fr; } }
 @media print { body { background: #fff; } .card { break-inside: avoid; } }
 )";
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
 
 Error file_error(const std::string& message, const std::string& file) {
   return {.message = message + ": " + std::strerror(errno),
@@ -77,12 +65,12 @@ Result<std::string> inline_svg(const std::string& file, const std::string& name)
 
 std::string html_table(const PageTable& table) {
   std::string out = fmt::format("<h2>{}</h2>\n<p>{}</p>\n<div class=\"card\"><table>\n<tr>",
-                                escaped(table.title), escaped(table.caption));
-  for (const std::string& cell : table.header) out += "<th>" + escaped(cell) + "</th>";
+                                xml_text(table.title), xml_text(table.caption));
+  for (const std::string& cell : table.header) out += "<th>" + xml_text(cell) + "</th>";
   out += "</tr>\n";
   for (const auto& row : table.rows) {
     out += "<tr>";
-    for (const std::string& cell : row) out += "<td>" + escaped(cell) + "</td>";
+    for (const std::string& cell : row) out += "<td>" + xml_text(cell) + "</td>";
     out += "</tr>\n";
   }
   return out + "</table></div>\n";
@@ -95,7 +83,7 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p>{2}</p>\n",
-      escaped(page.title), kStyle, escaped(page.lead));
+      xml_text(page.title), kStyle, xml_text(page.lead));
   html += "<div class=\"figures\">\n";
   for (const Figure& figure : figures) {
     const Result<std::string> svg = inline_svg(folder + "/" + figure.name + ".svg", figure.name);
@@ -104,7 +92,7 @@ Status write_page(const Page& page, std::span<const Figure> figures, const std::
   }
   html += "</div>\n<h2>Run</h2>\n<div class=\"card\"><dl>\n";
   for (const auto& [name, value] : page.facts) {
-    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", escaped(name), escaped(value));
+    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", xml_text(name), xml_text(value));
   }
   html += "</dl></div>\n";
   for (const PageTable& table : page.tables) html += html_table(table);

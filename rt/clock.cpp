@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <ctime>
 
+#include "base/clock_ns.hpp"
 #include "rt/doorbell.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -13,11 +14,7 @@ void Clock::sleep_until_rung(std::int64_t deadline_ns, const Doorbell&, std::uin
   sleep_until(deadline_ns);
 }
 
-std::int64_t WallClock::now_ns() noexcept TANDEM_RT {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * kSecond_ns + now.tv_nsec;
-}
+std::int64_t WallClock::now_ns() noexcept TANDEM_RT { return clock_ns(CLOCK_MONOTONIC); }
 
 void WallClock::sleep_until(std::int64_t deadline_ns) noexcept {
   const timespec until{.tv_sec = deadline_ns / kSecond_ns, .tv_nsec = deadline_ns % kSecond_ns};

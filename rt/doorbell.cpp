@@ -9,6 +9,7 @@
 #include <climits>
 #include <ctime>
 
+#include "base/clock_ns.hpp"
 #include "rt/clock.hpp"
 
 namespace tandem::rt {
@@ -16,12 +17,6 @@ namespace {
 
 /// A signal only sets a flag, and mostly on another thread: it wakes nobody.
 constexpr std::int64_t kPatience_ns = 20'000'000;
-
-std::int64_t monotonic_ns() {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * kSecond_ns + now.tv_nsec;
-}
 
 }  // namespace
 
@@ -37,7 +32,7 @@ void Doorbell::end() noexcept {
 
 void Doorbell::wait(std::uint32_t seen, std::int64_t deadline_ns) const noexcept {
   while (count() == seen && !stop_requested()) {
-    const std::int64_t now_ns = monotonic_ns();
+    const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
     if (now_ns >= deadline_ns) return;
     const std::int64_t until_ns = std::min(deadline_ns, now_ns + kPatience_ns);
     const timespec until{.tv_sec = until_ns / kSecond_ns, .tv_nsec = until_ns % kSecond_ns};

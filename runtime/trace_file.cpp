@@ -7,17 +7,10 @@
 #include <cstring>
 #include <memory>
 
+#include "base/quoting.hpp"
+
 namespace tandem::runtime {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
-}
 
 /// Appends events to an open file; times in us, to the nanosecond.
 class Events {
@@ -25,7 +18,7 @@ class Events {
   Events(std::FILE* out, std::int64_t zero_ns) : out_(out), zero_ns_(zero_ns) {}
 
   void name(const char* what, const std::string& value) {
-    event(fmt::format(R"("ph":"M","name":"{}","args":{{"name":{}}})", what, quoted(value)));
+    event(fmt::format(R"("ph":"M","name":"{}","args":{{"name":{}}})", what, quoted_text(value)));
   }
   void span(const char* name, std::int64_t begin_ns, std::int64_t end_ns,
             const std::string& arguments = {}) {
@@ -33,7 +26,8 @@ class Events {
                       us(end_ns - begin_ns), arguments));
   }
   void instant(const std::string& name, std::int64_t at_ns) {
-    event(fmt::format(R"("ph":"i","s":"t","name":{},"ts":{})", quoted(name), us(at_ns - zero_ns_)));
+    event(fmt::format(R"("ph":"i","s":"t","name":{},"ts":{})", quoted_text(name),
+                      us(at_ns - zero_ns_)));
   }
   void counter(const char* name, std::int64_t at_ns, std::int64_t value_ns) {
     event(fmt::format(R"("ph":"C","name":"{}","ts":{},"args":{{"us":{}}})", name,
@@ -98,7 +92,7 @@ Status write_trace(const std::string& file, const std::string& robot, const Cycl
   std::FILE* out = std::fopen(file.c_str(), "wb");
   if (out == nullptr) return std::unexpected(write_error(file));
   fmt::print(out, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{{\"robot\":{},\"cycles\":{},",
-             quoted(robot), cycles.size());
+             quoted_text(robot), cycles.size());
   fmt::print(out, "\"cycles_before\":{}}},\n\"traceEvents\":[\n", trace.count() - cycles.size());
   Events events(out, cycles.empty() ? 0 : cycles.front().begin_ns);
   events.name("process_name", "tandem: " + robot);

@@ -14,7 +14,7 @@ constexpr double kLikeDamping_Nms_rad = 12.0;  // what COMAN's experiments add o
 
 std::string head(const NewRobot& robot, const std::string& what, double duration_s) {
   return fmt::format("# {}\nrobot = \"robot.toml\"\nposture = {}\nduration_s = {:.1f}\nseed = 1\n",
-                     what, toml_string(robot.config.postures[0].name), duration_s);
+                     what, quoted_text(robot.config.postures[0].name), duration_s);
 }
 
 /// A sentence, true for this robot.
@@ -66,8 +66,8 @@ std::vector<std::string> widest(const NewRobot& robot) {
 }
 
 std::string report(const std::vector<std::string>& joints) {
-  return fmt::format("\n[report]\nposition_of = {}\ntorque_of = {}\n", toml_string(joints.front()),
-                     toml_string(joints.back()));
+  return fmt::format("\n[report]\nposition_of = {}\ntorque_of = {}\n", quoted_text(joints.front()),
+                     quoted_text(joints.back()));
 }
 
 /// Quoted, in the order of [[joint]].
@@ -78,7 +78,7 @@ std::vector<std::string> legs_joints(const NewRobot& robot) {
       const bool its = std::ranges::any_of(limb.joints, [&](int index) {
         return robot.tree.joints[static_cast<std::size_t>(index)].name == joint.name;
       });
-      if (limb.foot >= 0 && its) names.push_back(toml_string(joint.name));
+      if (limb.foot >= 0 && its) names.push_back(quoted_text(joint.name));
     }
   }
   return names;
@@ -106,7 +106,7 @@ std::string move_text(const NewRobot& robot) {
   text += "\n[[controller]]\nplugin = \"joint_trajectory\"\n";
   std::vector<std::string> names;
   for (const hal::JointConfig& joint : robot.config.joints)
-    names.push_back(toml_string(joint.name));
+    names.push_back(quoted_text(joint.name));
   text += fmt::format("[controller.parameters]\njoints = [{}]\n", fmt::join(names, ", "));
   for (const WayPoint& point : robot.move.points) {
     text += fmt::format(

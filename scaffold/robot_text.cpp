@@ -41,7 +41,9 @@ class Writer {
     model();
     sites();
     drives();
-    line("\n# --- wires, all of them a guess: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a board");
+    line(
+        "\n# --- wires, all of them a guess: a bus a limb, CAN FD at 1 and 8 Mbit/s, two joints a "
+        "board");
     line(
         "[board_defaults]\nslow_pdo_every = {}  # guess: motor currents and the like, every n-th "
         "cycle",
@@ -70,11 +72,11 @@ class Writer {
     line("# notice beside this file before you pass the folder on.");
     for (const std::string& remark : robot_.remarks) line("# {}", commented(remark));
     line("# Every key: docs/configuration.md. The rules behind the figures: docs/robots.md.");
-    line("name = {}", toml_string(robot_.config.name));
+    line("name = {}", quoted_text(robot_.config.name));
   }
 
   void model() {
-    line("\n[model]\nurdf = {}\nbase = \"{}\"", toml_string(urdf_),
+    line("\n[model]\nurdf = {}\nbase = \"{}\"", quoted_text(urdf_),
          robot_.config.model.floating_base ? "floating" : "fixed");
     if (robot_.config.model.repair_inertia) line("inertia = \"repair\"");
     if (!(robot_.turned.distance_m > 0.0)) return;  // those of inertias alone cost nothing
@@ -91,7 +93,7 @@ class Writer {
       const hal::SiteConfig& site = robot_.config.model.sites[i];
       text_ += '\n';
       if (!robot_.feet[i].guess.empty()) line("# guess: {}", robot_.feet[i].guess);
-      line("[[site]]\nname = {}\nlink = {}", toml_string(site.name), toml_string(site.link));
+      line("[[site]]\nname = {}\nlink = {}", quoted_text(site.name), quoted_text(site.link));
       const char* from = robot_.feet[i].guess.empty() ? kFromShapes : kGuess;
       const auto set = [](const auto& v) {
         return std::ranges::any_of(v, [](double x) { return x != 0.0; });
@@ -184,15 +186,15 @@ class Writer {
   }
 
   void wire(const hal::BusConfig& bus) {
-    line("\n[[bus]]\nname = {}\ninterface = {}{}\nboards = [", toml_string(bus.name),
-         toml_string(bus.interface), kGuess);
+    line("\n[[bus]]\nname = {}\ninterface = {}{}\nboards = [", quoted_text(bus.name),
+         quoted_text(bus.interface), kGuess);
     for (const hal::BoardConfig& board : robot_.config.boards) {
       if (board.bus != bus.name) continue;
       std::vector<std::string> joints;
       for (const hal::JointConfig& joint : robot_.config.joints) {
-        if (joint.board == board.name) joints.push_back(toml_string(joint.name));
+        if (joint.board == board.name) joints.push_back(quoted_text(joint.name));
       }
-      line("  {{ name = {}, joints = [{}] }},", toml_string(board.name), fmt::join(joints, ", "));
+      line("  {{ name = {}, joints = [{}] }},", quoted_text(board.name), fmt::join(joints, ", "));
     }
     line("]");
   }
@@ -212,7 +214,7 @@ class Writer {
         const std::string own = limits(joint);
         auto group = std::ranges::find(groups, own, &decltype(groups)::value_type::first);
         if (group == groups.end()) group = groups.insert(groups.end(), {own, {}});
-        group->second.push_back(toml_string(joint.name));
+        group->second.push_back(quoted_text(joint.name));
       }
       for (const auto& [own, names] : groups) {
         line("\n[[joint]]\nnames = [{}]", fmt::join(names, ", "));
@@ -241,7 +243,8 @@ class Writer {
     }
     if (limit.effort_guessed) {
       text += fmt::format(
-          "max_torque_Nm = {}  # guess: from its load and its neighbours'; the description's is {}\n",
+          "max_torque_Nm = {}  # guess: from its load and its neighbours'; the description's is "
+          "{}\n",
           number(joint.max_torque_Nm), stated(joint.name, true));
     }
     if (limit.velocity_guessed) {
@@ -263,10 +266,10 @@ class Writer {
       text_ += '\n';
       if (!robot_.sensors[i].guess.empty()) line("# guess: {}", robot_.sensors[i].guess);
       const bool wrench = s.type == hal::SensorType::kForceTorque;
-      line("[[sensor]]\nname = {}\ntype = \"{}\"\nbus = {}", toml_string(s.name),
-           wrench ? "force_torque" : "imu", toml_string(s.bus));
-      if (wrench) line("joint = {}", toml_string(s.joint));
-      line("link = {}", toml_string(s.link));
+      line("[[sensor]]\nname = {}\ntype = \"{}\"\nbus = {}", quoted_text(s.name),
+           wrench ? "force_torque" : "imu", quoted_text(s.bus));
+      if (wrench) line("joint = {}", quoted_text(s.joint));
+      line("link = {}", quoted_text(s.link));
     }
   }
 
@@ -285,7 +288,7 @@ class Writer {
       std::vector<std::string> points;
       for (const auto& p : c.feet[f].points_m)
         points.push_back(fmt::format("[{:.5g}]", fmt::join(p, ", ")));
-      line("\n[[contact.foot]]\nsite = {}\npoints_m = [{}]{}", toml_string(c.feet[f].site),
+      line("\n[[contact.foot]]\nsite = {}\npoints_m = [{}]{}", quoted_text(c.feet[f].site),
            fmt::join(points, ", "), robot_.feet[f].guess.empty() ? kFromShapes : kGuess);
     }
   }

@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <ctime>
 
+#include "base/clock_ns.hpp"
 #include "hal/ethercat-can/frame_time.hpp"
 
 namespace tandem::hal::can {
@@ -18,12 +18,6 @@ using canopen::Frame;
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(1);
-
-std::int64_t now_ns(clockid_t clock) noexcept {
-  timespec now{};
-  ::clock_gettime(clock, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * kSecondNs + now.tv_nsec;
-}
 
 }  // namespace
 
@@ -58,7 +52,7 @@ Result<std::unique_ptr<FrameRecord>> FrameRecord::open(const std::string& path,
 FrameRecord::FrameRecord(const std::string& path, std::FILE* file, std::size_t ring_frames)
     : path_(path),
       file_(file),
-      epoch_ns_(now_ns(CLOCK_REALTIME) - now_ns(CLOCK_MONOTONIC)),
+      epoch_ns_(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC)),
       ring_(sizeof(Entry), ring_frames),
       thread_([this] { run(); }) {}
 
@@ -73,7 +67,7 @@ Bus& FrameRecord::watch(Bus& bus, const std::string& name) {
 std::size_t FrameRecord::Watched::send(std::span<const Frame> frames) noexcept TANDEM_RT {
   const std::size_t taken = bus_.send(frames);
   const std::int64_t known_ns = bus_.sent_ns();
-  const std::int64_t sent_ns = known_ns != 0 ? known_ns : now_ns(CLOCK_MONOTONIC);
+  const std::int64_t sent_ns = known_ns != 0 ? known_ns : clock_ns(CLOCK_MONOTONIC);
   for (const Frame& frame : frames.first(taken)) record_.push(sent_ns, index_, frame);
   return taken;
 }
@@ -82,7 +76,7 @@ std::size_t FrameRecord::Watched::receive(std::span<Frame> frames) noexcept TAND
   const std::size_t count = bus_.receive(frames);
   if (count == 0) return 0;
   const auto stamps = bus_.received_ns();
-  const std::int64_t now = stamps.empty() ? now_ns(CLOCK_MONOTONIC) : 0;
+  const std::int64_t now = stamps.empty() ? clock_ns(CLOCK_MONOTONIC) : 0;
   for (std::size_t i = 0; i < count; ++i) {
     record_.push(stamps.empty() ? now : stamps[i], index_, frames[i]);
   }

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "base/clock_ns.hpp"
 #include "hal/ethercat-can/frame_time.hpp"
 #include "hal/ethercat-can/socket_can_impl.hpp"
 #include "hal/ethercat-can/socket_frame.hpp"

@@ -77,7 +77,4 @@ inline constexpr std::uint64_t kReadInterfaceCalls = 4;
 /// @return errno; 0 when the socket is bound.
 [[nodiscard]] int bind_to(int socket, int index) noexcept;
 
-/// A clock in nanoseconds.
-[[nodiscard]] std::int64_t clock_ns(clockid_t clock) noexcept;
-
 }  // namespace tandem::hal::can

@@ -263,10 +263,4 @@ int bind_to(int socket, int index) noexcept {
   return ::bind(socket, generic, sizeof(address)) == 0 ? 0 : errno;
 }
 
-std::int64_t clock_ns(clockid_t clock) noexcept {
-  timespec now{};
-  ::clock_gettime(clock, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
-
 }  // namespace tandem::hal::can

@@ -3,7 +3,6 @@
 #include "hal/remote/link.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <random>
 
@@ -70,10 +69,6 @@ dds::Qos link_qos() {
   qos.transient_local = true;
   qos.depth = 4;
   return qos;
-}
-
-std::int64_t now_ns() noexcept TANDEM_RT {
-  return std::chrono::steady_clock::now().time_since_epoch().count();
 }
 
 std::uint64_t draw_number() {

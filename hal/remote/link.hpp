@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/clock_ns.hpp"
 #include "base/realtime.hpp"
 #include "dds/endpoint.hpp"
 #include "dds/service.hpp"
@@ -54,8 +55,6 @@ inline constexpr const char* kCommandTopic = "tandem/link/command";
 
 enum class Action : std::uint8_t { kAcquire = 0, kRenew = 1, kRelease = 2 };
 
-/// CLOCK_MONOTONIC [ns].
-[[nodiscard]] std::int64_t now_ns() noexcept TANDEM_RT;
 /// A number that no other process draws; not 0.
 [[nodiscard]] std::uint64_t draw_number();
 

@@ -25,7 +25,8 @@ bool RemoteBackend::there() noexcept {
     fresh_ = first_ || seen.cycle > last_cycle_;
   }
   if (fresh_ || ending_ || lost_) return true;
-  const std::int64_t silent_ns = now_ns() - heard_ns_.load(std::memory_order_relaxed);
+  const std::int64_t silent_ns =
+      clock_ns(CLOCK_MONOTONIC) - heard_ns_.load(std::memory_order_relaxed);
   if (static_cast<double>(silent_ns) * 1e-9 > config_.server_timeout_s) gone_ = true;
   return gone_ || (config_.interrupted && config_.interrupted());
 }
@@ -60,7 +61,7 @@ Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noe
   ahead_ns_ = seen.state.time_ns()[0] - time.time_ns;
   if (seen.answered_ns != answered_ns_) {
     answered_ns_ = seen.answered_ns;
-    if (answered_ns_ != 0) turn_around_.record(now_ns() - answered_ns_);
+    if (answered_ns_ != 0) turn_around_.record(clock_ns(CLOCK_MONOTONIC) - answered_ns_);
   }
   if (resetting_ && seen.answered_cycle >= reset_after_) resetting_ = false;
   return static_cast<Code>(seen.code) == Code::kTimeout ? Code::kTimeout : Code::kOk;
@@ -144,7 +145,7 @@ void RemoteBackend::send() noexcept {
   sample.sequence_number = ++sequence_;
   sample.cycle = seen.cycle;
   sample.state_ns = seen.sent_ns;
-  sample.sent_ns = now_ns();
+  sample.sent_ns = clock_ns(CLOCK_MONOTONIC);
   sample.live = live_;
   sample.done = done_;
   sample.stop = static_cast<std::uint8_t>(asked_);

@@ -234,7 +234,7 @@ void RemoteBackend::take_told() {
                    .lockstep = sample.lockstep,
                    .ending = sample.ending};
       ++told_count_;
-      heard_ns_ = now_ns();
+      heard_ns_ = clock_ns(CLOCK_MONOTONIC);
       if (!leased_) return;
       if (sample.ending) ending_ = true;
       if (sample.owner != client_) lost_ = true;
@@ -276,7 +276,7 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   to.reaction = static_cast<hal::StopCategory>(sample.reaction);
   to.is_one = true;
   phase_ = sample.phase;
-  heard_ns_ = now_ns();
+  heard_ns_ = clock_ns(CLOCK_MONOTONIC);
   return true;
 }
 

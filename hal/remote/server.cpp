@@ -77,7 +77,7 @@ void Server::take_requests() {
     switch (static_cast<Action>(sample.action)) {
       case Action::kAcquire: acquire(sample, sender); break;
       case Action::kRenew:
-        if (is_owner(sample.client, sender)) lease_.heard(now_ns());
+        if (is_owner(sample.client, sender)) lease_.heard(clock_ns(CLOCK_MONOTONIC));
         return;
       case Action::kRelease:
         if (is_owner(sample.client, sender)) (void)lease_.release(sample.client);
@@ -99,7 +99,7 @@ void Server::acquire(const tandem_msgs::LinkRequest& sample, const std::optional
   const std::lock_guard lock(owner_mutex_);
   if (lease_.owner() == sample.client && sender != owner_sender_) return;  // another one's number
   const char* name = sample.name == nullptr ? "" : sample.name;
-  if (lease_.acquire(sample.client, name, now_ns())) owner_sender_ = sender;
+  if (lease_.acquire(sample.client, name, clock_ns(CLOCK_MONOTONIC))) owner_sender_ = sender;
 }
 
 bool Server::is_owner(std::uint64_t client, const std::optional<Sender>& sender) {
@@ -134,7 +134,7 @@ Verdict Server::judge(const tandem_msgs::LinkCommand& sample, const std::optiona
     return Verdict::kStale;
   }
   if (!unpack(sample)) return Verdict::kMalformed;
-  lease_.heard(now_ns());
+  lease_.heard(clock_ns(CLOCK_MONOTONIC));
   newest_.publish();
   return Verdict::kTaken;
 }
@@ -189,7 +189,7 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
 }
 
 OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) const noexcept TANDEM_RT {
-  const std::int64_t now = now_ns();
+  const std::int64_t now = clock_ns(CLOCK_MONOTONIC);
   if (now - lease_.heard_ns() > ns(config_.lease_timeout_s)) return OwnerLoss::kSilent;
   const Taken& taken = newest_.front();
   if (config_.lockstep) {
@@ -204,7 +204,7 @@ OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) const 
 
 std::int64_t Server::wait_until_ns(const hal::PortView& view) noexcept {
   if (view.phase == RunPhase::kShutDown || view.phase == RunPhase::kDone) return 0;
-  const std::int64_t now = now_ns();
+  const std::int64_t now = clock_ns(CLOCK_MONOTONIC);
   const std::uint64_t owner = lease_.owner();
   if (owner == 0) {
     waits_since_ns_ = 0;
@@ -264,7 +264,7 @@ void Server::measure(const hal::PortView& view, const Taken& taken) noexcept TAN
   answered_sequence_ = taken.sequence;
   answered_cycle_ = taken.cycle;
   answered_ns_ = taken.sent_ns;
-  age_.record(now_ns() - taken.state_ns);
+  age_.record(clock_ns(CLOCK_MONOTONIC) - taken.state_ns);
   age_cycles_.record(static_cast<std::int64_t>(view.time.cycle - taken.cycle));
 }
 

@@ -101,7 +101,7 @@ Server::Shown Server::shown_of(const hal::PortView& view) noexcept TANDEM_RT {
           .answered_cycle = answered_cycle_,
           .owner = lease_.owner(),
           .time_ns = view.time.time_ns,
-          .sent_ns = now_ns(),
+          .sent_ns = clock_ns(CLOCK_MONOTONIC),
           .answered_ns = answered_ns_,
           .phase = static_cast<std::uint8_t>(view.phase),
           .code = static_cast<std::uint8_t>(view.read_code),

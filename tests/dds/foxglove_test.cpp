@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "base/quoting.hpp"
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
 
@@ -20,18 +21,6 @@ constexpr const char* kNode = TANDEM_NODE;
 #else
 constexpr const char* kNode = nullptr;
 #endif
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '\n': out += "\\n"; break;
-      case '"': out += "\\\""; break;
-      default: out += c;
-    }
-  }
-  return out;
-}
 
 std::string hex(const test::Bytes& bytes) {
   std::string out;
@@ -74,9 +63,9 @@ TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {
     const test::Codec codec(**participant, type);
     const auto sample = codec.sample(test::CdrWriter(test::pattern()).sample(*type.tree));
     ASSERT_TRUE(sample) << type.ros_name;
-    file << fmt::format(R"({{"type":"{}","definition":"{}","published":{},"cdr":"{}"}})",
-                        type.ros_name, escaped(type.definition), kPublished.contains(type.ros_name),
-                        hex(codec.bytes(*sample)))
+    file << fmt::format(R"({{"type":"{}","definition":{},"published":{},"cdr":"{}"}})",
+                        type.ros_name, quoted_text(type.definition),
+                        kPublished.contains(type.ros_name), hex(codec.bytes(*sample)))
          << "\n";
   }
   file.close();

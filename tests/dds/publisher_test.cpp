@@ -1,8 +1,7 @@
 // What of a run becomes samples, and when.
 #include "dds/publisher.hpp"
 
-#include <time.h>
-
+#include "base/clock_ns.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/dds/publisher_rig.hpp"
 #include "tests/support/rt_trap.hpp"
@@ -103,17 +102,11 @@ TEST(Publisher, TellsTheSimulationsTimeAlsoWhileItStandsStill) {
                                               100'000'000}));
 }
 
-std::int64_t now_ns(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
 TEST(Publisher, StampsTheWallClocksTimeWhereTimeIsNotSimulated) {
   PublisherRig rig({.simulated_time = false});
   auto joints = rig.reader<sensor_msgs::JointState>("joint_states");
-  rig.begin_ns = now_ns(CLOCK_MONOTONIC);
-  const std::int64_t wall_ns = now_ns(CLOCK_REALTIME);
+  rig.begin_ns = clock_ns(CLOCK_MONOTONIC);
+  const std::int64_t wall_ns = clock_ns(CLOCK_REALTIME);
   rig.start();
   rig.show_all(0, 100);
   rig.publisher->stop();

@@ -1,22 +1,15 @@
 #include "hal/ethercat-can/sdo_sequence.hpp"
 
 #include "hal/ethercat-can/node_master.hpp"
+#include "tests/canopen/wire.hpp"
 #include "tests/ethercat_can/rig.hpp"
 
 namespace tandem::hal::can {
 namespace {
 
 using canopen::Frame;
+using canopen::wire;
 using test::robot_config;
-
-Frame wire(std::uint32_t id, std::initializer_list<int> bytes) {
-  Frame frame;
-  frame.id = id;
-  frame.length = static_cast<std::uint8_t>(bytes.size());
-  std::size_t i = 0;
-  for (const int byte : bytes) frame.data[i++] = static_cast<std::uint8_t>(byte);
-  return frame;
-}
 
 const SdoStep* find(const std::vector<SdoStep>& steps, int index, int sub, bool last = false) {
   const SdoStep* found = nullptr;

@@ -12,9 +12,10 @@
 
 #include <cstdint>
 #include <cstdlib>
-#include <ctime>
 #include <string>
 #include <vector>
+
+#include "base/clock_ns.hpp"
 
 namespace tandem::test {
 
@@ -23,17 +24,11 @@ inline void shell(const std::string& command) {
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
 }
 
-[[nodiscard]] inline std::int64_t monotonic_ns() {
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
-
 /// Calls `done` every millisecond until it answers true. @return false after `patience_s`.
 template <class Done>
 [[nodiscard]] bool eventually(Done done, std::int64_t patience_s = 10) {
-  const std::int64_t end = monotonic_ns() + patience_s * 1'000'000'000;
-  while (monotonic_ns() < end) {
+  const std::int64_t end = clock_ns(CLOCK_MONOTONIC) + patience_s * 1'000'000'000;
+  while (clock_ns(CLOCK_MONOTONIC) < end) {
     if (done()) return true;
     ::usleep(1000);
   }

@@ -98,7 +98,7 @@ class LinkChecks : public testing::Test {
     out.client = kClient;
     out.sequence_number = ++sequence_;
     out.cycle = served.cycle->progress().cycles.load() - 1;
-    out.state_ns = out.sent_ns = now_ns();
+    out.state_ns = out.sent_ns = clock_ns(CLOCK_MONOTONIC);
     out.live = true;
     out.stop = static_cast<std::uint8_t>(hal::StopCategory::kWarn);
     out.command._buffer = reinterpret_cast<std::uint8_t*>(image_.bytes().data());

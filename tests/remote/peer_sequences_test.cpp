@@ -19,7 +19,7 @@ using namespace test;
 
 constexpr std::size_t kLanes = 6;  // sequences at a time: they mostly wait
 
-std::int64_t in_ms(std::int64_t ms) { return now_ns() + ms * 1'000'000; }
+std::int64_t in_ms(std::int64_t ms) { return clock_ns(CLOCK_MONOTONIC) + ms * 1'000'000; }
 
 /// A process with its loop, that comes and goes.
 class Peer {
@@ -54,7 +54,9 @@ void Peer::join(double patience_s, const std::atomic<bool>& left) {
   config.lockstep = true;
   config.server = run_->served.server->number();
   config.connect_timeout_s = patience_s;
-  config.interrupted = [this, &left] { return run_->over() || left || now_ns() > until_ns_; };
+  config.interrupted = [this, &left] {
+    return run_->over() || left || clock_ns(CLOCK_MONOTONIC) > until_ns_;
+  };
   until_ns_ = in_ms(static_cast<std::int64_t>(patience_s * 1e3));
   auto made = Owner::connect(**participant_, config, robot_);
   if (made) backend_ = std::move(*made);
@@ -62,7 +64,8 @@ void Peer::join(double patience_s, const std::atomic<bool>& left) {
 
 void Peer::answer(std::uint32_t cycles, std::int64_t patience_ms) {
   until_ns_ = in_ms(patience_ms);
-  for (; cycles > 0 && backend_ != nullptr && now_ns() < until_ns_; --cycles) answer_one();
+  for (; cycles > 0 && backend_ != nullptr && clock_ns(CLOCK_MONOTONIC) < until_ns_; --cycles)
+    answer_one();
 }
 
 void Peer::answer_one() {
