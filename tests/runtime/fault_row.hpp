@@ -114,6 +114,12 @@ inline void expect_stopped(FaultRig& rig, const std::string& cause) {
   EXPECT_NE(rig.backend->status_text().find(" s"), std::string::npos) << "with its time";
 }
 
+/// The newest injected fault has struck so many frames: without it the row would say nothing.
+inline void expect_struck(const FaultRig& rig, std::uint32_t frames) {
+  ASSERT_FALSE(rig.backend->emulated->faults().empty());
+  EXPECT_EQ(rig.backend->emulated->faults().back().struck, frames);
+}
+
 inline void expect_running(FaultRig& rig) {
   EXPECT_FALSE(rig.noticed()) << rig.causes();
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning);

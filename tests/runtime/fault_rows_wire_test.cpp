@@ -46,6 +46,7 @@ TEST(FaultRow, CommandLostOnce) {
   rig.run();
   rig.inject(lose(kCommandOfBoard0, 1));
   for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 1);
   expect_running(rig);
   expect_row({});
 }
@@ -55,6 +56,7 @@ TEST(FaultRow, CommandLostTenTimes) {
   rig.run();
   rig.inject(lose(kCommandOfBoard0, 10));
   for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 10);
   expect_running(rig);
   expect_row({});
 }
@@ -111,6 +113,7 @@ TEST(FaultRow, FrameCorruptedOnce) {
   fault.seed = 3;
   rig.inject(fault);
   for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 1);
   expect_running(rig);
   expect_row({});
 }
@@ -123,8 +126,8 @@ TEST(FaultRow, FrameTooShort) {
   fault.length = 4;
   rig.inject(fault);
   expect_row(rig.watch());
-  const std::uint32_t latest = rig.board(0).dictionary().value<std::uint32_t>(0x1003, 1);
-  EXPECT_TRUE(latest == 0xFF01 || (latest & 0xFFFF) == 0xFF01 || latest == 0x8210) << latest;
+  EXPECT_EQ(rig.board(0).dictionary().value<std::uint32_t>(0x1003, 1), 0x8210U)
+      << "not processed, for its length";
   expect_stopped(rig, "0xFF01");
 }
 
@@ -146,6 +149,7 @@ TEST(FaultRow, FrameTwice) {
   fault.kind = FaultKind::kFrameDuplicate;
   rig.inject(fault);
   for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 100);
   expect_running(rig);
   expect_row({});
 }
@@ -157,6 +161,7 @@ TEST(FaultRow, FramesReordered) {
   fault.kind = FaultKind::kFrameReorder;
   rig.inject(fault);
   for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 10);
   expect_running(rig);
   expect_row({});
 }
@@ -178,7 +183,10 @@ TEST(FaultRow, BusDownForFiveCycles) {
   Fault fault = of(FaultKind::kBusDown);
   fault.duration_ns = 5'000'000;
   rig.inject(fault);
-  for (int i = 0; i < 200; ++i) rig.step();
+  for (int i = 0; i < 5; ++i) rig.step();
+  for (std::size_t j = 0; j < 6; ++j) EXPECT_EQ(rig.cycle->state().age_cycles()[j], 5U);
+  for (int i = 0; i < 195; ++i) rig.step();
+  for (std::size_t j = 0; j < 6; ++j) EXPECT_EQ(rig.cycle->state().age_cycles()[j], 0U);
   expect_running(rig);
   expect_row({});
 }

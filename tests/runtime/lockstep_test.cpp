@@ -1,5 +1,9 @@
 // In lockstep a run over CAN is the in-process run, bit for bit.
 #include "tests/runtime/lockstep.hpp"
+
+#include <algorithm>
+
+#include "base/archive.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "log/compare.hpp"
 #include "model/kernel_library.hpp"
@@ -65,6 +69,14 @@ class Squat {
   std::unique_ptr<ControllerHost> host;
 };
 
+/// The plants, to the last bit: what the log of a run over CAN does not have.
+void expect_same_robot(sim::EmulatedRobot& a, sim::EmulatedRobot& b) {
+  Archive one, other;
+  const_cast<sim::Plant&>(a.plant()).archive(one);  // it is written from
+  const_cast<sim::Plant&>(b.plant()).archive(other);
+  EXPECT_TRUE(std::ranges::equal(one.bytes(), other.bytes()));
+}
+
 class Lockstep : public testing::TestWithParam<const char*> {};
 
 /// `cycles` of a squat in process and over the wire, compared; 0: all of it.
@@ -90,6 +102,7 @@ void expect_same_squat(const std::string& name, std::uint64_t cycles, bool bus_t
                               << topic.first->b;
     EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
   }
+  expect_same_robot((*sim)->robot(), *robot.emulated);
 }
 
 TEST_P(Lockstep, ASquatFromPowerOnIsTheInProcessRunBitForBit) {
@@ -136,6 +149,11 @@ TEST_P(Lockstep, AScenariosFaultsAreTheSameBitsOnEitherSide) {
     EXPECT_FALSE(topic.first) << topic.topic << ", message " << topic.first->message << ": "
                               << topic.first->signal;
     EXPECT_EQ(topic.messages_a, topic.messages_b) << topic.topic;
+  }
+  expect_same_robot((*sim)->robot(), *robot.emulated);
+  ASSERT_EQ((*sim)->robot().faults().size(), faults.size());
+  for (const sim::FaultSlot& slot : (*sim)->robot().faults()) {
+    EXPECT_GT(slot.struck, 5U) << hal::to_string(slot.fault.kind);
   }
 }
 
