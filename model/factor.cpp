@@ -13,12 +13,12 @@ using Eigen::Vector3d;
 
 constexpr double kExact = 1e-14;  // below this an entry is rounding noise
 
-Turn<double> make_turn(int axis, double c, double s) {
+AxisRotation<double> make_turn(int axis, double c, double s) {
   const double norm = std::hypot(c, s);
   return {axis, c / norm, s / norm, 2.0 * c / norm};
 }
 
-Matrix3d matrix_of(const Turn<double>& turn) {
+Matrix3d matrix_of(const AxisRotation<double>& turn) {
   Matrix3d R = Matrix3d::Identity();
   const int i = (turn.axis + 1) % 3;
   const int j = (turn.axis + 2) % 3;
@@ -29,14 +29,14 @@ Matrix3d matrix_of(const Turn<double>& turn) {
 }
 
 // The turn about `axis` that moves e_b (b != axis) towards `image`.
-Turn<double> turn_towards(int axis, int b, const Vector3d& image) {
+AxisRotation<double> turn_towards(int axis, int b, const Vector3d& image) {
   const int i = (axis + 1) % 3;
   const int j = (axis + 2) % 3;
   if (b == i) return make_turn(axis, image[i], image[j]);
   return make_turn(axis, image[j], -image[i]);
 }
 
-bool one_turn(const Matrix3d& Q, std::vector<Turn<double>>& turns) {
+bool one_turn(const Matrix3d& Q, std::vector<AxisRotation<double>>& turns) {
   for (int k = 0; k < 3; ++k) {
     if ((Q.col(k) - Vector3d::Unit(k)).lpNorm<Eigen::Infinity>() > kExact) continue;
     const int i = (k + 1) % 3;
@@ -47,8 +47,8 @@ bool one_turn(const Matrix3d& Q, std::vector<Turn<double>>& turns) {
 }
 
 // Q as turns, the first outermost; none when Q is the identity.
-std::vector<Turn<double>> factor_turns(const Matrix3d& Q) {
-  std::vector<Turn<double>> turns;
+std::vector<AxisRotation<double>> factor_turns(const Matrix3d& Q) {
+  std::vector<AxisRotation<double>> turns;
   if ((Q - Matrix3d::Identity()).lpNorm<Eigen::Infinity>() < kExact) return turns;
   if (one_turn(Q, turns)) return turns;
   for (int a = 0; a < 3; ++a) {
@@ -88,7 +88,7 @@ FixedRotation factor_rotation(const Matrix3d& R) {
       if (P.determinant() < 0.0) continue;
       candidate.turns = factor_turns(R * P.transpose());
       double angle = 0.0;
-      for (const Turn<double>& turn : candidate.turns)
+      for (const AxisRotation<double>& turn : candidate.turns)
         angle += std::abs(std::atan2(turn.s, turn.c));
       const std::size_t count = candidate.turns.size();
       if (count > fewest || (count == fewest && angle > smallest_angle - 1e-9)) continue;

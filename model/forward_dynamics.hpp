@@ -107,8 +107,8 @@ class ForwardDynamics {
       bias.n[i] += joint.Un[i] * u;
     }
     if (armature == 0.0) (slides ? bias.f : bias.n)[2] = tau_[m_.v_index(j)];
-    add_to(parent.inertia, up(joint.transform, x));
-    parent.bias = parent.bias + up(joint.transform, bias);
+    add_to(parent.inertia, to_parent(joint.transform, x));
+    parent.bias = parent.bias + to_parent(joint.transform, bias);
   }
 
   // x - U U^T / D; without armature nothing is left in the joint's own row and column.

@@ -35,7 +35,7 @@ class InverseDynamics {
       const JointTransform<S> t = joint_transform(m_.joints[j], q_[m_.q_index(j)]);
       const Force<S> child = visit(j + 1, next_motion(t, motion, v_[i], vdot));
       tau_[i] = (m_.joints[j].prismatic ? child.f[2] : child.n[2]) + m_.joints[j].armature * vdot;
-      force = force + up(t, child);
+      force = force + to_parent(t, child);
     }
     return force;
   }
@@ -69,8 +69,8 @@ class SensorWrenches {
   void write(const MechanismSensor& sensor, std::span<S> out) const {
     Force<S> force = inertial_force(sensor.beyond, motions_[sensor.body]) -
                      external_force(m_, sensor.body, wrench_, &sensor.sites);
-    for (const int j : sensor.joints) force = force + up(transforms_[j], subtree(j + 1));
-    if (sensor.through >= 0) force = up(transforms_[sensor.through], force);
+    for (const int j : sensor.joints) force = force + to_parent(transforms_[j], subtree(j + 1));
+    if (sensor.through >= 0) force = to_parent(transforms_[sensor.through], force);
     const auto& [R, p] = sensor.in_body;
     const Vec3<S> f = rotate_back(R, force.f);
     const Vec3<S> n = rotate_back(R, force.n - cross(p, force.f));
@@ -83,7 +83,7 @@ class SensorWrenches {
   Force<S> subtree(int body) const {
     Force<S> force =
         inertial_force(m_.true_moments[body], motions_[body]) - external_force(m_, body, wrench_);
-    for (const int j : m_.children[body]) force = force + up(transforms_[j], subtree(j + 1));
+    for (const int j : m_.children[body]) force = force + to_parent(transforms_[j], subtree(j + 1));
     return force;
   }
 

@@ -14,7 +14,7 @@ namespace tandem::model {
 template <class S>
 struct JointTransform {
   const MechanismJoint* joint;
-  Turn<S> turn;   ///< revolute: by q + offset about z
+  AxisRotation<S> turn;   ///< revolute: by q + offset about z
   S slide = 0.0;  ///< prismatic: q along z
 };
 
@@ -42,17 +42,17 @@ template <class S>
 
 /// A direction's components in the body's frame.
 template <class S>
-[[nodiscard]] Vec3<S> down(const JointTransform<S>& t, const Vec3<S>& v) {
+[[nodiscard]] Vec3<S> to_child(const JointTransform<S>& t, const Vec3<S>& v) {
   const Vec3<S> fixed = rotate_back(t.joint->in_parent.R, v);
   return t.joint->prismatic ? fixed : rotate(t.turn.inverse(), fixed);
 }
 template <class S>
-[[nodiscard]] Vec3<S> up(const JointTransform<S>& t, const Vec3<S>& v) {
+[[nodiscard]] Vec3<S> to_parent(const JointTransform<S>& t, const Vec3<S>& v) {
   return rotate(t.joint->in_parent.R, t.joint->prismatic ? v : rotate(t.turn, v));
 }
 /// Inertias (moments or articulated) seen from the parent's frame.
 template <class S, template <class> class Inertial>
-[[nodiscard]] Inertial<S> up(const JointTransform<S>& t, Inertial<S> x) {
+[[nodiscard]] Inertial<S> to_parent(const JointTransform<S>& t, Inertial<S> x) {
   if (t.joint->prismatic) {
     shift(x, 2, t.slide);
   } else {
@@ -64,14 +64,14 @@ template <class S, template <class> class Inertial>
   return x;
 }
 template <class S>
-[[nodiscard]] Force<S> up(const JointTransform<S>& t, const Force<S>& x) {
+[[nodiscard]] Force<S> to_parent(const JointTransform<S>& t, const Force<S>& x) {
   Vec3<S> n = x.n;
   if (t.joint->prismatic) {
     n[0] -= t.slide * x.f[1];
     n[1] += t.slide * x.f[0];
   }
-  const Vec3<S> f = up(t, x.f);
-  return {f, up(t, n) + cross(t.joint->in_parent.p, f)};
+  const Vec3<S> f = to_parent(t, x.f);
+  return {f, to_parent(t, n) + cross(t.joint->in_parent.p, f)};
 }
 /// The body's angular and linear quantity (of its origin) from its parent's, with the joint at
 /// rest: velocities, or accelerations where no velocity matters.
@@ -79,8 +79,8 @@ template <class S>
 void carry_down(const JointTransform<S>& t, const Vec3<S>& angular, const Vec3<S>& linear,
                 Vec3<S>& body_angular, Vec3<S>& body_linear) {
   const auto& [R, p] = t.joint->in_parent;
-  body_angular = down(t, angular);
-  body_linear = down(t, linear - cross(p, angular));
+  body_angular = to_child(t, angular);
+  body_linear = to_child(t, linear - cross(p, angular));
   if (t.joint->prismatic) {
     body_linear[0] += t.slide * body_angular[1];
     body_linear[1] -= t.slide * body_angular[0];
@@ -115,9 +115,9 @@ template <class S>
 [[nodiscard]] BodyMotion<S> next_motion(const JointTransform<S>& t, const BodyMotion<S>& parent,
                                         const S& v, const S& vdot) {
   BodyMotion<S> body;
-  body.w = down(t, parent.w);
-  body.al = down(t, parent.al);
-  body.a = down(t, parent.a + multiply(parent.U, vec<S>(t.joint->in_parent.p)));
+  body.w = to_child(t, parent.w);
+  body.al = to_child(t, parent.al);
+  body.a = to_child(t, parent.a + multiply(parent.U, vec<S>(t.joint->in_parent.p)));
   if (t.joint->prismatic) {
     body.U = acceleration_matrix(body.w, body.al);
     for (int i = 0; i < 3; ++i) body.a[i] += body.U[i][2] * t.slide;

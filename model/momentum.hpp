@@ -62,9 +62,9 @@ class MassMatrix {
         const S entry = slides ? column.force.f[2] : column.force.n[2];
         const bool own = column.index == m_.v_index(j);
         set(m_.v_index(j), column.index, own ? entry + m_.joints[j].armature : entry);
-        columns.push_back({column.index, up(t, column.force)});
+        columns.push_back({column.index, to_parent(t, column.force)});
       }
-      add_to(composite, up(t, child));
+      add_to(composite, to_parent(t, child));
     }
     return composite;
   }
@@ -121,12 +121,12 @@ class CenterOfMass {
     for (const int j : m_.children[body]) {
       const JointTransform<S> t = joint_transform(m_.joints[j], q_[m_.q_index(j)]);
       Mat3<S> child_R;
-      for (int row = 0; row < 3; ++row) child_R[row] = down(t, R[row]);
+      for (int row = 0; row < 3; ++row) child_R[row] = to_child(t, R[row]);
       const Moments<S> child = visit(j + 1, child_R);
       const Vec3<S> column = m_.joints[j].prismatic ? Vec3<S>{S(0.0), S(0.0), child.m}
                                                     : Vec3<S>{-child.h[1], child.h[0], S(0.0)};
       set_column(m_.v_index(j), multiply(child_R, column));
-      add_to(sum, up(t, child));
+      add_to(sum, to_parent(t, child));
     }
     return sum;
   }
@@ -189,8 +189,8 @@ class Momentum {
       const Total child = visit(j + 1, w, v);
       const S own = slides ? child.momentum.f[2] : child.momentum.n[2];
       energy2_ += rate * (own + m_.joints[j].armature * rate);
-      total.momentum = total.momentum + up(t, child.momentum);
-      add_to(total.moments, up(t, child.moments));
+      total.momentum = total.momentum + to_parent(t, child.momentum);
+      add_to(total.moments, to_parent(t, child.moments));
     }
     return total;
   }

@@ -22,7 +22,7 @@ template <class S>
     const BodyPose<S>& parent = poses[m.joints[j].parent];
     const JointTransform<S> t = joint_transform(m.joints[j], q[m.q_index(j)]);
     BodyPose<S> body;
-    for (int row = 0; row < 3; ++row) body.R[row] = down(t, parent.R[row]);
+    for (int row = 0; row < 3; ++row) body.R[row] = to_child(t, parent.R[row]);
     body.p = parent.p + multiply(parent.R, m.joints[j].in_parent.p);
     if (m.joints[j].prismatic)
       for (int i = 0; i < 3; ++i) body.p[i] += body.R[i][2] * t.slide;

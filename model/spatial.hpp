@@ -61,18 +61,18 @@ template <class S>
 
 /// A rotation about one coordinate axis: R = R(axis, angle).
 template <class T>
-struct Turn {
+struct AxisRotation {
   int axis = 2;
   T c = 1.0;   ///< cosine
   T s = 0.0;   ///< sine
   T c2 = 2.0;  ///< twice the cosine
 
-  [[nodiscard]] Turn inverse() const { return {axis, c, -s, c2}; }
+  [[nodiscard]] AxisRotation inverse() const { return {axis, c, -s, c2}; }
 };
 
 /// R v
 template <class S, class T>
-[[nodiscard]] Vec3<S> rotate(const Turn<T>& turn, const Vec3<S>& v) {
+[[nodiscard]] Vec3<S> rotate(const AxisRotation<T>& turn, const Vec3<S>& v) {
   const int i = (turn.axis + 1) % 3;
   const int j = (turn.axis + 2) % 3;
   Vec3<S> result = v;
@@ -84,7 +84,7 @@ template <class S, class T>
 /// R A R^T in 15 operations: with k = s (a_ii - a_jj) + 2 c a_ij the block of the two turned
 /// axes becomes [a_ii - s k, c k - a_ij; ., a_jj + s k].
 template <class S, class T>
-[[nodiscard]] Sym3<S> rotate(const Turn<T>& turn, const Sym3<S>& a) {
+[[nodiscard]] Sym3<S> rotate(const AxisRotation<T>& turn, const Sym3<S>& a) {
   const int k = turn.axis;
   const int i = (k + 1) % 3;
   const int j = (k + 2) % 3;
@@ -101,7 +101,7 @@ template <class S, class T>
 
 /// R A R^T, A without symmetry: the same identity, k = s (a_ii - a_jj) + c (a_ij + a_ji).
 template <class S, class T>
-[[nodiscard]] Mat3<S> rotate(const Turn<T>& turn, const Mat3<S>& a) {
+[[nodiscard]] Mat3<S> rotate(const AxisRotation<T>& turn, const Mat3<S>& a) {
   const int k = turn.axis;
   const int i = (k + 1) % 3;
   const int j = (k + 2) % 3;
@@ -123,7 +123,7 @@ template <class S, class T>
 /// A rotation that does not change, as few turns about axes after a signed permutation:
 /// R = turns[0] turns[1] … P.
 struct FixedRotation {
-  std::vector<Turn<double>> turns;
+  std::vector<AxisRotation<double>> turns;
   std::array<int, 3> from{0, 1, 2};  ///< (P v)[r] = sign[r] v[from[r]]
   std::array<double, 3> sign{1.0, 1.0, 1.0};
 };
@@ -159,7 +159,7 @@ template <class X>
 /// R^T v
 template <class S>
 [[nodiscard]] Vec3<S> rotate_back(const FixedRotation& r, Vec3<S> v) {
-  for (const Turn<double>& turn : r.turns) v = rotate(turn.inverse(), v);
+  for (const AxisRotation<double>& turn : r.turns) v = rotate(turn.inverse(), v);
   Vec3<S> result;
   for (int i = 0; i < 3; ++i) result[r.from[i]] = r.sign[i] * v[i];
   return result;

@@ -37,7 +37,7 @@ AxisScale AxisScale::of(const JointConfig& joint) {
           .mille_per_Nm = 1.0e6 / rated_mNm};
 }
 
-void RawFeedback::take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+void RawFeedback::decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
   switch (field) {
     case WireField::kStatusword: statusword = get<std::uint16_t>(bytes); break;
     case WireField::kPosition: position = get<std::int32_t>(bytes); break;
@@ -62,7 +62,7 @@ void RawFeedback::adopt(const RawFeedback& sample) noexcept TANDEM_RT {
   motor_position = sample.motor_position;
 }
 
-void RawCommand::give(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT {
+void RawCommand::encode(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT {
   switch (field) {
     case WireField::kControlword: put(bytes, controlword); break;
     case WireField::kMode: put(bytes, mode); break;

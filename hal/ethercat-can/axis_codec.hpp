@@ -45,7 +45,7 @@ struct RawFeedback {
   std::int16_t temperature = 0;
   std::int8_t mode_display = 0;
 
-  void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT;
+  void decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT;
   /// Takes over the values that travel every SYNC.
   void adopt(const RawFeedback& sample) noexcept TANDEM_RT;
   void archive(Archive& ar);
@@ -63,7 +63,7 @@ struct RawCommand {
   std::int16_t target_current = 0;
   std::int8_t mode = 0;
 
-  void give(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT;
+  void encode(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT;
   void archive(Archive& ar);
 };
 

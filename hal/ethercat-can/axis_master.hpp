@@ -47,12 +47,12 @@ class AxisMaster {
   }
 
   /// A field of a slow TPDO: counts at once.
-  void take(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
-    feedback_.take(field, bytes);
+  void decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+    feedback_.decode(field, bytes);
   }
   /// A field of an every-SYNC TPDO: counts when received() says that the sample is whole.
   void take_sample(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
-    sample_.take(field, bytes);
+    sample_.decode(field, bytes);
   }
   /// The axis' error code from an emergency of its board.
   void on_emergency(std::uint16_t code) noexcept TANDEM_RT { emergency_code_ = code; }

@@ -163,7 +163,7 @@ void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
       axes[node.plan.joints[field.axis]].take_sample(field.field, bytes);
       joint_fresh[node.plan.joints[field.axis]] = whole ? 1 : 0;
     } else {
-      axes[node.plan.joints[field.axis]].take(field.field, bytes);
+      axes[node.plan.joints[field.axis]].decode(field.field, bytes);
     }
   }
   if (pdo.group == PdoGroup::kSensor && whole) node.channels = node.sample;
@@ -258,7 +258,7 @@ void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
         if (field.field == WireField::kCycleCounter) {
           *bytes = counter;
         } else {
-          axes[node.plan.joints[field.axis]].raw().give(field.field, bytes);
+          axes[node.plan.joints[field.axis]].raw().encode(field.field, bytes);
         }
       }
       const bool due =

@@ -74,15 +74,15 @@ TEST_F(Codec, FeedbackFromLiteralBytes) {
   const std::array<std::uint8_t, 2> voltage{0x60, 0x09};               // 2400
   const std::array<std::uint8_t, 2> temperature{0x6E, 0x01};           // 366
   const std::array<std::uint8_t, 1> mode{0xFF};                        // -1
-  feedback.take(WireField::kStatusword, status.data());
-  feedback.take(WireField::kPosition, position.data());
-  feedback.take(WireField::kVelocity, velocity.data());
-  feedback.take(WireField::kTorque, torque.data());
-  feedback.take(WireField::kMotorPosition, motor.data());
-  feedback.take(WireField::kCurrent, current.data());
-  feedback.take(WireField::kVoltage, voltage.data());
-  feedback.take(WireField::kTemperature, temperature.data());
-  feedback.take(WireField::kModeDisplay, mode.data());
+  feedback.decode(WireField::kStatusword, status.data());
+  feedback.decode(WireField::kPosition, position.data());
+  feedback.decode(WireField::kVelocity, velocity.data());
+  feedback.decode(WireField::kTorque, torque.data());
+  feedback.decode(WireField::kMotorPosition, motor.data());
+  feedback.decode(WireField::kCurrent, current.data());
+  feedback.decode(WireField::kVoltage, voltage.data());
+  feedback.decode(WireField::kTemperature, temperature.data());
+  feedback.decode(WireField::kModeDisplay, mode.data());
   decode_feedback(scale(), feedback, 0, state);
   EXPECT_DOUBLE_EQ(state.position_rad()[0], -std::numbers::pi / 2);
   EXPECT_DOUBLE_EQ(state.velocity_rad_s()[0], std::numbers::pi / 180.0);
@@ -105,11 +105,11 @@ TEST_F(Codec, CommandToLiteralBytes) {
   out.torque_offset = -250;
   out.stiffness = 1.0F;
   std::array<std::uint8_t, 16> bytes{};
-  out.give(WireField::kControlword, &bytes[0]);
-  out.give(WireField::kMode, &bytes[2]);
-  out.give(WireField::kTargetPosition, &bytes[3]);
-  out.give(WireField::kTorqueOffset, &bytes[7]);
-  out.give(WireField::kStiffness, &bytes[9]);
+  out.encode(WireField::kControlword, &bytes[0]);
+  out.encode(WireField::kMode, &bytes[2]);
+  out.encode(WireField::kTargetPosition, &bytes[3]);
+  out.encode(WireField::kTorqueOffset, &bytes[7]);
+  out.encode(WireField::kStiffness, &bytes[9]);
   EXPECT_EQ(bytes, (std::array<std::uint8_t, 16>{0x0F, 0x00, 0xFF, 0xD8, 0xDC, 0xFF, 0xFF, 0x06,
                                                  0xFF, 0x00, 0x00, 0x80, 0x3F}));
 }
