@@ -2,6 +2,7 @@
 // order.
 #include "dds/joint_topics.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace tandem::dds {
@@ -23,6 +24,12 @@ constexpr std::array<Interface, 9> kInterfaces{{
     {"voltage", &hal::StateImage::voltage_V},
     {"temperature", &hal::StateImage::temperature_C},
 }};
+
+/// Every joint has been measured once: its sample is no older than the run.
+bool measured(const hal::StateImage& state) {
+  const std::uint64_t cycle = state.cycle()[0];
+  return std::ranges::all_of(state.age_cycles(), [=](std::uint32_t age) { return age <= cycle; });
+}
 
 std::vector<std::string> joint_names(const hal::RobotConfig& robot) {
   std::vector<std::string> names;
@@ -58,6 +65,7 @@ JointTopics::JointTopics(OutputMaker& maker, const RunDescription& run)
 }
 
 void JointTopics::publish(const CycleSample& sample) {
+  if (!measured(sample.state)) return;
   if (sample.is_due(Topic::kJointStates) && joint_states_.wanted()) {
     sensor_msgs::JointState message{};
     message.header = {ros_time(sample.stamp_ns), refer(no_frame_)};

@@ -82,13 +82,17 @@ void RobotView::follow(std::uint16_t channel, std::int64_t time_ns,
       CdrWriter(body_).text(robot_.urdf);
       emit(description_, body_);
     }
-    write_joint_states(time_ns, image);
-    emit(joint_states_, body_);
+    if (write_joint_states(time_ns, image)) emit(joint_states_, body_);
   }
   if (truth_.due(channel, time_ns) && write_base(time_ns, image)) emit(tf_, body_);
 }
 
-void RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::byte> state) {
+bool RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::byte> state) {
+  // Older than the run: a joint of which nothing has been measured yet.
+  read_field(state_layout_, "cycle", state, values_);
+  const double cycle = values_.front();
+  read_field(state_layout_, "age_cycles", state, values_);
+  if (std::ranges::any_of(values_, [cycle](double age) { return age > cycle; })) return false;
   CdrWriter out(body_);
   write_header(out, time_ns, "");
   out.number(static_cast<std::uint32_t>(joints_.size()));
@@ -97,6 +101,7 @@ void RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::by
     read_field(state_layout_, field, state, values_);
     out.list(values_);
   }
+  return true;
 }
 
 bool RobotView::write_base(std::int64_t time_ns, std::span<const std::byte> truth) {

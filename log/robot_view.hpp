@@ -49,7 +49,8 @@ class RobotView {
     std::int64_t last_period = std::numeric_limits<std::int64_t>::min();
     [[nodiscard]] bool due(std::uint16_t of, std::int64_t time_ns);
   };
-  void write_joint_states(std::int64_t time_ns, std::span<const std::byte> state);
+  /// @return false: a joint's board has not answered yet
+  bool write_joint_states(std::int64_t time_ns, std::span<const std::byte> state);
   /// @return false: the base's place is no number
   [[nodiscard]] bool write_base(std::int64_t time_ns, std::span<const std::byte> truth);
 

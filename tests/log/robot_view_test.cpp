@@ -19,7 +19,8 @@ struct Counts {
 
 /// A log of two joints on a base, `cycles` long.
 struct View {
-  explicit View(ViewedRobot robot, bool has_truth = true, std::uint64_t cycles = 100) {
+  explicit View(ViewedRobot robot, bool has_truth = true, std::uint64_t cycles = 100,
+                std::uint64_t first_answer = 0) {
     auto recorder =
         Recorder::open(path, {.robot = "two", .joints = {"hip", "knee"}, .period_ns = kCycle_ns},
                        {.viewed = std::move(robot)});
@@ -32,6 +33,9 @@ struct View {
     (*recorder)->start();
     for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
       const auto time_ns = static_cast<std::int64_t>(cycle) * kCycle_ns;
+      state.cycle()[0] = cycle;
+      state.age_cycles()[1] =
+          cycle < first_answer ? static_cast<std::uint32_t>(cycle) + 1 : std::uint32_t{0};
       state.position_rad()[0] = truth.base_position_m()[2] = static_cast<double>(cycle);
       (*recorder)->wait_for_space(2);
       (*recorder)->push(state_channel, time_ns, state.bytes());
@@ -78,6 +82,11 @@ TEST(RobotView, WritesJointStatesFiftyTimesASecondAndTheDescriptionOnce) {
   }
   const auto description = view.of("/robot_description");
   EXPECT_EQ(description[0], std::pair(std::int64_t{0}, std::string("\x09\0\0\0<robot/>\0", 13)));
+}
+
+TEST(RobotView, SaysNothingOfJointsThatHaveNotAnsweredYet) {
+  const View view({.urdf = "<robot/>"}, true, 100, 40);
+  EXPECT_EQ(view.counts(), (Counts{9, 0, 1})) << "of 0.12 to 0.3 s";
 }
 
 TEST(RobotView, EncodesAJointStateAsCdrHasIt) {
