@@ -95,8 +95,7 @@ TEST_F(Stops, AreNotConfirmedByAProcessThatDoesNotAnswer) {
   EXPECT_EQ(stop.status, 1);
   EXPECT_EQ(stop.err,
             "error: no answer within 3 s (a process that was stopped carries the stop out when it "
-            "goes on; "
-            "until then stop the robot by its own stop circuit)\n");
+            "continues; until then stop the robot by its own stop circuit)\n");
   signal("CONT");
   until(R"("phase": "faulted")");
   EXPECT_EQ(end(), 1);
