@@ -47,10 +47,11 @@ Result<pid_t> spawn(const Spawn& what) {
   posix_spawnattr_init(&attributes);
   if (what.own_group) posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t child = 0;
-  const int error =
-      posix_spawnp(&child, arguments[0], &actions, &attributes, arguments.data(), environ);
+  int error = posix_spawnp(&child, arguments[0], &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
+  // A folder of $PATH that is closed to this user makes it say EACCES of a program that is in none.
+  if (error == EACCES && !program_exists(what.command.front())) error = ENOENT;
   if (error != 0) {
     return fail(what.command.front() + " could not be started: " + std::strerror(error));
   }

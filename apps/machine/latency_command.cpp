@@ -23,12 +23,25 @@ namespace {
 void note(const std::string& text) { fmt::print(stderr, "note: {}\n", text); }
 
 /// What the thread set-up says on a thread of its own: asked before anything is measured.
-rt::ThreadReport granted(const LatencyPlan& plan, int cpu) {
+rt::ThreadReport granted(const rt::ThreadConfig& config) {
   rt::ThreadReport report;
-  std::thread([&] {
-    report = rt::set_up_thread({.policy = plan.policy, .priority = plan.priority, .cpu = cpu});
-  }).join();
+  std::thread([&] { report = rt::set_up_thread(config); }).join();
   return report;
+}
+
+bool cyclictest_runs() {
+  const std::string alone = "our loop is measured alone";
+  if (!program_exists("cyclictest")) {
+    note("cyclictest is not installed: " + alone + " (apt-get install rt-tests)");
+    return false;
+  }
+  // It asks for this before anything else, whatever its policy will be, and ends without it.
+  const rt::ThreadReport report =
+      granted({.policy = rt::SchedulingPolicy::kFifo, .priority = 1, .lock_memory = false});
+  if (report.complete()) return true;
+  note("cyclictest does not run without the right to real-time priorities: " + alone + " (" +
+       report.missing.front().how + ")");
+  return false;
 }
 
 /// CPUs and mode, as they were asked for or as the machine has them.
@@ -63,17 +76,16 @@ Result<LatencyPlan> plan_of(const LatencyOptions& options) {
                 : options.policy == "rr" ? rt::SchedulingPolicy::kRoundRobin
                                          : rt::SchedulingPolicy::kOther;
   if (const Status s = choose_cpus(options, plan); !s) return std::unexpected(s.error());
-  for (const rt::Missing& one : granted(plan, plan.cpus.front()).missing) {
+  const rt::ThreadConfig wanted{
+      .policy = plan.policy, .priority = plan.priority, .cpu = plan.cpus.front()};
+  for (const rt::Missing& one : granted(wanted).missing) {
     note(fmt::format("could not get {}: {} ({})", one.what, one.why, one.how));
     if (one.what.starts_with("SCHED_")) {
       plan.policy = rt::SchedulingPolicy::kOther;
-      note("both are measured with SCHED_OTHER");
+      note("measured with SCHED_OTHER");
     }
   }
-  plan.cyclictest = program_exists("cyclictest");
-  if (!plan.cyclictest) {
-    note("cyclictest is not installed: our loop is measured alone (apt-get install rt-tests)");
-  }
+  plan.cyclictest = cyclictest_runs();
   plan.folder = options.output;
   return plan;
 }

@@ -244,7 +244,7 @@ TEST_F(Topic, InASecuredDomainTheKeysOfATomlOpenEveryCommand) {
     GTEST_SKIP() << "the openssl command is not installed";
   }
   const std::string keys = (folder_ / "keys").string();
-  ASSERT_EQ(std::system((TANDEM_SOURCE_DIR "/examples/dds_security/make-files '" + keys +
+  ASSERT_EQ(std::system(("'" TANDEM_SOURCE_DIR "/examples/dds_security/make-files' '" + keys +
                          "' > /dev/null 2>&1")
                             .c_str()),
             0);

@@ -5,31 +5,30 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
+
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem {
 namespace {
 
-namespace fs = std::filesystem;
-
 class Process : public testing::Test {
  protected:
-  void SetUp() override { fs::create_directories(folder_); }
   [[nodiscard]] std::string said() const {
     std::ifstream in(output_);
     return {std::istreambuf_iterator<char>(in), {}};
   }
   /// Its exit status.
   int run(std::vector<std::string> command, int input = -1) {
-    const Result<pid_t> child = spawn(
-        {.command = std::move(command), .output = output_, .directory = folder_, .input = input});
+    const Result<pid_t> child = spawn({.command = std::move(command),
+                                       .output = output_,
+                                       .directory = folder_.path(),
+                                       .input = input});
     return child ? wait_for(*child) : -2;
   }
-  const std::string folder_ = testing::TempDir() + "process of a test";  // by all, at once
-  const std::string output_ = testing::TempDir() + "process_" +
-                              testing::UnitTest::GetInstance()->current_test_info()->name();
+  const test::ScratchFolder folder_;
+  const std::string output_ = folder_ / "output";
 };
 
 TEST_F(Process, GetsItsWordsAsTheyAre) {
@@ -38,8 +37,8 @@ TEST_F(Process, GetsItsWordsAsTheyAre) {
 }
 
 TEST_F(Process, WorksInItsFolderAndBothOutputsAreInTheFile) {
-  EXPECT_EQ(run({"sh", "-c", "basename \"$PWD\"; echo wrong >&2; exit 3"}), 3);
-  EXPECT_EQ(said(), "process of a test\nwrong\n");
+  EXPECT_EQ(run({"sh", "-c", "pwd; echo wrong >&2; exit 3"}), 3);
+  EXPECT_EQ(said(), folder_.path() + "\nwrong\n");
 }
 
 TEST_F(Process, HasAnEmptyInputOrTheOneThatIsGiven) {

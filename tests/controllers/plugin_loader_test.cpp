@@ -1,9 +1,9 @@
 #include "controllers/plugin_loader.hpp"
 
-#include <filesystem>
 #include <fstream>
 
 #include "tests/controllers/harness.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem {
 namespace {
@@ -80,10 +80,9 @@ TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {
 }
 
 TEST(PluginLoader, RefusesAFileThatIsNoLibrary) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "no_library";
-  std::filesystem::create_directories(folder);
+  const test::ScratchFolder folder;
   std::ofstream(folder / "text.so") << "this is no library";
-  const auto loaded = load_controller("text", {folder.string()});
+  const auto loaded = load_controller("text", {folder.path()});
   ASSERT_FALSE(loaded.has_value());
   EXPECT_TRUE(loaded.error().message.starts_with("cannot be loaded")) << loaded.error().message;
 }

@@ -12,6 +12,7 @@
 #include "base/quoting.hpp"
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -56,7 +57,8 @@ TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {
   auto domain = Domain::open(test::own_config());
   ASSERT_TRUE(domain) << domain.error().to_string();
   const auto participant = Participant::open(std::move(*domain), "codec");
-  const std::string path = fmt::format("{}tandem-samples-{}", testing::TempDir(), ::getpid());
+  const tandem::test::ScratchFolder scratch;
+  const std::string path = scratch / "samples";
   std::ofstream file(path);
   for (const Type& type : types()) {
     if (type.tree->request_or_response) continue;  // no message's encoding: who asked goes first
@@ -69,12 +71,10 @@ TEST(Messages, AreDecodedByAnotherProjectWithThePublishedDefinitions) {
          << "\n";
   }
   file.close();
-  const std::string command =
-      fmt::format("cd {} && {} decode_samples.mjs {} > {}.out 2>&1", folder, kNode, path, path);
+  const std::string command = fmt::format("cd '{}' && '{}' decode_samples.mjs '{}' > '{}.out' 2>&1",
+                                          folder, kNode, path, path);
   EXPECT_EQ(std::system(command.c_str()), 0) << content(path + ".out");
   std::printf("%s", content(path + ".out").c_str());
-  std::filesystem::remove(path);
-  std::filesystem::remove(path + ".out");
 }
 
 }  // namespace

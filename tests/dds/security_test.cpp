@@ -12,6 +12,7 @@
 #include "tests/dds/raw_topic.hpp"
 #include "tests/support/dds_domain.hpp"
 #include "tests/support/eventually.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -63,27 +64,26 @@ class Security : public testing::Test {
     if (std::system("openssl version > /dev/null 2>&1") != 0) {
       GTEST_SKIP() << "the openssl command is not installed";
     }
-    folder_ = fmt::format("{}tandem-security-{}", testing::TempDir(), ::getpid());
-    const std::string command = fmt::format(
-        "{}/examples/dds_security/make-files {} > /dev/null 2>&1", TANDEM_SOURCE_DIR, folder_);
-    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+    make_files(folder_.path());
   }
-  void TearDown() override {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  static void make_files(const std::string& folder) {
+    const std::string command = fmt::format(
+        "'{}/examples/dds_security/make-files' '{}' > /dev/null 2>&1", TANDEM_SOURCE_DIR, folder);
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
   }
 
   [[nodiscard]] Config secured() const {
     Config config = test::own_config();
-    config.security = {.identity_ca = folder_ + "/ca.pem",
-                       .identity_certificate = folder_ + "/robot.pem",
-                       .private_key = folder_ + "/robot.key",
-                       .permissions_ca = folder_ + "/ca.pem",
-                       .governance = folder_ + "/governance.p7s",
-                       .permissions = folder_ + "/permissions.p7s"};
+    config.security = {.identity_ca = folder_ / "ca.pem",
+                       .identity_certificate = folder_ / "robot.pem",
+                       .private_key = folder_ / "robot.key",
+                       .permissions_ca = folder_ / "ca.pem",
+                       .governance = folder_ / "governance.p7s",
+                       .permissions = folder_ / "permissions.p7s"};
     return config;
   }
 
-  std::string folder_;
+  const tandem::test::ScratchFolder folder_;
 };
 
 TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
@@ -113,13 +113,10 @@ TEST_F(Security, LetsTwoWithCertificatesTalkAndNobodyElseHear) {
 }
 
 TEST_F(Security, WithACertificateOfAnotherAuthorityIsAStranger) {
-  const std::string own = folder_;
+  const std::string own = folder_.path();
   Config foreign = secured();
   const std::string other = own + "/other";
-  ASSERT_EQ(std::system(fmt::format("{}/examples/dds_security/make-files {} > /dev/null 2>&1",
-                                    TANDEM_SOURCE_DIR, other)
-                            .c_str()),
-            0);
+  make_files(other);
   for (std::string* file : {&foreign.security.identity_ca, &foreign.security.identity_certificate,
                             &foreign.security.private_key, &foreign.security.permissions_ca,
                             &foreign.security.governance, &foreign.security.permissions}) {

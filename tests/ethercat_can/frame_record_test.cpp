@@ -1,12 +1,12 @@
 #include "hal/ethercat-can/frame_record.hpp"
 
 #include <array>
-#include <filesystem>
 #include <fstream>
 #include <regex>
 
 #include "hal/ethercat-can/loopback.hpp"
 #include "rt/scoped_realtime.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::hal::can {
 namespace {
@@ -37,9 +37,8 @@ TEST(FrameRecord, WritesCandumpsLines) {
 
 class FrameRecordFile : public testing::Test {
  protected:
-  std::string path_ =
-      testing::TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".log";
-  void TearDown() override { std::filesystem::remove(path_); }
+  const tandem::test::ScratchFolder folder_;
+  const std::string path_ = folder_ / "frames.log";
 };
 
 TEST_F(FrameRecordFile, HasWhatIsSentAndReceivedInOrder) {

@@ -1,12 +1,11 @@
 // A robot.toml beside its description: limits that it leaves open, names that do not fit.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "tests/hal/robot_config_text.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::hal {
 namespace {
@@ -56,13 +55,12 @@ TEST_F(Completed, SuggestsTheNearestForAJointThatTheDescriptionLacks) {
 
 /// What a text without other errors says of names, beside the description.
 std::string names_wrong(const std::string& text, const RobotDescription& d = description()) {
-  // Tests run side by side: each has a file of its own.
-  const std::string file = testing::TempDir() + "names-" + std::to_string(::getpid()) + ".toml";
+  const test::ScratchFolder folder;
+  const std::string file = folder / "names.toml";
   std::ofstream(file) << text;
   Diagnostics errors;
   std::vector<JointReference> loose;
   const RobotConfig robot = read_robot_config(file, errors, loose);
-  std::filesystem::remove(file);
   EXPECT_TRUE(errors.empty()) << errors.front().to_string();
   std::string all;
   for (const Error& error : check_names(robot, d, loose)) {

@@ -1,32 +1,18 @@
-// A folder of one test, removed with it, and what its files hold.
+// A folder of one test, and what its files hold.
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "tests/support/scratch_folder.hpp"
+
 namespace tandem::log {
 
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string pattern = testing::TempDir() + "tandem_log_XXXXXX";
-    if (::mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
+using test::ScratchFolder;
 
 inline std::string content(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

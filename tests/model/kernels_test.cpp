@@ -1,6 +1,5 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include "model/kernel_library.hpp"
 #include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::model {
 namespace {
@@ -192,18 +192,14 @@ TEST(Generator, HashFollowsWhatMattersAndNothingElse) {
   EXPECT_NE(description_hash(tree, spec), hash);
 }
 
-/// A file of this process' own: tests run side by side.
-std::filesystem::path own_file(const std::string& name) {
-  return std::filesystem::path(testing::TempDir()) / (std::to_string(::getpid()) + "-" + name);
-}
-
 TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
   auto library = load_kernels("/nonexistent/kernels.so");
   ASSERT_FALSE(library);
   EXPECT_NE(library.error().to_string().find("tandem model build"), std::string::npos);
-  const auto text = own_file("text.so");
+  const test::ScratchFolder folder;
+  const std::string text = folder / "text.so";
   std::ofstream(text) << "no library";
-  library = load_kernels(text.string());
+  library = load_kernels(text);
   ASSERT_FALSE(library);
   EXPECT_NE(library.error().message.find("was not made by tandem"), std::string::npos);
   library = load_kernels(built_library("ur5e"), std::string(64, '0'));
@@ -218,7 +214,8 @@ TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
 TEST(KernelLibrary, OpensNoDamagedOne) {
   std::ifstream in(built_library("double_pendulum"), std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(in), {}};
-  const auto path = own_file("damaged.so");
+  const test::ScratchFolder folder;
+  const std::string path = folder / "damaged.so";
   for (std::size_t i = 0; i < 60; ++i) {
     std::string damaged = whole;
     const std::size_t at = i < 30 ? 2 * i : whole.size() * (i - 30) / 30;
@@ -228,38 +225,27 @@ TEST(KernelLibrary, OpensNoDamagedOne) {
       damaged.resize(at);
     }
     std::ofstream(path, std::ios::binary) << damaged;
-    const auto library = load_kernels(path.string());
+    const auto library = load_kernels(path);
     ASSERT_FALSE(library) << i;
     EXPECT_NE(library.error().hint.find("tandem model build"), std::string::npos);
   }
   std::ofstream(path, std::ios::binary) << whole;
-  EXPECT_TRUE(load_kernels(path.string()));
+  EXPECT_TRUE(load_kernels(path));
 }
 
 TEST(KernelLibrary, OpensNoneThatOthersMayChange) {
-  const auto path = own_file("shared.so");
-  std::filesystem::copy_file(built_library("double_pendulum"), path,
-                             std::filesystem::copy_options::overwrite_existing);
+  const test::ScratchFolder folder;
+  const std::string path = folder / "shared.so";
+  std::filesystem::copy_file(built_library("double_pendulum"), path);
   std::filesystem::permissions(path, std::filesystem::perms::all);
-  const auto library = load_kernels(path.string());
+  const auto library = load_kernels(path);
   ASSERT_FALSE(library);
   EXPECT_EQ(library.error().message, "may be changed by everybody");
 }
 
-struct BuildFolder {
-  std::filesystem::path path = std::filesystem::path(testing::TempDir()) /
-                               testing::UnitTest::GetInstance()->current_test_info()->name();
-  BuildFolder() {
-    std::filesystem::remove_all(path);
-    std::filesystem::create_directories(path);
-  }
-  ~BuildFolder() { std::filesystem::remove_all(path); }
+struct BuildFolder : test::ScratchFolder {
   [[nodiscard]] BuildOptions options() const {
-    return {.library = (path / "k.so").string(),
-            .compiler = {},
-            .jobs = 1,
-            .progress = {},
-            .waiting = {}};
+    return {.library = *this / "k.so", .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}};
   }
 };
 
@@ -373,7 +359,7 @@ TEST(KernelBuild, WritesNoLibraryThatDisagreesWithTheDescription) {
   const ReferenceRobot& robot = reference_robot("double_pendulum");
   BuildOptions options = folder.options();
   ASSERT_TRUE(build_kernels(reference_tree(robot), reference_spec(robot), options));
-  options.compiler = (folder.path / "compiler").string();
+  options.compiler = folder / "compiler";
   std::ofstream(options.compiler)
       << "#!/bin/sh\nsed -i 's/9[.]81/9.82/g' part_*.cpp\nexec c++ \"$@\"\n";
   std::filesystem::permissions(options.compiler, std::filesystem::perms::owner_all);

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
-#include <filesystem>
 #include <random>
 
 #include "model/emit.hpp"
@@ -12,6 +11,7 @@
 #include "model/placements.hpp"
 #include "model/regular.hpp"
 #include "tests/model/reference.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::model {
 namespace {
@@ -294,9 +294,7 @@ TEST(Mimic, AFollowersMassIsEnoughForItsLeader) {
 
 // The generated text itself: angles that are products, compiled.
 TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "mimic_kernels";
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
+  const test::ScratchFolder folder;
   const ReferenceRobot& reference = reference_robot("double_pendulum");
   Tree tree = reference_tree(reference);
   tree.joints[1].leader = 0;
@@ -304,7 +302,7 @@ TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
   tree.joints[1].offset = 0.3;
   const ModelSpec spec = reference_spec(reference);
   EXPECT_NE(description_hash(tree, spec), description_hash(reference_tree(reference), spec));
-  const std::string library = (folder / "k.so").string();
+  const std::string library = folder / "k.so";
   const auto built = build_kernels(
       tree, spec, {.library = library, .compiler = {}, .jobs = 1, .progress = {}, .waiting = {}});
   ASSERT_TRUE(built) << built.error().to_string();
@@ -324,7 +322,6 @@ TEST(Mimic, CompiledKernelsComputeWhatTheAlgorithmsDoOnDoubles) {
   Array J(6 * k.sites);
   k.site_jacobians(s.q.data(), J.data());
   EXPECT_LE(relative_error(J, evaluate_kernel(Kernel::kSiteJacobians, m, {s.q})[0]), 1e-14);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(Placements, PutFollowersWhereTheKernelsDo) {

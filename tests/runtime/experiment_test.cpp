@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
+
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -323,17 +324,11 @@ TEST(Experiment, SuggestsTheNearestKey) {
 
 class ExperimentFiles : public testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() / (std::string("tandem_") + test->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
   std::string write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name) << text;
-    return (folder_ / name).string();
+    return folder_ / name;
   }
-  std::filesystem::path folder_;
+  const test::ScratchFolder folder_;
 };
 
 TEST_F(ExperimentFiles, FindTheRobotBesideThem) {
@@ -349,7 +344,7 @@ TEST_F(ExperimentFiles, NameAMissingDescription) {
   write("robot.toml", kRobot);
   const auto e = read_experiment(write("x.toml", kExperiment));
   ASSERT_FALSE(e.has_value());
-  EXPECT_EQ(e.error()[0].file, (folder_ / "arm.urdf").string());
+  EXPECT_EQ(e.error()[0].file, folder_ / "arm.urdf");
 }
 
 TEST_F(ExperimentFiles, SuggestTheDescriptionsJoint) {
@@ -357,7 +352,7 @@ TEST_F(ExperimentFiles, SuggestTheDescriptionsJoint) {
   write("arm.urdf", replaced(kUrdf, "\"elbow\"", "\"ellbow\""));
   const auto e = read_experiment(write("x.toml", kExperiment));
   ASSERT_FALSE(e.has_value());
-  EXPECT_EQ(e.error()[0].to_string(), (folder_ / "robot.toml").string() +
+  EXPECT_EQ(e.error()[0].to_string(), (folder_ / "robot.toml") +
                                           ":22: joint.elbow: the description has no joint "
                                           "'elbow' (did you mean 'ellbow'?)");
 }
@@ -370,7 +365,7 @@ TEST_F(ExperimentFiles, ReportTheErrorsOfBothFiles) {
   ASSERT_EQ(e.error().size(), 2u);
   EXPECT_EQ(e.error()[0].key, "perod_ns");
   EXPECT_EQ(e.error()[1].key, "gains.motor.position.kp");
-  EXPECT_EQ(e.error()[1].file, (folder_ / "robot.toml").string());
+  EXPECT_EQ(e.error()[1].file, folder_ / "robot.toml");
 }
 
 TEST_F(ExperimentFiles, ReportARobotsErrorsAndThoseAgainstItsDescriptionTogether) {
@@ -388,13 +383,13 @@ TEST_F(ExperimentFiles, ReportARobotsErrorsAndThoseAgainstItsDescriptionTogether
 TEST_F(ExperimentFiles, NameAMissingRobot) {
   const auto e = read_experiment(write("x.toml", kExperiment));
   ASSERT_FALSE(e.has_value());
-  EXPECT_EQ(e.error()[0].file, (folder_ / "robot.toml").string());
+  EXPECT_EQ(e.error()[0].file, folder_ / "robot.toml");
 }
 
 TEST_F(ExperimentFiles, NameThemselvesWhenMissing) {
-  const auto e = read_experiment((folder_ / "no.toml").string());
+  const auto e = read_experiment(folder_ / "no.toml");
   ASSERT_FALSE(e.has_value());
-  EXPECT_EQ(e.error()[0].file, (folder_ / "no.toml").string());
+  EXPECT_EQ(e.error()[0].file, folder_ / "no.toml");
 }
 
 TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
@@ -403,10 +398,10 @@ TEST_F(ExperimentFiles, TakeLimitsFromTheRobotWhereTheDescriptionHasNone) {
   const auto none = read_robot(write("robot.toml", kRobot));
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error()[0].to_string(),
-            (folder_ / "robot.toml").string() +
+            (folder_ / "robot.toml") +
                 ":22: joint.elbow: neither this file nor the description gives a "
                 "limit (the joint at " +
-                (folder_ / "arm.urdf").string() +
+                (folder_ / "arm.urdf") +
                 ":4 has no <limit>) (set min_position_rad, "
                 "max_position_rad, max_velocity_rad_s and max_torque_Nm)");
   EXPECT_EQ(none.error().size(), 1u) << "one <limit> is missing";
@@ -454,7 +449,7 @@ TEST_F(ExperimentFiles, TakeMassAndInertiaFromTheRobot) {
       read_robot(write("robot.toml", replaced(kRobot, "[actuator.motor]",
                                               "[model.link.uper]\nmass_kg = 2\n[actuator.motor]")));
   ASSERT_FALSE(unknown.has_value());
-  EXPECT_EQ(unknown.error()[0].to_string(), (folder_ / "robot.toml").string() +
+  EXPECT_EQ(unknown.error()[0].to_string(), (folder_ / "robot.toml") +
                                                 ":5: model.link.uper: the description has no link "
                                                 "'uper' (did you mean 'upper'?)");
 }

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <regex>
@@ -14,6 +13,7 @@
 #include "runtime/experiment.hpp"
 #include "scaffold/words.hpp"
 #include "tests/scaffold/robots.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::scaffold {
 namespace {
@@ -24,10 +24,10 @@ std::string text_of(const PublicRobot& robot) {
 }
 
 NewRobot made_of(const std::string& urdf) {
-  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_made_of.urdf";
+  const test::ScratchFolder folder;
+  const std::string file = folder / "made.urdf";
   std::ofstream(file, std::ios::binary) << urdf;
-  auto found = make_robot({.urdf = file.string(), .name = "made"});
-  std::filesystem::remove(file);
+  auto found = make_robot({.urdf = file, .name = "made"});
   if (!found) throw std::runtime_error(found.error().front().to_string());
   return std::move(*found);
 }
@@ -368,10 +368,10 @@ constexpr char kHopper[] = R"(<robot name="hopper">
 </robot>)";
 
 TEST(NewRobot, UsesWhatTheReaderOffersForFloatingRootsAndImpossibleInertias) {
-  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_hopper.urdf";
+  const test::ScratchFolder folder;
+  const std::string file = folder / "hopper.urdf";
   std::ofstream(file) << kHopper;
-  const auto robot = make_robot({.urdf = file.string(), .name = "hopper"});
-  std::filesystem::remove(file);
+  const auto robot = make_robot({.urdf = file, .name = "hopper"});
   ASSERT_TRUE(robot) << robot.error().front().to_string();
   EXPECT_TRUE(robot->config.model.floating_base);
   EXPECT_TRUE(robot->config.model.repair_inertia);
@@ -381,10 +381,10 @@ TEST(NewRobot, UsesWhatTheReaderOffersForFloatingRootsAndImpossibleInertias) {
 }
 
 TEST(NewRobot, ToldOfNoMovingJointIsAnError) {
-  const auto file = std::filesystem::temp_directory_path() / "tandem_new_robot_test.urdf";
+  const test::ScratchFolder folder;
+  const std::string file = folder / "stone.urdf";
   std::ofstream(file) << "<robot name='stone'><link name='stone'/></robot>";
-  const auto robot = make_robot({.urdf = file.string(), .name = "stone"});
-  std::filesystem::remove(file);
+  const auto robot = make_robot({.urdf = file, .name = "stone"});
   ASSERT_FALSE(robot);
   EXPECT_NE(robot.error().front().message.find("no joint that moves"), std::string::npos);
 }

@@ -2,25 +2,30 @@
 // Layer: tests.  Thread: main.
 #pragma once
 
-#include <fcntl.h>
-#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <cstddef>
 #include <string>
 
 #include "dds/config.hpp"
 
 namespace tandem::dds::test {
 
-/// The number of a domain that nothing else in the tests of this machine has, until this program
-/// ends; each call gives another one.
+/// The number of a domain that nothing else in the tests of this network has, whoever's they are,
+/// until this program ends; each call gives another one.
 inline int another_domain() {
   for (int number = 100; number < 200; ++number) {
-    std::string file = "/tmp/tandem-test-dds-";
-    file.append(std::to_string(number)).append(".lock");
-    const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) == 0) return number;  // open until the end
-    if (fd >= 0) ::close(fd);
+    // An abstract socket: a name that one process of the network namespace can have, and no file.
+    sockaddr_un name{};
+    name.sun_family = AF_UNIX;
+    const std::size_t length = ("tandem-test-dds-" + std::to_string(number))
+                                   .copy(name.sun_path + 1, sizeof name.sun_path - 1);
+    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
+    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (::bind(fd, reinterpret_cast<const sockaddr*>(&name), size) == 0) return number;  // kept
+    ::close(fd);
   }
   return 200;
 }
