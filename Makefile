@@ -5,13 +5,14 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit hil rtsan fuzz clean help
+.PHONY: demo test test-all unit hil rtsan fuzz format lint clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
 	@echo "make fuzz   the fuzzers, a minute each, two at a time; FUZZ_RUNS=1000000: so many inputs each"
+	@echo "make format  lay out every source; make lint: whether they are (part of make test)"
 	@echo "make clean  remove build/ and runs/"
 
 # Installs missing packages (root or sudo only then), builds what the demo needs, runs it.
@@ -31,6 +32,7 @@ demo:
 # a minute of each fuzz target; the real-time proof. The last lines say what ran and what did not.
 test:
 	@rm -f build/summary
+	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory unit
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
 	@$(MAKE) --no-print-directory rtsan
@@ -68,6 +70,15 @@ fuzz:
 	@cmake --preset fuzz --log-level=WARNING
 	@cmake --build build/fuzz --target $(addprefix fuzz_,$(FUZZ_TARGETS)) --parallel $(JOBS)
 	@TARGETS="$(FUZZ_TARGETS)" scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS) "$(FUZZ_RUNS)" $(FUZZ_JOBS)
+
+# With the formatter of Debian 12; others lay some lines out differently.
+CLANG_FORMAT ?= clang-format-14
+SOURCES = git ls-files '*.cpp' '*.hpp' '*.c' '*.h'
+format:
+	@$(SOURCES) | xargs $(CLANG_FORMAT) -i
+lint:
+	@scripts/install-dependencies test
+	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
 
 clean:
 	@rm -rf build runs
