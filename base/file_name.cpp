@@ -40,7 +40,8 @@ std::string topic_name_problem(std::string_view name) {
 
 std::string topic_token(std::string_view name) {
   std::string token(name.substr(0, kLongestFileName));
-  std::ranges::replace_if(token, [](char c) { return !is_word(c); }, '_');
+  std::ranges::replace_if(
+      token, [](char c) { return !is_word(c); }, '_');
   if (!token.empty() && is_digit(token.front())) token.front() = '_';
   return token;
 }

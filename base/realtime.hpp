@@ -18,14 +18,14 @@ namespace tandem {
 /// What a call on the real-time path answers. One byte, never thrown.
 enum class Code : std::uint8_t {
   kOk = 0,
-  kTimeout,      ///< a node or the bus missed the deadline
-  kBusOff,       ///< the bus cannot be used
-  kQueueFull,    ///< dropped, and counted
-  kNotFinite,    ///< a NaN or infinity was met and not passed on
-  kOutOfRange,   ///< a value beyond its limit was met
-  kFault,        ///< a drive, the plant or a controller is in fault; the state says which
-  kDiverged,     ///< an integration step left the finite or plausible range
-  kStopped,      ///< the component asks for the end of the run
+  kTimeout,     ///< a node or the bus missed the deadline
+  kBusOff,      ///< the bus cannot be used
+  kQueueFull,   ///< dropped, and counted
+  kNotFinite,   ///< a NaN or infinity was met and not passed on
+  kOutOfRange,  ///< a value beyond its limit was met
+  kFault,       ///< a drive, the plant or a controller is in fault; the state says which
+  kDiverged,    ///< an integration step left the finite or plausible range
+  kStopped,     ///< the component asks for the end of the run
 };
 
 /// The code's name without the `k`, for messages ("Timeout").

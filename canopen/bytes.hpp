@@ -17,18 +17,26 @@ namespace detail {
 template <std::size_t Size>
 struct UnsignedOf;
 template <>
-struct UnsignedOf<1> { using Type = std::uint8_t; };
+struct UnsignedOf<1> {
+  using Type = std::uint8_t;
+};
 template <>
-struct UnsignedOf<2> { using Type = std::uint16_t; };
+struct UnsignedOf<2> {
+  using Type = std::uint16_t;
+};
 template <>
-struct UnsignedOf<4> { using Type = std::uint32_t; };
+struct UnsignedOf<4> {
+  using Type = std::uint32_t;
+};
 template <>
-struct UnsignedOf<8> { using Type = std::uint64_t; };
+struct UnsignedOf<8> {
+  using Type = std::uint64_t;
+};
 }  // namespace detail
 
 /// Writes `value` (integer, REAL32, REAL64) to sizeof(T) bytes from `out`, lowest byte first.
 template <class T>
-  requires std::is_arithmetic_v<T>
+requires std::is_arithmetic_v<T>
 constexpr void put(std::uint8_t* out, T value) noexcept TANDEM_RT {
   using Bits = typename detail::UnsignedOf<sizeof(T)>::Type;
   const auto bits = std::bit_cast<Bits>(value);
@@ -37,7 +45,7 @@ constexpr void put(std::uint8_t* out, T value) noexcept TANDEM_RT {
 
 /// Reads a T from sizeof(T) bytes from `in`, lowest byte first.
 template <class T>
-  requires std::is_arithmetic_v<T>
+requires std::is_arithmetic_v<T>
 [[nodiscard]] constexpr T get(const std::uint8_t* in) noexcept TANDEM_RT {
   using Bits = typename detail::UnsignedOf<sizeof(T)>::Type;
   Bits bits = 0;

@@ -54,10 +54,10 @@ DriveState drive_state(std::uint16_t word) noexcept TANDEM_RT {
 
 std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT {
   switch (state) {
-    case DriveState::kSwitchOnDisabled: return kCommandShutdown;               // 2
-    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;                // 3
-    case DriveState::kSwitchedOn: return kCommandEnableOperation;              // 4
-    case DriveState::kOperationEnabled: return kCommandEnableOperation;        // stays
+    case DriveState::kSwitchOnDisabled: return kCommandShutdown;         // 2
+    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;          // 3
+    case DriveState::kSwitchedOn: return kCommandEnableOperation;        // 4
+    case DriveState::kOperationEnabled: return kCommandEnableOperation;  // stays
     case DriveState::kNotReadyToSwitchOn:   // transition 1 is the drive's own
     case DriveState::kQuickStopActive:      // transition 12
     case DriveState::kFaultReactionActive:  // transition 14 is the drive's own
@@ -69,8 +69,7 @@ std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT {
 DriveState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
                               const DriveOptions& options) noexcept TANDEM_RT {
   fault_was_reset_ = false;
-  const bool in_fault =
-      state_ == DriveState::kFault || state_ == DriveState::kFaultReactionActive;
+  const bool in_fault = state_ == DriveState::kFault || state_ == DriveState::kFaultReactionActive;
   if (inputs.fault && !in_fault) {  // transition 13
     const bool powered = motion_ != DriveMotion::kNone;
     enter(DriveState::kFaultReactionActive);

@@ -141,8 +141,8 @@ std::pair<std::uint16_t, int> on_axis(std::uint16_t index) {
   const bool profile = index >= 0x6000 && index < 0xA000;
   if (!manufacturer && !profile) return {index, -1};
   const int base = manufacturer ? 0x2000 : 0x6000;
-  const bool of_node = index == 0x2050 || index == object::kCycleCounter ||
-                       index == object::kSensorChannels;
+  const bool of_node =
+      index == 0x2050 || index == object::kCycleCounter || index == object::kSensorChannels;
   const int offset = index - base;
   return {static_cast<std::uint16_t>(base + offset % kAxisStride),
           of_node ? -1 : offset / kAxisStride};
@@ -209,8 +209,7 @@ std::string value_of(const ObjectEntry& entry) {
       return format("0x%08X", *static_cast<const std::uint32_t*>(entry.data));
     case DataType::kReal32:
       return format("%.9g", static_cast<double>(*static_cast<const float*>(entry.data)));
-    case DataType::kVisibleString:
-      return {static_cast<const char*>(entry.data), entry.size};
+    case DataType::kVisibleString: return {static_cast<const char*>(entry.data), entry.size};
   }
   return {};
 }
@@ -259,8 +258,8 @@ std::string object_text(std::span<const ObjectEntry> entries, const EdsDefaults&
 }
 
 std::string list_text(std::string_view title, const std::vector<std::uint16_t>& indices) {
-  std::string text = "\n[" + std::string(title) + "]\n" +
-                     line("SupportedObjects", std::to_string(indices.size()));
+  std::string text =
+      "\n[" + std::string(title) + "]\n" + line("SupportedObjects", std::to_string(indices.size()));
   for (std::size_t i = 0; i < indices.size(); ++i) {
     text += line(std::to_string(i + 1), format("0x%04X", indices[i]));
   }

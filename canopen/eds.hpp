@@ -19,7 +19,7 @@ struct EdsDevice {
   std::uint32_t vendor = 0;
   std::uint32_t product = 0;
   std::uint32_t revision = 0;
-  bool fd = true;           ///< a PDO may have up to 64 bytes
+  bool fd = true;  ///< a PDO may have up to 64 bytes
 };
 
 /// Default values that replace those of the dictionary: by index and sub-index, as the sheet writes

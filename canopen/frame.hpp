@@ -25,9 +25,9 @@ enum FrameFlag : std::uint8_t {
 /// A frame with an 11-bit identifier. Plain data without padding; unused data bytes are zero, so
 /// that equal frames have equal bytes.
 struct Frame {
-  std::uint32_t id = 0;      ///< COB-ID, 0 to 0x7FF
-  std::uint8_t length = 0;   ///< bytes of data: 0..8, or with kFlagFd 12, 16, 20, 24, 32, 48, 64
-  std::uint8_t flags = 0;    ///< FrameFlag bits
+  std::uint32_t id = 0;     ///< COB-ID, 0 to 0x7FF
+  std::uint8_t length = 0;  ///< bytes of data: 0..8, or with kFlagFd 12, 16, 20, 24, 32, 48, 64
+  std::uint8_t flags = 0;   ///< FrameFlag bits
   std::array<std::uint8_t, 2> reserved{};
   std::array<std::uint8_t, kMaxFrameBytes> data{};
 

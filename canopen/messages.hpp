@@ -51,8 +51,8 @@ struct HeartbeatMessage {
   NmtState state = NmtState::kBootUp;
 };
 [[nodiscard]] Frame make_heartbeat(int node, NmtState state) noexcept TANDEM_RT;
-[[nodiscard]] std::optional<HeartbeatMessage> parse_heartbeat(const Frame& frame) noexcept
-    TANDEM_RT;
+[[nodiscard]] std::optional<HeartbeatMessage> parse_heartbeat(
+    const Frame& frame) noexcept TANDEM_RT;
 
 /// Frame 080 + node: bytes 0-1 error code, byte 2 error register, bytes 3-7 the manufacturer's.
 /// Error code 0 says that every error is gone. Ours: byte 3 is the axis, counted from 0.
@@ -63,7 +63,7 @@ struct EmergencyMessage {
   std::array<std::uint8_t, 5> manufacturer{};
 };
 [[nodiscard]] Frame make_emergency(const EmergencyMessage& message) noexcept TANDEM_RT;
-[[nodiscard]] std::optional<EmergencyMessage> parse_emergency(const Frame& frame) noexcept
-    TANDEM_RT;
+[[nodiscard]] std::optional<EmergencyMessage> parse_emergency(
+    const Frame& frame) noexcept TANDEM_RT;
 
 }  // namespace tandem::canopen

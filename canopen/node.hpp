@@ -23,24 +23,24 @@ inline constexpr std::size_t kHeartbeatConsumers = 2;
 inline constexpr std::size_t kNodeObjects = 700;
 
 struct NodeConfig {
-  int id = 1;                      ///< 1 to 127
-  std::uint32_t device_type = 0;   ///< 1000
+  int id = 1;                     ///< 1 to 127
+  std::uint32_t device_type = 0;  ///< 1000
   std::uint32_t vendor = kTandemVendor;
   std::uint32_t product = 0;
   std::uint32_t revision = kTandemRevision;
   std::uint32_t serial = 0;
-  std::string_view name;           ///< 1008; outlives the node
+  std::string_view name;  ///< 1008; outlives the node
 };
 
 /// What the node asks its application to do, or tells it. Bits of a set.
 enum NodeEvent : std::uint16_t {
-  kEventSync = 1,             ///< a SYNC came: sample, then call transmit_synchronous()
-  kEventRpdo = 2,             ///< an RPDO took effect: applied_rpdos() says which
-  kEventOperational = 4,      ///< NMT start: PDOs run from now on
-  kEventLeftOperational = 8,  ///< by NMT command or by a communication error
-  kEventResetNode = 16,       ///< set the application's objects to their power-on values
+  kEventSync = 1,                 ///< a SYNC came: sample, then call transmit_synchronous()
+  kEventRpdo = 2,                 ///< an RPDO took effect: applied_rpdos() says which
+  kEventOperational = 4,          ///< NMT start: PDOs run from now on
+  kEventLeftOperational = 8,      ///< by NMT command or by a communication error
+  kEventResetNode = 16,           ///< set the application's objects to their power-on values
   kEventResetCommunication = 32,  ///< the node did it already; the application need do nothing
-  kEventHeartbeatLost = 64,   ///< a monitored heartbeat stopped: the drive's reaction is 6007
+  kEventHeartbeatLost = 64,       ///< a monitored heartbeat stopped: the drive's reaction is 6007
 };
 using NodeEvents = std::uint16_t;
 

@@ -123,8 +123,7 @@ AbortCode ObjectDictionary::exists(std::uint16_t index, std::uint8_t sub) const 
   return AbortCode::kNoObject;
 }
 
-AbortCode ObjectDictionary::read(std::uint16_t index, std::uint8_t sub,
-                                 std::span<std::uint8_t> out,
+AbortCode ObjectDictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> out,
                                  std::size_t& length) const noexcept TANDEM_RT {
   const ObjectEntry* entry = find(index, sub);
   if (entry == nullptr) return exists(index, sub);

@@ -31,13 +31,13 @@ enum class DataType : std::uint8_t {
 
 /// Bits of ObjectEntry::access.
 enum Access : std::uint8_t {
-  kRead = 1,        ///< by SDO
-  kWrite = 2,       ///< by SDO
-  kMapRpdo = 4,     ///< may be mapped into an RPDO
-  kMapTpdo = 8,     ///< may be mapped into a TPDO
+  kRead = 1,     ///< by SDO
+  kWrite = 2,    ///< by SDO
+  kMapRpdo = 4,  ///< may be mapped into an RPDO
+  kMapTpdo = 8,  ///< may be mapped into a TPDO
   kReadWrite = kRead | kWrite,
-  kReadTpdo = kRead | kMapTpdo,                 ///< an actual value
-  kWriteRpdo = kRead | kWrite | kMapRpdo,       ///< a demand
+  kReadTpdo = kRead | kMapTpdo,            ///< an actual value
+  kWriteRpdo = kRead | kWrite | kMapRpdo,  ///< a demand
 };
 
 /// The values that a write is accepted for; outside it 0609 0031 or 0609 0032.
@@ -82,15 +82,24 @@ struct ObjectEntry {
 namespace detail {
 template <class T>
 [[nodiscard]] constexpr DataType data_type() noexcept {
-  if constexpr (std::is_same_v<T, bool>) return DataType::kBoolean;
-  else if constexpr (std::is_same_v<T, std::int8_t>) return DataType::kInteger8;
-  else if constexpr (std::is_same_v<T, std::int16_t>) return DataType::kInteger16;
-  else if constexpr (std::is_same_v<T, std::int32_t>) return DataType::kInteger32;
-  else if constexpr (std::is_same_v<T, std::uint8_t>) return DataType::kUnsigned8;
-  else if constexpr (std::is_same_v<T, std::uint16_t>) return DataType::kUnsigned16;
-  else if constexpr (std::is_same_v<T, std::uint32_t>) return DataType::kUnsigned32;
-  else if constexpr (std::is_same_v<T, float>) return DataType::kReal32;
-  else static_assert(!sizeof(T), "no CANopen type");
+  if constexpr (std::is_same_v<T, bool>)
+    return DataType::kBoolean;
+  else if constexpr (std::is_same_v<T, std::int8_t>)
+    return DataType::kInteger8;
+  else if constexpr (std::is_same_v<T, std::int16_t>)
+    return DataType::kInteger16;
+  else if constexpr (std::is_same_v<T, std::int32_t>)
+    return DataType::kInteger32;
+  else if constexpr (std::is_same_v<T, std::uint8_t>)
+    return DataType::kUnsigned8;
+  else if constexpr (std::is_same_v<T, std::uint16_t>)
+    return DataType::kUnsigned16;
+  else if constexpr (std::is_same_v<T, std::uint32_t>)
+    return DataType::kUnsigned32;
+  else if constexpr (std::is_same_v<T, float>)
+    return DataType::kReal32;
+  else
+    static_assert(!sizeof(T), "no CANopen type");
 }
 }  // namespace detail
 
@@ -110,24 +119,35 @@ class ObjectDictionary {
   template <class T>
   bool add(std::uint16_t index, std::uint8_t sub, T& variable, std::uint8_t access,
            ObjectRange range = {}, ObjectOwner* owner = nullptr) {
-    return insert({.index = index, .sub = sub, .type = detail::data_type<T>(), .access = access,
-                   .size = sizeof(T), .data = &variable, .range = range, .owner = owner});
+    return insert({.index = index,
+                   .sub = sub,
+                   .type = detail::data_type<T>(),
+                   .access = access,
+                   .size = sizeof(T),
+                   .data = &variable,
+                   .range = range,
+                   .owner = owner});
   }
   /// An entry whose value the dictionary holds itself (and archives).
   template <class T>
   bool add_value(std::uint16_t index, std::uint8_t sub, T value, std::uint8_t access = kRead,
                  ObjectRange range = {}, ObjectOwner* owner = nullptr) {
     void* slot = store(&value, sizeof value);
-    return slot != nullptr &&
-           insert({.index = index, .sub = sub, .type = detail::data_type<T>(), .access = access,
-                   .size = sizeof(T), .data = slot, .range = range, .owner = owner});
+    return slot != nullptr && insert({.index = index,
+                                      .sub = sub,
+                                      .type = detail::data_type<T>(),
+                                      .access = access,
+                                      .size = sizeof(T),
+                                      .data = slot,
+                                      .range = range,
+                                      .owner = owner});
   }
   /// A constant string. `text` must outlive the dictionary.
   bool add_string(std::uint16_t index, std::uint8_t sub, std::string_view text);
 
   /// The entry, or nullptr.
-  [[nodiscard]] const ObjectEntry* find(std::uint16_t index, std::uint8_t sub) const noexcept
-      TANDEM_RT;
+  [[nodiscard]] const ObjectEntry* find(std::uint16_t index,
+                                        std::uint8_t sub) const noexcept TANDEM_RT;
   /// kNone, kNoObject or kNoSubIndex.
   [[nodiscard]] AbortCode exists(std::uint16_t index, std::uint8_t sub) const noexcept TANDEM_RT;
 

@@ -44,11 +44,11 @@ class LoadedController {
 /// Opens `name`.so from the first of `folders` that has it, or the file `name` itself when it
 /// holds a '/'. The library is not opened before its file exists.
 ///
-/// Errors: there is no such file (with the folders searched and the nearest name); others may change
-/// it (check_trusted_code()), found out before it is opened; the system
-/// cannot load it; it lacks tandem_controller_plugin(); it was built for another plugin ABI, or
-/// by another compiler; it throws. A library that calls exit() ends the process with status 2.
-/// `key` of the error is `name`.
+/// Errors: there is no such file (with the folders searched and the nearest name); others may
+/// change it (check_trusted_code()), found out before it is opened; the system cannot load it; it
+/// lacks tandem_controller_plugin(); it was built for another plugin ABI, or by another compiler;
+/// it throws. A library that calls exit() ends the process with status 2. `key` of the error is
+/// `name`.
 [[nodiscard]] Result<LoadedController> load_controller(const std::string& name,
                                                        const std::vector<std::string>& folders);
 

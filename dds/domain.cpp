@@ -51,7 +51,8 @@ void DdsLog::write(void* self, const dds_log_data_t* data) {
 }
 
 Result<std::shared_ptr<Domain>> Domain::open(const Config& config) {
-  const std::size_t descriptors = kDescriptors + kDescriptorsOfAnInterface * config.interfaces.size();
+  const std::size_t descriptors =
+      kDescriptors + kDescriptorsOfAnInterface * config.interfaces.size();
   if (const Status room = check_descriptors(descriptors); !room) {
     return std::unexpected(room.error());
   }

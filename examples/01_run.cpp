@@ -29,10 +29,9 @@ int main(int argc, char** argv) {
     if (!controllers.add(one.name, std::move(plugin), one.parameters)) return 2;
   }
   rt::WallClock clock;
-  runtime::RobotCycle cycle({e.robot, *robot, controllers, clock},
-                            {.loop = e.loop,
-                             .running_cycles = e.cycles(),
-                             .settle_cycles = e.settle_cycles()});
+  runtime::RobotCycle cycle(
+      {e.robot, *robot, controllers, clock},
+      {.loop = e.loop, .running_cycles = e.cycles(), .settle_cycles = e.settle_cycles()});
   while (cycle.step()) {
     if (cycle.state().cycle()[0] % 500 != 0) continue;
     std::printf("%5.1f s  %.3f rad\n", static_cast<double>(cycle.state().time_ns()[0]) * 1e-9,

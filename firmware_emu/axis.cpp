@@ -182,17 +182,16 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   watch_stop();
   const DriveState before = machine_.state();
   const bool brake_was_set = machine_.brake_set();
-  const DriveState now = machine_.step(
-      objects_.controlword,
-      {.fault = cause != ErrorCode::kNone,
-       .at_rest = stopped(),
-       .internal_limit = controller_.limited(),
-       .follows_command = mode_ != Mode::kNone,
-       .following_error = protection_.lagging(),
-       .warning = protection_.warning(protection_config_),
-       .has_brake = has_brake(),
-       .brake_moved = brake_moved()},
-      objects_.options);
+  const DriveState now = machine_.step(objects_.controlword,
+                                       {.fault = cause != ErrorCode::kNone,
+                                        .at_rest = stopped(),
+                                        .internal_limit = controller_.limited(),
+                                        .follows_command = mode_ != Mode::kNone,
+                                        .following_error = protection_.lagging(),
+                                        .warning = protection_.warning(protection_config_),
+                                        .has_brake = has_brake(),
+                                        .brake_moved = brake_moved()},
+                                       objects_.options);
   objects_.statusword = machine_.statusword();
   watch_brake(brake_was_set);
 
@@ -217,8 +216,8 @@ void Axis::seed_references() noexcept {
 }
 
 void Axis::watch_stop() noexcept {
-  const bool stops = machine_.motion() == DriveMotion::kSlowDown ||
-                     machine_.motion() == DriveMotion::kQuickStop;
+  const bool stops =
+      machine_.motion() == DriveMotion::kSlowDown || machine_.motion() == DriveMotion::kQuickStop;
   const bool rests = std::abs(measured_.motor_velocity_rad_s) < kRestVelocity_rad_s;
   stopping_s_ = stops ? stopping_s_ + period_s_ : 0.0;
   resting_s_ = stops && rests ? resting_s_ + period_s_ : 0.0;
@@ -310,14 +309,12 @@ AbortCode Axis::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexc
     case canopen::object::kEncoderResolution:
     case canopen::object::kMotorResolution:
     case canopen::object::kRatedTorque:  // they give every position and torque its meaning
-    case canopen::object::kBrake:
-      return powered() ? AbortCode::kDeviceState : AbortCode::kNone;
+    case canopen::object::kBrake: return powered() ? AbortCode::kDeviceState : AbortCode::kNone;
     default: return AbortCode::kNone;
   }
 }
 
-AbortCode Axis::check_limits(const ObjectEntry& entry,
-                             const std::uint8_t* bytes) const noexcept {
+AbortCode Axis::check_limits(const ObjectEntry& entry, const std::uint8_t* bytes) const noexcept {
   const auto limit = get<std::int32_t>(bytes);
   const bool inverted =
       entry.sub == 1 ? limit > objects_.max_position : limit < objects_.min_position;
@@ -341,8 +338,8 @@ void Axis::archive(Archive& ar) {
   settings_changed_ = changed;
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
-     damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_,
-     brake_periods_, mode_, sensors_valid_);
+     damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_, brake_periods_, mode_,
+     sensors_valid_);
 }
 
 }  // namespace tandem::firmware

@@ -93,10 +93,10 @@ class Axis final : private canopen::ObjectOwner {
   double temperature_C_ = 0.0;
   double stiffness_Nm_rad_ = 0.0;  ///< the last one that was a number and not negative
   double damping_Nms_rad_ = 0.0;
-  double stopping_s_ = 0.0;        ///< since the stop in progress began
-  double resting_s_ = 0.0;         ///< since the motor came to rest in it
-  double slowest_rad_s_ = 0.0;     ///< of the motor, in it
-  double stalled_s_ = 0.0;         ///< since it last became slower
+  double stopping_s_ = 0.0;         ///< since the stop in progress began
+  double resting_s_ = 0.0;          ///< since the motor came to rest in it
+  double slowest_rad_s_ = 0.0;      ///< of the motor, in it
+  double stalled_s_ = 0.0;          ///< since it last became slower
   std::int64_t brake_periods_ = 0;  ///< since the brake's command changed
   canopen::Mode mode_ = canopen::Mode::kNone;
   bool sensors_valid_ = true;

@@ -61,8 +61,7 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.damping = real32(setup.damping_Nms_rad);
   o.gains = {gains_of(c.position), gains_of(c.velocity), gains_of(c.torque), gains_of(c.current)};
   o.feed_forward = {real32(c.torque_to_voltage_V_Nm), real32(c.emf_compensation_Vs_rad)};
-  o.motor_data = {real32(c.resistance_ohm), real32(c.motor_constant_Nm_A),
-                  real32(c.spring_Nm_rad)};
+  o.motor_data = {real32(c.resistance_ohm), real32(c.motor_constant_Nm_A), real32(c.spring_Nm_rad)};
   o.cutoffs_Hz = {real32(setup.link_velocity_cutoff_Hz), real32(setup.motor_velocity_cutoff_Hz),
                   real32(setup.torque_rate_cutoff_Hz)};
   o.limits = {real32(c.voltage_limit_V), real32(c.current_limit_A), real32(c.torque_limit_Nm),
@@ -156,8 +155,10 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          add_array(od, at(co::kOscillation), oscillation, kReadWrite, kNotNegative, &owner) &&
          od.add_value<std::uint8_t>(at(co::kBrake), 0, 3) &&
          od.add(at(co::kBrake), kBrakeFitted, brake[0], kReadWrite, {0, 1}, &owner) &&
-         od.add(at(co::kBrake), kBrakeRelease, brake[1], kReadWrite, {0, kLongestBrake_ms}, &owner) &&
-         od.add(at(co::kBrake), kBrakeEngage, brake[2], kReadWrite, {0, kLongestBrake_ms}, &owner) &&
+         od.add(at(co::kBrake), kBrakeRelease, brake[1], kReadWrite, {0, kLongestBrake_ms},
+                &owner) &&
+         od.add(at(co::kBrake), kBrakeEngage, brake[2], kReadWrite, {0, kLongestBrake_ms},
+                &owner) &&
          od.add(at(co::kCommandTimeout), 0, command_timeout, kReadWrite) &&
          od.add(at(co::kTemperatureLimit), 0, temperature_limit, kReadWrite, {}, &owner) &&
          od.add(at(own::kUndervoltage), 0, undervoltage_V, kReadWrite, kNotNegative, &owner) &&

@@ -16,16 +16,16 @@ namespace tandem::firmware {
 
 /// Manufacturer's objects that only the firmware knows; axis 0, see canopen::of_axis().
 namespace object {
-inline constexpr std::uint16_t kEstimators = 0x2027;        // f32 [Hz]: EstimatorSub
-inline constexpr std::uint16_t kTransferTime = 0x2028;      // f32 [s]
-inline constexpr std::uint16_t kUndervoltage = 0x2035;      // f32 [V]
-inline constexpr std::uint16_t kStopTime = 0x2036;          // f32 [s]
-inline constexpr std::uint16_t kPositionMargin = 0x2037;    // f32 [rad]
-inline constexpr std::uint16_t kMismatch = 0x2038;          // f32: MismatchSub
-inline constexpr std::uint16_t kTelemetry = 0x2040;         // f32: TelemetrySub
-inline constexpr std::uint16_t kRefusedValues = 0x2041;     // u32: values by PDO not taken
+inline constexpr std::uint16_t kEstimators = 0x2027;      // f32 [Hz]: EstimatorSub
+inline constexpr std::uint16_t kTransferTime = 0x2028;    // f32 [s]
+inline constexpr std::uint16_t kUndervoltage = 0x2035;    // f32 [V]
+inline constexpr std::uint16_t kStopTime = 0x2036;        // f32 [s]
+inline constexpr std::uint16_t kPositionMargin = 0x2037;  // f32 [rad]
+inline constexpr std::uint16_t kMismatch = 0x2038;        // f32: MismatchSub
+inline constexpr std::uint16_t kTelemetry = 0x2040;       // f32: TelemetrySub
+inline constexpr std::uint16_t kRefusedValues = 0x2041;   // u32: values by PDO not taken
 /// Of the board, not of an axis.
-inline constexpr std::uint16_t kIgnoredFrames = 0x2050;     // u32: no frame of CAN or CAN FD
+inline constexpr std::uint16_t kIgnoredFrames = 0x2050;  // u32: no frame of CAN or CAN FD
 }  // namespace object
 
 enum EstimatorSub : std::uint8_t {
@@ -98,7 +98,7 @@ struct AxisObjects {
   std::uint16_t statusword = 0;
   std::uint16_t following_timeout_ms = 0;
   std::array<std::uint16_t, 3> brake{};  ///< BrakeSub
-  std::uint16_t max_torque = 0;  ///< [per mille of rated]
+  std::uint16_t max_torque = 0;          ///< [per mille of rated]
   std::int16_t torque = 0;
   std::int16_t target_torque = 0;
   std::int16_t torque_offset = 0;

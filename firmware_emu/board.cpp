@@ -215,8 +215,7 @@ void Board::heard_heartbeat(const Frame& frame) noexcept {
 ErrorCode Board::connection(std::size_t axis) const noexcept {
   const std::uint32_t allowed = axes_[axis]->objects().command_timeout;
   const std::int64_t period_ns = *sync_period_us_ * kNsPerUs;
-  const bool silent =
-      allowed != 0 && period_ns > 0 && since_sync_ns_ > (allowed + 1) * period_ns;
+  const bool silent = allowed != 0 && period_ns > 0 && since_sync_ns_ > (allowed + 1) * period_ns;
   // A master whose SYNC is lost may stop the node for it: SYNC is the cause.
   if (offline_ && !heartbeat_lost_) {
     return silent ? ErrorCode::kSyncLost : ErrorCode::kCommandTimeout;

@@ -68,9 +68,7 @@ class Board {
   [[nodiscard]] std::size_t axes() const noexcept { return axes_.size(); }
   [[nodiscard]] const Axis& axis(std::size_t index) const noexcept { return *axes_[index]; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return node_.state(); }
-  [[nodiscard]] std::int64_t control_period_ns() const noexcept {
-    return setup_.control_period_ns;
-  }
+  [[nodiscard]] std::int64_t control_period_ns() const noexcept { return setup_.control_period_ns; }
   [[nodiscard]] const canopen::ObjectDictionary& dictionary() const noexcept { return od_; }
 
   /// What 1018:`sub` says from now on: the firmware was exchanged, or the whole board.

@@ -189,8 +189,7 @@ void JointController::cascade(const Reference& reference, const Measurement& mea
 Saturation JointController::limit_torque(double& torque_Nm, double last_Nm) const noexcept {
   const double step_Nm = config_.torque_slope_Nm_s * period_s_;
   const Saturation slope = saturate(torque_Nm, last_Nm - step_Nm, last_Nm + step_Nm);
-  const Saturation limit =
-      saturate(torque_Nm, -config_.torque_limit_Nm, config_.torque_limit_Nm);
+  const Saturation limit = saturate(torque_Nm, -config_.torque_limit_Nm, config_.torque_limit_Nm);
   return limit != Saturation::kNone ? limit : slope;
 }
 

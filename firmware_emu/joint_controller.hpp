@@ -33,7 +33,7 @@ struct ControllerConfig {
   double torque_limit_Nm = 0.0;
   /// By how much the torque reference may change: the limit of its rate.
   double torque_slope_Nm_s = std::numeric_limits<double>::infinity();
-  double velocity_limit_rad_s = 0.0;     ///< of velocity references; 0: none
+  double velocity_limit_rad_s = 0.0;  ///< of velocity references; 0: none
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
   double transfer_time_s = 0.02;  ///< in which the voltage step of a mode change decays

@@ -18,15 +18,15 @@ struct AxisSense {
   double motor_position_rad = 0.0;
   double spring_torque_Nm = 0.0;  ///< positive when it drives the link to +
   double current_A = 0.0;
-  double temperature_C = 25.0;    ///< of the winding
+  double temperature_C = 25.0;  ///< of the winding
   double bus_voltage_V = 0.0;
-  bool emergency_stop = false;    ///< the board's interlock input is active
+  bool emergency_stop = false;  ///< the board's interlock input is active
 };
 
 /// What one axis does to its motor until the next control period.
 struct AxisDrive {
   double voltage_V = 0.0;
-  bool enabled = false;  ///< false: bridge open, no current whatever the back-EMF
+  bool enabled = false;     ///< false: bridge open, no current whatever the back-EMF
   bool brake_open = false;  ///< the brake's coil has current; without power it is set
 };
 
@@ -37,41 +37,41 @@ struct AxisSetup {
   double rated_torque_Nm = 1.0;            ///< 6076
   /// Gains, motor data, limits. Position limits (607D) may be infinite: no limit.
   ControllerConfig controller{};
-  double stiffness_Nm_rad = 0.0;           ///< 2010
-  double damping_Nms_rad = 0.0;            ///< 2011
-  double torque_noise_Nm = 0.0;            ///< standard deviation of the torque's measurement
-  double torque_quantum_Nm = 0.0;          ///< step of the torque's measurement; 0: none
-  double link_velocity_cutoff_Hz = 150.0;  ///< 2027:1; 0: plain difference
-  double motor_velocity_cutoff_Hz = 150.0; ///< 2027:2
-  double torque_rate_cutoff_Hz = 150.0;    ///< 2027:3
-  double position_margin_rad = 0.1;        ///< 2037: beyond 607D, until a fault
-  double following_window_rad = 0.5;       ///< 6065; 0: not watched
-  double following_timeout_s = 0.1;        ///< 6066
-  double continuous_current_A = 0.0;       ///< 2031:1; 0: not watched
-  double thermal_time_s = 30.0;            ///< 2031:2
-  double temperature_limit_C = 120.0;      ///< 2034
-  double undervoltage_V = 0.0;             ///< 2035; 0: not watched
-  double mismatch_window_rad = 0.0;        ///< 2038:1; 0: not watched
-  double mismatch_timeout_s = 0.01;        ///< 2038:2
-  double oscillation_limit_Nm = 0.0;       ///< 2039:1; 0: not watched
-  double oscillation_time_s = 1.0;         ///< 2039:2
-  bool brake = false;                      ///< 203A:1: the motor has a spring-applied brake
-  std::uint16_t brake_release_ms = 0;      ///< 203A:2
-  std::uint16_t brake_engage_ms = 0;       ///< 203A:3
-  double stop_time_s = 1.0;                ///< 2036: longest stop until the bridge opens
+  double stiffness_Nm_rad = 0.0;            ///< 2010
+  double damping_Nms_rad = 0.0;             ///< 2011
+  double torque_noise_Nm = 0.0;             ///< standard deviation of the torque's measurement
+  double torque_quantum_Nm = 0.0;           ///< step of the torque's measurement; 0: none
+  double link_velocity_cutoff_Hz = 150.0;   ///< 2027:1; 0: plain difference
+  double motor_velocity_cutoff_Hz = 150.0;  ///< 2027:2
+  double torque_rate_cutoff_Hz = 150.0;     ///< 2027:3
+  double position_margin_rad = 0.1;         ///< 2037: beyond 607D, until a fault
+  double following_window_rad = 0.5;        ///< 6065; 0: not watched
+  double following_timeout_s = 0.1;         ///< 6066
+  double continuous_current_A = 0.0;        ///< 2031:1; 0: not watched
+  double thermal_time_s = 30.0;             ///< 2031:2
+  double temperature_limit_C = 120.0;       ///< 2034
+  double undervoltage_V = 0.0;              ///< 2035; 0: not watched
+  double mismatch_window_rad = 0.0;         ///< 2038:1; 0: not watched
+  double mismatch_timeout_s = 0.01;         ///< 2038:2
+  double oscillation_limit_Nm = 0.0;        ///< 2039:1; 0: not watched
+  double oscillation_time_s = 1.0;          ///< 2039:2
+  bool brake = false;                       ///< 203A:1: the motor has a spring-applied brake
+  std::uint16_t brake_release_ms = 0;       ///< 203A:2
+  std::uint16_t brake_engage_ms = 0;        ///< 203A:3
+  double stop_time_s = 1.0;                 ///< 2036: longest stop until the bridge opens
 };
 
 /// A board with one or more axes: 1 to canopen::kMaxAxes.
 struct BoardSetup {
   int node_id = 1;
-  std::string name = "tandem board";         ///< 1008
+  std::string name = "tandem board";  ///< 1008
   std::uint32_t vendor = canopen::kTandemVendor;
   std::uint32_t product = canopen::kBoardProduct;
   std::uint32_t revision = canopen::kTandemRevision;
   std::uint32_t serial = 0;
   std::int64_t control_period_ns = 1'000'000;
-  int command_timeout_syncs = 10;            ///< 2032; 0: never
-  std::uint64_t seed = 1;                    ///< of the torque sensors' noise
+  int command_timeout_syncs = 10;  ///< 2032; 0: never
+  std::uint64_t seed = 1;          ///< of the torque sensors' noise
   std::vector<AxisSetup> axes;
 };
 

@@ -13,20 +13,20 @@
 namespace tandem::log {
 
 enum class EventKind : std::uint8_t {
-  kStarted = 0,      ///< the first cycle
-  kBringUpDone,      ///< every axis follows the command; controllers start
-  kControllersDone,  ///< the duration is over, or every controller is done
-  kFault,            ///< a joint, the backend or a controller is in fault; the run stops
-  kSensorLost,       ///< a sensor's sample is too old
-  kLimited,          ///< a command was limited for the first time (per joint)
-  kOverrun,          ///< the loop skipped `code` cycles
-  kStopRequested,    ///< from outside: signal or caller
-  kShutDown,         ///< the drives are disabled
-  kInjected,         ///< a fault was injected: `code` is its hal::FaultKind
-  kEmergencyStop,    ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
-  kResetRequested,   ///< of the latched faults
-  kResetDone,        ///< every joint is enabled again
-  kResetFailed,      ///< a cause is still there
+  kStarted = 0,          ///< the first cycle
+  kBringUpDone,          ///< every axis follows the command; controllers start
+  kControllersDone,      ///< the duration is over, or every controller is done
+  kFault,                ///< a joint, the backend or a controller is in fault; the run stops
+  kSensorLost,           ///< a sensor's sample is too old
+  kLimited,              ///< a command was limited for the first time (per joint)
+  kOverrun,              ///< the loop skipped `code` cycles
+  kStopRequested,        ///< from outside: signal or caller
+  kShutDown,             ///< the drives are disabled
+  kInjected,             ///< a fault was injected: `code` is its hal::FaultKind
+  kEmergencyStop,        ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
+  kResetRequested,       ///< of the latched faults
+  kResetDone,            ///< every joint is enabled again
+  kResetFailed,          ///< a cause is still there
   kControllersSwitched,  ///< on request: some were stopped, some started
   kJointSet,             ///< on request: a joint's mode, interaction or impedance
   kGainsSet,             ///< on request: gains of a joint's drive

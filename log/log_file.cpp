@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "base/nearest.hpp"
+#include "base/sha256.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
-#include "base/sha256.hpp"
 
 namespace tandem::log {
 namespace {

@@ -331,11 +331,11 @@ Status McapWriter::close() {
   file_ = -1;
   if (closed != 0 && !failed()) error_ = std::strerror(errno);
   if (!failed()) return {};
-  return std::unexpected(Error{.message = "the log is incomplete: " + error_,
-                               .hint = deleted_ ? "record the run again"
-                                                : "it can be read up to where writing failed",
-                               .file = path_,
-                               .key = {}});
+  return std::unexpected(
+      Error{.message = "the log is incomplete: " + error_,
+            .hint = deleted_ ? "record the run again" : "it can be read up to where writing failed",
+            .file = path_,
+            .key = {}});
 }
 
 }  // namespace tandem::log

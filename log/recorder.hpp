@@ -13,13 +13,13 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
+#include "base/sha256.hpp"
 #include "base/spsc_ring.hpp"
 #include "hal/image.hpp"
 #include "log/event.hpp"
 #include "log/info.hpp"
 #include "log/mcap_writer.hpp"
 #include "log/robot_view.hpp"
-#include "base/sha256.hpp"
 
 namespace tandem::log {
 
@@ -100,7 +100,7 @@ class Recorder {
   std::thread thread_;
   std::atomic<bool> closing_{false};
   std::atomic<bool> failed_{false};
-  std::string trouble_;  // the writer's thread, before failed_
+  std::string trouble_;     // the writer's thread, before failed_
   std::uint64_t lost_ = 0;  // the writer's thread, read after its end
   Bytes event_;             // reused
 };

@@ -35,12 +35,12 @@ typedef struct tandem_kernels {
   const char* description_hash; /* SHA-256, hex, of everything the kernels were made from */
   const char* variant;          /* "baseline", "x86-64-v3", … the one chosen at load */
   uint32_t nq, nv, joints, sites, wrenches, sensors;
-  const char* const* joint_names;   /* joints, model order: v index (6 or 0) + i */
-  const char* const* site_names;    /* sites: frames with pose, twist, acceleration, Jacobian */
-  const char* const* wrench_names;  /* wrenches: the sites where an external wrench may act */
-  const char* const* sensor_names;  /* sensors: six-axis force/torque */
-  double mass_kg;                   /* of everything that moves */
-  double gravity_m_s2[3];           /* in W */
+  const char* const* joint_names;  /* joints, model order: v index (6 or 0) + i */
+  const char* const* site_names;   /* sites: frames with pose, twist, acceleration, Jacobian */
+  const char* const* wrench_names; /* wrenches: the sites where an external wrench may act */
+  const char* const* sensor_names; /* sensors: six-axis force/torque */
+  double mass_kg;                  /* of everything that moves */
+  double gravity_m_s2[3];          /* in W */
   const tandem_kernel_count* counts;
   uint32_t kernel_count;
 

@@ -14,8 +14,8 @@ namespace tandem::model {
 template <class S>
 struct JointTransform {
   const MechanismJoint* joint;
-  AxisRotation<S> turn;   ///< revolute: by q + offset about z
-  S slide = 0.0;  ///< prismatic: q along z
+  AxisRotation<S> turn;  ///< revolute: by q + offset about z
+  S slide = 0.0;         ///< prismatic: q along z
 };
 
 template <class S>

@@ -64,13 +64,13 @@ struct Mechanism {
   std::vector<MechanismJoint> joints;
   std::vector<JointCoordinate> coordinate_of;  ///< per joint
   int coordinates = 0;                         ///< joints that follow nobody
-  std::vector<std::vector<int>> children;     ///< per body: the joints that start there
-  std::vector<Moments<double>> moments;       ///< per body, regrouped
-  std::vector<Moments<double>> true_moments;  ///< per body, as described
+  std::vector<std::vector<int>> children;      ///< per body: the joints that start there
+  std::vector<Moments<double>> moments;        ///< per body, regrouped
+  std::vector<Moments<double>> true_moments;   ///< per body, as described
   std::vector<MechanismSite> sites;
   std::vector<MechanismSensor> sensors;
   int wrenches = 0;
-  double mass_kg = 0.0;  ///< of everything that moves
+  double mass_kg = 0.0;                  ///< of everything that moves
   std::vector<std::string> joint_names;  ///< per coordinate
   std::vector<std::string> site_names, wrench_names, sensor_names;
 

@@ -96,7 +96,10 @@ Result<log::Table> read_columns(const log::LogFile& file, const std::string& top
   auto table = file.read(topic, columns_of(fields));
   if (!table || std::ranges::is_sorted(table->time_s)) return table;
   return std::unexpected(Error{"the messages of " + topic + " are not in the order of their times",
-                               "the file is damaged; record the run again", file.path(), 0, {}});
+                               "the file is damaged; record the run again",
+                               file.path(),
+                               0,
+                               {}});
 }
 
 /// Moves `count` columns from `from` on.

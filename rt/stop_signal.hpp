@@ -1,13 +1,14 @@
-// Ctrl-C, SIGTERM and a closed terminal, and SIGUSR1 as emergency stop: flags that the loop looks at once per cycle.
-// Layer: rt.  Thread: any.
+// Ctrl-C, SIGTERM and a closed terminal, and SIGUSR1 as emergency stop: flags that the loop looks
+// at once per cycle. Layer: rt.  Thread: any.
 #pragma once
 
 #include "base/realtime.hpp"
 
 namespace tandem::rt {
 
-/// From now on the first SIGINT, SIGTERM or SIGHUP (unless that is ignored, as under nohup) sets the
-/// stop flag; a second one ends the process the usual way, so that a hung program can still be ended.
+/// From now on the first SIGINT, SIGTERM or SIGHUP (unless that is ignored, as under nohup) sets
+/// the stop flag; a second one ends the process the usual way, so that a hung program can still be
+/// ended.
 void install_stop_signals();
 
 /// True once a stop was requested, by a signal or by request_stop().

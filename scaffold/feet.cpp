@@ -78,8 +78,7 @@ double leg_length(const Tree& tree, const Posed& neutral, int body) {
 }
 
 /// Shapes of the links called foot, sole, toe or ankle; without any, of the whole body.
-ContactPatch patch_of(const Tree& tree, const Posed& neutral, int body,
-                      int& link) {
+ContactPatch patch_of(const Tree& tree, const Posed& neutral, int body, int& link) {
   for (const int least : {1, 0}) {
     std::vector<Shape> shapes;
     std::vector<Placement> placements;
@@ -154,8 +153,7 @@ Foot make_foot(const Tree& tree, const Posed& neutral, int body) {
 
 }  // namespace
 
-std::vector<Foot> find_feet(const Tree& tree, const Posed& neutral,
-                            FeetBy by) {
+std::vector<Foot> find_feet(const Tree& tree, const Posed& neutral, FeetBy by) {
   std::vector<Foot> feet;
   for (const int body : by == FeetBy::kName ? named_feet(tree) : lowest_ends(tree, neutral)) {
     feet.push_back(make_foot(tree, neutral, body));
@@ -167,8 +165,8 @@ Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral) {
   std::vector<model::FootReach> reach;
   for (const Foot& foot : feet) {
     if (!foot.flat()) continue;
-    reach.push_back({neutral.origin(foot.body - 1),
-                     (neutral.link(foot.link) * foot.sole_in_link).p});
+    reach.push_back(
+        {neutral.origin(foot.body - 1), (neutral.link(foot.link) * foot.sole_in_link).p});
   }
   return model::direction_ahead(reach);
 }

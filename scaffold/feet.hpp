@@ -29,8 +29,7 @@ enum class FeetBy : std::uint8_t {
 
 /// @param neutral  a posture in which soles are level, as far as anybody knows
 /// @return none when nothing looks like a foot
-[[nodiscard]] std::vector<Foot> find_feet(const model::Tree& tree, const Posed& neutral,
-                                          FeetBy by);
+[[nodiscard]] std::vector<Foot> find_feet(const model::Tree& tree, const Posed& neutral, FeetBy by);
 
 /// Where the robot looks, by model::direction_ahead(): one of the root's axes, in W.
 [[nodiscard]] Eigen::Vector3d direction_ahead(const std::vector<Foot>& feet, const Posed& neutral);

@@ -220,12 +220,12 @@ Diagnostics check_bus_load(const RobotConfig& robot, std::int64_t period_ns) {
     if (load.fits()) continue;
     const bool urgent = load.urgent_us > load.period_us();
     errors.push_back(
-        {.message = fmt::format(
-             "{} cannot carry {}: {}{}", rates_text(load),
-             urgent ? "what every cycle needs" : "its mean load", arithmetic(load, urgent),
-             urgent ? ""
-                    : fmt::format(", {:.1f} % with at most {:g} %", 100.0 * load.load,
-                                  100.0 * load.max_load)),
+        {.message = fmt::format("{} cannot carry {}: {}{}", rates_text(load),
+                                urgent ? "what every cycle needs" : "its mean load",
+                                arithmetic(load, urgent),
+                                urgent ? ""
+                                       : fmt::format(", {:.1f} % with at most {:g} %",
+                                                     100.0 * load.load, 100.0 * load.max_load)),
          .hint = load.remedy,
          .file = robot.file,
          .line = robot.buses[b].line,

@@ -75,8 +75,7 @@ std::size_t CanBackend::Collected::receive(std::span<Frame> frames) noexcept TAN
 }
 
 Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
-                                                       std::span<Bus* const> buses,
-                                                       FrameWait& wait,
+                                                       std::span<Bus* const> buses, FrameWait& wait,
                                                        const CanBackendConfig& config) {
   std::vector<std::unique_ptr<Collected>> collected;
   std::vector<Bus*> ends;
@@ -116,7 +115,7 @@ bool CanBackend::answered(std::size_t bus) const noexcept {
 void CanBackend::exchange(const CycleTime& time) noexcept {
   if (silent_) return;
   for (const auto& bus : buses_) {
-    if (!begun_) bus->forget();  // what was said before there was a master
+    if (!begun_) bus->forget();             // what was said before there was a master
     if (!config_.lockstep) bus->collect();  // late answers to the last SYNC are none to this one
     bus->begin_cycle();
   }

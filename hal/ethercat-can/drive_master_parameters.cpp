@@ -32,9 +32,10 @@ void DriveMaster::Impl::send_parameter(Node& node,
   if (sdo.status() == canopen::SdoClient::Status::kBusy) return;
   if (node.sending >= 0 && sdo.status() == canopen::SdoClient::Status::kAborted) {
     refused_node = static_cast<std::int32_t>(&node - nodes.data());
-    refused_step = {.sub = sdo.sub(), .index = sdo.index(),
-                    .axis = static_cast<std::int8_t>(static_cast<std::size_t>(node.sending) /
-                                                     kItemsPerAxis)};
+    refused_step = {
+        .sub = sdo.sub(),
+        .index = sdo.index(),
+        .axis = static_cast<std::int8_t>(static_cast<std::size_t>(node.sending) / kItemsPerAxis)};
     refused_code = sdo.abort_code();
   }
   node.sending = -1;
@@ -53,9 +54,9 @@ void DriveMaster::Impl::send_parameter(Node& node,
     PidGains wanted = parameters.gains(joint, loop);
     PidGains& sent = sent_gains[joint * kPidLoops + static_cast<std::size_t>(loop)];
     if (item(wanted, which) == item(sent, which)) continue;
-    const SdoStep step = write_step(
-        canopen::of_axis(gains_object(loop), static_cast<int>(axis)),
-        static_cast<std::uint8_t>(which + 1), static_cast<float>(item(wanted, which)));
+    const SdoStep step =
+        write_step(canopen::of_axis(gains_object(loop), static_cast<int>(axis)),
+                   static_cast<std::uint8_t>(which + 1), static_cast<float>(item(wanted, which)));
     sdo.download(step.index, step.sub, step.value(), ports[node.plan.bus].sink);
     item(sent, which) = item(wanted, which);
     node.sending = static_cast<std::int16_t>(now);

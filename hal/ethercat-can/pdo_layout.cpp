@@ -57,8 +57,7 @@ constexpr std::array kClassicCommand2{kCommandFields[3], kCommandFields[1]};
 constexpr std::array kClassicSlowCommand1{kSlowCommandFields[0], kSlowCommandFields[1],
                                           kSlowCommandFields[2]};
 constexpr std::array kClassicSlowCommand2{kSlowCommandFields[3]};
-constexpr std::array kClassicFeedback1{kFeedbackFields[0], kFeedbackFields[1],
-                                       kFeedbackFields[3]};
+constexpr std::array kClassicFeedback1{kFeedbackFields[0], kFeedbackFields[1], kFeedbackFields[3]};
 constexpr std::array kClassicFeedback2{kFeedbackFields[2], kFeedbackFields[4]};
 constexpr std::array kClassicSlowFeedback1{kSlowFeedbackFields[0], kSlowFeedbackFields[1],
                                            kSlowFeedbackFields[2]};
@@ -151,18 +150,18 @@ void lay_out_fd(NodePlan& node, std::uint8_t slow) {
 void lay_out_classic(NodePlan& node, std::uint8_t slow) {
   using Pdo = std::pair<PdoGroup, std::span<const FieldSpec>>;
   Packer receive(node, PdoDirection::kReceive, false);
-  for (const auto& [group, fields] : {Pdo{PdoGroup::kCommand, kClassicCommand1},
-                                      Pdo{PdoGroup::kCommand, kClassicCommand2},
-                                      Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand1},
-                                      Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand2}}) {
+  for (const auto& [group, fields] :
+       {Pdo{PdoGroup::kCommand, kClassicCommand1}, Pdo{PdoGroup::kCommand, kClassicCommand2},
+        Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand1},
+        Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand2}}) {
     receive.begin(group, canopen::kEverySync);
     add_axes(receive, 1, fields);
   }
   Packer transmit(node, PdoDirection::kTransmit, false);
-  for (const auto& [group, fields] : {Pdo{PdoGroup::kFeedback, kClassicFeedback1},
-                                      Pdo{PdoGroup::kFeedback, kClassicFeedback2},
-                                      Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback1},
-                                      Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback2}}) {
+  for (const auto& [group, fields] :
+       {Pdo{PdoGroup::kFeedback, kClassicFeedback1}, Pdo{PdoGroup::kFeedback, kClassicFeedback2},
+        Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback1},
+        Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback2}}) {
     transmit.begin(group, group == PdoGroup::kFeedback ? canopen::kEverySync : slow);
     add_axes(transmit, 1, fields);
   }

@@ -44,8 +44,8 @@ class WireModel {
 
   /// @pre sender < senders; a sender's `ready_ns` does not go back, nor behind next()'s `until_ns`
   ///      (earlier ones count as ready from then on, as nothing is sent in the past)
-  bool push(std::size_t sender, const canopen::Frame& frame, std::int64_t ready_ns) noexcept
-      TANDEM_RT;
+  bool push(std::size_t sender, const canopen::Frame& frame,
+            std::int64_t ready_ns) noexcept TANDEM_RT;
   /// The next frame that is complete at `until_ns` or before. One that has begun before and ends
   /// after it is on the wire, and keeps it.
   /// @return false when there is none.

@@ -136,8 +136,8 @@ void Actuators::obey_coil(std::size_t joint, double position_rad) noexcept {
   state.anchor_rad = position_rad;
 }
 
-void Actuators::advance_brakes(std::int64_t step_ns, const double* position_rad) noexcept
-    TANDEM_RT {
+void Actuators::advance_brakes(std::int64_t step_ns,
+                               const double* position_rad) noexcept TANDEM_RT {
   if (!any_brake_) return;
   for (std::size_t j = 0; j < brakes_.size(); ++j) {
     const Brake& brake = brakes_[j];
@@ -146,7 +146,8 @@ void Actuators::advance_brakes(std::int64_t step_ns, const double* position_rad)
     state.since_ns += step_ns;
     obey_coil(j, position_rad[j]);
     const double reach = brake.torque_Nm / brake.stiffness_Nm_rad;
-    state.anchor_rad = std::clamp(state.anchor_rad, position_rad[j] - reach, position_rad[j] + reach);
+    state.anchor_rad =
+        std::clamp(state.anchor_rad, position_rad[j] - reach, position_rad[j] + reach);
   }
 }
 
@@ -155,8 +156,8 @@ double Actuators::brake_torque(std::size_t joint, double position_rad,
   const BrakeState& state = brake_states_[joint];
   if (state.closed == 0) return 0.0;
   const Brake& brake = brakes_[joint];
-  const double spring = clamp_to(
-      brake.stiffness_Nm_rad * (state.anchor_rad - position_rad), brake.torque_Nm);
+  const double spring =
+      clamp_to(brake.stiffness_Nm_rad * (state.anchor_rad - position_rad), brake.torque_Nm);
   return clamp_to(spring - brake.damping_Nms_rad * velocity_rad_s, brake.torque_Nm);
 }
 
@@ -197,10 +198,9 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
       torque_Nm[j] = braked_[j] != 0 ? rigid_brake(j, q[j], qd[j]) : drive;
       continue;
     }
-    const double spring =
-        broken_[j] != 0 ? 0.0
-                        : m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
-                              m.spring_damping_Nms_rad * (velocity - qd[j]);
+    const double spring = broken_[j] != 0 ? 0.0
+                                          : m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
+                                                m.spring_damping_Nms_rad * (velocity - qd[j]);
     torque_Nm[j] = spring;
     const bool held = braked_[j] != 0;
     rate.position_rad[j] = held ? 0.0 : velocity;

@@ -13,8 +13,8 @@ constexpr std::size_t kWireCapacity = 128;  // frames that a node has ready
 void EmulatedRobot::add_wires(const hal::RobotConfig& robot, const SimRobotConfig& config) {
   for (const hal::BusConfig& bus : robot.buses) {
     const hal::can::BitRates rates{.nominal = bus.bitrate, .data = bus.data_bitrate};
-    wires_.push_back({hal::can::WireModel(rates, other_sender() + 1, config.bus_latency_ns,
-                                          kWireCapacity)});
+    wires_.push_back(
+        {hal::can::WireModel(rates, other_sender() + 1, config.bus_latency_ns, kWireCapacity)});
   }
 }
 

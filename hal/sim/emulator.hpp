@@ -35,10 +35,10 @@ struct EmulatorStatistics {
   std::uint64_t silent_steps = 0;
   std::uint64_t safe_after_steps = 0;
   std::uint64_t open_after_steps = 0;
-  std::vector<BoardStop> boards;         ///< each by itself, in the robot's order
+  std::vector<BoardStop> boards;  ///< each by itself, in the robot's order
   std::uint64_t frames_in = 0;
   std::uint64_t frames_out = 0;
-  std::uint64_t frames_lost = 0;         ///< answers that a bus did not take
+  std::uint64_t frames_lost = 0;  ///< answers that a bus did not take
 };
 
 /// In lockstep a step is made when SYNC has come on every bus; after its answers TIME goes out on
@@ -51,8 +51,8 @@ class Emulator {
  public:
   /// @param buses  the boards' end of each of the robot's buses, in their order; outlive it, as
   ///               robot and wait do
-  Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses,
-           hal::can::FrameWait& wait, const EmulatorConfig& config);
+  Emulator(EmulatedRobot& robot, std::span<hal::can::Bus* const> buses, hal::can::FrameWait& wait,
+           const EmulatorConfig& config);
 
   /// Takes what has come, steps if it is time to, else waits, `patience_ns` at most.
   /// @return kOk: a step was made; kTimeout: none yet; kDiverged: none will be any more.

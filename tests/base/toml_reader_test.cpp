@@ -50,8 +50,9 @@ TEST(TomlReader, RefusesNumbersThatAreNotFiniteOrOutOfRange) {
 }
 
 TEST(TomlReader, RefusesIntegersThatNoDoubleHolds) {
-  const TomlDocument document = parse("kp = 9007199254740993\nlist = [1, 9007199254740993]\n"
-                                      "exact = 9007199254740992\n");
+  const TomlDocument document = parse(
+      "kp = 9007199254740993\nlist = [1, 9007199254740993]\n"
+      "exact = 9007199254740992\n");
   TomlTable root = document.root();
   (void)root.number("kp");
   (void)root.numbers("list", 2);

@@ -179,8 +179,8 @@ TEST_F(Drive, ALostConnectionFollowsItsOption) {
 
 TEST_F(Drive, ShowsTheInputsInItsStatusword) {
   enable();
-  inputs = {.internal_limit = true, .follows_command = true, .following_error = true,
-            .warning = true};
+  inputs = {
+      .internal_limit = true, .follows_command = true, .following_error = true, .warning = true};
   step(0x0F);
   EXPECT_EQ(drive.statusword(), 0x0237 | 0x0080 | 0x0800 | 0x1000 | 0x2000);
 }

@@ -60,8 +60,8 @@ TEST(Board, TakesACommandAtTheSyncAfterIt) {
   rig.start();
   rig.send_commands = false;
   rig.cycles(2);
-  const std::vector<std::uint8_t> command{0x06, 0x00, 0xFF, 0x78, 0x56, 0x34, 0x12, 0xFE,
-                                          0xFF, 0xFF, 0xFF, 0x38, 0xFF};  // padded to 16
+  const std::vector<std::uint8_t> command{0x06, 0x00, 0xFF, 0x78, 0x56, 0x34, 0x12,
+                                          0xFE, 0xFF, 0xFF, 0xFF, 0x38, 0xFF};  // padded to 16
   rig.send(0x205, command);
   rig.step();
   EXPECT_EQ(rig.object<std::uint16_t>(0x6040), 0x00);
@@ -120,8 +120,8 @@ TEST(Board, RefusesSettingsThatAreNoNumberOrOfTheWrongSign) {
   rig.start();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
-  for (const int object : {0x2020, 0x2021, 0x2022, 0x2023, 0x2024, 0x2030, 0x2031,
-                           0x2026, 0x2027}) {
+  for (const int object :
+       {0x2020, 0x2021, 0x2022, 0x2023, 0x2024, 0x2030, 0x2031, 0x2026, 0x2027}) {
     const auto index = static_cast<std::uint16_t>(object);
     const float before = rig.object<float>(index, 1);
     EXPECT_EQ(rig.write(index, 1, nan), 0x06090030U) << std::hex << index;
@@ -135,7 +135,7 @@ TEST(Board, RefusesSettingsThatAreNoNumberOrOfTheWrongSign) {
   EXPECT_EQ(rig.write<std::uint8_t>(0x2025, 0, 2), 0x06090031U);
   EXPECT_EQ(rig.write<std::int32_t>(0x607D, 1, rig.object<std::int32_t>(0x607D, 2) + 1),
             0x06090036U);
-  EXPECT_EQ(rig.write<std::uint16_t>(0x6041, 0, 0), 0x06010002U);  // read-only
+  EXPECT_EQ(rig.write<std::uint16_t>(0x6041, 0, 0), 0x06010002U);          // read-only
   EXPECT_EQ(rig.write<std::uint16_t>(0x6041 + 0x800, 0, 0), 0x06020000U);  // there is one axis
 }
 

@@ -52,8 +52,7 @@ TEST(FilteredDifference, HasTheStatedFrequencyResponse) {
         if (k >= 2000) sum += v * std::polar(2.0 / 1000.0, -phase);
       }
       const std::complex<double> wanted =
-          cutoff > 0.0 ? stated(f, cutoff)
-                       : (1.0 - std::polar(1.0, -2.0 * kPi * f * kT)) / kT;
+          cutoff > 0.0 ? stated(f, cutoff) : (1.0 - std::polar(1.0, -2.0 * kPi * f * kT)) / kT;
       EXPECT_NEAR(std::abs(sum - wanted) / std::abs(wanted), 0.0, 1.0e-9) << cutoff << " " << f;
     }
   }

@@ -325,8 +325,8 @@ TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
 }
 
 TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) {
-  for (const Mode mode : {Mode::kCsp, Mode::kCsv, Mode::kCst, Mode::kImpedance,
-                          Mode::kVelocityImpedance}) {
+  for (const Mode mode :
+       {Mode::kCsp, Mode::kCsv, Mode::kCst, Mode::kImpedance, Mode::kVelocityImpedance}) {
     SCOPED_TRACE(static_cast<int>(mode));
     ControllerConfig c = config();
     c.torque_slope_Nm_s = 5000.0;

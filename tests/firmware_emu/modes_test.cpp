@@ -38,8 +38,7 @@ TEST_F(Modes, CspFollowsAMovingTargetWithVelocityOffset) {
   for (int k = 0; k < 6000; ++k) {
     const double phase = 2.0 * std::numbers::pi * 0.25 * k * 1.0e-3;
     command.position = Rig::counts(0.3 * (1.0 - std::cos(phase)));
-    command.velocity_offset =
-        Rig::counts(0.3 * 2.0 * std::numbers::pi * 0.25 * std::sin(phase));
+    command.velocity_offset = Rig::counts(0.3 * 2.0 * std::numbers::pi * 0.25 * std::sin(phase));
     rig.cycle();
     if (k > 2000) worst = std::max(worst, std::abs(0.3 * (1.0 - std::cos(phase)) - joint.q));
   }
@@ -155,9 +154,10 @@ TEST_F(Modes, NeverDriveMoreThanTheLimits) {
       hard.commands[0].torque_offset = 30000;
       hard.cycle();
       const TestJoint& j = hard.joints[0];
-      worst_A = std::max(worst_A, std::abs(hard.drives[0].voltage_V -
-                                           j.NK * hard.board.axis(0).measured()
-                                                      .motor_velocity_rad_s) / j.R);
+      worst_A =
+          std::max(worst_A, std::abs(hard.drives[0].voltage_V -
+                                     j.NK * hard.board.axis(0).measured().motor_velocity_rad_s) /
+                                j.R);
       worst_V = std::max(worst_V, std::abs(hard.drives[0].voltage_V));
     }
     EXPECT_LE(worst_A, 8.0 + 1.0e-5) << mode;  // settings travel as REAL32

@@ -340,9 +340,9 @@ TEST_F(Guard, StopsAJointThatRingsInEveryModeWhoseGainsAreTooHigh) {
     std::uint16_t gains;  ///< the object of the loop that rings
     float factor;
   };
-  for (const Case& one : {Case{8, 0x2020, 1000.0F}, Case{9, 0x2021, 1000.0F},
-                          Case{10, 0x2022, 1000.0F}, Case{-1, 0x2022, 1000.0F},
-                          Case{-3, 0x2023, 1000.0F}}) {
+  for (const Case& one :
+       {Case{8, 0x2020, 1000.0F}, Case{9, 0x2021, 1000.0F}, Case{10, 0x2022, 1000.0F},
+        Case{-1, 0x2022, 1000.0F}, Case{-3, 0x2023, 1000.0F}}) {
     SCOPED_TRACE(static_cast<int>(one.mode));
     start(watched_setup());
     Rig& r = *rig_owner;

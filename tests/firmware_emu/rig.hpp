@@ -99,8 +99,12 @@ inline void append(std::vector<std::uint8_t>& bytes, std::uint64_t value, int si
 class Rig {
  public:
   explicit Rig(const BoardSetup& setup = board_setup())
-      : board(setup), joints(setup.axes.size()), commands(setup.axes.size()),
-        drives(setup.axes.size()), senses(setup.axes.size()), id(setup.node_id) {}
+      : board(setup),
+        joints(setup.axes.size()),
+        commands(setup.axes.size()),
+        drives(setup.axes.size()),
+        senses(setup.axes.size()),
+        id(setup.node_id) {}
 
   void send(std::uint32_t cob, const std::vector<std::uint8_t>& bytes) {
     give(canopen::make_frame(cob, bytes));
@@ -153,12 +157,10 @@ class Rig {
     step();
     for (std::size_t a = 0; a < commands.size(); ++a) {
       const auto o = static_cast<std::uint32_t>(0x800 * a);
-      append_mapping(rpdo_, {0x60400010 + (o << 16), 0x60600008 + (o << 16),
-                             0x607A0020 + (o << 16), 0x60B10020 + (o << 16),
-                             0x60B20010 + (o << 16)});
-      append_mapping(tpdo_, {0x60410010 + (o << 16), 0x60640020 + (o << 16),
-                             0x606C0020 + (o << 16), 0x60770010 + (o << 16),
-                             0x20000020 + (o << 16)});
+      append_mapping(rpdo_, {0x60400010 + (o << 16), 0x60600008 + (o << 16), 0x607A0020 + (o << 16),
+                             0x60B10020 + (o << 16), 0x60B20010 + (o << 16)});
+      append_mapping(tpdo_, {0x60410010 + (o << 16), 0x60640020 + (o << 16), 0x606C0020 + (o << 16),
+                             0x60770010 + (o << 16), 0x20000020 + (o << 16)});
     }
     map(0x1400, 0x1600, 0x200 + static_cast<std::uint32_t>(id), rpdo_);
     map(0x1800, 0x1A00, 0x180 + static_cast<std::uint32_t>(id), tpdo_);

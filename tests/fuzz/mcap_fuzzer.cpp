@@ -20,7 +20,6 @@ namespace {
 using namespace tandem;
 using fuzz::require;
 
-
 /// A file in memory that is written anew for each input.
 class MemoryFile {
  public:

@@ -9,8 +9,7 @@
 namespace tandem::fuzz {
 
 /// Ends the program, with the line that asks, when it does not hold.
-inline void require(bool holds,
-                    const std::source_location& at = std::source_location::current()) {
+inline void require(bool holds, const std::source_location& at = std::source_location::current()) {
   if (holds) return;
   std::fprintf(stderr, "%s:%u: what is required here does not hold\n", at.file_name(), at.line());
   std::abort();

@@ -160,10 +160,12 @@ TEST(RobotConfigDefaults, ReportAListThatCannotBeReadOnce) {
 }
 
 TEST(RobotConfigDefaults, LetSensorsStandBelowTheirBus) {
-  const std::string table = "[[sensor]]\nname = \"imu\"\ntype = \"imu\"\nbus = \"left\"\n"
-                            "link = \"pelvis\"\n";
-  std::string text = shortened(table, "[[sensor]]\nname = \"imu2\"\ntype = \"imu\"\n"
-                                      "bus = \"left\"\nlink = \"foot\"\n");
+  const std::string table =
+      "[[sensor]]\nname = \"imu\"\ntype = \"imu\"\nbus = \"left\"\n"
+      "link = \"pelvis\"\n";
+  std::string text = shortened(table,
+                               "[[sensor]]\nname = \"imu2\"\ntype = \"imu\"\n"
+                               "bus = \"left\"\nlink = \"foot\"\n");
   const std::string end = "slow_pdo_every = 2 },\n]\n";
   text.insert(text.find(end) + end.size(),
               "sensors = [{ name = \"imu\", type = \"imu\", link = \"pelvis\" }]\n");

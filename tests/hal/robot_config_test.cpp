@@ -466,8 +466,7 @@ TEST(RobotConfig, RefusesStrangeBrakesOscillationsAndRatesWithLineAndKey) {
         Case{"max_torque_rate_Nm_s = 0", "max_torque_rate_Nm_s"},
         Case{"max_torque_rate_Nm_s = -5", "max_torque_rate_Nm_s"},
         Case{"max_torque_rate_Nm_s = nan", "max_torque_rate_Nm_s"}}) {
-    const std::string found =
-        errors_of(with(kRobot, "[[sensor]]", std::string(one.line) + "\n"));
+    const std::string found = errors_of(with(kRobot, "[[sensor]]", std::string(one.line) + "\n"));
     EXPECT_NE(found.find("robots/leg.toml:"), std::string::npos) << one.line << "\n" << found;
     EXPECT_NE(found.find(one.key), std::string::npos) << one.line << "\n" << found;
   }

@@ -109,9 +109,10 @@ TEST_F(RealTime, ALoopThatHangsIsEndedAndEveryNodeIsStopped) {
   ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
   Process master(run_words("100"), folder_ / "run.txt");
   EXPECT_EQ(master.wait(), 1);
-  for (const char* text : {"fault: the loop hangs: no cycle for 0.5 s, it is in the controller "
-                           "'hangs'. The emergency stop is latched; NMT stop is sent on can0; ",
-                           "fault: the loop hung in the controller 'hangs' and did not come back"}) {
+  for (const char* text :
+       {"fault: the loop hangs: no cycle for 0.5 s, it is in the controller "
+        "'hangs'. The emergency stop is latched; NMT stop is sent on can0; ",
+        "fault: the loop hung in the controller 'hangs' and did not come back"}) {
     EXPECT_NE(master.output().find(text), std::string::npos) << text << "\nin: " << master.output();
   }
   EXPECT_EQ(robot.interrupt(), 0) << robot.output();

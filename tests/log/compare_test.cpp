@@ -8,9 +8,9 @@ namespace {
 
 struct Written {
   std::uint64_t messages = 3;
-  std::uint64_t odd_message = 99;   ///< whose knee position is another
-  std::int64_t late_message = 99;   ///< whose time is 1 ns later
-  bool command = false;             ///< write a second topic
+  std::uint64_t odd_message = 99;  ///< whose knee position is another
+  std::int64_t late_message = 99;  ///< whose time is 1 ns later
+  bool command = false;            ///< write a second topic
 };
 
 LogFile write(const std::string& path, const Written& what) {

@@ -15,17 +15,18 @@ struct OddServer : testing::Test {
     auto made = Server::open(*at_robot, robot, identity_of(robot, "hash", test::kPeriod_ns), {});
     EXPECT_TRUE(made);
     server = std::move(*made);
-    auto connected = RemoteBackend::connect(
-        *at_owner, robot, identity_of(robot, "hash", test::kPeriod_ns),
-        {.name = "test", .server = server->number(), .interrupted = [this] { return owned.load(); }});
+    auto connected =
+        RemoteBackend::connect(*at_owner, robot, identity_of(robot, "hash", test::kPeriod_ns),
+                               {.name = "test", .server = server->number(), .interrupted = [this] {
+                                  return owned.load();
+                                }});
     EXPECT_TRUE(connected) << connected.error().to_string();
     owned = true;
     owner = std::move(*connected);
   }
   template <class T>
   void say(const char* topic, const T& sample) {
-    auto writer =
-        dds::Writer<T>::create(*at_robot, at_robot->topic_name(topic), link_qos());
+    auto writer = dds::Writer<T>::create(*at_robot, at_robot->topic_name(topic), link_qos());
     ASSERT_TRUE(writer);
     ASSERT_TRUE(test::eventually([&] { return writer->endpoint().matched() > 0; }));
     ASSERT_TRUE(writer->write(sample));

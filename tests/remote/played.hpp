@@ -100,7 +100,7 @@ inline void Played::ask(const Deed<Ask>& one) {
     case Ask::kReset: served.cycle->inbox().reset_faults(); break;
     case Ask::kStop:
       served.cycle->inbox().emergency_stop(one.amount % 2 == 0 ? hal::StopCategory::kCategory0
-                                                                  : hal::StopCategory::kCategory1);
+                                                               : hal::StopCategory::kCategory1);
       break;
     case Ask::kLook: (void)control().await_standing(100'000); break;
     case Ask::kWait: std::this_thread::sleep_for(std::chrono::microseconds(100 * one.amount));

@@ -22,8 +22,8 @@ struct Squat {
                  log::Recorder* recorder = nullptr, bool bus_timing = false,
                  const std::string& name = "squat", const CycleConfig& config = {})
       : wanted(config) {
-    auto read = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/" + name +
-                                ".toml");
+    auto read =
+        read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot + "/" + name + ".toml");
     if (!read) {
       ADD_FAILURE() << read.error().at(0).to_string();
       return;

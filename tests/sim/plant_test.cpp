@@ -301,8 +301,8 @@ PlantConfig braked(int order, double torque_Nm) {
   PlantConfig config =
       pendulum(order == 0 ? pendulum_kernels<139>() : pendulum_kernels<0>(), order, 1.0);
   config.joints[0].actuator.damping_Nms_rad = 0.0;
-  config.joints[0].brake = hal::BrakeConfig{.torque_Nm = torque_Nm, .release_ms = 7,
-                                            .engage_ms = 5};
+  config.joints[0].brake =
+      hal::BrakeConfig{.torque_Nm = torque_Nm, .release_ms = 7, .engage_ms = 5};
   return config;
 }
 
@@ -312,8 +312,7 @@ double gravity_Nm(double q) {
 
 TEST(PlantBrake, HoldsWithoutCreeping) {
   for (const int order : {0, 2}) {
-    for (const Integrator integrator :
-         {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
+    for (const Integrator integrator : {Integrator::kSemiImplicitEuler, Integrator::kRungeKutta4}) {
       PlantConfig config = braked(order, 20.0);  // the spring swings to twice the load at first
       config.integrator = integrator;
       config.joints[0].actuator.spring_damping_Nms_rad = 5.0;

@@ -25,8 +25,8 @@ T take(Result<T> made) {
 
 TestRobot load_test_robot(const std::string& name) {
   TestRobot out;
-  out.robot = take(hal::read_robot_config(std::string(TANDEM_SOURCE_DIR) + "/config/" + name +
-                                          "/robot.toml"));
+  out.robot = take(
+      hal::read_robot_config(std::string(TANDEM_SOURCE_DIR) + "/config/" + name + "/robot.toml"));
   const model::UrdfModel urdf = take(runtime::complete_robot(out.robot));
   const std::string folder = std::string(TANDEM_BINARY_DIR) + "/lib/models";
   out.kernels =
