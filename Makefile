@@ -5,7 +5,7 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit hil rtsan fuzz format lint clean help
+.PHONY: demo test test-all unit anywhere hil rtsan fuzz format lint clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
@@ -28,12 +28,13 @@ demo:
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
-# What CI runs: all tests; side by side, for each takes one core, the tests on a real CAN stack and
+# What CI runs: all tests; some of them in strange surroundings; side by side, for each takes one core, the tests on a real CAN stack and
 # a minute of each fuzz target; the real-time proof. The last lines say what ran and what did not.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory unit
+	@$(MAKE) --no-print-directory anywhere
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
 	@$(MAKE) --no-print-directory rtsan
 	@echo
@@ -43,6 +44,7 @@ test:
 test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
+	@scripts/test-anywhere --paths
 
 unit:
 	@scripts/install-dependencies test
@@ -50,6 +52,10 @@ unit:
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
 	@TITLE=unit scripts/run-tests build/release $(JOBS) -LE hil
+
+# A choice of the unit tests, as `unit` built them, as another user and with other surroundings.
+anywhere:
+	@scripts/test-anywhere build/release
 
 # On this machine's kernel if it has CAN, else in a User-Mode-Linux one: tests/hil/README.md.
 hil:

@@ -1,5 +1,8 @@
 // Wrong input ends with exit status 2, one clear message, and no run.
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 
@@ -327,7 +330,19 @@ TEST_F(BadInput, APluginOfAnotherAbiIsRefused) {
 }
 
 // With 6 and 7 Cyclone DDS crashed in its own clean-up.
+bool loopback_is_up() {
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(9);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const int routed = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  ::close(fd);
+  return routed == 0;
+}
+
 TEST_F(BadInput, OfTooFewOpenFilesForDdsIsRefusedWhateverIsLeft) {
+  if (!loopback_is_up()) GTEST_SKIP() << "DDS needs the loopback interface, which is down";
   for (int limit = 4; limit <= 40; ++limit) {
     const Outcome outcome =
         tandem("run hold.toml --duration 0.05 --no-log --no-socket -q --dds --domain 99",
