@@ -205,6 +205,8 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish, bool
                                 hal::CommandImage& command) noexcept TANDEM_RT {
   LoopAnswer answer{.joint = static_cast<std::int32_t>(joint), .one = owner_[joint]};
   hal::PositionControl& motions = operator_.position;
+  const hal::JointCapabilities& limit = capabilities_[joint];
+  const double reference = command.position_rad()[joint];
   operator_.begin(state, command);
   if (owner_[joint] >= 0) {
     answer.reason = RejectReason::kClaimed;
@@ -214,9 +216,11 @@ LoopAnswer ControllerHost::move(std::size_t joint, const MoveRequest& wish, bool
     (void)motions.stop(joint);
   } else if (recovers_[joint] != 0) {
     answer.reason = RejectReason::kRecovering;
+  } else if (reference < limit.min_position_rad || reference > limit.max_position_rad) {
+    answer.reason = RejectReason::kOutside;  // the limits would slow it down, and then let it rush
   } else {
-    const double limit = capabilities_[joint].max_velocity_rad_s;
-    const double speed = std::isfinite(wish.speed_rad_s) ? wish.speed_rad_s : limit / 4.0;
+    const double most = limit.max_velocity_rad_s;
+    const double speed = std::isfinite(wish.speed_rad_s) ? wish.speed_rad_s : most / 4.0;
     const double acceleration =
         std::isfinite(wish.acceleration_rad_s2) ? wish.acceleration_rad_s2 : speed / 0.5;
     // From what is commanded now, a transfer's offset included.

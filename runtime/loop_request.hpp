@@ -65,6 +65,7 @@ enum class RejectReason : std::uint32_t {
   kIncapable,   ///< `joint` lacks the mode
   kWithin,      ///< `joint` is within its limits
   kOtherMode,   ///< `joint` is not in position control
+  kOutside,     ///< `joint` stands outside its limits
   kBeyond,      ///< a value is beyond `joint`'s limits
   kNotEnabled,  ///< nothing moves in this phase
   kNotHeld,     ///< no reset holds controllers back

@@ -139,6 +139,10 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.message = "is within its limits already, or on its way";
       error.hint = "tandem joint list shows where it is";
       break;
+    case RejectReason::kOutside:
+      error.message = "stands outside its limits";
+      error.hint = "lead it back first: tandem joint recover " + joint;
+      break;
     case RejectReason::kBeyond:
       error.message = "cannot go there, or not at this speed";
       error.hint = "its limits are in robot.toml";

@@ -132,8 +132,7 @@ class RunServices {
   /// Moves a joint that no active controller claims, on a trapezoid of speed; one under way goes
   /// over into it. Without a target it brakes. Done means begun.
   /// Errors: unknown joint; claimed; a target, speed or acceleration beyond its limits (which are
-  /// named); not in position control; on its way back to its limits; not in the phases held or
-  /// running.
+  /// named); not in position control; outside its limits; not in the phases held or running.
   [[nodiscard]] Result<RequestResult> move_joint(const std::string& joint, const MoveRequest& wish,
                                                  Patience patience = kPatience);
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.

@@ -130,12 +130,30 @@ TEST_F(JointRecovery, IsNotEndedByTheStartOfAControllerThatClaimsTheJoint) {
             "again when it is inside: tandem joint list elbow shows where it is)");
   EXPECT_EQ(start([](RunServices& services) { return services.switch_controllers({}, {"sine"}); }),
             all());
+  const auto moved = start(
+      [](RunServices& services) { return services.move_joint("elbow", {.target_rad = 0.0}); });
+  EXPECT_NE(moved.find("is on its way back to its limits, which this would end"), std::string::npos)
+      << moved;
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
   EXPECT_LT(answered(), before);
   steps(15'100);
   EXPECT_EQ(cycle->command().position_rad()[1], 1.5);
   EXPECT_EQ(all(), "started");
   EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+}
+
+TEST_F(JointRecovery, ComesBeforeAMotion) {
+  stop_at(1.6);
+  reset();
+  auto asked = std::async(std::launch::async, [&] {
+    return cycle->services().move_joint("elbow", {.target_rad = 0.0});
+  });
+  while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) steps(1);
+  const auto answer = asked.get();
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().to_string(),
+            "elbow: stands outside its limits (lead it back first: tandem joint recover elbow)");
+  EXPECT_EQ(cycle->command().position_rad()[1], 1.6);
 }
 
 TEST_F(JointServices, ShowEveryJointAfterTheLastCycle) {
