@@ -53,7 +53,7 @@ std::string section_of(unsigned long index, unsigned long sub, const Sheet& shee
 
 std::size_t type_bits(const Section& section) {
   static const std::map<std::string, std::size_t> kBits{
-      {"0x0002", 8}, {"0x0003", 16}, {"0x0004", 32}, {"0x0005", 8},
+      {"0x0002", 8},  {"0x0003", 16}, {"0x0004", 32}, {"0x0005", 8},
       {"0x0006", 16}, {"0x0007", 32}, {"0x0008", 32}};
   const auto found = kBits.find(section.at("DataType"));
   return found == kBits.end() ? 0 : found->second;
@@ -109,9 +109,8 @@ int expect_mapping(const Sheet& sheet, unsigned long first, const std::string& r
   for (unsigned long index = first; index < first + 4; ++index) {
     const int count = std::stoi(sheet.at(section_of(index, 0, sheet)).at("DefaultValue"));
     for (int sub = 1; sub <= count; ++sub) {
-      const unsigned long entry =
-          hex(sheet.at(section_of(index, static_cast<unsigned long>(sub), sheet))
-                  .at("DefaultValue"));
+      const unsigned long entry = hex(
+          sheet.at(section_of(index, static_cast<unsigned long>(sub), sheet)).at("DefaultValue"));
       const Section& object = sheet.at(section_of(entry >> 16, entry >> 8 & 0xFF, sheet));
       EXPECT_EQ(object.at("PDOMapping"), "1") << std::hex << entry;
       EXPECT_NE(object.at("AccessType"), refused_access) << std::hex << entry;
@@ -147,10 +146,10 @@ TEST_F(Eds, OfABoardHasItsDictionaryAndTheRobotsMapping) {
 
 TEST_F(Eds, OfClassicBoardsAndOfSensorsAreTypesOfTheirOwn) {
   const Outcome classic =
-      tandem("eds " TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml -o classic");
+      tandem("eds '" TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml' -o classic");
   ASSERT_EQ(classic.status, 0) << classic.err;
   expect_complete(read_sheet(folder_ / "classic/board_1_axis_classic.eds"));
-  const Outcome coman = tandem("eds " TANDEM_SOURCE_DIR "/config/coman/robot.toml -o coman");
+  const Outcome coman = tandem("eds '" TANDEM_SOURCE_DIR "/config/coman/robot.toml' -o coman");
   ASSERT_EQ(coman.status, 0) << coman.err;
   for (const char* name : {"board_2_axes_fd.eds", "force_torque_fd.eds", "imu_fd.eds"}) {
     ASSERT_TRUE(std::filesystem::exists(folder_ / "coman" / name)) << name << coman.out;
