@@ -14,7 +14,7 @@ namespace {
 /// A plugin that threw had ended `tandem check` with a signal, one that called exit(0) with
 /// success.
 TEST_F(BadInput, FromAControllersLibraryIsRefused) {
-  const std::string folder = "TANDEM_CONTROLLERS=" TANDEM_BINARY_DIR "/tests/broken_plugins";
+  const std::string folder = "TANDEM_CONTROLLERS='" TANDEM_BINARY_DIR "/tests/broken_plugins'";
   for (const std::string command : {"check", "run"}) {
     edit("hold.toml", "plugin = \"hold\"", "plugin = \"throws\"");
     const Outcome threw = tandem(command + " hold.toml", folder);

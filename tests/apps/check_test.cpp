@@ -119,13 +119,13 @@ TEST_F(Check, RefusesWhatARealBusCannotCarryAndSoDoesRun) {
 }
 
 TEST_F(Check, TellsHowLoopsCloseAndWhatCanStillMove) {
-  const Outcome robot = tandem("check " TANDEM_SOURCE_DIR "/config/four_bar/robot.toml");
+  const Outcome robot = tandem("check '" TANDEM_SOURCE_DIR "/config/four_bar/robot.toml'");
   EXPECT_EQ(robot.status, 0) << robot.err;
   for (const std::string text :
        {"revolute, coupler_end to rocker_end", "closes from a gap of 0.0", "1 of 3 degrees"}) {
     EXPECT_NE(robot.out.find(text), std::string::npos) << text << "\nin: " << robot.out;
   }
-  const Outcome run = tandem("check " TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml");
+  const Outcome run = tandem("check '" TANDEM_SOURCE_DIR "/config/parallel_ankle/hold.toml'");
   EXPECT_NE(run.out.find("2 of 4 degrees"), std::string::npos) << run.out;
 }
 
@@ -277,7 +277,7 @@ TEST_F(Check, HoldsOfWhatTheDemoNamesNext) {
     file = TANDEM_SOURCE_DIR "/" + file;
     EXPECT_TRUE(std::filesystem::exists(file)) << file;
     if (command != "run") continue;
-    EXPECT_EQ(tandem("check " + file).status, 0) << read_text(folder_ / "err.txt");
+    EXPECT_EQ(tandem("check '" + file + "'").status, 0) << read_text(folder_ / "err.txt");
   }
   EXPECT_EQ(named, 3);
 }

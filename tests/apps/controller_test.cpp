@@ -50,9 +50,9 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
 
 TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   begin("");
-  const std::string broken = TANDEM_BINARY_DIR "/tests/broken_plugins/";
-  expect(refused("controller load " + broken + "no_entry.so"), "has no entry point");
-  expect(refused("controller load " + broken + "older_interface.so"),
+  const std::string broken = "'" TANDEM_BINARY_DIR "/tests/broken_plugins/";
+  expect(refused("controller load " + broken + "no_entry.so'"), "has no entry point");
+  expect(refused("controller load " + broken + "older_interface.so'"),
          "was built for controller interface ");
   expect(refused("controller load hodl"), "did you mean 'hold'?");
   expect(refused("controller load hold"), "of this name is loaded already");

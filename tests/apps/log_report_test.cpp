@@ -106,8 +106,8 @@ TEST_F(LogAndReport, ReportTellsTheFaultAtTheTimeThatTheRunTold) {
 }
 
 TEST_F(LogAndReport, ReportOfClosedLoopsHasTheirErrorsAndTheTorqueThroughThem) {
-  const Outcome run = tandem("run " TANDEM_SOURCE_DIR
-                             "/config/parallel_ankle/move.toml --duration 0.5 --log . --report");
+  const Outcome run = tandem("run '" TANDEM_SOURCE_DIR
+                             "/config/parallel_ankle/move.toml' --duration 0.5 --log . --report");
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_NE(run.out.find("\n\n  closed loops"), std::string::npos) << run.out;
   const std::string page = read_text(folder_ / "parallel_ankle-move-001/report.html");
@@ -128,12 +128,12 @@ TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
       "' 2>/dev/null || echo 0) -gt 300000 ] "
       "&& break; sleep 0.1; done; kill -9 $!; wait";
   std::system(kill_when_it_has_written.c_str());
-  const Outcome info = tandem("log info " + log + " --json -");
+  const Outcome info = tandem("log info '" + log + "' --json -");
   ASSERT_EQ(info.status, 0) << info.err;
   const auto json = nlohmann::json::parse(info.out);
   EXPECT_EQ(json["complete"], false);
   EXPECT_GT(json["topics"]["/tandem/state"]["messages"], 100);
-  const Outcome report = tandem("report " + log);
+  const Outcome report = tandem("report '" + log + "'");
   EXPECT_EQ(report.status, 0) << report.err;
   EXPECT_EQ(report.err, "") << "nothing is left out";
 }

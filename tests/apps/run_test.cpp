@@ -43,7 +43,7 @@ TEST_F(Run, WritesTheDocumentedKeys) {
 
 TEST_F(Run, FollowsATrajectoryOverClassicCan) {
   const auto json =
-      run(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml --no-log");
+      run("'" TANDEM_SOURCE_DIR "/config/double_pendulum_classic/trajectory.toml' --no-log");
   EXPECT_EQ(json["period_ns"], 2'000'000);
   EXPECT_TRUE(json["faults"].empty());
   EXPECT_LT(json["joints"]["joint2"]["max_tracking_error_rad"].get<double>(), 0.02);
@@ -52,7 +52,7 @@ TEST_F(Run, FollowsATrajectoryOverClassicCan) {
 TEST_F(Run, KeepsClosedLoopsClosedThroughBoardsAndFirmware) {
   for (const std::string experiment :
        {"four_bar/hold", "four_bar/turn", "parallel_ankle/hold", "parallel_ankle/move"}) {
-    const auto json = run(TANDEM_SOURCE_DIR "/config/" + experiment + ".toml --no-log");
+    const auto json = run("'" TANDEM_SOURCE_DIR "/config/" + experiment + ".toml' --no-log");
     EXPECT_TRUE(json["faults"].empty()) << experiment << json["faults"];
     EXPECT_EQ(json["loops"].size(), experiment.starts_with("four_bar") ? 1U : 2U);
     for (const auto& [name, loop] : json["loops"].items()) {
@@ -131,7 +131,7 @@ TEST_F(Run, OfAScenarioEndsInItsFaultWhichTheLogTells) {
   EXPECT_EQ(outcome.status, 1);
   const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
   const std::string log = folder_ / json["log"]["path"].get<std::string>();
-  const Outcome events = tandem("log csv " + log + " --topic event");
+  const Outcome events = tandem("log csv '" + log + "' --topic event");
   EXPECT_NE(events.out.find("injected encoder_unplug of joint2"), std::string::npos)
       << events.out << events.err;
 }

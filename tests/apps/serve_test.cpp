@@ -17,7 +17,9 @@ class Serve : public Program {
   [[nodiscard]] static std::string domain() {
     return " --domain " + std::to_string(dds::test::own_domain());
   }
-  [[nodiscard]] static std::string coman() { return TANDEM_SOURCE_DIR "/config/coman/squat.toml"; }
+  [[nodiscard]] static std::string coman() {
+    return "'" TANDEM_SOURCE_DIR "/config/coman/squat.toml'";
+  }
 
   /// Starts `tandem ARGUMENTS` in the background; its process id.
   [[nodiscard]] pid_t begin(const std::string& arguments, const std::string& name) const {
@@ -114,10 +116,10 @@ TEST_F(Serve, AnOwnerThatIsKilledLeavesTheDeclaredReaction) {
       begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet", "serve");
   const std::string socket = control_folder() + "/run-" + std::to_string(server) + ".sock";
   const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
-                                "--duration 600 --socket " + (folder_ / "o.sock").string(),
+                                "--duration 600 --socket ./o.sock",
                             "owner");
   ASSERT_TRUE(eventually([&] {
-    const auto status = ask((folder_ / "o.sock").string(), "status");
+    const auto status = ask("./o.sock", "status");
     return status.is_object() && status.value("phase", "") == "running";
   })) << read_text(folder_ / "owner.err");
   ASSERT_EQ(::kill(owner, SIGKILL), 0);
@@ -136,10 +138,10 @@ TEST_F(Serve, AServerThatIsKilledEndsItsOwnerInAFault) {
   const pid_t server =
       begin("serve trajectory.toml" + domain() + " --realtime --no-log --quiet", "serve");
   const pid_t owner = begin("run trajectory.toml" + domain() + " --hal dds --no-log --quiet " +
-                                "--duration 600 --socket " + (folder_ / "o.sock").string(),
+                                "--duration 600 --socket ./o.sock",
                             "owner");
   ASSERT_TRUE(eventually([&] {
-    const auto status = ask((folder_ / "o.sock").string(), "status");
+    const auto status = ask("./o.sock", "status");
     return status.is_object() && status.value("phase", "") == "running";
   })) << read_text(folder_ / "owner.err");
   ASSERT_EQ(::kill(server, SIGKILL), 0);
