@@ -144,7 +144,8 @@ class VelocityControl {
   [[nodiscard]] double ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
   Code stop(std::size_t j) noexcept TANDEM_RT { return velocity_move(j, 0.0); }
 
-  /// Writes this cycle's references. Called once a cycle.
+  /// Writes this cycle's references of the joints that velocity_move() has moved in this mode.
+  /// Called once a cycle.
   void advance() noexcept TANDEM_RT;
   void archive(Archive& ar);
 
@@ -152,6 +153,7 @@ class VelocityControl {
   struct Ramp {
     double target_rad_s = 0.0;
     double acceleration_rad_s2 = 0.0;
+    std::int64_t asked = 0;  ///< else the joint's reference is somebody else's
   };
   JointAccess& io_;
   std::vector<Ramp> ramps_;

@@ -123,8 +123,10 @@ Code VelocityControl::velocity_move(std::size_t j, double rad_s) noexcept TANDEM
   if (j >= ramps_.size() || !in_mode(io_, j, ControlMode::kVelocity)) return Code::kOutOfRange;
   const double max = io_.joints[j].max_velocity_rad_s;
   const Code code = checked(io_, j, rad_s, -max, max);
-  if (code == Code::kOk) ramps_[j].target_rad_s = rad_s;
-  return code;
+  if (code != Code::kOk) return code;
+  ramps_[j].target_rad_s = rad_s;
+  ramps_[j].asked = 1;
+  return Code::kOk;
 }
 double VelocityControl::target_velocity_rad_s(std::size_t j) const noexcept TANDEM_RT {
   return j < ramps_.size() ? ramps_[j].target_rad_s : at({}, j);
@@ -145,8 +147,10 @@ void VelocityControl::advance() noexcept TANDEM_RT {
     Ramp& ramp = ramps_[j];
     if (!in_mode(io_, j, ControlMode::kVelocity)) {  // another mode ends the motion
       ramp.target_rad_s = 0.0;
+      ramp.asked = 0;
       continue;
     }
+    if (ramp.asked == 0) continue;
     double& reference = io_.command->velocity_rad_s()[j];
     const double change = ramp.acceleration_rad_s2 * dt;
     reference = std::clamp(ramp.target_rad_s, reference - change, reference + change);

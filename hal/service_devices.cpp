@@ -104,17 +104,18 @@ std::uint32_t AmplifierControl::fault(std::size_t j) const noexcept TANDEM_RT {
 Code AmplifierControl::reset_fault(std::size_t j) noexcept TANDEM_RT {
   if (j >= io_.joints.size()) return Code::kOutOfRange;
   io_.command->fault_reset()[j] = 1;
+  resets_[j] = 1;
   return Code::kOk;
 }
 
 void AmplifierControl::advance() noexcept TANDEM_RT {
   for (std::size_t j = 0; j < io_.joints.size(); ++j) {
-    if (io_.command->fault_reset()[j] == 0) continue;
+    if (resets_[j] == 0) continue;
     seed_references(io_, j, static_cast<ControlMode>(io_.command->mode()[j]));
-    if (io_.state->fault()[j] == 0) io_.command->fault_reset()[j] = 0;
+    if (io_.state->fault()[j] == 0) io_.command->fault_reset()[j] = resets_[j] = 0;
   }
 }
 
-void AmplifierControl::archive(Archive& ar) { ar(enabled_mode_); }
+void AmplifierControl::archive(Archive& ar) { ar(enabled_mode_, resets_); }
 
 }  // namespace tandem::hal

@@ -49,7 +49,9 @@ class ImpedanceControl {
 class AmplifierControl {
  public:
   explicit AmplifierControl(JointAccess& access)
-      : io_(access), enabled_mode_(access.joints.size(), ControlMode::kPosition) {}
+      : io_(access),
+        enabled_mode_(access.joints.size(), ControlMode::kPosition),
+        resets_(access.joints.size()) {}
   /// Enables the drive in the mode it had before disable() (position control at first), with its
   /// references at the measured state.
   Code enable(std::size_t j) noexcept TANDEM_RT;
@@ -66,13 +68,14 @@ class AmplifierControl {
   /// Asks the drive to clear its latched fault, until it has; references are seeded anew.
   Code reset_fault(std::size_t j) noexcept TANDEM_RT;
 
-  /// Withdraws the resets that have worked. Called once a cycle.
+  /// Withdraws those of its resets that have worked. Called once a cycle.
   void advance() noexcept TANDEM_RT;
   void archive(Archive& ar);
 
  private:
   JointAccess& io_;
   std::vector<ControlMode> enabled_mode_;
+  std::vector<std::uint8_t> resets_;  // asked for here
 };
 
 }  // namespace tandem::hal

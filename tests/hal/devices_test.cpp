@@ -86,6 +86,25 @@ TEST_F(DevicesTest, RefuseAReferenceOfAnotherMode) {
   EXPECT_EQ(devices.torque.set_ref_torque(0, 1.0), Code::kOk);
 }
 
+// Two controllers have devices over the same images: each writes what it was asked for.
+TEST_F(DevicesTest, LeaveAloneTheJointsThatOthersMove) {
+  Devices other{robot_of(robot), state, command, parameters, 1'000'000};
+  mode(ControlMode::kVelocity);
+  ASSERT_EQ(devices.velocity.velocity_move(0, 0.5), Code::kOk);
+  ASSERT_EQ(devices.modes.set_control_mode(1, ControlMode::kPosition), Code::kOk);
+  ASSERT_EQ(devices.position.position_move(1, 0.3), Code::kOk);
+  state.fault()[2] = 0x8611;
+  ASSERT_EQ(devices.amplifier.reset_fault(2), Code::kOk);
+  for (int i = 0; i < 100; ++i) devices.advance();
+  state.fault()[2] = 0;
+  const CommandImage before = command;
+  EXPECT_GT(command.velocity_rad_s()[0], 0.0);
+  other.advance();
+  EXPECT_TRUE(std::ranges::equal(command.bytes(), before.bytes()));
+  devices.advance();
+  EXPECT_EQ(command.fault_reset()[2], 0);
+}
+
 TEST_F(DevicesTest, AnswerForAJointThatDoesNotExist) {
   EXPECT_TRUE(std::isnan(devices.encoders.position_rad(3)));
   EXPECT_EQ(devices.encoders.timestamp_ns(3), -1);
