@@ -152,7 +152,7 @@ class ControllerHost {
 
   // The cycle.
 
-  /// Each cycle in which no controller runs and joints are held, last: the motions of move().
+  /// The motions of move(), in each cycle without update(), which does it itself.
   void move_on(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
   /// Each cycle in which joints are held, last: their references, toward their limits.
   void lead_back(hal::CommandImage& command) noexcept TANDEM_RT;

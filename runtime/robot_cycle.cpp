@@ -10,7 +10,8 @@ using log::EventKind;
 
 namespace {
 
-/// The part of a cycle that may not block: the traps are armed, and the watchdog sees it at work.
+/// While one exists the cycle may not block: the real-time traps are armed, and the watchdog counts
+/// the loop as working.
 class AtWork {
  public:
   explicit AtWork(Heartbeat& heartbeat) noexcept : heartbeat_(&heartbeat) { heartbeat_->enter(); }
@@ -120,7 +121,7 @@ void RobotCycle::check_backend(Code code) noexcept TANDEM_RT {
          .category = StopCategory::kCategory1});
 }
 
-/// The run's course when nobody asks for anything.
+/// The phase changes that nobody requests: when the backend is ready, and when time is over.
 void RobotCycle::advance_phase() noexcept TANDEM_RT {
   const bool over = run_.time_is_over(time_.cycle);
   switch (run_.phase()) {

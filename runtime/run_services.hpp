@@ -162,6 +162,7 @@ class RunServices {
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;
+  [[nodiscard]] Result<std::size_t> joint_to_change(const std::string& name);
   [[nodiscard]] Status check_mode(std::size_t joint, const JointRequest& wish,
                                   const JointStatus& now) const;
   [[nodiscard]] std::vector<JointStatus> looks() const;

@@ -43,6 +43,13 @@ Result<std::size_t> RunServices::joint_of(const std::string& name) const {
   return fail_at(name, "the robot has no joint '" + name + "'", suggest(name, names));
 }
 
+/// The joint's index, when the run can still be asked for something.
+Result<std::size_t> RunServices::joint_to_change(const std::string& name) {
+  collect();
+  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
+  return joint_of(name);
+}
+
 std::vector<JointStatus> RunServices::looks() const {
   std::vector<JointStatus> looks(robot_->joints.size());
   while (!looks_.read(looks)) std::this_thread::yield();
@@ -90,9 +97,7 @@ Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
 Result<RequestResult> RunServices::set_joint(const std::string& joint, const JointRequest& wish,
                                              Patience patience) {
   Lock lock(mutex_);
-  collect();
-  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  const Result<std::size_t> index = joint_of(joint);
+  const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointCapabilities& limit = host_->capabilities()[*index];
   const JointStatus now = looks()[*index];
@@ -122,9 +127,7 @@ Result<RequestResult> RunServices::set_joint(const std::string& joint, const Joi
 
 Result<RequestResult> RunServices::recover(const std::string& joint, Patience patience) {
   Lock lock(mutex_);
-  collect();
-  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  const Result<std::size_t> index = joint_of(joint);
+  const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   return ask(lock,
              {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
@@ -134,9 +137,7 @@ Result<RequestResult> RunServices::recover(const std::string& joint, Patience pa
 Result<RequestResult> RunServices::move_joint(const std::string& joint, const MoveRequest& wish,
                                               Patience patience) {
   Lock lock(mutex_);
-  collect();
-  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  const Result<std::size_t> index = joint_of(joint);
+  const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointCapabilities& limit = host_->capabilities()[*index];
   const double target = wish.target_rad, speed = wish.speed_rad_s;
@@ -164,9 +165,7 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
 Result<RequestResult> RunServices::set_gains(const std::string& joint, hal::PidLoop loop,
                                              const GainsRequest& wish, Patience patience) {
   Lock lock(mutex_);
-  collect();
-  if (Status phase = check_phase(); !phase) return std::unexpected(phase.error());
-  const Result<std::size_t> index = joint_of(joint);
+  const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   if (!host_->capabilities()[*index].can(needed_by(loop))) {
     return fail_at(joint, std::string("this joint has no ") + hal::to_string(loop) + " loop",

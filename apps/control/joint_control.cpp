@@ -158,7 +158,7 @@ void add_joint_commands(ControlRegistry& registry, RunServices& services,
                [&services](const Json& request) { return set(services, request); });
   registry.add(
       "joint.move", ControlEffect::kChanges,
-      "moves a joint that no active controller claims, on a trapezoid of speed",
+      "moves a joint that no active controller claims, with a trapezoidal velocity profile",
       {joint,
        {.name = "target_rad", .type = Type::kNumber, .required = true, .doc = "m of a slide"},
        {.name = "speed_rad_s", .type = Type::kNumber, .doc = "else a quarter of its limit"},
