@@ -47,10 +47,10 @@ void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::v
   const auto i = [&](std::size_t k) { return std::span<const S>(in[k]); };
   const auto o = [&](std::size_t k) { return std::span<S>(out[k]); };
   switch (kernel) {
-    case Kernel::kForwardDynamics: return ForwardDynamics<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
-    case Kernel::kInverseDynamics: return InverseDynamics<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
-    case Kernel::kMassMatrix: return MassMatrix<S>(m, i(0), o(0)).run();
-    case Kernel::kBias: return InverseDynamics<S>(m, i(0), i(1), {}, {}, o(0)).run();
+    case Kernel::kForwardDynamics: return Aba<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
+    case Kernel::kInverseDynamics: return Rnea<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
+    case Kernel::kMassMatrix: return Crba<S>(m, i(0), o(0)).run();
+    case Kernel::kBias: return Rnea<S>(m, i(0), i(1), {}, {}, o(0)).run();
     case Kernel::kCenterOfMass: return CenterOfMass<S>(m, i(0), i(1), o(0), o(1), o(2)).run();
     case Kernel::kCentroidalMomentum: return centroidal_momentum<S>(m, i(0), i(1), o(0));
     case Kernel::kEnergy: return energy<S>(m, i(0), i(1), o(0));

@@ -1,7 +1,7 @@
-// Forward dynamics by the articulated-body algorithm (Featherstone 2008, chapter 7), over any
-// scalar. Accelerations are counted from those that the bodies would have with vdot = 0, so that
-// velocities and gravity enter through the bodies' bias forces alone.
-// Layer: model.  Thread: any.
+// Forward dynamics by the articulated-body algorithm (ABA; Featherstone 2008, chapter 7), over
+// any scalar. Accelerations are counted from those that the bodies would have with vdot = 0, so
+// that velocities and gravity enter through the bodies' bias forces alone. Layer: model.  Thread:
+// any.
 #pragma once
 
 #include "model/kinematics.hpp"
@@ -30,10 +30,10 @@ template <class S>
 }
 
 template <class S>
-class ForwardDynamics {
+class Aba {
  public:
-  ForwardDynamics(const Mechanism& m, std::span<const S> q, std::span<const S> v,
-                  std::span<const S> tau, std::span<const S> wrench, std::span<S> vdot)
+  Aba(const Mechanism& m, std::span<const S> q, std::span<const S> v, std::span<const S> tau,
+      std::span<const S> wrench, std::span<S> vdot)
       : m_(m),
         q_(q),
         v_(v),

@@ -62,16 +62,16 @@ class InterpretedKernels {
 
   void set_functions() {
     kernels_.forward_dynamics = [](In a, In b, In c, In d, double* r) {
-      ForwardDynamics<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
+      Aba<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
     };
     kernels_.inverse_dynamics = [](In a, In b, In c, In d, double* r) {
-      InverseDynamics<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
+      Rnea<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
     };
     kernels_.mass_matrix = [](In a, double* r) {
-      MassMatrix<double>(m(), q(a), out(r, nv() * nv())).run();
+      Crba<double>(m(), q(a), out(r, nv() * nv())).run();
     };
     kernels_.bias = [](In a, In b, double* r) {
-      InverseDynamics<double>(m(), q(a), v(b), {}, {}, out(r, nv())).run();
+      Rnea<double>(m(), q(a), v(b), {}, {}, out(r, nv())).run();
     };
     kernels_.center_of_mass = [](In a, In b, double* c, double* cdot, double* J) {
       CenterOfMass<double>(m(), q(a), v(b), out(c, 3), out(cdot, 3), out(J, 3 * nv())).run();

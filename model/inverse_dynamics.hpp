@@ -1,5 +1,5 @@
-// Inverse dynamics and bias by Newton-Euler recursion, and the wrenches through sensors, over
-// any scalar.
+// Inverse dynamics and bias by the recursive Newton-Euler algorithm (RNEA), and the wrenches
+// through sensors, over any scalar.
 // Layer: model.  Thread: any.
 #pragma once
 
@@ -9,10 +9,10 @@ namespace tandem::model {
 
 /// tau = M vdot + h - sum J^T f; with an empty `vdot` of zeros.
 template <class S>
-class InverseDynamics {
+class Rnea {
  public:
-  InverseDynamics(const Mechanism& m, std::span<const S> q, std::span<const S> v,
-                  std::span<const S> vdot, std::span<const S> wrench, std::span<S> tau)
+  Rnea(const Mechanism& m, std::span<const S> q, std::span<const S> v, std::span<const S> vdot,
+       std::span<const S> wrench, std::span<S> tau)
       : m_(m), q_(q), v_(v), vdot_(vdot), wrench_(wrench), tau_(tau) {}
 
   void run() {

@@ -13,11 +13,12 @@ template <class S>
   return result;
 }
 
-/// M by composite bodies (Featherstone 2008, chapter 6): nv x nv, both triangles.
+/// M by the composite-rigid-body algorithm (CRBA; Featherstone 2008, chapter 6): nv x nv, both
+/// triangles.
 template <class S>
-class MassMatrix {
+class Crba {
  public:
-  MassMatrix(const Mechanism& m, std::span<const S> q, std::span<S> M) : m_(m), q_(q), M_(M) {}
+  Crba(const Mechanism& m, std::span<const S> q, std::span<S> M) : m_(m), q_(q), M_(M) {}
 
   void run() {
     for (S& entry : M_) entry = S(0.0);
