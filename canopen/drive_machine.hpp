@@ -13,8 +13,9 @@ class Archive;
 
 namespace tandem::canopen {
 
+/// Numbered as the images and the log number them, where 0 is a drive that was not heard yet.
 enum class DriveState : std::uint8_t {
-  kNotReadyToSwitchOn = 0,  ///< statusword x0xx 0000
+  kNotReadyToSwitchOn = 1,  ///< statusword x0xx 0000
   kSwitchOnDisabled,        ///< x1xx 0000
   kReadyToSwitchOn,         ///< x01x 0001
   kSwitchedOn,              ///< x01x 0011

@@ -17,6 +17,12 @@ using canopen::put;
 
 namespace {
 
+// An image takes the bus' drive states as they are numbered.
+static_assert(static_cast<int>(canopen::DriveState::kNotReadyToSwitchOn) ==
+                  static_cast<int>(DriveState::kNotReadyToSwitchOn) &&
+              static_cast<int>(canopen::DriveState::kFault) ==
+                  static_cast<int>(DriveState::kFault));
+
 /// A gain on the wire: a number, whatever the caller computed.
 float real32(double value) noexcept {
   constexpr double kMax = 3.4e38;
@@ -105,21 +111,6 @@ std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TA
   return {ControlMode::kIdle, kStiff};
 }
 
-DriveState image_state(canopen::DriveState state) noexcept TANDEM_RT {
-  using Wire = canopen::DriveState;
-  switch (state) {
-    case Wire::kNotReadyToSwitchOn: return DriveState::kNotReadyToSwitchOn;
-    case Wire::kSwitchOnDisabled: return DriveState::kSwitchOnDisabled;
-    case Wire::kReadyToSwitchOn: return DriveState::kReadyToSwitchOn;
-    case Wire::kSwitchedOn: return DriveState::kSwitchedOn;
-    case Wire::kOperationEnabled: return DriveState::kOperationEnabled;
-    case Wire::kQuickStopActive: return DriveState::kQuickStopActive;
-    case Wire::kFaultReactionActive: return DriveState::kFaultReactionActive;
-    case Wire::kFault: return DriveState::kFault;
-  }
-  return DriveState::kUnknown;
-}
-
 void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
                     RawCommand& raw) noexcept TANDEM_RT {
   const auto mode = static_cast<ControlMode>(command.mode()[joint]);
@@ -151,7 +142,7 @@ void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t
   state.temperature_C()[joint] = raw.temperature * kKelvinPerUnit;
   state.statusword()[joint] = raw.statusword;
   const auto drive = canopen::drive_state(raw.statusword);
-  state.drive_state()[joint] = static_cast<std::uint8_t>(image_state(drive));
+  state.drive_state()[joint] = static_cast<std::uint8_t>(drive);
   auto [mode, interaction] = image_mode(raw.mode_display);
   if (drive != canopen::DriveState::kOperationEnabled) mode = ControlMode::kIdle;
   state.mode()[joint] = static_cast<std::int8_t>(mode);

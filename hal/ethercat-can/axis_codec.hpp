@@ -73,8 +73,6 @@ struct RawCommand {
 /// The way back, for the mode display; kIdle for a mode that is none of ours.
 [[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(
     std::int8_t mode) noexcept TANDEM_RT;
-/// The image's number of a drive state.
-[[nodiscard]] DriveState image_state(canopen::DriveState state) noexcept TANDEM_RT;
 
 /// Everything but the controlword: references, feed-forward and mode (kIdle: the mode stays).
 void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
