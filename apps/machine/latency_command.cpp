@@ -120,7 +120,7 @@ Result<std::vector<LatencySample>> measure(const LatencyPlan& plan,
                                            bool quiet) {
   const bool turns = plan.mode == LatencyMode::kTurns && plan.cyclictest;
   const double per_load_s = plan.duration_s * (turns ? 2.0 : 1.0);
-  Progress bar(out, per_load_s * static_cast<double>(loads.size()));
+  ProgressBar bar(out, per_load_s * static_cast<double>(loads.size()));
   std::vector<LatencySample> samples;
   for (const std::string& load : loads) {
     std::optional<ChildProcess> stress;

@@ -8,8 +8,8 @@
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/run/commands.hpp"
-#include "apps/run/errands.hpp"
 #include "apps/run/inject.hpp"
+#include "apps/run/task_queue.hpp"
 #include "apps/text/console.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "base/counted.hpp"
@@ -195,13 +195,13 @@ void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
 }
 
 /// Emulates until it is asked to stop, or the plant diverges.
-void emulate(Emulation& e, Errands& errands, std::FILE* out, bool quiet) {
+void emulate(Emulation& e, TaskQueue& tasks, std::FILE* out, bool quiet) {
   constexpr std::int64_t kPatienceNs = 100'000'000;
   StatusLine line(out);
   BusWatch buses(e.sockets->sockets(), stderr);
   while (!rt::stop_requested()) {
     if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
-    errands.do_all();
+    tasks.run_waiting();
     tell_injected(e, out, quiet);
     if (!quiet) buses.look();
     if (quiet || !line.due()) continue;
@@ -233,13 +233,13 @@ Exit emulate_command(const EmulateOptions& options) {
                options.lockstep ? "a step per SYNC" : "in real time");
     std::fflush(out);
   }
-  Errands errands;
+  TaskQueue tasks;
   ControlRegistry commands;
   commands.add(
       "status", ControlEffect::kReads, "steps, frames and simulated time so far", {},
-      [&](const Json&) { return errands.ask([&] { return summary_json(e, options.lockstep); }); });
+      [&](const Json&) { return tasks.run([&] { return summary_json(e, options.lockstep); }); });
   add_inject(commands, e.subject.robot, e.subject.sim.period_ns, [&](const sim::Fault& fault) {
-    const auto done = errands.ask([&]() -> Result<Json> {
+    const auto done = tasks.run([&]() -> Result<Json> {
       if (Status added = injected(e.robot->inject(fault)); !added) {
         return std::unexpected(added.error());
       }
@@ -249,7 +249,7 @@ Exit emulate_command(const EmulateOptions& options) {
   });
   const auto socket =
       serve(commands, {.path = options.socket, .kind = "emulate", .wanted = !options.no_socket});
-  emulate(e, errands, out, options.quiet);
+  emulate(e, tasks, out, options.quiet);
   if (!options.quiet) print_summary(e, out);
   if (const Status written = write_json(options.json, summary_json(e, options.lockstep)); !written)
     return refuse(written.error());

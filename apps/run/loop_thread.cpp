@@ -52,7 +52,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
-  Progress bar(out, static_cast<double>(e.cycles()) * period_s);
+  ProgressBar bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.can_buses(), stderr);
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {

@@ -240,14 +240,14 @@ void StatusLine::show(const std::string& text) {
   drawn_ = terminal_;
 }
 
-Progress::Progress(std::FILE* out, double total_s)
+ProgressBar::ProgressBar(std::FILE* out, double total_s)
     : out_(out),
       total_s_(total_s),
       terminal_(is_terminal(out)),
       started_(std::chrono::steady_clock::now()),
       next_(started_) {}
 
-void Progress::update(double done_s, const std::string& note) {
+void ProgressBar::update(double done_s, const std::string& note) {
   if (total_s_ <= 0.0) return update_endless(done_s, note);
   const double share = std::clamp(done_s / total_s_, 0.0, 1.0);
   if (!terminal_) {
@@ -272,7 +272,7 @@ void Progress::update(double done_s, const std::string& note) {
   drawn_ = true;
 }
 
-void Progress::update_endless(double done_s, const std::string& note) {
+void ProgressBar::update_endless(double done_s, const std::string& note) {
   const auto now = std::chrono::steady_clock::now();
   const bool news = !noted_ || *noted_ != note;
   noted_ = note;
@@ -289,7 +289,7 @@ void Progress::update_endless(double done_s, const std::string& note) {
   drawn_ = true;
 }
 
-void Progress::finish() {
+void ProgressBar::finish() {
   if (drawn_) fmt::print(out_, "\n");
   drawn_ = false;
 }

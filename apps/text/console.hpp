@@ -123,10 +123,10 @@ class StatusLine {
 };
 
 /// The progress of a run: a bar that is redrawn on a terminal, a line per tenth elsewhere.
-class Progress {
+class ProgressBar {
  public:
   /// @param total_s  of the whole; 0: it has no end, and no bar
-  Progress(std::FILE* out, double total_s);
+  ProgressBar(std::FILE* out, double total_s);
   /// @param done_s  simulated seconds so far.  @param note  behind the bar; may be empty.
   void update(double done_s, const std::string& note);
   /// Ends the bar's line, when there is one.

@@ -242,12 +242,12 @@ void ControlSocket::work() {
   for (;;) {
     more_.wait(lock, [this] { return ending_ || !questions_.empty(); });
     if (ending_) return;
-    Errand errand = std::move(questions_.front());
+    Message message = std::move(questions_.front());
     questions_.pop_front();
     lock.unlock();
-    errand.text = answer_to(errand.text);
+    message.text = answer_to(message.text);
     lock.lock();
-    answers_.push_back(std::move(errand));
+    answers_.push_back(std::move(message));
     wake(done_);
   }
 }
@@ -256,12 +256,12 @@ void ControlSocket::work() {
 void ControlSocket::deliver() {
   std::uint64_t count = 0;
   (void)!::read(done_, &count, sizeof count);
-  std::vector<Errand> answers;
+  std::vector<Message> answers;
   {
     const std::scoped_lock lock(mutex_);
     answers.swap(answers_);
   }
-  for (Errand& answer : answers) {
+  for (Message& answer : answers) {
     const auto found = std::ranges::find(clients_, answer.client, &Client::number);
     if (found == clients_.end()) continue;
     Client& client = **found;

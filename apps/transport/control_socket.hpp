@@ -52,7 +52,7 @@ class ControlSocket {
  private:
   struct Client;
   /// A question for the second thread, or its answer.
-  struct Errand {
+  struct Message {
     std::uint64_t client;
     std::string text;
   };
@@ -81,8 +81,8 @@ class ControlSocket {
   int done_ = -1;  // eventfd: the second thread's word to the first, "answers_ has some"
   std::mutex mutex_;
   std::condition_variable more_;
-  std::deque<Errand> questions_;
-  std::vector<Errand> answers_;
+  std::deque<Message> questions_;
+  std::vector<Message> answers_;
   bool ending_ = false;
 
   std::thread thread_;
