@@ -255,17 +255,17 @@ class Builder {
                            "lengths are in metres", tree.file, outline_.joint_lines.at(joint.name),
                            "joint " + joint.name});
       }
-      const Placement seat = above.in_body * origin;
+      const Placement in_body = above.in_body * origin;
       if (const double* position = lock_of(joint.name)) {
         link.body = above.body;
-        link.in_body = seat * displacement(joint, *position);
+        link.in_body = in_body * displacement(joint, *position);
       } else if (!moves(joint)) {
         link.body = above.body;
-        link.in_body = seat;
+        link.in_body = in_body;
       } else {
         link.moving = static_cast<int>(tree.joints.size());
         link.body = link.moving + 1;
-        tree.joints.push_back(moving_joint(joint, above.body, seat));
+        tree.joints.push_back(moving_joint(joint, above.body, in_body));
         tree.bodies.push_back({source.name, {}});
       }
     }
@@ -284,12 +284,12 @@ class Builder {
                              outline_.link_lines.at(link.name), "link " + link.name});
   }
 
-  Joint moving_joint(const urdf::Joint& source, int parent, const Placement& seat) {
+  Joint moving_joint(const urdf::Joint& source, int parent, const Placement& in_body) {
     Joint joint;
     joint.name = source.name;
     joint.parent = parent;
     joint.axis = axis_of(source);
-    joint.in_parent = seat;
+    joint.in_parent = in_body;
     joint.line = outline_.joint_lines.at(source.name);
     joint.type = source.type == urdf::Joint::PRISMATIC    ? JointType::kPrismatic
                  : source.type == urdf::Joint::CONTINUOUS ? JointType::kContinuous

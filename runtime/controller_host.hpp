@@ -206,10 +206,10 @@ class ControllerHost {
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
-  void seat(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
-            const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
-  void leave(std::size_t joint, const hal::StateImage& state,
-             hal::CommandImage& command) const noexcept TANDEM_RT;
+  void assign(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
+              const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
+  void release(std::size_t joint, const hal::StateImage& state,
+               hal::CommandImage& command) const noexcept TANDEM_RT;
   void set_modes(const HostedController& one, hal::CommandImage& command) const noexcept TANDEM_RT;
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
     return (active_ & only(slot)) != 0;

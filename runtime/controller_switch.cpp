@@ -60,9 +60,9 @@ void ControllerHost::set_modes(const HostedController& one,
 
 /// Every reference at what is measured. The torque is that of the spring now: what carries the
 /// load goes on to carry it, as reference or as feed-forward.
-void ControllerHost::seat(std::size_t joint, ControlMode mode, InteractionMode interaction,
-                          const hal::StateImage& state,
-                          hal::CommandImage& command) const noexcept TANDEM_RT {
+void ControllerHost::assign(std::size_t joint, ControlMode mode, InteractionMode interaction,
+                            const hal::StateImage& state,
+                            hal::CommandImage& command) const noexcept TANDEM_RT {
   const bool carries = is_enabled(state, joint) && mode != ControlMode::kIdle &&
                        command.mode()[joint] != static_cast<std::int8_t>(ControlMode::kIdle);
   command.mode()[joint] = static_cast<std::int8_t>(mode);
@@ -77,8 +77,8 @@ void ControllerHost::seat(std::size_t joint, ControlMode mode, InteractionMode i
 }
 
 /// A joint that nobody has any more stays: with its reference, when that was a stiff position.
-void ControllerHost::leave(std::size_t joint, const hal::StateImage& state,
-                           hal::CommandImage& command) const noexcept TANDEM_RT {
+void ControllerHost::release(std::size_t joint, const hal::StateImage& state,
+                             hal::CommandImage& command) const noexcept TANDEM_RT {
   const bool keeps = command.mode()[joint] == kPositionMode &&
                      command.interaction()[joint] == kStiffMode && is_enabled(state, joint);
   if (keeps) {
@@ -86,8 +86,8 @@ void ControllerHost::leave(std::size_t joint, const hal::StateImage& state,
     return;
   }
   const bool can = capabilities_[joint].can(hal::Capability::kPosition);
-  seat(joint, can ? ControlMode::kPosition : ControlMode::kIdle, InteractionMode::kStiff, state,
-       command);
+  assign(joint, can ? ControlMode::kPosition : ControlMode::kIdle, InteractionMode::kStiff, state,
+         command);
 }
 
 bool ControllerHost::is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT {
@@ -136,7 +136,7 @@ LoopAnswer ControllerHost::switch_over(ControllerSet stop, ControllerSet start, 
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((stop & only(slot)) == 0) continue;
     enter(*table_[slot]).stop();
-    for (const auto& claim : table_[slot]->claims) leave(claim.joint, state, command);
+    for (const auto& claim : table_[slot]->claims) release(claim.joint, state, command);
   }
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
     if ((start & only(slot)) == 0) continue;
@@ -195,7 +195,7 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish
     command.stiffness_Nm_rad()[joint] = impedance.stiffness_Nm_rad;
     command.damping_Nms_rad()[joint] = impedance.damping_Nms_rad;
   } else {
-    seat(joint, mode, interaction, state, command);
+    assign(joint, mode, interaction, state, command);
   }
   return {.joint = number, .one = owned_by};
 }

@@ -268,7 +268,7 @@ RobotConfig read(const TomlDocument& document, std::vector<JointReference>& loos
   };
   if (std::ranges::any_of(document.diagnostics(), of_lists))
     return robot;  // what follows names them
-  read_joints(root, seats_of(boards), robot, loose);
+  read_joints(root, axes_listed_by(boards), robot, loose);
   const auto wrong = [](const BoardTable& board) { return board.table.has_errors(); };
   if (std::ranges::any_of(boards, wrong)) loose.clear();  // a list that could not be read
   for (const SensorTable& sensor : sensors) read_sensor(sensor.table, sensor.bus, ids, robot);

@@ -1,4 +1,5 @@
-// [[bus]] and [[board]]: node ids that count up along a bus, and the seats of the listed joints.
+// [[bus]] and [[board]]: node ids that count up along a bus, and the axes of the joints that they
+// list.
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -112,14 +113,14 @@ std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& r
   return boards;
 }
 
-std::vector<Seat> seats_of(std::span<const BoardTable> boards) {
-  std::vector<Seat> seats;
+std::vector<AxisAssignment> axes_listed_by(std::span<const BoardTable> boards) {
+  std::vector<AxisAssignment> listed;
   for (const BoardTable& board : boards) {
     for (std::size_t axis = 0; axis < board.joints.size(); ++axis) {
-      seats.push_back({board.joints[axis], board.board, static_cast<int>(axis)});
+      listed.push_back({board.joints[axis], board.board, static_cast<int>(axis)});
     }
   }
-  return seats;
+  return listed;
 }
 
 void check_boards(std::span<BoardTable> boards, const RobotConfig& robot,

@@ -96,17 +96,17 @@ std::vector<std::string> read_names(TomlTable& table) {
 }
 
 /// Its board and axis: where a board lists it, or as its table says.
-void read_seat(TomlTable& table, std::span<const Seat> seats, const RobotConfig& robot,
+void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const RobotConfig& robot,
                JointConfig& joint, std::vector<JointReference>& loose) {
   const std::string board = table.text_or("board", {});
   const int axis = static_cast<int>(table.integer_or("axis", 0, 0, 7));
-  const auto seat = std::ranges::find(seats, joint.name, &Seat::joint);
-  if (seat != seats.end()) {
-    joint.board = seat->board;
-    joint.axis = seat->axis;
+  const auto found = std::ranges::find(listed, joint.name, &AxisAssignment::joint);
+  if (found != listed.end()) {
+    joint.board = found->board;
+    joint.axis = found->axis;
     for (const char* key : {"board", "axis"}) {
       if (!table.has(key)) continue;
-      table.error(key, "board '" + seat->board + "' lists joint '" + joint.name + "' already",
+      table.error(key, "board '" + found->board + "' lists joint '" + joint.name + "' already",
                   "remove this key");
     }
   } else if (table.has("names")) {
@@ -145,7 +145,7 @@ void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& 
   check_not_locked(table, key, joint.name, robot);
 }
 
-void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robot,
+void add_joints(TomlTable& table, std::span<const AxisAssignment> listed, RobotConfig& robot,
                 std::vector<JointReference>& loose) {
   JointConfig common = read_joint(table, robot);
   common.line = table.line();
@@ -157,7 +157,7 @@ void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robo
   for (const std::string& name : read_names(table)) {
     JointConfig joint = common;
     joint.name = name;
-    read_seat(table, seats, robot, joint, loose);
+    read_axis(table, listed, robot, joint, loose);
     check_joint(table, joint, robot);
     robot.joints.push_back(joint);
   }
@@ -166,16 +166,16 @@ void add_joints(TomlTable& table, std::span<const Seat> seats, RobotConfig& robo
 
 }  // namespace
 
-void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot,
+void read_joints(TomlTable& root, std::span<const AxisAssignment> listed, RobotConfig& robot,
                  std::vector<JointReference>& loose) {
   const TomlTable defaults = read_defaults(
       root, "joint_defaults", [&](TomlTable& table) { return read_joint(table, robot); });
   for (TomlTable& joint : root.tables("joint")) {
     joint.inherit(defaults);
-    add_joints(joint, seats, robot, loose);
+    add_joints(joint, listed, robot, loose);
   }
   std::ranges::stable_sort(robot.joints, {}, [&](const JointConfig& joint) {
-    return std::ranges::find(seats, joint.name, &Seat::joint) - seats.begin();
+    return std::ranges::find(listed, joint.name, &AxisAssignment::joint) - listed.begin();
   });
 }
 

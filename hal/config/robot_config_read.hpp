@@ -125,8 +125,8 @@ struct BoardTable {
   std::vector<std::string> joints;
 };
 
-/// Where the motor of a joint is that a board lists.
-struct Seat {
+/// The axis of a board that moves a joint, where the board lists its joints.
+struct AxisAssignment {
   std::string joint;
   std::string board;
   int axis = 0;
@@ -144,10 +144,10 @@ struct SensorTable {
 [[nodiscard]] std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& robot,
                                                  std::vector<SensorTable>& sensors);
 /// The joints that boards list, in that order.
-[[nodiscard]] std::vector<Seat> seats_of(std::span<const BoardTable> boards);
-/// [joint_defaults] and [[joint]]; after everything that a joint refers to. Those with a seat come
-/// first, in that order.
-void read_joints(TomlTable& root, std::span<const Seat> seats, RobotConfig& robot,
+[[nodiscard]] std::vector<AxisAssignment> axes_listed_by(std::span<const BoardTable> boards);
+/// [joint_defaults] and [[joint]]; after everything that a joint refers to. Those that a board
+/// lists come first, in that order.
+void read_joints(TomlTable& root, std::span<const AxisAssignment> listed, RobotConfig& robot,
                  std::vector<JointReference>& loose);
 /// A board's axes are numbered from 0 without a gap, there is at least one, and every joint that
 /// it lists is there.

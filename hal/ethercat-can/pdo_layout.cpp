@@ -201,7 +201,7 @@ Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& nam
   return bus;
 }
 
-Status seat_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
+Status assign_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
   std::vector<std::pair<int, std::size_t>> axes;
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     if (robot.joints[j].board == node.name) axes.emplace_back(robot.joints[j].axis, j);
@@ -239,8 +239,8 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
   const auto bus = attach(robot, board.bus, node);
   if (!bus) return std::unexpected(bus.error());
   const bool fd = (*bus)->fd;
-  if (auto seated = seat_axes(robot, fd, node); !seated) {
-    return std::unexpected(seated.error());
+  if (auto assigned = assign_axes(robot, fd, node); !assigned) {
+    return std::unexpected(assigned.error());
   }
   const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
   if (fd) {

@@ -212,9 +212,9 @@ void BodyContact::place(const double* q, const double* v) noexcept {
     Body& body = bodies_[j + 1];
     const double position = joint.multiplier * at[joint.coordinate] + joint.offset;
     const double speed = joint.multiplier * rate[joint.coordinate];
-    const Mat3 seat = product(parent.R, joint.R);
-    body.axis = rotate(seat.data(), joint.axis.data());
-    body.R = joint.prismatic ? seat : product(seat, turn(joint.axis, position));
+    const Mat3 before_joint = product(parent.R, joint.R);
+    body.axis = rotate(before_joint.data(), joint.axis.data());
+    body.R = joint.prismatic ? before_joint : product(before_joint, turn(joint.axis, position));
     Vec3 offset = rotate(parent.R.data(), joint.p.data());
     body.w = parent.w;
     Vec3 slide{};
