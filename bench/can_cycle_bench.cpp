@@ -49,8 +49,8 @@ class OwnClock final : public rt::Clock {
 
 /// One run's figures.
 struct Sample {
-  std::vector<std::int64_t> work_ns;                      ///< our part of each cycle
-  std::array<std::int64_t, runtime::kStages> stage_ns{};  ///< sums, of a traced run
+  std::vector<std::int64_t> work_ns;                           ///< our part of each cycle
+  std::array<std::int64_t, runtime::kCycleStages> stage_ns{};  ///< sums, of a traced run
   double calls_per_cycle = 0.0;
 
   [[nodiscard]] rt::Percentiles percentiles() const {
@@ -87,8 +87,8 @@ Result<Sample> take(runtime::RobotCycle& cycle, const FakeCanKernel& kernel, Way
   const auto faults = cycle.faults();
   if (!faults.empty()) return fail("the run ended in a fault: " + faults.front().text);
   for (const runtime::CycleStamps& stamps : cycle.trace().cycles()) {
-    for (std::size_t i = 0; i < runtime::kStages; ++i) {
-      sample.stage_ns[i] += stamps.stage_ns(static_cast<runtime::Stage>(i));
+    for (std::size_t i = 0; i < runtime::kCycleStages; ++i) {
+      sample.stage_ns[i] += stamps.stage_ns(static_cast<runtime::CycleStage>(i));
     }
   }
   sample.calls_per_cycle = static_cast<double>(calls) / static_cast<double>(sample.work_ns.size());
@@ -143,8 +143,8 @@ void print_row(const std::string& name, const rt::Percentiles& p) {
 
 void print_stages(const Sample& sample) {
   fmt::print("  stages' means [us], {:.1f} system calls:", sample.calls_per_cycle);
-  for (std::size_t i = 1; i < runtime::kStages; ++i) {
-    fmt::print(" {} {:.2f}", runtime::to_string(static_cast<runtime::Stage>(i)),
+  for (std::size_t i = 1; i < runtime::kCycleStages; ++i) {
+    fmt::print(" {} {:.2f}", runtime::to_string(static_cast<runtime::CycleStage>(i)),
                us(sample.stage_ns[i]) / static_cast<double>(sample.work_ns.size()));
   }
   fmt::print("\n");

@@ -20,10 +20,10 @@ namespace {
 /// Takes the time between the calls of SimRobot's hook.
 struct SimStages {
   rt::WallClock clock;
-  std::array<std::int64_t, sim::kStages> sum_ns{};
+  std::array<std::int64_t, sim::kSimStages> sum_ns{};
   std::int64_t last_ns = 0;
 
-  static void hook(void* self, sim::Stage finished) {
+  static void hook(void* self, sim::SimStage finished) {
     auto* stages = static_cast<SimStages*>(self);
     const std::int64_t now_ns = stages->clock.now_ns();
     stages->sum_ns[static_cast<std::size_t>(finished)] += now_ns - stages->last_ns;
@@ -31,8 +31,8 @@ struct SimStages {
   }
 };
 
-constexpr const char* kSimStages[sim::kStages] = {"master: SYNC",     "plant",          "sensors",
-                                                  "boards' firmware", "master: decode", "truth"};
+constexpr const char* kSimStageNames[sim::kSimStages] = {
+    "master: SYNC", "plant", "sensors", "boards' firmware", "master: decode", "truth"};
 
 void row(const std::string& name, std::int64_t sum_ns, std::uint64_t cycles,
          std::int64_t total_ns) {
@@ -42,21 +42,21 @@ void row(const std::string& name, std::int64_t sum_ns, std::uint64_t cycles,
 }
 
 void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
-  using runtime::Stage;
-  std::array<std::int64_t, runtime::kStages> sum_ns{};
+  using runtime::CycleStage;
+  std::array<std::int64_t, runtime::kCycleStages> sum_ns{};
   for (const runtime::CycleStamps& stamps : cycle.trace().cycles()) {
     for (std::size_t i = 1; i < sum_ns.size(); ++i) {
-      sum_ns[i] += stamps.stage_ns(static_cast<Stage>(i));
+      sum_ns[i] += stamps.stage_ns(static_cast<CycleStage>(i));
     }
   }
   const std::uint64_t cycles = cycle.loop().cycles;
   const std::int64_t total_ns = std::accumulate(sum_ns.begin(), sum_ns.end(), std::int64_t{0});
   fmt::print("\n{:24} {:>9} {:>8}\n", "stage", "us/cycle", "share");
   for (std::size_t i = 2; i < sum_ns.size(); ++i) {  // it neither waits nor exchanges
-    row(runtime::to_string(static_cast<Stage>(i)), sum_ns[i], cycles, total_ns);
-    if (static_cast<Stage>(i) != Stage::kRead) continue;
-    for (std::size_t s = 0; s < sim::kStages; ++s) {
-      row(fmt::format("  {}", kSimStages[s]), sim.sum_ns[s], cycles, total_ns);
+    row(runtime::to_string(static_cast<CycleStage>(i)), sum_ns[i], cycles, total_ns);
+    if (static_cast<CycleStage>(i) != CycleStage::kRead) continue;
+    for (std::size_t s = 0; s < sim::kSimStages; ++s) {
+      row(fmt::format("  {}", kSimStageNames[s]), sim.sum_ns[s], cycles, total_ns);
     }
   }
   row("all", total_ns, cycles, total_ns);

@@ -5,16 +5,16 @@
 
 namespace tandem::runtime {
 
-const char* to_string(Stage stage) noexcept {
+const char* to_string(CycleStage stage) noexcept {
   switch (stage) {
-    case Stage::kWait: return "wait";
-    case Stage::kExchange: return "exchange";
-    case Stage::kRead: return "read";
-    case Stage::kCheck: return "check";
-    case Stage::kUpdate: return "update";
-    case Stage::kLimit: return "limit";
-    case Stage::kWrite: return "write";
-    case Stage::kHandOver: return "hand over";
+    case CycleStage::kWait: return "wait";
+    case CycleStage::kExchange: return "exchange";
+    case CycleStage::kRead: return "read";
+    case CycleStage::kCheck: return "check";
+    case CycleStage::kUpdate: return "update";
+    case CycleStage::kLimit: return "limit";
+    case CycleStage::kWrite: return "write";
+    case CycleStage::kHandOver: return "hand over";
   }
   return "?";
 }

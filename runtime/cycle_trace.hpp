@@ -12,7 +12,7 @@
 namespace tandem::runtime {
 
 /// The stages of a cycle, in their order; docs/realtime.md.
-enum class Stage : std::uint8_t {
+enum class CycleStage : std::uint8_t {
   kWait,      ///< for the grid point, and when time is simulated for the log
   kExchange,  ///< with the bus; only of a backend that waits for one
   kRead,
@@ -22,19 +22,20 @@ enum class Stage : std::uint8_t {
   kWrite,
   kHandOver,
 };
-inline constexpr std::size_t kStages = 8;
-[[nodiscard]] const char* to_string(Stage stage) noexcept;
+inline constexpr std::size_t kCycleStages = 8;
+[[nodiscard]] const char* to_string(CycleStage stage) noexcept;
 
 /// One cycle's clock times [ns], of the loop's clock.
 struct CycleStamps {
   std::uint64_t cycle = 0;
-  std::int64_t begin_ns = 0;                   ///< of the wait: the end of the cycle before
-  std::array<std::int64_t, kStages> end_ns{};  ///< of each stage; it begins where the last ended
+  std::int64_t begin_ns = 0;  ///< of the wait: the end of the cycle before
+  std::array<std::int64_t, kCycleStages>
+      end_ns{};                 ///< of each stage; it begins where the last ended
   std::int64_t wakeup_ns = -1;  ///< from the grid point to the end of the wait; -1: not paced
   std::uint64_t skipped = 0;    ///< grid points missed just before
   bool late = false;            ///< the cycle before overran into this one's grid point
 
-  [[nodiscard]] std::int64_t stage_ns(Stage stage) const noexcept {
+  [[nodiscard]] std::int64_t stage_ns(CycleStage stage) const noexcept {
     const auto i = static_cast<std::size_t>(stage);
     return end_ns[i] - (i == 0 ? begin_ns : end_ns[i - 1]);
   }
@@ -53,16 +54,16 @@ class CycleTrace {
   /// A cycle begins: the end of its wait. It takes the oldest one's place.
   void begin(const rt::Tick& tick) noexcept TANDEM_RT;
   /// The end of one of its stages, at `now_ns`.
-  void mark(Stage stage, std::int64_t now_ns) noexcept TANDEM_RT {
+  void mark(CycleStage stage, std::int64_t now_ns) noexcept TANDEM_RT {
     if (stamps_ != nullptr) stamps_->end_ns[static_cast<std::size_t>(stage)] = now_ns;
   }
   /// The same, now.
-  void mark(Stage stage, rt::Clock& clock) noexcept TANDEM_RT {
+  void mark(CycleStage stage, rt::Clock& clock) noexcept TANDEM_RT {
     if (stamps_ != nullptr) mark(stage, clock.now_ns());
   }
   /// The end of its last stage.
   void end(std::int64_t now_ns) noexcept TANDEM_RT {
-    mark(Stage::kHandOver, now_ns);
+    mark(CycleStage::kHandOver, now_ns);
     ended_ns_ = now_ns;
   }
 

@@ -68,7 +68,7 @@ void RobotCycle::exchange(rt::Tick& tick) noexcept {
     loop_.skip(tick, missed);
     time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
   }
-  if (backend_->waits_for_bus()) trace_.mark(Stage::kExchange, loop_.exchanged());
+  if (backend_->waits_for_bus()) trace_.mark(CycleStage::kExchange, loop_.exchanged());
 }
 
 void RobotCycle::read() noexcept TANDEM_RT {
@@ -82,7 +82,7 @@ void RobotCycle::read() noexcept TANDEM_RT {
     if (injected.kind == hal::FaultKind::kNone) break;
     event(EventKind::kInjected, injected.joint, static_cast<std::uint32_t>(injected.kind));
   }
-  trace_.mark(Stage::kRead, *clock_);
+  trace_.mark(CycleStage::kRead, *clock_);
 }
 
 /// Of the loop, the joints, the sensors, the body and the backend; then what time brings.
@@ -180,7 +180,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       break;
     case RunPhase::kDone: break;
   }
-  trace_.mark(Stage::kUpdate, *clock_);
+  trace_.mark(CycleStage::kUpdate, *clock_);
 }
 
 void RobotCycle::run_controllers() noexcept TANDEM_RT {
@@ -267,7 +267,7 @@ void RobotCycle::limit() noexcept TANDEM_RT {
              .category = StopCategory::kCategory1});
     }
   }
-  trace_.mark(Stage::kLimit, *clock_);
+  trace_.mark(CycleStage::kLimit, *clock_);
 }
 
 void RobotCycle::write() noexcept TANDEM_RT {
@@ -281,7 +281,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
       on(RunEvent::kDisabled);
     }
   }
-  trace_.mark(Stage::kWrite, *clock_);
+  trace_.mark(CycleStage::kWrite, *clock_);
 }
 
 /// To the log, the threads that watch the run, and those that wait for an answer.

@@ -29,7 +29,7 @@ void RobotCycle::take_inbox() noexcept TANDEM_RT {
     on(RunEvent::kEnd);
   }
   take_requests();
-  trace_.mark(Stage::kCheck, *clock_);
+  trace_.mark(CycleStage::kCheck, *clock_);
 }
 
 void RobotCycle::take_requests() noexcept TANDEM_RT {

@@ -49,15 +49,17 @@ class Events {
 };
 
 void write_cycle(Events& events, const CycleStamps& stamps) {
-  const auto end_of = [&](Stage stage) { return stamps.end_ns[static_cast<std::size_t>(stage)]; };
-  const std::int64_t woken_ns = end_of(Stage::kWait);
-  const std::int64_t done_ns = end_of(Stage::kHandOver);
-  events.span(to_string(Stage::kWait), stamps.begin_ns, woken_ns);
+  const auto end_of = [&](CycleStage stage) {
+    return stamps.end_ns[static_cast<std::size_t>(stage)];
+  };
+  const std::int64_t woken_ns = end_of(CycleStage::kWait);
+  const std::int64_t done_ns = end_of(CycleStage::kHandOver);
+  events.span(to_string(CycleStage::kWait), stamps.begin_ns, woken_ns);
   events.span("cycle", woken_ns, done_ns, fmt::format(R"(,"args":{{"cycle":{}}})", stamps.cycle));
-  for (std::size_t i = 1; i < kStages; ++i) {
-    const bool has_bus = end_of(Stage::kExchange) > woken_ns;
-    if (static_cast<Stage>(i) == Stage::kExchange && !has_bus) continue;
-    events.span(to_string(static_cast<Stage>(i)), stamps.end_ns[i - 1], stamps.end_ns[i]);
+  for (std::size_t i = 1; i < kCycleStages; ++i) {
+    const bool has_bus = end_of(CycleStage::kExchange) > woken_ns;
+    if (static_cast<CycleStage>(i) == CycleStage::kExchange && !has_bus) continue;
+    events.span(to_string(static_cast<CycleStage>(i)), stamps.end_ns[i - 1], stamps.end_ns[i]);
   }
   if (stamps.late) {
     events.instant(stamps.skipped > 0 ? fmt::format("overrun: {} skipped", stamps.skipped)
@@ -65,7 +67,7 @@ void write_cycle(Events& events, const CycleStamps& stamps) {
                    woken_ns);
   }
   if (stamps.wakeup_ns >= 0) events.counter("wake-up latency [us]", woken_ns, stamps.wakeup_ns);
-  events.counter("work [us]", woken_ns, done_ns - end_of(Stage::kExchange));
+  events.counter("work [us]", woken_ns, done_ns - end_of(CycleStage::kExchange));
 }
 
 void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fault> faults) {
@@ -73,7 +75,7 @@ void write_faults(Events& events, const CycleStamps& stamps, std::span<const Fau
     if (fault.cycle != stamps.cycle) continue;
     const std::string where = fault.joint.empty() ? "" : fault.joint + ": ";
     events.instant("fault: " + where + fault.text,
-                   stamps.end_ns[static_cast<std::size_t>(Stage::kCheck)]);
+                   stamps.end_ns[static_cast<std::size_t>(CycleStage::kCheck)]);
   }
 }
 

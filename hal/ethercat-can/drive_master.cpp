@@ -141,8 +141,7 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
 void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
                                 std::int64_t at_ns) noexcept TANDEM_RT {
   const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
-  const bool listening =
-      node.master.running() || node.master.stage() == NodeMaster::Stage::kStarting;
+  const bool listening = node.master.running() || node.master.stage() == NodeStage::kStarting;
   if (p < 0 || !listening) return;
   const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
   if (frame.length < pdo.bytes) return;
@@ -201,7 +200,7 @@ void DriveMaster::Impl::watch_doubles(Node& node) noexcept TANDEM_RT {
 /// A board whose answers or heartbeats are lost may hear and move on: it stops by itself now, not
 /// when it has missed its commands for long enough.
 void DriveMaster::Impl::stop_when_lost(Node& node) noexcept TANDEM_RT {
-  if (node.master.stage() != NodeMaster::Stage::kDown || node.counters_sent == 0) return;
+  if (node.master.stage() != NodeStage::kDown || node.counters_sent == 0) return;
   node.counters_sent = 0;
   if (shutting_down || node.plan.board < 0) return;
   ports[node.plan.bus].sink.push(canopen::make_nmt(canopen::NmtCommand::kStop, node.plan.id));
@@ -217,7 +216,7 @@ void DriveMaster::Impl::process_nodes() noexcept TANDEM_RT {
     node.next_part = 0;
     watch_doubles(node);
     node.silent_cycles = complete ? 0 : node.silent_cycles + 1;
-    if (!complete && stage == Stage::kRunning && !shutting_down) ++node.missed;
+    if (!complete && stage == MasterStage::kRunning && !shutting_down) ++node.missed;
     if (!node.master.running() || node.timeout_cycles == 0) continue;
     if (node.silent_cycles > static_cast<std::uint32_t>(node.timeout_cycles)) {
       node.master.fail(NodeError::kFeedbackLost, now_ns);
@@ -287,8 +286,8 @@ Code DriveMaster::Impl::receive_code() const noexcept TANDEM_RT {
   for (const Port& port : ports) {
     if (!usable(port.bus->state())) return Code::kBusOff;
   }
-  if (stage == Stage::kFaulted || stage == Stage::kFailed) return Code::kFault;
-  if (stage != Stage::kRunning) return Code::kOk;
+  if (stage == MasterStage::kFaulted || stage == MasterStage::kFailed) return Code::kFault;
+  if (stage != MasterStage::kRunning) return Code::kOk;
   const bool silent = std::ranges::any_of(nodes, [](const Node& n) { return n.silent_cycles > 0; });
   return silent ? Code::kTimeout : Code::kOk;
 }
@@ -320,7 +319,7 @@ Code DriveMaster::receive(StateImage& state) noexcept TANDEM_RT {
   m.process_nodes();
   if (!m.shutting_down) {
     m.advance();
-    if (m.stage != Impl::Stage::kRunning) {
+    if (m.stage != Impl::MasterStage::kRunning) {
       m.make_commands(nullptr);
       m.write_pdos();
     }
@@ -334,15 +333,16 @@ Code DriveMaster::send(const CommandImage& command,
                        const ParameterImage& parameters) noexcept TANDEM_RT {
   Impl& m = *impl_;
   if (m.shutting_down) return Code::kOk;
-  if (m.stage == Impl::Stage::kFailed) return Code::kFault;
-  if (m.stage == Impl::Stage::kBooting || m.stage == Impl::Stage::kEnabling) return Code::kOk;
+  if (m.stage == Impl::MasterStage::kFailed) return Code::kFault;
+  if (m.stage == Impl::MasterStage::kBooting || m.stage == Impl::MasterStage::kEnabling)
+    return Code::kOk;
   m.take_resets(command);
-  if (m.stage == Impl::Stage::kFaulted) return Code::kFault;
+  if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
   m.make_commands(&command);
   m.write_pdos();
   m.send_parameters(parameters);
   const bool taken = m.flush();
-  if (m.stage == Impl::Stage::kFaulted) return Code::kFault;
+  if (m.stage == Impl::MasterStage::kFaulted) return Code::kFault;
   if (!taken) ++m.unsent;
   return taken ? Code::kOk : Code::kQueueFull;
 }
@@ -363,11 +363,11 @@ bool DriveMaster::shut_down() noexcept TANDEM_RT {
 Phase DriveMaster::phase() const noexcept {
   if (impl_->resetting) return Phase::kBringUp;
   switch (impl_->stage) {
-    case Impl::Stage::kBooting:
-    case Impl::Stage::kEnabling: return Phase::kBringUp;
-    case Impl::Stage::kRunning: return Phase::kOperational;
-    case Impl::Stage::kFaulted:
-    case Impl::Stage::kFailed: return Phase::kFault;
+    case Impl::MasterStage::kBooting:
+    case Impl::MasterStage::kEnabling: return Phase::kBringUp;
+    case Impl::MasterStage::kRunning: return Phase::kOperational;
+    case Impl::MasterStage::kFaulted:
+    case Impl::MasterStage::kFailed: return Phase::kFault;
   }
   return Phase::kFault;
 }

@@ -19,7 +19,7 @@ namespace tandem::hal::can {
 inline constexpr std::size_t kMaxFramesPerCycle = 512;
 
 struct DriveMaster::Impl {
-  enum class Stage : std::uint8_t {
+  enum class MasterStage : std::uint8_t {
     kBooting,   ///< nodes are configured and started
     kEnabling,  ///< axes walk to Operation Enabled for the first time
     kRunning,
@@ -132,7 +132,7 @@ struct DriveMaster::Impl {
   std::vector<PidGains> sent_gains;        ///< by joint and loop: what the drive has
   std::vector<std::uint32_t> sent_revision;
 
-  Stage stage = Stage::kBooting;
+  MasterStage stage = MasterStage::kBooting;
   StopCategory reaction = StopCategory::kWarn;  ///< the hardest that is carried out
   StopCategory latched = StopCategory::kWarn;   ///< of stop(): until reset()
   bool resetting = false;                       ///< reset() is not through yet

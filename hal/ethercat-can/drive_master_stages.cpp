@@ -22,7 +22,6 @@
 namespace tandem::hal::can {
 
 using TargetState = AxisMaster::TargetState;
-using NodeStage = NodeMaster::Stage;
 
 namespace {
 
@@ -50,25 +49,25 @@ constexpr auto kNodeLostCode = static_cast<std::uint16_t>(canopen::ErrorCode::kH
 
 void DriveMaster::Impl::advance() noexcept TANDEM_RT {
   switch (stage) {
-    case Stage::kBooting: boot(); break;
-    case Stage::kEnabling:
+    case MasterStage::kBooting: boot(); break;
+    case MasterStage::kEnabling:
       if (std::ranges::any_of(nodes, [](const Node& n) { return !n.master.running(); })) {
         fail();
       } else if (all_enabled()) {
         set_targets(TargetState::kFollow);
-        stage = Stage::kRunning;
+        stage = MasterStage::kRunning;
       }
       break;
-    case Stage::kRunning:
+    case MasterStage::kRunning:
       watch();
       recover();
       break;
-    case Stage::kFaulted:
+    case MasterStage::kFaulted:
       watch();
       recover();
       enable_again();
       break;
-    case Stage::kFailed: break;
+    case MasterStage::kFailed: break;
   }
   if (resetting) watch_reset();
 }
@@ -90,7 +89,7 @@ void DriveMaster::Impl::enable_again() noexcept TANDEM_RT {
     if (axis.error() == AxisError::kNone) axis.set_target(TargetState::kFollow, now_ns);
   }
   reaction = StopCategory::kWarn;
-  stage = Stage::kRunning;
+  stage = MasterStage::kRunning;
 }
 
 /// A joint whose category is "warn" never keeps the others from moving.
@@ -116,15 +115,15 @@ FaultCause DriveMaster::Impl::cause(std::size_t joint) const noexcept TANDEM_RT 
 /// reset() is through when every joint follows again, or when nothing is under way any more and a
 /// cause is still there.
 void DriveMaster::Impl::watch_reset() noexcept TANDEM_RT {
-  bool under_way = stage == Stage::kFaulted;
+  bool under_way = stage == MasterStage::kFaulted;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) {
     const AxisMaster& axis = axes[joint];
     const Node& node = node_of(joint);
     const bool node_starts =
         axis.error() == AxisError::kNodeLost && (node.recovering || node.master.running());
     if (axis.target() == TargetState::kReset || node_starts) return;
-    if (stage == Stage::kFaulted && stands_in_the_way(joint)) under_way = false;
-    if (stage == Stage::kRunning && axis.error() == AxisError::kNone &&
+    if (stage == MasterStage::kFaulted && stands_in_the_way(joint)) under_way = false;
+    if (stage == MasterStage::kRunning && axis.error() == AxisError::kNone &&
         axis.target() != TargetState::kFollow) {
       under_way = true;
     }
@@ -145,7 +144,7 @@ void DriveMaster::Impl::boot() noexcept TANDEM_RT {
     for (Node& node : nodes) node.master.start(now_ns, ports[node.plan.bus].sink);
   } else if (all_running) {
     set_targets(TargetState::kBringUp);
-    stage = Stage::kEnabling;
+    stage = MasterStage::kEnabling;
   }
 }
 
@@ -171,7 +170,7 @@ void DriveMaster::Impl::watch() noexcept TANDEM_RT {
 /// @return whether an axis is to do something else than before.
 bool DriveMaster::Impl::react(StopCategory category) noexcept TANDEM_RT {
   reaction = std::min(reaction, category);  // the lower the number, the harder the stop
-  stage = Stage::kFaulted;
+  stage = MasterStage::kFaulted;
   const TargetState target = reaction == StopCategory::kCategory0   ? TargetState::kNothing
                              : reaction == StopCategory::kCategory1 ? TargetState::kQuickStop
                                                                     : TargetState::kHold;
@@ -188,8 +187,8 @@ void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
   if (category == StopCategory::kWarn || shutting_down) return;
   latched = std::min(latched, category);
   resetting = false;
-  if (stage == Stage::kFailed) return;
-  if (stage == Stage::kBooting || stage == Stage::kEnabling) {
+  if (stage == MasterStage::kFailed) return;
+  if (stage == MasterStage::kBooting || stage == MasterStage::kEnabling) {
     fail();
   } else if (!react(category)) {
     return;  // it has been told
@@ -200,7 +199,7 @@ void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
 }
 
 void DriveMaster::Impl::reset() noexcept TANDEM_RT {
-  if (shutting_down || (stage != Stage::kFaulted && stage != Stage::kRunning)) return;
+  if (shutting_down || (stage != MasterStage::kFaulted && stage != MasterStage::kRunning)) return;
   latched = StopCategory::kWarn;
   resetting = true;
   for (std::size_t joint = 0; joint < axes.size(); ++joint) reset_joint(joint);
@@ -236,10 +235,11 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
       axis.clear_error();
       axis.set_target(TargetState::kNothing, now_ns);
     }
-    const bool idle_alone = stage == Stage::kRunning && axis.target() == TargetState::kNothing &&
+    const bool idle_alone = stage == MasterStage::kRunning &&
+                            axis.target() == TargetState::kNothing &&
                             axis.error() == AxisError::kNone;
     if (idle_alone) axis.set_target(TargetState::kEnable, now_ns);
-    if (stage == Stage::kRunning && axis.target() == TargetState::kEnable && axis.enabled()) {
+    if (stage == MasterStage::kRunning && axis.target() == TargetState::kEnable && axis.enabled()) {
       axis.set_target(TargetState::kFollow, now_ns);
     }
   }
@@ -277,7 +277,7 @@ void DriveMaster::Impl::set_targets(TargetState target) noexcept TANDEM_RT {
 }
 
 void DriveMaster::Impl::fail() noexcept TANDEM_RT {
-  stage = Stage::kFailed;
+  stage = MasterStage::kFailed;
   set_targets(TargetState::kNothing);
 }
 
@@ -290,7 +290,7 @@ void DriveMaster::Impl::make_commands(const CommandImage* image) noexcept TANDEM
       axis.set_target(TargetState::kNothing, now_ns);
     } else {
       worst = std::min(worst, category(joint));
-      if (stage == Stage::kEnabling) return fail();
+      if (stage == MasterStage::kEnabling) return fail();
     }
   }
   if (stops_drives(worst)) (void)react(worst);

@@ -7,8 +7,6 @@
 
 namespace tandem::hal::can {
 
-using NodeStage = NodeMaster::Stage;
-
 namespace {
 
 /// Share of the bring-up that the configuration of the nodes makes; the rest is the enabling.
@@ -137,20 +135,20 @@ std::string DriveMaster::Impl::axis_text(std::size_t joint) const {
 
 std::string DriveMaster::Impl::status() const {
   std::vector<std::string> causes;
-  if (stage != Stage::kBooting && stage != Stage::kEnabling) {
+  if (stage != MasterStage::kBooting && stage != MasterStage::kEnabling) {
     for (std::size_t j = 0; j < axes.size(); ++j) {
       if (std::string text = axis_text(j); !text.empty()) causes.push_back(std::move(text));
     }
   }
   for (const Node& node : nodes) {
     const bool told = !causes.empty() && node.plan.board >= 0;
-    const bool waits = stage == Stage::kBooting ? node.master.stage() != NodeStage::kReady
-                                                : !node.master.running();
+    const bool waits = stage == MasterStage::kBooting ? node.master.stage() != NodeStage::kReady
+                                                      : !node.master.running();
     const bool has_error = node.master.error() != NodeError::kNone;
-    if (told || (!has_error && (!waits || stage == Stage::kFailed))) continue;
+    if (told || (!has_error && (!waits || stage == MasterStage::kFailed))) continue;
     if (std::string text = node_text(node); !text.empty()) causes.push_back(std::move(text));
   }
-  for (std::size_t j = 0; stage == Stage::kEnabling && j < axes.size(); ++j) {
+  for (std::size_t j = 0; stage == MasterStage::kEnabling && j < axes.size(); ++j) {
     if (axes[j].enabled()) continue;
     causes.push_back(fmt::format("{}: waiting for 'operation enabled', is in '{}'", joint_name(j),
                                  canopen::to_string(axes[j].drive())));
@@ -158,7 +156,7 @@ std::string DriveMaster::Impl::status() const {
   if (causes.empty() && latched != StopCategory::kWarn) {
     return fmt::format("stopped by request ({})", to_string(latched));
   }
-  if (causes.empty()) return stage == Stage::kFaulted ? "enabling every axis again" : "";
+  if (causes.empty()) return stage == MasterStage::kFaulted ? "enabling every axis again" : "";
   std::string text;
   for (std::size_t i = 0; i < std::min(causes.size(), kMostCauses); ++i) {
     if (i > 0) text += '\n';
@@ -192,7 +190,7 @@ std::string DriveMaster::Impl::refused_text() const {
 }
 
 double DriveMaster::Impl::progress() const noexcept {
-  if (stage == Stage::kRunning || stage == Stage::kFaulted) return 1.0;
+  if (stage == MasterStage::kRunning || stage == MasterStage::kFaulted) return 1.0;
   std::size_t done = 0;
   std::size_t all = 0;
   for (const Node& node : nodes) {

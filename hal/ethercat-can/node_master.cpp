@@ -29,7 +29,7 @@ void NodeMaster::set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT {
 }
 
 void NodeMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
-  enter(Stage::kWaitBootUp, now_ns);
+  enter(NodeStage::kWaitBootUp, now_ns);
   error_ = NodeError::kNone;
   next_reset_ns_ = now_ns;
   reboots_ = 0;
@@ -39,18 +39,18 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
   nmt_ = state;
   heard_ns_ = now_ns;
   if (state == NmtState::kBootUp) {
-    if (stage_ == Stage::kDown) return;
+    if (stage_ == NodeStage::kDown) return;
     const bool again = booted_ns_ == now_ns;  // no node boots twice in a cycle
     booted_ns_ = now_ns;
     if (again) return fail(NodeError::kTwoNodes, now_ns);
-    const bool expected = stage_ == Stage::kWaitBootUp;
+    const bool expected = stage_ == NodeStage::kWaitBootUp;
     const bool too_often = !expected && ++reboots_ > kReboots;
-    if (stage_ == Stage::kRunning || too_often) return fail(NodeError::kRebooted, now_ns);
-    return enter(Stage::kConfigure, now_ns);
+    if (stage_ == NodeStage::kRunning || too_often) return fail(NodeError::kRebooted, now_ns);
+    return enter(NodeStage::kConfigure, now_ns);
   }
-  if (stage_ == Stage::kStarting && state == NmtState::kOperational) {
-    enter(Stage::kRunning, now_ns);
-  } else if (stage_ == Stage::kRunning && state != NmtState::kOperational) {
+  if (stage_ == NodeStage::kStarting && state == NmtState::kOperational) {
+    enter(NodeStage::kRunning, now_ns);
+  } else if (stage_ == NodeStage::kRunning && state != NmtState::kOperational) {
     fail(NodeError::kLeftOperational, now_ns);
   }
 }
@@ -62,22 +62,24 @@ void NodeMaster::on_sdo(const canopen::Frame& frame, FrameSink& out) noexcept TA
 void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
                          FrameSink& out) noexcept TANDEM_RT {
   switch (stage_) {
-    case Stage::kWaitBootUp:
+    case NodeStage::kWaitBootUp:
       if (now_ns - since_ns_ >= kBootTimeoutNs) return fail(NodeError::kNoBootUp, now_ns);
       if (now_ns < next_reset_ns_) return;
       out.push(canopen::make_nmt(canopen::NmtCommand::kResetNode, id_));
       next_reset_ns_ = now_ns + kResetEveryNs;
       return;
-    case Stage::kConfigure: return configure(now_ns, dt_ns, out);
-    case Stage::kReady: return watch_heartbeat(now_ns);
-    case Stage::kStarting:
+    case NodeStage::kConfigure: return configure(now_ns, dt_ns, out);
+    case NodeStage::kReady: return watch_heartbeat(now_ns);
+    case NodeStage::kStarting:
       watch_heartbeat(now_ns);
-      if (stage_ == Stage::kStarting && now_ns - since_ns_ >= kStartTimeoutNs) {
+      if (stage_ == NodeStage::kStarting && now_ns - since_ns_ >= kStartTimeoutNs) {
         fail(NodeError::kNotOperational, now_ns);
       }
       return;
-    case Stage::kRunning: sdo_.process(dt_ns, kSdoAnswerNs, out); return watch_heartbeat(now_ns);
-    case Stage::kDown: return;
+    case NodeStage::kRunning:
+      sdo_.process(dt_ns, kSdoAnswerNs, out);
+      return watch_heartbeat(now_ns);
+    case NodeStage::kDown: return;
   }
 }
 
@@ -86,7 +88,7 @@ void NodeMaster::configure(std::int64_t now_ns, std::int64_t dt_ns, FrameSink& o
   sdo_.process(dt_ns, kSdoAnswerNs, out);
   if (sdo_.status() == SdoClient::Status::kBusy) return;
   step_answered(now_ns);
-  if (stage_ == Stage::kConfigure) request(out);
+  if (stage_ == NodeStage::kConfigure) request(out);
 }
 
 void NodeMaster::request(FrameSink& out) noexcept {
@@ -115,13 +117,13 @@ void NodeMaster::step_answered(std::int64_t now_ns) noexcept {
   tries_ = 0;
   if (++step_ == steps_.size()) {
     heard_ns_ = now_ns;  // its heartbeat has just been switched on
-    enter(Stage::kReady, now_ns);
+    enter(NodeStage::kReady, now_ns);
   }
 }
 
 void NodeMaster::start(std::int64_t now_ns, FrameSink& out) noexcept TANDEM_RT {
   out.push(canopen::make_nmt(canopen::NmtCommand::kStart, id_));
-  enter(Stage::kStarting, now_ns);
+  enter(NodeStage::kStarting, now_ns);
 }
 
 void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
@@ -131,13 +133,13 @@ void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
 void NodeMaster::fail(NodeError error, std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = error;
   trouble_ns_ = now_ns;
-  stage_ = Stage::kDown;
+  stage_ = NodeStage::kDown;
 }
 
-void NodeMaster::enter(Stage stage, std::int64_t now_ns) noexcept {
+void NodeMaster::enter(NodeStage stage, std::int64_t now_ns) noexcept {
   stage_ = stage;
   since_ns_ = now_ns;
-  if (stage == Stage::kConfigure || stage == Stage::kWaitBootUp) {
+  if (stage == NodeStage::kConfigure || stage == NodeStage::kWaitBootUp) {
     step_ = 0;
     tries_ = 0;
     requested_ = false;

@@ -26,18 +26,19 @@ enum class NodeError : std::uint8_t {
   kTwoNodes,         ///< two answer under its id
 };
 
+/// How far a node is brought up.
+enum class NodeStage : std::uint8_t {
+  kWaitBootUp,
+  kConfigure,
+  kReady,     ///< configured; start() lets it run
+  kStarting,  ///< NMT start is sent
+  kRunning,
+  kDown,  ///< error() says why
+};
+
 /// Non-blocking: frames and time in, frames out, at most one SDO request per call.
 class NodeMaster {
  public:
-  enum class Stage : std::uint8_t {
-    kWaitBootUp,
-    kConfigure,
-    kReady,     ///< configured; start() lets it run
-    kStarting,  ///< NMT start is sent
-    kRunning,
-    kDown,  ///< error() says why
-  };
-
   static constexpr std::int64_t kBootTimeoutNs = 3'000'000'000;
   static constexpr std::int64_t kResetEveryNs = 500'000'000;
   static constexpr std::int64_t kSdoAnswerNs = 100'000'000;
@@ -63,8 +64,8 @@ class NodeMaster {
   /// The client for transfers at run time. @pre stage() == kRunning
   [[nodiscard]] canopen::SdoClient& sdo() noexcept { return sdo_; }
 
-  [[nodiscard]] Stage stage() const noexcept { return stage_; }
-  [[nodiscard]] bool running() const noexcept { return stage_ == Stage::kRunning; }
+  [[nodiscard]] NodeStage stage() const noexcept { return stage_; }
+  [[nodiscard]] bool running() const noexcept { return stage_ == NodeStage::kRunning; }
   [[nodiscard]] NodeError error() const noexcept { return error_; }
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return nmt_; }
@@ -81,13 +82,13 @@ class NodeMaster {
   void step_answered(std::int64_t now_ns) noexcept;
   void request(canopen::FrameSink& out) noexcept;
   void watch_heartbeat(std::int64_t now_ns) noexcept;
-  void enter(Stage stage, std::int64_t now_ns) noexcept;
+  void enter(NodeStage stage, std::int64_t now_ns) noexcept;
 
   int id_;
   std::int64_t heartbeat_timeout_ns_;
   std::vector<SdoStep> steps_;
 
-  Stage stage_ = Stage::kWaitBootUp;
+  NodeStage stage_ = NodeStage::kWaitBootUp;
   NodeError error_ = NodeError::kNone;
   canopen::NmtState nmt_ = canopen::NmtState::kBootUp;
   bool requested_ = false;  ///< the step's request is out

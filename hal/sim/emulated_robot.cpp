@@ -198,9 +198,9 @@ Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
     deliver(false);
     run_boards();
   }
-  hook_(Stage::kPlant);
+  hook_(SimStage::kPlant);
   sense();
-  hook_(Stage::kSense);
+  hook_(SimStage::kSense);
   deliver(true);
   run_boards();
   for (std::size_t b = 0; b < wires_.size(); ++b) carry(b, time_ns + answer_window_ns_, false);
@@ -209,7 +209,7 @@ Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
     enabled_ns_ = now_ns_ - first_ns_;
     plant_.release();
   }
-  hook_(Stage::kBoards);
+  hook_(SimStage::kBoards);
   return Code::kOk;
 }
 

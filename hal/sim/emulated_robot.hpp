@@ -42,7 +42,7 @@ struct SimRobotConfig {
 };
 
 /// The stages of a cycle of the simulated robot, from cycle k-1 to cycle k.
-enum class Stage : std::uint8_t {
+enum class SimStage : std::uint8_t {
   kMasterSync,    ///< the master sends SYNC k
   kPlant,         ///< physics, in sub-steps of the plant, up to the time of cycle k
   kSense,         ///< accelerations, forces and sensors' truth at cycle k
@@ -50,15 +50,15 @@ enum class Stage : std::uint8_t {
   kMasterDecode,  ///< the master fills the state image
   kTruth,         ///< the true state is copied for the log
 };
-inline constexpr std::size_t kStages = 6;
+inline constexpr std::size_t kSimStages = 6;
 
 /// Calls `call(context, stage)` at the end of a stage: what takes the time is bench/'s question,
 /// and no clock is read here. Null: nobody asks.
 struct StageHook {
-  void (*call)(void* context, Stage finished) = nullptr;
+  void (*call)(void* context, SimStage finished) = nullptr;
   void* context = nullptr;
 
-  void operator()(Stage finished) const noexcept {
+  void operator()(SimStage finished) const noexcept {
     if (call != nullptr) call(context, finished);
   }
 };

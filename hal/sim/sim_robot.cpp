@@ -49,14 +49,14 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
     posted_.pop();
   }
   master_->cycle_begin(time);
-  hook_(Stage::kMasterSync);
+  hook_(SimStage::kMasterSync);
   if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
   const Code code = master_->receive(state);
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
-  hook_(Stage::kMasterDecode);
+  hook_(SimStage::kMasterDecode);
   if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
-  hook_(Stage::kTruth);
+  hook_(SimStage::kTruth);
   return code;
 }
 

@@ -129,7 +129,7 @@ TEST_F(ScriptedNode, IsResetReadWrittenAndStarted) {
   EXPECT_EQ(wait(1), std::vector<Frame>{wire(0x605, {0x2B, 0x17, 0x10, 0x00, 50, 0, 0, 0})});
   answer({0x60, 0x17, 0x10, 0x00, 0, 0, 0, 0});
   EXPECT_TRUE(wait(1).empty());
-  EXPECT_EQ(node.stage(), NodeMaster::Stage::kReady);
+  EXPECT_EQ(node.stage(), NodeStage::kReady);
   node.start(now_ns, sink);
   EXPECT_EQ(sink.frames().back(), wire(0x000, {0x01, 0x05}));
   node.on_heartbeat(canopen::NmtState::kOperational, now_ns);
@@ -167,7 +167,7 @@ TEST_F(ScriptedNode, IsRefusedWithAnotherIdentity) {
 
 TEST_F(ScriptedNode, ThatDoesNotStartIsReported) {
   configure();
-  ASSERT_EQ(node.stage(), NodeMaster::Stage::kReady);
+  ASSERT_EQ(node.stage(), NodeStage::kReady);
   node.start(now_ns, sink);
   for (int ms = 0; ms < 1100; ms += 50) {
     node.on_heartbeat(canopen::NmtState::kPreOperational, now_ns);
@@ -189,7 +189,7 @@ TEST_F(ScriptedNode, ThatRebootsAgainAndAgainIsGivenUp) {
   for (int i = 0; i < 3; ++i) {
     now_ns += 1'000'000;
     boot();
-    EXPECT_EQ(node.stage(), NodeMaster::Stage::kConfigure);
+    EXPECT_EQ(node.stage(), NodeStage::kConfigure);
   }
   now_ns += 1'000'000;
   boot();

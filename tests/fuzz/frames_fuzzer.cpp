@@ -158,9 +158,9 @@ struct Wires {
 /// Where inputs begin, as snapshots of one robot.
 enum Situation : std::size_t { kPowerOn, kConfiguring, kOperational, kFollowing, kStopped, kAll };
 
-class Stage {
+class Rig {
  public:
-  Stage() {
+  Rig() {
     save(kPowerOn);
     for (int i = 0; i < 20; ++i) wires.step({}, false);
     require(wires.master->phase() == hal::Phase::kBringUp);
@@ -199,9 +199,9 @@ class Stage {
 /// One input's story.
 class Play {
  public:
-  Play(Stage& stage, Input input) : wires_(stage.wires), input_(input) {
+  Play(Rig& rig, Input input) : wires_(rig.wires), input_(input) {
     const auto situation = static_cast<Situation>(input_.byte() % kAll);
-    stage.restore(situation);
+    rig.restore(situation);
     stopped_ = situation == kStopped;
     while (input_.more() && cycles_ < kMostCycles) act();
     cycle();
@@ -377,7 +377,7 @@ class Play {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static Stage stage;
-  const Play play(stage, Input({data, size}));
+  static Rig rig;
+  const Play play(rig, Input({data, size}));
   return 0;
 }

@@ -88,8 +88,8 @@ TEST_F(TracedRun, KeepsTheLastCyclesWithTheirStagesInOrder) {
   for (std::size_t i = 0; i < cycles.size(); ++i) {
     EXPECT_EQ(cycles[i].cycle, all - 50 + i);
     EXPECT_EQ(cycles[i].begin_ns, before_ns);  // a cycle begins where the last one ended
-    for (std::size_t s = 0; s < kStages; ++s) {
-      EXPECT_GT(cycles[i].stage_ns(static_cast<Stage>(s)), 0) << s;
+    for (std::size_t s = 0; s < kCycleStages; ++s) {
+      EXPECT_GT(cycles[i].stage_ns(static_cast<CycleStage>(s)), 0) << s;
     }
     before_ns = cycles[i].end_ns.back();
   }
@@ -103,10 +103,10 @@ TEST_F(TracedRun, SplitsTheCycleIntoWakeUpBusAndWork) {
   ASSERT_EQ(cycles.size(), loop.cycles);
   std::int64_t bus_ns = 0, work_ns = 0, wakeup_ns = 0;
   for (const CycleStamps& stamps : cycles) {
-    bus_ns += stamps.stage_ns(Stage::kExchange);
+    bus_ns += stamps.stage_ns(CycleStage::kExchange);
     work_ns += stamps.end_ns.back() - stamps.end_ns[1];
     if (stamps.wakeup_ns >= 0) wakeup_ns += stamps.wakeup_ns;
-    EXPECT_GE(stamps.stage_ns(Stage::kExchange), 200'000);
+    EXPECT_GE(stamps.stage_ns(CycleStage::kExchange), 200'000);
     EXPECT_LT(stamps.end_ns.back() - stamps.end_ns[1], 200'000);
   }
   EXPECT_EQ(bus_ns, loop.bus.sum_ns());
@@ -120,7 +120,7 @@ TEST_F(TracedRun, HasNoBusTimeWithoutABus) {
   cycle->run();
   EXPECT_EQ(cycle->loop().bus.count(), 0U);
   for (const CycleStamps& stamps : cycle->trace().cycles()) {
-    EXPECT_EQ(stamps.stage_ns(Stage::kExchange), 0);
+    EXPECT_EQ(stamps.stage_ns(CycleStage::kExchange), 0);
   }
   for (const Json& span : events(written(), "X")) EXPECT_NE(span["name"], "exchange");
 }
@@ -142,7 +142,7 @@ TEST_F(TracedRun, WritesSpansThatNestAndSumUp) {
   EXPECT_EQ(trace["otherData"]["cycles"], 40);
   EXPECT_EQ(trace["otherData"]["cycles_before"], cycle->loop().cycles - 40);
   const std::vector<Json> spans = events(trace, "X");
-  constexpr std::size_t kPerCycle = kStages + 1;
+  constexpr std::size_t kPerCycle = kCycleStages + 1;
   ASSERT_EQ(spans.size(), 40 * kPerCycle);
   const auto begin = [](const Json& span) { return span["ts"].get<double>(); };
   const auto end = [](const Json& span) {

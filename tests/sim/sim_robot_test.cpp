@@ -188,15 +188,16 @@ TEST(SimRobot, AnUnstableSubStepIsRefusedWithTheJoint) {
 
 TEST(SimRobot, StagesAreReportedInOrder) {
   Loop loop(swing_robot());
-  std::vector<Stage> stages;
-  stages.reserve(kStages);  // the hook runs in the cycle
-  loop.sim_robot->set_stage_hook({[](void* context, Stage stage) {
-                                    static_cast<std::vector<Stage>*>(context)->push_back(stage);
+  std::vector<SimStage> stages;
+  stages.reserve(kSimStages);  // the hook runs in the cycle
+  loop.sim_robot->set_stage_hook({[](void* context, SimStage stage) {
+                                    static_cast<std::vector<SimStage>*>(context)->push_back(stage);
                                   },
                                   &stages});
   loop.run(1);
-  EXPECT_EQ(stages, (std::vector<Stage>{Stage::kMasterSync, Stage::kPlant, Stage::kSense,
-                                        Stage::kBoards, Stage::kMasterDecode, Stage::kTruth}));
+  EXPECT_EQ(stages,
+            (std::vector<SimStage>{SimStage::kMasterSync, SimStage::kPlant, SimStage::kSense,
+                                   SimStage::kBoards, SimStage::kMasterDecode, SimStage::kTruth}));
 }
 
 TEST(EmulatedRobot, FramesAfterSyncWaitForTheNextStep) {
