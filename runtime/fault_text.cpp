@@ -5,6 +5,78 @@
 
 namespace tandem::runtime {
 
+namespace {
+
+std::string emergency_text(EmergencyInput input) {
+  switch (input) {
+    case EmergencyInput::kSignal: return "emergency stop by a signal";
+    case EmergencyInput::kRequest: return "emergency stop on request";
+    case EmergencyInput::kWatchdog: return "emergency stop by the watchdog: the loop hung";
+  }
+  return {};
+}
+
+std::string owner_text(hal::OwnerLoss loss) {
+  switch (loss) {
+    case hal::OwnerLoss::kNone: return "the remote owner asked for a stop";
+    case hal::OwnerLoss::kSilent: return "the remote owner is gone: its lease has run out";
+    case hal::OwnerLoss::kStale: return "the remote owner's commands stopped, or came too late";
+    case hal::OwnerLoss::kLate: return "the remote owner gave no command for this cycle in time";
+  }
+  return {};
+}
+
+std::string text_of(const FaultRecord& record, const FaultContext& about) {
+  const std::string count = std::to_string(record.code);
+  const char* code = tandem::to_string(static_cast<Code>(record.code));
+  switch (record.source) {
+    case FaultSource::kDrive: return about.backend.fault_text(record.cause, record.code);
+    case FaultSource::kJointLost: return "no feedback for " + count + " cycles";
+    case FaultSource::kSensorLost: return "no sample for " + count + " cycles";
+    case FaultSource::kBackend: return "the robot answered " + std::string(code);
+    case FaultSource::kController: return "the controller gave up: " + std::string(code);
+    case FaultSource::kCommand: return "a controller's command was not a finite number";
+    case FaultSource::kStray:
+      return "the controller '" + about.controllers.name(record.code) +
+             "' wrote to this joint, or its mode, without a claim: taken back";
+    case FaultSource::kOverrun:
+      return std::to_string(about.config.loop.stop_late) + " of the last " +
+             std::to_string(about.config.loop.stop_window) + " cycles were late";
+    case FaultSource::kBringUp: return "the drives were not enabled in time";
+    case FaultSource::kEmergencyStop:
+      return emergency_text(static_cast<EmergencyInput>(record.code));
+    case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
+    case FaultSource::kFall:
+      return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
+  }
+  return {};
+}
+
+/// The joint, sensor or controller that the fault is about, and a joint's board.
+void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault) {
+  const auto index = static_cast<std::size_t>(record.index);
+  switch (record.source) {
+    case FaultSource::kDrive:
+    case FaultSource::kJointLost:
+    case FaultSource::kCommand:
+    case FaultSource::kStray:
+      fault.joint = about.robot.joints[index].name;
+      fault.board = about.robot.joints[index].board;
+      break;
+    case FaultSource::kSensorLost: fault.joint = about.robot.sensors[index].name; break;
+    case FaultSource::kController: fault.joint = about.controllers.name(index); break;
+    case FaultSource::kEmergencyStop:
+      if (static_cast<EmergencyInput>(record.code) == EmergencyInput::kWatchdog &&
+          record.index >= 0) {
+        fault.joint = about.controllers.name(index);
+      }
+      break;
+    default: break;
+  }
+}
+
+}  // namespace
+
 Fault in_words(const FaultRecord& record, std::int64_t cleared_ns, const FaultContext& about) {
   Fault fault;
   fault.cycle = record.cycle;
@@ -12,69 +84,8 @@ Fault in_words(const FaultRecord& record, std::int64_t cleared_ns, const FaultCo
   fault.category = record.category;
   fault.latched = cleared_ns == FaultLog::kLatched;
   fault.cleared_s = fault.latched ? 0.0 : static_cast<double>(cleared_ns) * 1e-9;
-  const auto index = static_cast<std::size_t>(record.index);
-  const char* code = tandem::to_string(static_cast<Code>(record.code));
-  switch (record.source) {
-    case FaultSource::kDrive:
-      fault.text = about.backend.fault_text(record.cause, record.code);
-      break;
-    case FaultSource::kJointLost:
-      fault.text = "no feedback for " + std::to_string(record.code) + " cycles";
-      break;
-    case FaultSource::kSensorLost:
-      fault.joint = about.robot.sensors[index].name;
-      fault.text = "no sample for " + std::to_string(record.code) + " cycles";
-      break;
-    case FaultSource::kBackend: fault.text = "the robot answered " + std::string(code); break;
-    case FaultSource::kController:
-      fault.joint = about.controllers.name(index);
-      fault.text = "the controller gave up: " + std::string(code);
-      break;
-    case FaultSource::kCommand:
-      fault.text = "a controller's command was not a finite number";
-      break;
-    case FaultSource::kStray:
-      fault.text = "the controller '" + about.controllers.name(record.code) +
-                   "' wrote to this joint, or its mode, without a claim: taken back";
-      break;
-    case FaultSource::kOverrun:
-      fault.text = std::to_string(about.config.loop.stop_late) + " of the last " +
-                   std::to_string(about.config.loop.stop_window) + " cycles were late";
-      break;
-    case FaultSource::kBringUp: fault.text = "the drives were not enabled in time"; break;
-    case FaultSource::kEmergencyStop:
-      switch (static_cast<EmergencyInput>(record.code)) {
-        case EmergencyInput::kSignal: fault.text = "emergency stop by a signal"; break;
-        case EmergencyInput::kRequest: fault.text = "emergency stop on request"; break;
-        case EmergencyInput::kWatchdog:
-          if (record.index >= 0) fault.joint = about.controllers.name(index);
-          fault.text = "emergency stop by the watchdog: the loop hung";
-          break;
-      }
-      break;
-    case FaultSource::kOwner:
-      switch (static_cast<hal::OwnerLoss>(record.code)) {
-        case hal::OwnerLoss::kNone: fault.text = "the remote owner asked for a stop"; break;
-        case hal::OwnerLoss::kSilent:
-          fault.text = "the remote owner is gone: its lease has run out";
-          break;
-        case hal::OwnerLoss::kStale:
-          fault.text = "the remote owner's commands stopped, or came too late";
-          break;
-        case hal::OwnerLoss::kLate:
-          fault.text = "the remote owner gave no command for this cycle in time";
-          break;
-      }
-      break;
-    case FaultSource::kFall:
-      fault.text = fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
-      break;
-  }
-  if (record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
-      record.source == FaultSource::kCommand || record.source == FaultSource::kStray) {
-    fault.joint = about.robot.joints[index].name;
-    fault.board = about.robot.joints[index].board;
-  }
+  fault.text = text_of(record, about);
+  name_it(record, about, fault);
   return fault;
 }
 

@@ -24,6 +24,57 @@ Status errors_of(const TomlDocument& document) {
   return fail(all, "the parameters of each controller are in docs/controllers.md");
 }
 
+/// Why the loop refused, and what to do about it.
+struct Words {
+  std::string message;
+  std::string hint;
+};
+
+/// @param one, other  controllers that stand in the way; empty where there is none
+Words words_of(RejectReason reason, const std::string& joint, const std::string& one,
+               const std::string& other) {
+  switch (reason) {
+    case RejectReason::kNone: break;
+    case RejectReason::kEnding: return {"the run shuts down", "start another run"};
+    case RejectReason::kNotRunning:
+      return {"every joint is held until the controllers run",
+              "ask again in the phase running; after a fault: tandem fault reset first"};
+    case RejectReason::kConflict:
+      return {"is claimed by the controllers '" + one + "' and '" + other + "'",
+              "stop one of them in the same switch"};
+    case RejectReason::kGone:
+      return {"there is no such controller any more",
+              "tandem controller list shows what is loaded"};
+    case RejectReason::kActive:
+      return {"the controller '" + one + "' is active, or is not, already",
+              "tandem controller list shows which are"};
+    case RejectReason::kClaimed:
+      return {"is claimed by the controller '" + one + "', which sets its mode",
+              "stop it first: tandem controller stop " + one};
+    case RejectReason::kWithin:
+      return {"is within its limits already, or on its way", "tandem joint list shows where it is"};
+    case RejectReason::kOutside:
+      return {"stands outside its limits", "lead it back first: tandem joint recover " + joint};
+    case RejectReason::kBeyond:
+      return {"cannot go there, or not at this speed", "its limits are in robot.toml"};
+    case RejectReason::kOtherMode:
+      return {"is not in position control, which it needs for this",
+              "tandem joint set " + joint + " --mode position"};
+    case RejectReason::kNotEnabled:
+      return {"nothing is moved before the joints are enabled, or while a fault is latched",
+              "tandem fault reset, then ask again"};
+    case RejectReason::kNotHeld:
+      return {"no controllers are held back by a reset", "name those to start"};
+    case RejectReason::kRecovering:
+      return {"is on its way back to its limits, which " +
+                  (one.empty() ? "this" : "the controller '" + one + "'") + " would end",
+              "ask again when it is inside: tandem joint list " + joint + " shows where it is"};
+    case RejectReason::kIncapable:
+      return {"cannot be put into this mode", "its [gains] table lacks the loop"};
+  }
+  return {};
+}
+
 }  // namespace
 
 RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, Inbox& inbox,
@@ -104,73 +155,12 @@ std::string RunServices::controller_name(std::int32_t slot) const {
 }
 
 Error RunServices::refusal(const LoopAnswer& answer) const {
-  Error error{.message = {}, .hint = {}, .file = {}, .key = {}};
   const std::string joint =
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
-  const std::string one = controller_name(answer.one);
-  switch (answer.reason) {
-    case RejectReason::kNone: break;
-    case RejectReason::kEnding:
-      error.message = "the run shuts down";
-      error.hint = "start another run";
-      break;
-    case RejectReason::kNotRunning:
-      error.message = "every joint is held until the controllers run";
-      error.hint = "ask again in the phase running; after a fault: tandem fault reset first";
-      break;
-    case RejectReason::kConflict:
-      error.message =
-          "is claimed by the controllers '" + one + "' and '" + controller_name(answer.other) + "'";
-      error.hint = "stop one of them in the same switch";
-      break;
-    case RejectReason::kGone:
-      error.message = "there is no such controller any more";
-      error.hint = "tandem controller list shows what is loaded";
-      break;
-    case RejectReason::kActive:
-      error.message = "the controller '" + one + "' is active, or is not, already";
-      error.hint = "tandem controller list shows which are";
-      break;
-    case RejectReason::kClaimed:
-      error.message = "is claimed by the controller '" + one + "', which sets its mode";
-      error.hint = "stop it first: tandem controller stop " + one;
-      break;
-    case RejectReason::kWithin:
-      error.message = "is within its limits already, or on its way";
-      error.hint = "tandem joint list shows where it is";
-      break;
-    case RejectReason::kOutside:
-      error.message = "stands outside its limits";
-      error.hint = "lead it back first: tandem joint recover " + joint;
-      break;
-    case RejectReason::kBeyond:
-      error.message = "cannot go there, or not at this speed";
-      error.hint = "its limits are in robot.toml";
-      break;
-    case RejectReason::kOtherMode:
-      error.message = "is not in position control, which it needs for this";
-      error.hint = "tandem joint set " + joint + " --mode position";
-      break;
-    case RejectReason::kNotEnabled:
-      error.message = "nothing is moved before the joints are enabled, or while a fault is latched";
-      error.hint = "tandem fault reset, then ask again";
-      break;
-    case RejectReason::kNotHeld:
-      error.message = "no controllers are held back by a reset";
-      error.hint = "name those to start";
-      break;
-    case RejectReason::kRecovering:
-      error.message = "is on its way back to its limits, which " +
-                      (one.empty() ? "this" : "the controller '" + one + "'") + " would end";
-      error.hint = "ask again when it is inside: tandem joint list " + joint + " shows where it is";
-      break;
-    case RejectReason::kIncapable:
-      error.message = "cannot be put into this mode";
-      error.hint = "its [gains] table lacks the loop";
-      break;
-  }
-  error.key = joint;
-  return error;
+  Words words =
+      words_of(answer.reason, joint, controller_name(answer.one), controller_name(answer.other));
+  return {
+      .message = std::move(words.message), .hint = std::move(words.hint), .file = {}, .key = joint};
 }
 
 void RunServices::restored(const hal::ParameterImage& parameters) {

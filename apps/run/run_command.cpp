@@ -163,116 +163,176 @@ Result<std::unique_ptr<DdsServices>> open_services(DdsRun* run, const ControlReg
   return DdsServices::open(run->participant(), commands, remote_gate(remote, owner), admission);
 }
 
-/// The loop was given up. Its thread is still there, and may go on at any time: what it uses stays.
-[[noreturn]] void end_without_loop(const LoopGuard& guard, const RunOptions& options,
-                                   Composition& c, log::Recorder* recorder,
-                                   std::unique_ptr<ControlSocket>& socket) {
-  const std::string fault = "the loop hung " + guard.where() + " and did not come back";
-  std::string log;
-  if (recorder != nullptr) log = recorder->close({{"ended", fault}}).path;
-  if (c.frames != nullptr) (void)c.frames->close();
-  remember_error({.message = fault, .hint = {}, .file = {}, .key = {}});
-  write_failure(options.json);
-  socket.reset();
-  fmt::print(stderr, "fault: {}{}\n", fault, log.empty() ? "" : "; the log up to then is " + log);
-  std::fflush(nullptr);
-  ::_exit(static_cast<int>(Exit::kFault));
-}
+/// A run, or a server: the loop and all that talks to it. Taken apart in reverse order.
+class Session {
+ public:
+  Session(Composition& composition, const RunOptions& options)
+      : c_(composition),
+        options_(options),
+        out_(human_output(options.json)),
+        admission_(composition.experiment.remote.trust == runtime::RemoteTrust::kDomain) {}
 
-Exit run(Composition& c, const RunOptions& options) {
-  std::FILE* out = human_output(options.json);
-  runtime::Experiment& e = c.experiment;
-  const runtime::CycleConfig config = cycle_config(c, options);
-  const bool keeps_truth = c.sim != nullptr && e.sim.ground_truth;
-  const hal::TruthImage* truth = keeps_truth ? &c.sim->truth() : nullptr;
-  const auto dds = DdsRun::open(c, options.serves ? "tandem_serve" : "tandem_run", truth);
-  if (!dds) return refuse(dds.error());
-  std::unique_ptr<log::Recorder> recorder;
-  if (!options.no_log) {
-    auto opened = open_log(c, options.log_folder.empty() ? e.log.folder : options.log_folder);
-    if (!opened) return refuse(opened.error());
-    recorder = std::move(*opened);
+  Exit run() {
+    if (const Status opened = open_outputs(); !opened) return refuse(opened.error());
+    make_cycle();
+    announce();
+    if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
+    const auto wall_s = loop();
+    if (!wall_s) return refuse(wall_s.error());
+    return finish(*wall_s);
   }
-  DdsAdmission admission(e.remote.trust == runtime::RemoteTrust::kDomain);
-  const auto server = open_server(c, dds->get(), options.once, admission);
-  if (!server) return refuse(server.error());
-  rt::WallClock clock;
-  runtime::RobotCycle cycle({.robot = e.robot,
-                             .backend = *c.backend,
-                             .controllers = *c.controllers,
-                             .clock = clock,
-                             .recorder = recorder.get(),
-                             .truth = truth,
-                             .observer = *dds == nullptr ? nullptr : &(*dds)->tap(),
-                             .owner = {server->get(), c.owner.get(), c.owner_slot}},
-                            config);
-  if (*server != nullptr) tell_faults(**server, cycle);
-  if (!options.quiet) {
-    fmt::print(out, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
-               counted(e.robot.joints.size(), "joint"), length_text(e),
-               1e6 / static_cast<double>(e.loop.period_ns), options.serves ? served_text(e) : "",
-               pace_text(c));
-  }
-  ControlRegistry commands;
-  add_run_commands(commands, cycle, e.robot, slides_of(c.tree));
-  if (*dds != nullptr) admission.add_to(commands);
-  if (c.sim != nullptr) {
-    add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
-      if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
-      return injected(c.sim->post(fault) ? Code::kOk : Code::kQueueFull);
-    });
-  }
-  const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
-  auto socket = serve(
-      commands,
-      {.path = options.socket, .kind = "run", .wanted = !options.no_socket, .needed = on_robot});
-  if (!socket) return refuse(socket.error());
-  if (*server != nullptr && *socket == nullptr && e.remote.trust != runtime::RemoteTrust::kDomain) {
-    return refuse(fail("without a control socket no process can be admitted to this robot",
-                       "leave out --no-socket; or [remote] trust = \"domain\" admits everybody")
-                      .error());
-  }
-  const auto services = open_services(dds->get(), commands, e.remote, server->get(), admission);
-  if (!services) return refuse(services.error());
-  rt::install_stop_signals();
-  rt::install_emergency_signal();
-  std::optional<rt::NoCpuSleep> awake;
-  if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
-  if (*dds != nullptr) (*dds)->start(cycle);
-  auto guard = LoopGuard::open(c, cycle);
-  if (!guard) return refuse(guard.error());
-  LoopThread loop(cycle, e.thread);
-  watch(cycle, loop, c, **guard, recorder.get(), out, options.quiet);
-  if ((*guard)->gave_up()) end_without_loop(**guard, options, c, recorder.get(), *socket);
-  loop.join();
-  guard->reset();
-  if (*server != nullptr) (*server)->close();
-  if (!loop.report().complete()) fmt::print(stderr, "note: {}\n", loop.report().to_string());
 
-  RunSummary summary{c, cycle, loop.wall_s(), std::nullopt, std::nullopt, {}, {}};
-  summary.server = server->get();
-  if (*dds != nullptr) summary.dds = (*dds)->finish();
-  if (*services != nullptr) summary.dds->services = (*services)->counts();
-  if (recorder != nullptr) summary.log = recorder->close();
-  if (c.frames != nullptr) summary.frames = c.frames->close();
-  summary.faults = fault_texts(cycle, summary.log);
-  if (!options.quiet) {
-    fmt::print(out, "\n");
-    summary.print(out);
-  }
-  if (c.master != nullptr) {
-    for (const std::string& warning : c.master->warnings()) {
-      fmt::print(stderr, "warning: {}\n", warning);
+ private:
+  [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
+
+  /// DDS, the log, and the door for an owner over DDS.
+  Status open_outputs() {
+    if (c_.sim != nullptr && experiment().sim.ground_truth) truth_ = &c_.sim->truth();
+    auto dds = DdsRun::open(c_, options_.serves ? "tandem_serve" : "tandem_run", truth_);
+    if (!dds) return std::unexpected(dds.error());
+    dds_ = std::move(*dds);
+    if (!options_.no_log) {
+      const std::string& asked = options_.log_folder;
+      auto recorder = open_log(c_, asked.empty() ? experiment().log.folder : asked);
+      if (!recorder) return std::unexpected(recorder.error());
+      recorder_ = std::move(*recorder);
     }
+    auto server = open_server(c_, dds_.get(), options_.once, admission_);
+    if (!server) return std::unexpected(server.error());
+    server_ = std::move(*server);
+    return {};
   }
-  for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
-  add_report(options, summary, out);
-  if (const Status traced = add_trace(options, summary, out); !traced)
-    return refuse(traced.error());
-  if (const Status written = write_json(options.json, summary.json()); !written)
-    return refuse(written.error());
-  return summary.faults.empty() ? Exit::kDone : Exit::kFault;
-}
+
+  void make_cycle() {
+    const runtime::CycleConfig config = cycle_config(c_, options_);
+    cycle_.emplace(runtime::CycleParts{.robot = experiment().robot,
+                                       .backend = *c_.backend,
+                                       .controllers = *c_.controllers,
+                                       .clock = clock_,
+                                       .recorder = recorder_.get(),
+                                       .truth = truth_,
+                                       .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
+                                       .owner = {server_.get(), c_.owner.get(), c_.owner_slot}},
+                   config);
+    if (server_ != nullptr) tell_faults(*server_, *cycle_);
+  }
+
+  void announce() const {
+    if (options_.quiet) return;
+    const runtime::Experiment& e = experiment();
+    fmt::print(out_, "{}: {}, {} at {:.3g} kHz, {}{}\n", e.robot.name,
+               counted(e.robot.joints.size(), "joint"), length_text(e),
+               1e6 / static_cast<double>(e.loop.period_ns), options_.serves ? served_text(e) : "",
+               pace_text(c_));
+  }
+
+  /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
+  Status open_inputs() {
+    const runtime::Experiment& e = experiment();
+    add_run_commands(commands_, *cycle_, e.robot, slides_of(c_.tree));
+    if (dds_ != nullptr) admission_.add_to(commands_);
+    if (c_.sim != nullptr) {
+      add_inject(commands_, e.robot, e.loop.period_ns, [this](const sim::Fault& fault) -> Status {
+        if (fault.kind == hal::FaultKind::kBoardDuplicate) return injected(Code::kOutOfRange);
+        return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
+      });
+    }
+    const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
+    auto socket = serve(commands_, {.path = options_.socket,
+                                    .kind = "run",
+                                    .wanted = !options_.no_socket,
+                                    .needed = on_robot});
+    if (!socket) return std::unexpected(socket.error());
+    socket_ = std::move(*socket);
+    if (server_ != nullptr && socket_ == nullptr &&
+        e.remote.trust != runtime::RemoteTrust::kDomain) {
+      return fail("without a control socket no process can be admitted to this robot",
+                  "leave out --no-socket; or [remote] trust = \"domain\" admits everybody");
+    }
+    auto services = open_services(dds_.get(), commands_, e.remote, server_.get(), admission_);
+    if (!services) return std::unexpected(services.error());
+    services_ = std::move(*services);
+    return {};
+  }
+
+  /// The run itself, from the first cycle to the last. Answers the seconds that it took.
+  Result<double> loop() {
+    const runtime::Experiment& e = experiment();
+    rt::install_stop_signals();
+    rt::install_emergency_signal();
+    std::optional<rt::NoCpuSleep> awake;
+    if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
+    if (dds_ != nullptr) dds_->start(*cycle_);
+    auto guard = LoopGuard::open(c_, *cycle_);
+    if (!guard) return std::unexpected(guard.error());
+    LoopThread thread(*cycle_, e.thread);
+    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, options_.quiet);
+    if ((*guard)->gave_up()) end_without_loop(**guard);
+    thread.join();
+    guard->reset();
+    if (server_ != nullptr) server_->close();
+    if (!thread.report().complete()) {
+      fmt::print(stderr, "note: {}\n", thread.report().to_string());
+    }
+    return thread.wall_s();
+  }
+
+  /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
+  /// stays.
+  [[noreturn]] void end_without_loop(const LoopGuard& guard) {
+    const std::string fault = "the loop hung " + guard.where() + " and did not come back";
+    std::string log;
+    if (recorder_ != nullptr) log = recorder_->close({{"ended", fault}}).path;
+    if (c_.frames != nullptr) (void)c_.frames->close();
+    remember_error({.message = fault, .hint = {}, .file = {}, .key = {}});
+    write_failure(options_.json);
+    socket_.reset();
+    fmt::print(stderr, "fault: {}{}\n", fault, log.empty() ? "" : "; the log up to then is " + log);
+    std::fflush(nullptr);
+    ::_exit(static_cast<int>(Exit::kFault));
+  }
+
+  /// Closes what the loop wrote to, and tells what the run amounts to.
+  Exit finish(double wall_s) {
+    RunSummary summary{c_, *cycle_, wall_s, std::nullopt, std::nullopt, {}, {}};
+    summary.server = server_.get();
+    if (dds_ != nullptr) summary.dds = dds_->finish();
+    if (services_ != nullptr) summary.dds->services = services_->counts();
+    if (recorder_ != nullptr) summary.log = recorder_->close();
+    if (c_.frames != nullptr) summary.frames = c_.frames->close();
+    summary.faults = fault_texts(*cycle_, summary.log);
+    if (!options_.quiet) {
+      fmt::print(out_, "\n");
+      summary.print(out_);
+    }
+    if (c_.master != nullptr) {
+      for (const std::string& warning : c_.master->warnings()) {
+        fmt::print(stderr, "warning: {}\n", warning);
+      }
+    }
+    for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
+    add_report(options_, summary, out_);
+    if (const Status traced = add_trace(options_, summary, out_); !traced)
+      return refuse(traced.error());
+    if (const Status written = write_json(options_.json, summary.json()); !written)
+      return refuse(written.error());
+    return summary.faults.empty() ? Exit::kDone : Exit::kFault;
+  }
+
+  Composition& c_;
+  const RunOptions& options_;
+  std::FILE* out_;
+  const hal::TruthImage* truth_ = nullptr;
+  std::unique_ptr<DdsRun> dds_;
+  std::unique_ptr<log::Recorder> recorder_;
+  DdsAdmission admission_;
+  std::unique_ptr<remote::Server> server_;
+  rt::WallClock clock_;
+  std::optional<runtime::RobotCycle> cycle_;
+  ControlRegistry commands_;
+  std::unique_ptr<ControlSocket> socket_;
+  std::unique_ptr<DdsServices> services_;
+};
 
 /// What is simulated is then not quite what the description says. `tandem check` has the details.
 void warn_of_inertias(const runtime::Experiment& e) {
@@ -318,7 +378,7 @@ Exit run_command(const RunOptions& options) {
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
     return refuse(errors);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  return run(**composition, options);
+  return Session(**composition, options).run();
 }
 
 Exit serve_command(const ServeOptions& options) {

@@ -143,6 +143,72 @@ void add_limited(const RunSummary& s, Facts& facts) {
                         joints > 1 ? fmt::format(", {} more joints", joints - 1) : ""));
 }
 
+/// What the robot did: on the ground, and its floating base.
+void add_motion_facts(const RunSummary& summary, Facts& facts) {
+  if (const auto ground =
+          summary.cycle.statistics().ground(weight_N(*summary.composition.kernels))) {
+    facts.add("force on the ground",
+              fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",
+                          ground->mean_vertical_force_N, ground->weight_N,
+                          100.0 * (ground->mean_vertical_force_N / ground->weight_N - 1.0)));
+    facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
+  }
+  if (const auto base = summary.cycle.statistics().base()) {
+    facts.add("base height",
+              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
+                          base->max_height_m, base->final_tilt_rad * kDegrees));
+  }
+}
+
+/// How long cycles took, and whether they were in time.
+void add_timing_facts(const RunSummary& summary, Facts& facts) {
+  const rt::LoopStatistics& loop = summary.cycle.loop();
+  const bool wall_clock = summary.composition.experiment.loop.pacing != rt::Pacing::kSimulated;
+  if (wall_clock) {
+    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", summary.wall_s,
+                                 counted(summary.cycle.running_cycles(), "cycle"), loop.skipped));
+  } else {
+    facts.add(
+        "simulated",
+        fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", summary.sim_s(), summary.wall_s,
+                    summary.wall_s > 0.0 ? summary.sim_s() / summary.wall_s : 0.0));
+  }
+  facts.add("cycle p50/p99/p99.9/max", microseconds(summary.cycle.loop().work.percentiles()));
+  if (summary.composition.backend->waits_for_bus()) {
+    facts.add("bus p50/p99/p99.9/max", microseconds(summary.cycle.loop().bus.percentiles()));
+  }
+  const bool woken = loop.wakeup.count() > 0;  // not by a server's cycles
+  if (woken) facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
+  if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
+}
+
+/// What the run wrote and published.
+void add_output_facts(const RunSummary& summary, Facts& facts) {
+  if (summary.log) {
+    facts.add("log", fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", summary.log->path,
+                                 summary.log->messages, summary.log->dropped,
+                                 static_cast<double>(summary.log->bytes) * 1e-6));
+  }
+  if (summary.dds) {
+    facts.add("DDS", fmt::format("domain {}: {} samples, {} refused; {} cycles dropped",
+                                 summary.dds->domain, summary.dds->counts.sent,
+                                 summary.dds->counts.refused, summary.dds->counts.dropped));
+    if (summary.dds->services.requests > 0) {
+      facts.add("requests over DDS", fmt::format("{}, {} dropped", summary.dds->services.requests,
+                                                 summary.dds->services.dropped));
+    }
+  }
+}
+
+/// The frames that were recorded.
+void add_frame_facts(const RunSummary& summary, Facts& facts) {
+  if (summary.frames) {
+    const std::string trouble = summary.frames->error.empty() ? "" : "; " + summary.frames->error;
+    facts.add("frames", fmt::format("{} ({} frames, {} lost{})", summary.frames->path,
+                                    summary.frames->frames, summary.frames->lost, trouble));
+  }
+}
+
 }  // namespace
 
 double RunSummary::sim_s() const {
@@ -205,56 +271,13 @@ void RunSummary::print(std::FILE* out) const {
   }
   Facts facts;
   add_limited(*this, facts);
-  if (const auto ground = cycle.statistics().ground(weight_N(*composition.kernels))) {
-    facts.add("force on the ground",
-              fmt::format("{:.2f} N on average, weight {:.2f} N ({:+.3f} %)",
-                          ground->mean_vertical_force_N, ground->weight_N,
-                          100.0 * (ground->mean_vertical_force_N / ground->weight_N - 1.0)));
-    facts.add("feet slip", fmt::format("{:.3f} mm at most", ground->max_foot_slip_m * 1e3));
-  }
-  if (const auto base = cycle.statistics().base()) {
-    facts.add("base height",
-              fmt::format("{:.4f} to {:.4f} m, tilted {:.3f} deg at the end", base->min_height_m,
-                          base->max_height_m, base->final_tilt_rad * kDegrees));
-  }
-  const rt::LoopStatistics& loop = cycle.loop();
-  const bool wall_clock = composition.experiment.loop.pacing != rt::Pacing::kSimulated;
-  if (wall_clock) {
-    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", wall_s,
-                                 counted(cycle.running_cycles(), "cycle"), loop.skipped));
-  } else {
-    facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", sim_s(), wall_s,
-                                       wall_s > 0.0 ? sim_s() / wall_s : 0.0));
-  }
-  facts.add("cycle p50/p99/p99.9/max", microseconds(cycle.loop().work.percentiles()));
-  if (composition.backend->waits_for_bus()) {
-    facts.add("bus p50/p99/p99.9/max", microseconds(cycle.loop().bus.percentiles()));
-  }
-  const bool woken = loop.wakeup.count() > 0;  // not by a server's cycles
-  if (woken) facts.add("wake-up p50/p99/p99.9/max", microseconds(loop.wakeup.percentiles()));
-  if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
+  add_motion_facts(*this, facts);
+  add_timing_facts(*this, facts);
   add_remote_facts(server, composition.remote, facts);
   facts.add("kernels", composition.kernels->variant);
-  if (log) {
-    facts.add("log",
-              fmt::format("{} ({} messages, {} dropped, {:.1f} MB)", log->path, log->messages,
-                          log->dropped, static_cast<double>(log->bytes) * 1e-6));
-  }
-  if (dds) {
-    facts.add("DDS",
-              fmt::format("domain {}: {} samples, {} refused; {} cycles dropped", dds->domain,
-                          dds->counts.sent, dds->counts.refused, dds->counts.dropped));
-    if (dds->services.requests > 0) {
-      facts.add("requests over DDS",
-                fmt::format("{}, {} dropped", dds->services.requests, dds->services.dropped));
-    }
-  }
+  add_output_facts(*this, facts);
   add_bus_facts(composition.can_buses(), facts);
-  if (frames) {
-    const std::string trouble = frames->error.empty() ? "" : "; " + frames->error;
-    facts.add("frames", fmt::format("{} ({} frames, {} lost{})", frames->path, frames->frames,
-                                    frames->lost, trouble));
-  }
+  add_frame_facts(*this, facts);
   facts.print(out);
 }
 
