@@ -1,3 +1,4 @@
+// The program `tandem`: reads its command line and calls the command.
 #include <string_view>
 
 #include "apps/clients/commands.hpp"

@@ -1,3 +1,4 @@
+// What stands in for the comparison with Pinocchio where it is not installed.
 #include <benchmark/benchmark.h>
 
 #include "bench/kernels_bench.hpp"

@@ -1,3 +1,4 @@
+// Pinocchio's dynamics of the same robots, timed as ours are.
 #include <benchmark/benchmark.h>
 
 #include <memory>

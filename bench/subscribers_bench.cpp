@@ -175,29 +175,53 @@ void print(const TimedTap& tap) {
       p999[1] / p999[0], p999[2] / p999[0], tap.blocks.size() / kKinds.size());
 }
 
+/// Its topics are those of a run.
+Result<std::unique_ptr<dds::Publisher>> make_publisher(const Rig& rig, const sim::SimRobot& robot,
+                                                       dds::Participant& node) {
+  const runtime::Experiment& e = rig.experiment;
+  const auto description = runtime::read_robot(e.robot_file);
+  if (!description) return std::unexpected(description.error().front());
+  return dds::Publisher::create(node, {.robot = e.robot,
+                                       .tree = description->description.tree,
+                                       .urdf = {},
+                                       .hal = "sim",
+                                       .version = "bench",
+                                       .description_hash = rig.kernels->description_hash,
+                                       .period_ns = e.loop.period_ns,
+                                       .simulated_time = true,
+                                       .truth = &robot.truth(),
+                                       .run = 1});
+}
+
+/// Steps through all blocks on a thread of its own; the process `subscribers` reads which is on.
+void step_through(runtime::RobotCycle& cycle, const TimedTap& tap, int cpu,
+                  std::FILE* subscribers) {
+  std::thread loop([&] {
+    rt::ThreadConfig thread;
+    thread.cpu = cpu;
+    const rt::ThreadReport report = rt::set_up_thread(thread);
+    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
+    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
+    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
+      if (k % tap.cycles_per_block != 0) continue;
+      std::fputc(kKinds[k / tap.cycles_per_block % kKinds.size()], subscribers);
+      std::fflush(subscribers);
+    }
+  });
+  loop.join();
+}
+
 int run(const Options& options, const char* program) {
   auto rig = make_rig(options.experiment, options.library);
   if (!rig) return fail_with(rig.error());
   runtime::Experiment& e = (*rig)->experiment;
-  const auto description = runtime::read_robot(e.robot_file);
-  if (!description) return fail_with(description.error().front());
   auto robot = sim::SimRobot::create(e.robot, (*rig)->kernels.get(), e.sim_robot_config());
   if (!robot) return fail_with(robot.error());
   const auto domain = dds::Domain::open(config_of(options.domain));
   if (!domain) return fail_with(domain.error());
   const auto node = dds::Participant::open(*domain, "subscribers_bench");
   if (!node) return fail_with(node.error());
-  auto publisher =
-      dds::Publisher::create(**node, {.robot = e.robot,
-                                      .tree = description->description.tree,
-                                      .urdf = {},
-                                      .hal = "sim",
-                                      .version = "bench",
-                                      .description_hash = (*rig)->kernels->description_hash,
-                                      .period_ns = e.loop.period_ns,
-                                      .simulated_time = true,
-                                      .truth = &(*robot)->truth(),
-                                      .run = 1});
+  const auto publisher = make_publisher(**rig, **robot, **node);
   if (!publisher) return fail_with(publisher.error());
 
   TimedTap tap(**publisher);
@@ -218,28 +242,16 @@ int run(const Options& options, const char* program) {
                              .observer = &tap},
                             config);
   const std::string others = fmt::format("{} --subscribers --domain {}", program, options.domain);
-  std::FILE* words = ::popen(others.c_str(), "w");
-  if (words == nullptr) return fail_with(fail("cannot start the subscribers").error());
+  std::FILE* subscribers = ::popen(others.c_str(), "w");
+  if (subscribers == nullptr) return fail_with(fail("cannot start the subscribers").error());
   fmt::print("{}{} blocks of {:g} s of each kind, {} at 1 kHz\n", machine_text(), options.blocks,
              options.seconds, e.robot.name);
   (*publisher)
       ->start({.version = [] { return std::uint64_t{0}; },
                .faults = [] { return std::vector<dds::FaultEntry>(); },
                .lost = [] { return std::uint64_t{0}; }});
-  std::thread loop([&] {
-    rt::ThreadConfig thread;
-    thread.cpu = options.cpu;
-    const rt::ThreadReport report = rt::set_up_thread(thread);
-    if (!report.complete()) fmt::print(stderr, "note: {}\n", report.to_string());
-    const std::uint64_t all = tap.cycles_per_block * tap.blocks.size();
-    for (std::uint64_t k = 0; k < all && cycle.step(); ++k) {
-      if (k % tap.cycles_per_block != 0) continue;
-      std::fputc(kKinds[k / tap.cycles_per_block % kKinds.size()], words);
-      std::fflush(words);
-    }
-  });
-  loop.join();
-  ::pclose(words);
+  step_through(cycle, tap, options.cpu, subscribers);
+  ::pclose(subscribers);
   const dds::PublishCounts counts = (*publisher)->stop();
   print(tap);
   fmt::print("published {}, refused {}, dropped cycles {}\n", counts.sent, counts.refused,

@@ -26,7 +26,7 @@ enum class DriveState : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(DriveState state) noexcept;
 
-/// The state that a statusword tells; bits 4, 7 to 15 play no part. A pattern of no state (none
+/// The state in a statusword; bits 4, 7 to 15 play no part. A pattern of no state (none
 /// is sent by a conforming drive) counts as kNotReadyToSwitchOn.
 [[nodiscard]] DriveState drive_state(std::uint16_t statusword) noexcept TANDEM_RT;
 

@@ -32,7 +32,7 @@ struct NodeConfig {
   std::string_view name;  ///< 1008; outlives the node
 };
 
-/// What the node asks its application to do, or tells it. Bits of a set.
+/// What the node asks its application to do, or lets it know. Bits of a set.
 enum NodeEvent : std::uint16_t {
   kEventSync = 1,                 ///< a SYNC came: sample, then call transmit_synchronous()
   kEventRpdo = 2,                 ///< an RPDO took effect: applied_rpdos() says which

@@ -48,7 +48,7 @@ struct ObjectRange {
 
 struct ObjectEntry;
 
-/// Asked before and told after a write by SDO; for objects that are more than a variable.
+/// Called before and after a write by SDO; for objects that are more than a variable.
 class ObjectOwner {
  public:
   /// `bytes` has the entry's size and lies in its range. kNone accepts.

@@ -158,7 +158,7 @@ enum LimitSub : std::uint8_t {
 };
 /// Sub-indices of object::kI2t.
 enum I2tSub : std::uint8_t {
-  kContinuousCurrent = 1,  ///< [A] that can be borne for ever
+  kContinuousCurrent = 1,  ///< [A] that the motor can carry for ever
   kThermalTime,            ///< [s] time constant of the winding
 };
 /// Sub-indices of object::kOscillation.

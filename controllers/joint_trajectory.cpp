@@ -73,7 +73,7 @@ class JointTrajectory : public Controller {
   void archive(Archive& ar) override { ar(start_ns_, segment_, points_); }
 
  private:
-  /// What is mostly wrong with every way-point when it is with one: told of the first alone.
+  /// Mostly wrong with every way-point when it is with one, so only the first is reported.
   class Mistake {
    public:
     void add(const TomlTable& table, std::string message, std::string hint) {

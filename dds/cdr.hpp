@@ -32,7 +32,7 @@ struct Member {
 ///
 /// A request or response begins with the members "request_guid" and "request_sequence".
 /// @param definition  resolved
-/// @param bytes  with the four bytes in front that tell the encoding, as dds_takecdr gives them
+/// @param bytes  with the four bytes in front that name the encoding, as dds_takecdr gives them
 /// Errors: another encoding than plain CDR (XCDR1), bytes too few or too many, a length beyond
 /// what is there or allowed, a bool that is neither 0 nor 1, a string that does not end.
 [[nodiscard]] Result<Value> decode(const MessageDefinition& definition,

@@ -1,4 +1,4 @@
-// Who writes and reads which topic in the domain, as discovery tells it.
+// Who writes and reads which topic in the domain, by discovery.
 // Layer: dds.  Thread: any, non-RT.
 #pragma once
 

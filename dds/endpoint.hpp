@@ -70,7 +70,7 @@ class Reader {
   }
 
   /// Calls `use(sample, info)` for every sample that waits, the oldest first. Nothing in it has
-  /// been checked but that it is of the type. Samples that only tell of a writer's end are left
+  /// been checked but that it is of the type. Samples that only announce a writer's end are left
   /// out. @return how many there were.
   template <class Use>
   std::size_t take(Use use) {

@@ -18,7 +18,7 @@
 
 namespace tandem::dds {
 
-/// Who tells the run's faults; asked on the publisher's thread.
+/// Source of the run's faults; called on the publisher's thread.
 struct FaultSource {
   std::function<std::uint64_t()>
       version;  ///< 0: there are none; another one: some have come or gone
@@ -92,7 +92,7 @@ class Publisher final : public hal::CycleObserver {
   FaultSource fault_source_;
   std::uint64_t fault_version_ = 0;
   std::vector<FaultEntry> faults_;
-  std::int64_t clock_ns_ = 0;               // that `clock` tells next
+  std::int64_t clock_ns_ = 0;               // that `clock` publishes next
   std::atomic<std::int64_t> newest_ns_{0};  // of take()'s last cycle
   std::chrono::steady_clock::time_point clock_due_, offset_due_;
   std::int64_t wall_offset_ns_ = 0;  // the wall clock less the loop's

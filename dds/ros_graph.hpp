@@ -1,6 +1,6 @@
-// What ROS 2's tools list of this process: its node with the endpoints that are the node's, told on
-// the topic ros_discovery_info as ROS 2's Cyclone DDS middleware tells it.
-// Layer: dds.  Thread: any, non-RT.
+// What ROS 2's tools list of this process: its node with the endpoints that are the node's,
+// published on the topic ros_discovery_info as ROS 2's Cyclone DDS middleware does. Layer: dds.
+// Thread: any, non-RT.
 #pragma once
 
 #include <memory>
@@ -24,14 +24,14 @@ using Gid = rmw_dds_common_msg_dds__Gid_;
 
 class RosGraph {
  public:
-  /// Tells of the node, which has no endpoint yet.
+  /// Announces the node, which has no endpoint yet.
   /// @param name_space  "/", "/left"
   /// Errors: a name that ROS 2 has no nodes of; what Cyclone DDS refuses.
   [[nodiscard]] static Result<std::unique_ptr<RosGraph>> open(dds_entity_t participant,
                                                               std::string name_space,
                                                               std::string node);
 
-  /// Tells of one endpoint more, or less.
+  /// Announces one endpoint more, or less.
   void add(EndpointKind kind, const Gid& gid);
   void remove(EndpointKind kind, const Gid& gid);
 

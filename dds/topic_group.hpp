@@ -18,7 +18,7 @@
 
 namespace tandem::dds {
 
-/// A fault of the run as the topics tell it.
+/// A fault of the run as it is published.
 struct FaultEntry {
   std::uint64_t cycle = 0;
   double time_s = 0.0;
@@ -39,7 +39,7 @@ struct RunDescription {
   std::string version{};    ///< of Tandem
   std::string description_hash{};
   std::int64_t period_ns = 1'000'000;
-  bool simulated_time = false;  ///< stamps are time_ns and `clock` tells them; else wall clock
+  bool simulated_time = false;  ///< stamps are time_ns and `clock` publishes them; else wall clock
   const hal::TruthImage* truth = nullptr;  ///< the cycles'; null: they bring none
   std::uint64_t run = 0;                   ///< drawn at its start
 };

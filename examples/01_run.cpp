@@ -1,4 +1,4 @@
-// 01: runs a simulated robot with its controllers and tells its first joint's way. From build/…:
+// 01: runs a simulated robot with its controllers and prints its first joint's path. From build/…:
 //   bin/example_01_run ../../config/double_pendulum/trajectory.toml lib/models
 #include <cstdio>
 #include <cstdlib>

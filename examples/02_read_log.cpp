@@ -1,4 +1,4 @@
-// 02: reads a run's log and tells how well each joint followed its reference.
+// 02: reads a run's log and prints how well each joint followed its reference.
 //   build/release/bin/example_02_read_log runs/…/log.mcap
 #include <cmath>
 #include <cstdio>

@@ -16,7 +16,7 @@
 
 namespace tandem::firmware {
 
-/// What supervise() tells the board.
+/// What supervise() reports to the board.
 struct AxisEvents {
   canopen::ErrorCode raised = canopen::ErrorCode::kNone;  ///< a fault was latched just now
   bool reset = false;                                     ///< a fault was cleared just now

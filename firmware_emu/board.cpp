@@ -227,7 +227,7 @@ ErrorCode Board::connection(std::size_t axis) const noexcept {
 
 void Board::supervise(std::size_t axis) noexcept {
   const AxisEvents events = axes_[axis]->supervise(connection(axis), heartbeat_lost_);
-  // The node itself has told of a lost heartbeat.
+  // The node itself has reported a lost heartbeat.
   if (events.raised != ErrorCode::kNone && events.raised != ErrorCode::kHeartbeatLost) {
     node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis), outbox_);
   }

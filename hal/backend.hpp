@@ -90,8 +90,8 @@ class Backend {
   /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
 
-  /// What the joints are told in a cycle that calls shut_down(), before that call. For a robot that
-  /// another loop drives: it carries it out.
+  /// What the joints are commanded in a cycle that calls shut_down(), before that call. For a robot
+  /// that another loop drives: it carries it out.
   virtual void last_command(const CommandImage& /*command*/) noexcept TANDEM_RT {}
   /// The command that the robot follows before it follows this loop's: that of the loop that owns
   /// it, to go on from. False: there is no such loop.
@@ -102,7 +102,7 @@ class Backend {
   [[nodiscard]] virtual std::uint64_t missed() const noexcept TANDEM_RT { return 0; }
 
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
-  /// that is not in this process tells nothing.
+  /// that is not in this process reports nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend

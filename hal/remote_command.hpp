@@ -38,7 +38,7 @@ struct RemoteCommand {
   bool live = false;                  ///< `command` is to be followed
   bool done = false;                  ///< it gives the robot back, with `command` as its last
   bool ends_run = false;              ///< with `done`: nobody else is waited for
-  OwnerLoss loss = OwnerLoss::kNone;  ///< told once
+  OwnerLoss loss = OwnerLoss::kNone;  ///< reported once
   StopCategory on_loss = StopCategory::kWarn;  ///< with `loss`: kWarn holds every joint
   StopCategory stop = StopCategory::kWarn;     ///< asked for since the last exchange()
   bool reset = false;                          ///< asked for since the last exchange()

@@ -15,7 +15,7 @@ enum class StopCategory : std::uint8_t {
   /// category 1: a protective stop (ISO 10218), which a standing robot survives.
   kCategory2 = 2,
   kHold = 3,  ///< every axis stays under control where it is
-  kWarn = 4,  ///< nothing is stopped: it is told
+  kWarn = 4,  ///< nothing is stopped: it is reported
 };
 
 /// Whether it keeps drives from following commands at once. In category 2 they follow the retreat.
@@ -25,7 +25,7 @@ enum class StopCategory : std::uint8_t {
 
 /// Why a joint is in fault.
 enum class FaultCause : std::uint8_t {
-  kDrive,           ///< the drive itself: its error code tells
+  kDrive,           ///< the drive itself: see its error code
   kEmergencyInput,  ///< the emergency stop input of its board
   kNotEnabled,      ///< it was not enabled in time
   kLeftEnabled,     ///< it was disabled, and not by us

@@ -1,6 +1,6 @@
 // A tree prepared for the algorithms: every body's frame turned and shifted so that its joint
 // moves about (or along) its own z and constant transforms are sparse, and constant inertias
-// regrouped so that each body keeps only what its joint can tell apart.
+// regrouped so that each body keeps only what its joint can distinguish.
 // Layer: model.  Thread: non-RT to build; immutable afterwards.
 #pragma once
 

@@ -1,6 +1,5 @@
-// A number and how far rounding may have moved it: tells a small constant that matters from the
-// noise that is left where large ones cancelled.
-// Layer: model.  Thread: any.
+// A number and how far rounding may have moved it: distinguishes a small constant that matters from
+// the noise that is left where large ones cancelled. Layer: model.  Thread: any.
 #pragma once
 
 #include <cmath>

@@ -153,7 +153,7 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   return faults;
 }
 
-/// When controllers ran, as the events tell: after bring-up and `settle_s`.
+/// When controllers ran, by the events: after bring-up and `settle_s`.
 Window window_of(const std::vector<log::EventText>& events, double settle_s) {
   Window window;
   constexpr double kHalfNanosecond = 0.5e-9;

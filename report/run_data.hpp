@@ -34,7 +34,7 @@ struct FootFigures {
   double slip_m = 0.0;  ///< farthest, level, from where it last touched down
 };
 
-/// What stopped a run, as its log's events tell.
+/// What stopped a run, by its log's events.
 struct RunFault {
   double time_s = 0.0;  ///< since the first SYNC
   std::string joint;    ///< empty: nobody's
@@ -85,7 +85,7 @@ struct RunData {
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
   /// Whether a joint (image) is prismatic: its columns are m, m/s and N then.
   [[nodiscard]] bool slides(std::size_t joint) const;
-  /// Whether the log tells where the base was and what the ground did.
+  /// Whether the log has where the base was and what the ground did.
   [[nodiscard]] bool truth() const { return !base.empty(); }
   /// Joints that were under position control, the worst first.
   [[nodiscard]] std::vector<Tracking> tracking() const;

@@ -69,7 +69,7 @@ class ClockControl {
     double rate;
     bool stood;  ///< the loop has been kept
   };
-  /// Whether attend() has anything to tell. @rt one relaxed load.
+  /// Whether attend() has anything to do. @rt one relaxed load.
   [[nodiscard]] bool changed() const noexcept TANDEM_RT { return gated_ || bell_->peek() != seen_; }
   /// Blocks while time is paused and no step is pending.
   /// @param cycle    that would begin next

@@ -26,7 +26,7 @@ void install_stop_signals() {
   sigemptyset(&action.sa_mask);
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
-  // The terminal has gone; nohup says beforehand that this shall mean nothing.
+  // The terminal has gone; under nohup it is to be ignored.
   struct sigaction former {};
   ::sigaction(SIGHUP, nullptr, &former);
   if (former.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);

@@ -27,8 +27,8 @@ class ClaimGuard {
 
   /// Gives everything that was not the controller's to write its value of remember().
   /// @param claimed  by joint: not 0 where one of `claims` is for it
-  /// @param told     by joint: not 0 where it was told before
-  /// @return the first joint of which that was necessary, and was not told; -1: none
+  /// @param told     by joint: not 0 where it was reported before
+  /// @return the first joint of which that was necessary, and was not reported; -1: none
   [[nodiscard]] std::int32_t take_back(std::span<const ControllerSetup::Claim> claims,
                                        std::span<const std::uint8_t> claimed,
                                        std::span<const std::uint8_t> told,

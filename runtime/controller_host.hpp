@@ -41,7 +41,7 @@ struct HostedController {
   std::shared_ptr<Controller> controller;  ///< a plugin's shares its library's life
   std::vector<ControllerSetup::Claim> claims;
   std::vector<std::uint8_t> claimed;  ///< by joint
-  std::vector<std::uint8_t> strayed;  ///< by joint: something was taken back, and told
+  std::vector<std::uint8_t> strayed;  ///< by joint: something was taken back, and reported
   std::uint32_t id = 0;               ///< of its name, for the fault log
   bool of_experiment = true;          ///< not loaded while the run went on
   bool leaves = false;                ///< the asking side's: the loop was asked to let it go

@@ -16,7 +16,7 @@
 
 namespace tandem::runtime {
 
-/// Tells of each fault once: again when a reset has found it gone, or a sensor was well meanwhile.
+/// Reports each fault once: again when a reset has found it gone, or a sensor was well meanwhile.
 class FaultWatch {
  public:
   /// Both outlive it.
@@ -39,11 +39,11 @@ class FaultWatch {
   /// Controllers start: flight is counted from here.
   void controllers_start() noexcept TANDEM_RT { fall_.begin(); }
 
-  /// Some joint's fault has been told of, and no reset has cleared it.
+  /// Some joint's fault has been reported, and no reset has cleared it.
   [[nodiscard]] bool joint_in_fault() const noexcept TANDEM_RT { return joint_in_fault_; }
-  /// A reset is done: what is still there (its category is "warn") is not told of again.
+  /// A reset is done: what is still there (its category is "warn") is not reported again.
   void reset(const hal::StateImage& state) noexcept TANDEM_RT;
-  /// Whether what `record` tells of is still there. Only joints and sensors can be looked at.
+  /// Whether the cause of `record` is still there. Only joints and sensors can be looked at.
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
   [[nodiscard]] std::size_t joints() const noexcept { return joint_told_.size(); }

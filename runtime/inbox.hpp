@@ -98,7 +98,7 @@ class Inbox {
     bool by_watchdog = false;      ///< an emergency stop, of the robot's category
     std::int32_t controller = -1;  ///< with it: the loop hung in this one; -1: in none
   };
-  /// Whether take_urgent() has something to tell.
+  /// Whether take_urgent() has something.
   [[nodiscard]] bool is_urgent() const noexcept {
     return (urgent_.load(std::memory_order_relaxed) & kFlags) != 0;
   }
@@ -117,7 +117,7 @@ class Inbox {
             .by_watchdog = (asked & kWatchdog) != 0,
             .controller = hung_in_.load(std::memory_order_relaxed)};
   }
-  /// When the commands of `cycle` are out: what take_urgent() told of is carried out.
+  /// When the commands of `cycle` are out: what take_urgent() gave is carried out.
   void confirm(std::uint64_t cycle) noexcept TANDEM_RT {
     if (taken_ == confirmed_.load(std::memory_order_relaxed)) return;
     confirmed_cycle_.store(cycle, std::memory_order_relaxed);

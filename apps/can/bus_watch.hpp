@@ -1,4 +1,4 @@
-// Tells of buses that are not well while a process runs, and what has passed on them at its end.
+// Reports buses that are not well while a process runs, and what has passed on them at its end.
 // Layer: apps/can.  Thread: main, beside the one that the buses belong to.
 #pragma once
 

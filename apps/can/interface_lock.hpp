@@ -9,7 +9,7 @@
 
 namespace tandem::apps {
 
-/// An abstract Unix socket that bears the interface's name: there is one of a name in a network
+/// An abstract Unix socket with the interface's name: there is one of a name in a network
 /// namespace, as there is one interface, whoever asks. The kernel takes it away with the process,
 /// however that ends. Nobody is served there.
 class InterfaceLock {

@@ -1,3 +1,4 @@
+// `tandem ask`: puts a question to a running process and prints the answer.
 #include <fmt/core.h>
 
 #include "apps/clients/commands.hpp"

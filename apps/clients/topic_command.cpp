@@ -1,3 +1,4 @@
+// `tandem topic`: lists, prints and measures the topics of a DDS domain.
 #include <fmt/core.h>
 
 #include <chrono>

@@ -18,11 +18,11 @@ class TopicRate {
   /// @param window  the newest intervals that rate, min, max and deviation are of; at least 1
   explicit TopicRate(std::size_t window) : window_(window) {}
 
-  /// @param cycle  of the loop, where the sample tells it
+  /// @param cycle  of the loop, where the sample has it
   void arrived(std::int64_t time_ns, std::optional<std::uint64_t> cycle);
 
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
-  /// Samples that were sent but did not come, as the cycles' numbers tell; empty where there are
+  /// Samples that were sent but did not come, by the cycles' numbers; empty where there are
   /// none. Correct when the topic's rate is constant.
   [[nodiscard]] std::optional<std::uint64_t> lost() const;
 

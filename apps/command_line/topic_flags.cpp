@@ -1,3 +1,4 @@
+// The flags, arguments and help of `tandem topic`.
 #include "apps/command_line/command_flags.hpp"
 
 namespace tandem::apps {

@@ -42,7 +42,7 @@ void fill_clock(const Json& answer, dds::tandem_msgs::Clock_Response& reply,
 /// `sequence` gets the texts of answer["active"].
 void fill_active(const Json& answer, dds_sequence_string& sequence, dds::ReplyMemory& memory);
 
-/// What all replies have that tell whether something was done.
+/// Common to all replies that say whether something was done.
 template <class Response>
 void fill_done(const Json& answer, Response& reply, dds::ReplyMemory& memory) {
   reply.success = answer.value("ok", false);
@@ -51,7 +51,7 @@ void fill_done(const Json& answer, Response& reply, dds::ReplyMemory& memory) {
   reply.cycle = answer.value("cycle", std::uint64_t{0});
 }
 
-/// And of those that tell who is active then.
+/// And to those that say who is active then.
 template <class Response>
 void fill_switched(const Json& answer, Response& reply, dds::ReplyMemory& memory) {
   fill_done(answer, reply, memory);

@@ -65,7 +65,7 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
   return answer;
 }
 
-/// Category 2 is category 1 where no controller can retreat: the loop's own record tells.
+/// Category 2 is category 1 where no controller can retreat: the loop's own record says which.
 hal::StopCategory carried_out_category(const runtime::RobotCycle& cycle, std::uint64_t at_cycle,
                                        hal::StopCategory asked) {
   if (asked != hal::StopCategory::kCategory2) return asked;

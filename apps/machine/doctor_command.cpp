@@ -1,3 +1,4 @@
+// `tandem doctor`: prints what it finds of the machine, as a table or as JSON.
 #include <fmt/core.h>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// `tandem latency`: measures under each load and prints, draws and judges what came out.
 #include <fmt/core.h>
 
 #include <algorithm>

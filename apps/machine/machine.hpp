@@ -1,4 +1,4 @@
-// What the machine tells of itself: files of /proc and /sys, and `ip` for the network.
+// What the machine says of itself: files of /proc and /sys, and `ip` for the network.
 // Layer: apps/machine.  Thread: main.
 #pragma once
 

@@ -1,3 +1,4 @@
+// `tandem check`: all that can be said of a robot or an experiment before it moves.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -101,7 +102,7 @@ Diagnostics check_buses(const std::string& file, bool robot_only, std::FILE* out
   constexpr std::int64_t kPeriodNs = 1'000'000;
   if (!robot_only) {
     const auto experiment = runtime::read_experiment(file);
-    if (!experiment) return {};  // composing tells of it
+    if (!experiment) return {};  // composing reports it
     return show_buses(experiment->robot, experiment->loop.period_ns, out, json);
   }
   const auto robot = read_robot(file);

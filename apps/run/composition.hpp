@@ -42,7 +42,7 @@ struct Overrides {
   std::optional<int> domain = std::nullopt;  ///< of DDS
 };
 
-/// A controller as `check` tells of it.
+/// A controller as `check` lists it.
 struct ControllerNote {
   std::string name;
   std::string doc;        ///< its plugin's one line

@@ -1,3 +1,4 @@
+// `tandem emulate`: the simulated robot with emulated boards on CAN interfaces.
 #include <fmt/core.h>
 
 #include "apps/can/bus_watch.hpp"

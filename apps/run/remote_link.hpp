@@ -22,7 +22,7 @@ namespace tandem::apps {
                                                                   DdsRun* dds, bool once,
                                                                   const DdsAdmission& admission);
 
-/// What the server tells of the run's faults.
+/// What the server publishes of the run's faults.
 void tell_faults(remote::Server& server, const runtime::RobotCycle& cycle);
 
 // Results, of either end; null: there is none.

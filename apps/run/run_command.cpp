@@ -1,3 +1,4 @@
+// `tandem run` and `tandem serve`: a loop with its controllers, its log and who talks to it.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -292,7 +293,7 @@ class Session {
     ::_exit(static_cast<int>(Exit::kFault));
   }
 
-  /// Closes what the loop wrote to, and tells what the run amounts to.
+  /// Closes what the loop wrote to, and prints what the run amounts to.
   Exit finish(double wall_s) {
     RunSummary summary{c_, *cycle_, wall_s, std::nullopt, std::nullopt, {}, {}};
     summary.server = server_.get();

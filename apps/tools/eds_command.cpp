@@ -1,3 +1,4 @@
+// `tandem eds`: writes the data sheets of a robot's nodes.
 #include <fmt/format.h>
 
 #include <filesystem>

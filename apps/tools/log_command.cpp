@@ -1,3 +1,4 @@
+// `tandem log`: what a log holds, its columns as CSV, and how two logs differ.
 #include <fmt/core.h>
 
 #include <filesystem>

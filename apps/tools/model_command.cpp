@@ -1,3 +1,4 @@
+// `tandem model`: builds a robot's kernels, and shows what its description amounts to.
 #include <fmt/core.h>
 
 #include "apps/robot/kernel_store.hpp"

@@ -1,3 +1,4 @@
+// `tandem new`: the files of a robot from its URDF.
 #include <fmt/format.h>
 #include <unistd.h>
 

@@ -190,7 +190,8 @@ struct BoardConfig {
   int heartbeat_ms = 50;                       ///< both ways; time-out is three of them
   int command_timeout_cycles = 10;             ///< SYNCs without a command until the safe state
   int slow_pdo_every = 1;                      ///< motor velocity, current, … every n-th SYNC
-  // 1018, as the board has to tell it; without a value that of the emulated boards, or any serial
+  // 1018, as the board has to identify itself; without a value that of the emulated boards, or any
+  // serial
   std::optional<std::uint32_t> vendor_id, product_code;
   std::optional<std::uint32_t> revision;  ///< major << 16 | minor: that major, at least that minor
   std::optional<std::uint32_t> serial;

@@ -51,7 +51,7 @@ struct RawFeedback {
   void archive(Archive& ar);
 };
 
-/// What a drive is told, as on the wire.
+/// What a drive is commanded, as on the wire.
 struct RawCommand {
   std::int32_t target_position = 0;
   std::int32_t velocity_offset = 0;

@@ -33,7 +33,7 @@ struct BusStatistics {
   std::uint64_t send_refused = 0;  ///< frames that were lost because the queue or the bus was down
   std::uint64_t queue_full = 0;    ///< times that the transmit queue took less than was given
   std::uint64_t receive_lost = 0;  ///< frames that came faster than they were taken
-  std::uint64_t error_frames = 0;  ///< that the controller's driver told of
+  std::uint64_t error_frames = 0;  ///< that the controller's driver reported
   std::uint64_t ignored = 0;       ///< frames that no node of ours sends: 29-bit, remote, malformed
   std::uint64_t recoveries = 0;    ///< times that the bus became usable again
 };

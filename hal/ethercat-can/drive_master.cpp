@@ -19,7 +19,7 @@ namespace {
 
 /// A sensor has no time-out of its own in the configuration.
 constexpr int kSensorTimeoutCycles = 10;
-/// Cycles in succession with two answers of one node that are borne.
+/// Cycles in succession with two answers of one node that are tolerated.
 constexpr std::uint32_t kDoubledCycles = 10;
 
 }  // namespace

@@ -63,7 +63,7 @@ struct RoundTrip {
 ///
 /// In operation a fault latches per joint, with cause and time, and the stop category of the
 /// joints concerned is carried out: 0 opens every bridge, 1 quick-stops every axis, hold keeps
-/// every healthy axis at its position, warn only tells. stop() latches the same without a fault.
+/// every healthy axis at its position, warn only reports. stop() latches the same without a fault.
 /// reset() clears all of it: drives are reset, a board that was lost is configured anew, and every
 /// axis is enabled at its measured position. CommandImage::fault_reset does that for one joint, but
 /// leaves what stop() latched.
@@ -116,9 +116,9 @@ class DriveMaster {
   /// Values that a node refused at run time (gains), with the object and why; empty when none.
   [[nodiscard]] std::string parameter_error() const;
 
-  /// What went wrong and was borne, a sentence each: feedback that did not come, counted by node;
-  /// commands that a bus did not take; a refused value. Empty when nothing did. A measurement, no
-  /// state: not in a snapshot. Not RT.
+  /// What went wrong and was tolerated, a sentence each: feedback that did not come, counted by
+  /// node; commands that a bus did not take; a refused value. Empty when nothing did. A
+  /// measurement, no state: not in a snapshot. Not RT.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
   /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.

@@ -191,7 +191,7 @@ void DriveMaster::Impl::stop(StopCategory category) noexcept TANDEM_RT {
   if (stage == MasterStage::kBooting || stage == MasterStage::kEnabling) {
     fail();
   } else if (!react(category)) {
-    return;  // it has been told
+    return;  // it has been reported
   }
   make_commands(nullptr);  // this cycle's SYNC is over: the next one makes it take effect
   write_pdos();

@@ -23,7 +23,7 @@ using canopen::Frame;
 
 namespace {
 
-/// How long a loss is told of by state().
+/// How long state() reports a loss.
 constexpr std::int64_t kLossyNs = kSecondNs;
 /// Messages that one receive() takes beyond the frames asked for: error frames and the like.
 constexpr std::size_t kMaxOthers = 256;

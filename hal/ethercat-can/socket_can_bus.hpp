@@ -32,7 +32,7 @@ struct SocketCanOptions {
   bool fd = true;         ///< frames of up to 64 bytes
   SocketSide side = SocketSide::kMaster;
   std::size_t receive_queue = 512;  ///< frames that wait in the socket until they are taken
-  bool stamps = true;               ///< tell received_ns() and sent_ns(): clock reads
+  bool stamps = true;               ///< fill received_ns() and sent_ns(): clock reads
   std::size_t send_queue = 256;     ///< frames that wait until the interface has taken them
 };
 
@@ -85,7 +85,7 @@ class SocketCanBus final : public Bus {
  private:
   enum class Link : std::uint8_t { kUp, kDown, kGone, kClassicOnly };
   struct Batch;
-  /// What status_text() tells of.
+  /// What status_text() reports.
   struct Told {
     BusState state = BusState::kActive;
     Link link = Link::kUp;

@@ -29,7 +29,7 @@ enum class KernelFrame : std::uint8_t {
 };
 
 /// Reads what the kernel gave.
-/// @param bytes  that it wrote: tells classic from FD
+/// @param bytes  that it wrote: by it classic and FD are told apart
 /// @param out    written when the answer is kData
 [[nodiscard]] KernelFrame from_kernel(const canfd_frame& in, std::size_t bytes,
                                       canopen::Frame& out) noexcept TANDEM_RT;

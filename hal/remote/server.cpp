@@ -94,7 +94,7 @@ void Server::take_requests() {
 }
 
 void Server::acquire(const tandem_msgs::LinkRequest& sample, const std::optional<Sender>& sender) {
-  if (sample.protocol != identity_.protocol) return;  // it has been told
+  if (sample.protocol != identity_.protocol) return;  // it has been reported
   if (!sender || (config_.admits && !config_.admits(*sender))) return;
   const std::lock_guard lock(owner_mutex_);
   if (lease_.owner() == sample.client && sender != owner_sender_) return;  // another one's number

@@ -36,7 +36,7 @@ struct ServerConfig {
 
 class Server final : public hal::RemoteCommandPort {
  public:
-  /// Begins to tell of the robot. The participant outlives it.
+  /// Begins to publish the robot. The participant outlives it.
   /// Errors: what DDS refuses.
   [[nodiscard]] static Result<std::unique_ptr<Server>> open(dds::Participant& participant,
                                                             const hal::RobotConfig& robot,
@@ -44,9 +44,9 @@ class Server final : public hal::RemoteCommandPort {
                                                             const ServerConfig& config);
   ~Server() override;
 
-  /// What is told to a client whose robot is in fault; called on another thread until close().
+  /// What a client whose robot is in fault is sent; called on another thread until close().
   void set_status(std::function<std::string()> status);
-  /// Tells that the run is over, and takes nothing any more. The loop has stopped.
+  /// Announces that the run is over, and takes nothing any more. The loop has stopped.
   void close();
 
   [[nodiscard]] bool lockstep() const noexcept override { return config_.lockstep; }

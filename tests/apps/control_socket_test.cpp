@@ -473,7 +473,7 @@ struct Impostor : Socket {
   pid_t child = 0;
 };
 
-// `tandem estop` had told this one, printed success and returned 0.
+// `tandem estop` had told this one of it, printed success and returned 0.
 TEST_F(Impostor, IsNotToldOfAnEmergencyStop) {
   const std::string where = control_folder() + "/run-1.sock";
   listen_as_stranger(where);

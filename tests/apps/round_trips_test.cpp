@@ -1,4 +1,4 @@
-// Round trips of nodes as a run's summary tells them.
+// Round trips of nodes as a run's summary lists them.
 #include "apps/can/round_trips.hpp"
 
 #include <gtest/gtest.h>

@@ -164,6 +164,31 @@ TEST(Architecture, IncludesAreWrittenFromTheRoot) {
   }
 }
 
+bool begins_with_a_comment(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  return std::getline(in, line) && line.starts_with("// ");
+}
+
+TEST(Architecture, EverySourceOrItsHeaderBeginsWithItsPurpose) {
+  const fs::path root = TANDEM_SOURCE_DIR;
+  int checked = 0;
+  for (const char* folder :
+       {"apps", "base", "bench", "canopen", "controllers", "dds", "examples", "firmware_emu", "hal",
+        "log", "model", "report", "rt", "runtime", "scaffold"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      const fs::path& file = entry.path();
+      if (file.extension() != ".hpp" && file.extension() != ".cpp") continue;
+      const fs::path header = fs::path(file).replace_extension(".hpp");
+      EXPECT_TRUE(begins_with_a_comment(file) ||
+                  (file.extension() == ".cpp" && begins_with_a_comment(header)))
+          << fs::relative(file, root).generic_string() << " does not say what it is for";
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 300);
+}
+
 TEST(Architecture, RuleRefusesARoomAboveAndAcceptsOneBelow) {
   EXPECT_TRUE(may_include("hal/sim", "firmware_emu/board.hpp"));
   EXPECT_TRUE(may_include("controllers", "model/kernels.h"));

@@ -33,7 +33,7 @@ class CdrWriter {
  public:
   explicit CdrWriter(Filling filling) : filling_(std::move(filling)) {}
 
-  /// With the four bytes in front that tell the encoding, padded to a multiple of four.
+  /// With the four bytes in front that name the encoding, padded to a multiple of four.
   Bytes sample(const MessageDefinition& definition) {
     bytes_ = {std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
     message(definition);

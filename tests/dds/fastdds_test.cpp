@@ -34,7 +34,7 @@ std::string topic_of(const char* prefix, const Type& type) {
   return std::string(prefix) + name;
 }
 
-/// Without the four bytes that tell the encoding, and without padding at the end, of which Fast DDS
+/// Without the four bytes that name the encoding, and without padding at the end, of which Fast DDS
 /// says and does another thing.
 Bytes payload(const Bytes& bytes, std::size_t size) {
   return {bytes.begin() + 4,

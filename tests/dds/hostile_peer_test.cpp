@@ -193,7 +193,7 @@ TEST_F(HostilePeer, ThatFloodsTakesNoMoreMemoryThanTheDepthOfTheHistory) {
   const Type& type = dds::type<std_msgs::String>();
   const RawEndpoint target = reader(type, "rt/flood", true);  // its depth is 10: 0.6 MB
   const test::FastDdsPeer peer({"flood", "reliable", "std_msgs/msg/String", "rt/flood"});
-  // Nobody takes the samples; the number at the beginning of the last one tells how many came.
+  // Nobody takes the samples; the number at the beginning of the last one says how many came.
   const auto flooded = [&] {
     void* samples[16]{};
     dds_sample_info_t infos[16];

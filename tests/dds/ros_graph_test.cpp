@@ -33,7 +33,7 @@ struct Listener {
     std::set<std::string> readers, writers;
   };
 
-  /// The node of a participant as it was told last.
+  /// The node of a participant as it was last published.
   std::optional<Node> node_of(const Gid& gid) {
     reader.take([&](const rmw_dds_common::ParticipantEntitiesInfo& info, const auto&) {
       if (text(info.gid) != text(gid)) return;

@@ -163,7 +163,7 @@ TEST(Topics, OfAForceSensorSkipOldSamplesAndWhatIsNotFinite) {
   rig.show(20);
   rig.state.sensor_age_cycles()[ft] = 3;
   rig.show(30);
-  rig.state.sensor_age_cycles()[ft] = 10;  // this one has been told already
+  rig.state.sensor_age_cycles()[ft] = 10;  // this one has been published already
   rig.show(40);
   rig.state.sensor_age_cycles()[ft] = 0;
   rig.state.sensor_values(ft)[2] = std::nan("");

@@ -237,7 +237,7 @@ TEST_F(Guard, StopsInEveryModeWhenSyncsComeWithoutCommands) {
     expect_fault(r, 0xFF01, 0x10);
     r.seen.clear();
     r.cycles(10);
-    EXPECT_TRUE(r.frames_of(0x085).empty());  // told once
+    EXPECT_TRUE(r.frames_of(0x085).empty());  // reported once
     r.send_commands = true;
     EXPECT_TRUE(reset(r)) << mode;
   }

@@ -178,7 +178,7 @@ class Rig {
     EXPECT_EQ(write(parameter, 1, cob), 0U);
   }
 
-  /// One cycle of the master: SYNC, step, and the commands that the next SYNC brings to bear.
+  /// One cycle of the master: SYNC, step, and the commands that take effect with the next SYNC.
   void cycle() {
     if (send_sync) send(0x080, {});
     step();

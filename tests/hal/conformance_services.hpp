@@ -56,7 +56,7 @@ TEST_P(BackendConformance, MoreDampingSlowsACompliantJoint) {
     EXPECT_EQ(devices.impedance.set_impedance_offset(j, offset), Code::kOk);
     return rig.peak([&] { return devices.encoders.velocity_rad_s(j); }, 1.0);
   };
-  // A robot's own damping is about the most that a free link bears on its spring.
+  // A robot's own damping is about the most that a free link on its spring can take.
   const double light = peak_with(damping / 4.0);
   EXPECT_LT(peak_with(damping), 0.95 * light);
 }

@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
 // --- in real time ---
 
 /// The double pendulum at 100 Hz in motion, on a machine that does other things as well: thirty
-/// cycles are borne, not ten.
+/// cycles are tolerated, not ten.
 class HilRealTimeFault : public HilFault {
  protected:
   static constexpr int kBorne = 30;
@@ -173,7 +173,7 @@ TEST_F(HilRealTimeFault, AnInjectedDeathOfABoardStopsTheRun) {
 }
 
 /// COMAN on its feet at 50 Hz, 29 axes on 16 boards and five buses, on a machine whose one CPU is
-/// both ends': longer silences are borne than a robot's boards would bear.
+/// both ends': longer silences are tolerated than by a robot's boards.
 class HilComanFault : public HilFault {
  protected:
   static constexpr int kBorne = 50;
@@ -256,7 +256,7 @@ TEST_F(HilComanFault, EveryBoardStopsByItselfWhenTheMasterIsKilled) {
   const auto [first, last] = std::ranges::minmax(opened);
   std::printf("bridges open after %d to %d cycles\n", first, last);
 
-  // Each board tells why by itself, once: no SYNC. A sensor node misses the heartbeat, later.
+  // Each board reports why by itself, once: no SYNC. A sensor node misses the heartbeat, later.
   std::size_t told = 0;
   for (const auto& [bus, ear] : emergencies) {
     std::set<std::uint32_t> heard;

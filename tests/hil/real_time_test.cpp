@@ -83,7 +83,7 @@ TEST_F(RealTime, ASecondMasterIsNotLetIn) {
   EXPECT_EQ(master.interrupt(), 0) << master.output();
 
   std::atomic<bool> over{false};
-  std::thread foreign([&over] {  // of another computer: no lock tells of it
+  std::thread foreign([&over] {  // of another computer: no lock shows it
     const RawCan other("can0");
     while (!over) {
       other.write(0x080, {});

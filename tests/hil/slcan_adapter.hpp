@@ -20,7 +20,7 @@
 
 namespace tandem::test {
 
-/// A classic interface of the kernel's CAN device layer, up. write() is what the adapter tells:
+/// A classic interface of the kernel's CAN device layer, up. write() is what the adapter sends:
 /// "t70A105\r" a frame, "sp130140\r" error-passive, "sb255001\r" bus-off, "sa001000\r" active.
 class SlcanAdapter {
  public:

@@ -171,7 +171,7 @@ TEST(SocketCan, CountsWhatCameFasterThanItWasTaken) {
   for (int i = 0; i < 200; ++i) other.write(0x181, {1, 2, 3, 4, 5, 6, 7, 8});
   const std::size_t first = small.receive().size();
   EXPECT_LT(first, 200U);
-  other.write(0x181, {});  // the kernel tells of what was lost with the next frame
+  other.write(0x181, {});  // the kernel reports what was lost with the next frame
   EXPECT_EQ(small.wait(1).size(), 1U);
   EXPECT_EQ(small.bus().statistics().receive_lost, 200 - first);
   EXPECT_EQ(small.bus().state(), BusState::kOverloaded);

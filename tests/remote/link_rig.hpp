@@ -40,7 +40,8 @@ inline bool eventually(const std::function<bool()>& condition) {
 inline std::unique_ptr<dds::Participant> participant(const std::string& node) {
   static const auto domain = [] {
     dds::Config config = dds::test::own_config();
-    config.every[static_cast<std::size_t>(dds::Topic::kClock)] = 1;  // each cycle's time is told
+    config.every[static_cast<std::size_t>(dds::Topic::kClock)] =
+        1;  // each cycle's time is published
     return dds::Domain::open(config);
   }();
   EXPECT_TRUE(domain) << domain.error().to_string();

@@ -29,7 +29,7 @@ enum class Act : std::uint8_t {
   kSilent,   ///< lives, and answers nothing
   kRelease,  ///< gives the lease back
   kDie,      ///< its participant goes without a word
-  kDone,     ///< tells that it is done, as a run's last command does
+  kDone,     ///< says that it is done, as a run's last command does
   kStop,     ///< asks for a stop of category 1
   kReset,    ///< asks for a reset
 };

@@ -28,7 +28,7 @@ class Watch final : public hal::CycleObserver {
   std::unique_ptr<dds::Publisher> publisher;
 };
 
-/// One run of a sequence. What goes wrong is told by complaints().
+/// One run of a sequence. complaints() lists what goes wrong.
 class Played {
  public:
   Played(const PeerSequence& sequence, dds::Participant& server, dds::Participant& listener);

@@ -228,8 +228,8 @@ struct SetClock final : hal::can::FrameWait {
   std::int64_t ns = 1'000'000'000;
 };
 
-// A master that is late and dies amid its SYNCs: the boards of the other buses stop sooner than the
-// last SYNC would say.
+// A master that is late and dies between its SYNCs: the boards of the other buses stop sooner than
+// the last SYNC would say.
 TEST(RealTimeEmulator, CountsABoardsSilenceFromTheLastSyncOfItsOwnBus) {
   Squat squat("coman");
   auto robot =

@@ -115,7 +115,7 @@ TEST(SquatSwitch, AtTheSameCycleGivesTheSameBits) {
   const auto before = run.cycle->save();
   ASSERT_TRUE(before);
   run.change({"squat"}, {"rest"});
-  const auto first = run.bytes(50);  // amid leading over
+  const auto first = run.bytes(50);  // during the transfer
   const auto amid = run.cycle->save();
   ASSERT_TRUE(amid);
   const auto rest = run.bytes(200);

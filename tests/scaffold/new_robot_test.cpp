@@ -316,7 +316,7 @@ TEST(NewRobot, SaysOfAMoveWhatItDoes) {
 }
 
 /// The simulated contact of a ball is a point of its shank, and no slip can help feet that are
-/// told to part.
+/// asked to part.
 TEST(NewRobot, LeavesPointFeetWhereTheyAreWhileTheRobotGoesDown) {
   const NewRobot anymal = made(kPublicRobots[3]);
   ASSERT_GT(anymal.move.squat_m, 0.005);

@@ -1,5 +1,5 @@
 // The rule of tests/dds/cdr_sample.hpp's pattern() for the classes of fastddsgen: fills a message,
-// or tells whether it is filled so.
+// or says whether it is filled so.
 // Layer: tests.  Thread: any.
 #pragma once
 
