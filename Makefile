@@ -45,6 +45,7 @@ test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@scripts/test-anywhere --paths
+	@scripts/test-build-types
 
 unit:
 	@scripts/install-dependencies test
