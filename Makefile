@@ -5,7 +5,7 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit anywhere hil rtsan fuzz format lint clean help
+.PHONY: demo test test-all unit anywhere hil sanitized rtsan fuzz format lint tidy clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
@@ -28,15 +28,15 @@ demo:
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
-# What CI runs: all tests; some of them in strange surroundings; side by side, for each takes one core, the tests on a real CAN stack and
-# a minute of each fuzz target; the real-time proof. The last lines say what ran and what did not.
+# What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
+# take one core, and beside them a minute of each fuzz target and the real-time proof. The last lines
+# say what ran and what did not.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory unit
 	@$(MAKE) --no-print-directory anywhere
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil fuzz
-	@$(MAKE) --no-print-directory rtsan
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil sanitized
 	@echo
 	@cat build/summary
 
@@ -65,6 +65,11 @@ hil:
 	@cmake --build --preset release --parallel $(JOBS)
 	@TITLE=hil scripts/run-tests build/release 1 -L hil --verbose
 
+# One after the other: each takes two cores.
+sanitized:
+	@$(MAKE) --no-print-directory fuzz
+	@$(MAKE) --no-print-directory rtsan
+
 # One humanoid will do: WALK-MAN's runs take as long as COMAN's, and call nothing else.
 rtsan:
 	@scripts/install-dependencies test
@@ -86,6 +91,11 @@ format:
 lint:
 	@scripts/install-dependencies test
 	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
+
+# Over the sources as `unit` compiles them.
+tidy:
+	@scripts/install-dependencies test
+	@run-clang-tidy-22 -quiet -j $(JOBS) -p build/release '^(?!.*/tests/).*/Unity/.*'
 
 clean:
 	@rm -rf build runs

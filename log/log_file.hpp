@@ -49,6 +49,8 @@ class LogFile {
   [[nodiscard]] const StringMap& result() const { return result_; }
   [[nodiscard]] const std::vector<Topic>& topics() const { return topics_; }
   [[nodiscard]] const Topic* find(std::string_view topic) const;
+  /// The same. Error: the log has no such topic.
+  [[nodiscard]] Result<const Topic*> require(const std::string& topic) const;
   /// True when the run was killed: the data end where its last chunk ended.
   [[nodiscard]] bool truncated() const { return truncated_; }
   [[nodiscard]] std::uint64_t messages() const;
@@ -67,8 +69,6 @@ class LogFile {
       const std::function<void(std::int64_t, std::span<const std::byte>)>& visit) const;
 
  private:
-  [[nodiscard]] Result<const Topic*> require(const std::string& topic) const;
-
   std::string path_;
   RunInfo info_;
   StringMap result_;

@@ -80,7 +80,8 @@ const char kModelInfoExamples[] = R"(Examples:
   tandem model info config/walkman/robot.toml --kernel-variant baseline --json -)";
 
 const char kLogInfoExamples[] = R"(Examples:
-  tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest)";
+  tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest
+  tandem log info runs/coman-squat-001.mcap --topic truth  its fields: how many values, units)";
 
 const char kLogCsvExamples[] = R"(Examples:
   tandem log csv runs/coman-squat-001.mcap > state.csv
@@ -374,6 +375,7 @@ void add_flags(CLI::App& app, LogOptions& o) {
   app.require_subcommand(1);
   CLI::App* info = app.add_subcommand("info", "What a log holds");
   info->add_option("log", o.log, "MCAP file")->required();
+  info->add_option("--topic", o.topic, "List the fields of this topic instead, with their units");
   info->add_option("--json", o.json, kJsonHelp);
   info->footer(kLogInfoExamples);
   info->callback([&o] { o.action = LogOptions::Action::kInfo; });

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 
@@ -135,8 +136,14 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
   commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
 
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (!words.empty() && words.front() == "help") {  // `tandem help joint` is `tandem joint --help`
+    words.erase(words.begin());
+    words.emplace_back("--help");
+  }
+  std::ranges::reverse(words);  // as CLI11 wants them
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
     app.exit(error);  // prints help or version

@@ -177,7 +177,7 @@ struct LogOptions {
   enum class Action : std::uint8_t { kInfo, kCsv, kDiff } action = Action::kInfo;
   std::string log;
   std::string other;                ///< diff: the log that `log` is compared with
-  std::string topic;                ///< empty: the state
+  std::string topic;                ///< csv: empty is the state; info: whose fields are listed
   std::vector<std::string> fields;  ///< empty: all
   std::size_t every = 1;            ///< n: each n-th message
   std::string output;               ///< empty: standard output

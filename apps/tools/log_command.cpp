@@ -65,10 +65,26 @@ void print_info(const log::LogFile& file, std::FILE* out) {
     table.add({topic.name, std::to_string(topic.messages),
                fmt::format("{:.3f}", static_cast<double>(topic.first_ns) * 1e-9),
                fmt::format("{:.3f}", static_cast<double>(topic.last_ns) * 1e-9),
-               std::to_string(topic.layout.fields().size())});
+               topic.layout.fields().empty() ? "" : std::to_string(topic.layout.fields().size())});
   }
   fmt::print(out, "\n");
   table.print(out);
+}
+
+/// What a topic's messages hold, by its schema.
+Status print_fields(const log::LogFile& file, const std::string& name, std::FILE* out) {
+  const auto topic = file.require(name);
+  if (!topic) return std::unexpected(topic.error());
+  if ((*topic)->layout.fields().empty()) {
+    return fail("the messages of " + name + " are no table of fields but " + (*topic)->type,
+                "open the log in a viewer: docs/log.md");
+  }
+  Table table({"field", "values", "meaning"});
+  for (const hal::Field& field : (*topic)->layout.fields()) {
+    table.add({field.name, std::to_string(field.count), field.doc});
+  }
+  table.print(out);
+  return {};
 }
 
 /// "state" and "/tandem/state" name the same topic.
@@ -161,6 +177,9 @@ Exit log_command(const LogOptions& options) {
     const Result<Exit> compared = diff(*file, options);
     if (compared) exit = *compared;
     if (!compared) done = std::unexpected(compared.error());
+  } else if (!options.topic.empty()) {
+    done = print_fields(*file, full_topic(options.topic), human_output(options.json));
+    if (done) done = write_json(options.json, info_json(*file));
   } else {
     print_info(*file, human_output(options.json));
     done = write_json(options.json, info_json(*file));

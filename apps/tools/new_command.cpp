@@ -13,6 +13,7 @@
 #include "apps/tools/commands.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
+#include "base/nearest.hpp"
 #include "base/utf8.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "model/tree.hpp"
@@ -44,6 +45,21 @@ std::vector<fs::path> robot_folders() {
   return {"config", root.parent_path().parent_path() / "config", root / "share/tandem/config"};
 }
 
+std::vector<std::string> bundled_robots() {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const fs::path& folder : robot_folders()) {
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+      if (fs::is_regular_file(entry.path() / "robot.toml", ignored)) {
+        names.push_back(entry.path().filename().string());
+      }
+    }
+  }
+  std::ranges::sort(names);
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
 /// The robot that --like names: a file, or the folder of a bundled one.
 std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
   std::error_code ignored;
@@ -54,7 +70,8 @@ std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
   }
   if (!fs::is_regular_file(file, ignored)) {
     return std::unexpected(
-        one("there is no bundled robot '" + name + "'", "give the path of its robot.toml", name));
+        one("there is no bundled robot '" + name + "'",
+            suggest(name, bundled_robots()) + "; or give the path of its robot.toml", name));
   }
   auto robot = read_robot(file);
   if (!robot) return std::unexpected(robot.error());

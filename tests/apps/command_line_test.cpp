@@ -21,6 +21,20 @@ TEST_F(CommandLine, HelpOfACommandHasExamplesOfItsOwn) {
   EXPECT_NE(outcome.out.find("tandem model build config/coman/robot.toml"), std::string::npos);
 }
 
+TEST_F(CommandLine, HelpMayComeFirst) {
+  for (const std::string command : {"", "model build"}) {
+    const Outcome outcome = tandem("help " + command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.out, tandem(command + " --help").out);
+  }
+}
+
+TEST_F(CommandLine, ABundledRobotThatIsMissedByALetterIsSuggested) {
+  const Outcome outcome = tandem("new nothing.urdf --like comman");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("did you mean 'coman'?"), std::string::npos) << outcome.err;
+}
+
 TEST_F(CommandLine, VersionIsPrinted) {
   const Outcome outcome = tandem("--version");
   EXPECT_EQ(outcome.status, 0);

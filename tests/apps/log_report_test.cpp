@@ -39,6 +39,19 @@ TEST_F(LogAndReport, InfoTellsTheHashOnce) {
   EXPECT_NE(outcome.out.find("double_pendulum, 2 joints, 0 sensors"), std::string::npos);
 }
 
+TEST_F(LogAndReport, InfoOfATopicListsItsFieldsWithUnits) {
+  const Outcome outcome = tandem("log info " + log_ + " --topic truth");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("position_rad"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("rad/s"), std::string::npos) << outcome.out;
+  const Outcome absent = tandem("log info " + log_ + " --topic truht");
+  EXPECT_EQ(absent.status, 2);
+  EXPECT_NE(absent.err.find("/tandem/truht"), std::string::npos) << absent.err;
+  const Outcome foreign = tandem("log info " + log_ + " --topic /joint_states");
+  EXPECT_EQ(foreign.status, 2);
+  EXPECT_NE(foreign.err.find("sensor_msgs/msg/JointState"), std::string::npos) << foreign.err;
+}
+
 TEST_F(LogAndReport, CsvWritesTheFieldsAskedFor) {
   const Outcome outcome = tandem("log csv " + log_ + " --fields position_rad");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
