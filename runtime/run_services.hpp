@@ -61,7 +61,8 @@ struct JointStatus {
 /// The same with what is known of it besides.
 struct JointInfo {
   std::string name;
-  std::string owner;  ///< controller; empty: nobody
+  std::string owner;    ///< controller; empty: nobody
+  bool slides = false;  ///< prismatic: m and N
   JointStatus look;
   std::array<hal::PidGains, hal::kPidLoops> gains{};  ///< by hal::PidLoop, as asked for last
 };

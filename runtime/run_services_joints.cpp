@@ -65,6 +65,7 @@ std::vector<JointInfo> RunServices::joints() {
     JointInfo& joint = all.emplace_back();
     joint.name = robot_->joints[j].name;
     joint.owner = controller_name(now[j].owner);
+    joint.slides = robot_->joints[j].slides;
     joint.look = now[j];
     for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop) {
       joint.gains[loop] = gains_.gains(j, static_cast<hal::PidLoop>(loop));

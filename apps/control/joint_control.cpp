@@ -41,6 +41,7 @@ Json joint_json(const runtime::JointInfo& joint) {
     gains[hal::to_string(loop)] = {{"kp", of.kp}, {"ki", of.ki}, {"kd", of.kd}};
   }
   return {{"joint", joint.name},
+          {"slides", joint.slides},
           {"controller", joint.owner},
           {"mode", hal::to_string(static_cast<ControlMode>(look.mode))},
           {"interaction", hal::to_string(static_cast<InteractionMode>(look.interaction))},
@@ -106,16 +107,21 @@ Result<Json> set(RunServices& services, const Json& request) {
   return tell(services, joint, services.set_joint(joint, wish));
 }
 
-Result<Json> move(RunServices& services, const Json& request,
-                  const std::vector<std::string>& slides) {
+/// Whether values in `unit` fit the joint; one that does not exist is refused elsewhere.
+Status check_unit(RunServices& services, const std::string& name, const std::string& unit) {
+  for (const runtime::JointInfo& joint : services.joints()) {
+    if (joint.name != name || unit == (joint.slides ? "length" : "angle")) continue;
+    return fail_at(name, fmt::format("this joint {}", joint.slides ? "slides" : "turns"),
+                   joint.slides ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
+  }
+  return {};
+}
+
+Result<Json> move(RunServices& services, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   if (request.contains("unit")) {
-    const auto unit = request["unit"].get<std::string>();
-    const bool is_slide = std::ranges::find(slides, joint) != slides.end();
-    if (unit != (is_slide ? "length" : "angle")) {
-      return fail_at(joint, fmt::format("this joint {}", is_slide ? "slides" : "turns"),
-                     is_slide ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
-    }
+    const Status fits = check_unit(services, joint, request["unit"].get<std::string>());
+    if (!fits) return std::unexpected(fits.error());
   }
   runtime::MoveRequest wish{.target_rad = request["target_rad"].get<double>()};
   wish.speed_rad_s = request.value("speed_rad_s", wish.speed_rad_s);
@@ -141,8 +147,7 @@ Result<Json> set_gains(RunServices& services, const Json& request) {
 
 }  // namespace
 
-void add_joint_commands(ControlRegistry& registry, RunServices& services,
-                        std::vector<std::string> slides) {
+void add_joint_commands(ControlRegistry& registry, RunServices& services) {
   using Type = ControlKey::Type;
   const ControlKey joint{.name = "joint", .required = true, .doc = "its name"};
   registry.add("joint.list", ControlEffect::kReads,
@@ -166,9 +171,7 @@ void add_joint_commands(ControlRegistry& registry, RunServices& services,
         .type = Type::kNumber,
         .doc = "else it reaches the speed in half a second"},
        {.name = "unit", .doc = "angle, length: what the joint has to be"}},
-      [&services, slides = std::move(slides)](const Json& request) {
-        return move(services, request, slides);
-      });
+      [&services](const Json& request) { return move(services, request); });
   registry.add("joint.stop", ControlEffect::kChanges, "brakes a joint that joint.move leads",
                {joint}, [&services](const Json& request) {
                  const auto name = request["joint"].get<std::string>();

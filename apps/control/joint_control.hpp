@@ -9,8 +9,6 @@ namespace tandem::apps {
 
 /// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.recover" and "joint.gains".
 /// The services outlive the registry.
-/// @param slides  names of the joints that slide
-void add_joint_commands(ControlRegistry& registry, runtime::RunServices& services,
-                        std::vector<std::string> slides);
+void add_joint_commands(ControlRegistry& registry, runtime::RunServices& services);
 
 }  // namespace tandem::apps

@@ -31,15 +31,6 @@
 namespace tandem::apps {
 namespace {
 
-/// Joints whose positions are metres.
-std::vector<std::string> slides_of(const model::Tree& tree) {
-  std::vector<std::string> names;
-  for (const model::Joint& joint : tree.joints) {
-    if (joint.type == model::JointType::kPrismatic) names.push_back(joint.name);
-  }
-  return names;
-}
-
 std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
   std::vector<std::string> texts;
@@ -214,7 +205,7 @@ Exit run(Composition& c, const RunOptions& options) {
                pace_text(c));
   }
   ControlRegistry commands;
-  add_run_commands(commands, cycle, e.robot, slides_of(c.tree));
+  add_run_commands(commands, cycle, e.robot);
   if (*dds != nullptr) admission.add_to(commands);
   if (c.sim != nullptr) {
     add_inject(commands, e.robot, e.loop.period_ns, [&c](const sim::Fault& fault) -> Status {
