@@ -33,6 +33,7 @@ RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, In
       inbox_(&inbox),
       progress_(&progress),
       looks_(robot.joints.size()),
+      sensor_looks_(robot.sensors.size()),
       gains_(std::move(parameters)) {}
 
 // Asking the loop.
@@ -163,6 +164,23 @@ Error RunServices::refusal(const LoopAnswer& answer) const {
       error.message = "is on its way back to its limits, which " +
                       (one.empty() ? "this" : "the controller '" + one + "'") + " would end";
       error.hint = "ask again when it is inside: tandem joint list " + joint + " shows where it is";
+      break;
+    case RejectReason::kResetting:
+      error.message = "its drive is being reset";
+      error.hint = "ask again when that is over: tandem joint show " + joint;
+      break;
+    case RejectReason::kNotNow:
+      error.message =
+          "its drive is not reset in the phase " + std::string(to_string(progress_->phase.load()));
+      error.hint = "ask again when the run is faulted, held or running";
+      break;
+    case RejectReason::kBoardLost:
+      error.message = "its board is lost, and would come back with all of its joints";
+      error.hint = "tandem fault reset brings them back together";
+      break;
+    case RejectReason::kServed:
+      error.message = "its drive is reset by the process that serves the robot";
+      error.hint = "ask that one, or reset every drive: tandem fault reset";
       break;
     case RejectReason::kIncapable:
       error.message = "cannot be put into this mode";

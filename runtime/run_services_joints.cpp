@@ -74,6 +74,17 @@ std::vector<JointInfo> RunServices::joints() {
   return all;
 }
 
+std::vector<SensorInfo> RunServices::sensors() const {
+  std::vector<SensorStatus> now(robot_->sensors.size());
+  while (!sensor_looks_.read(now)) std::this_thread::yield();
+  std::vector<SensorInfo> all;
+  for (std::size_t s = 0; s < now.size(); ++s) {
+    const hal::SensorConfig& sensor = robot_->sensors[s];
+    all.push_back({sensor.name, sensor.type, sensor.joint, sensor.link, now[s]});
+  }
+  return all;
+}
+
 /// Whether the loop would put the joint into the mode. The loop looks again.
 Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
                                const JointStatus& now) const {
@@ -132,6 +143,14 @@ Result<RequestResult> RunServices::recover(const std::string& joint, Patience pa
   if (!index) return std::unexpected(index.error());
   return ask(lock,
              {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
+             patience);
+}
+
+Result<RequestResult> RunServices::reset_joint(const std::string& joint, Patience patience) {
+  Lock lock(mutex_);
+  const Result<std::size_t> index = joint_to_change(joint);
+  if (!index) return std::unexpected(index.error());
+  return ask(lock, {.kind = LoopRequest::Kind::kReset, .joint = static_cast<std::uint32_t>(*index)},
              patience);
 }
 
