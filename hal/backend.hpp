@@ -86,6 +86,9 @@ class Backend {
   /// follows the command again, kFault when a cause is still there.
   virtual void reset() noexcept TANDEM_RT = 0;
 
+  /// Whether CommandImage::fault_reset clears the fault of that joint alone.
+  [[nodiscard]] virtual bool resets_one_joint() const noexcept TANDEM_RT { return true; }
+
   /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle
   /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;

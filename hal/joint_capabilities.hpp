@@ -49,6 +49,7 @@ struct JointCapabilities {
   double stiffness_Nm_rad = 0.0;  ///< the gains table's default, when compliant
   double damping_Nms_rad = 0.0;
   std::uint8_t bits = 0;
+  bool slides = false;  ///< prismatic: in every name read m for rad and N for Nm
   /// Of each loop, by PidLoop: no gain can be more, in robot.toml or while it runs. Of an input at
   /// its full range (1 rad, 1 rad/s, the torque limit, the current limit) a loop's kp asks for
   /// 10^4, 100, 100 and 100 times the full output (torque limit or voltage limit): what is beyond

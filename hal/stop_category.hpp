@@ -37,6 +37,11 @@ enum class FaultCause : std::uint8_t {
   kTwoBoards,     ///< two boards answer under its board's id
 };
 
+/// Whether the joint's board is the matter, and not its drive alone.
+[[nodiscard]] constexpr bool is_of_board(FaultCause cause) noexcept {
+  return cause >= FaultCause::kBoardSilent;
+}
+
 /// As the TOML has it: "category0".
 [[nodiscard]] constexpr const char* to_string(StopCategory category) noexcept {
   switch (category) {

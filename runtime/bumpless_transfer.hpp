@@ -35,6 +35,10 @@ class BumplessTransfer {
   void before_update(hal::CommandImage& command) const noexcept TANDEM_RT;
   /// After it: adds what is left of the offsets.
   void after_update(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
+  /// Whether an offset of the joint is left.
+  [[nodiscard]] bool is_going(std::size_t joint) const noexcept TANDEM_RT {
+    return joints_[joint].left > 0;
+  }
   /// Forgets all.
   void clear() noexcept TANDEM_RT;
 

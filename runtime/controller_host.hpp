@@ -160,6 +160,9 @@ class ControllerHost {
   /// A joint that is enabled and whose last command was in position control keeps its reference
   /// and feed-forward.
   void hold(const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
+  /// The same for one joint; ends its motion.
+  void hold(std::size_t joint, const hal::StateImage& state,
+            hal::CommandImage& command) noexcept TANDEM_RT;
   /// Every joint idle: no torque.
   void release(hal::CommandImage& command) noexcept TANDEM_RT;
 
@@ -195,6 +198,13 @@ class ControllerHost {
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
   }
+  /// Whether move() or recover() leads `joint`, or has not quite let it go.
+  [[nodiscard]] bool leads(std::size_t joint) const noexcept TANDEM_RT {
+    return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0 ||
+           transfer_.is_going(joint);
+  }
+  /// Whether one of `by` claims `joint`.
+  [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   /// A number of what is loaded: slots, names and claims.
   [[nodiscard]] std::uint64_t fingerprint() const noexcept;
   void archive(Archive& ar);
@@ -206,6 +216,8 @@ class ControllerHost {
   [[nodiscard]] Status check_claims(const std::string& name,
                                     std::span<const ControllerSetup::Claim> claims) const;
   [[nodiscard]] std::uint32_t new_id(const std::string& name);
+  void stay(std::size_t joint, const hal::StateImage& state,
+            hal::CommandImage& command) const noexcept TANDEM_RT;
   void assign(std::size_t joint, hal::ControlMode mode, hal::InteractionMode interaction,
               const hal::StateImage& state, hal::CommandImage& command) const noexcept TANDEM_RT;
   void release(std::size_t joint, const hal::StateImage& state,
@@ -214,7 +226,6 @@ class ControllerHost {
   [[nodiscard]] bool is_active(std::size_t slot) const noexcept TANDEM_RT {
     return (active_ & only(slot)) != 0;
   }
-  [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
   /// The two calls in which a controller writes, each followed by what is taken back.
   void call_start(HostedController& one, const hal::CycleTime& time, const hal::StateImage& state,
                   hal::CommandImage& command) noexcept TANDEM_RT;

@@ -27,19 +27,29 @@ LoopAnswer refuse(RejectReason why, std::size_t one) noexcept TANDEM_RT {
 
 void ControllerHost::hold(const hal::StateImage& state,
                           hal::CommandImage& command) const noexcept TANDEM_RT {
-  for (std::size_t j = 0; j < capabilities_.size(); ++j) {
-    if (!capabilities_[j].can(hal::Capability::kPosition)) {
-      command.mode()[j] = static_cast<std::int8_t>(ControlMode::kIdle);
-      continue;
-    }
-    if (command.mode()[j] != kPositionMode || !is_enabled(state, j)) {
-      command.mode()[j] = kPositionMode;
-      command.interaction()[j] = kStiffMode;
-      command.position_rad()[j] = state.position_rad()[j];
-      command.torque_Nm()[j] = 0.0;
-    }
-    command.velocity_rad_s()[j] = 0.0;
+  for (std::size_t j = 0; j < capabilities_.size(); ++j) stay(j, state, command);
+}
+
+void ControllerHost::hold(std::size_t joint, const hal::StateImage& state,
+                          hal::CommandImage& command) noexcept TANDEM_RT {
+  operator_.position.abandon(joint);
+  recovers_[joint] = 0;
+  stay(joint, state, command);
+}
+
+void ControllerHost::stay(std::size_t joint, const hal::StateImage& state,
+                          hal::CommandImage& command) const noexcept TANDEM_RT {
+  if (!capabilities_[joint].can(hal::Capability::kPosition)) {
+    command.mode()[joint] = static_cast<std::int8_t>(ControlMode::kIdle);
+    return;
   }
+  if (command.mode()[joint] != kPositionMode || !is_enabled(state, joint)) {
+    command.mode()[joint] = kPositionMode;
+    command.interaction()[joint] = kStiffMode;
+    command.position_rad()[joint] = state.position_rad()[joint];
+    command.torque_Nm()[joint] = 0.0;
+  }
+  command.velocity_rad_s()[joint] = 0.0;
 }
 
 void ControllerHost::release(hal::CommandImage& command) noexcept TANDEM_RT {
@@ -92,7 +102,8 @@ void ControllerHost::release(std::size_t joint, const hal::StateImage& state,
 
 bool ControllerHost::is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT {
   for (std::size_t slot = 0; slot < table_.size(); ++slot) {
-    if ((by & only(slot)) != 0 && table_[slot]->claimed[joint] != 0) return true;
+    if ((by & only(slot)) == 0 || table_[slot] == nullptr) continue;
+    if (table_[slot]->claimed[joint] != 0) return true;
   }
   return false;
 }

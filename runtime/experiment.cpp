@@ -377,7 +377,8 @@ hal::RobotDescription plain(const model::UrdfModel& model) {
     const auto note = model.limits_notes.find(joint.name);
     description.moving_joints.push_back({joint.name, joint.lower, joint.upper, joint.velocity,
                                          joint.effort,
-                                         note == model.limits_notes.end() ? "" : note->second});
+                                         note == model.limits_notes.end() ? "" : note->second,
+                                         joint.type == model::JointType::kPrismatic});
   }
   for (const model::Link& link : model.tree.links) {
     description.links.push_back(link.name);

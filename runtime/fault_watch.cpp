@@ -1,6 +1,8 @@
 // Looks through the state image once a cycle for joints and sensors that are in fault or lost.
 #include "runtime/fault_watch.hpp"
 
+#include <algorithm>
+
 namespace tandem::runtime {
 namespace {
 
@@ -75,6 +77,11 @@ void FaultWatch::reset(const hal::StateImage& state) noexcept TANDEM_RT {
     joint_told_[j] = is_ill(state, j) ? 1 : 0;
     joint_in_fault_ = joint_in_fault_ || joint_told_[j] != 0;
   }
+}
+
+void FaultWatch::forget(std::size_t joint) noexcept TANDEM_RT {
+  joint_told_[joint] = 0;
+  joint_in_fault_ = std::ranges::find(joint_told_, 1) != joint_told_.end();
 }
 
 bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {

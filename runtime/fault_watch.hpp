@@ -43,6 +43,11 @@ class FaultWatch {
   [[nodiscard]] bool joint_in_fault() const noexcept TANDEM_RT { return joint_in_fault_; }
   /// A reset is done: what is still there (its category is "warn") is not reported again.
   void reset(const hal::StateImage& state) noexcept TANDEM_RT;
+  /// The drive is in fault, or its feedback is lost.
+  [[nodiscard]] bool is_ill(const hal::StateImage& state,
+                            std::size_t joint) const noexcept TANDEM_RT;
+  /// The joint alone was reset, and is well: reported again when it falls ill.
+  void forget(std::size_t joint) noexcept TANDEM_RT;
   /// Whether the cause of `record` is still there. Only joints and sensors can be looked at.
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
@@ -52,9 +57,6 @@ class FaultWatch {
   void archive(Archive& ar) { ar(joint_told_, sensor_told_, joint_in_fault_, fall_); }
 
  private:
-  [[nodiscard]] bool is_ill(const hal::StateImage& state,
-                            std::size_t joint) const noexcept TANDEM_RT;
-
   const hal::RobotConfig* robot_;
   const hal::Backend* backend_;
   std::uint32_t lost_after_cycles_;

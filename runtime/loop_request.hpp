@@ -40,6 +40,7 @@ struct LoopRequest {
     kGains,    ///< `gains` of `joint` and `loop`
     kRecover,  ///< `joint`, back to its limits
     kMove,     ///< `joint`, as `move` says
+    kReset,    ///< the drive of `joint`
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -70,6 +71,10 @@ enum class RejectReason : std::uint32_t {
   kNotEnabled,  ///< nothing moves in this phase
   kNotHeld,     ///< no reset holds controllers back
   kRecovering,  ///< `joint`, which `one` claims, is on its way back to its limits
+  kResetting,   ///< the drive of `joint` is being reset
+  kNotNow,      ///< no drive is reset in this phase
+  kBoardLost,   ///< not the drive of `joint`, its board has to come back, with all its joints
+  kServed,      ///< another process resets the drives
 };
 
 struct LoopAnswer {

@@ -1,6 +1,8 @@
 // The cycle, and what each of its stages does.
 #include "runtime/robot_cycle.hpp"
 
+#include <algorithm>
+
 #include "rt/scoped_realtime.hpp"
 
 namespace tandem::runtime {
@@ -100,6 +102,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   }
   check_backend(read_code_);
   advance_phase();
+  watch_drive_resets();
 }
 
 /// A missed sample shows as age, a lost command as the board's own time-out, and a drive's fault
@@ -165,6 +168,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       controllers_->hold(state_, command_);
       controllers_->move_on(state_, command_);
       controllers_->lead_back(command_);
+      hold_drives_in_reset(command_);
       break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
@@ -192,6 +196,7 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   ++ran_;
   const Code code = controllers_->update(time_, state_, controlled());
   controllers_->lead_back(controlled());
+  hold_drives_in_reset(controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
   controllers_answered(code);
   if (const auto stray = controllers_->take_stray()) {
@@ -272,6 +277,9 @@ void RobotCycle::limit() noexcept TANDEM_RT {
 
 void RobotCycle::write() noexcept TANDEM_RT {
   if (!run_.in(RunPhase::kShutDown)) {
+    for (std::size_t j = 0; j < resets_.size(); ++j) {  // told once: the cause may stay
+      if (resets_[j] == reset_cycles_) command_.fault_reset()[j] = 1;
+    }
     check_backend(backend_->write(command_, controllers_->gains()));
   } else {
     backend_->last_command(command_);
@@ -298,6 +306,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   progress_.latched.store(faults_.latched(), std::memory_order_relaxed);
   progress_.overruns.store(loop_.statistics().overruns, std::memory_order_relaxed);
   show_joints();
+  show_sensors();
   show();
   inbox_.confirm(time_.cycle);
   trace_.end(loop_.finish());
@@ -327,9 +336,11 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
                   .torque_Nm = state_.torque_Nm()[j],
                   .acceleration_rad_s2 = state_.acceleration_rad_s2()[j],
                   .motor_position_rad = state_.motor_position_rad()[j],
+                  .motor_velocity_rad_s = state_.motor_velocity_rad_s()[j],
                   .current_A = state_.current_A()[j],
                   .voltage_V = state_.voltage_V()[j],
                   .temperature_C = state_.temperature_C()[j],
+                  .commanded_rad = command_.position_rad()[j],
                   .stiffness_Nm_rad = command_.stiffness_Nm_rad()[j],
                   .damping_Nms_rad = command_.damping_Nms_rad()[j],
                   .fault = state_.fault()[j],
@@ -338,9 +349,24 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
                   .mode = command_.mode()[j],
                   .interaction = command_.interaction()[j],
                   .drive_mode = state_.mode()[j],
-                  .drive_state = state_.drive_state()[j]};
+                  .drive_state = state_.drive_state()[j],
+                  .moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0},
+                  .resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0}};
   }
   services_.show(joints_);
+}
+
+void RobotCycle::show_sensors() noexcept TANDEM_RT {
+  for (std::size_t s = 0; s < sensors_.size(); ++s) {
+    SensorStatus& sensor = sensors_[s];
+    sensor.cycle = time_.cycle;
+    sensor.age_cycles = state_.sensor_age_cycles()[s];
+    // One that was never heard is older than the run.
+    sensor.valid =
+        sensor.age_cycles <= std::min<std::uint64_t>(config_.lost_after_cycles, time_.cycle);
+    std::ranges::copy(state_.sensor_values(s), sensor.values.begin());
+  }
+  services_.show(sensors_);
 }
 
 /// The next phase, if this is one. Controllers stop with it, but for a retreat, which they carry

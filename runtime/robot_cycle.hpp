@@ -77,6 +77,9 @@ class RobotCycle {
   /// Every fault so far, in the order of their times. Any thread.
   [[nodiscard]] std::vector<Fault> faults() const;
   [[nodiscard]] const FaultLog& fault_log() const noexcept { return faults_; }
+  /// A drive's error code in words, with the cause that the run has latched of its joint; empty for
+  /// 0. Any thread.
+  [[nodiscard]] std::string drive_fault(std::size_t joint, std::uint32_t code) const;
 
   // Results, for when the run has stopped.
   [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return loop_.statistics(); }
@@ -115,6 +118,7 @@ class RobotCycle {
   void stamp(hal::CommandImage& command) const noexcept TANDEM_RT;
   void show() noexcept TANDEM_RT;
   void show_joints() noexcept TANDEM_RT;
+  void show_sensors() noexcept TANDEM_RT;
   void on(RunEvent event, bool holds_back = false) noexcept TANDEM_RT;
   void event(log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0) noexcept TANDEM_RT;
@@ -123,6 +127,7 @@ class RobotCycle {
   void take_inbox() noexcept TANDEM_RT;
   void take_requests() noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer carry_out(const LoopRequest& request) noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer go_on() noexcept TANDEM_RT;
   void log_request(const LoopRequest& request) noexcept TANDEM_RT;
@@ -146,6 +151,10 @@ class RobotCycle {
   void reset_done() noexcept TANDEM_RT;
   void reset_failed() noexcept TANDEM_RT;
   void hold_back() noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer reset_drive(std::size_t joint) noexcept TANDEM_RT;
+  void watch_drive_resets() noexcept TANDEM_RT;
+  void hold_drives_in_reset(hal::CommandImage& command) noexcept TANDEM_RT;
+  void drive_is_well(std::size_t joint) noexcept TANDEM_RT;
 
   void archive(Archive& ar);
 
@@ -176,7 +185,8 @@ class RobotCycle {
   Progress progress_;
   Heartbeat heartbeat_;
   RunServices services_;
-  std::vector<JointStatus> joints_;  // as services_ shows them
+  std::vector<JointStatus> joints_;    // as services_ shows them
+  std::vector<SensorStatus> sensors_;  // the same
 
   hal::CycleTime time_;        // this cycle's
   std::int64_t begin_ns_ = 0;  // clock time
@@ -189,6 +199,8 @@ class RobotCycle {
   std::uint64_t ran_ = 0;                    // cycles of kRunning
   std::vector<std::uint8_t> joint_limited_;  // noted once each
   std::vector<std::uint8_t> causes_;         // for the owner
+  std::uint64_t reset_cycles_;               // that the reset of one drive may take
+  std::vector<std::uint64_t> resets_;        // by joint: cycles that are left of it
 };
 
 }  // namespace tandem::runtime

@@ -61,6 +61,7 @@ void RobotCycle::begin_reset() noexcept TANDEM_RT {
   if (!run_.in(RunPhase::kFaulted) && !controlled) return;
   if (faults_.latched() == 0) return;
   event(EventKind::kResetRequested);
+  std::ranges::fill(resets_, std::uint64_t{0});
   if (controlled && !watch_.joint_in_fault()) return reset_done();  // a sensor's warning
   backend_->reset();
   on(RunEvent::kReset);
@@ -114,6 +115,67 @@ void RobotCycle::hold_back() noexcept TANDEM_RT {
 void RobotCycle::reset_failed() noexcept TANDEM_RT {
   event(EventKind::kResetFailed);
   progress_.failed_resets.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// Of one drive. It is enabled only where nothing is latched that stops the robot, held where it
+/// is, and only for a joint that no controller would move on.
+LoopAnswer RobotCycle::reset_drive(std::size_t joint) noexcept TANDEM_RT {
+  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
+  if (!watch_.is_ill(state_, joint)) return answer;
+  const bool controlled = run_.in(RunPhase::kRunning) || run_.in(RunPhase::kSettling);
+  if (!controlled && !run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kFaulted)) {
+    answer.reason = RejectReason::kNotNow;
+  } else if (!backend_->resets_one_joint()) {
+    answer.reason = RejectReason::kServed;
+  } else if (controlled && controllers_->owner(joint) >= 0) {
+    answer.reason = RejectReason::kClaimed;
+    answer.one = controllers_->owner(joint);
+  } else if (state_.fault()[joint] == 0 || hal::is_of_board(backend_->fault_cause(joint))) {
+    answer.reason = RejectReason::kBoardLost;
+  } else if (resets_[joint] == 0) {
+    event(EventKind::kResetRequested, answer.joint);
+    resets_[joint] = reset_cycles_;
+  }
+  return answer;
+}
+
+/// While the run is stopped the drive stays disabled, and its fault latched in the run.
+void RobotCycle::watch_drive_resets() noexcept TANDEM_RT {
+  const bool stopped = run_.in(RunPhase::kFaulted);
+  for (std::size_t j = 0; j < resets_.size(); ++j) {
+    if (resets_[j] == 0) continue;
+    command_.fault_reset()[j] = 0;
+    const auto joint = static_cast<std::int32_t>(j);
+    const auto drive = static_cast<hal::DriveState>(state_.drive_state()[j]);
+    const bool follows = drive == hal::DriveState::kOperationEnabled ||
+                         command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kIdle);
+    if (!watch_.is_ill(state_, j) && (stopped || follows)) {
+      resets_[j] = 0;
+      event(EventKind::kResetDone, joint);
+      if (!stopped) drive_is_well(j);
+    } else if (--resets_[j] == 0) {
+      event(EventKind::kResetFailed, joint);
+    }
+  }
+}
+
+/// Each joint where it is, until its drive is enabled: whoever led it before does so no more. An
+/// owner in another process, who comes meanwhile, commands it.
+void RobotCycle::hold_drives_in_reset(hal::CommandImage& command) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < resets_.size(); ++j) {
+    const bool owned = run_.in(RunPhase::kRunning) && controllers_->owner(j) >= 0;
+    if (resets_[j] != 0 && !owned) controllers_->hold(j, state_, command);
+  }
+}
+
+void RobotCycle::drive_is_well(std::size_t joint) noexcept TANDEM_RT {
+  watch_.forget(joint);
+  for (std::size_t i = 0; i < faults_.size(); ++i) {
+    const bool of_drive =
+        faults_[i].source == FaultSource::kDrive || faults_[i].source == FaultSource::kJointLost;
+    const bool its = of_drive && faults_[i].index == static_cast<std::int32_t>(joint);
+    if (its && faults_.cleared_ns(i) == FaultLog::kLatched) faults_.clear(i, time_.time_ns);
+  }
 }
 
 }  // namespace tandem::runtime

@@ -48,6 +48,9 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
 LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT {
   using Kind = LoopRequest::Kind;
   if (run_.in(RunPhase::kRetreating)) return {.reason = RejectReason::kNotEnabled};
+  const LoopAnswer not_enabled{.reason = RejectReason::kNotEnabled,
+                               .joint = static_cast<std::int32_t>(request.joint)};
+  const LoopAnswer being_reset{.reason = RejectReason::kResetting, .joint = not_enabled.joint};
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: {
@@ -60,30 +63,37 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     }
     case Kind::kGoOn: return go_on();
     case Kind::kSwitch:
-      if (const LoopAnswer no = controllers_->may_start(request.start);
-          no.reason != RejectReason::kNone) {
+      if (const LoopAnswer no = may_start(request.start); no.reason != RejectReason::kNone) {
         return no;
       }
       if (run_.in(RunPhase::kHeld)) return leave_hold(request.stop, request.start);
       return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
                                        controlled());
     case Kind::kJoint:
+      if (resets_[request.joint] != 0) return being_reset;
       return controllers_->set_joint(request.joint, request.wish, controlling_, state_,
                                      controlled());
     case Kind::kRecover:
-      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) {
-        return {.reason = RejectReason::kNotEnabled};
-      }
+      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) return not_enabled;
+      if (resets_[request.joint] != 0) return being_reset;
       return controllers_->recover(request.joint, controlled());
     case Kind::kMove:
-      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) {
-        return {.reason = RejectReason::kNotEnabled};
-      }
+      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) return not_enabled;
+      if (resets_[request.joint] != 0) return being_reset;
       return controllers_->move(request.joint, request.move, controlling_, state_, controlled());
+    case Kind::kReset: return reset_drive(request.joint);
     case Kind::kGains: break;
   }
   controllers_->gains().set_gains(request.joint, request.loop, request.gains);
   return {};
+}
+
+LoopAnswer RobotCycle::may_start(ControllerSet start) const noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < resets_.size(); ++j) {
+    if (resets_[j] == 0 || !controllers_->is_claimed(j, start)) continue;
+    return {.reason = RejectReason::kResetting, .joint = static_cast<std::int32_t>(j)};
+  }
+  return controllers_->may_start(start);
 }
 
 /// From held joints to controllers: no joint jumps.
@@ -107,7 +117,7 @@ LoopAnswer RobotCycle::go_on() noexcept TANDEM_RT {
   if (stopped) return {.reason = RejectReason::kNotEnabled};
   if (!run_.in(RunPhase::kHeld)) return {.reason = RejectReason::kNotHeld};
   if (held_back_ == 0) return {.reason = RejectReason::kGone};
-  const LoopAnswer no = controllers_->may_start(held_back_);
+  const LoopAnswer no = may_start(held_back_);
   if (no.reason != RejectReason::kNone) return no;
   return leave_hold(0, held_back_);
 }

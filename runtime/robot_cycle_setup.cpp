@@ -3,6 +3,12 @@
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::runtime {
+namespace {
+
+/// Longer than a drive master waits for a fault to go, and then for the drive to be enabled.
+constexpr std::int64_t kDriveReset_ns = 4'000'000'000;
+
+}  // namespace
 
 RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
     : robot_(&parts.robot),
@@ -28,8 +34,11 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       trace_(config.trace_cycles),
       services_(parts.robot, parts.controllers, inbox_, progress_, parts.controllers.gains()),
       joints_(parts.robot.joints.size()),
+      sensors_(parts.robot.sensors.size()),
       joint_limited_(parts.robot.joints.size()),
-      causes_(parts.robot.joints.size()) {
+      causes_(parts.robot.joints.size()),
+      reset_cycles_(static_cast<std::uint64_t>(kDriveReset_ns / config.loop.period_ns)),
+      resets_(parts.robot.joints.size()) {
   progress_.total_cycles = config.running_cycles;
   if (owner_.port != nullptr) owner_.port->on_news([this] { inbox_.bell().ring(); });
 }
@@ -48,7 +57,7 @@ void RobotCycle::archive(Archive& ar) {
   statistics_.archive(ar);
   controllers_->archive(ar);
   ar(time_, started_, controlling_, held_back_, before_retreat_, read_code_, ran_);
-  ar(joint_limited_, faults_);
+  ar(joint_limited_, faults_, resets_);
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {
@@ -93,6 +102,17 @@ std::vector<Fault> RobotCycle::faults() const {
     if (faults_[i].source == FaultSource::kBringUp) out[i].text += ": " + status;
   }
   return out;
+}
+
+std::string RobotCycle::drive_fault(std::size_t joint, std::uint32_t code) const {
+  if (code == 0) return {};
+  hal::FaultCause cause = hal::FaultCause::kDrive;
+  for (std::size_t i = 0; i < faults_.size(); ++i) {
+    const bool its = faults_[i].source == FaultSource::kDrive &&
+                     faults_[i].index == static_cast<std::int32_t>(joint);
+    if (its && faults_.cleared_ns(i) == FaultLog::kLatched) cause = faults_[i].cause;
+  }
+  return backend_->fault_text(cause, code);
 }
 
 }  // namespace tandem::runtime

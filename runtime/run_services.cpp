@@ -31,8 +31,8 @@ struct Words {
 };
 
 /// @param one, other  controllers that stand in the way; empty where there is none
-Words words_of(RejectReason reason, const std::string& joint, const std::string& one,
-               const std::string& other) {
+Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
+               const std::string& one, const std::string& other) {
   switch (reason) {
     case RejectReason::kNone: break;
     case RejectReason::kEnding: return {"the run shuts down", "start another run"};
@@ -69,6 +69,18 @@ Words words_of(RejectReason reason, const std::string& joint, const std::string&
       return {"is on its way back to its limits, which " +
                   (one.empty() ? "this" : "the controller '" + one + "'") + " would end",
               "ask again when it is inside: tandem joint list " + joint + " shows where it is"};
+    case RejectReason::kResetting:
+      return {"its drive is being reset",
+              "ask again when that is over: tandem joint show " + joint};
+    case RejectReason::kNotNow:
+      return {"its drive is not reset in the phase " + std::string(to_string(phase)),
+              "ask again when the run is faulted, held or running"};
+    case RejectReason::kBoardLost:
+      return {"its board is lost, and would come back with all of its joints",
+              "tandem fault reset brings them back together"};
+    case RejectReason::kServed:
+      return {"its drive is reset by the process that serves the robot",
+              "ask that one, or reset every drive: tandem fault reset"};
     case RejectReason::kIncapable:
       return {"cannot be put into this mode", "its [gains] table lacks the loop"};
   }
@@ -84,6 +96,7 @@ RunServices::RunServices(const hal::RobotConfig& robot, ControllerHost& host, In
       inbox_(&inbox),
       progress_(&progress),
       looks_(robot.joints.size()),
+      sensor_looks_(robot.sensors.size()),
       gains_(std::move(parameters)) {}
 
 // Asking the loop.
@@ -157,8 +170,8 @@ std::string RunServices::controller_name(std::int32_t slot) const {
 Error RunServices::refusal(const LoopAnswer& answer) const {
   const std::string joint =
       answer.joint < 0 ? "" : robot_->joints[static_cast<std::size_t>(answer.joint)].name;
-  Words words =
-      words_of(answer.reason, joint, controller_name(answer.one), controller_name(answer.other));
+  Words words = words_of(answer.reason, progress_->phase.load(), joint, controller_name(answer.one),
+                         controller_name(answer.other));
   return {
       .message = std::move(words.message), .hint = std::move(words.hint), .file = {}, .key = joint};
 }

@@ -46,9 +46,10 @@ struct ControllerStatus {
 struct JointStatus {
   std::uint64_t cycle = 0;
   double position_rad = 0.0, velocity_rad_s = 0.0, torque_Nm = 0.0;  ///< measured
-  double acceleration_rad_s2 = 0.0, motor_position_rad = 0.0;    ///< the motor's on the link side
+  double acceleration_rad_s2 = 0.0;
+  double motor_position_rad = 0.0, motor_velocity_rad_s = 0.0;   ///< on the link side
   double current_A = 0.0, voltage_V = 0.0, temperature_C = 0.0;  ///< of the motor
-  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;          ///< commanded
+  double commanded_rad = 0.0, stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;
   std::uint32_t fault = 0;       ///< 0, or the drive's CiA 402 error code
   std::uint32_t age_cycles = 0;  ///< of the sample
   std::int32_t owner = -1;       ///< slot of the active controller that claims it
@@ -56,14 +57,37 @@ struct JointStatus {
   std::uint8_t interaction = 0;  ///< hal::InteractionMode commanded
   std::int8_t drive_mode = 0;    ///< hal::ControlMode in force
   std::uint8_t drive_state = 0;  ///< hal::DriveState
+  std::uint8_t moving = 0;       ///< by move_joint() or recover()
+  std::uint8_t resetting = 0;    ///< by reset_joint()
+  std::uint8_t padding[6] = {};
 };
 
 /// The same with what is known of it besides.
 struct JointInfo {
   std::string name;
-  std::string owner;  ///< controller; empty: nobody
+  std::string owner;    ///< controller; empty: nobody
+  bool slides = false;  ///< prismatic: m and N
   JointStatus look;
   std::array<hal::PidGains, hal::kPidLoops> gains{};  ///< by hal::PidLoop, as asked for last
+};
+
+/// A sensor after the last cycle.
+struct SensorStatus {
+  static constexpr std::size_t kMostChannels = 10;
+
+  std::uint64_t cycle = 0;
+  std::uint64_t age_cycles = 0;                ///< of the sample
+  std::uint64_t valid = 0;                     ///< 1: there is a sample, and it is not too old
+  std::array<double, kMostChannels> values{};  ///< of its channels, hal::channels_of() first ones
+};
+
+/// The same with what is known of it besides.
+struct SensorInfo {
+  std::string name;
+  hal::SensorType type = hal::SensorType::kForceTorque;
+  std::string joint;  ///< force_torque: measures the wrench through this joint
+  std::string link;   ///< the frame of its values
+  SensorStatus look;
 };
 
 /// Gains to set; what is empty stays.
@@ -118,6 +142,8 @@ class RunServices {
 
   /// Every joint, in the image's order.
   [[nodiscard]] std::vector<JointInfo> joints();
+  /// Every sensor, in the image's order.
+  [[nodiscard]] std::vector<SensorInfo> sensors() const;
   /// Mode and interaction of a joint that no active controller claims, impedance of any.
   /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
   /// that the joint lacks; a value beyond its limit (which is named).
@@ -135,14 +161,24 @@ class RunServices {
   /// named); not in position control; outside its limits; not in the phases held or running.
   [[nodiscard]] Result<RequestResult> move_joint(const std::string& joint, const MoveRequest& wish,
                                                  Patience patience = kPatience);
+  /// Clears the latched fault of one drive. In the phase faulted the drive stays disabled and the
+  /// run stopped; else, with a fault that only warned, the joint is enabled and held where it is.
+  /// Done means begun: JointStatus::resetting.
+  /// Errors: unknown joint; claimed, while controllers run; its board is lost; the drives are
+  /// another process'; another phase than faulted, held, settling, running.
+  [[nodiscard]] Result<RequestResult> reset_joint(const std::string& joint,
+                                                  Patience patience = kPatience);
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
   [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,
                                                 const GainsRequest& wish,
                                                 Patience patience = kPatience);
 
-  /// The loop's: shows the joints. @rt wait-free.
+  /// The loop's: shows the joints, and the sensors. @rt wait-free.
   void show(std::span<const JointStatus> joints) noexcept TANDEM_RT { looks_.write(joints); }
+  void show(std::span<const SensorStatus> sensors) noexcept TANDEM_RT {
+    sensor_looks_.write(sensors);
+  }
   /// Between two steps: the run has been set back to a snapshot.
   void restored(const hal::ParameterImage& parameters);
 
@@ -173,6 +209,7 @@ class RunServices {
   Inbox* inbox_;
   const Progress* progress_;
   Seqlock<JointStatus> looks_;
+  Seqlock<SensorStatus> sensor_looks_;
 
   std::mutex mutex_;           // of all below, and of the asking side of inbox and host
   hal::ParameterImage gains_;  // as asked for last

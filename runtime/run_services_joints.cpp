@@ -65,10 +65,22 @@ std::vector<JointInfo> RunServices::joints() {
     JointInfo& joint = all.emplace_back();
     joint.name = robot_->joints[j].name;
     joint.owner = controller_name(now[j].owner);
+    joint.slides = robot_->joints[j].slides;
     joint.look = now[j];
     for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop) {
       joint.gains[loop] = gains_.gains(j, static_cast<hal::PidLoop>(loop));
     }
+  }
+  return all;
+}
+
+std::vector<SensorInfo> RunServices::sensors() const {
+  std::vector<SensorStatus> now(robot_->sensors.size());
+  while (!sensor_looks_.read(now)) std::this_thread::yield();
+  std::vector<SensorInfo> all;
+  for (std::size_t s = 0; s < now.size(); ++s) {
+    const hal::SensorConfig& sensor = robot_->sensors[s];
+    all.push_back({sensor.name, sensor.type, sensor.joint, sensor.link, now[s]});
   }
   return all;
 }
@@ -131,6 +143,14 @@ Result<RequestResult> RunServices::recover(const std::string& joint, Patience pa
   if (!index) return std::unexpected(index.error());
   return ask(lock,
              {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
+             patience);
+}
+
+Result<RequestResult> RunServices::reset_joint(const std::string& joint, Patience patience) {
+  Lock lock(mutex_);
+  const Result<std::size_t> index = joint_to_change(joint);
+  if (!index) return std::unexpected(index.error());
+  return ask(lock, {.kind = LoopRequest::Kind::kReset, .joint = static_cast<std::uint32_t>(*index)},
              patience);
 }
 

@@ -10,6 +10,7 @@
 #include "apps/control/controller_control.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/control/joint_control.hpp"
+#include "apps/control/sensor_control.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -112,7 +113,7 @@ Result<Json> stop(runtime::RobotCycle& cycle, const Json& request, hal::StopCate
 }  // namespace
 
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot, std::vector<std::string> slides) {
+                      const hal::RobotConfig& robot) {
   registry.add("status", ControlEffect::kReads, "phase and counts of the run", {},
                [&cycle](const Json&) -> Result<Json> { return status(cycle); });
   registry.add("fault.show", ControlEffect::kReads, "every fault of the run, latched or cleared",
@@ -137,7 +138,8 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  return Json::object();
                });
   add_controller_commands(registry, cycle.services(), robot);
-  add_joint_commands(registry, cycle.services(), std::move(slides));
+  add_joint_commands(registry, cycle);
+  add_sensor_commands(registry, cycle.services());
   add_clock_commands(registry, cycle);
 }
 

@@ -8,9 +8,8 @@
 namespace tandem::apps {
 
 /// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
-/// controllers, joints and clock. Cycle and robot outlive the registry.
-/// @param slides  names of the joints that slide; the others turn
+/// controllers, joints, sensors and clock. Cycle and robot outlive the registry.
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
-                      const hal::RobotConfig& robot, std::vector<std::string> slides = {});
+                      const hal::RobotConfig& robot);
 
 }  // namespace tandem::apps

@@ -85,14 +85,11 @@ std::optional<Error> too_weak_at(const RobotFiles& robot, const std::string& pos
   if (weak.empty()) return {};
   const Weak& worst = weak.front();
   const bool by_limit = worst.has >= worst.joint->max_torque_Nm;
-  const int index = robot.tree.joint_index(worst.joint->name);
-  const bool slides =
-      robot.tree.joints[static_cast<std::size_t>(index)].type == model::JointType::kPrismatic;
   Error error;
   error.message = fmt::format(
       "gravity asks {:.3g} {} of it {}, and it can give {:.3g}: it will sag, or stop with a "
       "fault{}",
-      worst.needs, slides ? "N" : "Nm",
+      worst.needs, worst.joint->slides ? "N" : "Nm",
       posture.empty() ? "with every joint at 0" : "in the posture '" + posture + "'", worst.has,
       weak.size() == 1 ? "" : fmt::format("; so will {} more", weak.size() - 1));
   error.hint = fmt::format("raise {}, or start in another posture",

@@ -32,15 +32,6 @@
 namespace tandem::apps {
 namespace {
 
-/// Joints whose positions are metres.
-std::vector<std::string> slides_of(const model::Tree& tree) {
-  std::vector<std::string> names;
-  for (const model::Joint& joint : tree.joints) {
-    if (joint.type == model::JointType::kPrismatic) names.push_back(joint.name);
-  }
-  return names;
-}
-
 std::vector<std::string> fault_texts(const runtime::RobotCycle& cycle,
                                      const std::optional<log::RecordingResult>& log) {
   std::vector<std::string> texts;
@@ -230,7 +221,7 @@ class Session {
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
   Status open_inputs() {
     const runtime::Experiment& e = experiment();
-    add_run_commands(commands_, *cycle_, e.robot, slides_of(c_.tree));
+    add_run_commands(commands_, *cycle_, e.robot);
     if (dds_ != nullptr) admission_.add_to(commands_);
     if (c_.sim != nullptr) {
       add_inject(commands_, e.robot, e.loop.period_ns, [this](const sim::Fault& fault) -> Status {

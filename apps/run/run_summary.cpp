@@ -92,13 +92,6 @@ std::string microseconds(const rt::Percentiles& p) {
                      us(p.max));
 }
 
-/// Whether a joint's positions are metres.
-bool slides(const model::Tree& tree, const std::string& joint) {
-  const int index = tree.joint_index(joint);
-  return index >= 0 &&
-         tree.joints[static_cast<std::size_t>(index)].type == model::JointType::kPrismatic;
-}
-
 void print_worst_joints(const RunSummary& s, std::FILE* out) {
   struct Row {
     std::string joint;
@@ -108,8 +101,8 @@ void print_worst_joints(const RunSummary& s, std::FILE* out) {
   std::vector<Row> rows;
   const auto tracking = s.cycle.statistics().tracking();
   for (std::size_t i = 0; i < tracking.size(); ++i) {
-    const std::string& joint = s.composition.experiment.robot.joints[i].name;
-    rows.push_back({joint, slides(s.composition.tree, joint), tracking[i]});
+    const hal::JointConfig& joint = s.composition.experiment.robot.joints[i];
+    rows.push_back({joint.name, joint.slides, tracking[i]});
   }
   if (rows.empty()) return;
   std::ranges::stable_sort(rows, std::ranges::greater{},

@@ -57,6 +57,7 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   const ActuatorConfig& actuator = robot.actuator_of(joint);
   const GainsConfig& gains = robot.gains_of(joint);
   JointCapabilities out;
+  out.slides = joint.slides;
   out.min_position_rad = joint.min_position_rad;
   out.max_position_rad = joint.max_position_rad;
   out.max_velocity_rad_s = joint.max_velocity_rad_s;

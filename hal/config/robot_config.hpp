@@ -143,6 +143,7 @@ struct JointConfig {
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
   std::optional<BrakeConfig> brake = {};
+  bool slides = false;  ///< prismatic: m and N; the URDF's, by complete_from_description()
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int on_fault_line = 0;                             ///< in the TOML, for messages
   int line = 0;                                      ///< the same
@@ -313,6 +314,7 @@ struct JointDescription {
   double max_velocity_rad_s;
   double max_torque_Nm;
   std::string limits_note = {};  ///< what is wrong with the URDF's limits, and where; or empty
+  bool slides = false;           ///< prismatic: m and N
 };
 
 /// A joint that mimics another, and where it lets that one go. Infinite where it sets no limit.
@@ -342,7 +344,8 @@ struct RobotDescription {
 [[nodiscard]] Diagnostics check_names(const RobotConfig& robot,
                                       const std::vector<JointReference>& loose);
 
-/// Checks the configuration against its URDF and fills the limits that the TOML left to it.
+/// Checks the configuration against its URDF and fills what it leaves to that: limits, and which
+/// joints slide.
 /// A joint without position limits (continuous) gets what its 32-bit encoder can count.
 /// Errors: a [[joint]] that is not a moving joint of the URDF (the nearest name is suggested) or
 /// follows another, a moving joint without [[joint]], [[passive]] or lock, a site or sensor on an

@@ -267,6 +267,7 @@ class Completion : private Check {
   void complete(JointConfig& joint, const JointDescription& found) {
     const std::string key = "joint." + joint.name;
     const double countable = countable_rad(joint);
+    joint.slides = found.slides;
     fill_position(joint.min_position_rad, found.min_position_rad, countable, "min_position_rad");
     fill_position(joint.max_position_rad, found.max_position_rad, countable, "max_position_rad");
     check_limits(joint, key, countable);

@@ -66,6 +66,8 @@ class RemoteBackend final : public hal::Backend {
   [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override;
   void stop(hal::StopCategory category) noexcept TANDEM_RT override;
   void reset() noexcept TANDEM_RT override;
+  /// The server is asked for the reset of all.
+  [[nodiscard]] bool resets_one_joint() const noexcept TANDEM_RT override { return false; }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;
 

@@ -73,6 +73,13 @@ TEST(PluginLoader, TakesALibraryOfHeadersInWhichOnlyTheWiringDiffers) {
   EXPECT_STREQ(loaded->plugin().name, "sway");
 }
 
+// Whether a joint slides is told in a byte that was free: nothing else has moved.
+TEST(PluginLoader, TakesALibraryOfHeadersInWhichNoJointSaysWhetherItSlides) {
+  const auto loaded = load_controller("before_slides", kBroken);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().to_string();
+  EXPECT_STREQ(loaded->plugin().name, "sway");
+}
+
 TEST(PluginLoader, RefusesALibraryOfAnotherCompiler) {
   const auto loaded = load_controller("other_compiler", kBroken);
   ASSERT_FALSE(loaded.has_value());

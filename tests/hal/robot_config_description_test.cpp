@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "hal/config/capabilities.hpp"
 #include "tests/hal/robot_config_text.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -35,6 +36,15 @@ TEST_F(Completed, TakesMissingLimitsFromTheDescription) {
   EXPECT_EQ(robot.joints[0].rated_torque_Nm, 100.0);
   EXPECT_EQ(robot.joints[1].max_torque_Nm, 80.0);
   EXPECT_EQ(robot.joints[1].max_velocity_rad_s, 6.0);
+}
+
+TEST_F(Completed, KnowsWhichJointsSlide) {
+  description_.moving_joints[1].slides = true;
+  read(kRobot);
+  EXPECT_FALSE(robot.joints[0].slides);
+  EXPECT_TRUE(robot.joints[1].slides);
+  EXPECT_FALSE(robot_of(robot).joints[0].slides);
+  EXPECT_TRUE(robot_of(robot).joints[1].slides) << "controllers know it too";
 }
 
 TEST_F(Completed, GivesAContinuousJointWhatItsEncoderCounts) {

@@ -32,6 +32,9 @@ class FirstOrderRobot : public hal::Backend {
   hal::TruthImage truth;                                 // its feet and base are the test's to set
   std::uint64_t idle_writes = 0;                         // commands with every joint idle
   bool reset_clears = true;                              // false: the cause is still there
+  bool resets_alone = true;                              // one joint's drive can be reset
+  std::uint64_t single_resets = 0;                       // that write() was told of
+  hal::FaultCause cause = hal::FaultCause::kDrive;       // of a faulted joint
   std::uint64_t stops = 0;                               // calls of stop()
   hal::StopCategory latched = hal::StopCategory::kWarn;  // by stop()
 
@@ -53,7 +56,8 @@ class FirstOrderRobot : public hal::Backend {
     const double dt = static_cast<double>(time.period_ns) * 1e-9;
     for (std::size_t j = 0; j < position_.size(); ++j) {
       const double before = position_[j];
-      if (follows() &&
+      const bool faulted = faulted_joint == static_cast<int>(j);
+      if (follows() && !faulted &&
           command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
         position_[j] += kShare * (command_.position_rad()[j] - position_[j]);
       }
@@ -64,7 +68,6 @@ class FirstOrderRobot : public hal::Backend {
       state.position_rad()[j] = position_[j];
       state.velocity_rad_s()[j] = velocity_[j];
       state.mode()[j] = command_.mode()[j];
-      const bool faulted = faulted_joint == static_cast<int>(j);
       state.fault()[j] = faulted ? 0x7310 : 0;
       state.drive_state()[j] =
           static_cast<std::uint8_t>(faulted     ? hal::DriveState::kFault
@@ -81,6 +84,11 @@ class FirstOrderRobot : public hal::Backend {
   }
   Code write(const hal::CommandImage& command, const hal::ParameterImage&) noexcept override {
     command_.assign(command);
+    for (std::size_t j = 0; j < position_.size(); ++j) {
+      if (command.fault_reset()[j] == 0) continue;
+      ++single_resets;
+      if (reset_clears && faulted_joint == static_cast<int>(j)) faulted_joint = -1;
+    }
     bool idle = true;
     for (const std::int8_t mode : command.mode()) idle = idle && mode == 0;
     if (idle) ++idle_writes;
@@ -97,6 +105,8 @@ class FirstOrderRobot : public hal::Backend {
     faulted_joint = lost_joint = -1;
     enabling_ = kEnablingCycles;
   }
+  bool resets_one_joint() const noexcept override { return resets_alone; }
+  hal::FaultCause fault_cause(std::size_t) const noexcept override { return cause; }
   bool shut_down() noexcept override { return ++shutting_down_ >= shut_down_cycles; }
   bool archive(Archive& ar) override {
     ar(position_, velocity_, command_, truth, cycles_, shutting_down_, enabling_, latched);

@@ -127,6 +127,64 @@ TEST_F(Swing, IsHeldAfterAResetAndLedOverWithoutABumpWhenItsControllerIsStarted)
   EXPECT_LT(torque_step(50), first_start_Nm + kBump_Nm) << "as at the first start";
 }
 
+/// One amplifier's fault, while the run is stopped: nothing is enabled by its reset.
+TEST_F(Swing, StaysDisabledWhenOnlyItsDriveIsReset) {
+  begin(StopCategory::kCategory1, AfterReset::kHold);
+  inject(FaultKind::kEncoderUnplug, 5);
+  come_to_rest();
+  ASSERT_NE(cycle->state().fault()[0], 0U);
+  ASSERT_TRUE(cycle->services().reset_joint("swing", RunServices::Patience{0}));
+  steps(100);
+  EXPECT_EQ(cycle->state().fault()[0], 0U);
+  EXPECT_EQ(cycle->services().joints()[0].look.resetting, 0);
+  for (int i = 0; i < 1000; ++i) {
+    steps(1);
+    ASSERT_FALSE(powered());
+  }
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(cycle->fault_log().latched(), 1U) << "the run's stop is";
+  cycle->inbox().reset_faults();
+  until(RunPhase::kHeld);
+  EXPECT_TRUE(powered());
+}
+
+/// Its fault only warned: the run goes on, and the drive comes back where the joint is.
+TEST_F(Swing, IsHeldWhereItIsWhenItsDriveIsResetAndNobodyHasIt) {
+  begin(StopCategory::kWarn);
+  inject(FaultKind::kEncoderUnplug, 5);
+  come_to_rest();
+  const double rest = cycle->state().position_rad()[0];
+  ASSERT_TRUE(cycle->services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  steps(1);
+  ASSERT_TRUE(cycle->services().reset_joint("swing", RunServices::Patience{0}));
+  int taken = 0;
+  for (; taken < 3000 && !powered(); ++taken) steps(1);
+  EXPECT_LT(taken, 1000);
+  steps(1000);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_NEAR(cycle->command().position_rad()[0], rest, 1e-3);
+  EXPECT_NEAR(cycle->state().position_rad()[0], rest, 0.02) << "it moves by its weight only";
+  EXPECT_EQ(cycle->fault_log().latched(), 0U);
+  inject(FaultKind::kEncoderUnplug, 5);
+  steps(50);
+  EXPECT_EQ(cycle->fault_log().latched(), 1U) << "the next one is told, too";
+}
+
+/// Nothing takes a second attempt by itself when the cause goes away later.
+TEST_F(Swing, StaysInFaultWhenTheCauseOutlastsTheReset) {
+  begin(StopCategory::kCategory1, AfterReset::kHold);
+  inject(FaultKind::kEncoderUnplug, 6000);
+  steps(500);
+  ASSERT_TRUE(cycle->services().reset_joint("swing", RunServices::Patience{0}));
+  steps(10);
+  EXPECT_EQ(cycle->services().joints()[0].look.resetting, 1);
+  steps(4000);
+  EXPECT_EQ(cycle->services().joints()[0].look.resetting, 0);
+  steps(3000);
+  EXPECT_NE(cycle->state().fault()[0], 0U);
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+}
+
 /// It hangs at 0, where it may not go.
 TEST_F(Swing, IsHeldBeyondItsLimitAndLedBackSlowly) {
   min_position_rad = 0.3;
