@@ -82,7 +82,7 @@ TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
   const auto tests = matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp") +
                                  text_of(kRoot / "tests/runtime/fault_rows_coman_test.cpp") +
                                  text_of(kRoot / "tests/runtime/fault_rows_wire_test.cpp"),
-                             "TEST\\(FaultRow, (\\w+)\\)");
+                             "TEST(?:_P)?\\(FaultRow, (\\w+)\\)");
   EXPECT_GT(tests.size(), 20U);
   EXPECT_EQ(named, tests);
 }

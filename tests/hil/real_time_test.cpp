@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
+#include <algorithm>
 #include <atomic>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -15,6 +16,7 @@ namespace {
 class RealTime : public OwnFolder {
  protected:
   static constexpr double kPeriodS = 0.01;
+  static constexpr std::size_t kBringUpSyncs = 20;  // more of them without an answer: bring-up
 
   void SetUp() override {
     const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/double_pendulum";
@@ -59,15 +61,29 @@ TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
   EXPECT_EQ(emulated["frames_lost"], 0);
 
   std::vector<double> syncs;
-  std::size_t answers = 0;
+  std::size_t asked = 0, answered = 0, since = 0;
   for (const LoggedFrame& frame : candump.stop()) {
-    if (frame.id() == "080") syncs.push_back(frame.time_s);
-    if (frame.id() == "181") ++answers;
+    if (frame.id() == "080") {
+      syncs.push_back(frame.time_s);
+      ++since;
+    } else if (frame.id() == "181") {
+      if (since <= kBringUpSyncs) asked += since;
+      if (since <= kBringUpSyncs && since > 0) ++answered;
+      since = 0;
+    }
   }
   ASSERT_GT(syncs.size(), 200U);
-  EXPECT_GT(answers, 200U);
-  // A free run is fifty times faster.
-  EXPECT_GT(syncs.back() - syncs.front(), 0.5 * kPeriodS * static_cast<double>(syncs.size()));
+  EXPECT_GT(answered, 200U);
+  EXPECT_GT(static_cast<double>(answered), 0.6 * static_cast<double>(asked)) << asked;
+
+  // Between the runs there is time for many cycles, so the whole says nothing of the pace.
+  std::vector<double> periods_s;
+  for (std::size_t i = 1; i < syncs.size(); ++i) periods_s.push_back(syncs[i] - syncs[i - 1]);
+  std::ranges::nth_element(periods_s, periods_s.begin() + std::ssize(periods_s) / 2);
+  EXPECT_GT(periods_s[periods_s.size() / 2], 0.9 * kPeriodS);
+  for (std::size_t i = 100; i < syncs.size(); ++i) {  // late ones and no burst that makes up for it
+    ASSERT_GT(syncs[i] - syncs[i - 100], 0.5 * 100.0 * kPeriodS) << "SYNC " << i;
+  }
 }
 
 // It had been let in, had reset the nodes, and had taken the torque from the running robot.

@@ -145,17 +145,18 @@ class Owner {
                                   config);
   }
 
-  explicit Owner(const ClientConfig& config, runtime::CycleConfig cycle_config = {})
-      : robot(hal::test::fake_robot()),
-        participant_(participant("owner")),
-        host(robot, nullptr, kPeriod_ns) {
+  explicit Owner(const ClientConfig& config, runtime::CycleConfig cycle_config = {},
+                 hal::RobotConfig of = hal::test::fake_robot(), double amplitude_rad = 0.2)
+      : robot(std::move(of)), participant_(participant("owner")), host(robot, nullptr, kPeriod_ns) {
     auto made = connect(*participant_, config, robot);
     EXPECT_TRUE(made) << made.error().to_string();
     if (!made) return;
     backend = std::move(*made);
     auto sine = std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0});
     controller = sine.get();
-    EXPECT_TRUE(host.add("sine", sine, runtime::test::parameters()));
+    EXPECT_TRUE(
+        host.add("sine", sine,
+                 runtime::test::parameters("amplitude_rad = " + std::to_string(amplitude_rad))));
     cycle_config.bring_up_cycles = ~std::uint64_t{0};
     cycle_config.loop.pacing = config.lockstep ? rt::Pacing::kSimulated : rt::Pacing::kExternal;
     cycle = std::make_unique<RobotCycle>(runtime::CycleParts{robot, *backend, host, clock},

@@ -11,9 +11,10 @@ using namespace test;
 constexpr double kHeld_rad = 0.01;  // what docs/safety.md says
 
 /// The UR5e with a brake on every joint; without torque_Nm with none.
-struct BrakedArm : private Ur5e, FaultRig {
+struct BrakedArm : private LoadedRobot, FaultRig {
   explicit BrakedArm(double share_of_torque, int release_ms = 50, int engage_ms = 20)
-      : FaultRig(with(loaded.robot, share_of_torque, release_ms, engage_ms), loaded.kernels.get(),
+      : LoadedRobot("ur5e"),
+        FaultRig(with(loaded.robot, share_of_torque, release_ms, engage_ms), loaded.kernels.get(),
                  "ready") {}
   static hal::RobotConfig with(hal::RobotConfig config, double share, int release_ms,
                                int engage_ms) {

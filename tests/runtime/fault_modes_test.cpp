@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(
 class Category : public testing::TestWithParam<hal::StopCategory> {};
 
 TEST_P(Category, IsWhatTheOtherJointsDoWhenABoardDies) {
-  ArmRig rig({}, GetParam());
+  RowRig rig("ur5e", {}, GetParam());
   rig.run();
   rig.inject(of(FaultKind::kBoardKill));
   for (int i = 0; i < 40; ++i) rig.step();

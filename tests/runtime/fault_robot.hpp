@@ -114,12 +114,12 @@ struct Outcome {
 /// A whole run: one joint moves on a sine, the others are held.
 struct FaultRig {
   FaultRig(hal::RobotConfig config, const tandem_kernels* kernels, const std::string& posture,
-           std::vector<sim::Fault> scenario = {})
+           std::vector<sim::Fault> scenario = {}, std::int64_t release_ns = 100'000'000)
       : robot(std::move(config)), host(robot, kernels, 1'000'000) {
     backend = std::make_unique<FaultRobot>(
         robot, kernels,
         sim::SimRobotConfig{
-            .posture = posture, .release_ns = 100'000'000, .faults = std::move(scenario)});
+            .posture = posture, .release_ns = release_ns, .faults = std::move(scenario)});
     auto moves = std::make_shared<Sine>(std::vector<std::size_t>{0});
     sine = moves.get();
     EXPECT_TRUE(host.add("sine", std::move(moves), parameters("amplitude_rad = 0.1")));

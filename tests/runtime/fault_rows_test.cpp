@@ -30,17 +30,21 @@ Outcome watch_without_master(FaultRig& rig) {
   return found;
 }
 
+INSTANTIATE_TEST_SUITE_P(Robots, FaultRow, testing::Values("ur5e", "coman"),
+                         [](const auto& one) { return std::string(one.param); });
+
 // --- the master and its loop ---
 
-TEST(FaultRow, MasterDies) {
-  ArmRig rig;
+TEST_P(FaultRow, MasterDies) {
+  RowRig rig(GetParam());
   rig.run();
   expect_row(watch_without_master(rig));
-  for (std::size_t b = 0; b < 3; ++b) EXPECT_EQ(rig.axis(b).objects().error_code, 0x8700);
+  for (std::size_t b = 0; b < rig.robot.boards.size(); ++b)
+    EXPECT_EQ(rig.axis(b).objects().error_code, 0x8700);
 }
 
-TEST(FaultRow, LoopStallsForTenCycles) {
-  ArmRig rig;
+TEST_P(FaultRow, LoopStallsForTenCycles) {
+  RowRig rig(GetParam());
   rig.run();
   for (int i = 0; i < 10; ++i) rig.backend->without_master();
   for (int i = 0; i < 100; ++i) rig.step();
@@ -48,8 +52,8 @@ TEST(FaultRow, LoopStallsForTenCycles) {
   expect_row({});
 }
 
-TEST(FaultRow, LoopStallsForLonger) {
-  ArmRig rig;
+TEST_P(FaultRow, LoopStallsForLonger) {
+  RowRig rig(GetParam());
   rig.run();
   Outcome found;
   for (int i = 1; i <= 2000 && found.open < 0; ++i) {
@@ -66,24 +70,24 @@ TEST(FaultRow, LoopStallsForLonger) {
 
 // --- emergency stop ---
 
-TEST(FaultRow, EmergencyStopByABoardsInput) {
-  ArmRig rig;
+TEST_P(FaultRow, EmergencyStopByABoardsInput) {
+  RowRig rig(GetParam());
   rig.run();
   rig.inject(of(FaultKind::kEmergencyStop));
   expect_row(rig.watch());
   expect_stopped(rig, "emergency stop");
 }
 
-TEST(FaultRow, EmergencyStopByRequest) {
-  ArmRig rig;
+TEST_P(FaultRow, EmergencyStopByRequest) {
+  RowRig rig(GetParam());
   rig.run();
   rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("emergency stop on request"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
-  ArmRig rig({}, hal::StopCategory::kHold);
+TEST_P(FaultRow, EmergencyStopWhileHeldAfterAReset) {
+  RowRig rig(GetParam(), {}, hal::StopCategory::kHold);
   rig.run();
   Fault unplugged = of(FaultKind::kEncoderUnplug);
   unplugged.duration_ns = 5'000'000;
@@ -93,7 +97,7 @@ TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
   rig.cycle->inbox().reset_faults();
   for (int i = 0; i < 5000 && rig.cycle->phase() != RunPhase::kHeld; ++i) rig.step();
   ASSERT_EQ(rig.cycle->phase(), RunPhase::kHeld) << rig.causes();
-  for (std::size_t b = 0; b < 3; ++b) {
+  for (std::size_t b = 0; b < rig.robot.boards.size(); ++b) {
     EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kFollow) << "enabled, and at rest";
   }
   const std::uint64_t ran = rig.cycle->running_cycles();
@@ -104,8 +108,8 @@ TEST(FaultRow, EmergencyStopWhileHeldAfterAReset) {
   EXPECT_EQ(rig.cycle->faults().at(1).text, "emergency stop on request");
 }
 
-TEST(FaultRow, EmergencyStopOfCategory0) {
-  ArmRig rig;
+TEST_P(FaultRow, EmergencyStopOfCategory0) {
+  RowRig rig(GetParam());
   rig.run();
   rig.cycle->inbox().emergency_stop(hal::StopCategory::kCategory0);
   const Outcome found = rig.watch();
@@ -113,9 +117,9 @@ TEST(FaultRow, EmergencyStopOfCategory0) {
   EXPECT_EQ(found.open, found.safe) << "no braking";
 }
 
-TEST(FaultRow, EmergencyStopBySignal) {
+TEST_P(FaultRow, EmergencyStopBySignal) {
   rt::install_emergency_signal();
-  ArmRig rig;
+  RowRig rig(GetParam());
   rig.run();
   ASSERT_EQ(::raise(SIGUSR1), 0);
   expect_row(rig.watch());
@@ -124,16 +128,16 @@ TEST(FaultRow, EmergencyStopBySignal) {
 
 // --- boards and sensor nodes ---
 
-TEST(FaultRow, BoardResets) {
-  ArmRig rig;
+TEST_P(FaultRow, BoardResets) {
+  RowRig rig(GetParam());
   rig.run();
   rig.inject(of(FaultKind::kBoardReset));
   expect_row(rig.watch());
   expect_stopped(rig, "booted again by itself");
 }
 
-TEST(FaultRow, BoardDies) {
-  ArmRig rig;
+TEST_P(FaultRow, BoardDies) {
+  RowRig rig(GetParam());
   rig.run();
   rig.inject(of(FaultKind::kBoardKill));
   expect_row(rig.watch());
@@ -141,14 +145,14 @@ TEST(FaultRow, BoardDies) {
   expect_stopped(rig, "no complete TPDO for 10 cycles");
 }
 
-TEST(FaultRow, TwoBoardsShareANodeId) {
-  ArmRig rig({of(FaultKind::kBoardDuplicate)});
+TEST_P(FaultRow, TwoBoardsShareANodeId) {
+  RowRig rig(GetParam(), {of(FaultKind::kBoardDuplicate)});
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("two nodes answer under this id"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, AnswersComeTwice) {
-  ArmRig rig;
+TEST_P(FaultRow, AnswersComeTwice) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = lose(kFeedbackOfBoard0, 0);
   fault.kind = FaultKind::kFrameDuplicate;
@@ -157,30 +161,30 @@ TEST(FaultRow, AnswersComeTwice) {
   expect_stopped(rig, "two nodes answer under this id");
 }
 
-TEST(FaultRow, WrongIdentity) {
+TEST_P(FaultRow, WrongIdentity) {
   Fault fault = of(FaultKind::kBoardIdentity);
   fault.number = 0x1234;
-  ArmRig rig({fault});
+  RowRig rig(GetParam(), {fault});
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("wrong product code"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, WrongFirmwareVersion) {
+TEST_P(FaultRow, WrongFirmwareVersion) {
   Fault fault = of(FaultKind::kBoardRevision);
   fault.number = 0x00020000;
-  ArmRig rig({fault});
+  RowRig rig(GetParam(), {fault});
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("wrong revision"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, NodeMissingAtStart) {
-  ArmRig rig({of(FaultKind::kBoardKill)});
+TEST_P(FaultRow, NodeMissingAtStart) {
+  RowRig rig(GetParam(), {of(FaultKind::kBoardKill)});
   expect_row(rig.watch(6000));
   EXPECT_NE(rig.causes().find("no boot-up message within 3 s"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, SensorNodeDies) {
-  ArmRig rig;
+TEST_P(FaultRow, SensorNodeDies) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = of(FaultKind::kBoardKill);
   fault.board = -1;
@@ -194,23 +198,23 @@ TEST(FaultRow, SensorNodeDies) {
   expect_row(found);
   EXPECT_EQ(rig.cycle->phase(), RunPhase::kRunning) << "it moves nothing";
   EXPECT_EQ(rig.cycle->faults()[0].joint, rig.robot.sensors[0].name);
-  for (std::size_t b = 0; b < 3; ++b) {
+  for (std::size_t b = 0; b < rig.robot.boards.size(); ++b) {
     EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kFollow);
   }
 }
 
 // --- joints ---
 
-TEST(FaultRow, EncoderFreezes) {
-  ArmRig rig;
+TEST_P(FaultRow, EncoderFreezes) {
+  RowRig rig(GetParam());
   rig.run();
   rig.inject(of(FaultKind::kEncoderFreeze));
   expect_row(rig.watch());
   expect_stopped(rig, "0x7320");
 }
 
-TEST(FaultRow, EncoderFreezesAtRest) {
-  ArmRig rig;
+TEST_P(FaultRow, EncoderFreezesAtRest) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = of(FaultKind::kEncoderFreeze);
   fault.joint = 2;  // is held
@@ -218,10 +222,15 @@ TEST(FaultRow, EncoderFreezesAtRest) {
   for (int i = 0; i < 500; ++i) rig.step();
   expect_running(rig);
   expect_row({});
+  const double from_rad = rig.cycle->command().position_rad()[2];
+  ASSERT_TRUE(rig.cycle->services().move_joint(
+      rig.robot.joints[2].name, {.target_rad = from_rad + 0.05}, RunServices::Patience{0}));
+  EXPECT_GT(rig.watch().safe, 0) << "it did freeze";
+  EXPECT_NE(rig.causes().find("0x7320"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, EncoderJumps) {
-  ArmRig rig;
+TEST_P(FaultRow, EncoderJumps) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = of(FaultKind::kEncoderJump);
   fault.value = 0.05;
@@ -230,8 +239,8 @@ TEST(FaultRow, EncoderJumps) {
   expect_stopped(rig, "0x7320");
 }
 
-TEST(FaultRow, EncoderUnplugged) {
-  ArmRig rig;
+TEST_P(FaultRow, EncoderUnplugged) {
+  RowRig rig(GetParam());
   rig.run();
   rig.inject(of(FaultKind::kEncoderUnplug));
   expect_row(rig.watch());
@@ -246,8 +255,16 @@ TEST(FaultRow, SpringBreaks) {
   EXPECT_NE(rig.causes().find("0x7320"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, MotorOverheats) {
-  ArmRig rig;
+TEST(FaultRow, SpringOfComanBreaks) {
+  RowRig rig("coman");
+  rig.run();
+  rig.inject(of(FaultKind::kSpringBreak));
+  expect_row(rig.watch());
+  expect_stopped(rig, "0x7320");
+}
+
+TEST_P(FaultRow, MotorOverheats) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = of(FaultKind::kMotorOverheat);
   fault.value = 130.0;
@@ -256,8 +273,8 @@ TEST(FaultRow, MotorOverheats) {
   expect_stopped(rig, "0x4310");
 }
 
-TEST(FaultRow, SupplySags) {
-  ArmRig rig;
+TEST_P(FaultRow, SupplySags) {
+  RowRig rig(GetParam());
   rig.run();
   Fault fault = of(FaultKind::kSupplySag);
   fault.value = 20.0;  // of 48 V
@@ -266,12 +283,16 @@ TEST(FaultRow, SupplySags) {
   expect_stopped(rig, "0x3100");
 }
 
-TEST(FaultRow, JointRings) {
-  ArmRig rig;
+TEST_P(FaultRow, JointRings) {
+  RowRig rig(GetParam());
   rig.run();
-  ASSERT_TRUE(rig.cycle->services().set_gains("shoulder_pan_joint", hal::PidLoop::kPosition,
-                                              {.kp = 1.4e6, .kd = 14'000.0},
-                                              RunServices::Patience{0}));
+  const hal::JointConfig& joint = rig.robot.joints[0];
+  const auto gains = std::ranges::find(rig.robot.gains, joint.gains, &hal::GainsConfig::name);
+  ASSERT_NE(gains, rig.robot.gains.end());
+  ASSERT_TRUE(rig.cycle->services().set_gains(
+      joint.name, hal::PidLoop::kPosition,
+      {.kp = 175.0 * gains->position.gains.kp, .kd = 50.0 * gains->position.gains.kd},
+      RunServices::Patience{0}));
   expect_row(rig.watch());
   expect_stopped(rig, "0xFF03");
   EXPECT_NE(rig.causes().find("the joint oscillates"), std::string::npos) << rig.causes();
@@ -279,16 +300,16 @@ TEST(FaultRow, JointRings) {
 
 // --- controllers ---
 
-TEST(FaultRow, ControllerGivesNaN) {
-  ArmRig rig;
+TEST_P(FaultRow, ControllerGivesNaN) {
+  RowRig rig(GetParam());
   rig.run();
   rig.sine->not_finite = true;
   expect_row(rig.watch());
   EXPECT_NE(rig.causes().find("not a finite number"), std::string::npos) << rig.causes();
 }
 
-TEST(FaultRow, ControllerGivesUp) {
-  ArmRig rig;
+TEST_P(FaultRow, ControllerGivesUp) {
+  RowRig rig(GetParam());
   rig.run();
   rig.sine->answer = Code::kOutOfRange;
   expect_row(rig.watch());

@@ -27,6 +27,7 @@ class FirstOrderRobot : public hal::Backend {
   std::uint64_t bring_up_cycles = 20;
   std::uint64_t shut_down_cycles = 3;
   Code answer = Code::kOk;  // of read()
+  double sag_rad = 0.0;     // a joint at rest stands so far below its reference
   int faulted_joint = -1, lost_joint = -1, lost_sensor = -1;
   bool latch_on_fault = false;                           // phase() turns kFault with a joint
   hal::TruthImage truth;                                 // its feet and base are the test's to set
@@ -59,7 +60,7 @@ class FirstOrderRobot : public hal::Backend {
       const bool faulted = faulted_joint == static_cast<int>(j);
       if (follows() && !faulted &&
           command_.mode()[j] == static_cast<std::int8_t>(hal::ControlMode::kPosition)) {
-        position_[j] += kShare * (command_.position_rad()[j] - position_[j]);
+        position_[j] += kShare * (command_.position_rad()[j] - sag_rad - position_[j]);
       }
       velocity_[j] = (position_[j] - before) / dt;
       const bool lost = lost_joint == static_cast<int>(j);
