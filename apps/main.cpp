@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
                      [](const EstopOptions& options) { return estop_command(options); },
                      [](const ControllerOptions& options) { return controller_command(options); },
                      [](const JointOptions& options) { return joint_command(options); },
+                     [](const SensorOptions& options) { return sensor_command(options); },
                      [](const ClockOptions& options) { return clock_command(options); },
                      [](const InjectOptions& options) { return inject_command(options); },
                      [](const CheckOptions& options) { return check_command(options); },

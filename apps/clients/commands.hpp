@@ -12,8 +12,11 @@ namespace tandem::apps {
 [[nodiscard]] Exit estop_command(const EstopOptions& options);
 /// Controllers of a running run: what is loaded, and changes of it.
 [[nodiscard]] Exit controller_command(const ControllerOptions& options);
-/// Joints of a running run: what they are, and changes of them.
+/// Joints of a running run: what they are, and changes of them. Exit::kFault: a motion that was
+/// waited for ended elsewhere; a drive's cause is still there.
 [[nodiscard]] Exit joint_command(const JointOptions& options);
+/// Sensors of a running run: where they are, and what they measure.
+[[nodiscard]] Exit sensor_command(const SensorOptions& options);
 /// Pauses and steps until simulated time stands.
 [[nodiscard]] Exit clock_command(const ClockOptions& options);
 /// Asks a running process one thing and prints its answer.

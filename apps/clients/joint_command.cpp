@@ -1,16 +1,19 @@
 // tandem joint: what it asks a running run, and its answer.
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
+#include <thread>
 #include <tuple>
+#include <vector>
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
+#include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
-#include "base/nearest.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
@@ -71,22 +74,6 @@ void print_gains(const Json& joints) {
   table.print(stdout);
 }
 
-/// The joints of `wanted`, in its order; all when it is empty.
-Result<Json> only(const Json& joints, const std::vector<std::string>& wanted) {
-  if (wanted.empty()) return joints;
-  std::vector<std::string> names;
-  for (const Json& joint : joints) names.push_back(joint.value("joint", ""));
-  Json some = Json::array();
-  for (const std::string& name : wanted) {
-    const auto found = std::ranges::find(names, name);
-    if (found == names.end()) {
-      return fail(fmt::format("the robot has no joint '{}'", name), suggest(name, names));
-    }
-    some.push_back(joints[static_cast<std::size_t>(found - names.begin())]);
-  }
-  return some;
-}
-
 struct Unit {
   const char* name;
   double si;         ///< one of it, in SI units
@@ -127,11 +114,13 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
 Result<Json> question_of(const JointOptions& o) {
   Json question{{"do", "joint.list"}};
   switch (o.action) {
-    case JointOptions::Action::kList: return question;
+    case JointOptions::Action::kList:
+    case JointOptions::Action::kShow: return question;
     case JointOptions::Action::kSet: question["do"] = "joint.set"; break;
     case JointOptions::Action::kMove: question["do"] = "joint.move"; break;
     case JointOptions::Action::kStop: question["do"] = "joint.stop"; break;
     case JointOptions::Action::kRecover: question["do"] = "joint.recover"; break;
+    case JointOptions::Action::kReset: question["do"] = "joint.reset"; break;
     case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
   }
   question["joint"] = o.joint;
@@ -154,56 +143,207 @@ Result<Json> question_of(const JointOptions& o) {
   return question;
 }
 
+const char* unit_of(const Json& joint) { return joint.value("slides", false) ? "m" : "rad"; }
+
+void print_joint(const Json& joint) {
+  const std::string unit = unit_of(joint);
+  const std::string torque = joint.value("slides", false) ? "N" : "Nm";
+  const auto with = [&](const char* key, const std::string& of) {
+    return number(joint, key) + " " + of;
+  };
+  const std::string owner = joint.value("controller", ""), fault = joint.value("fault_text", "");
+  const auto age_cycles = joint.value("age_cycles", 0U);
+  Facts facts;
+  facts.add("joint", joint.value("joint", "") + (unit == "m" ? ", slides" : ", turns"));
+  facts.add("controller", owner.empty() ? "-" : owner);
+  facts.add("mode", mode_of(joint));
+  facts.add("position", with("position_rad", unit) + ", commanded " +
+                            with("commanded_position_rad", unit) +
+                            (joint.value("moving", false) ? ", moving" : ""));
+  facts.add("velocity", with("velocity_rad_s", unit + "/s"));
+  facts.add("torque", with("torque_Nm", torque));
+  facts.add("motor position", with("motor_position_rad", unit) + " at the joint");
+  facts.add("motor velocity", with("motor_velocity_rad_s", unit + "/s") + " at the joint");
+  facts.add("stiffness", with("stiffness_Nm_rad", torque + "/" + unit));
+  facts.add("damping", with("damping_Nms_rad", torque + "s/" + unit));
+  facts.add("drive", drive_of(joint));
+  facts.add("fault", fault.empty() ? "none" : fault);
+  facts.add("current", with("current_A", "A"));
+  facts.add("voltage", with("voltage_V", "V"));
+  facts.add("winding", with("temperature_C", "degC"));
+  facts.add("sample", age_cycles == 0 ? "fresh" : fmt::format("{} cycles old", age_cycles));
+  facts.print(stdout);
+}
+
 void print_answer(const JointOptions& options, const Json& answer) {
-  if (answer.contains("joints")) {
+  using Action = JointOptions::Action;
+  if (options.action == Action::kList) {
     const Json& joints = answer["joints"];
     options.gains    ? print_gains(joints)
     : options.drives ? print_drives(joints)
                      : print_joints(joints);
     return;
   }
-  if (answer.value("done", false)) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
+  if (options.action == Action::kShow) return print_joint(answer);
+  const bool done = answer.value("done", false) && options.action != Action::kReset;
+  if (done) fmt::print("done in cycle {}\n", answer.value("cycle", 0));
   if (answer.contains("note")) fmt::print("{}\n", answer.value("note", ""));
-  if (options.action == JointOptions::Action::kGains) {
-    print_gains(Json::array({answer}));
-    return;
+  switch (options.action) {
+    case Action::kList:
+    case Action::kShow: break;
+    case Action::kReset:
+      if (!answer.value("latched", false)) fmt::print("{}: no fault is latched\n", options.joint);
+      break;
+    case Action::kGains: print_gains(Json::array({answer})); break;
+    case Action::kMove:
+      fmt::print("{} moves from {} to {}: tandem joint list {}\n", options.joint,
+                 number(answer, "position_rad"), options.to, options.joint);
+      break;
+    case Action::kStop:
+      fmt::print("{} brakes, and stays where it comes to rest\n", options.joint);
+      break;
+    case Action::kRecover:
+      fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", options.joint,
+                 number(answer, "position_rad"), unit_of(answer), options.joint);
+      break;
+    case Action::kSet: {
+      Facts facts;
+      facts.add("mode", mode_of(answer));
+      facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " Nm/rad");
+      facts.add("damping", number(answer, "damping_Nms_rad") + " Nms/rad");
+      facts.print(stdout);
+    }
   }
-  if (options.action == JointOptions::Action::kMove) {
-    fmt::print("{} moves from {} to {}: tandem joint list {}\n", options.joint,
-               number(answer, "position_rad"), options.to, options.joint);
-    return;
+}
+
+/// The joint, and the cycle of what is said of it.
+Result<Json> look(ControlClient& run, const std::string& name) {
+  const Result<Json> answer = run.ask({{"do", "joint.list"}});
+  if (!answer) return answer;
+  const Result<Json> joint = named((*answer)["joints"], "joint", {name});
+  if (!joint) return joint;
+  Json found = joint->front();
+  found["cycle"] = (*answer)["cycle"];
+  return found;
+}
+
+constexpr std::chrono::milliseconds kLook{20};  // between two
+
+/// The joint once its motion has ended, and its reference has come to rest.
+Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double target) {
+  Json before;
+  for (;;) {
+    Result<Json> now = look(run, name);
+    if (!now || !(*now)["commanded_position_rad"].is_number()) return now;
+    const double reference = (*now)["commanded_position_rad"];
+    (*now)["arrived"] = std::abs(reference - target) < 1e-6;
+    const bool rests = !before.is_null() && before["cycle"] != (*now)["cycle"] &&
+                       before["commanded_position_rad"] == (*now)["commanded_position_rad"];
+    if (!now->value("moving", false) && (now->value("arrived", false) || rests)) return now;
+    before = *now;
+    std::this_thread::sleep_for(kLook);
   }
-  if (options.action == JointOptions::Action::kStop) {
-    fmt::print("{} brakes, and stays where it comes to rest\n", options.joint);
-    return;
+}
+
+/// The joint once the reset of its drive is through.
+Result<Json> wait_for_reset(ControlClient& run, const std::string& name) {
+  for (;;) {
+    Result<Json> now = look(run, name);
+    if (!now || !now->value("resetting", false)) return now;
+    std::this_thread::sleep_for(kLook);
   }
-  if (options.action == JointOptions::Action::kRecover) {
-    fmt::print("{} comes back from {} rad to its limit: tandem joint list {}\n", options.joint,
-               number(answer, "position_rad"), options.joint);
-    return;
+}
+
+/// What came of a motion that was waited for.
+Exit tell_motion(const JointOptions& options, const Json& joint) {
+  // The reference: what is measured may lag, or rest against something.
+  const std::string at =
+      fmt::format("{0} {2}, measured {1} {2}", number(joint, "commanded_position_rad"),
+                  number(joint, "position_rad"), unit_of(joint));
+  if (joint.value("arrived", false)) {
+    if (options.json != "-") fmt::print("{} has arrived: {}\n", options.joint, at);
+    return Exit::kDone;
   }
-  Facts facts;
-  facts.add("mode", mode_of(answer));
-  facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " Nm/rad");
-  facts.add("damping", number(answer, "damping_Nms_rad") + " Nms/rad");
-  facts.print(stdout);
+  const std::string owner = joint.value("controller", "");
+  const bool enabled = joint.value("drive_state", "") == "operation enabled";
+  Error error{.message = fmt::format("its motion to {} has ended at {}", options.to, at),
+              .hint = "it was stopped, or sent elsewhere: tandem joint show " + options.joint,
+              .file = {},
+              .key = options.joint};
+  if (!owner.empty()) error.hint = fmt::format("the controller '{}' has it now", owner);
+  if (!enabled) error.hint = "its drive is not enabled any more: tandem fault show";
+  print_errors({error});
+  return Exit::kFault;
+}
+
+/// What came of the reset of a drive.
+Exit tell_reset(const JointOptions& options, const Json& joint) {
+  if (const std::string fault = joint.value("fault_text", ""); !fault.empty()) {
+    print_errors(
+        {{.message = fmt::format("the reset failed, its cause is still there: {}", fault),
+          .hint = "remove the cause, then `tandem joint reset " + options.joint + "` again",
+          .file = {},
+          .key = options.joint}});
+    return Exit::kFault;
+  }
+  if (options.json == "-") return Exit::kDone;
+  if (joint.value("drive_state", "") == "operation enabled") {
+    fmt::print("{}: its fault is cleared, and it is held where it is\n", options.joint);
+  } else {
+    fmt::print(
+        "{}: its fault is cleared, its drive stays disabled: `tandem fault reset` enables every "
+        "joint where it is\n",
+        options.joint);
+  }
+  return Exit::kDone;
+}
+
+/// list and show: those joints that are named.
+Exit show(const JointOptions& options, Json answer) {
+  const bool one = options.action == JointOptions::Action::kShow;
+  const Result<Json> some =
+      named(answer["joints"], "joint", one ? std::vector{options.joint} : options.joints);
+  if (!some) return refuse(some.error());
+  answer["joints"] = *some;
+  if (one) answer = some->front();
+  if (options.json != "-") print_answer(options, answer);
+  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
+  return Exit::kDone;
 }
 
 }  // namespace
 
 Exit joint_command(const JointOptions& options) {
+  using Action = JointOptions::Action;
   const Result<Json> question = question_of(options);
   if (!question) return refuse(question.error());
-  Result<Json> answer = ask(options.target, "run", *question);
-  if (!answer) return refuse(answer.error());
-  if (answer->contains("joints")) {
-    const Result<Json> some = only((*answer)["joints"], options.joints);
-    if (!some) return refuse(some.error());
-    (*answer)["joints"] = *some;
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refuse(run.error());
+  const Result<Json> asked = (*run)->ask(*question);
+  if (!asked) return refuse(asked.error());
+  Json answer = *asked;
+  if (answer.contains("joints")) return show(options, answer);
+  if (options.json != "-") print_answer(options, answer);
+  Exit exit = Exit::kDone;
+  const bool moves = options.action == Action::kMove && options.wait;
+  const bool resets = options.action == Action::kReset && answer.value("latched", false) &&
+                      answer.value("done", false);
+  if (moves || resets) {
+    std::fflush(stdout);  // before the waiting
+    const Result<Json> joint =
+        moves ? wait_for_motion(**run, options.joint, (*question)["target_rad"])
+              : wait_for_reset(**run, options.joint);
+    if (!joint) {
+      print_errors({joint.error()});
+      return Exit::kFault;
+    }
+    for (const auto& [key, value] : joint->items()) {
+      if (key != "cycle") answer[key] = value;  // that of the request stays
+    }
+    exit = moves ? tell_motion(options, *joint) : tell_reset(options, *joint);
   }
-  if (options.json != "-") print_answer(options, *answer);
-  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
-  return Exit::kDone;
+  if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
+  return exit;
 }
 
 }  // namespace tandem::apps

@@ -31,6 +31,7 @@ void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, InjectOptions& o);
 void add_flags(CLI::App& app, ControllerOptions& o);
 void add_flags(CLI::App& app, JointOptions& o);
+void add_flags(CLI::App& app, SensorOptions& o);
 void add_flags(CLI::App& app, EmulateOptions& o);
 void add_flags(CLI::App& app, CheckOptions& o);
 void add_flags(CLI::App& app, ModelOptions& o);

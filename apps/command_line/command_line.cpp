@@ -126,7 +126,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<EstopOptions>("estop", "Emergency stop of a running run");
   commands.add<ControllerOptions>(
       "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
-  commands.add<JointOptions>("joint", "Joints of a running run: list, set, gains");
+  commands.add<JointOptions>(
+      "joint", "Joints of a running run: list, show, move, stop, set, gains, reset, recover");
+  commands.add<SensorOptions>("sensor", "Sensors of a running run: list");
   commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
   commands.add<InjectOptions>("inject",

@@ -83,14 +83,16 @@ struct ControllerOptions {
   std::string json;
 };
 
-/// tandem joint list|set|gains
+/// tandem joint list|show|set|move|stop|recover|reset|gains
 struct JointOptions {
   enum class Action : std::uint8_t {
     kList,
+    kShow,
     kSet,
     kMove,
     kStop,
     kRecover,
+    kReset,
     kGains
   } action = Action::kList;
   std::vector<std::string> joints;      ///< list: only these; empty: all
@@ -98,10 +100,18 @@ struct JointOptions {
   bool drives = false;                  ///< list: motors and drives instead of joints
   std::string joint;                    ///< all but list
   std::string to, speed, acceleration;  ///< move: numbers with or without a unit; empty: default
+  bool wait = false;                    ///< move: until it has ended
   std::string mode, interaction;        ///< empty: as it is
   std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
   std::string loop;
   std::optional<double> kp, ki, kd;
+  ControlTarget target;
+  std::string json;
+};
+
+/// tandem sensor list
+struct SensorOptions {
+  std::vector<std::string> sensors;  ///< only these; empty: all
   ControlTarget target;
   std::string json;
 };
@@ -240,7 +250,7 @@ using Command =
     std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
                  ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
-                 DoctorOptions, EmulateOptions, TopicOptions>;
+                 DoctorOptions, EmulateOptions, TopicOptions, SensorOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

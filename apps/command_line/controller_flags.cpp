@@ -1,4 +1,4 @@
-// Flags of the commands that change a running run: tandem controller, tandem joint.
+// Flags of the commands that change a running run: tandem controller, joint, sensor.
 #include <cmath>
 
 #include "apps/command_line/command_flags.hpp"
@@ -18,11 +18,19 @@ Without --socket or --dds it is the only `tandem run` of this user.)";
 const char kJointExamples[] = R"(Examples:
   tandem joint list                                  every joint: its controller, mode, measurements
   tandem joint list LKneeSag RKneeSag --gains        and the gains of their loops
+  tandem joint show LElbj                            its encoders, its drive, its fault
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
   tandem joint move LElbj --to 30deg --speed 20deg/s a free joint to a place, and `joint stop LElbj`
+  tandem joint move LElbj --to 0 --wait              until it is there; Ctrl-C ends only the waiting
+  tandem joint reset LElbj                           clear the fault of its drive alone
   tandem joint recover LElbj                         outside its limits: slowly back inside
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
+Without --socket or --dds it is the only `tandem run` of this user.)";
+
+const char kSensorExamples[] = R"(Examples:
+  tandem sensor list                                 every IMU and force/torque sensor
+  tandem sensor list imu --json -                    one of them, for a program
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 CLI::Validator is_finite() {
@@ -94,6 +102,9 @@ void add_flags(CLI::App& app, JointOptions& o) {
   list->add_option("joints", o.joints, "Only these");
   list->add_flag("--drives", o.drives, "Motor position, current, voltage and winding instead")
       ->excludes(list->add_flag("--gains", o.gains, "The gains of its drive's loops instead"));
+  add("show", "One joint: encoders on both sides, drive, its fault in words", Action::kShow)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
   CLI::App* set =
       add("set", "Mode and interaction of a free joint, impedance of any", Action::kSet);
   set->add_option("joint", o.joint, "Its name")->required();
@@ -110,10 +121,18 @@ void add_flags(CLI::App& app, JointOptions& o) {
   move->add_option("--speed", o.speed, "20deg/s, 0.3 (default: a quarter of the joint's limit)");
   move->add_option("--acceleration", o.acceleration,
                    "40deg/s2, 0.6 (default: reaches the speed in half a second)");
+  move->add_flag(
+      "--wait", o.wait,
+      "Until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends the "
+      "waiting, not the motion: tandem joint stop");
   add("stop", "Brake a joint that `joint move` leads", Action::kStop)
       ->add_option("joint", o.joint, "Its name")
       ->required();
   add("recover", "Lead a free joint back inside its limits, slowly", Action::kRecover)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
+  add("reset", "Clear the fault of a free joint's drive; a run in fault stays stopped",
+      Action::kReset)
       ->add_option("joint", o.joint, "Its name")
       ->required();
   CLI::App* gains =
@@ -123,6 +142,13 @@ void add_flags(CLI::App& app, JointOptions& o) {
   gains->add_option("--kp", o.kp, "Units as in [gains], docs/configuration.md")->check(is_finite());
   gains->add_option("--ki", o.ki)->check(is_finite());
   gains->add_option("--kd", o.kd)->check(is_finite());
+}
+
+void add_flags(CLI::App& app, SensorOptions& o) {
+  app.require_subcommand(1);
+  app.footer(kSensorExamples);
+  add_command(app, "list", "Frame, values and age of each sensor", kSensorExamples, o)
+      ->add_option("sensors", o.sensors, "Only these");
 }
 
 }  // namespace tandem::apps

@@ -3,12 +3,12 @@
 #pragma once
 
 #include "apps/control/control_registry.hpp"
-#include "runtime/run_services.hpp"
+#include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 
-/// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.recover" and "joint.gains".
-/// The services outlive the registry.
-void add_joint_commands(ControlRegistry& registry, runtime::RunServices& services);
+/// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.recover", "joint.reset"
+/// and "joint.gains". The run outlives the registry.
+void add_joint_commands(ControlRegistry& registry, runtime::RobotCycle& run);
 
 }  // namespace tandem::apps

@@ -10,6 +10,7 @@
 #include "apps/control/controller_control.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/control/joint_control.hpp"
+#include "apps/control/sensor_control.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -137,7 +138,8 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  return Json::object();
                });
   add_controller_commands(registry, cycle.services(), robot);
-  add_joint_commands(registry, cycle.services());
+  add_joint_commands(registry, cycle);
+  add_sensor_commands(registry, cycle.services());
   add_clock_commands(registry, cycle);
 }
 

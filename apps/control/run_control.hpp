@@ -8,7 +8,7 @@
 namespace tandem::apps {
 
 /// Adds "status", "fault.show", "fault.reset", "estop" and "run.stop", and the commands of
-/// controllers, joints and clock. Cycle and robot outlive the registry.
+/// controllers, joints, sensors and clock. Cycle and robot outlive the registry.
 void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                       const hal::RobotConfig& robot);
 

@@ -63,8 +63,8 @@ TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {
 }
 
 TEST_F(CommandLine, ARunIsAskedByOneWay) {
-  for (const char* command : {"estop", "fault show", "controller list", "joint list", "clock show",
-                              "ask '{}'", "inject kind=bus_down"}) {
+  for (const char* command : {"estop", "fault show", "controller list", "joint list", "sensor list",
+                              "clock show", "ask '{}'", "inject kind=bus_down"}) {
     const Outcome both = tandem(command + std::string(" --dds --socket /tmp/run.sock"));
     EXPECT_EQ(both.status, 2) << command;
     EXPECT_NE(both.err.find("--socket excludes --dds"), std::string::npos) << both.err;

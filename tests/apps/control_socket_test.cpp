@@ -171,7 +171,7 @@ TEST(RemoteGate, RefusesChangesOfControllersAndJointsWhileSomebodyOwnsTheRobot) 
       remote_gate({.command = runtime::RemoteCommand::kLocal}, [&owner] { return owner; });
   EXPECT_TRUE(gate("controller.stop", ControlEffect::kChanges, {}));
   owner = "squat on robot-pc";
-  for (const char* name : {"controller.stop", "joint.set"}) {
+  for (const char* name : {"controller.stop", "joint.set", "joint.reset"}) {
     const Status refused = gate(name, ControlEffect::kChanges, {});
     ASSERT_FALSE(refused) << name;
     EXPECT_EQ(refused.error().message, name + ": 'squat on robot-pc' commands the robot"s);

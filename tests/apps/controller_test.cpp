@@ -142,6 +142,62 @@ TEST_F(Controllers, JointsAreMovedWhenNobodyHasThem) {
   EXPECT_EQ(end(), 0);
 }
 
+/// What interrupts the waiting does not end the motion.
+TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
+  begin("");
+  EXPECT_EQ(to_run("controller stop hold").status, 0);
+  const Outcome there = to_run("joint move joint1 --to 20deg --speed 100deg/s --wait");
+  EXPECT_EQ(there.status, 0) << there.err;
+  expect(there.out, "joint1 has arrived: 0.3");
+  const auto slow = asked("joint move joint1 --to 30deg --speed 200deg/s --wait");
+  EXPECT_EQ(slow["arrived"], true);
+  EXPECT_EQ(slow["moving"], false);
+  const std::string away = "joint move joint1 --to -300deg --speed 1deg/s --wait --socket ";
+  EXPECT_EQ(tandem(away + socket_, "timeout -s INT 0.5").status, 124);
+  const auto goes_on = asked("joint list joint1")["joints"][0];
+  EXPECT_EQ(goes_on["moving"], true);
+  EXPECT_LT(goes_on["position_rad"], 0.52);
+  EXPECT_EQ(to_run("joint stop joint1").status, 0);
+  EXPECT_TRUE(
+      test::eventually([&] { return asked("joint list joint1")["joints"][0]["moving"] == false; }));
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Controllers, SensorsAndDrivesAreShown) {
+  write_text(folder_ / "hold.toml",
+             "robot = \"" TANDEM_SOURCE_DIR
+             "/config/ur5e/robot.toml\"\nposture = \"ready\"\nduration_s = 5.0\nseed = 1\n"
+             "[[controller]]\nplugin = \"hold\"\n");
+  begin("--on-fault wait");
+  const auto sensors = asked("sensor list")["sensors"];
+  ASSERT_EQ(sensors.size(), 1U);
+  EXPECT_EQ(sensors[0]["type"], "force_torque");
+  EXPECT_EQ(sensors[0]["valid"], true);
+  EXPECT_FALSE(sensors[0]["link"].get<std::string>().empty());
+  EXPECT_EQ(sensors[0]["force_N"].size(), 3U);
+  const std::string name = sensors[0]["sensor"];
+  expect(to_run("sensor list").out, name);
+  expect(refused("sensor list " + name + "x"), "did you mean '" + name + "'?");
+  expect(to_run("joint show elbow_joint").out, "operation enabled");
+  expect(to_run("joint reset elbow_joint").out, "elbow_joint: no fault is latched");
+  EXPECT_EQ(to_run("inject kind=encoder_unplug joint=elbow_joint for_s=2").status, 0);
+  until(R"("phase": "faulted")");
+  const auto drive = asked("joint show elbow_joint");
+  EXPECT_EQ(drive["fault"], 0x7300);
+  expect(drive["fault_text"], "position sensor (error code 0x7300)");
+  Outcome reset;
+  EXPECT_TRUE(test::eventually([&] {  // until the cause is gone
+    reset = to_run("joint reset elbow_joint");
+    return reset.status == 0;
+  })) << reset.err;
+  expect(reset.out, "elbow_joint: its fault is cleared, its drive stays disabled");
+  EXPECT_EQ(asked("joint show elbow_joint")["fault"], 0);
+  until(R"("phase": "faulted")");
+  expect(refused("joint move elbow_joint --to 10deg"), "elbow_joint: nothing is moved before");
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Controllers, GainsAreKeptAndShown) {
   begin("");
   const auto gains = asked("joint gains joint1 position --kp 7.5");

@@ -333,6 +333,10 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   expect_same("controller start rest", "rest");
   expect_same("joint set jiont2 --mode idle", "did you mean 'joint2'?");
   expect_same("joint list --gains", "joint2");
+  expect_same("joint reset joint1", "joint1: no fault is latched");
+  expect_same("joint reset jiont1", "did you mean 'joint1'?");
+  expect_same("sensor list", "the robot has no sensors");
+  EXPECT_NE(over_dds("joint show joint2").out.find("operation enabled"), std::string::npos);
   expect_same("fault reset", "nothing is latched");
   EXPECT_EQ(over_dds("clock rate 50").status, 0);
   EXPECT_NE(over_dds("clock pause").out.find("paused"), std::string::npos);

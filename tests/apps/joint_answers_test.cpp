@@ -1,0 +1,254 @@
+// What a run answers of its joints and sensors: its commands over a fake robot, and what
+// `tandem sensor` and `tandem joint` print of them.
+#include <unistd.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <string>
+
+#include "apps/clients/commands.hpp"
+#include "apps/control/run_control.hpp"
+#include "apps/transport/control_socket.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/hal/fake_backend.hpp"
+#include "tests/runtime/first_order_robot.hpp"
+#include "tests/runtime/test_controllers.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using runtime::RunPhase;
+
+/// A run without controllers whose cycles are made while somebody waits for an answer. Its elbow
+/// slides.
+template <class Backend>
+struct Answered : ::testing::Test {
+  Answered() { robot.joints[1].slides = true; }
+  void begin() {
+    cycle = std::make_unique<runtime::RobotCycle>(
+        runtime::CycleParts{robot, backend, host, clock},
+        runtime::CycleConfig{.after_stop = runtime::AfterStop::kWait});
+    steps(100);
+    ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+    add_run_commands(registry, *cycle, robot);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
+  }
+  template <class Ask>
+  auto while_cycling(const Ask& ask) {
+    auto asked = std::async(std::launch::async, ask);
+    while (asked.wait_for(std::chrono::microseconds(100)) != std::future_status::ready) steps(1);
+    return asked.get();
+  }
+  [[nodiscard]] Json answer(const std::string& question) {
+    return while_cycling([&] { return registry.answer(question); });
+  }
+  [[nodiscard]] std::string refused(const std::string& question) {
+    const Json said = answer(question);
+    EXPECT_EQ(said["ok"], false) << said;
+    return said.value("error", "") + " (" + said.value("hint", "") + ")";
+  }
+  [[nodiscard]] Json joint(std::size_t index) {
+    return answer(R"({"do": "joint.list"})")["joints"][index];
+  }
+  /// Runs a command against the run's socket; `out` and `err` are what it printed.
+  template <class Options>
+  Exit command(Exit (*run)(const Options&), Options options) {
+    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-joints.sock";
+    const auto socket = ControlSocket::open(path, registry);
+    EXPECT_TRUE(socket) << socket.error().to_string();
+    options.target.socket = path;
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    const Exit status = while_cycling([&] { return run(options); });
+    out = ::testing::internal::GetCapturedStdout();
+    err = ::testing::internal::GetCapturedStderr();
+    return status;
+  }
+  static void has(const std::string& text, const std::string& words) {
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+  }
+
+  hal::RobotConfig robot = hal::test::fake_robot();
+  Backend backend{robot};
+  runtime::ControllerHost host{robot, nullptr, 1'000'000};
+  rt::WallClock clock;
+  std::unique_ptr<runtime::RobotCycle> cycle;
+  ControlRegistry registry;
+  std::string out, err;  // of the last command
+};
+
+using JointAnswers = Answered<runtime::test::FirstOrderRobot>;
+using SensorAnswers = Answered<hal::test::FakeBackend>;
+
+TEST_F(SensorAnswers, NameFrameValuesAndAge) {
+  robot.sensors[0].link = "palm";
+  begin();
+  const Json sensors = answer(R"({"do": "sensor.list"})")["sensors"];
+  ASSERT_EQ(sensors.size(), 2U);
+  EXPECT_EQ(sensors[0]["sensor"], "hand");
+  EXPECT_EQ(sensors[0]["type"], "force_torque");
+  EXPECT_EQ(sensors[0]["joint"], "wrist");
+  EXPECT_EQ(sensors[0]["link"], "palm");
+  EXPECT_EQ(sensors[0]["age_cycles"], 0);
+  EXPECT_EQ(sensors[0]["valid"], true);
+  EXPECT_EQ(sensors[0]["force_N"][2], 9.81);
+  EXPECT_EQ(sensors[0]["torque_Nm"].size(), 3U);
+  EXPECT_EQ(sensors[1]["type"], "imu");
+  EXPECT_EQ(sensors[1]["orientation_xyzw"], Json({0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(sensors[1]["angular_velocity_rad_s"].size(), 3U);
+  EXPECT_EQ(sensors[1]["specific_force_m_s2"], Json({0.0, 0.0, 9.81}));
+
+  EXPECT_EQ(command(sensor_command, SensorOptions{}), Exit::kDone) << err;
+  has(out, "palm");
+  has(out, "0  0  9.81");
+  has(out, "fresh");
+  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"imu"}, .target = {}, .json = {}}),
+            Exit::kDone);
+  EXPECT_EQ(out.find("palm"), std::string::npos) << out;
+  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"hnad"}, .target = {}, .json = {}}),
+            Exit::kUsage);
+  has(err, "the robot has no sensor 'hnad' (did you mean 'hand'?)");
+}
+
+TEST_F(JointAnswers, OfASensorThatIsSilentAreNotValid) {
+  begin();
+  backend.lost_sensor = 1;
+  steps(20);
+  const Json imu = answer(R"({"do": "sensor.list"})")["sensors"][1];
+  EXPECT_EQ(imu["valid"], false);
+  EXPECT_GE(imu["age_cycles"], 20);
+  EXPECT_EQ(command(sensor_command, SensorOptions{}), Exit::kDone);
+  has(out, "no sample for ");
+}
+
+TEST_F(JointAnswers, RefuseAnAngleForAJointThatSlides) {
+  begin();
+  const std::string move = R"({"do": "joint.move", "joint": "elbow", "target_rad": 0.5)";
+  EXPECT_EQ(refused(move + R"(, "unit": "angle"})"),
+            "elbow: this joint slides (give metres: 20mm, 0.02m)");
+  EXPECT_EQ(joint(1)["moving"], false);
+  EXPECT_EQ(answer(move + R"(, "unit": "length"})")["ok"], true);
+  EXPECT_EQ(joint(1)["moving"], true);
+  EXPECT_EQ(joint(1)["slides"], true);
+  EXPECT_EQ(joint(2)["slides"], false);
+  EXPECT_EQ(refused(R"({"do": "joint.move", "joint": "wrist", "target_rad": 0, "unit": "length"})"),
+            "wrist: this joint turns (give an angle: 30deg, 0.5rad)");
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "elbow";
+  options.to = "30deg";
+  EXPECT_EQ(command(joint_command, options), Exit::kUsage);
+  has(err, "elbow: this joint slides");
+}
+
+TEST_F(JointAnswers, RefuseAMotionWhileAFaultIsLatched) {
+  begin();
+  const std::string move = R"({"do": "joint.move", "joint": "wrist", "target_rad": 0.5})";
+  EXPECT_EQ(answer(move)["ok"], true);
+  backend.faulted_joint = 0;
+  steps(2);
+  ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(refused(move),
+            "wrist: nothing is moved before the joints are enabled, or while a fault is latched "
+            "(tandem fault reset, then ask again)");
+  EXPECT_EQ(joint(2)["moving"], false) << "the one under way is over";
+}
+
+TEST_F(JointAnswers, WaitForAMotionUntilItHasArrived) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  options.to = "0.3";
+  options.speed = "2";
+  options.wait = true;
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  has(out, "wrist has arrived: 0.");
+  EXPECT_EQ(joint(2)["commanded_position_rad"], 0.3);
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << "it is there already" << err;
+}
+
+/// Somebody else stops it, or a fault does.
+TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  options.to = "-1.2";
+  options.speed = "0.01";
+  options.wait = true;
+  const auto wait_and = [&](const std::function<void()>& meanwhile) {
+    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-wait.sock";
+    const auto socket = ControlSocket::open(path, registry);
+    options.target.socket = path;
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    auto waits = std::async(std::launch::async, [&] { return joint_command(options); });
+    for (int i = 0; i < 20'000 && joint(2)["moving"] == false; ++i) steps(1);
+    meanwhile();
+    while (waits.wait_for(std::chrono::microseconds(100)) != std::future_status::ready) steps(1);
+    out = ::testing::internal::GetCapturedStdout();
+    err = ::testing::internal::GetCapturedStderr();
+    return waits.get();
+  };
+  EXPECT_EQ(wait_and([this] {
+              EXPECT_EQ(answer(R"({"do": "joint.stop", "joint": "wrist"})")["ok"], true);
+            }),
+            Exit::kFault);
+  has(err, "error: wrist: its motion to -1.2 has ended at ");
+  has(err, "it was stopped, or sent elsewhere");
+  EXPECT_EQ(wait_and([this] {
+              backend.faulted_joint = 0;
+              steps(1);
+            }),
+            Exit::kFault);
+  has(err, "its drive is not enabled any more: tandem fault show");
+}
+
+TEST_F(JointAnswers, ShowOneJointWithItsDrive) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kShow};
+  options.joint = "elbow";
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  for (const char* words : {"elbow, slides", "motor position", " m at the joint", "N/m",
+                            "operation enabled", "fault           none", " degC", "fresh"}) {
+    has(out, words);
+  }
+  options.joint = "elbwo";
+  EXPECT_EQ(command(joint_command, options), Exit::kUsage);
+  has(err, "the robot has no joint 'elbwo' (did you mean 'elbow'?)");
+}
+
+TEST_F(JointAnswers, ResetOneDrive) {
+  for (hal::JointConfig& joint : robot.joints) joint.on_fault = hal::StopCategory::kWarn;
+  begin();
+  JointOptions options{.action = JointOptions::Action::kReset};
+  options.joint = "elbow";
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  has(out, "elbow: no fault is latched");
+  backend.faulted_joint = 1;
+  steps(2);
+  EXPECT_EQ(joint(1)["fault"], 0x7310);
+  has(joint(1)["fault_text"], "0x7310");
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  has(out, "elbow: its fault is cleared, and it is held where it is");
+  EXPECT_EQ(joint(1)["fault_text"], "");
+
+  backend.reset_clears = false;
+  backend.faulted_joint = 1;
+  steps(2);
+  EXPECT_EQ(command(joint_command, options), Exit::kFault) << out;
+  has(err, "error: elbow: the reset failed, its cause is still there: ");
+
+  backend.reset_clears = true;
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  steps(1);
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  has(out, "its drive stays disabled: `tandem fault reset` enables every joint where it is");
+  EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
+  EXPECT_EQ(answer(R"({"do": "fault.show"})")["latched"], 2) << "until the run is reset";
+}
+
+}  // namespace
+}  // namespace tandem::apps
