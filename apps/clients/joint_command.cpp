@@ -256,7 +256,10 @@ Result<Json> wait_for_reset(ControlClient& run, const std::string& name) {
 
 /// What came of a motion that was waited for.
 Exit tell_motion(const JointOptions& options, const Json& joint) {
-  const std::string at = number(joint, "position_rad") + " " + unit_of(joint);
+  // The reference: what is measured may lag, or rest against something.
+  const std::string at =
+      fmt::format("{0} {2}, measured {1} {2}", number(joint, "commanded_position_rad"),
+                  number(joint, "position_rad"), unit_of(joint));
   if (joint.value("arrived", false)) {
     if (options.json != "-") fmt::print("{} has arrived: {}\n", options.joint, at);
     return Exit::kDone;
