@@ -217,7 +217,7 @@ void emulate(Emulation& e, TaskQueue& tasks, std::FILE* out, bool quiet) {
 }  // namespace
 
 Exit emulate_command(const EmulateOptions& options) {
-  outlive_readers();
+  outlive_files();
   std::FILE* out = human_output(options.json);
   if (const Status writable = check_writable(options.json); !writable)
     return refuse(writable.error());

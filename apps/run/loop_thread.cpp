@@ -1,8 +1,10 @@
 #include "apps/run/loop_thread.hpp"
 
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <exception>
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/control/clock_control.hpp"
@@ -12,6 +14,24 @@ namespace tandem::apps {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
+
+thread_local bool is_loop = false;
+std::terminate_handler usual_end = nullptr;
+
+/// What is thrown in a controller ends here, as its functions are noexcept. The loop stands still
+/// instead of ending the process: what follows is the watchdog's, as for a loop that hangs.
+[[noreturn]] void stand_still() {
+  if (!is_loop) usual_end();
+  std::string what = "of an unknown type";
+  try {
+    if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::exception& exception) {
+    what = exception.what();
+  } catch (...) {
+  }
+  fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
+  while (true) ::pause();
+}
 
 std::string progress_note(const runtime::RobotCycle& cycle) {
   if (time_stands(cycle)) return "paused";
@@ -29,6 +49,8 @@ void warn_of_log(const log::Recorder& recorder) {
 }  // namespace
 
 void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
+  is_loop = true;
+  usual_end = std::set_terminate(stand_still);
   report_ = rt::set_up_thread(config);
   SteadyClock::time_point began = SteadyClock::now();
   auto before = runtime::RunPhase::kBringUp;

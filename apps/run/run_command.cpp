@@ -366,7 +366,7 @@ Exit run_command(const RunOptions& options) {
   warn_of_inertias((*composition)->experiment);
   print_warnings((*composition)->warnings);
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
-  outlive_readers();
+  outlive_files();
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
     return refuse(errors);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());

@@ -85,8 +85,9 @@ bool is_terminal(std::FILE* out) {
   return ::isatty(::fileno(out)) != 0;
 }
 
-void outlive_readers() {
+void outlive_files() {
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   std::fflush(stdout);
   stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
   stderr = lasting(STDERR_FILENO, _IONBF);

@@ -32,10 +32,11 @@ using Json = nlohmann::ordered_json;
 /// Whether people read along: `out` is a terminal.
 [[nodiscard]] bool is_terminal(std::FILE* out);
 
-/// From now on standard output and error outlive their readers: when a pipe's reader or the
-/// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()),
-/// instead of the process being ended in the middle of a cycle. Call it before other threads print.
-void outlive_readers();
+/// From now on no file ends the process in the middle of a cycle. When a pipe's reader or the
+/// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()). A
+/// file that reaches the limit on its size (`ulimit -f`) is an error of its writer, as a full disk
+/// is. Call it before other threads print.
+void outlive_files();
 
 /// Whether `file` can be written, found out before a run: an error that names it when not.
 [[nodiscard]] Status check_writable(const std::string& file);

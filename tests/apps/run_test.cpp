@@ -178,6 +178,25 @@ TEST_F(Run, OfALogThatIsDeletedWarnsAtOnceAndIsNoSuccess) {
   }
 }
 
+/// A limit on a file's size, which every user may set, stands for the full disk.
+TEST_F(Run, OfALogThatFillsItsDiskGoesOnWithoutIt) {
+  const std::string begin = "ulimit -f 500 && ";
+  const Outcome outcome = tandem(
+      "run hold.toml --duration 3 --rate 4 --no-socket -q --log logs --json run.json", begin);
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  for (const char* text : {"001.mcap: nothing is logged any more: File too large",
+                           "fault: the log lost ", "the log is incomplete: File too large"}) {
+    EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
+  }
+  EXPECT_LT(outcome.err.find("warning: "), outcome.err.find("fault: ")) << "while it goes on";
+  const auto result = json("run.json");
+  EXPECT_EQ(result["cycles"], 3000) << "the robot is controlled to the end";
+  EXPECT_EQ(result["log"]["dropped"], 0);
+  const Outcome info = tandem("log info logs/double_pendulum-hold-001.mcap");
+  EXPECT_EQ(info.status, 0) << info.err;
+  EXPECT_NE(info.out.find("/tandem/state"), std::string::npos) << info.out;
+}
+
 TEST_F(Run, WithoutALogWritesNone) {
   const auto json = run("hold.toml --duration 0.1 --no-log");
   EXPECT_TRUE(json["log"].is_null());

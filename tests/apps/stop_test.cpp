@@ -60,6 +60,21 @@ TEST_F(Stops, OfALoopThatHangsLeaveALogThatCanBeRead) {
   EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
+// std::terminate had ended the process by SIGABRT: no controller's name, no NMT stop, half a log.
+TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
+  hang("0.0", "throws = true\n[faults]\nwatchdog_s = 0.2\n");
+  const Outcome run = tandem("run hold.toml --no-socket -q --json run.json");
+  EXPECT_EQ(run.status, 1);
+  for (const char* text : {"fault: an exception left the loop, which stands still: no such thing",
+                           "fault: the loop hung in the controller 'lazy' and did not come back"}) {
+    EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
+  }
+  EXPECT_EQ(json("run.json")["ok"], false);
+  const Outcome info = tandem("log info runs/*.mcap");
+  EXPECT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
+}
+
 TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
   hang("1.0", "[faults]\nwatchdog_s = 0.2\n");
   const Outcome run = tandem("run hold.toml --no-log --no-socket --json run.json");

@@ -63,7 +63,7 @@ class LinkChecks : public testing::Test {
         *Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic), link_qos()));
     commands_.emplace(
         *Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic), link_qos()));
-    served.begin();
+    begin();
     ASSERT_TRUE(eventually([this] { return look() != 0; }));
     ASSERT_TRUE(eventually([this] {
       return served.phase() == RunPhase::kRunning && commands_->endpoint().matched() == 1 &&
@@ -75,6 +75,7 @@ class LinkChecks : public testing::Test {
     ASSERT_TRUE(eventually([this] { return served.server->lease().owner() == kClient; }));
   }
 
+  virtual void begin() { served.begin(); }
   /// The server's run; 0: not heard yet.
   std::uint64_t look() {
     told_->take([this](const tandem_msgs::LinkServer& sample, const auto&) { run_ = sample.run; });
@@ -279,6 +280,78 @@ TEST_F(LinkLossHeld, HoldsEveryJointAndTakesTheNextOwner) {
   EXPECT_TRUE(eventually([this] { return served.host.shown().active == 0; }));
   acquire(5000);
   EXPECT_TRUE(eventually([this] { return served.server->lease().owner() == 5000U; }));
+}
+
+/// The loop is stepped by the test: what is counted is cycles, on a machine of any speed.
+class LinkInCycles : public LinkLoss {
+ protected:
+  explicit LinkInCycles(hal::StopCategory on_lost = hal::StopCategory::kCategory1)
+      : LinkLoss(on_lost) {}
+
+  void begin() override {
+    for (int i = 0; i < 1000 && served.phase() != RunPhase::kRunning; ++i) step();
+  }
+  void step() { ASSERT_TRUE(served.cycle->step()); }
+  /// One cycle with a command for it.
+  void step_with(double position_rad) {
+    image_.position_rad()[0] = position_rad;
+    expect(Verdict::kTaken, sample());
+    step();
+  }
+  [[nodiscard]] double reference_rad() const { return served.cycle->command().position_rad()[0]; }
+};
+class OwnerIsLost : public LinkInCycles, public testing::WithParamInterface<hal::StopCategory> {
+ protected:
+  OwnerIsLost() : LinkInCycles(GetParam()) {}
+};
+INSTANTIATE_TEST_SUITE_P(Category, OwnerIsLost,
+                         testing::Values(hal::StopCategory::kWarn, hal::StopCategory::kCategory1,
+                                         hal::StopCategory::kCategory0));
+
+TEST_P(OwnerIsLost, WhenItsCommandsAreTooOldAndThenItIsAsDeclared) {
+  for (int i = 1; i <= 200; ++i) step_with(0.1 + 0.0005 * i);
+  ASSERT_NEAR(reference_rad(), 0.2, 1e-9) << "it is followed";
+  int lost = 0;
+  for (int i = 1; i <= 100 && lost == 0; ++i) {
+    step();
+    if (!served.cycle->faults().empty()) lost = i;
+  }
+  EXPECT_EQ(lost, 20) << "max_age_cycles, from the first cycle without a command";
+  EXPECT_EQ(served.cycle->faults().at(0).text,
+            "the remote owner's commands stopped, or came too late");
+  EXPECT_EQ(served.server->lease().owner(), 0U);
+  EXPECT_EQ(served.server->losses(), 1U);
+  const bool holds = GetParam() == hal::StopCategory::kWarn;
+  EXPECT_EQ(served.backend.latched, GetParam());
+  EXPECT_EQ(served.phase(), holds ? RunPhase::kRunning : RunPhase::kFaulted);
+  for (int i = 0; i < 200; ++i) step();
+  EXPECT_EQ(served.cycle->faults().size(), 1U);
+  if (holds) {
+    EXPECT_NEAR(reference_rad(), 0.2, 1e-9) << "it stays";
+  }
+}
+
+/// The loop stands while they come: it takes one command a cycle, the newest, whatever their
+/// number.
+TEST_F(LinkInCycles, AFloodOfTheOwnersIsItsNewestCommand) {
+  for (int i = 1; i <= 200; ++i) step_with(0.1 + 0.0005 * i);
+  constexpr std::uint64_t kFlood = 20'000;
+  const auto told = [this] {
+    std::uint64_t sum = 0;
+    for (std::size_t v = 0; v < kVerdicts; ++v)
+      sum += served.server->count(static_cast<Verdict>(v));
+    return sum;
+  };
+  const std::uint64_t before = told();
+  image_.position_rad()[0] = 0.1;
+  for (std::uint64_t i = 0; i < kFlood; ++i) commands_->write(sample());
+  EXPECT_TRUE(eventually([&] { return told() > before; }));
+  step_with(0.2005);
+  EXPECT_NEAR(reference_rad(), 0.2005, 1e-9) << "none of those before it";
+  EXPECT_LE(told() - before, kFlood + 1);
+  EXPECT_TRUE(served.cycle->faults().empty());
+  step_with(0.201);
+  EXPECT_NEAR(reference_rad(), 0.201, 1e-9);
 }
 
 TEST(Connect, TellsWhoHasTheRobotAndWhatDiffers) {

@@ -68,6 +68,19 @@ TEST_P(FaultRow, LoopStallsForLonger) {
   EXPECT_NE(rig.causes().find("0x8700"), std::string::npos) << rig.causes();
 }
 
+// What [overrun] does about it: RobotCycle.StopsWhenTooManyCyclesAreLate, CyclicLoop.
+TEST_P(FaultRow, ControllerIsTooSlow) {
+  RowRig rig(GetParam());
+  rig.run();
+  for (int i = 0; i < 200; ++i) {
+    rig.step();
+    rig.backend->without_master();
+    rig.backend->without_master();
+  }
+  expect_running(rig);
+  expect_row({});
+}
+
 // --- emergency stop ---
 
 TEST_P(FaultRow, EmergencyStopByABoardsInput) {

@@ -1,5 +1,6 @@
-// A controller that holds its joints, until it does not return from one update.
+// A controller that holds its joints, until it does not return from one update, or throws in it.
 #include <chrono>
+#include <stdexcept>
 #include <vector>
 
 #include "controllers/controller.hpp"
@@ -9,11 +10,14 @@ namespace {
 using namespace tandem;
 using SteadyClock = std::chrono::steady_clock;
 
+[[noreturn]] void complain() { throw std::runtime_error("no such thing"); }
+
 class Hangs final : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     after_ = setup.parameters.integer_or("after_cycles", 100, 0, 1'000'000'000);
     for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
+    throws_ = setup.parameters.boolean_or("throws", false);
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
     }
@@ -24,6 +28,7 @@ class Hangs final : public Controller {
   Code update(const hal::CycleTime&, const hal::StateImage&,
               hal::CommandImage&) noexcept TANDEM_RT override {
     if (++cycles_ != after_) return Code::kOk;
+    if (throws_) complain();
     const auto until = SteadyClock::now() + std::chrono::duration<double>(for_s_);
     while (for_s_ == 0.0 || SteadyClock::now() < until) asm volatile("" ::: "memory");
     return Code::kOk;
@@ -32,6 +37,7 @@ class Hangs final : public Controller {
  private:
   std::int64_t after_ = 0, cycles_ = 0;
   double for_s_ = 0.0;
+  bool throws_ = false;
 };
 
 }  // namespace
