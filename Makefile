@@ -5,7 +5,7 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit anywhere hil sanitized rtsan fuzz format lint tidy clean help
+.PHONY: demo test test-all unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
@@ -46,6 +46,9 @@ test-all: test
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
+	@$(MAKE) --no-print-directory asan
+	@$(MAKE) --no-print-directory tsan
+	@$(MAKE) --no-print-directory tidy
 
 unit:
 	@scripts/install-dependencies test
@@ -77,6 +80,13 @@ rtsan:
 	@cmake --build --preset rtsan --parallel $(JOBS)
 	@scripts/run-tests build/rtsan $(JOBS) -E walkman
 
+# Every room; the kernels are those of `unit`.
+asan tsan:
+	@scripts/install-dependencies test
+	@cmake --preset $@ --log-level=WARNING
+	@cmake --build --preset $@ --parallel $(JOBS)
+	@scripts/run-tests build/$@ $(JOBS) -LE hil
+
 fuzz:
 	@scripts/install-dependencies test
 	@cmake --preset fuzz --log-level=WARNING
@@ -94,7 +104,7 @@ lint:
 
 # Over the sources as `unit` compiles them.
 tidy:
-	@scripts/install-dependencies test
+	@scripts/install-dependencies tidy
 	@run-clang-tidy-22 -quiet -j $(JOBS) -p build/release '^(?!.*/tests/).*/Unity/.*'
 
 clean:

@@ -80,6 +80,7 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
                 "open the log in a viewer: docs/log.md");
   }
   Table table({"field", "values", "meaning"});
+  table.align_left();
   for (const hal::Field& field : (*topic)->layout.fields()) {
     table.add({field.name, std::to_string(field.count), field.doc});
   }
