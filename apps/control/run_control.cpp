@@ -6,7 +6,7 @@
 #include <chrono>
 #include <thread>
 
-#include "apps/control/clock_control.hpp"
+#include "apps/control/clock_commands.hpp"
 #include "apps/control/controller_control.hpp"
 #include "apps/control/fault_table.hpp"
 #include "apps/control/joint_control.hpp"

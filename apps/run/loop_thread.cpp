@@ -7,7 +7,7 @@
 #include <exception>
 
 #include "apps/can/bus_watch.hpp"
-#include "apps/control/clock_control.hpp"
+#include "apps/control/clock_commands.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {

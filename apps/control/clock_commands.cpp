@@ -1,4 +1,4 @@
-#include "apps/control/clock_control.hpp"
+#include "apps/control/clock_commands.hpp"
 
 #include "rt/clock.hpp"
 
