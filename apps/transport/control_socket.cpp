@@ -72,6 +72,7 @@ struct ControlSocket::Client {
   std::uint64_t last_turn = 0;
   bool waiting = false;  // the second thread has a question of this one
   bool ending = false;   // nothing more is read: closed when its answers are out
+  bool hung_up = false;  // it has closed its end, and reads no answer
   bool gone = false;
 };
 
@@ -152,6 +153,7 @@ void ControlSocket::serve() {
       if (happened == 0) continue;
       Client& client = *clients_[i];
       client.last_turn = ++turn_;
+      client.hung_up = (happened & POLLHUP) != 0;
       if ((happened & POLLIN) != 0) {
         take(client);
       } else if ((happened & POLLOUT) != 0) {
@@ -161,7 +163,7 @@ void ControlSocket::serve() {
         client.gone = true;
       }
     }
-    std::erase_if(clients_, [](const auto& one) { return one->gone; });
+    part();
     if (watched[1].revents != 0) deliver();
     if (watched[2].revents != 0) accept();
   }
@@ -211,10 +213,10 @@ void ControlSocket::answer_lines(Client& client) {
       client.in.erase(0, length);
       if (registry_->stops(question)) {
         client.out = answer_to(question);
-      } else if (hand_over(client, std::move(question))) {
-        return;
       } else {
-        client.out = refused("too many questions at once", "ask again");
+        // Whoever has hung up has given up: nothing may move when nobody expects it any more.
+        if (!client.hung_up) hand_over(client, std::move(question));
+        continue;
       }
     }
     client.out += '\n';
@@ -222,14 +224,11 @@ void ControlSocket::answer_lines(Client& client) {
   }
 }
 
-/// @return false when there is no room: clients that left theirs and went can fill it
-bool ControlSocket::hand_over(Client& client, std::string question) {
+void ControlSocket::hand_over(Client& client, std::string question) {
   const std::scoped_lock lock(mutex_);
-  if (questions_.size() == kMaxControlWaiting) return false;
   questions_.push_back({client.number, std::move(question)});
   client.waiting = true;
   more_.notify_one();
-  return true;
 }
 
 std::string ControlSocket::answer_to(std::string_view question) const {
@@ -250,6 +249,16 @@ void ControlSocket::work() {
     answers_.push_back(std::move(message));
     wake(done_);
   }
+}
+
+/// From the clients that are gone, and from what they asked for that has not begun.
+void ControlSocket::part() {
+  const std::scoped_lock lock(mutex_);
+  std::erase_if(questions_, [this](const Message& question) {
+    const auto asker = std::ranges::find(clients_, question.client, &Client::number);
+    return asker == clients_.end() || (*asker)->gone;
+  });
+  std::erase_if(clients_, [](const auto& one) { return one->gone; });
 }
 
 /// Hands the second thread's answers to the clients that are still there.

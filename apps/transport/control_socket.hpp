@@ -25,14 +25,12 @@ inline constexpr std::size_t kMaxControlLine = kMaxQuestion + 1;
 /// Clients at once. A further one takes the place of the one that has been quiet the longest, so
 /// that an emergency stop always finds its way in.
 inline constexpr std::size_t kMaxControlClients = 16;
-/// Questions that wait for one that is at work, those of clients that have gone included. One more
-/// is refused.
-inline constexpr std::size_t kMaxControlWaiting = 64;
 
 /// Serves a registry until it is destroyed; the file is removed then. Nothing that a client does
 /// or leaves undone reaches the process: a client that sends a line that is too long, that does
-/// not read its answers, or that is gone, is closed. A client's questions are answered in order; a
-/// command that stops the robot waits for no other client's.
+/// not read its answers, or that is gone, is closed. What such a client asked for and has not begun
+/// is dropped, unless it stops the robot. A client's questions are answered in order; a command
+/// that stops the robot waits for no other client's.
 class ControlSocket {
  public:
   /// Makes the folder of a default path (mode 0700) and the socket (mode 0600). The file of a dead
@@ -63,9 +61,10 @@ class ControlSocket {
   void take(Client& client);
   void answer_lines(Client& client);
   static void flush(Client& client);
-  bool hand_over(Client& client, std::string question);
+  void hand_over(Client& client, std::string question);
   [[nodiscard]] std::string answer_to(std::string_view question) const;
   void work();
+  void part();
   void deliver();
 
   std::string path_;
