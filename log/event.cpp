@@ -2,6 +2,8 @@
 #include "log/event.hpp"
 
 #include <cstdio>
+#include <iterator>
+#include <string>
 
 #include "base/realtime.hpp"
 #include "hal/fault_kind.hpp"
@@ -28,9 +30,55 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kControllersSwitched: return "controllers switched";
     case EventKind::kJointSet: return "mode or impedance set";
     case EventKind::kGainsSet: return "gains set";
+    case EventKind::kFeedbackLost: return "fault: no feedback";
+    case EventKind::kUnclaimed: return "fault: unclaimed write";
+    case EventKind::kBringUpFailed: return "fault: the drives were not enabled in time";
+    case EventKind::kTooLate: return "fault: too many late cycles";
+    case EventKind::kOwnerLost: return "fault: the remote owner is gone, or late";
+    case EventKind::kFell: return "fault: the robot fell";
   }
   return "?";
 }
+
+bool is_fault(EventKind kind) noexcept {
+  return kind == EventKind::kFault || kind == EventKind::kEmergencyStop ||
+         kind >= EventKind::kFeedbackLost;
+}
+
+namespace {
+
+/// What the code of such an event means; empty: it is told as a number.
+std::string text_of(const Event& event, bool has_joint) {
+  switch (event.kind) {
+    case EventKind::kOverrun: return ": " + std::to_string(event.code) + " cycles skipped";
+    case EventKind::kFeedbackLost: return " for " + std::to_string(event.code) + " cycles";
+    case EventKind::kInjected:
+    case EventKind::kUnclaimed:
+    case EventKind::kBringUpFailed:
+    case EventKind::kTooLate:
+    case EventKind::kOwnerLost: return "";
+    case EventKind::kFell: {
+      constexpr const char* kHow[] = {"",
+                                      ": its base is tilted",
+                                      ": its base is low",
+                                      ": its base is high",
+                                      ": no foot touches the ground",
+                                      ": a foot is below the ground"};
+      return event.code < std::size(kHow) ? kHow[event.code] : "";
+    }
+    case EventKind::kFault:
+      if (!has_joint) {
+        return std::string(": ") + tandem::to_string(static_cast<Code>(event.code));
+      }
+      [[fallthrough]];
+    default: break;
+  }
+  char code[16];
+  std::snprintf(code, sizeof code, " (0x%04X)", event.code);
+  return code;
+}
+
+}  // namespace
 
 std::string describe(const Event& event, std::span<const std::string> joints) {
   std::string text = to_string(event.kind);
@@ -44,16 +92,8 @@ std::string describe(const Event& event, std::span<const std::string> joints) {
                    : event.code == 3 ? " by the watchdog"
                                      : " on request");
   }
-  if (event.code == 0 || event.kind == EventKind::kInjected) return text;
-  char code[32];
-  if (event.kind == EventKind::kOverrun) {
-    std::snprintf(code, sizeof code, ": %u cycles skipped", event.code);
-  } else if (event.kind == EventKind::kFault && !has_joint) {
-    std::snprintf(code, sizeof code, ": %s", tandem::to_string(static_cast<Code>(event.code)));
-  } else {
-    std::snprintf(code, sizeof code, " (0x%04X)", event.code);
-  }
-  return text + code;
+  if (event.code == 0) return text;
+  return text + text_of(event, has_joint);
 }
 
 const std::string& event_schema() {

@@ -16,7 +16,7 @@ enum class EventKind : std::uint8_t {
   kStarted = 0,          ///< the first cycle
   kBringUpDone,          ///< every axis follows the command; controllers start
   kControllersDone,      ///< the duration is over, or every controller is done
-  kFault,                ///< a joint, the backend or a controller is in fault; the run stops
+  kFault,                ///< a joint, the backend or a controller is in fault
   kSensorLost,           ///< a sensor's sample is too old
   kLimited,              ///< a command was limited for the first time (per joint)
   kOverrun,              ///< the loop skipped `code` cycles
@@ -30,8 +30,16 @@ enum class EventKind : std::uint8_t {
   kControllersSwitched,  ///< on request: some were stopped, some started
   kJointSet,             ///< on request: a joint's mode, interaction or impedance
   kGainsSet,             ///< on request: gains of a joint's drive
+  kFeedbackLost,         ///< a fault: none of a joint for `code` cycles
+  kUnclaimed,            ///< a fault: a controller wrote to a joint that it had not claimed
+  kBringUpFailed,        ///< a fault: the drives were not enabled in time
+  kTooLate,              ///< a fault: too many late cycles
+  kOwnerLost,            ///< a fault: of the owner in another process; `code`: 0 it asked for it
+  kFell,                 ///< a fault: the robot fell; `code`: how (the text says it)
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
+/// Whether it is a fault, of whatever, or an emergency stop.
+[[nodiscard]] bool is_fault(EventKind kind) noexcept;
 
 /// Plain data: it crosses the ring as bytes.
 struct Event {

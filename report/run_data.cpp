@@ -130,17 +130,13 @@ struct Window {
   double fault_s = 1e300;
 };
 
-bool is_fault(log::EventKind kind) {
-  return kind == log::EventKind::kFault || kind == log::EventKind::kEmergencyStop;
-}
-
 std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
                                 const std::vector<std::string>& joints,
                                 const ErrorText& error_text) {
   constexpr std::uint32_t kFirstErrorCode = 0x1000;  // CiA 402; below it: other causes' figures
   std::vector<RunFault> faults;
   for (const auto& [event, text] : events) {
-    if (!is_fault(event.kind)) continue;
+    if (!log::is_fault(event.kind)) continue;
     RunFault fault{static_cast<double>(event.time_ns) * 1e-9, {}, text};
     const auto joint = static_cast<std::size_t>(event.joint);
     const bool of_drive = event.joint >= 0 && joint < joints.size();
@@ -166,7 +162,7 @@ Window window_of(const std::vector<log::EventText>& events, double settle_s) {
     const bool end = one.event.kind == log::EventKind::kControllersDone ||
                      one.event.kind == log::EventKind::kStopRequested;
     if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
-    if (is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
+    if (log::is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
   }
   return window;
 }

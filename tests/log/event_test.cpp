@@ -13,6 +13,10 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   EXPECT_EQ(describe(event, kJoints), "fault of knee (0x7310)");
   event = {.code = static_cast<std::uint32_t>(Code::kDiverged), .kind = EventKind::kFault};
   EXPECT_EQ(describe(event, kJoints), "fault: Diverged");
+  event = {.code = 11, .joint = 0, .kind = EventKind::kFeedbackLost};
+  EXPECT_EQ(describe(event, kJoints), "fault: no feedback of hip for 11 cycles");
+  event = {.code = 1, .kind = EventKind::kFell};
+  EXPECT_EQ(describe(event, kJoints), "fault: the robot fell: its base is tilted");
   event = {.code = 3, .kind = EventKind::kOverrun};
   EXPECT_EQ(describe(event, kJoints), "overrun: 3 cycles skipped");
   event = {.kind = EventKind::kBringUpDone};
