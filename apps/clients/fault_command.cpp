@@ -47,6 +47,29 @@ std::string causes_of(const Json& answer) {
   return causes;
 }
 
+/// Whether a fault that is latched now was latched before: its cause is still there.
+bool stayed(const Json& before, const Json& now) {
+  const auto is_latched = [](const Json& fault) { return fault.value("latched", false); };
+  for (const Json& fault : now.value("faults", Json::array())) {
+    for (const Json& old : before.value("faults", Json::array())) {
+      const bool same = fault.value("time_s", -1.0) == old.value("time_s", -2.0) &&
+                        fault.value("joint", "") == old.value("joint", "");
+      if (same && is_latched(fault) && is_latched(old)) return true;
+    }
+  }
+  return false;
+}
+
+/// Of a joint whose faults only warn: the others are enabled.
+Error still_there(const Json& answer) {
+  return {.message = fmt::format("a cause is still there ({}): this joint is not enabled, the "
+                                 "others are, and every controller is stopped",
+                                 causes_of(answer)),
+          .hint = "remove the cause, then `tandem fault reset` again",
+          .file = {},
+          .key = {}};
+}
+
 Error faulted_again(const Json& answer) {
   return {.message = fmt::format("the reset succeeded, and a fault followed at once ({})",
                                  causes_of(answer)),
@@ -96,10 +119,12 @@ Exit reset(const FaultOptions& options) {
   }
   const bool done = answer.value("resets", 0) > asked->value("resets", 0);
   const bool held = answer.value("phase", "") == "held";
+  const bool again = done && answer.value("latched", 0) > 0;
+  const bool stays = again && stayed(*asked, answer);
   if (options.json != "-") {
     if (nothing) fmt::print("nothing is latched\n");
     if (kept) fmt::print("{}\n", kAsked);
-    if (done) fmt::print("reset: every joint is enabled where it is\n");
+    if (done && !stays) fmt::print("reset: every joint is enabled where it is\n");
     if (!nothing) print_latched(answer);
     if (done && held) fmt::print("held: `tandem controller start` lets the controllers continue\n");
   }
@@ -107,8 +132,7 @@ Exit reset(const FaultOptions& options) {
     const bool through = answer.value("failed_resets", 0) > asked->value("failed_resets", 0);
     print_errors({failed_reset(answer, through)});
   }
-  const bool again = done && answer.value("latched", 0) > 0;
-  if (again) print_errors({faulted_again(answer)});
+  if (again) print_errors({stays ? still_there(answer) : faulted_again(answer)});
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
   return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
 }

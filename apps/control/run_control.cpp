@@ -62,6 +62,7 @@ Result<Json> reset(runtime::RobotCycle& cycle) {
     return fail(fmt::format("the run is in the phase {}", runtime::to_string(phase)),
                 "a fault is reset while the run waits for it: tandem run --on-fault wait");
   }
+  answer["faults"] = faults_json(cycle.faults());  // before it
   cycle.inbox().reset_faults();
   return answer;
 }

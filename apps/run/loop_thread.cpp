@@ -39,6 +39,30 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
+/// Prints each fault when it happens, for a run that waits for its reset.
+class FaultNotes {
+ public:
+  void look(const runtime::RobotCycle& cycle) {
+    if (cycle.fault_log().size() <= told_) return;
+    const std::vector<runtime::Fault> faults = cycle.faults();
+    const char* clear = is_terminal(stderr) ? "\r\x1b[K" : "";  // a progress bar
+    bool stopped = false;
+    for (; told_ < faults.size(); ++told_) {
+      const runtime::Fault& fault = faults[told_];
+      const bool warns = fault.category == hal::StopCategory::kWarn;
+      stopped = stopped || !warns;
+      fmt::print(stderr, "{}{}: {:.3f} s: {}{}{}\n", clear, warns ? "warning" : "fault",
+                 fault.time_s, fault.joint, fault.joint.empty() ? "" : ": ", fault.text);
+    }
+    if (stopped) {
+      fmt::print(stderr, "the run is stopped, and waits: tandem fault show, tandem fault reset\n");
+    }
+  }
+
+ private:
+  std::size_t told_ = 0;
+};
+
 void warn_of_log(const log::Recorder& recorder) {
   fmt::print(stderr,
              "warning: {}: nothing is logged any more: {}; the run continues without a log (end it "
@@ -70,12 +94,14 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
 }
 
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool quiet) {
+           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
+           bool quiet) {
   const runtime::Experiment& e = c.experiment;
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
   ProgressBar bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.can_buses(), stderr);
+  FaultNotes faults;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
     if (logged && recorder->failed()) {
@@ -83,6 +109,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
       warn_of_log(*recorder);
     }
     if (!quiet) buses.look();
+    if (waits && !quiet) faults.look(cycle);
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(cycle));

@@ -35,7 +35,9 @@ class LoopThread {
 /// Shows progress and the buses' states until the loop is done, or given up; with `quiet` it only
 /// waits. Either way it warns when the log is lost.
 /// @param recorder  null: nothing is logged
+/// @param waits  the run waits after a fault: each is printed when it happens, not at the end alone
 void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
-           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool quiet);
+           const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
+           bool quiet);
 
 }  // namespace tandem::apps

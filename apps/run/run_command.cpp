@@ -197,6 +197,7 @@ class Session {
 
   void make_cycle() {
     const runtime::CycleConfig config = cycle_config(c_, options_);
+    waits_ = config.after_stop == runtime::AfterStop::kWait;
     cycle_.emplace(runtime::CycleParts{.robot = experiment().robot,
                                        .backend = *c_.backend,
                                        .controllers = *c_.controllers,
@@ -258,7 +259,7 @@ class Session {
     auto guard = LoopGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
     LoopThread thread(*cycle_, e.thread);
-    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, options_.quiet);
+    watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, waits_, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
     guard->reset();
@@ -321,6 +322,7 @@ class Session {
   std::unique_ptr<remote::Server> server_;
   rt::WallClock clock_;
   std::optional<runtime::RobotCycle> cycle_;
+  bool waits_ = false;  // for a reset, after a fault
   ControlRegistry commands_;
   std::unique_ptr<ControlSocket> socket_;
   std::unique_ptr<DdsServices> services_;

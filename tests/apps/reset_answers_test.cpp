@@ -37,6 +37,33 @@ struct AnsweredRun : ::testing::Test {
     for (int i = 0; i < count; ++i) EXPECT_TRUE(cycle->step());
   }
 
+  /// `tandem fault reset` of a run whose joint `trips` is in fault when it looks; -1: none.
+  Exit reset(int trips) {
+    ControlRegistry served;
+    served.add("fault.reset", ControlEffect::kChanges, "as the run's", {},
+               [this](const Json&) -> Result<Json> {
+                 return registry.answer(R"({"do": "fault.reset"})");
+               });
+    served.add("fault.show", ControlEffect::kReads, "as the run's, some cycles later", {},
+               [this, trips](const Json&) -> Result<Json> {
+                 steps(20);
+                 if (trips >= 0) backend.faulted_joint = trips;
+                 steps(1);
+                 return registry.answer(R"({"do": "fault.show"})");
+               });
+    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-reset.sock";
+    const auto socket = ControlSocket::open(path, served);
+    EXPECT_TRUE(socket) << socket.error().to_string();
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    const Exit status = fault_command({.action = FaultOptions::Action::kReset,
+                                       .target = {.socket = path, .place = {}},
+                                       .json = {}});
+    out = ::testing::internal::GetCapturedStdout();
+    err = ::testing::internal::GetCapturedStderr();
+    return status;
+  }
+
   hal::RobotConfig robot = hal::test::fake_robot();
   runtime::test::FirstOrderRobot backend{robot};
   runtime::ControllerHost host{robot, nullptr, 1'000'000};
@@ -68,41 +95,32 @@ TEST_F(AnsweredRun, RefusesAResetAtOnceWhileTheRobotRetreats) {
 /// trips before that.
 TEST_F(AnsweredRun, EndsAResetThatAFaultFollowsAtOnceWithStatus1) {
   backend.latch_on_fault = true;
-  const auto reset = [this](bool trips) {
+  const auto stop = [this] {
     (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
     steps(1);
     EXPECT_EQ(cycle->phase(), RunPhase::kFaulted);
-    ControlRegistry served;
-    served.add("fault.reset", ControlEffect::kChanges, "as the run's", {},
-               [this](const Json&) -> Result<Json> {
-                 return registry.answer(R"({"do": "fault.reset"})");
-               });
-    served.add("fault.show", ControlEffect::kReads, "as the run's, some cycles later", {},
-               [this, trips](const Json&) -> Result<Json> {
-                 steps(20);
-                 if (trips) backend.faulted_joint = 1;
-                 steps(1);
-                 return registry.answer(R"({"do": "fault.show"})");
-               });
-    const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-reset.sock";
-    const auto socket = ControlSocket::open(path, served);
-    EXPECT_TRUE(socket) << socket.error().to_string();
-    ::testing::internal::CaptureStdout();
-    ::testing::internal::CaptureStderr();
-    const Exit status = fault_command({.action = FaultOptions::Action::kReset,
-                                       .target = {.socket = path, .place = {}},
-                                       .json = {}});
-    out = ::testing::internal::GetCapturedStdout();
-    err = ::testing::internal::GetCapturedStderr();
-    return status;
   };
-  EXPECT_EQ(reset(false), Exit::kDone) << err;
+  stop();
+  EXPECT_EQ(reset(-1), Exit::kDone) << err;
   EXPECT_EQ(err, "");
-  EXPECT_EQ(reset(true), Exit::kFault);
+  stop();
+  EXPECT_EQ(reset(1), Exit::kFault);
   EXPECT_NE(out.find("reset: every joint is enabled where it is"), std::string::npos) << out;
   EXPECT_NE(err.find("error: the reset succeeded, and a fault followed at once (elbow: "),
             std::string::npos)
       << err;
+}
+
+// It said that every joint was enabled, and that a new fault had followed at once.
+TEST_F(AnsweredRun, SaysThatACauseIsStillThereOfAJointWhoseFaultsOnlyWarn) {
+  robot.joints[1].on_fault = hal::StopCategory::kWarn;
+  backend.faulted_joint = 1;
+  backend.reset_clears = false;
+  steps(2);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  EXPECT_EQ(reset(1), Exit::kFault);
+  EXPECT_EQ(out.find("every joint is enabled"), std::string::npos) << out;
+  EXPECT_NE(err.find("error: a cause is still there (elbow: "), std::string::npos) << err;
 }
 
 }  // namespace
