@@ -192,19 +192,23 @@ LoopAnswer ControllerHost::set_joint(std::size_t joint, const JointRequest& wish
     }
     if (refused.reason != RejectReason::kNone) return refused;
   }
-  Impedance& impedance = impedance_[joint];
-  const Impedance before = impedance;
-  if (std::isfinite(wish.stiffness_Nm_rad)) impedance.stiffness_Nm_rad = wish.stiffness_Nm_rad;
-  if (std::isfinite(wish.damping_Nms_rad)) impedance.damping_Nms_rad = wish.damping_Nms_rad;
+  // What is not asked for stays: a controller may have written other values than ours.
+  Impedance wanted{command.stiffness_Nm_rad()[joint], command.damping_Nms_rad()[joint]};
+  if (std::isfinite(wish.stiffness_Nm_rad)) {
+    wanted.stiffness_Nm_rad = impedance_[joint].stiffness_Nm_rad = wish.stiffness_Nm_rad;
+  }
+  if (std::isfinite(wish.damping_Nms_rad)) {
+    wanted.damping_Nms_rad = impedance_[joint].damping_Nms_rad = wish.damping_Nms_rad;
+  }
   const bool same = command.mode()[joint] == static_cast<std::int8_t>(mode) &&
                     command.interaction()[joint] == static_cast<std::uint8_t>(interaction);
-  const bool yields = impedance.stiffness_Nm_rad != before.stiffness_Nm_rad ||
-                      impedance.damping_Nms_rad != before.damping_Nms_rad;
+  const bool yields = wanted.stiffness_Nm_rad != command.stiffness_Nm_rad()[joint] ||
+                      wanted.damping_Nms_rad != command.damping_Nms_rad()[joint];
   if (!running || (same && !yields)) return {.joint = number, .one = owned_by};
   transfer_.begin(joint, state, command);
   if (same) {
-    command.stiffness_Nm_rad()[joint] = impedance.stiffness_Nm_rad;
-    command.damping_Nms_rad()[joint] = impedance.damping_Nms_rad;
+    command.stiffness_Nm_rad()[joint] = wanted.stiffness_Nm_rad;
+    command.damping_Nms_rad()[joint] = wanted.damping_Nms_rad;
   } else {
     assign(joint, mode, interaction, state, command);
   }

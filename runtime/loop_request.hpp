@@ -19,6 +19,9 @@ struct JointRequest {
   double damping_Nms_rad = kAsItIs;
   std::int32_t mode = -1;         ///< hal::ControlMode
   std::int32_t interaction = -1;  ///< hal::InteractionMode
+
+  /// Whether it asks for a mode in which the drive drives.
+  [[nodiscard]] bool drives() const noexcept { return mode > 0 || interaction >= 0; }
 };
 
 /// Where a joint is to go, on a trapezoid of speed. NaN: hal::PositionControl's own.
@@ -75,6 +78,7 @@ enum class RejectReason : std::uint32_t {
   kNotNow,      ///< no drive is reset in this phase
   kBoardLost,   ///< not the drive of `joint`, its board has to come back, with all its joints
   kServed,      ///< another process resets the drives
+  kDriveFault,  ///< the drive of `joint` is in fault, or its board is lost
 };
 
 struct LoopAnswer {

@@ -127,6 +127,7 @@ class RobotCycle {
   void take_inbox() noexcept TANDEM_RT;
   void take_requests() noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer carry_out(const LoopRequest& request) noexcept TANDEM_RT;
+  [[nodiscard]] LoopAnswer may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer may_start(ControllerSet start) const noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer leave_hold(ControllerSet stop, ControllerSet start) noexcept TANDEM_RT;
   [[nodiscard]] LoopAnswer go_on() noexcept TANDEM_RT;

@@ -18,6 +18,23 @@ void RobotCycle::emergency_stop(EmergencyInput input, StopCategory category,
          .category = category});
 }
 
+namespace {
+
+EventKind event_of(FaultSource source) noexcept TANDEM_RT {
+  switch (source) {
+    case FaultSource::kJointLost: return EventKind::kFeedbackLost;
+    case FaultSource::kSensorLost: return EventKind::kSensorLost;
+    case FaultSource::kOverrun: return EventKind::kTooLate;
+    case FaultSource::kBringUp: return EventKind::kBringUpFailed;
+    case FaultSource::kOwner: return EventKind::kOwnerLost;
+    case FaultSource::kStray: return EventKind::kUnclaimed;
+    case FaultSource::kFall: return EventKind::kFell;
+    default: return EventKind::kFault;
+  }
+}
+
+}  // namespace
+
 /// Notes it, and carries out what its category says.
 void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint =
@@ -26,9 +43,7 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
-    const bool of_sensor = record.source == FaultSource::kSensorLost;
-    event(of_sensor ? EventKind::kSensorLost : EventKind::kFault, of_joint ? record.index : -1,
-          record.code);
+    event(event_of(record.source), of_joint ? record.index : -1, record.code);
   }
   if (record.category == StopCategory::kCategory2 && !run_.in(RunPhase::kRetreating) &&
       !retreat()) {

@@ -4,6 +4,8 @@
 #include "rt/stop_signal.hpp"
 #include "runtime/robot_cycle.hpp"
 
+#include <cmath>
+
 namespace tandem::runtime {
 
 using hal::StopCategory;
@@ -50,7 +52,6 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
   if (run_.in(RunPhase::kRetreating)) return {.reason = RejectReason::kNotEnabled};
   const LoopAnswer not_enabled{.reason = RejectReason::kNotEnabled,
                                .joint = static_cast<std::int32_t>(request.joint)};
-  const LoopAnswer being_reset{.reason = RejectReason::kResetting, .joint = not_enabled.joint};
   switch (request.kind) {
     case Kind::kInsert: return controllers_->insert(request.slot, *request.controller);
     case Kind::kRemove: {
@@ -69,23 +70,38 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
       if (run_.in(RunPhase::kHeld)) return leave_hold(request.stop, request.start);
       return controllers_->switch_over(request.stop, request.start, controlling_, time_, state_,
                                        controlled());
-    case Kind::kJoint:
-      if (resets_[request.joint] != 0) return being_reset;
+    case Kind::kJoint: {
+      const LoopAnswer no = may_lead(request.joint, request.wish.drives());
+      if (no.reason != RejectReason::kNone) return no;
       return controllers_->set_joint(request.joint, request.wish, controlling_, state_,
                                      controlled());
+    }
     case Kind::kRecover:
+    case Kind::kMove: {
       if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) return not_enabled;
-      if (resets_[request.joint] != 0) return being_reset;
-      return controllers_->recover(request.joint, controlled());
-    case Kind::kMove:
-      if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) return not_enabled;
-      if (resets_[request.joint] != 0) return being_reset;
+      const bool recovers = request.kind == Kind::kRecover;
+      const LoopAnswer no =
+          may_lead(request.joint, recovers || std::isfinite(request.move.target_rad));
+      if (no.reason != RejectReason::kNone) return no;
+      if (recovers) return controllers_->recover(request.joint, controlled());
       return controllers_->move(request.joint, request.move, controlling_, state_, controlled());
+    }
     case Kind::kReset: return reset_drive(request.joint);
     case Kind::kGains: break;
   }
   controllers_->gains().set_gains(request.joint, request.loop, request.gains);
   return {};
+}
+
+/// @param drives  what is asked for needs a drive that is well
+LoopAnswer RobotCycle::may_lead(std::size_t joint, bool drives) const noexcept TANDEM_RT {
+  LoopAnswer answer{.joint = static_cast<std::int32_t>(joint)};
+  if (resets_[joint] != 0) {
+    answer.reason = RejectReason::kResetting;
+  } else if (drives && watch_.is_ill(state_, joint)) {
+    answer.reason = RejectReason::kDriveFault;
+  }
+  return answer;
 }
 
 LoopAnswer RobotCycle::may_start(ControllerSet start) const noexcept TANDEM_RT {

@@ -78,6 +78,9 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
     case RejectReason::kBoardLost:
       return {"its board is lost, and would come back with all of its joints",
               "tandem fault reset brings them back together"};
+    case RejectReason::kDriveFault:
+      return {"its drive is in fault, or gives no feedback",
+              "see why: tandem joint show " + joint + "; then tandem joint reset " + joint};
     case RejectReason::kServed:
       return {"its drive is reset by the process that serves the robot",
               "ask that one, or reset every drive: tandem fault reset"};

@@ -201,6 +201,8 @@ class RunServices {
   [[nodiscard]] Result<std::size_t> joint_to_change(const std::string& name);
   [[nodiscard]] Status check_mode(std::size_t joint, const JointRequest& wish,
                                   const JointStatus& now) const;
+  [[nodiscard]] Status check_unclaimed(std::size_t joint) const;
+  [[nodiscard]] Status check_free_to_move(std::size_t joint) const;
   [[nodiscard]] std::vector<JointStatus> looks() const;
   [[nodiscard]] std::string controller_name(std::int32_t slot) const;
 

@@ -92,18 +92,28 @@ Status RunServices::check_mode(std::size_t joint, const JointRequest& wish,
   const auto interaction =
       static_cast<hal::InteractionMode>(wish.interaction >= 0 ? wish.interaction : now.interaction);
   if (Status able = hal::check_capability(*robot_, joint, mode, interaction); !able) return able;
-  LoopAnswer refused{.joint = static_cast<std::int32_t>(joint)};
+  if (Status free = check_unclaimed(joint); !free) return free;
+  if (progress_->phase.load() == RunPhase::kRunning) return {};
+  return std::unexpected(
+      refusal({.reason = RejectReason::kNotRunning, .joint = static_cast<std::int32_t>(joint)}));
+}
+
+/// As check_unclaimed(), in the phase in which controllers have joints.
+Status RunServices::check_free_to_move(std::size_t joint) const {
+  return progress_->phase.load() == RunPhase::kRunning ? check_unclaimed(joint) : Status();
+}
+
+/// Whether no controller has the joint. The loop looks again: late, when its time stands.
+Status RunServices::check_unclaimed(std::size_t joint) const {
   const ControllerSet active = planned();
   for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
     const auto& one = host_->owned()[slot];
     if ((active & only(slot)) == 0 || one == nullptr || one->claimed[joint] == 0) continue;
-    refused.reason = RejectReason::kClaimed;
-    refused.one = static_cast<std::int32_t>(slot);
-    return std::unexpected(refusal(refused));
+    return std::unexpected(refusal({.reason = RejectReason::kClaimed,
+                                    .joint = static_cast<std::int32_t>(joint),
+                                    .one = static_cast<std::int32_t>(slot)}));
   }
-  if (progress_->phase.load() == RunPhase::kRunning) return {};
-  refused.reason = RejectReason::kNotRunning;
-  return std::unexpected(refusal(refused));
+  return {};
 }
 
 Result<RequestResult> RunServices::set_joint(const std::string& joint, const JointRequest& wish,
@@ -141,6 +151,7 @@ Result<RequestResult> RunServices::recover(const std::string& joint, Patience pa
   Lock lock(mutex_);
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
+  if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
   return ask(lock,
              {.kind = LoopRequest::Kind::kRecover, .joint = static_cast<std::uint32_t>(*index)},
              patience);
@@ -160,22 +171,26 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
   const hal::JointCapabilities& limit = host_->capabilities()[*index];
+  const std::string unit = limit.slides ? " m" : " rad";
   const double target = wish.target_rad, speed = wish.speed_rad_s;
   if (target < limit.min_position_rad || target > limit.max_position_rad) {
     return fail_at(
-        joint, "the target " + number(target) + " is beyond the joint's limits",
-        "give " + number(limit.min_position_rad) + " to " + number(limit.max_position_rad));
+        joint, "the target " + number(target) + unit + " is beyond the joint's limits",
+        "give " + number(limit.min_position_rad) + " to " + number(limit.max_position_rad) + unit);
   }
   if (!std::isnan(speed) && !(speed > 0.0 && speed <= limit.max_velocity_rad_s)) {
-    return fail_at(joint, "the speed " + number(speed) + " is not one that the joint can go at",
-                   "give more than 0, up to " + number(limit.max_velocity_rad_s));
+    return fail_at(joint,
+                   "the speed " + number(speed) + unit + "/s is not one that the joint can go at",
+                   "give more than 0, up to " + number(limit.max_velocity_rad_s) + unit + "/s");
   }
   const double acceleration = wish.acceleration_rad_s2;
   if (!std::isnan(acceleration) &&
       !(acceleration > 0.0 && acceleration <= limit.max_acceleration_rad_s2)) {
-    return fail_at(joint, "the acceleration " + number(acceleration) + " is beyond its limit",
-                   "give more than 0, up to " + number(limit.max_acceleration_rad_s2));
+    return fail_at(
+        joint, "the acceleration " + number(acceleration) + unit + "/s^2 is beyond its limit",
+        "give more than 0, up to " + number(limit.max_acceleration_rad_s2) + unit + "/s^2");
   }
+  if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
   return ask(
       lock,
       {.kind = LoopRequest::Kind::kMove, .joint = static_cast<std::uint32_t>(*index), .move = wish},

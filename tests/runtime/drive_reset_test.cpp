@@ -195,6 +195,28 @@ TEST_F(DriveReset, IsPartOfASnapshot) {
 }
 
 // The other motion that a fault forbids: tandem joint move.
+// Of a joint whose faults only warn: it was told to move, and lay where it was.
+TEST_F(DriveReset, IsNeededBeforeTheJointIsMovedOrPutIntoAMode) {
+  begin(hal::StopCategory::kWarn);
+  trip(1);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  const auto move = [&](double target_rad) {
+    return answered([&](RunServices& services) {
+      return services.move_joint("elbow", {.target_rad = target_rad});
+    });
+  };
+  const auto set = [&](hal::ControlMode mode) {
+    return answered([&](RunServices& services) {
+      return services.set_joint("elbow", {.mode = static_cast<std::int32_t>(mode)});
+    });
+  };
+  has(move(0.2), "its drive is in fault");
+  has(move(0.2), "tandem joint reset elbow");
+  has(set(hal::ControlMode::kTorque), "its drive is in fault");
+  EXPECT_EQ(move(MoveRequest::kDefault), "done") << "a stop is never refused for that";
+  EXPECT_EQ(set(hal::ControlMode::kIdle), "done") << "nor is no torque";
+}
+
 TEST_F(DriveReset, AndAFaultThatIsLatchedKeepsEveryJointFromBeingMoved) {
   begin(hal::StopCategory::kCategory1);
   const auto move = [this] {

@@ -235,6 +235,27 @@ TEST_F(JointServices, GiveAClaimedJointTheImpedanceThatItsControllerDoesNotWrite
   EXPECT_EQ(cycle->command().stiffness_Nm_rad()[0], 30.0) << "a start keeps it";
 }
 
+// The value that was not given became that of robot.toml, or of an earlier request.
+TEST_F(JointServices, LeaveTheOtherValueOfAnImpedanceAsTheControllerWroteIt) {
+  hal::CommandImage command = cycle->command();
+  command.stiffness_Nm_rad()[0] = 1.0;
+  command.damping_Nms_rad()[0] = 0.05;
+  (void)host.set_joint(0, {.stiffness_Nm_rad = 0.5}, true, cycle->state(), command);
+  EXPECT_EQ(command.stiffness_Nm_rad()[0], 0.5);
+  EXPECT_EQ(command.damping_Nms_rad()[0], 0.05);
+  command.stiffness_Nm_rad()[0] = 1.0;
+  (void)host.set_joint(0, {.damping_Nms_rad = 0.09}, true, cycle->state(), command);
+  EXPECT_EQ(command.stiffness_Nm_rad()[0], 1.0);
+  EXPECT_EQ(command.damping_Nms_rad()[0], 0.09);
+}
+
+// "asked for" was the answer while time stood, and the joint never moved.
+TEST_F(JointServices, RefuseToMoveAClaimedJointWithoutAskingTheLoop) {
+  EXPECT_NE(text(services().move_joint("shoulder", {.target_rad = 0.3}, RunServices::Patience{0}))
+                .find("is claimed by the controller 'sine'"),
+            std::string::npos);
+}
+
 TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
   EXPECT_NE(text(mode("elbwo", ControlMode::kIdle)).find("did you mean 'elbow'?"),
             std::string::npos);
@@ -405,11 +426,12 @@ TEST_F(JointMoves, AreRefusedBeyondTheLimitsAndOfJointsThatAreTaken) {
   const auto has = [](const std::string& text, const char* words) {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   };
-  has(move("elbow", {.target_rad = 1.6}), "the target 1.6 is beyond the joint's limits");
+  has(move("elbow", {.target_rad = 1.6}), "the target 1.6 rad is beyond the joint's limits");
   has(move("elbow", {.target_rad = std::numeric_limits<double>::infinity()}), "is beyond");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}), "the speed 2.1 is not one");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 is not one");
-  has(move("elbow", {.target_rad = 0.0, .acceleration_rad_s2 = -1.0}), "the acceleration -1 is");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}), "the speed 2.1 rad/s is not one");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 rad/s is not one");
+  has(move("elbow", {.target_rad = 0.0, .acceleration_rad_s2 = -1.0}),
+      "the acceleration -1 rad/s^2 is");
   has(move("elbwo", {.target_rad = 0.0}), "did you mean 'elbow'?");
   has(answered("shoulder", {.target_rad = 0.0}), "is claimed by the controller 'sine'");
   ASSERT_TRUE(mode("elbow", ControlMode::kVelocity));
