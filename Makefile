@@ -5,13 +5,14 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 2
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy clean help
+.PHONY: demo test test-all unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
 	@echo "make fuzz   the fuzzers, a minute each, two at a time; FUZZ_RUNS=1000000: so many inputs each"
+	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
 	@echo "make format  lay out every source; make lint: whether they are (part of make test)"
 	@echo "make clean  remove build/ and runs/"
 
@@ -92,6 +93,12 @@ fuzz:
 	@cmake --preset fuzz --log-level=WARNING
 	@cmake --build build/fuzz --target $(addprefix fuzz_,$(FUZZ_TARGETS)) --parallel $(JOBS)
 	@TARGETS="$(FUZZ_TARGETS)" scripts/run-fuzzers build/fuzz $(FUZZ_SECONDS) "$(FUZZ_RUNS)" $(FUZZ_JOBS)
+
+# 200 lines are broken, one at a time, in a copy: tests/mutations.md has the last figures. Hours.
+mutations:
+	@scripts/install-dependencies test
+	@scripts/install-node-modules
+	@scripts/mutation-check --jobs $(JOBS)
 
 # With the formatter of Debian 12; others lay some lines out differently.
 CLANG_FORMAT ?= clang-format-14

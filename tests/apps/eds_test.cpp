@@ -80,6 +80,8 @@ void expect_complete(const Sheet& sheet) {
     EXPECT_EQ(static_cast<std::size_t>(count), objects.size() - 1) << list;
     for (int i = 1; i <= count; ++i) {
       const std::string name = objects.at(std::to_string(i)).substr(2);
+      EXPECT_EQ(name >= "2000" && name < "6000", std::string_view(list) == "ManufacturerObjects")
+          << name;
       ASSERT_TRUE(sheet.contains(name)) << name;
       expected.insert(name);
       const Section& object = sheet.at(name);

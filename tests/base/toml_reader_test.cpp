@@ -49,6 +49,20 @@ TEST(TomlReader, RefusesNumbersThatAreNotFiniteOrOutOfRange) {
   EXPECT_EQ(document.diagnostics()[5].message, "this key is missing");
 }
 
+TEST(TomlReader, TakesNumbersBetweenTheSmallestAndTheLargestSize) {
+  const TomlDocument document = parse("a = 1e-30\nb = -1e30\nc = 9e-31\nd = -1.1e30\n");
+  TomlTable root = document.root();
+  EXPECT_EQ(root.number("a"), 1e-30);
+  EXPECT_EQ(root.number("b"), -1e30);
+  EXPECT_TRUE(document.diagnostics().empty());
+  (void)root.number("c");
+  (void)root.number("d");
+  ASSERT_EQ(document.diagnostics().size(), 2U);
+  for (const Error& error : document.diagnostics()) {
+    EXPECT_EQ(error.hint, "give 0, or a size of 1e-30 to 1e30") << error.key;
+  }
+}
+
 TEST(TomlReader, RefusesIntegersThatNoDoubleHolds) {
   const TomlDocument document = parse(
       "kp = 9007199254740993\nlist = [1, 9007199254740993]\n"

@@ -42,6 +42,7 @@ TEST(ClampRound, RoundsToNearestAndNeverWraps) {
   EXPECT_EQ(clamp_round<std::int16_t>(2.5), 3);
   EXPECT_EQ(clamp_round<std::int16_t>(-2.5), -3);
   EXPECT_EQ(clamp_round<std::int16_t>(2.4999), 2);
+  EXPECT_EQ(clamp_round<std::int16_t>(-2.4999), -2);
   EXPECT_EQ(clamp_round<std::int16_t>(32767.4), 32767);
   EXPECT_EQ(clamp_round<std::int16_t>(32768.0), 32767);
   EXPECT_EQ(clamp_round<std::int16_t>(-40000.0), -32768);

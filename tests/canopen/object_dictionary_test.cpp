@@ -1,6 +1,7 @@
 #include "canopen/object_dictionary.hpp"
 
 #include <cmath>
+#include <limits>
 
 namespace tandem::canopen {
 namespace {
@@ -58,6 +59,15 @@ TEST_F(Dictionary, RefusesWithTheStandardsAbortCodes) {
   std::size_t length = 0;
   EXPECT_EQ(od.read(0x2FFF, 0, small, length), AbortCode::kWriteOnly);
   EXPECT_EQ(od.read(0x6064, 0, small, length), AbortCode::kOutOfMemory);
+}
+
+TEST_F(Dictionary, TakesEveryFloatWhereNoRangeIsGiven) {
+  float gain = 0.0f;
+  ASSERT_TRUE(od.add(0x2011, 0, gain, kWriteRpdo));
+  EXPECT_EQ(write(0x2011, 0, {0xFF, 0xFF, 0x7F, 0x7F}), AbortCode::kNone);
+  EXPECT_EQ(gain, std::numeric_limits<float>::max());
+  EXPECT_EQ(write(0x2011, 0, {0xFF, 0xFF, 0x7F, 0xFF}), AbortCode::kNone);
+  EXPECT_EQ(gain, std::numeric_limits<float>::lowest());
 }
 
 TEST_F(Dictionary, RefusesTheSameEntryTwiceAndMoreThanItsCapacity) {

@@ -59,6 +59,22 @@ TEST(Wire, SensorFramesAreTheDocumentsBytes) {
             (std::vector<double>{1.0, 2.0, 300.0, 0.0, 0.0, 0.0}));
 }
 
+TEST(Wire, APdoThatABoardDoesNotSendIsNoSample) {
+  Rig rig;
+  rig.bring_up();
+  rig.present[0] = false;
+  Frame frame;
+  frame.id = 0x48A;  // TPDO 4 of node 10, which has fewer
+  frame.length = 64;
+  frame.flags = canopen::kFlagFd;
+  frame.data.fill(0x11);
+  const double before = rig.state.position_rad()[0];
+  (void)rig.legs.boards().send({&frame, 1});
+  EXPECT_EQ(rig.read(), Code::kTimeout);
+  EXPECT_EQ(rig.state.age_cycles()[0], 1u);
+  EXPECT_EQ(rig.state.position_rad()[0], before);
+}
+
 TEST(Wire, BringUpSendsTheDocumentsSequence) {
   Rig rig;
   std::vector<Bytes> requests;

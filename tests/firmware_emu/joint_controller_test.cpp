@@ -324,6 +324,16 @@ TEST(JointController, HoldsWhereItWasWhenItHasToStop) {
   EXPECT_NEAR(controller.terms().position_error_rad, -0.05, 1.0e-15);
 }
 
+TEST(JointController, HoldsAtRest) {
+  ControllerConfig c = config();
+  c.position.ki = 0.0;
+  JointController controller = settled(c, Mode::kCst, measured(), reference());
+  controller.update(Action::kHold, Mode::kCst, reference(), measured());
+  controller.update(Action::kHold, Mode::kCst, reference(), measured());
+  // 100 * 0 + 4 * (0 - 0.2) + 2
+  EXPECT_NEAR(controller.terms().torque_reference_Nm, -4.0 * 0.2 + 2.0, 1.0e-12);
+}
+
 TEST(JointController, ChangesTheTorqueReferenceNoFasterThanItsSlopeInEveryMode) {
   for (const Mode mode :
        {Mode::kCsp, Mode::kCsv, Mode::kCst, Mode::kImpedance, Mode::kVelocityImpedance}) {

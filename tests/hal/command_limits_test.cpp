@@ -103,6 +103,13 @@ TEST_F(Limits, HoldEveryReferenceWithinItsRange) {
   EXPECT_EQ(limits.counters()[0].out_of_range, 6U);
 }
 
+TEST_F(Limits, TakeAnExcessOfOneInTenMillionForNoRounding) {
+  command.position_rad()[0] = 0.1 + 0.002 * (1.0 + 1e-7);
+  EXPECT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.position_rad()[0], 0.102);
+  EXPECT_EQ(limits.counters()[0].too_fast, 1U);
+}
+
 TEST_F(Limits, MoveAPositionNoFasterThanTheJointMay) {
   command.position_rad()[0] = 0.2;
   EXPECT_EQ(limits.apply(state, command), Code::kOk);

@@ -167,6 +167,15 @@ TEST(Capabilities, AreWhatTheGainsTableHasLoopsFor) {
   EXPECT_FALSE(joint.can(ControlMode::kVelocity, InteractionMode::kStiff));
 }
 
+TEST(Capabilities, TakeTheDampingOfTheGainsOrTheCriticalOne) {
+  RobotConfig robot = test::fake_robot();
+  EXPECT_EQ(joint_capabilities(robot)[0].max_damping_Nms_rad, 25.0);
+  robot.gains[0].position.gains.kd = 0.0;
+  robot.gains[0].damping_Nms_rad = 0.0;
+  // 2 sqrt(k m), k of the position loop: 200 Nm/rad, m of the rotor: 0.2 kg m2
+  EXPECT_DOUBLE_EQ(joint_capabilities(robot)[0].max_damping_Nms_rad, 2.0 * std::sqrt(40.0));
+}
+
 TEST(Capabilities, NameTheJointAndTheGainsTableThatLackALoop) {
   RobotConfig robot = test::fake_robot();
   robot.gains[0].current = {};

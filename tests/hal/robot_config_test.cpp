@@ -234,8 +234,29 @@ TEST(RobotConfig, RefusesNumbersThatAreNotFinite) {
                "robots/leg.toml:62: contact.damping_s_m: must be finite");
 }
 
+TEST(RobotConfig, TakesALimitOfTemperatureBelowThatOfARoom) {
+  const auto robot = parse_robot_config(with(kRobot, "[gains.big]", "temperature_limit_C = -40\n"),
+                                        "robots/leg.toml");
+  ASSERT_TRUE(robot.has_value()) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->actuators[0].temperature_limit_C, -40.0);
+}
+
+TEST(RobotConfig, RefusesADataPhaseThatIsSlowerThanTheArbitration) {
+  const auto rates = [](const std::string& data) {
+    return with(kRobot, "[[board]]", "bitrate = 500000\ndata_bitrate = " + data + "\n");
+  };
+  EXPECT_EQ(errors_of(rates("500000")), "");
+  const std::string errors = errors_of(rates("499999"));
+  EXPECT_NE(errors.find("bus[0].data_bitrate: is lower than the bitrate of the arbitration phase"),
+            std::string::npos)
+      << errors;
+}
+
 TEST(RobotConfig, RefusesReversedLimits) {
   expect_error(with("max_position_rad = 1.0", "max_position_rad = -2.0"),
+               "robots/leg.toml:42: joint[0].min_position_rad: the position limits are reversed or "
+               "equal (min_position_rad must be less than max_position_rad)");
+  expect_error(with("max_position_rad = 1.0", "max_position_rad = -1.5"),
                "robots/leg.toml:42: joint[0].min_position_rad: the position limits are reversed or "
                "equal (min_position_rad must be less than max_position_rad)");
 }

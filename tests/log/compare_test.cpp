@@ -86,6 +86,8 @@ TEST_F(Compare, ATimeStampCountsToo) {
   const Comparison result = with({}, {.late_message = 2});
   ASSERT_TRUE(state_of(result).first);
   EXPECT_EQ(state_of(result).first->signal, "time");
+  EXPECT_DOUBLE_EQ(state_of(result).first->a, 2.000e-6);
+  EXPECT_DOUBLE_EQ(state_of(result).first->b, 2.001e-6);
   EXPECT_EQ(state_of(result).first->message, 2U);
 }
 

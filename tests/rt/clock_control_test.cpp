@@ -268,6 +268,21 @@ TEST(Doorbell, GivesUpAtTheDeadline) {
   }
 }
 
+TEST(Doorbell, WithoutADeadlineWaitsForTheRing) {
+  Doorbell bell;
+  std::atomic<bool> rung{false}, early{false};
+  const std::uint32_t seen = bell.count();
+  std::thread waits([&] {
+    bell.wait(seen);
+    early.store(!rung.load());
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  rung.store(true);
+  bell.ring();
+  waits.join();
+  EXPECT_FALSE(early.load());
+}
+
 TEST(Doorbell, WakesWhoeverWaitsUntilTheEnd) {
   Doorbell bell;
   std::atomic<std::uint32_t> heard{0};
