@@ -38,13 +38,17 @@ function(tandem_install)
     PATTERN CMakeLists.txt EXCLUDE)
   install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
   install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs)
-  # The example's robot lies elsewhere then.
-  set(example examples/03_controller)
-  file(READ ${example}/sway.toml experiment)
-  string(REPLACE "../../config" "../../../../tandem/config" experiment "${experiment}")
-  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/installed/sway.toml CONTENT "${experiment}" @ONLY)
-  install(FILES ${example}/CMakeLists.txt ${example}/sway.cpp
-    ${PROJECT_BINARY_DIR}/installed/sway.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/${example})
+  # The examples' robot lies elsewhere then.
+  foreach(controller 03_controller/sway 06_devices/reach)
+    set(example examples/${controller})
+    cmake_path(GET example PARENT_PATH folder)
+    cmake_path(GET example FILENAME name)
+    file(READ ${example}.toml experiment)
+    string(REPLACE "../../config" "../../../../tandem/config" experiment "${experiment}")
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/installed/${name}.toml CONTENT "${experiment}" @ONLY)
+    install(FILES ${folder}/CMakeLists.txt ${example}.cpp
+      ${PROJECT_BINARY_DIR}/installed/${name}.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder})
+  endforeach()
 
   foreach(header IN LISTS TANDEM_PLUGIN_HEADERS)
     cmake_path(GET header PARENT_PATH folder)

@@ -1,5 +1,5 @@
-# Installs into WORK, builds example 03 against that, as it is installed and as a copy in a folder with
-# a blank, and lets the installed program run both on an installed robot.
+# Installs into WORK, builds the examples 03 and 06 against that, as they are installed, and 03 as a
+# copy in a folder with a blank, and lets the installed program run all on an installed robot.
 # -DBUILD=… -DWORK=… -DCOMPILER=…
 file(REMOVE_RECURSE ${WORK})
 set(prefix ${WORK}/prefix)
@@ -33,6 +33,12 @@ set(example ${prefix}/share/doc/tandem/examples/03_controller)
 build(${example} ${WORK}/in_place)
 set(ENV{TANDEM_CONTROLLERS} ${WORK}/in_place/lib/controllers)
 execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet ${example}/sway.toml
+  COMMAND_ERROR_IS_FATAL ANY)
+
+set(devices ${prefix}/share/doc/tandem/examples/06_devices)
+build(${devices} ${WORK}/devices)
+set(ENV{TANDEM_CONTROLLERS} ${WORK}/devices/lib/controllers)
+execute_process(COMMAND ${prefix}/bin/tandem run --no-log --duration 2 --quiet ${devices}/reach.toml
   COMMAND_ERROR_IS_FATAL ANY)
 
 file(COPY ${example}/ DESTINATION ${strange})

@@ -326,8 +326,11 @@ class Reader {
     };
     joint.lower = one("lower", 0.0);
     joint.upper = one("upper", 0.0);
+    const bool missing = limit.Attribute("lower") == nullptr && limit.Attribute("upper") == nullptr;
     if (joint.type != "continuous" && joint.lower >= joint.upper) {
-      note(joint.lower > joint.upper ? "lower is above upper" : "lower and upper are equal");
+      note(missing                     ? "lower and upper are missing"
+           : joint.lower > joint.upper ? "lower is above upper"
+                                       : "lower and upper are equal");
       joint.lower = joint.upper = kNoLimit;
     }
     joint.velocity = one("velocity", kNoLimit);

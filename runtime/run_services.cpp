@@ -37,6 +37,10 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
     case RejectReason::kNone: break;
     case RejectReason::kEnding: return {"the run shuts down", "start another run"};
     case RejectReason::kNotRunning:
+      if (phase == RunPhase::kHeld) {
+        return {"every joint is held after the reset, until the controllers run",
+                "tandem controller start lets them continue, then ask again"};
+      }
       return {"every joint is held until the controllers run",
               "ask again in the phase running; after a fault: tandem fault reset first"};
     case RejectReason::kConflict:
@@ -300,6 +304,15 @@ Result<ControllerSet> RunServices::set_of(const std::vector<std::string>& names)
   return set;
 }
 
+std::string RunServices::names_of(ControllerSet set) const {
+  std::string names;
+  for (std::size_t slot = 0; slot < kMostControllers; ++slot) {
+    if ((set & only(slot)) == 0) continue;
+    names += (names.empty() ? "" : ",") + controller_name(static_cast<std::int32_t>(slot));
+  }
+  return names;
+}
+
 Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const {
   const ControllerSet active = planned();
   ControllerHost::Table table{};
@@ -314,16 +327,29 @@ Status RunServices::check_switch(ControllerSet stop, ControllerSet start) const 
       return fail_at(name, "is not active", "tandem controller list shows which are");
     }
     if ((start & active & bit) != 0) {
+      const RunPhase phase = progress_->phase.load();
+      if (phase == RunPhase::kFaulted || phase == RunPhase::kResetting) {
+        return fail_at(name, "a fault is latched: this controller was active, and stands still",
+                       "tandem fault reset, then tandem controller start");
+      }
       return fail_at(name, "is active already", "tandem controller list shows which are");
     }
   }
-  if (const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start)) {
-    return std::unexpected(refusal({.reason = RejectReason::kConflict,
-                                    .joint = static_cast<std::int32_t>(conflict->joint),
-                                    .one = static_cast<std::int32_t>(conflict->one),
-                                    .other = static_cast<std::int32_t>(conflict->other)}));
+  const auto conflict = ControllerHost::find_conflict(table, (active & ~stop) | start);
+  if (!conflict) return {};
+  Error error = refusal({.reason = RejectReason::kConflict,
+                         .joint = static_cast<std::int32_t>(conflict->joint),
+                         .one = static_cast<std::int32_t>(conflict->one),
+                         .other = static_cast<std::int32_t>(conflict->other)});
+  // Everybody who stands in the way, unless two are in each other's that are both to start.
+  ControllerSet leave = stop;
+  while (const auto next = ControllerHost::find_conflict(table, (active & ~leave) | start)) {
+    const ControllerSet active_one = (only(next->one) | only(next->other)) & ~start;
+    if (active_one == 0) return std::unexpected(error);
+    leave |= active_one;
   }
-  return {};
+  error.hint = "tandem controller switch --stop " + names_of(leave) + " --start " + names_of(start);
+  return std::unexpected(error);
 }
 
 Result<RequestResult> RunServices::switch_controllers(const std::vector<std::string>& stop,

@@ -195,6 +195,7 @@ class RunServices {
   [[nodiscard]] Status check_phase() const;
   [[nodiscard]] Result<std::size_t> slot_of(const std::string& name) const;
   [[nodiscard]] Result<ControllerSet> set_of(const std::vector<std::string>& names) const;
+  [[nodiscard]] std::string names_of(ControllerSet set) const;
   [[nodiscard]] Status check_switch(ControllerSet stop, ControllerSet start) const;
   [[nodiscard]] ControllerSet planned() const;
   [[nodiscard]] Result<std::size_t> joint_of(const std::string& name) const;

@@ -111,13 +111,32 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
   return in;
 }
 
+/// A process that ends in order removes its socket; one that is killed leaves it.
+bool has_ended(const std::string& path) {
+  std::error_code error;
+  return !std::filesystem::exists(path, error);
+}
+
+Error ended() {
+  return {.message = "the run has ended",
+          .hint = "its own output and its log say how",
+          .file = {},
+          .key = {}};
+}
+
 class SocketClient : public ControlClient {
  public:
   explicit SocketClient(std::string path) : path_(std::move(path)) {}
-  Result<Json> ask(const Json& question) override { return apps::ask(path_, question); }
+  Result<Json> ask(const Json& question) override {
+    Result<Json> answer = apps::ask(path_, question);
+    if (!answer && heard_ && has_ended(path_)) return std::unexpected(ended());
+    heard_ = heard_ || answer;
+    return answer;
+  }
 
  private:
   std::string path_;
+  bool heard_ = false;
 };
 
 }  // namespace
@@ -179,7 +198,7 @@ Result<Json> ask(const std::string& path, const Json& question) {
     return std::unexpected(ours.error());
   }
   const Result<std::string> line = exchange(descriptor.get(), json_text(question) + "\n", patience);
-  if (!line) return std::unexpected(line.error());
+  if (!line) return std::unexpected(has_ended(path) ? ended() : line.error());
   return read_answer(*line, "what listens at " + path);
 }
 

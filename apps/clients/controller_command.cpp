@@ -64,6 +64,7 @@ Result<Json> load_question(const ControllerOptions& options) {
       {"plugin", path ? std::filesystem::absolute(options.plugin).string() : options.plugin}};
   if (!options.name.empty()) question["name"] = options.name;
   if (!parameters->empty()) question["parameters"] = *parameters;
+  if (!options.parameters.empty()) question["parameters_file"] = options.parameters;
   return question;
 }
 

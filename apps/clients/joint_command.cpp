@@ -14,10 +14,17 @@
 #include "apps/clients/control_client.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
+#include "rt/stop_signal.hpp"
 #include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+// Of a joint whose reference has arrived: what is measured is this far off, and is reported.
+constexpr double kFar_rad = 1.0 / kDegPerRad;
+constexpr double kFar_m = 0.01;
 
 std::string number(const Json& joint, const char* key) {
   return joint[key].is_number() ? fmt::format("{:.4g}", joint[key].get<double>()) : "-";
@@ -41,22 +48,56 @@ std::string drive_of(const Json& joint) {
   return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);
 }
 
+bool slides(const Json& joint) { return joint.value("slides", false); }
+std::string unit_of(const Json& joint) { return slides(joint) ? "m" : "rad"; }
+std::string torque_unit_of(const Json& joint) { return slides(joint) ? "N" : "Nm"; }
+
+/// Columns whose unit depends on the joint. It stands in the heading where all joints share it,
+/// else behind each value.
+class Units {
+ public:
+  explicit Units(const Json& joints) {
+    if (!joints.empty()) first_ = joints.front();
+    for (const Json& joint : joints) mixed_ = mixed_ || slides(joint) != slides(first_);
+  }
+  /// @param of  unit_of or torque_unit_of; `per` is added to what it says
+  template <class UnitOf>
+  [[nodiscard]] std::string heading(const char* name, const UnitOf& of,
+                                    const char* per = "") const {
+    return mixed_ ? name : fmt::format("{} [{}{}]", name, of(first_), per);
+  }
+  template <class UnitOf>
+  [[nodiscard]] std::string value(const Json& joint, const char* key, const UnitOf& of,
+                                  const char* per = "") const {
+    return number(joint, key) + (mixed_ ? " " + of(joint) + per : "");
+  }
+
+ private:
+  Json first_ = Json::object();
+  bool mixed_ = false;
+};
+
 void print_joints(const Json& joints) {
-  Table table({"joint", "controller", "mode", "position [rad]", "velocity [rad/s]", "torque [Nm]",
+  const Units units(joints);
+  Table table({"joint", "controller", "mode", units.heading("position", unit_of),
+               units.heading("velocity", unit_of, "/s"), units.heading("torque", torque_unit_of),
                "drive"});
   for (const Json& joint : joints) {
     const std::string owner = joint.value("controller", "");
     table.add({joint.value("joint", ""), owner.empty() ? "-" : owner, mode_of(joint),
-               number(joint, "position_rad"), number(joint, "velocity_rad_s"),
-               number(joint, "torque_Nm"), drive_of(joint)});
+               units.value(joint, "position_rad", unit_of),
+               units.value(joint, "velocity_rad_s", unit_of, "/s"),
+               units.value(joint, "torque_Nm", torque_unit_of), drive_of(joint)});
   }
   table.print(stdout);
 }
 
 void print_drives(const Json& joints) {
-  Table table({"joint", "motor [rad]", "current [A]", "voltage [V]", "winding [degC]", "drive"});
+  const Units units(joints);
+  Table table({"joint", units.heading("motor", unit_of), "current [A]", "voltage [V]",
+               "winding [degC]", "drive"});
   for (const Json& joint : joints) {
-    table.add({joint.value("joint", ""), number(joint, "motor_position_rad"),
+    table.add({joint.value("joint", ""), units.value(joint, "motor_position_rad", unit_of),
                number(joint, "current_A"), number(joint, "voltage_V"),
                number(joint, "temperature_C"), drive_of(joint)});
   }
@@ -143,11 +184,32 @@ Result<Json> question_of(const JointOptions& o) {
   return question;
 }
 
-const char* unit_of(const Json& joint) { return joint.value("slides", false) ? "m" : "rad"; }
+/// "-0.5 rad"; with `degrees` "-0.5 rad (-28.65 deg)"; "-" without a value.
+std::string place_of(const Json& joint, const Json& value, bool degrees) {
+  if (!value.is_number()) return "-";
+  const double number = value.get<double>();
+  const std::string place = fmt::format("{:.4g} {}", number, unit_of(joint));
+  return degrees ? fmt::format("{} ({:.4g} deg)", place, number * kDegPerRad) : place;
+}
+
+std::string limits_of(const Json& joint) {
+  const Json &min = joint["min_position_rad"], &max = joint["max_position_rad"];
+  std::string range = "any position";
+  if (min.is_number() && max.is_number()) {
+    range =
+        fmt::format("{:.4g} to {:.4g} {}", min.get<double>(), max.get<double>(), unit_of(joint));
+    if (!slides(joint)) {
+      range += fmt::format(" ({:.4g} to {:.4g} deg)", min.get<double>() * kDegPerRad,
+                           max.get<double>() * kDegPerRad);
+    }
+  }
+  return fmt::format("{}, {} {}/s, {} {}", range, number(joint, "max_velocity_rad_s"),
+                     unit_of(joint), number(joint, "max_torque_Nm"), torque_unit_of(joint));
+}
 
 void print_joint(const Json& joint) {
   const std::string unit = unit_of(joint);
-  const std::string torque = joint.value("slides", false) ? "N" : "Nm";
+  const std::string torque = torque_unit_of(joint);
   const auto with = [&](const char* key, const std::string& of) {
     return number(joint, key) + " " + of;
   };
@@ -160,6 +222,7 @@ void print_joint(const Json& joint) {
   facts.add("position", with("position_rad", unit) + ", commanded " +
                             with("commanded_position_rad", unit) +
                             (joint.value("moving", false) ? ", moving" : ""));
+  facts.add("limits", limits_of(joint));
   facts.add("velocity", with("velocity_rad_s", unit + "/s"));
   facts.add("torque", with("torque_Nm", torque));
   facts.add("motor position", with("motor_position_rad", unit) + " at the joint");
@@ -175,7 +238,10 @@ void print_joint(const Json& joint) {
   facts.print(stdout);
 }
 
-void print_answer(const JointOptions& options, const Json& answer) {
+/// Whether the target was written in degrees: it is shown in them, too.
+bool in_degrees(const JointOptions& options) { return options.to.ends_with("deg"); }
+
+void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
   using Action = JointOptions::Action;
   if (options.action == Action::kList) {
     const Json& joints = answer["joints"];
@@ -192,12 +258,18 @@ void print_answer(const JointOptions& options, const Json& answer) {
     case Action::kList:
     case Action::kShow: break;
     case Action::kReset:
-      if (!answer.value("latched", false)) fmt::print("{}: no fault is latched\n", options.joint);
+      if (!answer.value("latched", false)) {
+        fmt::print(
+            "{}: its drive has no fault; what the run has latched stays until `tandem fault "
+            "reset`\n",
+            options.joint);
+      }
       break;
     case Action::kGains: print_gains(Json::array({answer})); break;
     case Action::kMove:
       fmt::print("{} moves from {} to {}: tandem joint list {}\n", options.joint,
-                 number(answer, "position_rad"), options.to, options.joint);
+                 place_of(answer, answer["position_rad"], in_degrees(options)),
+                 place_of(answer, question["target_rad"], in_degrees(options)), options.joint);
       break;
     case Action::kStop:
       fmt::print("{} brakes, and stays where it comes to rest\n", options.joint);
@@ -209,8 +281,9 @@ void print_answer(const JointOptions& options, const Json& answer) {
     case Action::kSet: {
       Facts facts;
       facts.add("mode", mode_of(answer));
-      facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " Nm/rad");
-      facts.add("damping", number(answer, "damping_Nms_rad") + " Nms/rad");
+      const std::string torque = torque_unit_of(answer), unit = unit_of(answer);
+      facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " " + torque + "/" + unit);
+      facts.add("damping", number(answer, "damping_Nms_rad") + " " + torque + "s/" + unit);
       facts.print(stdout);
     }
   }
@@ -229,7 +302,7 @@ Result<Json> look(ControlClient& run, const std::string& name) {
 
 constexpr std::chrono::milliseconds kLook{20};  // between two
 
-/// The joint once its motion has ended, and its reference has come to rest.
+/// The joint once its motion has ended, and its reference has come to rest; after Ctrl-C at once.
 Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double target) {
   Json before;
   for (;;) {
@@ -240,6 +313,7 @@ Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double
     const bool rests = !before.is_null() && before["cycle"] != (*now)["cycle"] &&
                        before["commanded_position_rad"] == (*now)["commanded_position_rad"];
     if (!now->value("moving", false) && (now->value("arrived", false) || rests)) return now;
+    if (rt::stop_requested()) return now;
     before = *now;
     std::this_thread::sleep_for(kLook);
   }
@@ -254,19 +328,39 @@ Result<Json> wait_for_reset(ControlClient& run, const std::string& name) {
   }
 }
 
+/// The reference has arrived: what is measured may lag, or rest against something.
+void warn_if_far(const JointOptions& options, const Json& joint) {
+  if (!joint["position_rad"].is_number()) return;
+  const double off =
+      std::abs(joint["position_rad"].get<double>() - joint["commanded_position_rad"].get<double>());
+  if (off <= (slides(joint) ? kFar_m : kFar_rad)) return;
+  print_warnings(
+      {{.message = fmt::format("what is measured is {} off", place_of(joint, off, !slides(joint))),
+        .hint = "it lags, or something holds it: tandem joint show " + options.joint,
+        .file = {},
+        .key = options.joint}});
+}
+
 /// What came of a motion that was waited for.
-Exit tell_motion(const JointOptions& options, const Json& joint) {
-  // The reference: what is measured may lag, or rest against something.
-  const std::string at =
-      fmt::format("{0} {2}, measured {1} {2}", number(joint, "commanded_position_rad"),
-                  number(joint, "position_rad"), unit_of(joint));
+Exit tell_motion(const JointOptions& options, const Json& joint, double target) {
+  const bool degrees = in_degrees(options);
+  const std::string at = place_of(joint, joint["commanded_position_rad"], degrees) + ", measured " +
+                         place_of(joint, joint["position_rad"], degrees);
   if (joint.value("arrived", false)) {
     if (options.json != "-") fmt::print("{} has arrived: {}\n", options.joint, at);
+    std::fflush(stdout);  // before the warning
+    warn_if_far(options, joint);
     return Exit::kDone;
+  }
+  if (joint.value("moving", false)) {  // Ctrl-C
+    fmt::print(stderr, "{0} still moves to {1}: `tandem joint stop {0}` brakes it\n", options.joint,
+               place_of(joint, target, degrees));
+    return Exit::kFault;
   }
   const std::string owner = joint.value("controller", "");
   const bool enabled = joint.value("drive_state", "") == "operation enabled";
-  Error error{.message = fmt::format("its motion to {} has ended at {}", options.to, at),
+  Error error{.message = fmt::format("its motion to {} has ended at {}",
+                                     place_of(joint, target, degrees), at),
               .hint = "it was stopped, or sent elsewhere: tandem joint show " + options.joint,
               .file = {},
               .key = options.joint};
@@ -306,7 +400,7 @@ Exit show(const JointOptions& options, Json answer) {
   if (!some) return refuse(some.error());
   answer["joints"] = *some;
   if (one) answer = some->front();
-  if (options.json != "-") print_answer(options, answer);
+  if (options.json != "-") print_answer(options, answer, {});
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
   return Exit::kDone;
 }
@@ -319,13 +413,14 @@ Exit joint_command(const JointOptions& options) {
   if (!question) return refuse(question.error());
   const auto run = ControlClient::open(options.target, "run");
   if (!run) return refuse(run.error());
+  const bool moves = options.action == Action::kMove && options.wait;
+  if (moves) rt::install_stop_signals();
   const Result<Json> asked = (*run)->ask(*question);
   if (!asked) return refuse(asked.error());
   Json answer = *asked;
   if (answer.contains("joints")) return show(options, answer);
-  if (options.json != "-") print_answer(options, answer);
+  if (options.json != "-") print_answer(options, answer, *question);
   Exit exit = Exit::kDone;
-  const bool moves = options.action == Action::kMove && options.wait;
   const bool resets = options.action == Action::kReset && answer.value("latched", false) &&
                       answer.value("done", false);
   if (moves || resets) {
@@ -340,7 +435,8 @@ Exit joint_command(const JointOptions& options) {
     for (const auto& [key, value] : joint->items()) {
       if (key != "cycle") answer[key] = value;  // that of the request stays
     }
-    exit = moves ? tell_motion(options, *joint) : tell_reset(options, *joint);
+    exit = moves ? tell_motion(options, *joint, (*question)["target_rad"])
+                 : tell_reset(options, *joint);
   }
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
   return exit;

@@ -42,11 +42,13 @@ std::vector<std::string> flags_of(const CLI::App& app) {
   return flags;
 }
 
+std::vector<const CLI::App*> all_subcommands(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
 std::vector<std::string> subcommands_of(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
-    names.push_back(sub->get_name());
-  }
+  for (const CLI::App* sub : all_subcommands(app)) names.push_back(sub->get_name());
   return names;
 }
 
@@ -65,15 +67,33 @@ std::string path_of(const CLI::App& app) {
   return parent == nullptr ? app.get_name() : path_of(*parent) + " " + app.get_name();
 }
 
-Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App& command = innermost(app);
-  const std::vector<std::string> unknown = app.remaining(true);
-  const std::string message =
-      unknown.empty() ? std::string(error.what()) : unknown_word(command, unknown.front());
+Exit report_usage_error(const CLI::App& command, const std::string& message) {
   fmt::print(stderr, "tandem: {}\nTry `{} --help`.\n", message, path_of(command));
   remember_error(
       {.message = message, .hint = "try `" + path_of(command) + " --help`", .file = {}, .key = {}});
   return Exit::kUsage;
+}
+
+Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = innermost(app);
+  const std::vector<std::string> unknown = app.remaining(true);
+  return report_usage_error(command, unknown.empty() ? std::string(error.what())
+                                                     : unknown_word(command, unknown.front()));
+}
+
+/// `tandem help joint move` is `tandem joint move --help`.
+/// @return the status, when one of the words is no command
+std::optional<Exit> check_help(const CLI::App& app, const std::vector<std::string>& words) {
+  const CLI::App* command = &app;
+  for (const std::string& word : words) {
+    const std::vector<const CLI::App*> known = all_subcommands(*command);
+    if (word.starts_with('-') || known.empty()) break;
+    const auto next =
+        std::ranges::find_if(known, [&](const CLI::App* sub) { return sub->get_name() == word; });
+    if (next == known.end()) return report_usage_error(*command, unknown_word(*command, word));
+    command = *next;
+  }
+  return std::nullopt;
 }
 
 /// The subcommands with their options; the one that was named, once the line is parsed.
@@ -139,8 +159,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
 
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
-  if (!words.empty() && words.front() == "help") {  // `tandem help joint` is `tandem joint --help`
+  if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
+    if (const auto unknown = check_help(app, words)) return *unknown;
     words.emplace_back("--help");
   }
   std::ranges::reverse(words);  // as CLI11 wants them

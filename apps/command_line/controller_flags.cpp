@@ -21,7 +21,8 @@ const char kJointExamples[] = R"(Examples:
   tandem joint show LElbj                            its encoders, its drive, its fault
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
-  tandem joint move LElbj --to 30deg --speed 20deg/s a free joint to a place, and `joint stop LElbj`
+  tandem joint move LElbj --to -30deg --speed 20deg/s
+                                                     a free joint to a place, and `joint stop LElbj`
   tandem joint move LElbj --to 0 --wait              until it is there; Ctrl-C ends only the waiting
   tandem joint reset LElbj                           clear the fault of its drive alone
   tandem joint recover LElbj                         outside its limits: slowly back inside
@@ -110,9 +111,11 @@ void add_flags(CLI::App& app, JointOptions& o) {
   set->add_option("joint", o.joint, "Its name")->required();
   set->add_option("--mode", o.mode, "idle, position, velocity, torque, open_loop, current");
   set->add_option("--interaction", o.interaction, "stiff, compliant");
-  set->add_option("--stiffness", o.stiffness_Nm_rad, "Of the virtual spring [Nm/rad]")
+  set->add_option("--stiffness", o.stiffness_Nm_rad,
+                  "Of the virtual spring [Nm/rad, of a slide N/m]")
       ->check(is_finite());
-  set->add_option("--damping", o.damping_Nms_rad, "Of the virtual damper [Nms/rad]")
+  set->add_option("--damping", o.damping_Nms_rad,
+                  "Of the virtual damper [Nms/rad, of a slide Ns/m]")
       ->check(is_finite());
   CLI::App* move = add("move", "Lead a free joint to a place, at a steady speed", Action::kMove);
   move->add_option("joint", o.joint, "Its name")->required();

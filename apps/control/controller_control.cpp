@@ -63,14 +63,15 @@ Result<Json> switch_by_hand(RunServices& services, const Names& stop, const Name
 
 Result<TomlDocument> parameters_of(const Json& request) {
   const auto found = request.find("parameters");
-  if (found == request.end()) return TomlDocument::parse("", "parameters");
+  const std::string file = request.value("parameters_file", "parameters");
+  if (found == request.end()) return TomlDocument::parse("", file);
   const Result<std::string> text =
       found->is_string() ? Result<std::string>(found->get<std::string>()) : toml_of(*found);
   if (!text) return std::unexpected(text.error());
-  auto document = TomlDocument::parse(*text, "parameters");
+  auto document = TomlDocument::parse(*text, file);
   if (document) return document;
   const Error& error = document.error();
-  return fail("parameters:" + std::to_string(error.line) + ": " + error.message, error.hint);
+  return fail(file + ":" + std::to_string(error.line) + ": " + error.message, error.hint);
 }
 
 Result<Json> load(RunServices& services, const Json& request) {
@@ -108,7 +109,8 @@ void add_controller_commands(ControlRegistry& registry, RunServices& services,
                 {.name = "name", .doc = "default: the plugin's"},
                 {.name = "parameters",
                  .type = ControlKey::Type::kTextOrObject,
-                 .doc = "[controller.parameters]: TOML, or an object"}},
+                 .doc = "[controller.parameters]: TOML, or an object"},
+                {.name = "parameters_file", .doc = "what errors call them: parameters"}},
                [&services](const Json& request) { return load(services, request); });
   registry.add("controller.unload", ControlEffect::kChanges, "frees an inactive controller",
                {kName}, [&services](const Json& request) {

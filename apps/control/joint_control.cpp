@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
 
 #include "apps/control/controller_control.hpp"
 #include "base/nearest.hpp"
+#include "hal/config/capabilities.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -21,6 +25,19 @@ constexpr std::array kInteractions{InteractionMode::kStiff, InteractionMode::kCo
 constexpr std::array kLoops{hal::PidLoop::kPosition, hal::PidLoop::kVelocity, hal::PidLoop::kTorque,
                             hal::PidLoop::kCurrent};
 
+/// The run, its robot, and how far each joint goes.
+struct Run {
+  RobotCycle& cycle;
+  const hal::RobotConfig& robot;
+  std::vector<hal::JointCapabilities> limits;
+
+  /// Null: there is no such joint, which the run itself refuses.
+  [[nodiscard]] const hal::JointCapabilities* limits_of(const std::string& joint) const {
+    const int index = robot.joint_index(joint);
+    return index < 0 ? nullptr : &limits[static_cast<std::size_t>(index)];
+  }
+};
+
 /// The value of `known` that `request[key]` names.
 template <class Enum, std::size_t N>
 Result<Enum> choice(const Json& request, const char* key, const std::array<Enum, N>& known) {
@@ -34,8 +51,9 @@ Result<Enum> choice(const Json& request, const char* key, const std::array<Enum,
 }
 
 /// @param index  of the joint in the image
-Json joint_json(const RobotCycle& run, const runtime::JointInfo& joint, std::size_t index) {
+Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t index) {
   const runtime::JointStatus& look = joint.look;
+  const hal::JointCapabilities& limit = run.limits[index];
   Json gains = Json::object();
   for (const hal::PidLoop loop : kLoops) {
     const hal::PidGains& of = joint.gains[static_cast<std::size_t>(loop)];
@@ -52,6 +70,10 @@ Json joint_json(const RobotCycle& run, const runtime::JointInfo& joint, std::siz
           {"position_rad", look.position_rad},
           {"velocity_rad_s", look.velocity_rad_s},
           {"torque_Nm", look.torque_Nm},
+          {"min_position_rad", limit.min_position_rad},
+          {"max_position_rad", limit.max_position_rad},
+          {"max_velocity_rad_s", limit.max_velocity_rad_s},
+          {"max_torque_Nm", limit.max_torque_Nm},
           {"acceleration_rad_s2", look.acceleration_rad_s2},
           {"motor_position_rad", look.motor_position_rad},
           {"motor_velocity_rad_s", look.motor_velocity_rad_s},
@@ -62,16 +84,16 @@ Json joint_json(const RobotCycle& run, const runtime::JointInfo& joint, std::siz
           {"damping_Nms_rad", look.damping_Nms_rad},
           {"drive_state", hal::to_string(static_cast<hal::DriveState>(look.drive_state))},
           {"fault", look.fault},
-          {"fault_text", run.drive_fault(index, look.fault)},
+          {"fault_text", run.cycle.drive_fault(index, look.fault)},
           {"resetting", look.resetting != 0},
           {"age_cycles", look.age_cycles},
           {"gains", std::move(gains)}};
 }
 
-Json list(RobotCycle& run) {
+Json list(const Run& run) {
   Json all = Json::array();
   std::uint64_t cycle = 0;
-  for (const runtime::JointInfo& joint : run.services().joints()) {
+  for (const runtime::JointInfo& joint : run.cycle.services().joints()) {
     cycle = joint.look.cycle;
     all.push_back(joint_json(run, joint, all.size()));
   }
@@ -79,12 +101,12 @@ Json list(RobotCycle& run) {
 }
 
 /// What was done, and what the joint is now. A controller's own joints are its own.
-Result<Json> tell(RobotCycle& run, const std::string& name,
+Result<Json> tell(const Run& run, const std::string& name,
                   const Result<runtime::RequestResult>& asked) {
   if (!asked) return std::unexpected(asked.error());
   Json answer = asked_json(*asked);
   std::size_t index = 0;
-  for (const runtime::JointInfo& joint : run.services().joints()) {
+  for (const runtime::JointInfo& joint : run.cycle.services().joints()) {
     const std::size_t j = index++;
     if (joint.name != name) continue;
     answer.update(joint_json(run, joint, j));
@@ -96,7 +118,16 @@ Result<Json> tell(RobotCycle& run, const std::string& name,
   return answer;
 }
 
-Result<Json> set(RobotCycle& run, const Json& request) {
+/// Of what a user can get wrong; the run itself checks without knowing the units.
+Status check_impedance(const std::string& joint, const char* what, double value, double max,
+                       const char* unit) {
+  if (std::isnan(value) || (value >= 0.0 && value <= max)) return {};
+  return fail_at(joint,
+                 fmt::format("the {} {:g} {} is beyond the joint's limit", what, value, unit),
+                 fmt::format("give 0 to {:g} {}", max, unit));
+}
+
+Result<Json> set(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   if (request.size() == 2) return fail("joint.set: nothing is to be set", "name a value");
   runtime::JointRequest wish;
@@ -112,43 +143,103 @@ Result<Json> set(RobotCycle& run, const Json& request) {
   }
   wish.stiffness_Nm_rad = request.value("stiffness_Nm_rad", wish.stiffness_Nm_rad);
   wish.damping_Nms_rad = request.value("damping_Nms_rad", wish.damping_Nms_rad);
-  return tell(run, joint, run.services().set_joint(joint, wish));
-}
-
-/// Whether values in `unit` fit the joint; one that does not exist is refused elsewhere.
-Status check_unit(RobotCycle& run, const std::string& name, const std::string& unit) {
-  for (const runtime::JointInfo& joint : run.services().joints()) {
-    if (joint.name != name || unit == (joint.slides ? "length" : "angle")) continue;
-    return fail_at(name, fmt::format("this joint {}", joint.slides ? "slides" : "turns"),
-                   joint.slides ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
+  const hal::JointCapabilities* limit = run.limits_of(joint);
+  if (limit != nullptr && limit->can(hal::Capability::kCompliant)) {
+    const bool slides = limit->slides;
+    Status fits = check_impedance(joint, "stiffness", wish.stiffness_Nm_rad,
+                                  limit->max_stiffness_Nm_rad, slides ? "N/m" : "Nm/rad");
+    if (fits) {
+      fits = check_impedance(joint, "damping", wish.damping_Nms_rad, limit->max_damping_Nms_rad,
+                             slides ? "Ns/m" : "Nms/rad");
+    }
+    if (!fits) return std::unexpected(fits.error());
   }
-  return {};
+  return tell(run, joint, run.cycle.services().set_joint(joint, wish));
 }
 
-Result<Json> move(RobotCycle& run, const Json& request) {
+/// Whether values in `unit` fit the joint.
+Status check_unit(const std::string& name, bool slides, const std::string& unit) {
+  if (unit == (slides ? "length" : "angle")) return {};
+  return fail_at(name, fmt::format("this joint {}", slides ? "slides" : "turns"),
+                 slides ? "give metres: 20mm, 0.02m" : "give an angle: 30deg, 0.5rad");
+}
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+/// "0.5 rad/s (28.65 deg/s)", "0.02 m/s" with `per` "/s".
+std::string quantity(double value, bool slides, const char* per) {
+  if (slides) return fmt::format("{:g} m{}", value, per);
+  return fmt::format("{0:g} rad{2} ({1:.4g} deg{2})", value, value * kDegPerRad, per);
+}
+
+Status check_target(const std::string& joint, double target, const hal::JointCapabilities& limit) {
+  const double min = limit.min_position_rad, max = limit.max_position_rad;
+  if (!(target < min || target > max)) return {};
+  return fail_at(
+      joint,
+      fmt::format("the target {} is beyond the joint's limits", quantity(target, limit.slides, "")),
+      limit.slides ? fmt::format("give {:g} to {:g} m", min, max)
+                   : fmt::format("give {:g} to {:g} rad, which is {:.4g} to {:.4g} deg", min, max,
+                                 min * kDegPerRad, max * kDegPerRad));
+}
+
+/// Of the speed and the acceleration, which are above 0. @param value  NaN: not given
+Status check_rate(const std::string& joint, const char* what, double value, double max, bool slides,
+                  const char* per) {
+  if (std::isnan(value) || (value > 0.0 && value <= max)) return {};
+  std::string hint = "give more than 0";
+  if (std::isfinite(max)) hint += ", at most " + quantity(max, slides, per);
+  return fail_at(
+      joint,
+      fmt::format("the {} {} is beyond the joint's limit", what, quantity(value, slides, per)),
+      hint);
+}
+
+/// The run itself checks, too, without knowing the units.
+Status check_move(const std::string& joint, const runtime::MoveRequest& wish,
+                  const hal::JointCapabilities& limit) {
+  Status fits = check_target(joint, wish.target_rad, limit);
+  if (fits) {
+    fits =
+        check_rate(joint, "speed", wish.speed_rad_s, limit.max_velocity_rad_s, limit.slides, "/s");
+  }
+  if (fits) {
+    fits = check_rate(joint, "acceleration", wish.acceleration_rad_s2,
+                      limit.max_acceleration_rad_s2, limit.slides, "/s2");
+  }
+  return fits;
+}
+
+Result<Json> move(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
-  if (request.contains("unit")) {
-    const Status fits = check_unit(run, joint, request["unit"].get<std::string>());
+  const hal::JointCapabilities* limit = run.limits_of(joint);
+  if (limit != nullptr && request.contains("unit")) {
+    const Status fits = check_unit(joint, limit->slides, request["unit"].get<std::string>());
     if (!fits) return std::unexpected(fits.error());
   }
   runtime::MoveRequest wish{.target_rad = request["target_rad"].get<double>()};
   wish.speed_rad_s = request.value("speed_rad_s", wish.speed_rad_s);
   wish.acceleration_rad_s2 = request.value("acceleration_rad_s2", wish.acceleration_rad_s2);
-  return tell(run, joint, run.services().move_joint(joint, wish));
+  if (limit != nullptr) {
+    if (const Status fits = check_move(joint, wish, *limit); !fits) {
+      return std::unexpected(fits.error());
+    }
+  }
+  return tell(run, joint, run.cycle.services().move_joint(joint, wish));
 }
 
-Result<Json> reset(RobotCycle& run, const std::string& name) {
-  const auto joints = run.services().joints();
+Result<Json> reset(const Run& run, const std::string& name) {
+  const auto joints = run.cycle.services().joints();
   const auto joint = std::ranges::find(joints, name, &runtime::JointInfo::name);
   const bool latched = joint != joints.end() && joint->look.fault != 0;
-  Result<Json> answer = tell(run, name, run.services().reset_joint(name));
+  Result<Json> answer = tell(run, name, run.cycle.services().reset_joint(name));
   if (!answer) return answer;
   (*answer)["latched"] = latched;
   if (answer->value("done", false)) answer->erase("note");  // its drive is nobody's
   return answer;
 }
 
-Result<Json> set_gains(RobotCycle& run, const Json& request) {
+Result<Json> set_gains(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   const auto loop = choice(request, "loop", kLoops);
   if (!loop) return std::unexpected(loop.error());
@@ -159,19 +250,21 @@ Result<Json> set_gains(RobotCycle& run, const Json& request) {
   if (!wish.kp && !wish.ki && !wish.kd) {
     return fail("joint.gains: nothing is to be set", "give kp, ki or kd");
   }
-  auto answer = tell(run, joint, run.services().set_gains(joint, *loop, wish));
+  auto answer = tell(run, joint, run.cycle.services().set_gains(joint, *loop, wish));
   if (answer && answer->value("done", false)) answer->erase("note");  // gains are nobody's
   return answer;
 }
 
 }  // namespace
 
-void add_joint_commands(ControlRegistry& registry, RobotCycle& run) {
+void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
+                        const hal::RobotConfig& robot) {
+  const auto run = std::make_shared<const Run>(Run{cycle, robot, hal::joint_capabilities(robot)});
   using Type = ControlKey::Type;
   const ControlKey joint{.name = "joint", .required = true, .doc = "its name"};
   registry.add("joint.list", ControlEffect::kReads,
                "every joint: who has it, what it does, what is measured", {},
-               [&run](const Json&) -> Result<Json> { return list(run); });
+               [run](const Json&) -> Result<Json> { return list(*run); });
   registry.add("joint.set", ControlEffect::kChanges,
                "mode and interaction of a joint that no active controller claims, impedance of any",
                {joint,
@@ -179,7 +272,7 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& run) {
                 {.name = "interaction", .doc = "stiff, compliant"},
                 {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
                 {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
-               [&run](const Json& request) { return set(run, request); });
+               [run](const Json& request) { return set(*run, request); });
   registry.add(
       "joint.move", ControlEffect::kChanges,
       "moves a joint that no active controller claims, with a trapezoidal velocity profile",
@@ -190,29 +283,29 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& run) {
         .type = Type::kNumber,
         .doc = "else it reaches the speed in half a second"},
        {.name = "unit", .doc = "angle, length: what the joint has to be"}},
-      [&run](const Json& request) { return move(run, request); });
+      [run](const Json& request) { return move(*run, request); });
   registry.add("joint.stop", ControlEffect::kChanges, "brakes a joint that joint.move leads",
-               {joint}, [&run](const Json& request) {
+               {joint}, [run](const Json& request) {
                  const auto name = request["joint"].get<std::string>();
-                 return tell(run, name, run.services().move_joint(name, {}));
+                 return tell(*run, name, run->cycle.services().move_joint(name, {}));
                });
   registry.add("joint.recover", ControlEffect::kChanges,
                "leads a joint that stands outside its limits back, at a twentieth of its velocity",
-               {joint}, [&run](const Json& request) {
+               {joint}, [run](const Json& request) {
                  const auto name = request["joint"].get<std::string>();
-                 return tell(run, name, run.services().recover(name));
+                 return tell(*run, name, run->cycle.services().recover(name));
                });
   registry.add(
       "joint.reset", ControlEffect::kChanges,
       "clears the fault of one drive; while the run is faulted nothing is enabled", {joint},
-      [&run](const Json& request) { return reset(run, request["joint"].get<std::string>()); });
+      [run](const Json& request) { return reset(*run, request["joint"].get<std::string>()); });
   registry.add("joint.gains", ControlEffect::kChanges, "gains of a loop in a joint's drive, by SDO",
                {joint,
                 {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},
                 {.name = "kp", .type = Type::kNumber, .doc = "as in [gains]; it stays if left out"},
                 {.name = "ki", .type = Type::kNumber, .doc = "the same"},
                 {.name = "kd", .type = Type::kNumber, .doc = "the same"}},
-               [&run](const Json& request) { return set_gains(run, request); });
+               [run](const Json& request) { return set_gains(*run, request); });
 }
 
 }  // namespace tandem::apps

@@ -139,7 +139,7 @@ void add_run_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                  return Json::object();
                });
   add_controller_commands(registry, cycle.services(), robot);
-  add_joint_commands(registry, cycle);
+  add_joint_commands(registry, cycle, robot);
   add_sensor_commands(registry, cycle.services());
   add_clock_commands(registry, cycle);
 }

@@ -27,6 +27,12 @@ TEST_F(CommandLine, HelpMayComeFirst) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.out, tandem(command + " --help").out);
   }
+  const Outcome unknown = tandem("help joint mvoe");
+  EXPECT_EQ(unknown.status, 2);
+  EXPECT_EQ(unknown.out, "");
+  EXPECT_NE(unknown.err.find("unknown command 'mvoe': did you mean 'move'?"), std::string::npos)
+      << unknown.err;
+  EXPECT_EQ(tandem("help nonsense").status, 2);
 }
 
 TEST_F(CommandLine, ABundledRobotThatIsMissedByALetterIsSuggested) {

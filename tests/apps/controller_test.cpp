@@ -31,7 +31,8 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
   EXPECT_EQ(asked("controller load hold --name rest --set 'duration_s = 2.0'")["active"],
             nlohmann::json({"hold"}));
   expect(refused("controller start rest"),
-         "joint1: is claimed by the controllers 'hold' and 'rest'");
+         "joint1: is claimed by the controllers 'hold' and 'rest' (tandem controller switch --stop "
+         "hold --start rest)");
   const auto change = asked("controller switch --stop hold --start rest");
   EXPECT_EQ(change["done"], true);
   EXPECT_GT(change["cycle"], 0);
@@ -58,6 +59,10 @@ TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   expect(refused("controller load hold"), "of this name is loaded already");
   expect(refused("controller load hold --name x --set 'durtion_s = 2'"), "durtion_s");
   expect(refused("controller load hold --name x --set 'durtion_s = '"), "parameters:1");
+  for (const char* line : {"durtion_s = 2", "duration_s = "}) {
+    write_text(folder_ / "par.toml", std::string("\n\n\n") + line + "\n");
+    expect(refused("controller load hold --name x --parameters par.toml"), " par.toml:4: ");
+  }
   EXPECT_EQ(asked("controller list")["controllers"].size(), 1U);
   EXPECT_EQ(end(), 0);
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
@@ -106,8 +111,9 @@ TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
       asked("joint set joint2 --mode position --interaction compliant --stiffness 2.5");
   EXPECT_EQ(soft["interaction"], "compliant");
   EXPECT_EQ(soft["stiffness_Nm_rad"], 2.5);
-  expect(refused("joint set joint2 --stiffness 1e6"), "joint2: stiffness_Nm_rad 1e+06 is beyond");
-  expect(refused("joint set joint2 --damping -1"), "joint2: damping_Nms_rad -1 is beyond");
+  expect(refused("joint set joint2 --stiffness 1e6"),
+         "joint2: the stiffness 1e+06 Nm/rad is beyond");
+  expect(refused("joint set joint2 --damping -1"), "joint2: the damping -1 Nms/rad is beyond");
   expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
   expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
   expect(refused("joint set joint2"), "nothing is to be set");
@@ -131,7 +137,8 @@ TEST_F(Controllers, JointsAreMovedWhenNobodyHasThem) {
   position_rad = asked("joint list joint1")["joints"][0]["position_rad"];
   EXPECT_NEAR(position_rad, 0.5236, 0.1) << "it had only just begun";
   expect(to_run("joint list joint1 --drives").out, "winding [degC]");
-  expect(refused("joint move joint1 --to 400deg"), "joint1: the target 6.98132 is beyond");
+  expect(refused("joint move joint1 --to 400deg"),
+         "joint1: the target 6.98132 rad (400 deg) is beyond");
   expect(refused("joint move joint1 --to 20mm"), "joint1: this joint turns");
   expect(refused("joint move joint1 --to 30deg --speed 1m/s"),
          "--speed: '1m/s' is of another kind");
@@ -153,7 +160,10 @@ TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
   EXPECT_EQ(slow["arrived"], true);
   EXPECT_EQ(slow["moving"], false);
   const std::string away = "joint move joint1 --to -300deg --speed 1deg/s --wait --socket ";
-  EXPECT_EQ(tandem(away + socket_, "timeout -s INT 0.5").status, 124);
+  const Outcome interrupted = tandem(away + socket_, "timeout -s INT 0.5");
+  EXPECT_EQ(interrupted.status, 124);
+  expect(interrupted.err,
+         "joint1 still moves to -5.236 rad (-300 deg): `tandem joint stop joint1`");
   const auto goes_on = asked("joint list joint1")["joints"][0];
   EXPECT_EQ(goes_on["moving"], true);
   EXPECT_LT(goes_on["position_rad"], 0.52);
@@ -179,7 +189,7 @@ TEST_F(Controllers, SensorsAndDrivesAreShown) {
   expect(to_run("sensor list").out, name);
   expect(refused("sensor list " + name + "x"), "did you mean '" + name + "'?");
   expect(to_run("joint show elbow_joint").out, "operation enabled");
-  expect(to_run("joint reset elbow_joint").out, "elbow_joint: no fault is latched");
+  expect(to_run("joint reset elbow_joint").out, "elbow_joint: its drive has no fault");
   EXPECT_EQ(to_run("inject kind=encoder_unplug joint=elbow_joint for_s=2").status, 0);
   until(R"("phase": "faulted")");
   const auto drive = asked("joint show elbow_joint");

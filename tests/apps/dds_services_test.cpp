@@ -233,7 +233,7 @@ TEST_F(RunOverDds, SetJointsAndTheirGains) {
   set.mode = set.interaction = none.data();
   stiffness = 1e6;
   call<SetJoint_Response>("set_joint", set, was_set);
-  EXPECT_NE(message.find("joint2: stiffness_Nm_rad 1e+06 is beyond"), std::string::npos);
+  EXPECT_NE(message.find("joint2: the stiffness 1e+06 Nm/rad is beyond"), std::string::npos);
 
   std::string loop = "position";
   const dds_sequence_double stays{0, 0, nullptr, false};
@@ -333,7 +333,7 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   expect_same("controller start rest", "rest");
   expect_same("joint set jiont2 --mode idle", "did you mean 'joint2'?");
   expect_same("joint list --gains", "joint2");
-  expect_same("joint reset joint1", "joint1: no fault is latched");
+  expect_same("joint reset joint1", "joint1: its drive has no fault");
   expect_same("joint reset jiont1", "did you mean 'joint1'?");
   expect_same("sensor list", "the robot has no sensors");
   EXPECT_NE(over_dds("joint show joint2").out.find("operation enabled"), std::string::npos);

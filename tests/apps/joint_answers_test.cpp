@@ -6,6 +6,7 @@
 #include <future>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "apps/clients/commands.hpp"
 #include "apps/control/run_control.hpp"
@@ -165,9 +166,104 @@ TEST_F(JointAnswers, WaitForAMotionUntilItHasArrived) {
   options.speed = "2";
   options.wait = true;
   EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
-  has(out, "wrist has arrived: 0.");
+  has(out, "wrist moves from 0.1 rad to 0.3 rad: ");
+  has(out, "wrist has arrived: 0.3 rad, measured 0.");
+  EXPECT_EQ(err, "");
   EXPECT_EQ(joint(2)["commanded_position_rad"], 0.3);
   EXPECT_EQ(command(joint_command, options), Exit::kDone) << "it is there already" << err;
+}
+
+TEST_F(JointAnswers, WarnOfAMotionThatHasArrivedWhenTheJointHasNot) {
+  backend.sag_rad = 0.05;
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  options.to = "20deg";
+  options.speed = "2";
+  options.wait = true;
+  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  has(out, " rad (");
+  has(out, "to 0.3491 rad (20 deg): tandem joint list wrist");
+  has(out, "wrist has arrived: 0.3491 rad (20 deg), measured ");
+  has(err, "warning: wrist: what is measured is 0.05");
+  has(err, "it lags, or something holds it: tandem joint show wrist");
+  options.joint = "elbow";  // it slides
+  options.to = "0.4";
+  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  has(out, "to 0.4 m: ");
+  has(err, "warning: elbow: what is measured is 0.05");
+}
+
+TEST_F(JointAnswers, SayTheLimitsWithTheirUnits) {
+  begin();
+  const std::string wrist = R"({"do": "joint.move", "joint": "wrist", "target_rad": )";
+  EXPECT_EQ(refused(wrist + "-30}"),
+            "wrist: the target -30 rad (-1719 deg) is beyond the joint's limits (give -1.5 to 1.5 "
+            "rad, which is -85.94 to 85.94 deg)");
+  EXPECT_EQ(refused(wrist + R"(0, "speed_rad_s": 3})"),
+            "wrist: the speed 3 rad/s (171.9 deg/s) is beyond the joint's limit (give more than 0, "
+            "at most 2 rad/s (114.6 deg/s))");
+  EXPECT_EQ(refused(wrist + R"(0, "acceleration_rad_s2": -1})"),
+            "wrist: the acceleration -1 rad/s2 (-57.3 deg/s2) is beyond the joint's limit (give "
+            "more than 0)");
+  EXPECT_EQ(refused(R"({"do": "joint.move", "joint": "elbow", "target_rad": 20})"),
+            "elbow: the target 20 m is beyond the joint's limits (give -1.5 to 1.5 m)");
+  EXPECT_EQ(refused(R"({"do": "joint.set", "joint": "elbow", "stiffness_Nm_rad": 201})"),
+            "elbow: the stiffness 201 N/m is beyond the joint's limit (give 0 to 200 N/m)");
+  has(refused(R"({"do": "joint.set", "joint": "wrist", "damping_Nms_rad": -1})"),
+      "wrist: the damping -1 Nms/rad is beyond");
+  EXPECT_EQ(joint(2)["min_position_rad"], -1.5);
+}
+
+/// Those that turn and those that slide have no unit in common.
+TEST_F(JointAnswers, ShowEachJointInItsUnits) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kList};
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  for (const char* words : {"position  ", "0.1 rad  ", "0.1 m  ", " rad/s  ", " m/s  "}) {
+    has(out, words);
+  }
+  EXPECT_EQ(out.find('['), std::string::npos) << out;
+  options.joints = {"elbow"};
+  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  has(out, "position [m]  velocity [m/s]  torque [N]");
+  options.drives = true;
+  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  has(out, "motor [m]");
+  options.joints = {"wrist", "shoulder"};
+  EXPECT_EQ(command(joint_command, options), Exit::kDone);
+  has(out, "motor [rad]");
+  JointOptions set{.action = JointOptions::Action::kSet};
+  set.joint = "elbow";
+  set.stiffness_Nm_rad = 40.0;
+  EXPECT_EQ(command(joint_command, set), Exit::kDone) << err;
+  has(out, " N/m\n");
+  has(out, " Ns/m");
+}
+
+TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  options.to = "-1.2";
+  options.speed = "0.01";
+  options.wait = true;
+  options.target.socket = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-end.sock";
+  auto socket = ControlSocket::open(options.target.socket, registry);
+  ASSERT_TRUE(socket) << socket.error().to_string();
+  ::testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStdout();
+  auto waits = std::async(std::launch::async, [&] { return joint_command(options); });
+  for (int i = 0; i < 20'000 && joint(2)["moving"] == false; ++i) steps(1);
+  while_cycling([&] {  // until what is asked for is answered
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    socket->reset();
+    return 0;
+  });
+  EXPECT_EQ(waits.get(), Exit::kFault);
+  (void)::testing::internal::GetCapturedStdout();
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "error: the run has ended (its own output and its log say how)\n");
 }
 
 /// Somebody else stops it, or a fault does.
@@ -196,7 +292,7 @@ TEST_F(JointAnswers, EndTheWaitingWithStatus1WhenTheMotionEndsElsewhere) {
               EXPECT_EQ(answer(R"({"do": "joint.stop", "joint": "wrist"})")["ok"], true);
             }),
             Exit::kFault);
-  has(err, "error: wrist: its motion to -1.2 has ended at ");
+  has(err, "error: wrist: its motion to -1.2 rad has ended at ");
   has(err, "it was stopped, or sent elsewhere");
   EXPECT_EQ(wait_and([this] {
               backend.faulted_joint = 0;
@@ -211,10 +307,14 @@ TEST_F(JointAnswers, ShowOneJointWithItsDrive) {
   JointOptions options{.action = JointOptions::Action::kShow};
   options.joint = "elbow";
   EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
-  for (const char* words : {"elbow, slides", "motor position", " m at the joint", "N/m",
-                            "operation enabled", "fault           none", " degC", "fresh"}) {
+  for (const char* words :
+       {"elbow, slides", "motor position", " m at the joint", "N/m", "operation enabled",
+        "fault           none", " degC", "fresh", "limits          -1.5 to 1.5 m, 2 m/s, 20 N"}) {
     has(out, words);
   }
+  options.joint = "wrist";
+  EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+  has(out, "limits          -1.5 to 1.5 rad (-85.94 to 85.94 deg), 2 rad/s, 20 Nm");
   options.joint = "elbwo";
   EXPECT_EQ(command(joint_command, options), Exit::kUsage);
   has(err, "the robot has no joint 'elbwo' (did you mean 'elbow'?)");
@@ -226,7 +326,8 @@ TEST_F(JointAnswers, ResetOneDrive) {
   JointOptions options{.action = JointOptions::Action::kReset};
   options.joint = "elbow";
   EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
-  has(out, "elbow: no fault is latched");
+  has(out,
+      "elbow: its drive has no fault; what the run has latched stays until `tandem fault reset`");
   backend.faulted_joint = 1;
   steps(2);
   EXPECT_EQ(joint(1)["fault"], 0x7310);

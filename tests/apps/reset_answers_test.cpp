@@ -91,6 +91,24 @@ TEST_F(AnsweredRun, RefusesAResetAtOnceWhileTheRobotRetreats) {
   EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
 }
 
+/// What is missing is said: first the reset, then the start.
+TEST_F(AnsweredRun, SaysWhatIsMissingBeforeControllersRun) {
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  steps(1);
+  ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
+  const Json start = registry.answer(R"({"do": "controller.start", "name": "able"})");
+  EXPECT_EQ(start.value("error", ""),
+            "able: a fault is latched: this controller was active, and stands still");
+  EXPECT_EQ(start.value("hint", ""), "tandem fault reset, then tandem controller start");
+  EXPECT_EQ(registry.answer(R"({"do": "fault.reset"})")["ok"], true);
+  steps(20);
+  ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
+  const Json set = registry.answer(R"({"do": "joint.set", "joint": "wrist", "mode": "torque"})");
+  EXPECT_EQ(set.value("error", ""),
+            "wrist: every joint is held after the reset, until the controllers run");
+  EXPECT_EQ(set.value("hint", ""), "tandem controller start lets them continue, then ask again");
+}
+
 /// The run goes on only when `tandem fault reset` looks for its answer: the joint that was enabled
 /// trips before that.
 TEST_F(AnsweredRun, EndsAResetThatAFaultFollowsAtOnceWithStatus1) {

@@ -278,9 +278,12 @@ TEST(Urdf, LeavesLimitsThatMakeNoSenseToTheRobotsFile) {
       with("lower=\"-1\" upper=\"2\" velocity=\"3\" effort=\"4\"", "velocity=\"0\" effort=\"-4\""),
       0);
   EXPECT_TRUE(std::isnan(zero.joint.upper) && std::isnan(zero.joint.velocity));
-  EXPECT_EQ(zero.note,
-            "arm.urdf:28: lower and upper are equal, velocity is not above 0, effort is not above "
-            "0");
+  EXPECT_EQ(
+      zero.note,
+      "arm.urdf:28: lower and upper are missing, velocity is not above 0, effort is not above "
+      "0");
+  EXPECT_EQ(limits_of(with("lower=\"-1\" upper=\"2\"", "lower=\"2\" upper=\"2\""), 0).note,
+            "arm.urdf:28: lower and upper are equal");
   const Limits partly = limits_of(with("velocity=\"3\" effort=\"4\"", ""), 0);
   EXPECT_EQ(partly.joint.upper, 2.0);
   EXPECT_EQ(partly.note, "arm.urdf:28: velocity is missing, effort is missing");
