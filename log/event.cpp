@@ -42,12 +42,12 @@ const char* to_string(EventKind kind) noexcept {
 
 bool is_fault(EventKind kind) noexcept {
   return kind == EventKind::kFault || kind == EventKind::kEmergencyStop ||
-         kind >= EventKind::kFeedbackLost;
+         (kind >= EventKind::kFeedbackLost && kind <= EventKind::kFell);
 }
 
 namespace {
 
-/// What the code of such an event means; empty: it is told as a number.
+/// What follows the name of an event whose code is not 0: the code in words, or as a number.
 std::string text_of(const Event& event, bool has_joint) {
   switch (event.kind) {
     case EventKind::kOverrun: return ": " + std::to_string(event.code) + " cycles skipped";

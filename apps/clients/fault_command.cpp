@@ -62,8 +62,8 @@ bool stayed(const Json& before, const Json& now) {
 
 /// Of a joint whose faults only warn: the others are enabled.
 Error still_there(const Json& answer) {
-  return {.message = fmt::format("a cause is still there ({}): this joint is not enabled, the "
-                                 "others are, and every controller is stopped",
+  return {.message = fmt::format("a cause is still there ({}): what it struck is not enabled, "
+                                 "every other joint is",
                                  causes_of(answer)),
           .hint = "remove the cause, then `tandem fault reset` again",
           .file = {},

@@ -195,11 +195,10 @@ void add_output_facts(const RunSummary& summary, Facts& facts) {
 
 /// The frames that were recorded.
 void add_frame_facts(const RunSummary& summary, Facts& facts) {
-  if (summary.frames) {
-    const std::string trouble = summary.frames->error.empty() ? "" : "; " + summary.frames->error;
-    facts.add("frames", fmt::format("{} ({} frames, {} lost{})", summary.frames->path,
-                                    summary.frames->frames, summary.frames->lost, trouble));
-  }
+  if (!summary.frames) return;
+  const std::string trouble = summary.frames->error.empty() ? "" : "; " + summary.frames->error;
+  facts.add("frames", fmt::format("{} ({} frames, {} lost{})", summary.frames->path,
+                                  summary.frames->frames, summary.frames->lost, trouble));
 }
 
 }  // namespace

@@ -163,7 +163,7 @@ void ControlSocket::serve() {
         client.gone = true;
       }
     }
-    part();
+    drop_gone();
     if (watched[1].revents != 0) deliver();
     if (watched[2].revents != 0) accept();
   }
@@ -251,8 +251,8 @@ void ControlSocket::work() {
   }
 }
 
-/// From the clients that are gone, and from what they asked for that has not begun.
-void ControlSocket::part() {
+/// The clients that are gone, and what they asked for that has not begun.
+void ControlSocket::drop_gone() {
   const std::scoped_lock lock(mutex_);
   std::erase_if(questions_, [this](const Message& question) {
     const auto asker = std::ranges::find(clients_, question.client, &Client::number);

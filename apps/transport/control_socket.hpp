@@ -64,7 +64,7 @@ class ControlSocket {
   void hand_over(Client& client, std::string question);
   [[nodiscard]] std::string answer_to(std::string_view question) const;
   void work();
-  void part();
+  void drop_gone();
   void deliver();
 
   std::string path_;

@@ -29,7 +29,7 @@ enum class KernelFrame : std::uint8_t {
 };
 
 /// Reads what the kernel gave.
-/// @param bytes  that it wrote: by it classic and FD are told apart
+/// @param bytes  that it wrote: a classic frame is shorter than an FD frame
 /// @param out    written when the answer is kData
 [[nodiscard]] KernelFrame from_kernel(const canfd_frame& in, std::size_t bytes,
                                       canopen::Frame& out) noexcept TANDEM_RT;

@@ -73,7 +73,7 @@ TEST(PluginLoader, TakesALibraryOfHeadersInWhichOnlyTheWiringDiffers) {
   EXPECT_STREQ(loaded->plugin().name, "sway");
 }
 
-// Whether a joint slides is told in a byte that was free: nothing else has moved.
+// Whether a joint slides stands in a byte that was padding: no other member has moved.
 TEST(PluginLoader, TakesALibraryOfHeadersInWhichNoJointSaysWhetherItSlides) {
   const auto loaded = load_controller("before_slides", kBroken);
   ASSERT_TRUE(loaded.has_value()) << loaded.error().to_string();

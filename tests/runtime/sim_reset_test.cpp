@@ -167,7 +167,7 @@ TEST_F(Swing, IsHeldWhereItIsWhenItsDriveIsResetAndNobodyHasIt) {
   EXPECT_EQ(cycle->fault_log().latched(), 0U);
   inject(FaultKind::kEncoderUnplug, 5);
   steps(50);
-  EXPECT_EQ(cycle->fault_log().latched(), 1U) << "the next one is told, too";
+  EXPECT_EQ(cycle->fault_log().latched(), 1U) << "the next fault is noted, too";
 }
 
 /// Nothing takes a second attempt by itself when the cause goes away later.
