@@ -45,6 +45,7 @@ test:
 test-all: test
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
+	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
 	@$(MAKE) --no-print-directory asan
@@ -82,12 +83,13 @@ rtsan:
 	@cmake --build --preset rtsan --parallel $(JOBS)
 	@scripts/run-tests build/rtsan $(JOBS) -E 'walkman|RandomRobots'
 
-# Every room; the kernels are those of `unit`.
+# Every room; the kernels are those of `unit`. Of the generator's random robots fewer: they are slow
+# here, and each does the same.
 asan tsan:
 	@scripts/install-dependencies test
 	@cmake --preset $@ --log-level=WARNING
 	@cmake --build --preset $@ --parallel $(JOBS)
-	@scripts/run-tests build/$@ $(JOBS) -LE hil
+	@TANDEM_ROBOTS=50 scripts/run-tests build/$@ $(JOBS) -LE hil
 
 fuzz:
 	@scripts/install-dependencies test

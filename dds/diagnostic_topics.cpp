@@ -66,8 +66,8 @@ HealthStatus DiagnosticTopics::run(const CycleSample& sample) const {
     if (++latched == 1) {
       status.message = fault.joint + (fault.joint.empty() ? "" : ": ") + fault.text;
     }
-    const bool borne = fault.category == hal::StopCategory::kWarn;
-    status.level = std::max(status.level, borne ? Level::kWarn : Level::kError);
+    const bool warned = fault.category == hal::StopCategory::kWarn;
+    status.level = std::max(status.level, warned ? Level::kWarn : Level::kError);
   }
   status.values.emplace_back("latched faults", std::to_string(latched));
   if (sample.phase == hal::RunPhase::kFaulted) status.level = Level::kError;

@@ -29,7 +29,7 @@ std::vector<int> feet_of_wrenches(const RunData& run, const tandem_kernels& kern
   std::vector<int> feet;
   const auto& all = run.robot.contact.feet;
   for (std::uint32_t w = 0; w < kernels.wrenches; ++w) {
-    const auto foot = std::ranges::find(all, kernels.wrench_names[w], &hal::FootConfig::site);
+    const auto foot = std::ranges::find(all, kernels.wrench_names[w], &hal::Foot::site);
     feet.push_back(foot == all.end() ? -1 : static_cast<int>(foot - all.begin()));
   }
   return feet;

@@ -38,7 +38,7 @@ std::vector<std::vector<int>> children_of(const model::Tree& tree) {
 /// Whether a body or one that it carries has a foot's site.
 std::vector<bool> leg_bodies(const model::Tree& tree, const hal::RobotConfig& robot) {
   std::vector<bool> leg(tree.bodies.size(), false);
-  for (const hal::FootConfig& foot : robot.contact.feet) {
+  for (const hal::Foot& foot : robot.contact.feet) {
     for (const hal::SiteConfig& site : robot.model.sites) {
       const int link = site.name == foot.site ? tree.link_index(site.link) : -1;
       if (link < 0) continue;
@@ -101,7 +101,7 @@ struct FootPoints {
 std::vector<FootPoints> feet_of(const model::Tree& tree, const hal::RobotConfig& robot,
                                 std::span<const model::Placement> bodies) {
   std::vector<FootPoints> feet;
-  for (const hal::FootConfig& foot : robot.contact.feet) {
+  for (const hal::Foot& foot : robot.contact.feet) {
     const std::optional<SitePlace> sole = place_of(foot.site, tree, robot, bodies);
     if (!sole) continue;
     FootPoints& one = feet.emplace_back();

@@ -145,7 +145,7 @@ bool on_a_leg(const RunData& run, const hal::SensorConfig& sensor) {
   if (sensor.type != hal::SensorType::kForceTorque) return false;
   if (!legged(run)) return true;
   const std::vector<bool> beyond = links_beyond(run, sensor.joint);
-  return std::ranges::any_of(run.robot.contact.feet, [&](const hal::FootConfig& foot) {
+  return std::ranges::any_of(run.robot.contact.feet, [&](const hal::Foot& foot) {
     return std::ranges::any_of(run.robot.model.sites, [&](const hal::SiteConfig& site) {
       const int link = run.tree.link_index(site.link);
       return site.name == foot.site && link >= 0 && beyond[at(link)];

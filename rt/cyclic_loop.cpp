@@ -76,8 +76,8 @@ void CyclicLoop::obey() noexcept {
   set_step(scaled(config_.period_ns, pace.rate));
 }
 
-/// The next grid point follows from the last. Nothing is made good, nothing counts as late: where
-/// that point has passed, the grid restarts.
+/// The next grid point follows from the last. Where it has passed already, the grid restarts: lost
+/// time is not caught up, and does not count as late.
 void CyclicLoop::set_step(std::int64_t step_ns) noexcept {
   if (step_ns == step_ns_) return;
   grid_ns_ += step_ns - step_ns_;

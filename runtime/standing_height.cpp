@@ -23,7 +23,7 @@ std::optional<Standing> standing(const hal::RobotConfig& robot, const hal::Postu
                                  const model::Tree& tree) {
   const std::vector<model::Placement> bodies = bodies_in(robot, posture, tree);
   std::optional<Standing> highest;
-  for (const hal::FootConfig& foot : robot.contact.feet) {
+  for (const hal::Foot& foot : robot.contact.feet) {
     const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);
     const int index = site == robot.model.sites.end() ? -1 : tree.link_index(site->link);
     if (index < 0) continue;

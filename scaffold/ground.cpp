@@ -41,7 +41,7 @@ void fill_ground(const hal::RobotConfig* like, NewRobot& robot) {
   double points = 0.0;
   for (const Foot& foot : robot.feet) {
     robot.config.model.sites.push_back(site_of(robot.tree, foot));
-    hal::FootConfig config;
+    hal::Foot config;
     config.site = foot.name;
     for (const Eigen::Vector3d& p : foot.points) {
       config.points_m.push_back({clean(p.x(), 1e-5), clean(p.y(), 1e-5), clean(p.z(), 1e-5)});

@@ -18,7 +18,7 @@ constexpr double kTolerated_m = 0.005;
 double pressed_in(const RobotFiles& robot) {
   const hal::ContactConfig& contact = robot.config.contact;
   std::size_t points = 0;
-  for (const hal::FootConfig& foot : contact.feet) points += foot.points_m.size();
+  for (const hal::Foot& foot : contact.feet) points += foot.points_m.size();
   double mass_kg = 0.0;
   for (const model::Body& body : robot.tree.bodies) mass_kg += body.inertia.mass_kg;
   const auto& [x, y, z] = robot.spec.gravity_m_s2;

@@ -22,7 +22,7 @@ struct Weak {
 /// The joints that the ground may relieve.
 std::set<int> joints_to_feet(const RobotFiles& robot) {
   std::set<int> joints;
-  for (const hal::FootConfig& foot : robot.config.contact.feet) {
+  for (const hal::Foot& foot : robot.config.contact.feet) {
     const auto site =
         std::ranges::find(robot.config.model.sites, foot.site, &hal::SiteConfig::name);
     const int link =

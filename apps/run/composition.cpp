@@ -12,6 +12,7 @@
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
 #include "controllers/plugin_loader.hpp"
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/sim/scenario.hpp"
@@ -292,9 +293,10 @@ Diagnostics connect_remote(Composition& c) {
   auto participant = dds::Participant::open(std::move(*domain), "tandem_owner");
   if (!participant) return {participant.error()};
   c.participant = std::move(*participant);
+  const hal::Robot robot = hal::robot_of(e.robot);
   auto backend = remote::RemoteBackend::connect(
-      *c.participant, e.robot,
-      remote::identity_of(e.robot, c.kernels->description_hash, e.loop.period_ns),
+      *c.participant, robot,
+      remote::identity_of(robot, c.kernels->description_hash, e.loop.period_ns),
       {.name = fmt::format("tandem run {}, process {}",
                            std::filesystem::path(e.file).filename().string(), ::getpid()),
        .lockstep = e.hal.lockstep,

@@ -37,9 +37,10 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
     return fail("a robot in real time cannot wait for its owner's commands",
                 "leave --lockstep out");
   }
+  const hal::Robot robot = hal::robot_of(e.robot);
   return remote::Server::open(
-      dds->participant(), e.robot,
-      remote::identity_of(e.robot, c.kernels->description_hash, e.loop.period_ns),
+      dds->participant(), robot, hal::initial_parameters(e.robot),
+      remote::identity_of(robot, c.kernels->description_hash, e.loop.period_ns),
       {.lockstep = e.remote.lockstep,
        .ends_with_owner = once,
        .lease_timeout_s = e.remote.lease_timeout_s,

@@ -41,15 +41,9 @@ Robot robot_of(const RobotConfig& config) {
   for (const SensorConfig& sensor : config.sensors) {
     robot.sensors.push_back({sensor.name, sensor.type, sensor.joint, sensor.link});
   }
-  for (const SiteConfig& site : config.model.sites) {
-    robot.sites.push_back({site.name, site.link, site.xyz_m, site.rpy_rad, site.wrench});
-  }
-  for (const FootConfig& foot : config.contact.feet) {
-    robot.feet.push_back({foot.site, foot.points_m});
-  }
-  for (const PostureConfig& posture : config.postures) {
-    robot.postures.push_back({posture.name, posture.base_height_m, posture.position_rad});
-  }
+  robot.sites.assign(config.model.sites.begin(), config.model.sites.end());
+  robot.feet = config.contact.feet;
+  robot.postures.assign(config.postures.begin(), config.postures.end());
   return robot;
 }
 

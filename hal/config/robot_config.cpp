@@ -114,8 +114,8 @@ void read_sensor(TomlTable table, const std::string& bus, NodeIds& ids, RobotCon
   robot.sensors.push_back(sensor);
 }
 
-FootConfig read_foot(TomlTable table, const RobotConfig& robot) {
-  FootConfig foot;
+Foot read_foot(TomlTable table, const RobotConfig& robot) {
+  Foot foot;
   foot.site = table.text("site");
   check_reference(table, "site", foot.site, robot.model.sites, "site");
   for (const SiteConfig& site : robot.model.sites) {
@@ -123,7 +123,7 @@ FootConfig read_foot(TomlTable table, const RobotConfig& robot) {
     table.error("site", "the site '" + site.name + "' takes no wrench",
                 "set wrench = true in its [[site]]");
   }
-  for (const FootConfig& other : robot.contact.feet) {
+  for (const Foot& other : robot.contact.feet) {
     if (other.site == foot.site) table.error("site", "two feet have this site", "merge them");
   }
   for (const auto& row : table.rows("points_m", 3)) {

@@ -22,13 +22,8 @@
 namespace tandem::hal {
 
 /// [[site]]: a named frame of the model.
-struct SiteConfig {
-  std::string name;
-  std::string link;                 ///< URDF link the frame is fixed to
-  std::array<double, 3> xyz_m{};    ///< origin in the link's frame
-  std::array<double, 3> rpy_rad{};  ///< URDF convention
-  bool wrench = false;              ///< an external wrench may act here (contact)
-  int line = 0;                     ///< in the TOML, for messages
+struct SiteConfig : Site {
+  int line = 0;  ///< in the TOML, for messages
 };
 
 /// [model.link.NAME]: mass and inertia instead of the URDF's; what is not given stays the URDF's.
@@ -214,12 +209,6 @@ struct SensorConfig {
   [[nodiscard]] std::size_t channels() const { return channels_of(type); }
 };
 
-/// [[contact.foot]]: points of a sole that may touch the ground.
-struct FootConfig {
-  std::string site;                             ///< a site with wrench = true
-  std::vector<std::array<double, 3>> points_m;  ///< in the site's frame
-};
-
 /// [contact]: compliant ground at z = height. Per point.
 struct ContactConfig {
   double height_m = 0.0;
@@ -230,16 +219,13 @@ struct ContactConfig {
   double static_friction = 0.0;
   double sliding_friction = 0.0;
   double stick_velocity_m_s = 0.01;  ///< regularisation between static and sliding
-  std::vector<FootConfig> feet;
+  std::vector<Foot> feet;            ///< [[contact.foot]]
   std::map<std::string, int> lines;  ///< key -> line in the TOML, for messages
 };
 
-/// [posture.NAME]: positions by joint, in the image's order; joints not named are 0.
-struct PostureConfig {
-  std::string name;
-  double base_height_m = 0.0;  ///< of the base's origin above W's; floating base only. NaN:
-                               ///< "auto", until it is computed from the description
-  std::vector<double> position_rad;
+/// [posture.NAME]: joints that it does not name are at 0. base_height_m is NaN for "auto", until it
+/// is computed from the description.
+struct PostureConfig : Posture {
   int line = 0;  ///< in the TOML, for messages
 };
 

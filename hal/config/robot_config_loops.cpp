@@ -51,7 +51,7 @@ void read_loop(TomlTable table, RobotConfig& robot) {
     loop.sites = {sites[0], sites[1]};
     for (const std::string& site : sites) {
       check_reference(table, "sites", site, robot.model.sites, "[[site]]");
-      for (const FootConfig& foot : robot.contact.feet) {
+      for (const Foot& foot : robot.contact.feet) {
         if (foot.site != site) continue;
         table.error("sites", "the site '" + site + "' is a foot's",
                     "give the loop a [[site]] of its own");

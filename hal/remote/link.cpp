@@ -28,7 +28,7 @@ void on_data(dds_entity_t, void* call) { (*static_cast<std::function<void()>*>(c
 
 }  // namespace
 
-Identity identity_of(const hal::RobotConfig& robot, std::string description_hash,
+Identity identity_of(const hal::Robot& robot, std::string description_hash,
                      std::int64_t period_ns) {
   Identity identity;
   identity.robot = robot.name;

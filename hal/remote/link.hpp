@@ -13,8 +13,8 @@
 #include "base/realtime.hpp"
 #include "dds/endpoint.hpp"
 #include "dds/service.hpp"
-#include "hal/config/robot_config.hpp"
 #include "hal/image.hpp"
+#include "hal/robot.hpp"
 
 namespace tandem::remote {
 
@@ -41,7 +41,7 @@ struct Identity {
 
   bool operator==(const Identity&) const = default;
 };
-[[nodiscard]] Identity identity_of(const hal::RobotConfig& robot, std::string description_hash,
+[[nodiscard]] Identity identity_of(const hal::Robot& robot, std::string description_hash,
                                    std::int64_t period_ns);
 /// What `there` has otherwise than `here`, in words; empty: nothing. @pre one protocol
 [[nodiscard]] std::string difference(const Identity& here, const Identity& there);

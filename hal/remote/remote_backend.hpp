@@ -41,7 +41,7 @@ class RemoteBackend final : public hal::Backend {
   /// (what differs is named); in lockstep and the server not, or the other way round; owned by
   /// somebody else, who is named.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
-                                                                      const hal::RobotConfig& robot,
+                                                                      const hal::Robot& robot,
                                                                       const Identity& identity,
                                                                       const ClientConfig& config);
   /// Gives the robot back.
@@ -103,7 +103,7 @@ class RemoteBackend final : public hal::Backend {
     dds::Writer<tandem_msgs::LinkCommand> commands;
   };
 
-  RemoteBackend(Endpoints endpoints, const hal::RobotConfig& robot, ClientConfig config);
+  RemoteBackend(Endpoints endpoints, const hal::Robot& robot, ClientConfig config);
   [[nodiscard]] Status find_server(const Identity& identity);
   [[nodiscard]] Status take_lease();
   void ask(Action action);

@@ -71,7 +71,7 @@ std::unexpected<Error> interrupted() {
 }  // namespace
 
 Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& participant,
-                                                              const hal::RobotConfig& robot,
+                                                              const hal::Robot& robot,
                                                               const Identity& identity,
                                                               const ClientConfig& config) {
   const auto name = [&](const char* topic) { return participant.topic_name(topic); };
@@ -95,8 +95,7 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
   return made;
 }
 
-RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::RobotConfig& robot,
-                             ClientConfig config)
+RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::Robot& robot, ClientConfig config)
     : endpoints_(std::move(endpoints)),
       config_(std::move(config)),
       joints_(robot.joints.size()),

@@ -20,8 +20,8 @@ std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant,
-                                             const hal::RobotConfig& robot, Identity identity,
+Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, const hal::Robot& robot,
+                                             const hal::ParameterImage& gains, Identity identity,
                                              const ServerConfig& config) {
   const auto name = [&](const char* topic) { return participant.topic_name(topic); };
   auto server =
@@ -38,23 +38,23 @@ Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant,
   if (!commands) return std::unexpected(commands.error());
   return std::unique_ptr<Server>(new Server(
       {std::move(*server), std::move(*state), std::move(*requests), std::move(*commands)}, robot,
-      std::move(identity), config));
+      gains, std::move(identity), config));
 }
 
-Server::Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity identity,
-               const ServerConfig& config)
+Server::Server(Endpoints endpoints, const hal::Robot& robot, const hal::ParameterImage& gains,
+               Identity identity, const ServerConfig& config)
     : endpoints_(std::move(endpoints)),
       identity_(std::move(identity)),
       config_(config),
       request_senders_(endpoints_.requests.endpoint().get()),
       command_senders_(endpoints_.commands.endpoint().get()),
-      gains_(hal::initial_parameters(robot)),
+      gains_(gains),
       newest_(Taken{hal::CommandImage(robot.shape()), gains_}),
       stop_(static_cast<std::uint8_t>(StopCategory::kWarn)),
       ring_(sizeof(Shown) + identity_.state_bytes + identity_.command_bytes + robot.joints.size(),
             kRingCycles),
       joints_(robot.joints.size()),
-      capabilities_(hal::joint_capabilities(robot)),
+      capabilities_(robot.joints.begin(), robot.joints.end()),
       thread_([this] { run(); }) {
   on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
   on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });

@@ -15,7 +15,6 @@
 #include "base/result.hpp"
 #include "base/spsc_ring.hpp"
 #include "base/triple_buffer.hpp"
-#include "hal/config/capabilities.hpp"
 #include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
 #include "hal/remote_command.hpp"
@@ -37,9 +36,11 @@ struct ServerConfig {
 class Server final : public hal::RemoteCommandPort {
  public:
   /// Begins to publish the robot. The participant outlives it.
+  /// @param gains  that the robot starts with: what an owner does not change stays so
   /// Errors: what DDS refuses.
   [[nodiscard]] static Result<std::unique_ptr<Server>> open(dds::Participant& participant,
-                                                            const hal::RobotConfig& robot,
+                                                            const hal::Robot& robot,
+                                                            const hal::ParameterImage& gains,
                                                             Identity identity,
                                                             const ServerConfig& config);
   ~Server() override;
@@ -95,8 +96,8 @@ class Server final : public hal::RemoteCommandPort {
     dds::Reader<tandem_msgs::LinkCommand> commands;
   };
 
-  Server(Endpoints endpoints, const hal::RobotConfig& robot, Identity identity,
-         const ServerConfig& config);
+  Server(Endpoints endpoints, const hal::Robot& robot, const hal::ParameterImage& gains,
+         Identity identity, const ServerConfig& config);
 
   void run();
   void tell();

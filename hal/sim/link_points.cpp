@@ -78,7 +78,7 @@ std::vector<bool> feet_of(const hal::RobotConfig& robot, const model::Tree& tree
     }
     return (link.in_body.p - above.in_body.p).norm();
   };
-  for (const hal::FootConfig& foot : robot.contact.feet) {
+  for (const hal::Foot& foot : robot.contact.feet) {
     const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);
     if (site == robot.model.sites.end()) continue;
     const int sole = tree.link_index(site->link);

@@ -142,7 +142,7 @@ Status Plant::place_contact(const PlantConfig& config) {
   const std::vector<std::string> sites = names(kernels_->site_names, kernels_->sites);
   const std::vector<std::string> wrenches = names(kernels_->wrench_names, kernels_->wrenches);
   std::vector<Contact::Foot> feet;
-  for (const hal::FootConfig& foot : config.contact.feet) {
+  for (const hal::Foot& foot : config.contact.feet) {
     const int site = find(sites, foot.site);
     const int wrench = find(wrenches, foot.site);
     if (site < 0 || wrench < 0) {

@@ -207,7 +207,7 @@ inline hal::RobotConfig biped_robot() {
   robot.gains[0].position.gains = {1000.0, 0.0, 50.0};
   robot.gains[0].stiffness_Nm_rad = 300.0;
   robot.gains[0].damping_Nms_rad = 20.0;
-  hal::PostureConfig stand{"stand", 0.8, {}};
+  hal::PostureConfig stand{{"stand", 0.8, {}}};
   for (auto body = biped_bodies().rbegin(); body != biped_bodies().rend(); ++body) {
     hal::JointConfig& joint = robot.joints.emplace_back();
     joint.name = body->joint;

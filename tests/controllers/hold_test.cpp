@@ -6,8 +6,8 @@ namespace {
 
 hal::RobotConfig robot() {
   hal::RobotConfig config = hal::test::fake_robot();
-  config.postures.push_back({"ready", 0.0, {0.5, -0.5, 0.25}});
-  config.postures.push_back({"wrong", 0.0, {0.0, 2.0, 0.0}});
+  config.postures.push_back({{"ready", 0.0, {0.5, -0.5, 0.25}}});
+  config.postures.push_back({{"wrong", 0.0, {0.0, 2.0, 0.0}}});
   return config;
 }
 

@@ -73,7 +73,7 @@ inline hal::RobotConfig walker_robot(const Walker& walker) {
   robot.actuators[0].order = 2;
   robot.gains.emplace_back().name = "leg";
   robot.gains[0].position.gains = {1000.0, 0.0, 50.0};
-  hal::PostureConfig stand{"stand", 0.8, {}, 0};
+  hal::PostureConfig stand{{"stand", 0.8, {}}};
   const std::size_t last = walker.leg.size() - 1;
   for (int leg = 0; leg < walker.legs; ++leg) {
     const std::string prefix = "leg" + std::to_string(leg) + "_";
@@ -90,8 +90,10 @@ inline hal::RobotConfig walker_robot(const Walker& walker) {
     }
     const std::string foot = "foot" + std::to_string(leg);
     const std::string link = prefix + std::to_string(last) + "_link";
-    robot.model.sites.push_back(
-        {.name = foot, .link = link, .xyz_m = {0, 0, -walker.leg[last].length_m}, .wrench = true});
+    robot.model.sites.push_back({{.name = foot,
+                                  .link = link,
+                                  .xyz_m = {0, 0, -walker.leg[last].length_m},
+                                  .wrench = true}});
     robot.contact.feet.push_back({foot, walker.points_m});
   }
   robot.postures.push_back(stand);

@@ -203,7 +203,7 @@ TEST_F(Guard, StopsWhenEncodersAndSpringContradictEachOther) {
   ASSERT_EQ(r.error(), 0) << "a healthy joint";
   r.tamper = [](std::vector<AxisSense>& sense) { sense[0].link_position_rad += 0.03; };
   r.cycles(4);
-  EXPECT_EQ(r.error(), 0) << "a short one is borne";
+  EXPECT_EQ(r.error(), 0) << "a short one is no fault";
   ASSERT_LT(until_fault(r, 4), 4);
   expect_fault(r, 0x7320, 0x20);
   EXPECT_FALSE(reset(r));

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/server.hpp"
 #include "tests/fuzz/require.hpp"
@@ -43,6 +44,10 @@ T must(Result<T> made) {
 const hal::RobotConfig& robot() {
   static const hal::RobotConfig kRobot = hal::test::fake_robot();
   return kRobot;
+}
+const hal::ParameterImage& gains() {
+  static const hal::ParameterImage kGains = hal::initial_parameters(hal::test::fake_robot());
+  return kGains;
 }
 Identity identity() { return identity_of(robot(), "hash", kPeriod_ns); }
 
@@ -145,7 +150,7 @@ struct RobotEnd {
   std::unique_ptr<dds::Participant> at_owner = participant(domain, "owner");
   std::unique_ptr<dds::Participant> at_stranger = participant(domain, "stranger");
   std::unique_ptr<Server> server =
-      must(Server::open(*at_robot, robot(), identity(),
+      must(Server::open(*at_robot, robot(), gains(), identity(),
                         {.max_age_cycles = 20, .admits = [this](const Sender& sender) {
                            return sender == dds::id_of(*at_owner);
                          }}));
@@ -170,7 +175,7 @@ struct OwnersEnd {
   std::unique_ptr<dds::Participant> at_owner = participant(domain, "owner");
   std::unique_ptr<dds::Participant> at_stranger = participant(domain, "stranger");
   std::unique_ptr<Server> server =
-      must(Server::open(*at_robot, robot(), identity(), {.lease_timeout_s = 1e6}));
+      must(Server::open(*at_robot, robot(), gains(), identity(), {.lease_timeout_s = 1e6}));
   Peer<tandem_msgs::LinkState> of_robot{*at_robot, kStateTopic};
   Peer<tandem_msgs::LinkState> of_stranger{*at_stranger, kStateTopic};
   std::atomic<bool> connected{false};

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/server.hpp"
 #include "rt/clock.hpp"
@@ -89,8 +90,10 @@ class Served {
         backend(robot),
         host(robot, nullptr, kPeriod_ns),
         participant_(kept == nullptr ? participant("served") : nullptr) {
-    auto made = Server::open(kept == nullptr ? *participant_ : *kept, robot,
-                             identity_of(robot, "hash", kPeriod_ns), config);
+    const hal::Robot known = hal::robot_of(robot);
+    auto made =
+        Server::open(kept == nullptr ? *participant_ : *kept, known, hal::initial_parameters(robot),
+                     identity_of(known, "hash", kPeriod_ns), config);
     EXPECT_TRUE(made) << made.error().to_string();
     server = std::move(*made);
     owner = std::make_shared<runtime::OwnerController>();
@@ -139,8 +142,9 @@ class Owner {
  public:
   static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                         ClientConfig config,
-                                                        const hal::RobotConfig& robot) {
+                                                        const hal::RobotConfig& of) {
     if (config.name.empty()) config.name = "the test's owner";
+    const hal::Robot robot = hal::robot_of(of);
     return RemoteBackend::connect(participant, robot, identity_of(robot, "hash", kPeriod_ns),
                                   config);
   }

@@ -12,7 +12,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// An owner and its server, in whose name further samples are written.
 struct OddServer : testing::Test {
   OddServer() {
-    auto made = Server::open(*at_robot, robot, identity_of(robot, "hash", test::kPeriod_ns), {});
+    auto made = Server::open(*at_robot, robot, hal::initial_parameters(hal::test::fake_robot()),
+                             identity_of(robot, "hash", test::kPeriod_ns), {});
     EXPECT_TRUE(made);
     server = std::move(*made);
     auto connected =
@@ -56,7 +57,7 @@ struct OddServer : testing::Test {
     return owner->read({.cycle = cycle}, state);
   }
 
-  const hal::RobotConfig robot = hal::test::fake_robot();
+  const hal::Robot robot = hal::robot_of(hal::test::fake_robot());
   std::unique_ptr<dds::Participant> at_robot = test::participant("odd_robot");
   std::unique_ptr<dds::Participant> at_owner = test::participant("odd_owner");
   std::atomic<bool> owned{false};
@@ -89,12 +90,13 @@ TEST_F(OddServer, ShowsNoNumbersAndIsNotFollowed) {
 
 // Builds that number the stop categories in different ways had driven each other's robots.
 TEST(OtherVersions, AreRefusedAndToldWhichIsOlder) {
-  const hal::RobotConfig robot = hal::test::fake_robot();
+  const hal::Robot robot = hal::robot_of(hal::test::fake_robot());
   const auto at_robot = test::participant("robot"), at_owner = test::participant("owner");
   const auto refusal = [&](std::uint32_t protocol) {
     Identity identity = identity_of(robot, "hash", test::kPeriod_ns);
     identity.protocol = protocol;
-    const auto server = Server::open(*at_robot, robot, identity, {});
+    const auto server = Server::open(
+        *at_robot, robot, hal::initial_parameters(hal::test::fake_robot()), identity, {});
     EXPECT_TRUE(server);
     const auto owner =
         RemoteBackend::connect(*at_owner, robot, identity_of(robot, "hash", test::kPeriod_ns),

@@ -2,6 +2,7 @@
 // its loop's thread, and the suite as its owner.
 #include <thread>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/server.hpp"
 #include "hal/sim/sim_robot.hpp"
@@ -41,7 +42,8 @@ struct ServedUr5e {
     remote::ServerConfig link;
     link.lockstep = true;
     link.lease_timeout_s = 30.0;
-    server = take(remote::Server::open(participant(true), loaded.robot, identity(), link));
+    server = take(remote::Server::open(participant(true), hal::robot_of(loaded.robot),
+                                       hal::initial_parameters(loaded.robot), identity(), link));
     if (!host.add("remote", owner, runtime::test::parameters(), false)) throw std::logic_error("");
     cycle = std::make_unique<runtime::RobotCycle>(
         runtime::CycleParts{.robot = loaded.robot,
@@ -58,7 +60,7 @@ struct ServedUr5e {
     server->close();
   }
   [[nodiscard]] remote::Identity identity() const {
-    return remote::identity_of(loaded.robot, "hash", kPeriod_ns);
+    return remote::identity_of(hal::robot_of(loaded.robot), "hash", kPeriod_ns);
   }
 
   tandem::test::TestRobot loaded;
@@ -89,8 +91,8 @@ ConformanceRobot make_remote_ur5e() {
   client.name = "the conformance suite";
   client.lockstep = true;
   client.server = served->server->number();
-  made.backend = take(
-      remote::RemoteBackend::connect(participant(false), made.robot, served->identity(), client));
+  made.backend = take(remote::RemoteBackend::connect(participant(false), hal::robot_of(made.robot),
+                                                     served->identity(), client));
   made.keep = served;
   return made;
 }

@@ -43,7 +43,7 @@ double sunk_height_m(const std::string& name, const std::string& given) {
   double weight_N = 0.0;
   for (const model::Body& body : description->tree.bodies) weight_N += 9.81 * body.inertia.mass_kg;
   std::size_t points = 0;
-  for (const hal::FootConfig& foot : robot->contact.feet) points += foot.points_m.size();
+  for (const hal::Foot& foot : robot->contact.feet) points += foot.points_m.size();
   const double stiffness_N_m = robot->contact.stiffness_N_m * static_cast<double>(points);
   return robot->posture("stand")->base_height_m - weight_N / stiffness_N_m;
 }

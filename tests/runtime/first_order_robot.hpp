@@ -15,7 +15,7 @@ namespace tandem::runtime::test {
 
 class FirstOrderRobot : public hal::Backend {
  public:
-  static constexpr double kShare = 0.05;  // of the error made good in a cycle
+  static constexpr double kShare = 0.05;  // of the error that a cycle corrects
 
   explicit FirstOrderRobot(const hal::RobotConfig& robot, std::size_t feet = 0)
       : truth(robot.joints.size(), feet),

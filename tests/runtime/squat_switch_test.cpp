@@ -116,15 +116,15 @@ TEST(SquatSwitch, AtTheSameCycleGivesTheSameBits) {
   ASSERT_TRUE(before);
   run.change({"squat"}, {"rest"});
   const auto first = run.bytes(50);  // during the transfer
-  const auto amid = run.cycle->save();
-  ASSERT_TRUE(amid);
+  const auto midway = run.cycle->save();
+  ASSERT_TRUE(midway);
   const auto rest = run.bytes(200);
 
   ASSERT_TRUE(run.cycle->restore(*before));
   run.change({"squat"}, {"rest"});
   EXPECT_TRUE(run.bytes(50) == first);
   EXPECT_TRUE(run.bytes(200) == rest);
-  ASSERT_TRUE(run.cycle->restore(*amid));
+  ASSERT_TRUE(run.cycle->restore(*midway));
   EXPECT_TRUE(run.bytes(200) == rest);
 
   SwitchedSquat other;

@@ -199,7 +199,7 @@ TEST(InjectedFault, SnapshotsHoldEveryKindOfFault) {
   }
   Loop loop(swing_robot(), config);
   loop.bring_up();
-  loop.run(300);  // amidst all of them
+  loop.run(300);  // during all of them
   const std::vector<std::byte> saved = loop.bytes();
   const auto on = [&] {
     loop.run(400);

@@ -18,9 +18,9 @@ using test::pendulum_kernels;
 hal::RobotConfig block_robot() {
   hal::RobotConfig robot;
   robot.model.floating_base = true;
-  robot.model.sites = {{.name = "left", .link = "l", .wrench = true},
-                       {.name = "right", .link = "r", .wrench = true},
-                       {.name = "imu", .link = "imu_link"}};
+  robot.model.sites = {{{.name = "left", .link = "l", .wrench = true}},
+                       {{.name = "right", .link = "r", .wrench = true}},
+                       {{.name = "imu", .link = "imu_link"}}};
   hal::SensorConfig sensor;
   sensor.name = "right_ft";
   robot.sensors.push_back(sensor);
