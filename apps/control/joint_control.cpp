@@ -127,6 +127,19 @@ Status check_impedance(const std::string& joint, const char* what, double value,
                  fmt::format("give 0 to {:g} {}", max, unit));
 }
 
+/// A joint that is held keeps its impedance; the one that was asked for comes with a start.
+void note_held_impedance(const runtime::JointRequest& wish, Json& answer) {
+  if (!answer.value("done", false) || answer.contains("note")) return;
+  const auto kept = [&](const char* key, double asked) {
+    return !std::isnan(asked) && answer[key] != asked;
+  };
+  if (!kept("stiffness_Nm_rad", wish.stiffness_Nm_rad) &&
+      !kept("damping_Nms_rad", wish.damping_Nms_rad)) {
+    return;
+  }
+  answer["note"] = "the joint is held as it is: its new impedance is in force once controllers run";
+}
+
 Result<Json> set(const Run& run, const Json& request) {
   const auto joint = request["joint"].get<std::string>();
   if (request.size() == 2) return fail("joint.set: nothing is to be set", "name a value");
@@ -154,7 +167,9 @@ Result<Json> set(const Run& run, const Json& request) {
     }
     if (!fits) return std::unexpected(fits.error());
   }
-  return tell(run, joint, run.cycle.services().set_joint(joint, wish));
+  Result<Json> answer = tell(run, joint, run.cycle.services().set_joint(joint, wish));
+  if (answer) note_held_impedance(wish, *answer);
+  return answer;
 }
 
 /// Whether values in `unit` fit the joint.

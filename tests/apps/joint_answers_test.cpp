@@ -241,6 +241,37 @@ TEST_F(JointAnswers, ShowEachJointInItsUnits) {
   has(out, " Ns/m");
 }
 
+/// They were the old ones, as the command goes over to them within 0.1 s.
+TEST_F(JointAnswers, OfASetAreTheValuesThatWereAskedFor) {
+  begin();
+  const std::string set = R"({"do": "joint.set", "joint": "wrist", "stiffness_Nm_rad": 33,)"
+                          R"( "damping_Nms_rad": 1.5)";
+  const Json now = answer(set + R"(, "mode": "position", "interaction": "compliant"})");
+  EXPECT_EQ(now["stiffness_Nm_rad"], 33.0) << now;
+  EXPECT_EQ(now["damping_Nms_rad"], 1.5);
+  EXPECT_EQ(now["mode"], "position");
+  EXPECT_EQ(now["interaction"], "compliant");
+  EXPECT_EQ(now["moving"], false) << "nobody asked for a motion";
+  EXPECT_FALSE(now.contains("note"));
+  EXPECT_EQ(joint(2)["stiffness_Nm_rad"], 33.0);
+}
+
+/// The impedance of a joint that is held stays: the answer says when the other one comes.
+TEST_F(JointAnswers, OfASetWhileJointsAreHeldSayWhenItIsInForce) {
+  ASSERT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
+                       runtime::test::parameters()));
+  begin();
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  steps(2);
+  cycle->inbox().reset_faults();
+  steps(60);
+  ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
+  const Json later = answer(R"({"do": "joint.set", "joint": "wrist", "stiffness_Nm_rad": 33})");
+  EXPECT_EQ(later["done"], true) << later;
+  EXPECT_EQ(later.value("note", ""),
+            "the joint is held as it is: its new impedance is in force once controllers run");
+}
+
 TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
   begin();
   JointOptions options{.action = JointOptions::Action::kMove};

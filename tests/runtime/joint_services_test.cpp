@@ -213,6 +213,44 @@ TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
   EXPECT_EQ(before, 50.0);
 }
 
+// For 0.1 s the answer of `tandem joint set` was the old stiffness, and the joint was "moving".
+TEST_F(JointServices, ShowWhatWasAskedForWhileTheCommandGoesOverToIt) {
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1},
+                                   RunServices::Patience{0}));
+  steps(200);
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 3.0},
+                                   RunServices::Patience{0}));
+  for (int i = 0; i < 120; ++i) {
+    steps(1);
+    EXPECT_EQ(look(2).stiffness_Nm_rad, 50.0) << i;
+    EXPECT_EQ(look(2).damping_Nms_rad, 3.0) << i;
+    EXPECT_EQ(look(2).moving, 0) << i;
+    if (i == 0) {
+      EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0) << "without a step";
+    }
+  }
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 50.0);
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  steps(1);
+  EXPECT_EQ(look(0).moving, 0) << "nobody asked for a motion";
+}
+
+TEST(JointServicesOf, ADelayedRunShowWhatWasAskedForAtOnce) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  rt::WallClock clock;
+  RobotCycle cycle({robot, backend, host, clock}, {.delay_cycles = 5});
+  for (int i = 0; i < 50; ++i) cycle.step();
+  ASSERT_EQ(cycle.phase(), RunPhase::kRunning);
+  ASSERT_TRUE(cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0, .interaction = 1},
+                                         RunServices::Patience{0}));
+  cycle.step();
+  const JointStatus look = cycle.services().joints()[1].look;
+  EXPECT_EQ(look.stiffness_Nm_rad, 9.0);
+  EXPECT_EQ(look.interaction, static_cast<std::uint8_t>(InteractionMode::kCompliant));
+}
+
 TEST_F(JointServices, RefuseTheModeOfAClaimedJointAndNameItsController) {
   const std::string refused = text(mode("shoulder", ControlMode::kTorque));
   EXPECT_NE(refused.find("shoulder: is claimed by the controller 'sine'"), std::string::npos)
