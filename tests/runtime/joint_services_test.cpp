@@ -396,6 +396,11 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
   ASSERT_TRUE(cycle.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0}));
   ASSERT_TRUE(cycle.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0},
                                          RunServices::Patience{0}));
+  const auto move = [&](const MoveRequest& wish) {
+    return cycle.services().move_joint("wrist", wish, RunServices::Patience{0});
+  };
+  ASSERT_TRUE(move({.target_rad = 0.5}));
+  ASSERT_TRUE(move({}));
   cycle.run();
   (void)(*recorder)->close();
   std::vector<std::string> texts;
@@ -405,8 +410,9 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
     if (event.event.cycle == 50) texts.push_back(event.text);
   }
   EXPECT_EQ(texts,
-            (std::vector<std::string>{"controllers switched", "mode or impedance set of elbow",
-                                      "gains set of wrist"}));
+            (std::vector<std::string>{
+                "controllers switched", "mode or impedance set of elbow", "gains set of wrist",
+                "motion requested of wrist: to 0.5 rad (28.65 deg)", "motion stopped of wrist"}));
 }
 
 // An operator's motions: tandem joint move.
