@@ -14,8 +14,8 @@
 #include "apps/clients/control_client.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
+#include "base/counted.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -40,12 +40,24 @@ std::string mode_of(const Json& joint) {
 
 /// Its state and fault; of a drive that is not heard, whose figures are old, that alone.
 std::string drive_of(const Json& joint) {
-  const auto age_cycles = joint.value("age_cycles", 0U);
-  if (age_cycles > runtime::CycleConfig().lost_after_cycles)
-    return fmt::format("no feedback for {} cycles", age_cycles);
+  const std::string feedback = joint.value("feedback", "");
+  if (feedback == "lost") {
+    return fmt::format("no feedback for {} cycles", joint.value("age_cycles", 0U));
+  }
   const auto fault = joint.value("fault", 0U);
   const std::string state = joint.value("drive_state", "");
-  return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);
+  const char* sensor = feedback == "sensor_fault" ? ", sensor" : "";
+  return fault == 0 ? state : fmt::format("{} (0x{:04X}){}", state, fault, sensor);
+}
+
+/// What the figures of a joint are worth.
+std::string sample_of(const Json& joint) {
+  const std::string feedback = joint.value("feedback", "");
+  if (feedback == "sensor_fault") return "a sensor is in fault: what it measures is not valid";
+  const auto age_cycles = joint.value("age_cycles", 0U);
+  if (age_cycles == 0) return "fresh";
+  return fmt::format("{} old{}", counted(age_cycles, "cycle"),
+                     feedback == "lost" ? ": no feedback" : "");
 }
 
 bool slides(const Json& joint) { return joint.value("slides", false); }
@@ -214,7 +226,6 @@ void print_joint(const Json& joint) {
     return number(joint, key) + " " + of;
   };
   const std::string owner = joint.value("controller", ""), fault = joint.value("fault_text", "");
-  const auto age_cycles = joint.value("age_cycles", 0U);
   Facts facts;
   facts.add("joint", joint.value("joint", "") + (unit == "m" ? ", slides" : ", turns"));
   facts.add("controller", owner.empty() ? "-" : owner);
@@ -234,7 +245,7 @@ void print_joint(const Json& joint) {
   facts.add("current", with("current_A", "A"));
   facts.add("voltage", with("voltage_V", "V"));
   facts.add("winding", with("temperature_C", "degC"));
-  facts.add("sample", age_cycles == 0 ? "fresh" : fmt::format("{} cycles old", age_cycles));
+  facts.add("sample", sample_of(joint));
   facts.print(stdout);
 }
 

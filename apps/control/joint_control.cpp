@@ -50,6 +50,15 @@ Result<Enum> choice(const Json& request, const char* key, const std::array<Enum,
   return fail(fmt::format("\"{}\": there is no '{}'", key, wanted), suggest(wanted, names));
 }
 
+/// What the figures of a joint are worth. A drive says by the codes 73xx of CiA 402 that one of its
+/// sensors gives no value, or contradicts the other: what it goes on to send is no measurement.
+const char* feedback_of(const runtime::JointStatus& look) {
+  constexpr std::uint32_t kSensors = 0x7300;
+  if (look.age_cycles > runtime::CycleConfig().lost_after_cycles) return "lost";
+  if ((look.fault & 0xFF00) == kSensors) return "sensor_fault";
+  return look.age_cycles > 0 ? "old" : "fresh";
+}
+
 /// @param index  of the joint in the image
 Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t index) {
   const runtime::JointStatus& look = joint.look;
@@ -87,6 +96,7 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"fault_text", run.cycle.drive_fault(index, look.fault)},
           {"resetting", look.resetting != 0},
           {"age_cycles", look.age_cycles},
+          {"feedback", feedback_of(look)},
           {"gains", std::move(gains)}};
 }
 

@@ -272,6 +272,39 @@ TEST_F(JointAnswers, OfASetWhileJointsAreHeldSayWhenItIsInForce) {
             "the joint is held as it is: its new impedance is in force once controllers run");
 }
 
+/// The last good figures of an encoder that gives no value looked fresh.
+TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
+  for (hal::JointConfig& joint : robot.joints) joint.on_fault = hal::StopCategory::kWarn;
+  begin();
+  JointOptions options{.action = JointOptions::Action::kShow};
+  options.joint = "elbow";
+  const auto shown = [&] {
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+    return out;
+  };
+  EXPECT_EQ(joint(1)["feedback"], "fresh");
+  has(shown(), "sample          fresh");
+  backend.fault_code = 0x7300;
+  backend.faulted_joint = 1;
+  steps(2);
+  EXPECT_EQ(joint(1)["feedback"], "sensor_fault");
+  EXPECT_EQ(joint(0)["feedback"], "fresh");
+  has(shown(), "sample          a sensor is in fault: what it measures is not valid");
+  options.action = JointOptions::Action::kList;
+  has(shown(), "fault (0x7300), sensor");
+  options.action = JointOptions::Action::kShow;
+  backend.fault_code = 0x8611;  // it says nothing of the sensors
+  steps(2);
+  has(shown(), "sample          fresh");
+  backend.faulted_joint = -1;
+  backend.lost_joint = 1;
+  steps(3);  // and no more, as while an answer is awaited
+  EXPECT_EQ(registry.answer(R"({"do": "joint.list"})")["joints"][1]["feedback"], "old");
+  steps(20);
+  EXPECT_EQ(joint(1)["feedback"], "lost");
+  has(shown(), " cycles old: no feedback");
+}
+
 TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
   begin();
   JointOptions options{.action = JointOptions::Action::kMove};
