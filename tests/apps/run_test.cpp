@@ -142,7 +142,7 @@ TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
   const Outcome outcome = tandem("run hold.toml --duration 1 --scenario faults.toml");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.out.find("\n\n  fault at "), std::string::npos) << outcome.out;
-  EXPECT_NE(outcome.out.find(" joint   board    cause"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" where   board    cause"), std::string::npos) << outcome.out;
 }
 
 TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
