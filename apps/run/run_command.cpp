@@ -169,9 +169,9 @@ class Session {
     make_cycle();
     announce();
     if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
-    const auto wall_s = loop();
-    if (!wall_s) return refuse(wall_s.error());
-    return finish(*wall_s);
+    const auto times = loop();
+    if (!times) return refuse(times.error());
+    return finish(*times);
   }
 
  private:
@@ -248,8 +248,8 @@ class Session {
     return {};
   }
 
-  /// The run itself, from the first cycle to the last. Answers the seconds that it took.
-  Result<double> loop() {
+  /// The run itself, from the first cycle to the last. Answers the time that it took.
+  Result<LoopTimes> loop() {
     const runtime::Experiment& e = experiment();
     rt::install_stop_signals();
     rt::install_emergency_signal();
@@ -267,7 +267,7 @@ class Session {
     if (!thread.report().complete()) {
       fmt::print(stderr, "note: {}\n", thread.report().to_string());
     }
-    return thread.wall_s();
+    return thread.times();
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -286,8 +286,8 @@ class Session {
   }
 
   /// Closes what the loop wrote to, and prints what the run amounts to.
-  Exit finish(double wall_s) {
-    RunSummary summary{c_, *cycle_, wall_s, std::nullopt, std::nullopt, {}, {}};
+  Exit finish(const LoopTimes& times) {
+    RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}};
     summary.server = server_.get();
     if (dds_ != nullptr) summary.dds = dds_->finish();
     if (services_ != nullptr) summary.dds->services = services_->counts();

@@ -145,6 +145,12 @@ TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
   EXPECT_NE(outcome.out.find(" where   board    cause"), std::string::npos) << outcome.out;
 }
 
+TEST_F(Run, CountsTheJointsWhoseCommandsWereLimited) {
+  edit("robot.toml", "max_torque_Nm = 2.0", "max_torque_Nm = 2.0\nmax_acceleration_rad_s2 = 1.0");
+  const Outcome outcome = tandem("run trajectory.toml --no-log --no-socket");
+  EXPECT_NE(outcome.out.find(" cycles, 1 more joint\n"), std::string::npos) << outcome.out;
+}
+
 TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
   std::ofstream(folder_ / "faults.toml")
       << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint3\"\n";
