@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <string_view>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -133,17 +134,26 @@ struct Unit {
   const char* kind;  ///< for the run, which knows whether the joint turns or slides
 };
 
-/// Adds `text`, such as "30deg" with `per` "" or "20deg/s" with `per` "/s", to the question.
+std::string_view without_blanks_around(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+/// Adds `text`, such as "30deg" or "30 deg" with `per` "", "20deg/s" with "/s", to the question.
 Status add_quantity(Json& question, const char* key, const char* flag, const std::string& text,
                     const std::string& per) {
   if (text.empty()) return {};
   double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const std::string unit(end, text.data() + text.size());
+  const std::string_view trimmed = without_blanks_around(text);
+  const char* last = trimmed.data() + trimmed.size();
+  const auto [end, error] = std::from_chars(trimmed.data(), last, number);
+  const std::string_view unit = without_blanks_around({end, last});
   const auto wrong = [&] {
     return fail_at(
         flag, fmt::format("'{}' is no number with a unit", text),
-        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 0.02m{0}, or a number in SI units", per));
+        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a number in SI units",
+                    per));
   };
   if (error != std::errc() || !std::isfinite(number)) return wrong();
   question[key] = number;
@@ -151,6 +161,7 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
   for (const Unit& known : {Unit{"deg", std::numbers::pi / 180.0, "angle"},
                             {"rad", 1.0, "angle"},
                             {"mm", 1e-3, "length"},
+                            {"cm", 1e-2, "length"},
                             {"m", 1.0, "length"}}) {
     if (unit != known.name + per) continue;
     question[key] = number * known.si;
@@ -250,7 +261,7 @@ void print_joint(const Json& joint) {
 }
 
 /// Whether the target was written in degrees: it is shown in them, too.
-bool in_degrees(const JointOptions& options) { return options.to.ends_with("deg"); }
+bool in_degrees(const JointOptions& options) { return options.to.find("deg") != std::string::npos; }
 
 void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
   using Action = JointOptions::Action;

@@ -305,6 +305,33 @@ TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
   has(shown(), " cycles old: no feedback");
 }
 
+TEST_F(JointAnswers, TakeQuantitiesWithABlankAndInCentimetres) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  for (const char* text : {"30 deg", "30deg", " 30  deg ", "0.5235987755982988 rad"}) {
+    options.to = text;
+    options.speed = "20 deg/s";
+    options.acceleration = "40 deg/s2";
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+    has(out, "0.5236 rad");
+  }
+  options.joint = "elbow";  // it slides
+  for (const char* text : {"5cm", "5 cm", "50 mm", "50mm", "0.05 m", "0.05"}) {
+    options.to = text;
+    options.speed = "10 cm/s";
+    options.acceleration.clear();
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+    has(out, " to 0.05 m");
+  }
+  for (const char* text : {"5 c m", "5 km", "cm", " ", "5 5", "5 deg rad"}) {
+    options.to = text;
+    EXPECT_EQ(command(joint_command, options), Exit::kUsage) << text;
+    has(err, "is no number with a unit");
+    has(err, "2cm");
+  }
+}
+
 TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {
   begin();
   JointOptions options{.action = JointOptions::Action::kMove};
