@@ -217,6 +217,7 @@ class Session {
                counted(e.robot.joints.size(), "joint"), length_text(e),
                1e6 / static_cast<double>(e.loop.period_ns), options_.serves ? served_text(e) : "",
                pace_text(c_));
+    if (recorder_ != nullptr) fmt::print(out_, "log: {}\n", recorder_->path());
   }
 
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.

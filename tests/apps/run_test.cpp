@@ -151,6 +151,14 @@ TEST_F(Run, CountsTheJointsWhoseCommandsWereLimited) {
   EXPECT_NE(outcome.out.find(" cycles, 1 more joint\n"), std::string::npos) << outcome.out;
 }
 
+/// Nobody had seen before its end where a run writes.
+TEST_F(Run, NamesItsLogInItsFirstLines) {
+  const Outcome outcome = tandem("run hold.toml --duration 0.2");
+  const std::size_t log = outcome.out.find("log: runs/double_pendulum-hold-001.mcap\n");
+  EXPECT_NE(log, std::string::npos) << outcome.out;
+  EXPECT_LT(log, outcome.out.find("100 %")) << outcome.out;
+}
+
 TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {
   std::ofstream(folder_ / "faults.toml")
       << "[[fault]]\nkind = \"encoder_unplug\"\njoint = \"joint3\"\n";
