@@ -72,7 +72,8 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   load->add_option("--name", o.name, "Name of the controller (default: the plugin's)");
   load->add_option("--parameters", o.parameters, "TOML file of its [controller.parameters]")
       ->check(CLI::ExistingFile);
-  load->add_option("--set", o.set, "One parameter, 'key = value'; may be repeated")
+  load->add_option("--set", o.set,
+                   "One parameter, 'key = value', beside the file's; may be repeated")
       ->allow_extra_args(false);
   load->add_flag("--start", o.start_it, "Start it as well");
   add("unload", "Free an inactive controller", Action::kUnload)
