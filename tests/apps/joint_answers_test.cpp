@@ -22,11 +22,16 @@ namespace {
 
 using runtime::RunPhase;
 
+hal::RobotConfig with_a_slide() {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.joints[1].slides = true;
+  return robot;
+}
+
 /// A run without controllers whose cycles are made while somebody waits for an answer. Its elbow
 /// slides.
 template <class Backend>
 struct Answered : ::testing::Test {
-  Answered() { robot.joints[1].slides = true; }
   void begin() {
     cycle = std::make_unique<runtime::RobotCycle>(
         runtime::CycleParts{robot, backend, host, clock},
@@ -73,7 +78,7 @@ struct Answered : ::testing::Test {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   }
 
-  hal::RobotConfig robot = hal::test::fake_robot();
+  hal::RobotConfig robot = with_a_slide();
   Backend backend{robot};
   runtime::ControllerHost host{robot, nullptr, 1'000'000};
   rt::WallClock clock;

@@ -301,8 +301,8 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
     return text(
         services().set_joint("elbow", {.stiffness_Nm_rad = value}, RunServices::Patience{0}));
   };
-  EXPECT_NE(stiff(201.0).find("elbow: stiffness_Nm_rad 201 is beyond the joint's limit (give 0 "
-                              "to 200)"),
+  EXPECT_NE(stiff(201.0).find("elbow: the stiffness 201 Nm/rad is beyond the joint's limit (give 0 "
+                              "to 200 Nm/rad)"),
             std::string::npos)
       << stiff(201.0);
   EXPECT_NE(stiff(-1.0).find("beyond"), std::string::npos);
@@ -470,12 +470,15 @@ TEST_F(JointMoves, AreRefusedBeyondTheLimitsAndOfJointsThatAreTaken) {
   const auto has = [](const std::string& text, const char* words) {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   };
-  has(move("elbow", {.target_rad = 1.6}), "the target 1.6 rad is beyond the joint's limits");
+  has(move("elbow", {.target_rad = 1.6}),
+      "the target 1.6 rad (91.67 deg) is beyond the joint's limits (give -1.5 to 1.5 rad, which "
+      "is -85.94 to 85.94 deg)");
   has(move("elbow", {.target_rad = std::numeric_limits<double>::infinity()}), "is beyond");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}), "the speed 2.1 rad/s is not one");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 rad/s is not one");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}),
+      "the speed 2.1 rad/s (120.3 deg/s) is");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 rad/s (0 deg/s) is");
   has(move("elbow", {.target_rad = 0.0, .acceleration_rad_s2 = -1.0}),
-      "the acceleration -1 rad/s^2 is");
+      "the acceleration -1 rad/s2 (-57.3 deg/s2) is");
   has(move("elbwo", {.target_rad = 0.0}), "did you mean 'elbow'?");
   has(answered("shoulder", {.target_rad = 0.0}), "is claimed by the controller 'sine'");
   ASSERT_TRUE(mode("elbow", ControlMode::kVelocity));
