@@ -180,7 +180,7 @@ TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
   EXPECT_EQ(slow["arrived"], true);
   EXPECT_EQ(slow["moving"], false);
   const std::string away = "joint move joint1 --to -300deg --speed 1deg/s --wait --socket ";
-  const Outcome interrupted = tandem(away + socket_, "timeout -s INT 0.5");
+  const Outcome interrupted = tandem(away + socket_, "timeout --foreground -s INT 0.5");
   EXPECT_EQ(interrupted.status, 124);
   expect(interrupted.err,
          "joint1 still moves to -5.236 rad (-300 deg): `tandem joint stop joint1`");
