@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <iterator>
+#include <numbers>
 #include <string>
 
 #include "base/realtime.hpp"
@@ -36,6 +37,9 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kTooLate: return "fault: too many late cycles";
     case EventKind::kOwnerLost: return "fault: the remote owner is gone, or late";
     case EventKind::kFell: return "fault: the robot fell";
+    case EventKind::kMotionRequested: return "motion requested";
+    case EventKind::kMotionStopped: return "motion stopped";
+    case EventKind::kRecoveryRequested: return "recovery requested";
   }
   return "?";
 }
@@ -46,6 +50,19 @@ bool is_fault(EventKind kind) noexcept {
 }
 
 namespace {
+
+/// ": to 0.5 rad (28.65 deg)", ": to 0.02 m".
+std::string target_text(const Event& event) {
+  char text[64];
+  const double target = event.value;
+  if (event.code == 1) {
+    std::snprintf(text, sizeof text, ": to %.4g m", target);
+  } else {
+    std::snprintf(text, sizeof text, ": to %.4g rad (%.4g deg)", target,
+                  target * 180.0 / std::numbers::pi);
+  }
+  return text;
+}
 
 /// What follows the name of an event whose code is not 0: the code in words, or as a number.
 std::string text_of(const Event& event, bool has_joint) {
@@ -92,6 +109,7 @@ std::string describe(const Event& event, std::span<const std::string> joints) {
                    : event.code == 3 ? " by the watchdog"
                                      : " on request");
   }
+  if (event.kind == EventKind::kMotionRequested) return text + target_text(event);
   if (event.code == 0) return text;
   return text + text_of(event, has_joint);
 }
@@ -100,7 +118,7 @@ const std::string& event_schema() {
   static const std::string text =
       "uint64 cycle\n"
       "int64 time_ns\n"
-      "uint32 code  # a drive's CiA 402 error code, the loop's Code, or a count\n"
+      "uint32 code  # a drive's CiA 402 error code, the loop's Code, a count, a unit\n"
       "int32 joint  # index in the image, -1: none\n"
       "uint8 kind  # EventKind\n"
       "string text\n";

@@ -36,6 +36,9 @@ enum class EventKind : std::uint8_t {
   kTooLate,              ///< a fault: too many late cycles
   kOwnerLost,            ///< a fault: of the owner in another process; `code`: 0 it asked for it
   kFell,                 ///< a fault: the robot fell; `code`: how (the text says it)
+  kMotionRequested,      ///< on request: of a joint to `value`; `code`: 0 in rad, 1 in m
+  kMotionStopped,        ///< on request: a joint brakes
+  kRecoveryRequested,    ///< on request: a joint goes back to its limits
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.
@@ -48,7 +51,8 @@ struct Event {
   std::uint32_t code = 0;   ///< the drive's error code, a Code, a count: as the kind says
   std::int32_t joint = -1;  ///< index in the image; -1: none
   EventKind kind = EventKind::kStarted;
-  std::uint8_t padding[7] = {};
+  std::uint8_t padding[3] = {};
+  float value = 0.0F;  ///< of a motion: its target. In the log it is in the text
 };
 static_assert(std::is_trivially_copyable_v<Event> && sizeof(Event) == 32);
 

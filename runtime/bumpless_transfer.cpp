@@ -56,6 +56,13 @@ void BumplessTransfer::begin(std::size_t joint, const hal::StateImage& state,
           : 0;
 }
 
+BumplessTransfer::Impedance BumplessTransfer::written(
+    std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
+  const Joint& of = joints_[joint];
+  if (of.left > 0 && of.known != 0) return {of.written[kStiffness], of.written[kDamping]};
+  return {command.stiffness_Nm_rad()[joint], command.damping_Nms_rad()[joint]};
+}
+
 void BumplessTransfer::before_update(hal::CommandImage& command) const noexcept TANDEM_RT {
   if (going_ == 0) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {

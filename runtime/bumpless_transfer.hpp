@@ -25,6 +25,11 @@ class BumplessTransfer {
  public:
   static constexpr std::int64_t kTime_ns = 100'000'000;
 
+  struct Impedance {
+    double stiffness_Nm_rad = 0.0;
+    double damping_Nms_rad = 0.0;
+  };
+
   BumplessTransfer(std::size_t joints, std::int64_t period_ns);
 
   /// `joint` changes hands in this cycle; `command` is still what was sent last, and then what the
@@ -35,10 +40,9 @@ class BumplessTransfer {
   void before_update(hal::CommandImage& command) const noexcept TANDEM_RT;
   /// After it: adds what is left of the offsets.
   void after_update(const hal::StateImage& state, hal::CommandImage& command) noexcept TANDEM_RT;
-  /// Whether an offset of the joint is left.
-  [[nodiscard]] bool is_going(std::size_t joint) const noexcept TANDEM_RT {
-    return joints_[joint].left > 0;
-  }
+  /// What the owner of the joint wrote last: `command` goes over to it while an offset is left.
+  [[nodiscard]] Impedance written(std::size_t joint,
+                                  const hal::CommandImage& command) const noexcept TANDEM_RT;
   /// Forgets all.
   void clear() noexcept TANDEM_RT;
 

@@ -198,10 +198,14 @@ class ControllerHost {
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
   }
-  /// Whether move() or recover() leads `joint`, or has not quite let it go.
+  /// Whether move() or recover() leads `joint`. The rest of a transfer is no motion.
   [[nodiscard]] bool leads(std::size_t joint) const noexcept TANDEM_RT {
-    return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0 ||
-           transfer_.is_going(joint);
+    return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0;
+  }
+  /// What the joint's owner wants, which may be an operator: `command` goes over to it.
+  [[nodiscard]] BumplessTransfer::Impedance wanted_impedance(
+      std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {
+    return transfer_.written(joint, command);
   }
   /// Whether one of `by` claims `joint`.
   [[nodiscard]] bool is_claimed(std::size_t joint, ControllerSet by) const noexcept TANDEM_RT;
@@ -241,10 +245,7 @@ class ControllerHost {
   }
   void leave_calls() noexcept TANDEM_RT { at_work_.store(-1, std::memory_order_relaxed); }
 
-  struct Impedance {
-    double stiffness_Nm_rad = 0.0;
-    double damping_Nms_rad = 0.0;
-  };
+  using Impedance = BumplessTransfer::Impedance;
 
   const hal::RobotConfig* config_;
   const hal::Robot robot_;  // what the controllers see of it

@@ -16,9 +16,9 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
-                     std::uint32_t code) noexcept TANDEM_RT {
+                     std::uint32_t code, float value) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
-  recorder_->push(log::Event{time.cycle, time.time_ns, code, joint, kind, {}});
+  recorder_->push(log::Event{time.cycle, time.time_ns, code, joint, kind, {}, value});
 }
 
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,

@@ -24,8 +24,9 @@ class CycleLog {
     if (recorder_ != nullptr) recorder_->wait_for_space(messages);
   }
   /// @param joint  -1: none
+  /// @param value  of the kinds that have one
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
-             std::uint32_t code = 0) noexcept TANDEM_RT;
+             std::uint32_t code = 0, float value = 0.0F) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth) noexcept TANDEM_RT;
   /// Messages that found no room.

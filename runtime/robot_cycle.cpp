@@ -328,8 +328,11 @@ void RobotCycle::show() noexcept TANDEM_RT {
                              .skipped = loop_.statistics().skipped}});
 }
 
+/// What is asked of a joint is what its owner wants, before a delay and a transfer.
 void RobotCycle::show_joints() noexcept TANDEM_RT {
+  const hal::CommandImage& wanted = controlling_ ? controlled() : command_;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto impedance = controllers_->wanted_impedance(j, wanted);
     joints_[j] = {.cycle = time_.cycle,
                   .position_rad = state_.position_rad()[j],
                   .velocity_rad_s = state_.velocity_rad_s()[j],
@@ -341,13 +344,13 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
                   .voltage_V = state_.voltage_V()[j],
                   .temperature_C = state_.temperature_C()[j],
                   .commanded_rad = command_.position_rad()[j],
-                  .stiffness_Nm_rad = command_.stiffness_Nm_rad()[j],
-                  .damping_Nms_rad = command_.damping_Nms_rad()[j],
+                  .stiffness_Nm_rad = impedance.stiffness_Nm_rad,
+                  .damping_Nms_rad = impedance.damping_Nms_rad,
                   .fault = state_.fault()[j],
                   .age_cycles = state_.age_cycles()[j],
                   .owner = controllers_->owner(j),
-                  .mode = command_.mode()[j],
-                  .interaction = command_.interaction()[j],
+                  .mode = wanted.mode()[j],
+                  .interaction = wanted.interaction()[j],
                   .drive_mode = state_.mode()[j],
                   .drive_state = state_.drive_state()[j],
                   .moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0},

@@ -145,11 +145,14 @@ void RobotCycle::log_request(const LoopRequest& request) noexcept TANDEM_RT {
   if (request.kind == Kind::kSwitch || request.kind == Kind::kGoOn) {
     event(EventKind::kControllersSwitched);
   }
-  if (request.kind == Kind::kJoint || request.kind == Kind::kRecover ||
-      request.kind == Kind::kMove) {
-    event(EventKind::kJointSet, joint);
-  }
+  if (request.kind == Kind::kJoint) event(EventKind::kJointSet, joint);
+  if (request.kind == Kind::kRecover) event(EventKind::kRecoveryRequested, joint);
   if (request.kind == Kind::kGains) event(EventKind::kGainsSet, joint);
+  if (request.kind != Kind::kMove) return;
+  if (!std::isfinite(request.move.target_rad)) return event(EventKind::kMotionStopped, joint);
+  const std::uint32_t unit = robot_->joints[request.joint].slides ? 1 : 0;
+  log_.event(time_, EventKind::kMotionRequested, joint, unit,
+             static_cast<float>(request.move.target_rad));
 }
 
 }  // namespace tandem::runtime

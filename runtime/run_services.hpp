@@ -49,12 +49,13 @@ struct JointStatus {
   double acceleration_rad_s2 = 0.0;
   double motor_position_rad = 0.0, motor_velocity_rad_s = 0.0;   ///< on the link side
   double current_A = 0.0, voltage_V = 0.0, temperature_C = 0.0;  ///< of the motor
-  double commanded_rad = 0.0, stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;
-  std::uint32_t fault = 0;       ///< 0, or the drive's CiA 402 error code
-  std::uint32_t age_cycles = 0;  ///< of the sample
+  double commanded_rad = 0.0;
+  double stiffness_Nm_rad = 0.0, damping_Nms_rad = 0.0;  ///< asked for: the command goes over to it
+  std::uint32_t fault = 0;                               ///< 0, or the drive's CiA 402 error code
+  std::uint32_t age_cycles = 0;                          ///< of the sample
   std::int32_t owner = -1;       ///< slot of the active controller that claims it
-  std::int8_t mode = 0;          ///< hal::ControlMode commanded
-  std::uint8_t interaction = 0;  ///< hal::InteractionMode commanded
+  std::int8_t mode = 0;          ///< hal::ControlMode asked for
+  std::uint8_t interaction = 0;  ///< hal::InteractionMode asked for
   std::int8_t drive_mode = 0;    ///< hal::ControlMode in force
   std::uint8_t drive_state = 0;  ///< hal::DriveState
   std::uint8_t moving = 0;       ///< by move_joint() or recover()

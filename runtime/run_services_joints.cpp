@@ -1,7 +1,9 @@
-// Asking the loop for joints: what they are, and what can be set of them.
+// Asking the loop for joints: what they are, what can be set of them, and how far they go.
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 #include <limits>
+#include <numbers>
 #include <thread>
 #include <utility>
 
@@ -21,16 +23,71 @@ hal::Capability needed_by(hal::PidLoop loop) {
   return hal::Capability::kCurrent;
 }
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+/// "0.5 rad/s (28.65 deg/s)", "0.02 m/s" with `per` "/s".
+std::string quantity(double value, bool slides, const char* per) {
+  if (slides) return fmt::format("{:g} m{}", value, per);
+  return fmt::format("{0:g} rad{2} ({1:.4g} deg{2})", value, value * kDegPerRad, per);
 }
 
-Status check_range(const std::string& joint, const std::string& what, double value, double max) {
+/// @param unit  empty, or " Nm/rad": behind each number
+Status check_range(const std::string& joint, const char* what, double value, double max,
+                   const char* unit = "") {
   if (value >= 0.0 && value <= max) return {};
-  return fail_at(joint, what + " " + number(value) + " is beyond the joint's limit",
-                 "give 0 to " + number(max));
+  return fail_at(joint, fmt::format("{} {:g}{} is beyond the joint's limit", what, value, unit),
+                 fmt::format("give 0 to {:g}{}", max, unit));
+}
+
+/// Of what is asked for: NaN stays as it is.
+Status check_impedance(const std::string& joint, const JointRequest& wish,
+                       const hal::JointCapabilities& limit) {
+  const double stiffness = wish.stiffness_Nm_rad, damping = wish.damping_Nms_rad;
+  if (std::isnan(stiffness) && std::isnan(damping)) return {};
+  if (!limit.can(hal::Capability::kCompliant)) {
+    return fail_at(joint, "this joint cannot be compliant", "it has no torque control");
+  }
+  if (!std::isnan(stiffness)) {
+    const Status fits = check_range(joint, "the stiffness", stiffness, limit.max_stiffness_Nm_rad,
+                                    limit.slides ? " N/m" : " Nm/rad");
+    if (!fits) return fits;
+  }
+  if (std::isnan(damping)) return {};
+  return check_range(joint, "the damping", damping, limit.max_damping_Nms_rad,
+                     limit.slides ? " Ns/m" : " Nms/rad");
+}
+
+Status check_target(const std::string& joint, double target, const hal::JointCapabilities& limit) {
+  const double min = limit.min_position_rad, max = limit.max_position_rad;
+  if (!(target < min || target > max)) return {};
+  return fail_at(
+      joint,
+      fmt::format("the target {} is beyond the joint's limits", quantity(target, limit.slides, "")),
+      limit.slides ? fmt::format("give {:g} to {:g} m", min, max)
+                   : fmt::format("give {:g} to {:g} rad, which is {:.4g} to {:.4g} deg", min, max,
+                                 min * kDegPerRad, max * kDegPerRad));
+}
+
+/// Of the speed and the acceleration, which are above 0. @param value  NaN: not given
+Status check_rate_of_motion(const std::string& joint, const char* what, double value, double max,
+                            bool slides, const char* per) {
+  if (std::isnan(value) || (value > 0.0 && value <= max)) return {};
+  std::string hint = "give more than 0";
+  if (std::isfinite(max)) hint += ", at most " + quantity(max, slides, per);
+  return fail_at(
+      joint,
+      fmt::format("the {} {} is beyond the joint's limit", what, quantity(value, slides, per)),
+      hint);
+}
+
+Status check_move(const std::string& joint, const MoveRequest& wish,
+                  const hal::JointCapabilities& limit) {
+  if (Status fits = check_target(joint, wish.target_rad, limit); !fits) return fits;
+  const Status fits = check_rate_of_motion(joint, "speed", wish.speed_rad_s,
+                                           limit.max_velocity_rad_s, limit.slides, "/s");
+  if (!fits) return fits;
+  return check_rate_of_motion(joint, "acceleration", wish.acceleration_rad_s2,
+                              limit.max_acceleration_rad_s2, limit.slides, "/s2");
 }
 
 }  // namespace
@@ -121,24 +178,12 @@ Result<RequestResult> RunServices::set_joint(const std::string& joint, const Joi
   Lock lock(mutex_);
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
-  const hal::JointCapabilities& limit = host_->capabilities()[*index];
   const JointStatus now = looks()[*index];
   if (wish.mode >= 0 || wish.interaction >= 0) {
     if (Status free = check_mode(*index, wish, now); !free) return std::unexpected(free.error());
   }
-  const bool yields = !std::isnan(wish.stiffness_Nm_rad) || !std::isnan(wish.damping_Nms_rad);
-  if (yields && !limit.can(hal::Capability::kCompliant)) {
-    return fail_at(joint, "this joint cannot be compliant", "it has no torque control");
-  }
-  if (!std::isnan(wish.stiffness_Nm_rad)) {
-    const Status in_range =
-        check_range(joint, "stiffness_Nm_rad", wish.stiffness_Nm_rad, limit.max_stiffness_Nm_rad);
-    if (!in_range) return std::unexpected(in_range.error());
-  }
-  if (!std::isnan(wish.damping_Nms_rad)) {
-    const Status in_range =
-        check_range(joint, "damping_Nms_rad", wish.damping_Nms_rad, limit.max_damping_Nms_rad);
-    if (!in_range) return std::unexpected(in_range.error());
+  if (Status fits = check_impedance(joint, wish, host_->capabilities()[*index]); !fits) {
+    return std::unexpected(fits.error());
   }
   return ask(lock,
              {.kind = LoopRequest::Kind::kJoint,
@@ -170,25 +215,8 @@ Result<RequestResult> RunServices::move_joint(const std::string& joint, const Mo
   Lock lock(mutex_);
   const Result<std::size_t> index = joint_to_change(joint);
   if (!index) return std::unexpected(index.error());
-  const hal::JointCapabilities& limit = host_->capabilities()[*index];
-  const std::string unit = limit.slides ? " m" : " rad";
-  const double target = wish.target_rad, speed = wish.speed_rad_s;
-  if (target < limit.min_position_rad || target > limit.max_position_rad) {
-    return fail_at(
-        joint, "the target " + number(target) + unit + " is beyond the joint's limits",
-        "give " + number(limit.min_position_rad) + " to " + number(limit.max_position_rad) + unit);
-  }
-  if (!std::isnan(speed) && !(speed > 0.0 && speed <= limit.max_velocity_rad_s)) {
-    return fail_at(joint,
-                   "the speed " + number(speed) + unit + "/s is not one that the joint can go at",
-                   "give more than 0, up to " + number(limit.max_velocity_rad_s) + unit + "/s");
-  }
-  const double acceleration = wish.acceleration_rad_s2;
-  if (!std::isnan(acceleration) &&
-      !(acceleration > 0.0 && acceleration <= limit.max_acceleration_rad_s2)) {
-    return fail_at(
-        joint, "the acceleration " + number(acceleration) + unit + "/s^2 is beyond its limit",
-        "give more than 0, up to " + number(limit.max_acceleration_rad_s2) + unit + "/s^2");
+  if (Status fits = check_move(joint, wish, host_->capabilities()[*index]); !fits) {
+    return std::unexpected(fits.error());
   }
   if (Status free = check_free_to_move(*index); !free) return std::unexpected(free.error());
   return ask(

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -9,6 +10,7 @@
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
 #include "apps/text/console.hpp"
+#include "base/toml_reader.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -43,16 +45,35 @@ void print_done(const Json& answer) {
   }
 }
 
+/// Where the first table of a TOML file begins, behind which no line belongs to its top level; its
+/// end, when it has none or is no TOML (the run then says where it is wrong).
+std::size_t end_of_top_level(const std::string& text, const std::string& file) {
+  const auto document = TomlDocument::parse(text, file);
+  if (!document) return text.size();
+  std::size_t end = text.size();
+  for (const std::string& key : document->root().keys()) {
+    std::size_t begin = 0;
+    for (int line = document->root().line(key); line > 1; --line)
+      begin = text.find('\n', begin) + 1;
+    const std::size_t first = text.find_first_not_of(" \t", begin);
+    if (text[first] == '[') end = std::min(end, begin);  // and not KEY = VALUE
+  }
+  return end;
+}
+
+/// The file with what --set adds to it, below its own keys: the lines of errors in those stay.
 Result<std::string> parameters_of(const ControllerOptions& options) {
-  std::ostringstream text;
+  std::string text;
   if (!options.parameters.empty()) {
     std::ifstream file(options.parameters);
-    text << file.rdbuf();
+    std::ostringstream read;
+    read << file.rdbuf();
     if (!file) return fail("cannot read " + options.parameters, "is it a file?");
-    text << '\n';
+    text = read.str() + '\n';
   }
-  for (const std::string& line : options.set) text << line << '\n';
-  return text.str();
+  std::string added;
+  for (const std::string& line : options.set) added += line + '\n';
+  return text.insert(end_of_top_level(text, options.parameters), added);
 }
 
 Result<Json> load_question(const ControllerOptions& options) {

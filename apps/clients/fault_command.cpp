@@ -114,7 +114,10 @@ Exit reset(const FaultOptions& options) {
   const bool kept = !nothing && asked->value("paused", false);
   if (!nothing && !kept) {
     const Result<Json> through = wait_for_reset(**run, *asked);
-    if (!through) return refuse(through.error());
+    if (!through) {  // it was asked for, and nobody knows what came of it
+      print_errors({through.error()});
+      return Exit::kFault;
+    }
     answer = *through;
   }
   const bool done = answer.value("resets", 0) > asked->value("resets", 0);

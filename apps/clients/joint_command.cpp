@@ -6,16 +6,17 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <string_view>
 #include <thread>
 #include <tuple>
 #include <vector>
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
+#include "apps/clients/joint_print.hpp"
 #include "apps/clients/named.hpp"
 #include "apps/text/console.hpp"
 #include "rt/stop_signal.hpp"
-#include "runtime/robot_cycle.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -26,112 +27,32 @@ constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr double kFar_rad = 1.0 / kDegPerRad;
 constexpr double kFar_m = 0.01;
 
-std::string number(const Json& joint, const char* key) {
-  return joint[key].is_number() ? fmt::format("{:.4g}", joint[key].get<double>()) : "-";
-}
-
-/// "position", or "position (idle)" while the drive is not there yet.
-std::string mode_of(const Json& joint) {
-  const std::string mode = joint.value("mode", "");
-  const std::string in_force = joint.value("mode_in_force", "");
-  const std::string yields = joint.value("interaction", "") == "compliant" ? ", compliant" : "";
-  return mode + yields + (in_force == mode ? "" : " (" + in_force + ")");
-}
-
-/// Its state and fault; of a drive that is not heard, whose figures are old, that alone.
-std::string drive_of(const Json& joint) {
-  const auto age_cycles = joint.value("age_cycles", 0U);
-  if (age_cycles > runtime::CycleConfig().lost_after_cycles)
-    return fmt::format("no feedback for {} cycles", age_cycles);
-  const auto fault = joint.value("fault", 0U);
-  const std::string state = joint.value("drive_state", "");
-  return fault == 0 ? state : fmt::format("{} (0x{:04X})", state, fault);
-}
-
-bool slides(const Json& joint) { return joint.value("slides", false); }
-std::string unit_of(const Json& joint) { return slides(joint) ? "m" : "rad"; }
-std::string torque_unit_of(const Json& joint) { return slides(joint) ? "N" : "Nm"; }
-
-/// Columns whose unit depends on the joint. It stands in the heading where all joints share it,
-/// else behind each value.
-class Units {
- public:
-  explicit Units(const Json& joints) {
-    if (!joints.empty()) first_ = joints.front();
-    for (const Json& joint : joints) mixed_ = mixed_ || slides(joint) != slides(first_);
-  }
-  /// @param of  unit_of or torque_unit_of; `per` is added to what it says
-  template <class UnitOf>
-  [[nodiscard]] std::string heading(const char* name, const UnitOf& of,
-                                    const char* per = "") const {
-    return mixed_ ? name : fmt::format("{} [{}{}]", name, of(first_), per);
-  }
-  template <class UnitOf>
-  [[nodiscard]] std::string value(const Json& joint, const char* key, const UnitOf& of,
-                                  const char* per = "") const {
-    return number(joint, key) + (mixed_ ? " " + of(joint) + per : "");
-  }
-
- private:
-  Json first_ = Json::object();
-  bool mixed_ = false;
-};
-
-void print_joints(const Json& joints) {
-  const Units units(joints);
-  Table table({"joint", "controller", "mode", units.heading("position", unit_of),
-               units.heading("velocity", unit_of, "/s"), units.heading("torque", torque_unit_of),
-               "drive"});
-  for (const Json& joint : joints) {
-    const std::string owner = joint.value("controller", "");
-    table.add({joint.value("joint", ""), owner.empty() ? "-" : owner, mode_of(joint),
-               units.value(joint, "position_rad", unit_of),
-               units.value(joint, "velocity_rad_s", unit_of, "/s"),
-               units.value(joint, "torque_Nm", torque_unit_of), drive_of(joint)});
-  }
-  table.print(stdout);
-}
-
-void print_drives(const Json& joints) {
-  const Units units(joints);
-  Table table({"joint", units.heading("motor", unit_of), "current [A]", "voltage [V]",
-               "winding [degC]", "drive"});
-  for (const Json& joint : joints) {
-    table.add({joint.value("joint", ""), units.value(joint, "motor_position_rad", unit_of),
-               number(joint, "current_A"), number(joint, "voltage_V"),
-               number(joint, "temperature_C"), drive_of(joint)});
-  }
-  table.print(stdout);
-}
-
-void print_gains(const Json& joints) {
-  Table table({"joint", "loop", "kp", "ki", "kd"});
-  for (const Json& joint : joints) {
-    for (const auto& [loop, gains] : joint["gains"].items()) {
-      table.add({joint.value("joint", ""), loop, number(gains, "kp"), number(gains, "ki"),
-                 number(gains, "kd")});
-    }
-  }
-  table.print(stdout);
-}
-
 struct Unit {
   const char* name;
   double si;         ///< one of it, in SI units
   const char* kind;  ///< for the run, which knows whether the joint turns or slides
 };
 
-/// Adds `text`, such as "30deg" with `per` "" or "20deg/s" with `per` "/s", to the question.
+std::string_view without_blanks_around(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(' ') - first + 1);
+}
+
+/// Adds `text`, such as "30deg" or "30 deg" with `per` "", "20deg/s" with "/s", to the question.
 Status add_quantity(Json& question, const char* key, const char* flag, const std::string& text,
                     const std::string& per) {
   if (text.empty()) return {};
   double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const std::string unit(end, text.data() + text.size());
+  const std::string_view trimmed = without_blanks_around(text);
+  const char* last = trimmed.data() + trimmed.size();
+  const auto [end, error] = std::from_chars(trimmed.data(), last, number);
+  const std::string_view unit = without_blanks_around({end, last});
   const auto wrong = [&] {
     return fail_at(
         flag, fmt::format("'{}' is no number with a unit", text),
-        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 0.02m{0}, or a number in SI units", per));
+        fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a number in SI units",
+                    per));
   };
   if (error != std::errc() || !std::isfinite(number)) return wrong();
   question[key] = number;
@@ -139,6 +60,7 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
   for (const Unit& known : {Unit{"deg", std::numbers::pi / 180.0, "angle"},
                             {"rad", 1.0, "angle"},
                             {"mm", 1e-3, "length"},
+                            {"cm", 1e-2, "length"},
                             {"m", 1.0, "length"}}) {
     if (unit != known.name + per) continue;
     question[key] = number * known.si;
@@ -184,62 +106,8 @@ Result<Json> question_of(const JointOptions& o) {
   return question;
 }
 
-/// "-0.5 rad"; with `degrees` "-0.5 rad (-28.65 deg)"; "-" without a value.
-std::string place_of(const Json& joint, const Json& value, bool degrees) {
-  if (!value.is_number()) return "-";
-  const double number = value.get<double>();
-  const std::string place = fmt::format("{:.4g} {}", number, unit_of(joint));
-  return degrees ? fmt::format("{} ({:.4g} deg)", place, number * kDegPerRad) : place;
-}
-
-std::string limits_of(const Json& joint) {
-  const Json &min = joint["min_position_rad"], &max = joint["max_position_rad"];
-  std::string range = "any position";
-  if (min.is_number() && max.is_number()) {
-    range =
-        fmt::format("{:.4g} to {:.4g} {}", min.get<double>(), max.get<double>(), unit_of(joint));
-    if (!slides(joint)) {
-      range += fmt::format(" ({:.4g} to {:.4g} deg)", min.get<double>() * kDegPerRad,
-                           max.get<double>() * kDegPerRad);
-    }
-  }
-  return fmt::format("{}, {} {}/s, {} {}", range, number(joint, "max_velocity_rad_s"),
-                     unit_of(joint), number(joint, "max_torque_Nm"), torque_unit_of(joint));
-}
-
-void print_joint(const Json& joint) {
-  const std::string unit = unit_of(joint);
-  const std::string torque = torque_unit_of(joint);
-  const auto with = [&](const char* key, const std::string& of) {
-    return number(joint, key) + " " + of;
-  };
-  const std::string owner = joint.value("controller", ""), fault = joint.value("fault_text", "");
-  const auto age_cycles = joint.value("age_cycles", 0U);
-  Facts facts;
-  facts.add("joint", joint.value("joint", "") + (unit == "m" ? ", slides" : ", turns"));
-  facts.add("controller", owner.empty() ? "-" : owner);
-  facts.add("mode", mode_of(joint));
-  facts.add("position", with("position_rad", unit) + ", commanded " +
-                            with("commanded_position_rad", unit) +
-                            (joint.value("moving", false) ? ", moving" : ""));
-  facts.add("limits", limits_of(joint));
-  facts.add("velocity", with("velocity_rad_s", unit + "/s"));
-  facts.add("torque", with("torque_Nm", torque));
-  facts.add("motor position", with("motor_position_rad", unit) + " at the joint");
-  facts.add("motor velocity", with("motor_velocity_rad_s", unit + "/s") + " at the joint");
-  facts.add("stiffness", with("stiffness_Nm_rad", torque + "/" + unit));
-  facts.add("damping", with("damping_Nms_rad", torque + "s/" + unit));
-  facts.add("drive", drive_of(joint));
-  facts.add("fault", fault.empty() ? "none" : fault);
-  facts.add("current", with("current_A", "A"));
-  facts.add("voltage", with("voltage_V", "V"));
-  facts.add("winding", with("temperature_C", "degC"));
-  facts.add("sample", age_cycles == 0 ? "fresh" : fmt::format("{} cycles old", age_cycles));
-  facts.print(stdout);
-}
-
 /// Whether the target was written in degrees: it is shown in them, too.
-bool in_degrees(const JointOptions& options) { return options.to.ends_with("deg"); }
+bool in_degrees(const JointOptions& options) { return options.to.find("deg") != std::string::npos; }
 
 void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
   using Action = JointOptions::Action;
@@ -276,14 +144,14 @@ void print_answer(const JointOptions& options, const Json& answer, const Json& q
       break;
     case Action::kRecover:
       fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", options.joint,
-                 number(answer, "position_rad"), unit_of(answer), options.joint);
+                 number_of(answer, "position_rad"), unit_of(answer), options.joint);
       break;
     case Action::kSet: {
       Facts facts;
       facts.add("mode", mode_of(answer));
       const std::string torque = torque_unit_of(answer), unit = unit_of(answer);
-      facts.add("stiffness", number(answer, "stiffness_Nm_rad") + " " + torque + "/" + unit);
-      facts.add("damping", number(answer, "damping_Nms_rad") + " " + torque + "s/" + unit);
+      facts.add("stiffness", number_of(answer, "stiffness_Nm_rad") + " " + torque + "/" + unit);
+      facts.add("damping", number_of(answer, "damping_Nms_rad") + " " + torque + "s/" + unit);
       facts.print(stdout);
     }
   }

@@ -26,7 +26,7 @@ const char kExamples[] = R"(Examples:
   tandem latency --load idle --duration 10           wake-up latency of this machine
 `tandem COMMAND --help` shows more, with examples.
 
-Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage.)";
+Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage, or no run to ask.)";
 
 /// The innermost subcommand that was named.
 const CLI::App& innermost(const CLI::App& app) {
@@ -81,13 +81,14 @@ Exit report_usage_error(const CLI::App& app, const CLI::ParseError& error) {
                                                      : unknown_word(command, unknown.front()));
 }
 
-/// `tandem help joint move` is `tandem joint move --help`.
-/// @return the status, when one of the words is no command
-std::optional<Exit> check_help(const CLI::App& app, const std::vector<std::string>& words) {
+/// Of `tandem help joint move`, which is `tandem joint move --help`, and of this itself.
+/// @return the status, when one of the words should be a command, and is none
+std::optional<Exit> check_commands(const CLI::App& app, const std::vector<std::string>& words) {
   const CLI::App* command = &app;
   for (const std::string& word : words) {
     const std::vector<const CLI::App*> known = all_subcommands(*command);
-    if (word.starts_with('-') || known.empty()) break;
+    if (known.empty()) break;
+    if (word.starts_with('-')) continue;
     const auto next =
         std::ranges::find_if(known, [&](const CLI::App* sub) { return sub->get_name() == word; });
     if (next == known.end()) return report_usage_error(*command, unknown_word(*command, word));
@@ -161,14 +162,13 @@ Command parse_command_line(int argc, const char* const* argv) {
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());
-    if (const auto unknown = check_help(app, words)) return *unknown;
     words.emplace_back("--help");
   }
-  std::ranges::reverse(words);  // as CLI11 wants them
   try {
-    app.parse(std::move(words));
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
+    if (const auto unknown = check_commands(app, words)) return *unknown;
     app.exit(error);  // prints help or version
     return Exit::kDone;
   }

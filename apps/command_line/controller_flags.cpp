@@ -72,7 +72,8 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   load->add_option("--name", o.name, "Name of the controller (default: the plugin's)");
   load->add_option("--parameters", o.parameters, "TOML file of its [controller.parameters]")
       ->check(CLI::ExistingFile);
-  load->add_option("--set", o.set, "One parameter, 'key = value'; may be repeated")
+  load->add_option("--set", o.set,
+                   "One parameter, 'key = value', beside the file's; may be repeated")
       ->allow_extra_args(false);
   load->add_flag("--start", o.start_it, "Start it as well");
   add("unload", "Free an inactive controller", Action::kUnload)
@@ -119,7 +120,8 @@ void add_flags(CLI::App& app, JointOptions& o) {
       ->check(is_finite());
   CLI::App* move = add("move", "Lead a free joint to a place, at a steady speed", Action::kMove);
   move->add_option("joint", o.joint, "Its name")->required();
-  move->add_option("--to", o.to, "30deg, 0.5rad or 0.5; of a slide 20mm, 0.02m or 0.02")
+  move->add_option("--to", o.to,
+                   "30deg, '30 deg', 0.5rad or 0.5; of a slide 20mm, 2cm, 0.02m or 0.02")
       ->required();
   move->add_option("--speed", o.speed, "20deg/s, 0.3 (default: a quarter of the joint's limit)");
   move->add_option("--acceleration", o.acceleration,

@@ -37,7 +37,8 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
 void print_faults(const Json& faults, std::FILE* out) {
   if (faults.empty()) return;
   // Within 100 columns: the category is that of the reaction, and in the JSON.
-  Table table({"fault at", "joint", "board", "cause", "reaction", "state"});
+  // What was struck may also be a sensor or a controller.
+  Table table({"fault at", "where", "board", "cause", "reaction", "state"});
   table.align_left();
   for (const Json& fault : faults) {
     const bool latched = fault.value("latched", true);

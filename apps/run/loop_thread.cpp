@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
+#include <limits>
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/control/clock_commands.hpp"
@@ -63,6 +65,26 @@ class FaultNotes {
   std::size_t told_ = 0;
 };
 
+/// Seconds that no cycle of simulated time lasts, at whatever rate: time was paused meanwhile, or
+/// the process suspended. Real time goes on.
+double longest_cycle_s(runtime::RobotCycle& cycle) {
+  const rt::ClockState clock = cycle.inbox().clock().state();
+  if (clock.pacing != rt::Pacing::kSimulated) return std::numeric_limits<double>::infinity();
+  return std::max(0.5, 2e-9 * static_cast<double>(clock.period_ns) / rt::kSlowest);
+}
+
+/// Adds the `seconds` of a cycle that began in `phase`.
+void count_time(LoopTimes& times, runtime::RunPhase phase, double seconds, double longest_s) {
+  using enum runtime::RunPhase;
+  if (seconds > longest_s) {
+    times.stood_s += seconds;
+  } else if (phase == kRunning) {
+    times.running_s += seconds;
+  } else if (phase == kRetreating || phase == kFaulted || phase == kResetting || phase == kHeld) {
+    times.stopped_s += seconds;
+  }
+}
+
 void warn_of_log(const log::Recorder& recorder) {
   fmt::print(stderr,
              "warning: {}: nothing is logged any more: {}; the run continues without a log (end it "
@@ -76,19 +98,15 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
   is_loop = true;
   usual_end = std::set_terminate(stand_still);
   report_ = rt::set_up_thread(config);
+  const double longest_s = longest_cycle_s(cycle);
   SteadyClock::time_point began = SteadyClock::now();
-  auto before = runtime::RunPhase::kBringUp;
   bool more = true;
   while (more) {
+    const runtime::RunPhase phase = cycle.phase();
     more = cycle.step();
-    const runtime::RunPhase now = cycle.phase();
-    if (now == before) continue;
-    const SteadyClock::time_point time = SteadyClock::now();
-    if (now == runtime::RunPhase::kRunning) began = time;
-    if (before == runtime::RunPhase::kRunning) {
-      wall_s_ += std::chrono::duration<double>(time - began).count();
-    }
-    before = now;
+    const SteadyClock::time_point now = SteadyClock::now();
+    count_time(times_, phase, std::chrono::duration<double>(now - began).count(), longest_s);
+    began = now;
   }
   done_.store(true, std::memory_order_release);
 }

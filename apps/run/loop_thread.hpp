@@ -13,6 +13,13 @@
 
 namespace tandem::apps {
 
+/// Where the time of a run went, by the wall clock.
+struct LoopTimes {
+  double running_s = 0.0;  ///< controllers ran
+  double stopped_s = 0.0;  ///< in fault, on the way to a safe posture, in a reset, or held after it
+  double stood_s = 0.0;    ///< simulated time was paused, or the process suspended
+};
+
 class LoopThread {
  public:
   LoopThread(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
@@ -20,13 +27,13 @@ class LoopThread {
   [[nodiscard]] bool done() const { return done_.load(std::memory_order_acquire); }
   void join() { thread_.join(); }
   // For when it has joined.
-  [[nodiscard]] double wall_s() const { return wall_s_; }
+  [[nodiscard]] const LoopTimes& times() const { return times_; }
   [[nodiscard]] const rt::ThreadReport& report() const { return report_; }
 
  private:
   void run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config);
 
-  double wall_s_ = 0.0;
+  LoopTimes times_;
   rt::ThreadReport report_;
   std::atomic<bool> done_{false};
   std::thread thread_;  // last: it uses the others

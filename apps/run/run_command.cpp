@@ -169,9 +169,9 @@ class Session {
     make_cycle();
     announce();
     if (const Status opened = open_inputs(); !opened) return refuse(opened.error());
-    const auto wall_s = loop();
-    if (!wall_s) return refuse(wall_s.error());
-    return finish(*wall_s);
+    const auto times = loop();
+    if (!times) return refuse(times.error());
+    return finish(*times);
   }
 
  private:
@@ -217,6 +217,7 @@ class Session {
                counted(e.robot.joints.size(), "joint"), length_text(e),
                1e6 / static_cast<double>(e.loop.period_ns), options_.serves ? served_text(e) : "",
                pace_text(c_));
+    if (recorder_ != nullptr) fmt::print(out_, "log: {}\n", recorder_->path());
   }
 
   /// What may be asked of the run, and the ways in: the control socket and the services over DDS.
@@ -248,8 +249,8 @@ class Session {
     return {};
   }
 
-  /// The run itself, from the first cycle to the last. Answers the seconds that it took.
-  Result<double> loop() {
+  /// The run itself, from the first cycle to the last. Answers the time that it took.
+  Result<LoopTimes> loop() {
     const runtime::Experiment& e = experiment();
     rt::install_stop_signals();
     rt::install_emergency_signal();
@@ -267,7 +268,7 @@ class Session {
     if (!thread.report().complete()) {
       fmt::print(stderr, "note: {}\n", thread.report().to_string());
     }
-    return thread.wall_s();
+    return thread.times();
   }
 
   /// The loop was given up. Its thread is still there, and may go on at any time: what it uses
@@ -286,8 +287,8 @@ class Session {
   }
 
   /// Closes what the loop wrote to, and prints what the run amounts to.
-  Exit finish(double wall_s) {
-    RunSummary summary{c_, *cycle_, wall_s, std::nullopt, std::nullopt, {}, {}};
+  Exit finish(const LoopTimes& times) {
+    RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}};
     summary.server = server_.get();
     if (dds_ != nullptr) summary.dds = dds_->finish();
     if (services_ != nullptr) summary.dds->services = services_->counts();

@@ -133,7 +133,7 @@ void add_limited(const RunSummary& s, Facts& facts) {
                             .joints[static_cast<std::size_t>(most - limited.begin())]
                             .name,
                         *most, counted(s.cycle.running_cycles(), "cycle"),
-                        joints > 1 ? fmt::format(", {} more joints", joints - 1) : ""));
+                        joints > 1 ? ", " + counted(joints - 1, "more joint") : ""));
 }
 
 /// What the robot did: on the ground, and its floating base.
@@ -153,19 +153,28 @@ void add_motion_facts(const RunSummary& summary, Facts& facts) {
   }
 }
 
+/// The time that is not in the line above: nothing has run then.
+void add_stopped(const LoopTimes& times, Facts& facts) {
+  std::string text;
+  if (times.stopped_s > 0.0) text = fmt::format("{:.2f} s in fault or held", times.stopped_s);
+  if (times.stood_s > 0.0) {
+    text += fmt::format("{}{:.2f} s paused or suspended", text.empty() ? "" : ", ", times.stood_s);
+  }
+  if (!text.empty()) facts.add("not running", text);
+}
+
 /// How long cycles took, and whether they were in time.
 void add_timing_facts(const RunSummary& summary, Facts& facts) {
   const rt::LoopStatistics& loop = summary.cycle.loop();
   const bool wall_clock = summary.composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
-    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", summary.wall_s,
+    facts.add("ran", fmt::format("{:.3f} s, {}, {} skipped", summary.times.running_s,
                                  counted(summary.cycle.running_cycles(), "cycle"), loop.skipped));
   } else {
-    facts.add(
-        "simulated",
-        fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", summary.sim_s(), summary.wall_s,
-                    summary.wall_s > 0.0 ? summary.sim_s() / summary.wall_s : 0.0));
+    facts.add("simulated", fmt::format("{:.3f} s in {:.2f} s: {:.1f} x real time", summary.sim_s(),
+                                       summary.times.running_s, summary.realtime_factor()));
   }
+  add_stopped(summary.times, facts);
   facts.add("cycle p50/p99/p99.9/max", microseconds(summary.cycle.loop().work.percentiles()));
   if (summary.composition.backend->waits_for_bus()) {
     facts.add("bus p50/p99/p99.9/max", microseconds(summary.cycle.loop().bus.percentiles()));
@@ -208,6 +217,10 @@ double RunSummary::sim_s() const {
   return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
 }
 
+double RunSummary::realtime_factor() const {
+  return times.running_s > 0.0 ? sim_s() / times.running_s : 0.0;
+}
+
 Json RunSummary::json() const {
   const runtime::Experiment& e = composition.experiment;
   const rt::LoopStatistics& loop = cycle.loop();
@@ -218,8 +231,10 @@ Json RunSummary::json() const {
   json["cycles"] = cycle.running_cycles();
   json["period_ns"] = e.loop.period_ns;
   json["sim_seconds"] = sim_s();
-  json["wall_seconds"] = wall_s;
-  json["realtime_factor"] = wall_s > 0.0 ? Json(sim_s() / wall_s) : Json(nullptr);
+  json["wall_seconds"] = times.running_s;
+  json["stopped_seconds"] = times.stopped_s;
+  json["stood_seconds"] = times.stood_s;
+  json["realtime_factor"] = times.running_s > 0.0 ? Json(realtime_factor()) : Json(nullptr);
   json["overruns"] = loop.overruns;
   json["skipped"] = loop.skipped;
   json["wakeup_ns"] = percentiles_json(loop.wakeup.percentiles());

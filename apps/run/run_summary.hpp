@@ -9,6 +9,7 @@
 
 #include "apps/run/composition.hpp"
 #include "apps/run/dds_run.hpp"
+#include "apps/run/loop_thread.hpp"
 #include "apps/text/console.hpp"
 #include "hal/remote/server.hpp"
 #include "log/recorder.hpp"
@@ -19,7 +20,7 @@ namespace tandem::apps {
 struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;
-  double wall_s = 0.0;                                  ///< while controllers ran
+  LoopTimes times;
   std::optional<log::RecordingResult> log;              ///< empty: nothing was logged
   std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
   std::vector<std::string> faults;                      ///< the log's trouble included
@@ -27,6 +28,8 @@ struct RunSummary {
   const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
 
   [[nodiscard]] double sim_s() const;
+  /// Simulated by wall clock, while controllers ran; 0: they did not.
+  [[nodiscard]] double realtime_factor() const;
   /// docs/json.md
   [[nodiscard]] Json json() const;
   void print(std::FILE* out) const;

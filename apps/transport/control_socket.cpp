@@ -310,6 +310,10 @@ Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
     return fail("`tandem estop` would not reach this robot: " + socket.error().message,
                 socket.error().hint);
   }
+  if (!path.empty()) {
+    return fail("cannot make the socket that --socket names: " + socket.error().message,
+                socket.error().hint);
+  }
   fmt::print(stderr, "note: no control socket: {}\n", socket.error().to_string());
   return nullptr;
 }

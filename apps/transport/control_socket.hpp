@@ -97,8 +97,8 @@ struct ControlSocketOptions {
 };
 
 /// Serves `registry`; null when no socket is wanted, or when it cannot be opened and is not needed,
-/// which is said on standard error. Errors: a socket that is needed and cannot be opened; a path
-/// that was named in a folder that others may change.
+/// which is said on standard error. Errors: a socket that is needed, or whose path was named, and
+/// that cannot be opened; a path that was named in a folder that others may change.
 [[nodiscard]] Result<std::unique_ptr<ControlSocket>> serve(const ControlRegistry& registry,
                                                            const ControlSocketOptions& options);
 

@@ -51,6 +51,18 @@ TEST_F(Clock, ChangesTheRateAndPausesWhileTheRunGoesOn) {
   EXPECT_EQ(end(), 0);
 }
 
+// The pause counted as time in which the run was slow.
+TEST_F(Clock, APauseIsNoTimeOfTheRun) {
+  begin("");
+  (void)clock("pause");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  (void)clock("resume");
+  EXPECT_EQ(end(), 0);
+  const auto result = nlohmann::json::parse(read_text(folder_ / "run.json"), nullptr, false);
+  EXPECT_GE(result["stood_seconds"], 1.4);
+  EXPECT_EQ(result["stopped_seconds"], 0.0);
+}
+
 TEST_F(Clock, KeepsAnEmergencyStopForTheNextCycle) {
   begin("--on-fault wait");
   (void)clock("pause");

@@ -61,6 +61,20 @@ TEST_F(CommandLine, AnUnknownCommandSuggestsTheNearest) {
       << outcome.err;
 }
 
+// The help of all of `tandem` was the answer, with status 0.
+TEST_F(CommandLine, HelpOfAnUnknownCommandIsRefused) {
+  const Outcome outcome = tandem("nonsense --help");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_NE(outcome.err.find("unknown command 'nonsense'"), std::string::npos) << outcome.err;
+  EXPECT_NE(tandem("joint mvoe --help").err.find("did you mean 'move'?"), std::string::npos);
+  EXPECT_EQ(tandem("joint mvoe -h").status, 2);
+  for (const char* command : {"run --help hold.toml", "run hold.toml --help", "joint --help move",
+                              "--help joint", "joint move --help", "run --seed --help"}) {
+    EXPECT_EQ(tandem(command).err.find("unknown"), std::string::npos) << command;
+  }
+}
+
 TEST_F(CommandLine, AnUnknownSubcommandSuggestsTheNearest) {
   const Outcome outcome = tandem("log csb some.mcap");
   EXPECT_EQ(outcome.status, 2);

@@ -429,13 +429,18 @@ TEST_F(Socket, RefusesPathsThatCannotBe) {
 }
 
 TEST_F(Socket, IsAConditionWhereARobotMoves) {
-  const std::string nowhere = folder + "/none/s.sock";
-  const auto simulated = serve(registry, {.path = nowhere, .kind = "run"});
+  std::filesystem::create_directory(control_folder());
+  ASSERT_EQ(::chmod(control_folder().c_str(), 0755), 0);
+  const auto simulated = serve(registry, {.path = {}, .kind = "run"});
   ASSERT_TRUE(simulated.has_value());
   EXPECT_EQ(*simulated, nullptr);
-  const auto robot = serve(registry, {.path = nowhere, .kind = "run", .needed = true});
+  const auto robot = serve(registry, {.path = {}, .kind = "run", .needed = true});
   ASSERT_FALSE(robot.has_value());
-  EXPECT_EQ(robot.error().message.find("`tandem estop` would not reach this robot: cannot listen"),
+  EXPECT_EQ(robot.error().message.find("`tandem estop` would not reach this robot: "), 0U);
+  const std::string nowhere = folder + "/none/s.sock";
+  const auto named = serve(registry, {.path = nowhere, .kind = "run", .needed = true});
+  ASSERT_FALSE(named.has_value());
+  EXPECT_EQ(named.error().message.find("`tandem estop` would not reach this robot: cannot listen"),
             0U);
 }
 
@@ -553,6 +558,20 @@ TEST_F(Socket, LiesInNoFolderThatOthersMayChange) {
   ASSERT_EQ(::chmod(open_folder.c_str(), 01777), 0);  // as /tmp
   EXPECT_TRUE(ask(where, {{"do", "help"}}).has_value());
   EXPECT_NE(open(open_folder + "/t.sock"), nullptr);
+}
+
+// It was a note, and `tandem estop --socket` of the same path reached nobody.
+TEST_F(Socket, ThatIsNamedAndCannotBeMadeIsAnError) {
+  const std::string long_name = folder + "/" + std::string(120, 'x') + ".sock";
+  for (const std::string& named : {long_name, folder}) {
+    const auto socket = serve(registry, {.path = named, .kind = "run"});
+    ASSERT_FALSE(socket.has_value()) << named;
+    EXPECT_NE(socket.error().to_string().find("--socket"), std::string::npos)
+        << socket.error().to_string();
+  }
+  const auto none = serve(registry, {.path = long_name, .kind = "run", .wanted = false});
+  ASSERT_TRUE(none.has_value());
+  EXPECT_EQ(*none, nullptr);
 }
 
 TEST_F(Socket, LiesInNoFolderOfAnotherUserOrGroup) {

@@ -68,6 +68,26 @@ TEST_F(Controllers, ThatAreBrokenAreRefusedWhileTheRunGoesOn) {
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
 }
 
+// --set went into the file's last table.
+TEST_F(Controllers, TakeParametersOfAFileWithTablesAndOfTheCommandLine) {
+  begin("");
+  const std::string tables =
+      "[[waypoint]]\ntime_s = 1.0\nposition_rad = [0.1, 0.2]\n"
+      "[[waypoint]]\ntime_s = 2.0\nposition_rad = [0.2, 0.1]\n";
+  write_text(folder_ / "par.toml", "# of a test\ninterpolation = \"quintic\"\n" + tables);
+  write_text(folder_ / "tables.toml", tables);
+  const std::string load = "controller load joint_trajectory --set 'stop_at_end = true' ";
+  const Outcome both = to_run(load + "--parameters par.toml");
+  EXPECT_EQ(both.status, 0) << both.err;
+  EXPECT_EQ(to_run(load + "--name two --parameters tables.toml").status, 0);
+  write_text(folder_ / "wrong.toml", "\n\ninterpolatoin = \"quintic\"\n" + tables);
+  expect(refused(load + "--name x --parameters wrong.toml"), " wrong.toml:3: ");
+  expect(refused("controller load joint_trajectory --name x --parameters par.toml "
+                 "--set 'stop_at_edn = true'"),
+         "stop_at_edn");
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Controllers, TakeTheirParametersAsAnObjectToo) {
   begin("");
   const Outcome outcome = to_run(
@@ -160,7 +180,7 @@ TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
   EXPECT_EQ(slow["arrived"], true);
   EXPECT_EQ(slow["moving"], false);
   const std::string away = "joint move joint1 --to -300deg --speed 1deg/s --wait --socket ";
-  const Outcome interrupted = tandem(away + socket_, "timeout -s INT 0.5");
+  const Outcome interrupted = tandem(away + socket_, "timeout --foreground -s INT 0.5");
   EXPECT_EQ(interrupted.status, 124);
   expect(interrupted.err,
          "joint1 still moves to -5.236 rad (-300 deg): `tandem joint stop joint1`");

@@ -143,6 +143,20 @@ TEST_F(Faults, BySignalAreOfTheRobotsCategory) {
   EXPECT_EQ(end(), 1) << "it is still latched";
 }
 
+/// The time in fault was in no line of the table at the end.
+TEST_F(Faults, StopARunForATimeThatItsTableTells) {
+  begin("--on-fault wait --quiet=false >table.txt");
+  EXPECT_EQ(to_run("estop").status, 0);
+  until(R"("phase": "faulted")");
+  EXPECT_EQ(to_run("fault reset").status, 0);
+  EXPECT_EQ(to_run("controller start").status, 0);
+  EXPECT_EQ(end(), 0);
+  const std::string table = read_text(folder_ / "table.txt");
+  EXPECT_NE(table.find("  not running  "), std::string::npos) << table;
+  EXPECT_NE(table.find(" s in fault or held"), std::string::npos) << table;
+  EXPECT_GT(json("run.json")["stopped_seconds"], 0.0);
+}
+
 TEST_F(Faults, EndASimulatedRunThatWasNotToldToWait) {
   begin("");
   EXPECT_EQ(to_run("estop").status, 0);

@@ -22,11 +22,16 @@ namespace {
 
 using runtime::RunPhase;
 
+hal::RobotConfig with_a_slide() {
+  hal::RobotConfig robot = hal::test::fake_robot();
+  robot.joints[1].slides = true;
+  return robot;
+}
+
 /// A run without controllers whose cycles are made while somebody waits for an answer. Its elbow
 /// slides.
 template <class Backend>
 struct Answered : ::testing::Test {
-  Answered() { robot.joints[1].slides = true; }
   void begin() {
     cycle = std::make_unique<runtime::RobotCycle>(
         runtime::CycleParts{robot, backend, host, clock},
@@ -73,7 +78,7 @@ struct Answered : ::testing::Test {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   }
 
-  hal::RobotConfig robot = hal::test::fake_robot();
+  hal::RobotConfig robot = with_a_slide();
   Backend backend{robot};
   runtime::ControllerHost host{robot, nullptr, 1'000'000};
   rt::WallClock clock;
@@ -239,6 +244,97 @@ TEST_F(JointAnswers, ShowEachJointInItsUnits) {
   EXPECT_EQ(command(joint_command, set), Exit::kDone) << err;
   has(out, " N/m\n");
   has(out, " Ns/m");
+}
+
+/// They were the old ones, as the command goes over to them within 0.1 s.
+TEST_F(JointAnswers, OfASetAreTheValuesThatWereAskedFor) {
+  begin();
+  const std::string set = R"({"do": "joint.set", "joint": "wrist", "stiffness_Nm_rad": 33,)"
+                          R"( "damping_Nms_rad": 1.5)";
+  const Json now = answer(set + R"(, "mode": "position", "interaction": "compliant"})");
+  EXPECT_EQ(now["stiffness_Nm_rad"], 33.0) << now;
+  EXPECT_EQ(now["damping_Nms_rad"], 1.5);
+  EXPECT_EQ(now["mode"], "position");
+  EXPECT_EQ(now["interaction"], "compliant");
+  EXPECT_EQ(now["moving"], false) << "nobody asked for a motion";
+  EXPECT_FALSE(now.contains("note"));
+  EXPECT_EQ(joint(2)["stiffness_Nm_rad"], 33.0);
+}
+
+/// The impedance of a joint that is held stays: the answer says when the other one comes.
+TEST_F(JointAnswers, OfASetWhileJointsAreHeldSayWhenItIsInForce) {
+  ASSERT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
+                       runtime::test::parameters()));
+  begin();
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  steps(2);
+  cycle->inbox().reset_faults();
+  steps(60);
+  ASSERT_EQ(cycle->phase(), RunPhase::kHeld);
+  const Json later = answer(R"({"do": "joint.set", "joint": "wrist", "stiffness_Nm_rad": 33})");
+  EXPECT_EQ(later["done"], true) << later;
+  EXPECT_EQ(later.value("note", ""),
+            "the joint is held as it is: its new impedance is in force once controllers run");
+}
+
+/// The last good figures of an encoder that gives no value looked fresh.
+TEST_F(JointAnswers, SayThatTheFiguresOfAFaultySensorAreNotLive) {
+  for (hal::JointConfig& joint : robot.joints) joint.on_fault = hal::StopCategory::kWarn;
+  begin();
+  JointOptions options{.action = JointOptions::Action::kShow};
+  options.joint = "elbow";
+  const auto shown = [&] {
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << err;
+    return out;
+  };
+  EXPECT_EQ(joint(1)["feedback"], "fresh");
+  has(shown(), "sample          fresh");
+  backend.fault_code = 0x7300;
+  backend.faulted_joint = 1;
+  steps(2);
+  EXPECT_EQ(joint(1)["feedback"], "sensor_fault");
+  EXPECT_EQ(joint(0)["feedback"], "fresh");
+  has(shown(), "sample          a sensor is in fault: what it measures is not valid");
+  options.action = JointOptions::Action::kList;
+  has(shown(), "fault (0x7300), sensor");
+  options.action = JointOptions::Action::kShow;
+  backend.fault_code = 0x8611;  // it says nothing of the sensors
+  steps(2);
+  has(shown(), "sample          fresh");
+  backend.faulted_joint = -1;
+  backend.lost_joint = 1;
+  steps(3);  // and no more, as while an answer is awaited
+  EXPECT_EQ(registry.answer(R"({"do": "joint.list"})")["joints"][1]["feedback"], "old");
+  steps(20);
+  EXPECT_EQ(joint(1)["feedback"], "lost");
+  has(shown(), " cycles old: no feedback");
+}
+
+TEST_F(JointAnswers, TakeQuantitiesWithABlankAndInCentimetres) {
+  begin();
+  JointOptions options{.action = JointOptions::Action::kMove};
+  options.joint = "wrist";
+  for (const char* text : {"30 deg", "30deg", " 30  deg ", "0.5235987755982988 rad"}) {
+    options.to = text;
+    options.speed = "20 deg/s";
+    options.acceleration = "40 deg/s2";
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+    has(out, "0.5236 rad");
+  }
+  options.joint = "elbow";  // it slides
+  for (const char* text : {"5cm", "5 cm", "50 mm", "50mm", "0.05 m", "0.05"}) {
+    options.to = text;
+    options.speed = "10 cm/s";
+    options.acceleration.clear();
+    EXPECT_EQ(command(joint_command, options), Exit::kDone) << text << ": " << err;
+    has(out, " to 0.05 m");
+  }
+  for (const char* text : {"5 c m", "5 km", "cm", " ", "5 5", "5 deg rad"}) {
+    options.to = text;
+    EXPECT_EQ(command(joint_command, options), Exit::kUsage) << text;
+    has(err, "is no number with a unit");
+    has(err, "2cm");
+  }
 }
 
 TEST_F(JointAnswers, TellAWaiterThatTheRunHasEnded) {

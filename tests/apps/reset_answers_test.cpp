@@ -51,6 +51,11 @@ struct AnsweredRun : ::testing::Test {
                  steps(1);
                  return registry.answer(R"({"do": "fault.show"})");
                });
+    return reset_of(served);
+  }
+
+  /// `tandem fault reset` of what answers so.
+  Exit reset_of(const ControlRegistry& served) {
     const std::string path = "/tmp/tandem-test-" + std::to_string(::getpid()) + "-reset.sock";
     const auto socket = ControlSocket::open(path, served);
     EXPECT_TRUE(socket) << socket.error().to_string();
@@ -127,6 +132,21 @@ TEST_F(AnsweredRun, EndsAResetThatAFaultFollowsAtOnceWithStatus1) {
   EXPECT_NE(err.find("error: the reset succeeded, and a fault followed at once (elbow: "),
             std::string::npos)
       << err;
+}
+
+/// A stop or a reset that did not succeed has status 1: only what was not asked at all has 2.
+TEST_F(AnsweredRun, EndsAResetThatIsNotAnsweredToTheEndWithStatus1) {
+  (void)cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  steps(1);
+  ControlRegistry served;
+  served.add(
+      "fault.reset", ControlEffect::kChanges, "as the run's", {},
+      [this](const Json&) -> Result<Json> { return registry.answer(R"({"do": "fault.reset"})"); });
+  served.add("fault.show", ControlEffect::kReads, "ended meanwhile", {},
+             [](const Json&) -> Result<Json> { return fail("the run has ended"); });
+  EXPECT_EQ(reset_of(served), Exit::kFault) << err;
+  EXPECT_NE(err.find("error: the run has ended"), std::string::npos) << err;
+  EXPECT_EQ(reset_of({}), Exit::kUsage) << "there is no such command";
 }
 
 // It said that every joint was enabled, and that a new fault had followed at once.

@@ -142,7 +142,21 @@ TEST_F(Run, TablesStandApartAndFaultsBeginAtTheLeft) {
   const Outcome outcome = tandem("run hold.toml --duration 1 --scenario faults.toml");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_NE(outcome.out.find("\n\n  fault at "), std::string::npos) << outcome.out;
-  EXPECT_NE(outcome.out.find(" joint   board    cause"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" where   board    cause"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Run, CountsTheJointsWhoseCommandsWereLimited) {
+  edit("robot.toml", "max_torque_Nm = 2.0", "max_torque_Nm = 2.0\nmax_acceleration_rad_s2 = 1.0");
+  const Outcome outcome = tandem("run trajectory.toml --no-log --no-socket");
+  EXPECT_NE(outcome.out.find(" cycles, 1 more joint\n"), std::string::npos) << outcome.out;
+}
+
+/// Nobody had seen before its end where a run writes.
+TEST_F(Run, NamesItsLogInItsFirstLines) {
+  const Outcome outcome = tandem("run hold.toml --duration 0.2");
+  const std::size_t log = outcome.out.find("log: runs/double_pendulum-hold-001.mcap\n");
+  EXPECT_NE(log, std::string::npos) << outcome.out;
+  EXPECT_LT(log, outcome.out.find("100 %")) << outcome.out;
 }
 
 TEST_F(Run, OfAScenarioWithAMistakeDoesNotBegin) {

@@ -25,6 +25,15 @@ TEST(Event, SaysWhatHappenedInOneLine) {
            .joint = 1,
            .kind = EventKind::kInjected};
   EXPECT_EQ(describe(event, kJoints), "injected encoder_freeze of knee");
+  event = {.joint = 1, .kind = EventKind::kMotionRequested, .value = -0.5F};
+  EXPECT_EQ(describe(event, kJoints), "motion requested of knee: to -0.5 rad (-28.65 deg)");
+  event.code = 1;  // it slides
+  EXPECT_EQ(describe(event, kJoints), "motion requested of knee: to -0.5 m");
+  event = {.joint = 0, .kind = EventKind::kMotionStopped};
+  EXPECT_EQ(describe(event, kJoints), "motion stopped of hip");
+  event = {.joint = 0, .kind = EventKind::kRecoveryRequested};
+  EXPECT_EQ(describe(event, kJoints), "recovery requested of hip");
+  EXPECT_FALSE(is_fault(event.kind));
 }
 
 TEST(Event, IsEncodedAsPlainCdr) {

@@ -29,6 +29,7 @@ class FirstOrderRobot : public hal::Backend {
   Code answer = Code::kOk;  // of read()
   double sag_rad = 0.0;     // a joint at rest stands so far below its reference
   int faulted_joint = -1, lost_joint = -1, lost_sensor = -1;
+  std::uint32_t fault_code = 0x7310;                     // of a faulted joint
   bool latch_on_fault = false;                           // phase() turns kFault with a joint
   hal::TruthImage truth;                                 // its feet and base are the test's to set
   std::uint64_t idle_writes = 0;                         // commands with every joint idle
@@ -69,7 +70,7 @@ class FirstOrderRobot : public hal::Backend {
       state.position_rad()[j] = position_[j];
       state.velocity_rad_s()[j] = velocity_[j];
       state.mode()[j] = command_.mode()[j];
-      state.fault()[j] = faulted ? 0x7310 : 0;
+      state.fault()[j] = faulted ? fault_code : 0;
       state.drive_state()[j] =
           static_cast<std::uint8_t>(faulted     ? hal::DriveState::kFault
                                     : follows() ? hal::DriveState::kOperationEnabled

@@ -213,6 +213,44 @@ TEST_F(JointServices, LeadAStiffnessOverWhileItYields) {
   EXPECT_EQ(before, 50.0);
 }
 
+// For 0.1 s the answer of `tandem joint set` was the old stiffness, and the joint was "moving".
+TEST_F(JointServices, ShowWhatWasAskedForWhileTheCommandGoesOverToIt) {
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 20.0, .interaction = 1},
+                                   RunServices::Patience{0}));
+  steps(200);
+  ASSERT_TRUE(services().set_joint("wrist", {.stiffness_Nm_rad = 50.0, .damping_Nms_rad = 3.0},
+                                   RunServices::Patience{0}));
+  for (int i = 0; i < 120; ++i) {
+    steps(1);
+    EXPECT_EQ(look(2).stiffness_Nm_rad, 50.0) << i;
+    EXPECT_EQ(look(2).damping_Nms_rad, 3.0) << i;
+    EXPECT_EQ(look(2).moving, 0) << i;
+    if (i == 0) {
+      EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 20.0) << "without a step";
+    }
+  }
+  EXPECT_EQ(cycle->command().stiffness_Nm_rad()[2], 50.0);
+  ASSERT_TRUE(services().switch_controllers({"sine"}, {}, RunServices::Patience{0}));
+  steps(1);
+  EXPECT_EQ(look(0).moving, 0) << "nobody asked for a motion";
+}
+
+TEST(JointServicesOf, ADelayedRunShowWhatWasAskedForAtOnce) {
+  const hal::RobotConfig robot = hal::test::fake_robot();
+  test::FirstOrderRobot backend(robot);
+  ControllerHost host(robot, nullptr, 1'000'000);
+  rt::WallClock clock;
+  RobotCycle cycle({robot, backend, host, clock}, {.delay_cycles = 5});
+  for (int i = 0; i < 50; ++i) cycle.step();
+  ASSERT_EQ(cycle.phase(), RunPhase::kRunning);
+  ASSERT_TRUE(cycle.services().set_joint("elbow", {.stiffness_Nm_rad = 9.0, .interaction = 1},
+                                         RunServices::Patience{0}));
+  cycle.step();
+  const JointStatus look = cycle.services().joints()[1].look;
+  EXPECT_EQ(look.stiffness_Nm_rad, 9.0);
+  EXPECT_EQ(look.interaction, static_cast<std::uint8_t>(InteractionMode::kCompliant));
+}
+
 TEST_F(JointServices, RefuseTheModeOfAClaimedJointAndNameItsController) {
   const std::string refused = text(mode("shoulder", ControlMode::kTorque));
   EXPECT_NE(refused.find("shoulder: is claimed by the controller 'sine'"), std::string::npos)
@@ -263,8 +301,8 @@ TEST_F(JointServices, RefuseWhatAJointCannotDoAndNameTheLimit) {
     return text(
         services().set_joint("elbow", {.stiffness_Nm_rad = value}, RunServices::Patience{0}));
   };
-  EXPECT_NE(stiff(201.0).find("elbow: stiffness_Nm_rad 201 is beyond the joint's limit (give 0 "
-                              "to 200)"),
+  EXPECT_NE(stiff(201.0).find("elbow: the stiffness 201 Nm/rad is beyond the joint's limit (give 0 "
+                              "to 200 Nm/rad)"),
             std::string::npos)
       << stiff(201.0);
   EXPECT_NE(stiff(-1.0).find("beyond"), std::string::npos);
@@ -358,6 +396,11 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
   ASSERT_TRUE(cycle.services().set_joint("elbow", {.mode = 3}, RunServices::Patience{0}));
   ASSERT_TRUE(cycle.services().set_gains("wrist", PidLoop::kPosition, {.kp = 150.0},
                                          RunServices::Patience{0}));
+  const auto move = [&](const MoveRequest& wish) {
+    return cycle.services().move_joint("wrist", wish, RunServices::Patience{0});
+  };
+  ASSERT_TRUE(move({.target_rad = 0.5}));
+  ASSERT_TRUE(move({}));
   cycle.run();
   (void)(*recorder)->close();
   std::vector<std::string> texts;
@@ -367,8 +410,9 @@ TEST(JointServicesOf, ALoggedRunAreInItsLog) {
     if (event.event.cycle == 50) texts.push_back(event.text);
   }
   EXPECT_EQ(texts,
-            (std::vector<std::string>{"controllers switched", "mode or impedance set of elbow",
-                                      "gains set of wrist"}));
+            (std::vector<std::string>{
+                "controllers switched", "mode or impedance set of elbow", "gains set of wrist",
+                "motion requested of wrist: to 0.5 rad (28.65 deg)", "motion stopped of wrist"}));
 }
 
 // An operator's motions: tandem joint move.
@@ -426,12 +470,15 @@ TEST_F(JointMoves, AreRefusedBeyondTheLimitsAndOfJointsThatAreTaken) {
   const auto has = [](const std::string& text, const char* words) {
     EXPECT_NE(text.find(words), std::string::npos) << text;
   };
-  has(move("elbow", {.target_rad = 1.6}), "the target 1.6 rad is beyond the joint's limits");
+  has(move("elbow", {.target_rad = 1.6}),
+      "the target 1.6 rad (91.67 deg) is beyond the joint's limits (give -1.5 to 1.5 rad, which "
+      "is -85.94 to 85.94 deg)");
   has(move("elbow", {.target_rad = std::numeric_limits<double>::infinity()}), "is beyond");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}), "the speed 2.1 rad/s is not one");
-  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 rad/s is not one");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 2.1}),
+      "the speed 2.1 rad/s (120.3 deg/s) is");
+  has(move("elbow", {.target_rad = 0.0, .speed_rad_s = 0.0}), "the speed 0 rad/s (0 deg/s) is");
   has(move("elbow", {.target_rad = 0.0, .acceleration_rad_s2 = -1.0}),
-      "the acceleration -1 rad/s^2 is");
+      "the acceleration -1 rad/s2 (-57.3 deg/s2) is");
   has(move("elbwo", {.target_rad = 0.0}), "did you mean 'elbow'?");
   has(answered("shoulder", {.target_rad = 0.0}), "is claimed by the controller 'sine'");
   ASSERT_TRUE(mode("elbow", ControlMode::kVelocity));
