@@ -230,11 +230,16 @@ Json latency_json(const LatencyPlan& plan, std::span<const LatencySample> sample
   return json;
 }
 
+std::vector<report::Figure> latency_figures(std::span<const LatencySample> samples) {
+  std::vector<report::Figure> figures;
+  for (const LatencySample& sample : samples) add_figures(sample, figures);
+  return figures;
+}
+
 Result<report::ReportFiles> draw_latency(const LatencyPlan& plan,
                                          std::span<const LatencySample> samples,
                                          const std::string& folder) {
-  std::vector<report::Figure> figures;
-  for (const LatencySample& sample : samples) add_figures(sample, figures);
+  const std::vector<report::Figure> figures = latency_figures(samples);
   if (const Status s = report::draw(figures, folder); !s) return std::unexpected(s.error());
   if (const Status s = report::write_page(page_of(plan, samples), figures, folder); !s) {
     return std::unexpected(s.error());

@@ -10,6 +10,7 @@
 #include "apps/machine/latency_measure.hpp"
 #include "apps/text/console.hpp"
 #include "base/result.hpp"
+#include "report/figure.hpp"
 #include "report/report.hpp"
 
 namespace tandem::apps {
@@ -25,8 +26,10 @@ void print_latency(const LatencyPlan& plan, std::span<const LatencySample> sampl
 /// docs/json.md
 [[nodiscard]] Json latency_json(const LatencyPlan& plan, std::span<const LatencySample> samples);
 
-/// Draws `folder`/report.html and PNG files: per load a histogram, and the share of wake-ups that
-/// come later than a time. Errors: as report::draw() and write_page().
+/// Per load a histogram, and the share of wake-ups that come later than a time.
+[[nodiscard]] std::vector<report::Figure> latency_figures(std::span<const LatencySample> samples);
+
+/// Draws them as `folder`/report.html and PNG files. Errors: as report::draw() and write_page().
 [[nodiscard]] Result<report::ReportFiles> draw_latency(const LatencyPlan& plan,
                                                        std::span<const LatencySample> samples,
                                                        const std::string& folder);

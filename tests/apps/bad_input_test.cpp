@@ -316,6 +316,10 @@ TEST_F(BadInput, AJointTooWeakForItsStartPostureIsWarnedOf) {
               std::string::npos)
         << outcome.err;
   }
+  edit("robot.toml", "base = \"fixed\"", "base = \"floating\"");
+  const Outcome falls = tandem("check robot.toml");
+  EXPECT_NE(falls.err.find("falls for ever"), std::string::npos) << falls.err;
+  EXPECT_EQ(falls.err.find("gravity asks"), std::string::npos) << "one reason is enough";
 }
 
 TEST_F(BadInput, APluginWithoutItsEntryPointIsRefused) {

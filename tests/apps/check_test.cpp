@@ -160,6 +160,15 @@ TEST_F(CheckLoops, RefusesAnAxisThatDiffersAndSaysByHowMuch) {
       "it, or turn a site by rpy_rad)");
 }
 
+TEST_F(CheckLoops, AreCheckedByEmulateToo) {
+  edit("robot.toml", "rocker\"\nxyz_m", "rocker\"\nrpy_rad = [0.5, 0, 0]\nxyz_m");
+  const Outcome outcome = tandem("emulate robot.toml --no-build");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("loop.pin: the loop does not close in the posture 'ready'"),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(CheckLoops, RefusesAGapThatNoPositionCloses) {
   edit("robot.toml", "[0.28, 0.0, 0.0]", "[2.28, 0.0, 0.0]");
   const Outcome outcome = tandem("check robot.toml --json -");

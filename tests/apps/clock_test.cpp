@@ -1,4 +1,6 @@
 // `tandem clock` against a running `tandem run`.
+#include <chrono>
+
 #include "tests/apps/running.hpp"
 
 namespace tandem::apps {
@@ -47,7 +49,15 @@ TEST_F(Clock, ChangesTheRateAndPausesWhileTheRunGoesOn) {
   EXPECT_EQ(paused["standing"], true);
   EXPECT_EQ(paused["dropped_steps"], 0);
   EXPECT_EQ(clock("show")["cycles"], paused["cycles"]);
+  const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(clock("resume")["paused"], false);
+  const std::uint64_t before = paused["cycles"];
+  auto shown = clock("show");
+  while (shown["cycles"].get<std::uint64_t>() < before + 100) shown = clock("show");
+  // Simulated over real time: the real time is within what has passed here.
+  const std::chrono::duration<double> here = std::chrono::steady_clock::now() - start;
+  const auto cycles = static_cast<double>(shown["cycles"].get<std::uint64_t>() - before - 2);
+  EXPECT_GE(shown["realtime_factor"].get<double>(), cycles * 1e-3 / here.count());
   EXPECT_EQ(end(), 0);
 }
 

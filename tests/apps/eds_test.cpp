@@ -159,6 +159,22 @@ TEST_F(Eds, OfClassicBoardsAndOfSensorsAreTypesOfTheirOwn) {
   }
 }
 
+TEST_F(Eds, OfASecondKindOfATypeIsNumberedTwo) {
+  std::filesystem::copy_file(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml",
+                             folder_ / "classic.toml");
+  edit("classic.toml", "../double_pendulum/", "");
+  edit("classic.toml", "slow_pdo_every = 4", "slow_pdo_every = 8");  // of the first board
+  const Outcome outcome = tandem("eds classic.toml -o sheets --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  ASSERT_EQ(json.size(), 2U) << outcome.out;
+  EXPECT_EQ(json[0]["file"], "sheets/board_1_axis_classic.eds");
+  EXPECT_EQ(json[1]["file"], "sheets/board_1_axis_classic_2.eds");
+  EXPECT_EQ(json[1]["nodes"], nlohmann::json::array({"board_2"}));
+  const Sheet second = read_sheet(folder_ / "sheets/board_1_axis_classic_2.eds");
+  EXPECT_EQ(second.at("FileInfo").at("FileName"), "board_1_axis_classic_2.eds");
+}
+
 TEST_F(Eds, SaysWhatIsWrongWithTheRobot) {
   edit("robot.toml", "fd = true", "fd = false");
   const Outcome outcome = tandem("eds robot.toml");

@@ -124,5 +124,17 @@ TEST(LatencyRatio, IsOursToTheirsAndNotANumberWithoutTheirs) {
   EXPECT_DOUBLE_EQ(ratio.max, 0.25);
 }
 
+TEST(LatencyFigures, ShowAShareOfLaterWakeUpsThatOnlyFalls) {
+  LatencySample sample;
+  sample.load = "idle";
+  for (const std::int64_t late_ns : {2'000, 3'000, 3'000, 40'000}) sample.tandem.record(late_ns);
+  const std::vector<report::Figure> figures = latency_figures({&sample, 1});
+  ASSERT_EQ(figures.size(), 2U);
+  EXPECT_EQ(figures[1].name, "tail_idle");
+  const report::Curve& tail = figures[1].curves.at(0);
+  EXPECT_EQ(tail.y, (std::vector<double>{1.0, 0.75, 0.75, 0.25, 0.25, 0.25}))
+      << "in the end one of four, which a logarithmic axis can show";
+}
+
 }  // namespace
 }  // namespace tandem::apps

@@ -94,6 +94,15 @@ TEST(TopicRate, KnowsRateSpreadAndWhatIsMissing) {
   EXPECT_NEAR(json["min_s"].get<double>(), 0.01, 1e-12);
   EXPECT_NEAR(json["max_s"].get<double>(), 0.03, 1e-12);
   EXPECT_EQ(json["interval_ns"]["max"], 30'000'000);
+  Facts facts;
+  rate.add_to(facts);
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* out = ::open_memstream(&text, &size);
+  facts.print(out);
+  std::fclose(out);
+  EXPECT_NE(std::string(text, size).find(" / 30.000 ms, of all 38"), std::string::npos) << text;
+  std::free(text);
   rate.arrived(time_ns, 0);  // another run: its numbers begin anew
   EXPECT_EQ(rate.lost(), 0U);
 }

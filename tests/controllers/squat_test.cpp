@@ -49,6 +49,18 @@ TEST_F(StanceTest, SolvesFourteenEquationsToRounding) {
   }
 }
 
+TEST_F(StanceTest, IsPlacedBesideItsFeetWhenItsLegsLeanAside) {
+  std::vector<double> aside = robot.postures[0].position_rad;
+  for (const std::string side : {"L", "R"}) {
+    aside[static_cast<std::size_t>(robot.joint_index(side + "HipLat"))] = 0.2;
+    aside[static_cast<std::size_t>(robot.joint_index(side + "AnkLat"))] = -0.2;  // flat soles
+  }
+  stance.place(aside);
+  EXPECT_LT(stance.slip_m(), 1e-9);
+  const test::BipedPose at(stance.q().data());
+  EXPECT_NEAR(std::abs(at.p[0].y()), (at.p[4].z() - at.p[6].z()) * std::tan(0.2), 1e-9);
+}
+
 TEST_F(StanceTest, KneeBendsByTheTriangleOfItsLeg) {
   ASSERT_TRUE(stance.solve(height - 0.25, 50).converged);
   const test::BipedPose at(stance.q().data());

@@ -88,6 +88,16 @@ TEST(Cdr, OfARequestBeginsWithWhoAskedAndItsNumber) {
   EXPECT_EQ(std::get<std::int64_t>(find(*value, "request_sequence")->of), 9);
 }
 
+TEST(Cdr, OfABoolIsOneForTrue) {
+  for (const int byte : {0, 1}) {
+    const auto value = decode(definition("std_srvs/srv/Trigger_Response"),
+                              bytes({0, 1, 0, 0, 0, 0,    0, 0, 0, 0, 0, 0, 0, 0, 0,
+                                     0, 0, 0, 0, 0, byte, 0, 0, 0, 1, 0, 0, 0, 0}));
+    ASSERT_TRUE(value) << value.error().to_string();
+    EXPECT_EQ(std::get<bool>(find(*value, "success")->of), byte == 1);
+  }
+}
+
 struct Malformed {
   const char* type;
   Bytes bytes;

@@ -291,7 +291,8 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
   const auto& joints = rig.robot.config.joints;
   rig.state.fault()[0] = 0x8611;
   rig.state.age_cycles()[5] = 40;
-  rig.state.temperature_C()[9] = 119.0;
+  rig.state.temperature_C()[8] = 107.9;
+  rig.state.temperature_C()[9] = 108.0;  // docs/faults.md: with a warning from 108
   rig.faults = {{12, 0.012, joints[12].name, joints[12].board, "following error",
                  hal::StopCategory::kCategory1, true, 0.0}};
   rig.fault_version = 1;
@@ -311,7 +312,9 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
       EXPECT_EQ(of(0), (std::pair<int, std::string>(2, "fault 0x8611")));
       EXPECT_EQ(of(1).first, 0);
       EXPECT_EQ(of(5), (std::pair<int, std::string>(3, "no feedback for 40 cycles")));
-      EXPECT_EQ(of(9).first, 1);
+      EXPECT_EQ(of(8).first, 0);
+      EXPECT_EQ(of(9),
+                (std::pair<int, std::string>(1, "the winding is hot: 108 of at most 120 C")));
       EXPECT_EQ(found.at("tandem: run").first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).second,

@@ -3,6 +3,8 @@
 #include <array>
 
 #include "base/archive.hpp"
+#include "hal/ethercat-can/can_backend.hpp"
+#include "tests/ethercat_can/rig.hpp"
 
 namespace tandem::hal::can {
 namespace {
@@ -70,6 +72,23 @@ TEST(Loopback, ArchivesTheFramesInFlight) {
   ASSERT_TRUE(restore.ok() && restore.at_end());
   ASSERT_EQ(bus.to_boards().size(), 2u);
   EXPECT_EQ(bus.to_boards()[1], frames[1]);
+}
+
+/// Nobody ever answers, and no time passes.
+struct NoAnswer final : FrameWait {
+  std::int64_t now_ns() noexcept override { return 0; }
+  void wait(std::int64_t, int) noexcept override {}
+};
+
+TEST(CanBackend, SaysThatRealBoardsCannotBeRewound) {
+  LoopbackBus legs, arms;
+  const std::array<Bus*, 2> buses{&legs.master(), &arms.master()};
+  NoAnswer wait;
+  const RobotConfig robot = test::robot_config();
+  const auto backend = CanBackend::create(robot, buses, wait, {});
+  ASSERT_TRUE(backend) << backend.error().to_string();
+  Archive saved;
+  EXPECT_FALSE((*backend)->archive(saved));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ TEST(RobotConfig, ReadsLoopsAndPassiveJoints) {
   const auto robot = parse_robot_config(with_loop(R"([[passive]]
 name = "slider"
 position_rad = 0.3
+damping_Nms_rad = 0.02
 [[loop]]
 name = "hinge"
 type = "revolute"
@@ -37,6 +38,7 @@ length_m = 0.2
   EXPECT_TRUE(robot->is_passive("slider"));
   EXPECT_FALSE(robot->is_passive("knee"));
   EXPECT_EQ(robot->passive[0].position_rad, 0.3);
+  EXPECT_EQ(robot->passive[0].damping_Nms_rad, 0.02);
 }
 
 TEST(RobotConfig, SaysWhatIsWrongWithALoop) {
@@ -63,6 +65,9 @@ TEST(RobotConfig, SaysWhatIsWrongWithALoop) {
   EXPECT_NE(loop("type = \"rod\"\nsites = [\"pin\", \"eye\"]").find("length_m"), std::string::npos);
   EXPECT_NE(errors_of(with_loop("[[passive]]\nname = \"knee\"\n"))
                 .find("the joint 'knee' has a motor: it is a [[joint]] too"),
+            std::string::npos);
+  EXPECT_NE(errors_of(with_loop("[[passive]]\nname = \"slider\"\ndamping_Nms_rad = -0.1\n"))
+                .find("passive[0].damping_Nms_rad"),
             std::string::npos);
 }
 

@@ -60,6 +60,10 @@ TEST(Event, RefusesACutMessage) {
   for (std::size_t size = 0; size < body.size(); ++size) {
     EXPECT_FALSE(decode_event(std::span(body).first(size))) << size;
   }
+  encode_event({}, "", body = {});
+  body.resize(body.size() - 1);
+  body[28] = std::byte{0};
+  EXPECT_FALSE(decode_event(body)) << "a text of no bytes lacks the zero at its end";
 }
 
 }  // namespace

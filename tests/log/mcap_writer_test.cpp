@@ -1,6 +1,7 @@
 #include "log/mcap_writer.hpp"
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -49,6 +50,17 @@ TEST(McapWriter, WritesTheSameFileForTheSameCalls) {
     write_sample(folder / "b.mcap", {.compression = one}, 500);
     EXPECT_TRUE(content(folder / "a.mcap") == content(folder / "b.mcap"));
   }
+}
+
+TEST(McapWriter, ClosesItsFileAndNoOther) {
+  const ScratchFolder folder;
+  const auto open_files = [] {
+    const std::filesystem::directory_iterator all("/proc/self/fd");
+    return std::distance(begin(all), end(all));
+  };
+  const auto before = open_files();
+  write_sample(folder / "a.mcap", {}, 3);
+  EXPECT_EQ(open_files(), before);
 }
 
 TEST(McapWriter, ExplainsAFolderThatIsMissingOrReadOnly) {

@@ -210,6 +210,28 @@ TEST_F(LinkChecks, WhatIsNotFiniteOrOfAnotherSizeIsNotTaken) {
   EXPECT_TRUE(served.cycle->faults().empty());
 }
 
+TEST_F(LinkChecks, GainsOfZeroAndMoreAreTaken) {
+  const hal::ParameterImage now = hal::initial_parameters(served.robot);
+  std::vector<double> gains;
+  for (std::size_t j = 0; j < now.joints(); ++j) {
+    for (std::size_t loop = 0; loop < hal::kPidLoops; ++loop) {
+      const hal::PidGains& one = now.gains(j, static_cast<hal::PidLoop>(loop));
+      gains.insert(gains.end(), {one.kp, one.ki, one.kd});
+    }
+  }
+  const auto with_first = [&](double gain) {
+    gains[0] = gain;
+    auto command = sample();
+    command.gains._buffer = gains.data();
+    command.gains._length = command.gains._maximum = static_cast<std::uint32_t>(gains.size());
+    return command;
+  };
+  expect(Verdict::kTaken, with_first(0.5));
+  expect(Verdict::kTaken, with_first(0.0));
+  expect(Verdict::kMalformed, with_first(-0.5));
+  expect(Verdict::kMalformed, with_first(std::numeric_limits<double>::quiet_NaN()));
+}
+
 TEST_F(LinkChecks, AFloodIsCountedAndLeavesTheLoopAlone) {
   auto flood = sample();
   flood.client = 1;

@@ -41,6 +41,8 @@ void over_the_link(Record& record, std::uint32_t delay) {
   EXPECT_TRUE(owner.cycle->faults().empty());
   EXPECT_TRUE(served.cycle->faults().empty());
   EXPECT_EQ(owner.cycle->running_cycles(), kRunning);
+  EXPECT_EQ(owner.cycle->loop().bus.count(), owner.cycle->loop().cycles)
+      << "its wait for the server is no work";
 }
 
 bool same(const hal::Image& a, const hal::Image& b) {
@@ -86,6 +88,31 @@ TEST(LockstepLink, WithADelayIsTheDelayedRunInOneProcess) {
   expect_same(here, there);
   in_process(undelayed, 0);
   EXPECT_FALSE(same(here.cycles().back().state, undelayed.cycles().back().state));
+}
+
+TEST(LockstepLink, AnOwnersGainsAreTheServedRobots) {
+  Served served({.lockstep = true,
+                 .ends_with_owner = true,
+                 .lease_timeout_s = 30.0,
+                 .lockstep_timeout_s = 20.0,
+                 .on_lost = hal::StopCategory::kCategory1});
+  served.begin();
+  ClientConfig config;
+  config.lockstep = true;
+  Owner owner(config, {.running_cycles = 20});
+  hal::ParameterImage& gains = owner.host.gains();
+  const hal::PidGains soft{.kp = 0.5, .ki = 0.0, .kd = 12.5};
+  ASSERT_NE(gains.gains(1, hal::PidLoop::kPosition), soft);
+  gains.set_gains(1, hal::PidLoop::kPosition, soft);
+  owner.cycle->run();
+  served.join();
+  EXPECT_TRUE(owner.cycle->faults().empty());
+  for (std::size_t j = 0; j < gains.joints(); ++j) {
+    for (std::size_t i = 0; i < hal::kPidLoops; ++i) {
+      const auto loop = static_cast<hal::PidLoop>(i);
+      EXPECT_EQ(served.host.gains().gains(j, loop), gains.gains(j, loop)) << j << ", loop " << i;
+    }
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include "controllers/stance.hpp"
 #include "hal/config/capabilities.hpp"
@@ -135,6 +136,8 @@ TEST_P(AnyFeet, PosturesBesideEachOtherDoNotTouch) {
   const Figure& posture = figure("posture");
   const Curve& legs = *std::ranges::find(posture.curves, "legs", &Curve::label);
   const std::size_t each = legs.x.size() / 4;  // start, half way, lowest, end
+  const auto [low, high] =
+      std::ranges::minmax(legs.y | std::views::filter([](double z) { return std::isfinite(z); }));
   double last = -1e300;
   for (std::size_t one_posture = 0; one_posture < 4; ++one_posture) {
     double left = 1e300, right = -1e300;
@@ -145,6 +148,9 @@ TEST_P(AnyFeet, PosturesBesideEachOtherDoNotTouch) {
     }
     EXPECT_GT(left, last);
     last = right;
+    const std::size_t first = each * one_posture;
+    if (one_posture == 0) continue;
+    EXPECT_GT(legs.x[first] - legs.x[first - each], 0.5 * (high - low)) << "no crowd of thin ones";
   }
 }
 

@@ -173,13 +173,22 @@ TEST_F(TracedRun, WritesSpansThatNestAndSumUp) {
 TEST_F(TracedRun, CountsWakeUpLatencyAndWorkPerCycle) {
   make({.trace_cycles = 40});
   cycle->run();
-  std::map<std::string, int> counters;
+  std::map<std::string, std::vector<double>> counters;
   for (const Json& event : events(written(), "C")) {
-    ++counters[event["name"]];
-    EXPECT_GE(event["args"]["us"].get<double>(), 0.0);
+    counters[event["name"]].push_back(event["args"]["us"].get<double>());
+    EXPECT_GE(counters[event["name"]].back(), 0.0);
   }
-  EXPECT_EQ(counters["wake-up latency [us]"], 40);
-  EXPECT_EQ(counters["work [us]"], 40);
+  EXPECT_EQ(counters["wake-up latency [us]"].size(), 40U);
+  const std::vector<CycleStamps> cycles = cycle->trace().cycles();
+  const std::vector<double>& work_us = counters["work [us]"];
+  ASSERT_EQ(work_us.size(), cycles.size());
+  for (std::size_t i = 0; i < cycles.size(); ++i) {  // all stages behind the exchange
+    double sum_us = 0.0;
+    for (std::size_t s = 2; s < kCycleStages; ++s) {
+      sum_us += 1e-3 * static_cast<double>(cycles[i].stage_ns(static_cast<CycleStage>(s)));
+    }
+    EXPECT_NEAR(work_us[i], sum_us, 1e-6);
+  }
 }
 
 TEST_F(TracedRun, MarksOverrunsAndFaults) {

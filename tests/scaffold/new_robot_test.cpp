@@ -11,6 +11,7 @@
 
 #include "hal/ethercat-can/bus_load.hpp"
 #include "runtime/experiment.hpp"
+#include "scaffold/toml_words.hpp"
 #include "scaffold/words.hpp"
 #include "tests/scaffold/robots.hpp"
 #include "tests/support/scratch_folder.hpp"
@@ -160,6 +161,23 @@ TEST(NewRobot, TakesWhereTheDescriptionHasNoLimitWhatTheModelNeeds) {
   const std::string text = robot_text(icub, "icub.urdf", "icub.urdf");
   EXPECT_NE(text.find("# guess: from its load and its neighbours'; the description's is 50000"),
             std::string::npos);
+}
+
+/// One joint with a link of 10 kg, whose centre of mass is 4 m away: 392 Nm hold it.
+std::string long_arm(const std::string& effort) {
+  return "<robot name='long_arm'><link name='base'/>"
+         "<joint name='lift' type='revolute'><parent link='base'/><child link='arm'/>"
+         "<axis xyz='0 1 0'/><limit lower='-1' upper='1' velocity='1' effort='" +
+         effort +
+         "'/></joint><link name='arm'><inertial><origin xyz='4 0 0'/><mass value='10'/>"
+         "<inertia ixx='1' iyy='10' izz='10' ixy='0' ixz='0' iyz='0'/></inertial></link></robot>";
+}
+
+TEST(NewRobot, BelievesAnEffortThatItsReachCanUse) {
+  const NewRobot strong = made_of(long_arm("2000"));  // 10 times its weight at 1 m are 981 Nm
+  EXPECT_FALSE(strong.limits[0].effort_guessed);
+  EXPECT_EQ(strong.limits[0].effort, 2000.0);
+  EXPECT_TRUE(made_of(long_arm("4000")).limits[0].effort_guessed) << "and at 4 m 3924 Nm";
 }
 
 TEST(NewRobot, NamesLimbsAsPeopleDo) {
@@ -350,6 +368,13 @@ TEST(NewRobot, WritesNamesAsTomlNeedsThem) {
   ASSERT_TRUE(read) << read.error().front().to_string();
   EXPECT_EQ(read->joints[1].name, "a \"b\\c");
   EXPECT_TRUE(runtime::parse_experiment(move_text(robot), "move.toml", *read));
+}
+
+TEST(TomlWords, KeysAreBareWhereTomlAllowsIt) {
+  EXPECT_EQ(key_of("Left-knee_2"), "Left-knee_2");
+  for (const std::string quoted : {"left knee", "left.knee", "l+r", "gen\xC3\xBC", ""}) {
+    EXPECT_EQ(key_of(quoted), '"' + quoted + '"');
+  }
 }
 
 /// A one-legged hopper whose root moves by a floating joint, and whose foot's inertia is

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "model/placements.hpp"
 #include "tests/scaffold/robots.hpp"
 
 namespace tandem::scaffold {
@@ -39,6 +40,17 @@ TEST_P(StandingRobots, TouchTheGroundWithEveryPointOfTheirSoles) {
   ASSERT_EQ(robot.feet.size(), GetParam().feet);
   const Posed posed(robot.tree, posture_of(robot));
   for (const Eigen::Vector3d& p : points_of(robot, posed)) EXPECT_NEAR(p.z(), 0.0, 2e-4);
+}
+
+TEST_P(StandingRobots, GetSitesThatLieAsTheirSolesDo) {
+  const NewRobot robot = made(GetParam());
+  ASSERT_EQ(robot.config.model.sites.size(), robot.feet.size());
+  for (std::size_t i = 0; i < robot.feet.size(); ++i) {
+    const hal::SiteConfig& site = robot.config.model.sites[i];
+    const model::Placement sole = model::placement_of(site.xyz_m, site.rpy_rad);
+    EXPECT_LT((sole.R - robot.feet[i].sole_in_link.R).norm(), 1e-7) << site.name;
+    EXPECT_LT((sole.p - robot.feet[i].sole_in_link.p).norm(), 1e-5) << site.name;
+  }
 }
 
 TEST_P(StandingRobots, KeepTheirMassOverTheirFeetAndTheirJointsWithinLimits) {

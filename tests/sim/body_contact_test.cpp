@@ -115,6 +115,46 @@ TEST(BodyContact, LeavesOutWhatStartsInsideTheGround) {
   EXPECT_NEAR(block.plant->q()[2], -0.05, 0.002);
 }
 
+/// A rod that swings about +y, a ball at its end.
+model::Tree arm_on_fixed_base() {
+  model::Tree tree;
+  tree.bodies = {{"base", {}}, {"rod", {}}};
+  tree.joints.resize(1);
+  tree.joints[0].name = "swing";
+  tree.joints[0].axis = Eigen::Vector3d::UnitY();
+  tree.links.resize(2);
+  tree.links[0].name = "base";
+  tree.links[1].name = "rod";
+  tree.links[1].body = 1;
+  tree.links[1].parent = tree.links[1].moving = 0;
+  tree.links[1].shapes = {{Shape::Kind::kSphere,
+                           {0.02, 0.0, 0.0},
+                           {Eigen::Matrix3d::Identity(), {0.0, 0.0, -test::kPendulumLength}}}};
+  return tree;
+}
+
+// Virtual work: the torque of springs is the slope of their energy.
+TEST(BodyContact, OfAnArmOnAFixedBaseGivesTheTorqueThatItsEnergyTells) {
+  hal::RobotConfig robot = on_ground();
+  robot.contact.height_m = -0.3;
+  const double raised = 1.2, lying = 0.93, rest = 0.0, h = 1e-5;
+  const BodyContact untouched(robot, arm_on_fixed_base(), *test::pendulum_kernels(), &raised, {},
+                              1'000'000);
+  const auto energy_J = [&](double q) {
+    BodyContact contact = untouched;
+    contact.evaluate(&q, &rest, true);
+    return contact.elastic_energy_J();
+  };
+  BodyContact contact = untouched;
+  contact.evaluate(&lying, &rest, true);
+  ASSERT_TRUE(contact.touching("rod"));
+  double torque_Nm = 0.0;
+  contact.add_forces(&torque_Nm);
+  ASSERT_GT(std::abs(torque_Nm), 1.0);
+  const double slope = (energy_J(lying + h) - energy_J(lying - h)) / (2 * h);
+  EXPECT_NEAR(torque_Nm, -slope, 1e-3 * std::abs(torque_Nm));
+}
+
 TEST(LinkPoints, OfALinkWithoutAShapeAreThoseOfTheBoxWithItsInertia) {
   model::Tree tree = one_link({});
   const double a = 0.5, b = 0.3, c = 0.2, m = test::kBlockMass;  // 333 kg/m^3
