@@ -43,6 +43,18 @@ TEST(Hold, LeadsToAPostureWithoutAJump) {
   EXPECT_EQ(run.command.position_rad()[1], -0.5);
 }
 
+TEST(Hold, TakesThreeSecondsToAPostureWhenNothingIsSaid) {
+  test::Harness run(robot(), "hold", "posture = 'ready'\n");
+  ASSERT_EQ(run.problem(), "");
+  run.state.position_rad()[0] = -0.5;
+  run.start();
+  run.run(1.5);
+  EXPECT_NEAR(run.command.position_rad()[0], 0.0, 1e-3) << "half the time, half the way";
+  run.run(1.5);
+  ASSERT_EQ(run.step(), Code::kOk);
+  EXPECT_EQ(run.command.position_rad()[0], 0.5);
+}
+
 TEST(Hold, BrakesTheSwingOfALinkOnRequest) {
   test::Harness run(robot(), "hold", "joints = ['wrist']\nlink_damping_Nms_rad = 4.0\n");
   ASSERT_EQ(run.problem(), "");

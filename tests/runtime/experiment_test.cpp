@@ -111,6 +111,9 @@ TEST(Experiment, IsReadWithItsDefaults) {
   EXPECT_EQ(e->sim.integrator, sim::Integrator::kSemiImplicitEuler);
   EXPECT_TRUE(e->sim.hoist);
   EXPECT_FALSE(e->remote.command.has_value());
+  EXPECT_EQ(e->remote.lease_timeout_s, 1.0);
+  EXPECT_EQ(e->remote.lockstep_timeout_s, 60.0);
+  EXPECT_EQ(e->remote.max_age_cycles, 100U);
   EXPECT_EQ(e->log.folder, "runs");
   ASSERT_EQ(e->controllers.size(), 1u);
   EXPECT_EQ(e->controllers[0].name, "hold");

@@ -466,6 +466,18 @@ TEST_F(JointMoves, BrakeWhenTheyAreStoppedAndGoOverIntoAnotherTarget) {
   EXPECT_EQ(reference(1), from);
 }
 
+/// A joint in its limit is not beyond it.
+TEST_F(JointMoves, ReachBothLimitsAndLeaveThemAgain) {
+  for (const double limit : {1.5, -1.5}) {
+    EXPECT_EQ(answered("elbow", {.target_rad = limit, .speed_rad_s = 2.0}), "done");
+    steps(3000);
+    ASSERT_EQ(reference(1), limit);
+    EXPECT_EQ(answered("elbow", {.target_rad = 0.0, .speed_rad_s = 2.0}), "done");
+    steps(3000);
+    EXPECT_EQ(reference(1), 0.0);
+  }
+}
+
 TEST_F(JointMoves, AreRefusedBeyondTheLimitsAndOfJointsThatAreTaken) {
   const auto has = [](const std::string& text, const char* words) {
     EXPECT_NE(text.find(words), std::string::npos) << text;

@@ -240,6 +240,29 @@ TEST_F(Waiting, AResetWhoseCauseIsStillThereStaysLatchedAndIsTold) {
   EXPECT_EQ(controller->starts, 1);
 }
 
+/// The reset has released the drives already, when a joint fails whose fault alone stops nothing.
+TEST_F(Waiting, AFailedResetStopsTheDrivesAsBefore) {
+  for (const StopCategory before :
+       {StopCategory::kCategory0, StopCategory::kCategory1, StopCategory::kWarn}) {
+    start({.settle_cycles = 10, .after_stop = AfterStop::kWait}, StopCategory::kWarn);
+    if (before == StopCategory::kWarn) {
+      backend->faulted_joint = 1;
+    } else {
+      cycle->inbox().emergency_stop(before);
+    }
+    steps(10);
+    cycle->inbox().reset_faults();
+    until(RunPhase::kResetting);
+    ASSERT_EQ(backend->latched, StopCategory::kWarn);
+    backend->latch_on_fault = true;
+    backend->faulted_joint = 1;
+    until(RunPhase::kFaulted);
+    EXPECT_EQ(cycle->progress().failed_resets.load(), 1U);
+    EXPECT_EQ(backend->latched, std::min(before, StopCategory::kHold))
+        << "where nothing had stopped it, it is held";
+  }
+}
+
 TEST_F(Waiting, AResetWhileNothingIsLatchedChangesNothing) {
   const int updates = controller->updates;
   cycle->inbox().reset_faults();

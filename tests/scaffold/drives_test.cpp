@@ -105,6 +105,16 @@ TEST(Drives, DoNotChatterUnderALoadThatIsHeavyForThem) {
   EXPECT_GT(g.position.gains.kp, 15.0 * kGravity_m_s2) << "it would not carry a trunk of 15 kg";
 }
 
+/// An ankle whose weight alone asks for less: docs/robots.md gives kp = 3 G.
+TEST(Drives, AreThreeTimesAsStiffAsThePendulumOnALegNeeds) {
+  model::Tree tree;
+  tree.joints.resize(1);
+  const std::vector<JointLimits> limits{{.effort = 100.0, .velocity = 4.0, .range = {}}};
+  const JointLoad body{.least_inertia = 1.0, .most_inertia = 100.0, .fall_Nm_rad = 600.0};
+  const hal::GainsConfig g = tune(size_drives(tree, limits), {body}, 1e-3).at(0).gains;
+  EXPECT_NEAR(g.position.gains.kp, 3.0 * 600.0, 1e-6);
+}
+
 /// A cube's inertia says nothing of ahead: soles of both feet lie along x, whatever the last digit.
 TEST(Feet, OfACubesInertiaLieAlikeLeftAndRight) {
   for (const double last_digit : {-1e-12, 1e-12}) {

@@ -405,6 +405,51 @@ TEST(NewRobot, UsesWhatTheReaderOffersForFloatingRootsAndImpossibleInertias) {
   EXPECT_NE(robot_text(*robot, "h.urdf", "h.urdf").find("inertia = \"repair\""), std::string::npos);
 }
 
+/// Its box ends 15 mm above the ground that the link says.
+TEST(NewRobot, PutsContactPointsIntoThePlaneOfALevelSoleLink) {
+  const std::string sole = R"(<link name="sole"/>
+  <joint name="to_sole" type="fixed"><origin xyz="0.03 0 -0.075"/><parent link="stub"/><child link="sole"/></joint>
+</robot>)";
+  const NewRobot robot = made_of(std::regex_replace(kHopper, std::regex("</robot>"), sole));
+  ASSERT_EQ(robot.feet.size(), 1U);
+  const Foot& foot = robot.feet[0];
+  EXPECT_EQ(robot.tree.links[static_cast<std::size_t>(foot.link)].name, "sole");
+  ASSERT_EQ(foot.points.size(), 4U);
+  for (const Eigen::Vector3d& p : foot.points) {
+    const Eigen::Vector3d in_link = foot.sole_in_link.R * p + foot.sole_in_link.p;
+    EXPECT_NEAR(in_link.z(), 0.0, 1e-12);
+    EXPECT_NEAR(std::abs(in_link.x()), 0.1, 1e-12) << "where the box has its corners";
+    EXPECT_NEAR(std::abs(in_link.y()), 0.05, 1e-12);
+  }
+}
+
+/// Chains of two joints each on a fixed root, at `y_m`.
+std::string star(const std::vector<double>& y_m) {
+  std::string urdf = "<robot name='star'><link name='root'/>";
+  for (std::size_t i = 0; i < y_m.size(); ++i) {
+    std::string parent = "root", origin = "0 " + std::to_string(y_m[i]) + " 0";
+    for (const char* part : {"upper", "lower"}) {
+      const std::string link = part + std::to_string(i);
+      urdf += "<joint name='to_" + link + "' type='revolute'><origin xyz='" + origin +
+              "'/><parent link='" + parent + "'/><child link='" + link +
+              "'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='20' velocity='5'/></joint>"
+              "<link name='" +
+              link +
+              "'><inertial><origin xyz='0 0 0.1'/><mass value='1'/><inertia ixx='0.01' iyy='0.01' "
+              "izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+      parent = link;
+      origin = "0 0 0.2";
+    }
+  }
+  return urdf + "</robot>";
+}
+
+TEST(NewRobot, CallsALimbLeftOrRightOnlyWhenItIsAside) {
+  std::vector<std::string> names;
+  for (const Limb& limb : made_of(star({0.3, 0.0, -0.3})).limbs) names.push_back(limb.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"left_arm", "arm", "right_arm"}));
+}
+
 TEST(NewRobot, ToldOfNoMovingJointIsAnError) {
   const test::ScratchFolder folder;
   const std::string file = folder / "stone.urdf";

@@ -106,6 +106,21 @@ TEST_P(PosedOnPublicRobots, JacobiansAreTheDerivativesOfPositions) {
   }
 }
 
+/// Of b^k values in a row one lies in each of as many equal parts of 0 to 1, b the dimension's
+/// prime.
+TEST(Halton, FillsEveryDimensionEvenly) {
+  for (const auto& [dimension, parts] : {std::pair{0, 32}, {1, 27}, {2, 25}, {23, 89}, {24, 32}}) {
+    std::vector<int> values(static_cast<std::size_t>(parts));
+    for (int index = 0; index < parts; ++index) {
+      const double value = halton(index, dimension);
+      ASSERT_GE(value, 0.0);
+      ASSERT_LT(value, 1.0);
+      ++values[static_cast<std::size_t>(value * parts + 1e-9)];
+    }
+    EXPECT_EQ(values, std::vector<int>(static_cast<std::size_t>(parts), 1)) << dimension;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(, PosedOnPublicRobots, ::testing::ValuesIn(kPublicRobots),
                          [](const auto& test) { return std::string(test.param.name); });
 
