@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/archive.hpp"
+#include "base/split_mix.hpp"
 
 namespace tandem::sim {
 
@@ -15,14 +16,6 @@ using hal::FaultKind;
 namespace {
 
 constexpr std::uint64_t kNever = ~std::uint64_t{0};
-
-/// SplitMix64 (Steele, Lea, Flood 2014): one word of state.
-std::uint64_t draw(std::uint64_t& state) noexcept {
-  std::uint64_t z = (state += 0x9E3779B97F4A7C15U);
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-  return z ^ (z >> 31);
-}
 
 bool goes(Direction which, Direction frame) noexcept {
   return (static_cast<unsigned>(which) & static_cast<unsigned>(frame)) != 0;
@@ -47,7 +40,7 @@ void corrupt(FaultSlot& slot, Frame& frame) noexcept {
   }
   if (frame.length == 0) return;
   for (std::uint32_t i = 0; i < slot.fault.bits; ++i) {
-    const std::uint64_t bit = draw(slot.random) % (std::uint64_t{frame.length} * 8);
+    const std::uint64_t bit = split_mix(slot.random) % (std::uint64_t{frame.length} * 8);
     frame.data[bit / 8] ^= static_cast<std::uint8_t>(1U << (bit % 8));
   }
 }
@@ -60,8 +53,8 @@ bool FaultInjection::add(const Fault& fault) noexcept TANDEM_RT {
   slot = {};
   slot.fault = fault;
   slot.random = seed_;
-  slot.random = draw(slot.random) ^ fault.seed;
-  slot.random = draw(slot.random) ^ ++count_;
+  slot.random = split_mix(slot.random) ^ fault.seed;
+  slot.random = split_mix(slot.random) ^ ++count_;
   return true;
 }
 
@@ -88,7 +81,7 @@ bool FaultInjection::strikes(FaultSlot& slot) noexcept {
   const Fault& fault = slot.fault;
   if (fault.count != 0 && slot.struck >= fault.count) return false;
   if (fault.probability < 1.0) {
-    const double share = static_cast<double>(draw(slot.random) >> 11) * 0x1p-53;
+    const double share = static_cast<double>(split_mix(slot.random) >> 11) * 0x1p-53;
     if (share >= fault.probability) return false;
   }
   ++slot.struck;

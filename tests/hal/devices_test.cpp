@@ -110,6 +110,7 @@ TEST_F(DevicesTest, AnswerForAJointThatDoesNotExist) {
   EXPECT_EQ(devices.encoders.timestamp_ns(3), -1);
   EXPECT_EQ(devices.modes.set_control_mode(3, ControlMode::kIdle), Code::kOutOfRange);
   EXPECT_EQ(devices.position.position_move(3, 0.0), Code::kOutOfRange);
+  EXPECT_EQ(devices.position.set_ref_speed(3, 0.1), Code::kOutOfRange);
   EXPECT_EQ(devices.pid.set_pid(3, PidLoop::kTorque, {}), Code::kOutOfRange);
   EXPECT_TRUE(std::isnan(devices.pid.pid(3, PidLoop::kTorque).kp));
   EXPECT_EQ(devices.amplifier.status(3), DriveState::kUnknown);
