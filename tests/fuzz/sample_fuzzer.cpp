@@ -41,8 +41,8 @@ T must(Result<T> made) {
   return std::move(*made);
 }
 
-const hal::RobotConfig& robot() {
-  static const hal::RobotConfig kRobot = hal::test::fake_robot();
+const hal::Robot& robot() {
+  static const hal::Robot kRobot = hal::robot_of(hal::test::fake_robot());
   return kRobot;
 }
 const hal::ParameterImage& gains() {
