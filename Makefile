@@ -112,10 +112,12 @@ lint:
 	@scripts/install-dependencies test
 	@$(SOURCES) | xargs $(CLANG_FORMAT) --dry-run -Werror
 
-# Over the sources as `unit` compiles them.
+# Over the sources as `unit` compiles them. The precompiled header, which clang reads as text, wants
+# Eigen's folder everywhere.
 tidy:
 	@scripts/install-dependencies tidy
-	@run-clang-tidy-22 -quiet -j $(JOBS) -p build/release '^(?!.*/tests/).*/Unity/.*'
+	@run-clang-tidy-22 -quiet -j $(JOBS) -p build/release -extra-arg=-isystem/usr/include/eigen3 \
+	  '^(?!.*/tests/).*/Unity/.*'
 
 clean:
 	@rm -rf build runs

@@ -277,7 +277,7 @@ std::string TomlTable::choice(std::string_view key, const std::vector<std::strin
 
 std::string TomlTable::choice_or(std::string_view key, std::string value,
                                  const std::vector<std::string>& allowed) {
-  const std::string found = text_or(key, value);
+  std::string found = text_or(key, value);
   if (found == value) return value;
   for (const std::string& one : allowed) {
     if (found == one) return found;

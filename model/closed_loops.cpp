@@ -45,7 +45,7 @@ std::size_t equations_of(LoopType type) {
 std::string LoopGap::to_string() const {
   constexpr double kSmall = 1e-9;
   const double degrees = axis_rad * 180.0 / std::numbers::pi;
-  const std::string axes = fmt::format("its axes are {:.4g} degrees apart", degrees);
+  std::string axes = fmt::format("its axes are {:.4g} degrees apart", degrees);
   if (!(axis_rad > kSmall)) return fmt::format("a gap of {:.4g} m is left", position_m);
   if (!(position_m > kSmall)) return axes;
   return axes + fmt::format(", and a gap of {:.4g} m is left", position_m);

@@ -58,7 +58,6 @@ class Emitter {
 
  private:
   void name_arguments() {
-    std::string inputs;
     for (const KernelArray& in : kernel_.shape.inputs) {
       parameters_ += "const double* __restrict " + in.name + ", ";
       arguments_ += in.name + ", ";
@@ -162,7 +161,7 @@ class Emitter {
 
   std::string expression(std::uint32_t i) {
     const Node& node = nodes_[i];
-    const std::string a = operand(node.a);
+    std::string a = operand(node.a);
     switch (node.op) {
       case Op::kAdd: return a + " + " + operand(node.b);
       case Op::kSub: return a + " - " + operand(node.b);

@@ -164,7 +164,8 @@ std::string overview(std::span<const Figure> figures, const std::string& folder)
       kWidth, height, quoted(folder + "/overview.png"));
   for (std::size_t f = 0; f < figures.size(); ++f) {
     const double left = f % 2 == 0 ? 0.0 : 0.5 * kWidth;
-    const double bottom = height - kRowHeight * static_cast<double>(f / 2 + 1);
+    const std::size_t row = f / 2 + 1;
+    const double bottom = height - kRowHeight * static_cast<double>(row);
     out += body(figures[f], f, {kWidth, height, left, bottom, 0.5 * kWidth, kRowHeight, 20.0});
   }
   return out + "unset multiplot\nunset output\n";

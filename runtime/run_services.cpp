@@ -31,6 +31,7 @@ struct Words {
 };
 
 /// @param one, other  controllers that stand in the way; empty where there is none
+// NOLINTNEXTLINE(readability-function-size): a table
 Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
                const std::string& one, const std::string& other) {
   switch (reason) {

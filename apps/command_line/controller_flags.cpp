@@ -91,6 +91,7 @@ void add_flags(CLI::App& app, ControllerOptions& o) {
   change->add_option("--start", o.start, "Controllers to start, by comma")->delimiter(',');
 }
 
+// NOLINTNEXTLINE(readability-function-size): a table
 void add_flags(CLI::App& app, JointOptions& o) {
   using Action = JointOptions::Action;
   app.require_subcommand(1);

@@ -192,13 +192,10 @@ std::string hal_name(const runtime::HalOptions& hal) {
   return hal.lockstep ? name + " lockstep" : name;
 }
 
-std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
-                                                                 const Overrides& overrides) {
-  auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
-  if (!experiment) return std::unexpected(experiment.error());
-  auto c = std::make_unique<Composition>();
-  runtime::Experiment& e = c->experiment;
-  e = std::move(*experiment);
+namespace {
+
+/// What the command line wants of the experiment.
+void override_experiment(runtime::Experiment& e, const Overrides& overrides) {
   e.seed = overrides.seed.value_or(e.seed);
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
@@ -207,79 +204,112 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
-  Collector errors;
+}
+
+/// Why it cannot be run, whatever the robot.
+Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
   if (e.cycles() == 0) {
-    errors.add({.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
-                .hint = fmt::format("run for {} s or longer",
-                                    static_cast<double>(e.loop.period_ns) * 1e-9),
-                .file = {},
-                .key = "duration_s"},
-               e.file, 0);
-    return errors.give();
-  }
-  if (overrides.serves) serve_only(e, overrides.lockstep);
-  if (overrides.serves && e.hal.backend == runtime::BackendKind::kDds) {
-    errors.add({.message = "a robot of another process cannot be served once more",
-                .hint = "add --hal sim or --hal can",
-                .file = {},
-                .key = "hal.backend"},
-               e.file, 0);
-    return errors.give();
+    return {{.message = fmt::format("{} s are less than half a cycle of the loop", e.duration_s),
+             .hint = fmt::format("run for {} s or longer",
+                                 static_cast<double>(e.loop.period_ns) * 1e-9),
+             .file = e.file,
+             .key = "duration_s"}};
   }
   const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
-  if (is_remote) {
-    e.dds.enabled = false;  // the robot is the server's to show
-    e.hal.settle_s = 0.0;   // bring-up and settling are the server's
+  if (overrides.serves && is_remote) {
+    return {{.message = "a robot of another process cannot be served once more",
+             .hint = "add --hal sim or --hal can",
+             .file = e.file,
+             .key = "hal.backend"}};
   }
+  if (!overrides.scenario.empty() && e.hal.backend != runtime::BackendKind::kSim) {
+    return {{.message = "faults are injected on the other end of the wire",
+             .hint = is_remote ? "give --scenario to `tandem serve`"
+                               : "give --scenario to `tandem emulate`",
+             .file = overrides.scenario,
+             .key = {}}};
+  }
+  return {};
+}
 
+/// What only one end of the link does.
+void keep_to_own_end(runtime::Experiment& e, const Overrides& overrides) {
+  if (overrides.serves) serve_only(e, overrides.lockstep);
+  if (e.hal.backend != runtime::BackendKind::kDds) return;
+  e.dds.enabled = false;  // the robot is the server's to show
+  e.hal.settle_s = 0.0;   // bring-up and settling are the server's
+}
+
+/// What the description says of the robot and of where it starts.
+void add_description(Composition& c, const RobotFiles& robot, Collector& errors) {
+  runtime::Experiment& e = c.experiment;
+  c.tree = robot.tree;
+  e.tree = std::make_shared<const model::Tree>(robot.tree);
+  if (e.hal.backend == runtime::BackendKind::kSim) {
+    if (auto error = wrong_start_height(robot, e.posture)) errors.add(std::move(*error), {}, 0);
+    c.warnings = buried_links(robot, e.posture);
+    errors.add(study_loops(e.robot, robot.tree, {&e.posture, 1}).errors);
+  }
+  if (e.hal.backend != runtime::BackendKind::kDds) {
+    std::ranges::move(start_warnings(robot, e.posture), std::back_inserter(c.warnings));
+  }
+  errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
+}
+
+/// The robot in simulation. @param scenario  a file of faults; may be empty
+Diagnostics add_simulation(Composition& c, const std::string& scenario) {
+  const runtime::Experiment& e = c.experiment;
+  sim::SimRobotConfig sim = e.sim_robot_config();
+  if (!scenario.empty()) {
+    auto faults = sim::read_scenario(scenario, e.robot, e.loop.period_ns);
+    if (!faults) return faults.error();
+    sim.faults = std::move(*faults);
+  }
+  auto backend = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
+  if (!backend) {
+    const bool of_experiment = backend.error().key == "sim.substep_ns";
+    Error error = backend.error();
+    error.file = of_experiment ? e.file : e.robot.file;
+    if (of_experiment) {
+      error.line = e.document.root().table_or_empty("sim").line("substep_ns");
+    }
+    return {error};
+  }
+  c.sim = backend->get();
+  c.master = &c.sim->master();
+  c.backend = std::move(*backend);
+  return {};
+}
+
+}  // namespace
+
+std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::string& file,
+                                                                 const Overrides& overrides) {
+  auto experiment = overrides.serves ? read_served(file) : runtime::read_experiment(file);
+  if (!experiment) return std::unexpected(experiment.error());
+  auto c = std::make_unique<Composition>();
+  runtime::Experiment& e = c->experiment;
+  e = std::move(*experiment);
+  override_experiment(e, overrides);
+  if (auto reasons = unfit(e, overrides); !reasons.empty()) return std::unexpected(reasons);
+  keep_to_own_end(e, overrides);
   if (Status done = replace_interfaces(e.robot, overrides.interfaces); !done) {
     return std::unexpected(Diagnostics{done.error()});
   }
   const auto robot = with_description(e.robot);
   if (!robot) return std::unexpected(robot.error());
-  c->tree = robot->tree;
-  e.tree = std::make_shared<const model::Tree>(robot->tree);
-  if (e.hal.backend == runtime::BackendKind::kSim) {
-    if (auto error = wrong_start_height(*robot, e.posture)) errors.add(std::move(*error), {}, 0);
-    c->warnings = buried_links(*robot, e.posture);
-    errors.add(study_loops(e.robot, robot->tree, {&e.posture, 1}).errors);
-  }
-  if (!is_remote)
-    std::ranges::move(start_warnings(*robot, e.posture), std::back_inserter(c->warnings));
-  errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
+  Collector errors;
+  add_description(*c, *robot, errors);
   if (!add_kernels(*c, *robot, overrides, errors)) return errors.give();
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
   if (auto warning = no_retreat(*c)) c->warnings.push_back(std::move(*warning));
-  if (c->kernels.get() == nullptr) return c;
-  if (e.hal.backend != runtime::BackendKind::kSim) {
-    if (overrides.scenario.empty()) return c;
-    errors.add({.message = "faults are injected on the other end of the wire",
-                .hint = is_remote ? "give --scenario to `tandem serve`"
-                                  : "give --scenario to `tandem emulate`",
-                .file = overrides.scenario,
-                .key = {}},
-               overrides.scenario, 0);
-    return errors.give();
+  const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
+  if (!simulated || c->kernels.get() == nullptr) return c;
+  if (auto failed = add_simulation(*c, overrides.scenario); !failed.empty()) {
+    return std::unexpected(failed);
   }
-
-  sim::SimRobotConfig sim = e.sim_robot_config();
-  if (!overrides.scenario.empty()) {
-    auto faults = sim::read_scenario(overrides.scenario, e.robot, e.loop.period_ns);
-    if (!faults) return std::unexpected(faults.error());
-    sim.faults = std::move(*faults);
-  }
-  auto backend = sim::SimRobot::create(e.robot, c->kernels.get(), sim);
-  if (!backend) {
-    const bool of_experiment = backend.error().key == "sim.substep_ns";
-    const int line = e.document.root().table_or_empty("sim").line("substep_ns");
-    errors.add(backend.error(), of_experiment ? e.file : e.robot.file, of_experiment ? line : 0);
-    return errors.give();
-  }
-  c->sim = backend->get();
-  c->master = &c->sim->master();
-  c->backend = std::move(*backend);
   return c;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <utility>
+
 #include "hal/sim/scenario.hpp"
 
 namespace tandem::apps {
@@ -10,7 +12,7 @@ void add_inject(ControlRegistry& registry, const hal::RobotConfig& robot, std::i
                 std::function<Status(const sim::Fault&)> add) {
   const ControlKey text{"scenario", ControlKey::Type::kText, true, "[[fault]] tables, TOML"};
   registry.add("inject", ControlEffect::kChanges, "inject faults, from the next cycle on", {text},
-               [&robot, period_ns, add](const Json& request) -> Result<Json> {
+               [&robot, period_ns, add = std::move(add)](const Json& request) -> Result<Json> {
                  const auto faults = sim::parse_scenario(request["scenario"].get<std::string>(),
                                                          "inject", robot, period_ns);
                  if (!faults) return std::unexpected(faults.error().front());

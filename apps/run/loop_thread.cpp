@@ -29,7 +29,7 @@ std::terminate_handler usual_end = nullptr;
     if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
   } catch (const std::exception& exception) {
     what = exception.what();
-  } catch (...) {
+  } catch (...) {  // NOLINT(bugprone-empty-catch): `what` says so already
   }
   fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
   while (true) ::pause();

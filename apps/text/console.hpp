@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.hpp"
@@ -98,7 +99,9 @@ class Table {
 /// Name and value, one pair a line, the values aligned.
 class Facts {
  public:
-  void add(std::string name, std::string value) { facts_.emplace_back(name, value); }
+  void add(std::string name, std::string value) {
+    facts_.emplace_back(std::move(name), std::move(value));
+  }
   void print(std::FILE* out) const;
 
  private:

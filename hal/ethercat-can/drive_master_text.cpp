@@ -53,6 +53,7 @@ std::string DriveMaster::Impl::step_text(const Node& node, const SdoStep& step) 
                : fmt::format("{} {} (node {})", label(node.plan), node.plan.name, node.plan.id));
 }
 
+// NOLINTNEXTLINE(readability-function-size): a table
 std::string DriveMaster::Impl::node_text(const Node& node) const {
   const NodeMaster& m = node.master;
   const std::string who = fmt::format("{} {} (node {}, bus {})", label(node.plan), node.plan.name,
