@@ -89,7 +89,8 @@ asan tsan:
 	@scripts/install-dependencies test
 	@cmake --preset $@ --log-level=WARNING
 	@cmake --build --preset $@ --parallel $(JOBS)
-	@TANDEM_ROBOTS=50 scripts/run-tests build/$@ $(JOBS) -LE hil
+	@TANDEM_ROBOTS=50 TSAN_OPTIONS=suppressions=$(CURDIR)/tests/tsan-suppressions.txt \
+	  scripts/run-tests build/$@ $(JOBS) -LE hil
 
 fuzz:
 	@scripts/install-dependencies test

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -71,8 +72,18 @@ struct PublisherRig {
 
   void start() {
     publisher->start({.version = [this] { return fault_version.load(); },
-                      .faults = [this] { return faults; },
+                      .faults =
+                          [this] {
+                            const std::lock_guard lock(faults_mutex);
+                            return faults;
+                          },
                       .lost = [] { return std::uint64_t{3}; }});
+  }
+  /// For the publisher's thread to see.
+  void set_faults(std::vector<FaultEntry> now) {
+    const std::lock_guard lock(faults_mutex);
+    faults = std::move(now);
+    ++fault_version;
   }
   /// Shows one cycle.
   void show(std::uint64_t cycle) {
@@ -111,6 +122,7 @@ struct PublisherRig {
   hal::RunPhase phase = hal::RunPhase::kRunning;
   std::int64_t begin_ns = 0;
   std::atomic<std::uint64_t> fault_version{0};
+  std::mutex faults_mutex;  // of `faults`, which the publisher reads until it is gone
   std::vector<FaultEntry> faults;
   std::unique_ptr<Participant> participant, listener;
   std::unique_ptr<Publisher> publisher;

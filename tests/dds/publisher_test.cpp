@@ -186,12 +186,13 @@ TEST(Publisher, TellsFaultsWhenTheyComeAndGo) {
       latched.push_back(fault.latched);
     });
   };
-  rig.faults = {{12, 0.012, "joint1", "board", "its board is silent", hal::StopCategory::kCategory1,
-                 true, 0.0}};
-  rig.fault_version = 1;
+  FaultEntry fault{
+      12,   0.012, "joint1", "board", "its board is silent", hal::StopCategory::kCategory1,
+      true, 0.0};
+  rig.set_faults({fault});
   ASSERT_TRUE(eventually([&] { return take(), latched == std::vector{true}; }));
-  rig.faults[0].latched = false;
-  rig.fault_version = 2;
+  fault.latched = false;
+  rig.set_faults({fault});
   ASSERT_TRUE(eventually([&] { return take(), latched == std::vector{true, false}; }));
 }
 

@@ -293,9 +293,8 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
   rig.state.age_cycles()[5] = 40;
   rig.state.temperature_C()[8] = 107.9;
   rig.state.temperature_C()[9] = 108.0;  // docs/faults.md: with a warning from 108
-  rig.faults = {{12, 0.012, joints[12].name, joints[12].board, "following error",
-                 hal::StopCategory::kCategory1, true, 0.0}};
-  rig.fault_version = 1;
+  rig.set_faults({{12, 0.012, joints[12].name, joints[12].board, "following error",
+                   hal::StopCategory::kCategory1, true, 0.0}});
   auto reader = rig.reader<diagnostic_msgs::DiagnosticArray>("diagnostics");
   auto faults = rig.reader<tandem_msgs::Faults>("tandem/faults", true);
   rig.start();

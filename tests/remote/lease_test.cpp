@@ -63,13 +63,13 @@ class LinkChecks : public testing::Test {
         *Writer<tandem_msgs::LinkRequest>::create(*participant_, name(kRequestTopic), link_qos()));
     commands_.emplace(
         *Writer<tandem_msgs::LinkCommand>::create(*participant_, name(kCommandTopic), link_qos()));
+    image_.assign(served.cycle->command());  // as it is before the first cycle
     begin();
     ASSERT_TRUE(eventually([this] { return look() != 0; }));
     ASSERT_TRUE(eventually([this] {
       return served.phase() == RunPhase::kRunning && commands_->endpoint().matched() == 1 &&
              requests_->endpoint().matched() == 1;
     }));
-    image_.assign(served.cycle->command());
     for (std::int8_t& mode : image_.mode()) mode = 1;
     acquire(kClient);
     ASSERT_TRUE(eventually([this] { return served.server->lease().owner() == kClient; }));
