@@ -84,7 +84,7 @@ TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
     EXPECT_NE(run.err.find(text), std::string::npos) << text << "\nin: " << run.err;
   }
   EXPECT_EQ(json("run.json")["fault_log"][0]["joint"], "lazy");
-  EXPECT_LT(json("run.json")["running_cycles"], 200);
+  EXPECT_LT(json("run.json")["cycles"], 200);
 }
 
 // Neither is a hang, whatever the watchdog's time.
