@@ -47,7 +47,7 @@ TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
   ASSERT_EQ(json["errors"].size(), 2U) << outcome.out;  // unknown, wrong sign
   for (const auto& error : json["errors"]) {
     EXPECT_NE(error["file"].get<std::string>().find("robot.toml"), std::string::npos);
-    EXPECT_GT(error["line"], 0);
+    EXPECT_GT(error["line"].get<int>(), 0);
     EXPECT_NE(error["key"], "");
     EXPECT_NE(error["message"], "");
     EXPECT_TRUE(error.contains("hint"));
@@ -223,7 +223,7 @@ TEST_F(CheckLoops, TellsOfThemAsJsonBeforeKernelsAreBuilt) {
     const auto posture = json["loop_postures"][0];
     EXPECT_EQ(posture["posture"], "ready");
     EXPECT_EQ(posture["closed"], true);
-    EXPECT_GT(posture["start_gap_m"], 0.0);
+    EXPECT_GT(posture["start_gap_m"].get<double>(), 0.0);
     EXPECT_NEAR(posture["passive"]["coupler"], -0.6, 0.2);
     EXPECT_EQ(json["freedom"]["degrees"], 1);
     EXPECT_EQ(json["freedom"]["open_degrees"], 3);

@@ -69,7 +69,7 @@ TEST_F(Clock, APauseIsNoTimeOfTheRun) {
   (void)clock("resume");
   EXPECT_EQ(end(), 0);
   const auto result = nlohmann::json::parse(read_text(folder_ / "run.json"), nullptr, false);
-  EXPECT_GE(result["stood_seconds"], 1.4);
+  EXPECT_GE(result["stood_seconds"].get<double>(), 1.4);
   EXPECT_EQ(result["stopped_seconds"], 0.0);
 }
 

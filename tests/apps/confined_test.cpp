@@ -372,7 +372,7 @@ TEST_F(Confined, ARunEndsInOrderWithRealTimePriorityAndLockedMemory) {
     EXPECT_EQ(read_text(folder_ / "err.txt").find("could not get"), std::string::npos)
         << read_text(folder_ / "err.txt");
     const auto json = nlohmann::json::parse(read_text(folder_ / "run.json"));
-    EXPECT_GT(json["log"]["messages"], 1000) << "and its log is there";
+    EXPECT_GT(json["log"]["messages"].get<int>(), 1000) << "and its log is there";
     EXPECT_EQ(json["overruns"].is_number(), true);
   }
 }

@@ -35,7 +35,7 @@ TEST_F(Controllers, AreLoadedSwitchedStoppedAndUnloaded) {
          "hold --start rest)");
   const auto change = asked("controller switch --stop hold --start rest");
   EXPECT_EQ(change["done"], true);
-  EXPECT_GT(change["cycle"], 0);
+  EXPECT_GT(change["cycle"].get<int>(), 0);
   EXPECT_EQ(change["active"], nlohmann::json({"rest"}));
   expect(refused("controller unload rest"), "rest: the controller is active");
   expect(to_run("controller stop rest").out, "active: none");
@@ -186,7 +186,7 @@ TEST_F(Controllers, JointsThatMoveAreWaitedFor) {
          "joint1 still moves to -5.236 rad (-300 deg): `tandem joint stop joint1`");
   const auto goes_on = asked("joint list joint1")["joints"][0];
   EXPECT_EQ(goes_on["moving"], true);
-  EXPECT_LT(goes_on["position_rad"], 0.52);
+  EXPECT_LT(goes_on["position_rad"].get<double>(), 0.52);
   EXPECT_EQ(to_run("joint stop joint1").status, 0);
   EXPECT_TRUE(
       test::eventually([&] { return asked("joint list joint1")["joints"][0]["moving"] == false; }));

@@ -74,7 +74,7 @@ TEST_F(Faults, LeaveAJointBeyondItsLimitWhereItIsUntilItIsRecovered) {
   const Outcome recover = to_run("joint recover joint1");
   EXPECT_EQ(recover.status, 0) << recover.err;
   EXPECT_NE(recover.out.find("joint1 comes back"), std::string::npos) << recover.out;
-  for (int i = 0; i < 200 && joint()["position_rad"] > 2.91; ++i) {
+  for (int i = 0; i < 200 && joint()["position_rad"].get<double>() > 2.91; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   EXPECT_NEAR(joint()["position_rad"], 2.9, 0.02);
@@ -154,7 +154,7 @@ TEST_F(Faults, StopARunForATimeThatItsTableTells) {
   const std::string table = read_text(folder_ / "table.txt");
   EXPECT_NE(table.find("  not running  "), std::string::npos) << table;
   EXPECT_NE(table.find(" s in fault or held"), std::string::npos) << table;
-  EXPECT_GT(json("run.json")["stopped_seconds"], 0.0);
+  EXPECT_GT(json("run.json")["stopped_seconds"].get<double>(), 0.0);
 }
 
 TEST_F(Faults, EndASimulatedRunThatWasNotToldToWait) {
@@ -169,7 +169,7 @@ TEST_F(Faults, AClosedTerminalIsAStopInOrder) {
   begin("--on-fault wait");
   signal("HUP");
   EXPECT_EQ(join(), 0);
-  EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"], 2'000'000);
+  EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"].get<int>(), 2'000'000);
 }
 
 TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
@@ -182,7 +182,9 @@ TEST_F(Faults, AReaderThatGoesIsAStopInOrder) {
         pipe + " >out.txt";
     EXPECT_EQ(std::system(command.c_str()), 0);
     EXPECT_EQ(read_text(folder_ / "status"), "0\n");
-    EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"], 5'000'000) << pipe;
+    EXPECT_LT(nlohmann::json::parse(read_text(folder_ / "run.json"))["cycles"].get<int>(),
+              5'000'000)
+        << pipe;
   }
 }
 

@@ -126,7 +126,7 @@ TEST_F(JointAnswers, OfASensorThatIsSilentAreNotValid) {
   steps(20);
   const Json imu = answer(R"({"do": "sensor.list"})")["sensors"][1];
   EXPECT_EQ(imu["valid"], false);
-  EXPECT_GE(imu["age_cycles"], 20);
+  EXPECT_GE(imu["age_cycles"].get<int>(), 20);
   EXPECT_EQ(command(sensor_command, SensorOptions{}), Exit::kDone);
   has(out, "no sample for ");
 }

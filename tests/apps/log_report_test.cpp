@@ -25,7 +25,7 @@ TEST_F(LogAndReport, InfoTellsTopicsAndMetadata) {
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["complete"], true);
   EXPECT_EQ(json["metadata"]["robot"], "double_pendulum");
-  EXPECT_GE(json["topics"]["/tandem/state"]["messages"], 500);
+  EXPECT_GE(json["topics"]["/tandem/state"]["messages"].get<int>(), 500);
   EXPECT_EQ(json["data_sha256"].get<std::string>().size(), 64U);
 }
 
@@ -145,7 +145,7 @@ TEST_F(LogAndReport, AKilledRunLeavesALogThatIsReadAndDrawn) {
   ASSERT_EQ(info.status, 0) << info.err;
   const auto json = nlohmann::json::parse(info.out);
   EXPECT_EQ(json["complete"], false);
-  EXPECT_GT(json["topics"]["/tandem/state"]["messages"], 100);
+  EXPECT_GT(json["topics"]["/tandem/state"]["messages"].get<int>(), 100);
   const Outcome report = tandem("report '" + log + "'");
   EXPECT_EQ(report.status, 0) << report.err;
   EXPECT_EQ(report.err, "") << "nothing is left out";

@@ -23,10 +23,11 @@ class New : public Program {
       EXPECT_TRUE(run["fault_log"].empty()) << experiment;
       EXPECT_FALSE(run["joints"].empty());
       for (const auto& [name, joint] : run["joints"].items()) {
-        EXPECT_LT(joint["max_tracking_error_rad"], most_rad) << experiment << ": " << name;
+        EXPECT_LT(joint["max_tracking_error_rad"].get<double>(), most_rad)
+            << experiment << ": " << name;
       }
       if (!run["base"].is_null()) {
-        EXPECT_LT(run["base"]["final_tilt_rad"], 0.02) << experiment;
+        EXPECT_LT(run["base"]["final_tilt_rad"].get<double>(), 0.02) << experiment;
       }
     }
   }

@@ -20,15 +20,16 @@ TEST_F(SquatDemo, ComanSquatsAndStandsAtTheEnd) {
 
   constexpr double kDegree = std::numbers::pi / 180.0;
   for (const std::string joint : {"LHipSag", "RHipSag", "LKneeSag", "RKneeSag"}) {
-    EXPECT_LT(json["joints"][joint]["rms_tracking_error_rad"], 1.0 * kDegree) << joint;
+    EXPECT_LT(json["joints"][joint]["rms_tracking_error_rad"].get<double>(), 1.0 * kDegree)
+        << joint;
   }
   const double weight = json["ground"]["weight_N"];
   EXPECT_NEAR(json["ground"]["mean_vertical_force_N"].get<double>(), weight, 0.005 * weight);
-  EXPECT_LT(json["ground"]["max_foot_slip_m"], 0.005);
+  EXPECT_LT(json["ground"]["max_foot_slip_m"].get<double>(), 0.005);
   const double depth =
       json["base"]["max_height_m"].get<double>() - json["base"]["min_height_m"].get<double>();
   EXPECT_NEAR(depth, 0.10, 0.02);
-  EXPECT_LT(json["base"]["final_tilt_rad"], 3.0 * kDegree);
+  EXPECT_LT(json["base"]["final_tilt_rad"].get<double>(), 3.0 * kDegree);
 
   const std::filesystem::path report = folder_ / "runs/coman-squat-001";
   EXPECT_TRUE(std::filesystem::exists(report / "report.html"));

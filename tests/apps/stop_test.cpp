@@ -20,7 +20,7 @@ TEST_F(Stops, AreConfirmedByTheLoopWithItsCycle) {
   const Outcome asked = to_run("ask '{\"do\": \"estop\", \"category\": 0}'");
   const auto answer = nlohmann::json::parse(asked.out, nullptr, false);
   EXPECT_EQ(answer["confirmed"], true) << asked.out;
-  EXPECT_GT(answer["cycle"], 100) << asked.out;
+  EXPECT_GT(answer["cycle"].get<int>(), 100) << asked.out;
   EXPECT_NE(to_run("ask '{\"do\": \"status\"}'").out.find(R"("phase": "faulted")"),
             std::string::npos)
       << "what is confirmed is carried out";
@@ -84,7 +84,7 @@ TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
     EXPECT_NE(run.err.find(text), std::string::npos) << text << "\nin: " << run.err;
   }
   EXPECT_EQ(json("run.json")["fault_log"][0]["joint"], "lazy");
-  EXPECT_LT(json("run.json")["cycles"], 200);
+  EXPECT_LT(json("run.json")["cycles"].get<int>(), 200);
 }
 
 // Neither is a hang, whatever the watchdog's time.

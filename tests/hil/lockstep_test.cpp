@@ -44,7 +44,7 @@ class Lockstep : public test::OwnFolder {
     const auto topics = json("diff.json")["topics"];
     for (const char* name : {"/tandem/state", "/tandem/command", "/tandem/event"}) {
       ASSERT_TRUE(topics.contains(name)) << diff.output();
-      EXPECT_GT(topics[name]["messages"][0], 0) << name;
+      EXPECT_GT(topics[name]["messages"][0].get<int>(), 0) << name;
     }
     const std::uint64_t cycles = topics["/tandem/state"]["messages"][0];
     EXPECT_GT(cycles, cycles_at_least) << "from power-on to the end";
@@ -109,7 +109,8 @@ TEST_F(HilServe, ARobotOnCanDrivenOverDdsIsTheInProcessRunBitForBit) {
   const auto served = json("serve.json");
   EXPECT_EQ(served["hal"], "can lockstep");
   EXPECT_EQ(served["remote"]["losses"], 0);
-  EXPECT_GT(served["remote"]["commands"]["taken"], 500) << "bring-up and half a second at 500 Hz";
+  EXPECT_GT(served["remote"]["commands"]["taken"].get<int>(), 500)
+      << "bring-up and half a second at 500 Hz";
   expect_same_bits("/double_pendulum-trajectory-001.mcap", 1000);
 }
 
