@@ -53,8 +53,8 @@ struct ServeOptions {
 /// tandem fault show|reset
 struct FaultOptions {
   enum class Action : std::uint8_t { kShow, kReset } action = Action::kShow;
-  ControlTarget target;
-  std::string json;
+  ControlTarget target{};
+  std::string json{};
 };
 
 /// tandem estop
@@ -95,25 +95,25 @@ struct JointOptions {
     kReset,
     kGains
   } action = Action::kList;
-  std::vector<std::string> joints;      ///< list: only these; empty: all
-  bool gains = false;                   ///< list: the gains instead of what is measured
-  bool drives = false;                  ///< list: motors and drives instead of joints
-  std::string joint;                    ///< all but list
-  std::string to, speed, acceleration;  ///< move: numbers with or without a unit; empty: default
-  bool wait = false;                    ///< move: until it has ended
-  std::string mode, interaction;        ///< empty: as it is
-  std::optional<double> stiffness_Nm_rad, damping_Nms_rad;
-  std::string loop;
-  std::optional<double> kp, ki, kd;
-  ControlTarget target;
-  std::string json;
+  std::vector<std::string> joints{};          ///< list: only these; empty: all
+  bool gains = false;                         ///< list: the gains instead of what is measured
+  bool drives = false;                        ///< list: motors and drives instead of joints
+  std::string joint{};                        ///< all but list
+  std::string to{}, speed{}, acceleration{};  ///< move: with or without a unit; empty: default
+  bool wait = false;                          ///< move: until it has ended
+  std::string mode{}, interaction{};          ///< empty: as it is
+  std::optional<double> stiffness_Nm_rad{}, damping_Nms_rad{};
+  std::string loop{};
+  std::optional<double> kp{}, ki{}, kd{};
+  ControlTarget target{};
+  std::string json{};
 };
 
 /// tandem sensor list
 struct SensorOptions {
-  std::vector<std::string> sensors;  ///< only these; empty: all
-  ControlTarget target;
-  std::string json;
+  std::vector<std::string> sensors{};  ///< only these; empty: all
+  ControlTarget target{};
+  std::string json{};
 };
 
 /// tandem clock show|pause|resume|step|rate

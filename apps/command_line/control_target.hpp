@@ -10,10 +10,10 @@
 namespace tandem::apps {
 
 struct ControlTarget {
-  std::string socket;                     ///< of the process; empty: the only one of this user
-  bool dds = false;                       ///< ask over DDS instead
-  DdsPlace place;                         ///< of DDS
-  std::optional<std::string> name_space;  ///< "left"; empty: the only process of the domain
+  std::string socket{};                     ///< of the process; empty: the only one of this user
+  bool dds = false;                         ///< ask over DDS instead
+  DdsPlace place{};                         ///< of DDS
+  std::optional<std::string> name_space{};  ///< "left"; empty: the only process of the domain
 };
 
 }  // namespace tandem::apps

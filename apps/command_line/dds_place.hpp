@@ -10,8 +10,7 @@ namespace tandem::apps {
 struct DdsPlace {
   int domain = 0;
   std::vector<std::string> interfaces{"lo"};  ///< network interfaces
-  std::string
-      from;  ///< TOML with the [dds] table that says all of it, with DDS Security; empty: none
+  std::string from{};  ///< TOML whose [dds] says all of it, with DDS Security; empty: none
 };
 
 }  // namespace tandem::apps

@@ -112,11 +112,9 @@ TEST_F(SensorAnswers, NameFrameValuesAndAge) {
   has(out, "palm");
   has(out, "0  0  9.81");
   has(out, "fresh");
-  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"imu"}, .target = {}, .json = {}}),
-            Exit::kDone);
+  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"imu"}}), Exit::kDone);
   EXPECT_EQ(out.find("palm"), std::string::npos) << out;
-  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"hnad"}, .target = {}, .json = {}}),
-            Exit::kUsage);
+  EXPECT_EQ(command(sensor_command, SensorOptions{.sensors = {"hnad"}}), Exit::kUsage);
   has(err, "the robot has no sensor 'hnad' (did you mean 'hand'?)");
 }
 

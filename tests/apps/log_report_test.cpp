@@ -66,7 +66,7 @@ TEST_F(LogAndReport, CsvDoesNotWriteOverTheLog) {
   EXPECT_NE(outcome.err.find("this is the log itself"), std::string::npos) << outcome.err;
   EXPECT_EQ(tandem("log info " + log_).status, 0);
   const std::string robot = read_text(folder_ / "robot.toml");
-  for (const std::string command :
+  for (const std::string& command :
        {"log csv " + log_ + " -o robot.toml", std::string("model build robot.toml -o robot.toml"),
         "report " + log_ + " --json robot.toml"}) {
     const Outcome over = tandem(command);

@@ -61,9 +61,8 @@ struct AnsweredRun : ::testing::Test {
     EXPECT_TRUE(socket) << socket.error().to_string();
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
-    const Exit status = fault_command({.action = FaultOptions::Action::kReset,
-                                       .target = {.socket = path, .place = {}},
-                                       .json = {}});
+    const Exit status =
+        fault_command({.action = FaultOptions::Action::kReset, .target = {.socket = path}});
     out = ::testing::internal::GetCapturedStdout();
     err = ::testing::internal::GetCapturedStderr();
     return status;
