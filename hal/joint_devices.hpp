@@ -83,7 +83,8 @@ class InteractionModes {
 class PositionControl {
  public:
   explicit PositionControl(JointAccess& access);
-  /// Starts a motion to `target_rad`; one under way goes over into it without a jump.
+  /// Starts a motion to `target_rad`; one under way goes over into it without a jump. When it is
+  /// too fast to rest there, it passes the target and comes back.
   Code position_move(std::size_t j, double target_rad) noexcept TANDEM_RT;
   /// The same, by `way_rad` from the reference's place now.
   Code relative_move(std::size_t j, double way_rad) noexcept TANDEM_RT;
@@ -93,10 +94,11 @@ class PositionControl {
   /// Greater than 0 and at most the joint's limit. Default: a quarter of the limit.
   Code set_ref_speed(std::size_t j, double rad_s) noexcept TANDEM_RT;
   [[nodiscard]] double ref_speed_rad_s(std::size_t j) const noexcept TANDEM_RT;
-  /// Greater than 0. Default: the default speed in half a second.
+  /// Greater than 0. Default: the default speed in half a second. A motion under way keeps the
+  /// largest that it had: with less it could not brake before its joint's limits.
   Code set_ref_acceleration(std::size_t j, double rad_s2) noexcept TANDEM_RT;
   [[nodiscard]] double ref_acceleration_rad_s2(std::size_t j) const noexcept TANDEM_RT;
-  /// Brakes with the reference acceleration and stays there.
+  /// Brakes with the motion's acceleration, at least the default one, and stays there.
   Code stop(std::size_t j) noexcept TANDEM_RT;
   /// Ends every motion, or the joint's, without a further reference: somebody else has the joint.
   void abandon() noexcept TANDEM_RT;
@@ -115,6 +117,7 @@ class PositionControl {
     double target_rad = 0.0;
     double speed_rad_s = 0.0;
     double acceleration_rad_s2 = 0.0;
+    double hardest_rad_s2 = 0.0;  ///< the largest acceleration since it left its rest
     std::int64_t phase = kResting;
   };
   JointAccess& io_;

@@ -13,13 +13,20 @@ constexpr double kSmallest = std::numeric_limits<double>::min();
 
 double seconds(const JointAccess& io) noexcept { return static_cast<double>(io.period_ns) * 1e-9; }
 
+double default_speed_rad_s(const JointCapabilities& joint) noexcept {
+  return joint.max_velocity_rad_s / 4.0;
+}
+double default_acceleration_rad_s2(const JointCapabilities& joint) noexcept {
+  return default_speed_rad_s(joint) / 0.5;
+}
+
 }  // namespace
 
 PositionControl::PositionControl(JointAccess& access)
     : io_(access), motions_(access.joints.size()) {
   for (std::size_t j = 0; j < motions_.size(); ++j) {
-    motions_[j].speed_rad_s = io_.joints[j].max_velocity_rad_s / 4.0;
-    motions_[j].acceleration_rad_s2 = motions_[j].speed_rad_s / 0.5;
+    motions_[j].speed_rad_s = default_speed_rad_s(io_.joints[j]);
+    motions_[j].acceleration_rad_s2 = default_acceleration_rad_s2(io_.joints[j]);
   }
 }
 
@@ -29,7 +36,11 @@ Code PositionControl::position_move(std::size_t j, double target_rad) noexcept T
   const Code code = checked(io_, j, target_rad, limit.min_position_rad, limit.max_position_rad);
   if (code != Code::kOk) return code;
   Motion& motion = motions_[j];
-  if (motion.phase == kResting) motion.reference = {io_.command->position_rad()[j], 0.0};
+  if (motion.phase == kResting) {
+    motion.reference = {io_.command->position_rad()[j], 0.0};
+    motion.hardest_rad_s2 = 0.0;
+  }
+  motion.hardest_rad_s2 = std::max(motion.hardest_rad_s2, motion.acceleration_rad_s2);
   motion.target_rad = target_rad;
   motion.phase = kMoving;
   return Code::kOk;
@@ -70,7 +81,10 @@ double PositionControl::ref_acceleration_rad_s2(std::size_t j) const noexcept TA
 
 Code PositionControl::stop(std::size_t j) noexcept TANDEM_RT {
   if (j >= motions_.size()) return Code::kOutOfRange;
-  if (motions_[j].phase == kMoving) motions_[j].phase = kBraking;
+  Motion& motion = motions_[j];
+  if (motion.phase == kMoving) motion.phase = kBraking;
+  motion.hardest_rad_s2 =
+      std::max(motion.hardest_rad_s2, default_acceleration_rad_s2(io_.joints[j]));
   return Code::kOk;
 }
 
@@ -99,9 +113,9 @@ void PositionControl::advance() noexcept TANDEM_RT {
     Trapezoid& reference = motion.reference;
     bool done = false;
     if (motion.phase == kMoving) {
-      done = reference.step(motion.target_rad, motion.speed_rad_s, motion.acceleration_rad_s2, dt);
+      done = reference.step(motion.target_rad, motion.speed_rad_s, motion.hardest_rad_s2, dt);
     } else {
-      reference.run(0.0, motion.acceleration_rad_s2, dt);
+      reference.run(0.0, motion.hardest_rad_s2, dt);
       motion.target_rad = reference.position_rad;
       done = reference.velocity_rad_s == 0.0;
     }

@@ -12,7 +12,7 @@ bool Trapezoid::step(double target_rad, double speed_rad_s, double acceleration_
   const double a = acceleration_rad_s2;
   const double change = a * dt_s;  // of the velocity, at most
   const double way = target_rad - position_rad;
-  if (std::abs(way) <= change * dt_s && std::abs(velocity_rad_s) <= change) {
+  if (std::abs(way) <= std::min(change, speed_rad_s) * dt_s && std::abs(velocity_rad_s) <= change) {
     position_rad = target_rad;
     velocity_rad_s = 0.0;
     return true;
@@ -21,8 +21,8 @@ bool Trapezoid::step(double target_rad, double speed_rad_s, double acceleration_
   // way that is left after this step, way - (v + w) dt / 2.
   const double side = way < 0.0 ? -1.0 : 1.0;
   const double left = side * (way - velocity_rad_s * dt_s / 2.0);
-  const double brake =
-      a * (std::sqrt(dt_s * dt_s / 4.0 + 2.0 * std::max(left, 0.0) / a) - dt_s / 2.0);
+  const double twice = 2.0 * std::max(left, 0.0);
+  const double brake = twice / (std::sqrt(dt_s * dt_s / 4.0 + twice / a) + dt_s / 2.0);
   const double wanted = side * std::min(brake, speed_rad_s);
   run(wanted, a, dt_s);
   return false;

@@ -44,6 +44,22 @@ TEST(Trapezoid, TurnsRoundWithoutAJumpOfVelocity) {
   EXPECT_EQ(reference.position_rad, -0.2);
 }
 
+/// With 1400 rad/s^2 the last step would otherwise be 1.4 mm long, in a millisecond.
+TEST(Trapezoid, IsNeverFasterThanItsSpeedHoweverHardItMayBrake) {
+  for (const double acceleration : {700.0, 1400.0, 1e4, 1e9, 1e300}) {
+    Trapezoid reference;
+    int steps = 0;
+    double last = 0.0;
+    while (!reference.step(1.0, 0.7, acceleration, 1e-3)) {
+      ASSERT_LE(reference.position_rad - last, 0.7e-3 * (1 + 1e-9)) << acceleration;
+      ASSERT_LT(++steps, 2'000) << acceleration;
+      last = reference.position_rad;
+    }
+    EXPECT_LE(reference.position_rad - last, 0.7e-3 * (1 + 1e-9)) << acceleration;
+    EXPECT_EQ(reference.position_rad, 1.0) << acceleration;
+  }
+}
+
 class DevicesTest : public testing::Test {
  protected:
   void mode(ControlMode mode) { ASSERT_EQ(devices.modes.set_control_mode(0, mode), Code::kOk); }
@@ -54,6 +70,66 @@ class DevicesTest : public testing::Test {
   ParameterImage parameters = initial_parameters(robot);
   Devices devices{robot_of(robot), state, command, parameters, 1'000'000};
 };
+
+/// At 2 rad/s, braking with 4 rad/s^2 takes half a radian; with the slow motion's own 0.01 rad/s^2
+/// it would take two hundred.
+class FastMotion : public DevicesTest {
+ protected:
+  void SetUp() override {
+    mode(ControlMode::kPosition);
+    ASSERT_EQ(motion.set_ref_speed(0, 2.0), Code::kOk);
+    ASSERT_EQ(motion.set_ref_acceleration(0, 4.0), Code::kOk);
+    ASSERT_EQ(motion.position_move(0, 1.4), Code::kOk);
+    for (int i = 0; i < 600; ++i) advance();
+    fast_at_rad = command.position_rad()[0];
+    ASSERT_GT(command.velocity_rad_s()[0], 1.4);
+  }
+  void advance() {
+    motion.advance();
+    farthest_rad = std::max(farthest_rad, command.position_rad()[0]);
+  }
+  void rest() {
+    for (int i = 0; !motion.check_motion_done(0); ++i) {
+      advance();
+      ASSERT_LT(i, 100'000);
+    }
+  }
+
+  PositionControl& motion = devices.position;
+  double fast_at_rad = 0.0, farthest_rad = 0.0;
+};
+
+TEST_F(FastMotion, KeepsItsBrakeWhenASlowerOneTakesItOver) {
+  ASSERT_EQ(motion.set_ref_speed(0, 0.02), Code::kOk);
+  ASSERT_EQ(motion.set_ref_acceleration(0, 0.01), Code::kOk);
+  ASSERT_EQ(motion.position_move(0, fast_at_rad + 0.2), Code::kOk);
+  rest();
+  EXPECT_LE(farthest_rad, fast_at_rad + 0.51) << "half a radian, and then back";
+  EXPECT_EQ(command.position_rad()[0], fast_at_rad + 0.2);
+}
+
+TEST_F(FastMotion, IsStoppedWithItsBrakeByWhoeverHasAskedForASlowOne) {
+  ASSERT_EQ(motion.set_ref_acceleration(0, 0.01), Code::kOk);
+  ASSERT_EQ(motion.position_move(0, 1.4), Code::kOk);
+  ASSERT_EQ(motion.stop(0), Code::kOk);
+  rest();
+  EXPECT_LE(command.position_rad()[0], fast_at_rad + 0.51);
+}
+
+/// The default is 1 rad/s^2 here: a quarter of 2 rad/s in half a second.
+TEST_F(DevicesTest, AStopBrakesAtLeastAsHardAsAnOrdinaryMotion) {
+  mode(ControlMode::kPosition);
+  PositionControl& motion = devices.position;
+  ASSERT_EQ(motion.set_ref_acceleration(0, 0.1), Code::kOk);
+  ASSERT_EQ(motion.position_move(0, 1.4), Code::kOk);
+  for (int i = 0; i < 3000; ++i) motion.advance();
+  const double from = command.position_rad()[0];
+  ASSERT_GT(command.velocity_rad_s()[0], 0.29);
+  ASSERT_EQ(motion.stop(0), Code::kOk);
+  for (int i = 0; i < 310; ++i) motion.advance();
+  EXPECT_TRUE(motion.check_motion_done(0));
+  EXPECT_LE(command.position_rad()[0] - from, 0.3 * 0.3 / 2.0 * 1.01);
+}
 
 TEST_F(DevicesTest, RefuseWhatIsNotFiniteOrBeyondALimitAndChangeNothing) {
   mode(ControlMode::kPosition);
