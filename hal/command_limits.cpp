@@ -96,7 +96,11 @@ void CommandLimits::position(std::size_t joint, const StateImage& state,
   double& reference = command.position_rad()[joint];
   const double measured = state.position_rad()[joint];
   const bool wanted = is(ControlMode::kPosition, command.mode()[joint]);
-  const bool closed = wanted && is(ControlMode::kPosition, last.mode) && in_operation(state, joint);
+  const bool stiffens =
+      last.interaction == static_cast<std::int64_t>(InteractionMode::kCompliant) &&
+      command.interaction()[joint] == static_cast<std::uint8_t>(InteractionMode::kStiff);
+  const bool closed =
+      wanted && is(ControlMode::kPosition, last.mode) && !stiffens && in_operation(state, joint);
   if (!closed && std::isfinite(measured)) last.position_rad = measured;
   last.mode = command.mode()[joint];
   last.interaction = command.interaction()[joint];

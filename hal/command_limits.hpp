@@ -34,8 +34,8 @@ struct LimitCounters {
 /// - A joint that stands outside its range when its position loop is closed stays there: its
 ///   reference may come in, at kRecoveryShare of its velocity, and not go out again.
 /// - A position reference moves by at most max velocity * period from the last one. Where the
-///   position loop is not yet closed (other mode, drive not enabled) the last one is the
-///   measured position, so that every start is from where the joint stands. In other modes the
+///   position loop is not yet closed (other mode, compliant, drive not enabled) the last one is
+///   the measured position, so that every start is from where the joint stands. In other modes the
 ///   position reference is not used, and set to the measured position.
 /// - Where a joint declares them, a position reference keeps its acceleration and jerk, a velocity
 ///   reference its acceleration and jerk: ReferenceMotion.

@@ -145,6 +145,23 @@ TEST_F(Limits, StartFromTheMeasuredPositionWheneverTheLoopWasOpen) {
   EXPECT_DOUBLE_EQ(command.position_rad()[0], -0.498);
 }
 
+/// A spring may yield far: stiff again, the joint stays where it is instead of leaping to where the
+/// reference was.
+TEST_F(Limits, StartFromTheMeasuredPositionWhenAJointBecomesStiff) {
+  command.interaction()[0] = static_cast<std::uint8_t>(InteractionMode::kCompliant);
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  state.position_rad()[0] = 0.8;  // pulled off its reference, which is 0.1
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_EQ(command.position_rad()[0], 0.1) << "as long as it yields";
+  command.interaction()[0] = static_cast<std::uint8_t>(InteractionMode::kStiff);
+  command.position_rad()[0] = 0.8;
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_EQ(command.position_rad()[0], 0.8);
+  command.position_rad()[0] = 0.1;  // whoever still wants it there gets it at the joint's speed
+  ASSERT_EQ(limits.apply(state, command), Code::kOk);
+  EXPECT_DOUBLE_EQ(command.position_rad()[0], 0.798);
+}
+
 TEST_F(Limits, LeaveAJointOutsideOfItsRangeWhereItIsAndLeadItBackSlowly) {
   state.position_rad()[0] = 1.6;
   state.drive_state()[0] = static_cast<std::uint8_t>(DriveState::kSwitchedOn);
