@@ -228,8 +228,9 @@ void McapWriter::finish_chunk() {
 void McapWriter::write_indices(Chunk& chunk) {
   const std::uint64_t begin = offset_;
   Bytes records;
-  for (std::uint16_t channel = 0; channel < index_.size(); ++channel) {
-    std::vector<IndexEntry>& entries = index_[channel];
+  for (std::size_t i = 0; i < index_.size(); ++i) {
+    const auto channel = static_cast<std::uint16_t>(i);
+    std::vector<IndexEntry>& entries = index_[i];
     if (entries.empty()) continue;
     chunk.index_offsets[channel] = begin + records.size();
     Bytes content;

@@ -130,7 +130,7 @@ class Reader {
 
   /// An attribute that names something: no blanks around it, no control characters in it.
   std::string name_of(const XMLElement& e, const char* attribute_name, const std::string& key) {
-    const std::string name = attribute(e, attribute_name, key, Needed::kYes);
+    std::string name = attribute(e, attribute_name, key, Needed::kYes);
     const bool odd = std::ranges::any_of(name, [](unsigned char c) { return c < 32 || c == 127; });
     if (!is_utf8(name)) {
       error(e.GetLineNum(), key,

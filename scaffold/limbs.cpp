@@ -94,7 +94,7 @@ class Namer {
   }
 
   [[nodiscard]] std::string name(const Limb& limb) const {
-    const std::string kind = kind_of(limb);
+    std::string kind = kind_of(limb);
     if (kind == "torso" || kind == "head" || limbs_.size() == 1) return kind;
     const Vector3d tip = neutral_.beyond(limb.joints.back()).com_m;
     const Vector3d left = Vector3d::UnitZ().cross(ahead_);

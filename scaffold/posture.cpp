@@ -106,8 +106,9 @@ VectorXd spared_posture(const Tree& tree) {
     double least = loaded(tree, Posed(tree, q), joint);
     double best = q[joint];
     for (int i = 2; least > kSparedLoad; ++i) {  // to either side, ever farther
-      const double at = q[joint] + kSearchStep * (i % 2 == 0 ? i / 2 : -(i / 2));
-      if (kSearchStep * (i / 2) > bounds.upper[joint] - bounds.lower[joint]) break;
+      const int steps = i / 2;
+      const double at = q[joint] + kSearchStep * (i % 2 == 0 ? steps : -steps);
+      if (kSearchStep * steps > bounds.upper[joint] - bounds.lower[joint]) break;
       if (at < bounds.lower[joint] || at > bounds.upper[joint]) continue;
       VectorXd moved = q;
       moved[joint] = at;

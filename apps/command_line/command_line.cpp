@@ -30,8 +30,9 @@ Exit status: 0 done; 1 the run ended in a fault; 2 wrong input or usage, or no r
 
 /// The innermost subcommand that was named.
 const CLI::App& innermost(const CLI::App& app) {
-  const std::vector<CLI::App*> named = app.get_subcommands();
-  return named.empty() ? app : innermost(*named.front());
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+  return *at;
 }
 
 std::vector<std::string> flags_of(const CLI::App& app) {
