@@ -1,17 +1,19 @@
 # Two commands: `make demo` and `make test`. Thin covers over the CMake presets.
 JOBS ?= $(shell nproc)
+# Some tests wait for other processes.
+TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
-FUZZ_JOBS ?= 2
+FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
+.PHONY: demo test test-all unit anywhere hil beside_hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
-	@echo "make fuzz   the fuzzers, a minute each, two at a time; FUZZ_RUNS=1000000: so many inputs each"
+	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
 	@echo "make format  lay out every source; make lint: whether they are (part of make test)"
 	@echo "make clean  remove build/ and runs/"
@@ -29,15 +31,14 @@ demo:
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
-# What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
-# take one core, and beside them a minute of each fuzz target and the real-time proof. The last lines
+# What CI runs: all tests; the tests on a real CAN stack, which take one core, and beside them some
+# tests in strange surroundings, a minute of each fuzz target and the real-time proof. The last lines
 # say what ran and what did not.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint
 	@$(MAKE) --no-print-directory unit
-	@$(MAKE) --no-print-directory anywhere
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil sanitized
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync=line hil beside_hil
 	@echo
 	@cat build/summary
 
@@ -57,7 +58,11 @@ unit:
 	@scripts/install-node-modules
 	@cmake --preset release --log-level=WARNING
 	@cmake --build --preset release --parallel $(JOBS)
-	@TITLE=unit scripts/run-tests build/release $(JOBS) -LE hil
+	@TITLE=unit scripts/run-tests build/release $(TEST_JOBS) -LE hil
+
+beside_hil:
+	@$(MAKE) --no-print-directory anywhere
+	@$(MAKE) --no-print-directory sanitized
 
 # A choice of the unit tests, as `unit` built them, as another user and with other surroundings.
 anywhere:
@@ -75,13 +80,13 @@ sanitized:
 	@$(MAKE) --no-print-directory fuzz
 	@$(MAKE) --no-print-directory rtsan
 
-# One humanoid will do: WALK-MAN's runs take as long as COMAN's, and call nothing else. Random robots
-# are for the generator, which is not in the cycle.
+# One humanoid will do: WALK-MAN's runs take as long as COMAN's, and call nothing else. Nor does a
+# long run.
 rtsan:
 	@scripts/install-dependencies test
 	@cmake --preset rtsan --log-level=WARNING
 	@cmake --build --preset rtsan --parallel $(JOBS)
-	@scripts/run-tests build/rtsan $(JOBS) -E 'walkman|RandomRobots'
+	@scripts/run-tests build/rtsan $(TEST_JOBS) -E 'walkman|DoesNotDriftInAMinute'
 
 # Every room; the kernels are those of `unit`. Of the generator's random robots fewer: they are slow
 # here, and each does the same.

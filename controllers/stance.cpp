@@ -28,6 +28,15 @@ Vector3d origin(const std::vector<double>& pose, std::size_t site) noexcept {
   return Map<const Vector3d>(&pose[12 * site + 9]);
 }
 
+/// The least rotation from one direction to another that is not its opposite. Eigen's
+/// FromTwoVectors gives the same bits, but compiles a singular value decomposition for opposites.
+Matrix3d shortest_turn(const Vector3d& from, const Vector3d& to) noexcept TANDEM_RT {
+  const Vector3d a = from.normalized(), b = to.normalized();
+  const double twice_cos_half = std::sqrt((1.0 + b.dot(a)) * 2.0);
+  const Vector3d axis = a.cross(b) * (1.0 / twice_cos_half);
+  return Eigen::Quaterniond(twice_cos_half * 0.5, axis.x(), axis.y(), axis.z()).toRotationMatrix();
+}
+
 }  // namespace
 
 Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet)
@@ -162,7 +171,7 @@ void Stance::level(std::size_t i, const Matrix3d& base_G) noexcept TANDEM_RT {
       wanted = Vector3d(axis.x(), axis.y(), 0.0).normalized();
       across = Vector3d::UnitZ().cross(wanted);
     }
-    turn = Eigen::Quaterniond::FromTwoVectors(axis, wanted).toRotationMatrix() * turn;
+    turn = shortest_turn(axis, wanted) * turn;
   }
   Map<Matrix3d>(placed_[i].turn.data()) = turn;
   Map<Vector3d>(placed_[i].across.data()) = across;

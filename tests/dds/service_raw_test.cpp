@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 using tandem::test::eventually;
 using RawRequest = std_srvs_srv_dds__Trigger_Request_;
 using RawResponse = std_srvs_srv_dds__Trigger_Response_;
-using Bytes = std::vector<std::uint8_t>;
+using Octets = std::vector<std::uint8_t>;
 
 /// A client or a server of "reset" that knows nothing of our wrapper.
 struct RawEnd {
@@ -46,11 +46,11 @@ struct RawEnd {
            dds_get_matched_publications(reader, nullptr, 0) > 0;
   }
   /// The next sample with its encoding's header.
-  [[nodiscard]] Bytes take_bytes() const {
+  [[nodiscard]] Octets take_bytes() const {
     ddsi_serdata* data = nullptr;
     dds_sample_info_t info;
     if (dds_takecdr(reader, &data, 1, &info, DDS_ANY_STATE) != 1) return {};
-    Bytes bytes(ddsi_serdata_size(data));
+    Octets bytes(ddsi_serdata_size(data));
     ddsi_serdata_to_ser(data, 0, bytes.size(), bytes.data());
     ddsi_serdata_unref(data);
     return bytes;
@@ -111,13 +111,13 @@ TEST_F(RawService, AnswersWithTheHeaderOfTheRequestByteForByte) {
   ASSERT_TRUE(eventually([&] { return raw->connected(); }));
   const RawRequest request{0x1122334455667788, 7, 0};
   ASSERT_EQ(dds_write(raw->writer, &request), DDS_RETCODE_OK);
-  Bytes reply;
+  Octets reply;
   ASSERT_TRUE(eventually([&] { return !(reply = raw->take_bytes()).empty(); }));
-  const Bytes expected{0x00, 0x01, 0x00, 0x00,                          // little-endian CDR
-                       0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,  // guid
-                       0x07, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,  // sequence
-                       0x01, 0x00, 0x00, 0x00,                          // success, alignment
-                       0x05, 0x00, 0x00, 0x00, 'd',  'o',  'n',  'e',  0x00};
+  const Octets expected{0x00, 0x01, 0x00, 0x00,                          // little-endian CDR
+                        0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,  // guid
+                        0x07, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,  // sequence
+                        0x01, 0x00, 0x00, 0x00,                          // success, alignment
+                        0x05, 0x00, 0x00, 0x00, 'd',  'o',  'n',  'e',  0x00};
   ASSERT_GE(reply.size(), expected.size());  // it may be padded to four bytes
   reply.resize(expected.size());
   reply[3] = 0;  // how many bytes of padding there are
@@ -185,7 +185,7 @@ TEST_F(RawService, RepliesThatAreNotForItAreIgnoredByAClient) {
       *participant, "reset");
   ASSERT_TRUE(polite);
   std::thread impostor([&raw] {
-    Bytes request;
+    Octets request;
     if (!eventually([&] { return !(request = raw.take_bytes()).empty(); })) return;
     std::uint64_t guid = 0;
     std::int64_t sequence = 0;
