@@ -162,9 +162,9 @@ Status Plant::place_contact(const PlantConfig& config) {
 }
 
 Status Plant::close_loops(double* q) {
-  constexpr int kMostSteps = 200;
+  constexpr int kStepsFromAnywhere = 200;
   model::ClosedLoops& loops = loops_.equations();
-  if (loops_.none() || loops.close(q, kMostSteps)) return {};
+  if (loops_.none() || loops.close(q, kStepsFromAnywhere)) return {};
   std::size_t worst = 0;
   for (std::size_t l = 1; l < loops.loops(); ++l)
     if (loops.position_error_m(l) > loops.position_error_m(worst)) worst = l;
