@@ -11,6 +11,15 @@ namespace tandem::runtime {
 using hal::StopCategory;
 using log::EventKind;
 
+namespace {
+
+/// joint.stop
+bool stops_motion(const LoopRequest& request) noexcept TANDEM_RT {
+  return request.kind == LoopRequest::Kind::kMove && !std::isfinite(request.move.target_rad);
+}
+
+}  // namespace
+
 /// After everything that may change the phase: the owner, then what is urgent, then requests.
 void RobotCycle::take_inbox() noexcept TANDEM_RT {
   follow_owner();
@@ -39,8 +48,9 @@ void RobotCycle::take_requests() noexcept TANDEM_RT {
     const std::optional<LoopRequest> request = inbox_.take_request();
     if (!request) return;
     const bool ending = ends(run_.phase());
+    const bool at_rest = stops_motion(*request) && !controllers_->leads(request->joint);
     LoopAnswer answer = ending ? LoopAnswer{.reason = RejectReason::kEnding} : carry_out(*request);
-    if (answer.reason == RejectReason::kNone) log_request(*request);
+    if (answer.reason == RejectReason::kNone && !at_rest) log_request(*request);
     answer.number = request->number;
     answer.cycle = time_.cycle;
     inbox_.answer(answer);
@@ -149,7 +159,7 @@ void RobotCycle::log_request(const LoopRequest& request) noexcept TANDEM_RT {
   if (request.kind == Kind::kRecover) event(EventKind::kRecoveryRequested, joint);
   if (request.kind == Kind::kGains) event(EventKind::kGainsSet, joint);
   if (request.kind != Kind::kMove) return;
-  if (!std::isfinite(request.move.target_rad)) return event(EventKind::kMotionStopped, joint);
+  if (stops_motion(request)) return event(EventKind::kMotionStopped, joint);
   const std::uint32_t unit = robot_->joints[request.joint].slides ? 1 : 0;
   log_.event(time_, EventKind::kMotionRequested, joint, unit,
              static_cast<float>(request.move.target_rad));

@@ -30,6 +30,31 @@ struct Words {
   std::string hint;
 };
 
+/// @param what  "moved", "set"
+Words while_latched(const std::string& what) {
+  return {"nothing is " + what + " while a fault is latched", "tandem fault reset, then ask again"};
+}
+
+/// Why no joint may move in the phase. Empty in one with another answer.
+Words not_yet(RunPhase phase) {
+  switch (phase) {
+    case RunPhase::kBringUp:
+      return {"its drive is not enabled yet", "ask again in the phase running"};
+    case RunPhase::kSettling:
+      return {"the joints are held until the robot has settled at its start",
+              "wait a moment, then ask again"};
+    case RunPhase::kRetreating:
+      return {"the robot is on its way to a safe posture", "ask again after a reset"};
+    case RunPhase::kFaulted: return while_latched("moved");
+    case RunPhase::kResetting: return {"a reset is under way", "wait a moment, then ask again"};
+    case RunPhase::kRunning:
+    case RunPhase::kHeld:
+    case RunPhase::kShutDown:
+    case RunPhase::kDone: break;
+  }
+  return {};
+}
+
 /// @param one, other  controllers that stand in the way; empty where there is none
 // NOLINTNEXTLINE(readability-function-size): a table
 Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
@@ -38,6 +63,7 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
     case RejectReason::kNone: break;
     case RejectReason::kEnding: return {"the run shuts down", "start another run"};
     case RejectReason::kNotRunning:
+      if (phase == RunPhase::kFaulted) return while_latched("set");
       if (phase == RunPhase::kHeld) {
         return {"every joint is held after the reset, until the controllers run",
                 "tandem controller start lets them continue, then ask again"};
@@ -66,6 +92,7 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
       return {"is not in position control, which it needs for this",
               "tandem joint set " + joint + " --mode position"};
     case RejectReason::kNotEnabled:
+      if (Words yet = not_yet(phase); !yet.message.empty()) return yet;
       return {"nothing is moved before the joints are enabled, or while a fault is latched",
               "tandem fault reset, then ask again"};
     case RejectReason::kNotHeld:

@@ -44,7 +44,9 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
                     const std::string& per) {
   if (text.empty()) return {};
   double number = 0.0;
-  const std::string_view trimmed = without_blanks_around(text);
+  std::string_view trimmed = without_blanks_around(text);
+  // std::from_chars() knows no plus sign.
+  if (trimmed.starts_with('+') && !trimmed.starts_with("+-")) trimmed.remove_prefix(1);
   const char* last = trimmed.data() + trimmed.size();
   const auto [end, error] = std::from_chars(trimmed.data(), last, number);
   const std::string_view unit = without_blanks_around({end, last});
@@ -54,7 +56,11 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
         fmt::format("write 30deg{0}, 0.5rad{0}, 20mm{0}, 2cm{0}, 0.02m{0}, or a number in SI units",
                     per));
   };
-  if (error != std::errc() || !std::isfinite(number)) return wrong();
+  const bool read = error == std::errc();
+  if (error == std::errc::result_out_of_range || (read && !std::isfinite(number))) {
+    return fail_at(flag, fmt::format("'{}' is not finite", text), "give a finite number");
+  }
+  if (!read) return wrong();
   question[key] = number;
   if (unit.empty()) return {};
   for (const Unit& known : {Unit{"deg", std::numbers::pi / 180.0, "angle"},
@@ -74,7 +80,20 @@ Status add_quantity(Json& question, const char* key, const char* flag, const std
   return wrong();
 }
 
+/// Whether there is something to do.
+Status check_asked(const JointOptions& o) {
+  if (o.action == JointOptions::Action::kSet && o.mode.empty() && o.interaction.empty() &&
+      !o.stiffness_Nm_rad && !o.damping_Nms_rad) {
+    return fail("nothing is to be set", "give --mode, --interaction, --stiffness or --damping");
+  }
+  if (o.action == JointOptions::Action::kGains && !o.kp && !o.ki && !o.kd) {
+    return fail("nothing is to be set", "give --kp, --ki or --kd");
+  }
+  return {};
+}
+
 Result<Json> question_of(const JointOptions& o) {
+  if (Status asked = check_asked(o); !asked) return std::unexpected(asked.error());
   Json question{{"do", "joint.list"}};
   switch (o.action) {
     case JointOptions::Action::kList:
@@ -109,6 +128,13 @@ Result<Json> question_of(const JointOptions& o) {
 /// Whether the target was written in degrees: it is shown in them, too.
 bool in_degrees(const JointOptions& options) { return options.to.find("deg") != std::string::npos; }
 
+/// @param answer  the joint after the stop, where the stop is `done`
+const char* outcome_of_stop(bool done, const Json& answer) {
+  if (!done) return "brakes then; a motion that has not begun is taken back";
+  return answer.value("moving", false) ? "brakes, and stays where it comes to rest"
+                                       : "does not move: there is nothing to stop";
+}
+
 void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
   using Action = JointOptions::Action;
   if (options.action == Action::kList) {
@@ -135,13 +161,12 @@ void print_answer(const JointOptions& options, const Json& answer, const Json& q
       break;
     case Action::kGains: print_gains(Json::array({answer})); break;
     case Action::kMove:
-      fmt::print("{} moves from {} to {}: tandem joint list {}\n", options.joint,
+      fmt::print("{} {} from {} to {}: tandem joint list {}\n", options.joint,
+                 done ? "moves" : "will move",
                  place_of(answer, answer["position_rad"], in_degrees(options)),
                  place_of(answer, question["target_rad"], in_degrees(options)), options.joint);
       break;
-    case Action::kStop:
-      fmt::print("{} brakes, and stays where it comes to rest\n", options.joint);
-      break;
+    case Action::kStop: fmt::print("{} {}\n", options.joint, outcome_of_stop(done, answer)); break;
     case Action::kRecover:
       fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", options.joint,
                  number_of(answer, "position_rad"), unit_of(answer), options.joint);
@@ -171,15 +196,19 @@ Result<Json> look(ControlClient& run, const std::string& name) {
 constexpr std::chrono::milliseconds kLook{20};  // between two
 
 /// The joint once its motion has ended, and its reference has come to rest; after Ctrl-C at once.
-Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double target) {
+/// @param begun  whether the loop has taken the request; set when it has in the meantime
+Result<Json> wait_for_motion(ControlClient& run, const std::string& name, double target,
+                             bool& begun) {
   Json before;
   for (;;) {
     Result<Json> now = look(run, name);
     if (!now || !(*now)["commanded_position_rad"].is_number()) return now;
     const double reference = (*now)["commanded_position_rad"];
     (*now)["arrived"] = std::abs(reference - target) < 1e-6;
-    const bool rests = !before.is_null() && before["cycle"] != (*now)["cycle"] &&
-                       before["commanded_position_rad"] == (*now)["commanded_position_rad"];
+    const bool cycled = !before.is_null() && before["cycle"] != (*now)["cycle"];
+    begun = begun || cycled;
+    const bool rests =
+        cycled && before["commanded_position_rad"] == (*now)["commanded_position_rad"];
     if (!now->value("moving", false) && (now->value("arrived", false) || rests)) return now;
     if (rt::stop_requested()) return now;
     before = *now;
@@ -210,7 +239,8 @@ void warn_if_far(const JointOptions& options, const Json& joint) {
 }
 
 /// What came of a motion that was waited for.
-Exit tell_motion(const JointOptions& options, const Json& joint, double target) {
+/// @param begun  false: Ctrl-C ended the waiting before the loop took the request
+Exit tell_motion(const JointOptions& options, const Json& joint, double target, bool begun) {
   const bool degrees = in_degrees(options);
   const std::string at = place_of(joint, joint["commanded_position_rad"], degrees) + ", measured " +
                          place_of(joint, joint["position_rad"], degrees);
@@ -223,6 +253,13 @@ Exit tell_motion(const JointOptions& options, const Json& joint, double target) 
   if (joint.value("moving", false)) {  // Ctrl-C
     fmt::print(stderr, "{0} still moves to {1}: `tandem joint stop {0}` brakes it\n", options.joint,
                place_of(joint, target, degrees));
+    return Exit::kFault;
+  }
+  if (!begun) {
+    fmt::print(stderr,
+               "{0} has not begun to move to {1}: it begins when the run goes on (tandem clock "
+               "resume); `tandem joint stop {0}` takes the motion back\n",
+               options.joint, place_of(joint, target, degrees));
     return Exit::kFault;
   }
   const std::string owner = joint.value("controller", "");
@@ -291,10 +328,11 @@ Exit joint_command(const JointOptions& options) {
   Exit exit = Exit::kDone;
   const bool resets = options.action == Action::kReset && answer.value("latched", false) &&
                       answer.value("done", false);
+  bool begun = answer.value("done", false);
   if (moves || resets) {
     std::fflush(stdout);  // before the waiting
     const Result<Json> joint =
-        moves ? wait_for_motion(**run, options.joint, (*question)["target_rad"])
+        moves ? wait_for_motion(**run, options.joint, (*question)["target_rad"], begun)
               : wait_for_reset(**run, options.joint);
     if (!joint) {
       print_errors({joint.error()});
@@ -303,7 +341,7 @@ Exit joint_command(const JointOptions& options) {
     for (const auto& [key, value] : joint->items()) {
       if (key != "cycle") answer[key] = value;  // that of the request stays
     }
-    exit = moves ? tell_motion(options, *joint, (*question)["target_rad"])
+    exit = moves ? tell_motion(options, *joint, (*question)["target_rad"], begun)
                  : tell_reset(options, *joint);
   }
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());

@@ -208,6 +208,13 @@ CLI::Option* add_place(CLI::App& app, DdsPlace& place, CLI::Option* dds) {
   return from;
 }
 
+CLI::Validator is_given(const std::string& hint) {
+  const auto check = [hint](const std::string& text) -> std::string {
+    return text.empty() ? "is empty (" + hint + ")" : "";
+  };
+  return {check, ""};
+}
+
 void add_target(CLI::App& app, ControlTarget& target) {
   CLI::Option* socket = app.add_option("--socket", target.socket, kSocketHelp);
   CLI::Option* dds =

@@ -14,6 +14,10 @@ inline constexpr char kJsonHelp[] =
 inline constexpr char kSocketHelp[] =
     "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
 
+/// Of an option whose text may not be empty.
+/// @param hint  what to give, or to leave out
+[[nodiscard]] CLI::Validator is_given(const std::string& hint);
+
 /// The flags that say which running process is asked, and by which way.
 void add_target(CLI::App& app, ControlTarget& target);
 /// --domain, --interface, --dds-from.

@@ -123,10 +123,13 @@ void add_flags(CLI::App& app, JointOptions& o) {
   move->add_option("joint", o.joint, "Its name")->required();
   move->add_option("--to", o.to,
                    "30deg, '30 deg', 0.5rad or 0.5; of a slide 20mm, 2cm, 0.02m or 0.02")
-      ->required();
-  move->add_option("--speed", o.speed, "20deg/s, 0.3 (default: a quarter of the joint's limit)");
+      ->required()
+      ->check(is_given("say where to: 30deg"));
+  move->add_option("--speed", o.speed, "20deg/s, 0.3 (default: a quarter of the joint's limit)")
+      ->check(is_given("leave it out for the default"));
   move->add_option("--acceleration", o.acceleration,
-                   "40deg/s2, 0.6 (default: reaches the speed in half a second)");
+                   "40deg/s2, 0.6 (default: reaches the speed in half a second)")
+      ->check(is_given("leave it out for the default"));
   move->add_flag(
       "--wait", o.wait,
       "Until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends the "

@@ -136,7 +136,8 @@ TEST_F(Controllers, JointsAreSetWhenNobodyHasThem) {
   expect(refused("joint set joint2 --damping -1"), "joint2: the damping -1 Nms/rad is beyond");
   expect(refused("joint set jiont2 --mode idle"), "did you mean 'joint2'?");
   expect(refused("joint set joint2 --mode fast"), "there is no 'fast'");
-  expect(refused("joint set joint2"), "nothing is to be set");
+  expect(refused("joint set joint2"),
+         "nothing is to be set (give --mode, --interaction, --stiffness or --damping)");
   expect(to_run("joint list joint1").out, "joint1           -  velocity");
   EXPECT_EQ(end(), 0);
 }
@@ -162,10 +163,19 @@ TEST_F(Controllers, JointsAreMovedWhenNobodyHasThem) {
   expect(refused("joint move joint1 --to 20mm"), "joint1: this joint turns");
   expect(refused("joint move joint1 --to 30deg --speed 1m/s"),
          "--speed: '1m/s' is of another kind");
-  for (const char* words : {"--to 30°", "--to deg", "--to nan", "--to inf", "--to 1e999",
+  for (const char* words : {"--to 30°", "--to deg", "--to +", "--to +-1", "--to ++1",
                             "--to 30deg --speed 20deg", "--to 30deg/s"}) {
     expect(refused(std::string("joint move joint1 ") + words), "is no number with a unit");
   }
+  for (const char* number : {"nan", "inf", "-inf", "1e999", "1e999deg"}) {
+    expect(refused(std::string("joint move joint1 --to ") + number),
+           "--to: '" + std::string(number) + "' is not finite");
+  }
+  for (const char* flag : {"--to", "--to 1 --speed", "--to 1 --acceleration"}) {
+    const std::string name = std::string(flag).substr(std::string(flag).rfind('-') - 1);
+    expect(refused(std::string("joint move joint1 ") + flag + " ''"), name + ": is empty");
+  }
+  EXPECT_EQ(to_run("joint move joint1 --to +0.5").status, 0);
   EXPECT_EQ(end(), 0);
 }
 
@@ -223,7 +233,8 @@ TEST_F(Controllers, SensorsAndDrivesAreShown) {
   expect(reset.out, "elbow_joint: its fault is cleared, its drive stays disabled");
   EXPECT_EQ(asked("joint show elbow_joint")["fault"], 0);
   until(R"("phase": "faulted")");
-  expect(refused("joint move elbow_joint --to 10deg"), "elbow_joint: nothing is moved before");
+  expect(refused("joint move elbow_joint --to 10deg"),
+         "elbow_joint: nothing is moved while a fault is latched");
   EXPECT_EQ(to_run("fault reset").status, 0);
   EXPECT_EQ(end(), 0);
 }
@@ -236,7 +247,7 @@ TEST_F(Controllers, GainsAreKeptAndShown) {
   expect(to_run("joint list joint1 --gains").out, "joint1  position   7.5    12  0.25");
   expect(refused("joint gains joint1 position --kp -1"), "joint1: kp -1 is beyond");
   expect(refused("joint gains joint1 speed --kp 1"), "there is no 'speed'");
-  expect(refused("joint gains joint1 position"), "nothing is to be set");
+  expect(refused("joint gains joint1 position"), "nothing is to be set (give --kp, --ki or --kd)");
   EXPECT_EQ(end(), 0);
 }
 

@@ -155,9 +155,11 @@ TEST_F(JointAnswers, RefuseAMotionWhileAFaultIsLatched) {
   backend.faulted_joint = 0;
   steps(2);
   ASSERT_EQ(cycle->phase(), RunPhase::kFaulted);
-  EXPECT_EQ(refused(move),
-            "wrist: nothing is moved before the joints are enabled, or while a fault is latched "
-            "(tandem fault reset, then ask again)");
+  EXPECT_EQ(
+      refused(move),
+      "wrist: nothing is moved while a fault is latched (tandem fault reset, then ask again)");
+  EXPECT_EQ(refused(R"({"do": "joint.set", "joint": "wrist", "mode": "velocity"})"),
+            "wrist: nothing is set while a fault is latched (tandem fault reset, then ask again)");
   EXPECT_EQ(joint(2)["moving"], false) << "the one under way is over";
 }
 

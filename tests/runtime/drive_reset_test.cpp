@@ -227,8 +227,7 @@ TEST_F(DriveReset, AndAFaultThatIsLatchedKeepsEveryJointFromBeingMoved) {
   trip(2);
   const double reference = cycle->command().position_rad()[1];
   has(move(),
-      "elbow: nothing is moved before the joints are enabled, or while a fault is latched "
-      "(tandem fault reset, then ask again)");
+      "elbow: nothing is moved while a fault is latched (tandem fault reset, then ask again)");
   EXPECT_EQ(reset("wrist"), "done");
   has(move(), "while a fault is latched");
   steps(100);
