@@ -12,6 +12,9 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
 #include <string_view>
 
 #include "apps/clients/dds_client.hpp"
@@ -64,13 +67,33 @@ Status check_listener(int descriptor, const std::string& path) {
               "name your own run's socket with --socket, or stop the robot by its own means");
 }
 
-/// Whether the process that "<kind>-<pid>.sock" names is gone.
-bool owner_is_dead(const std::string& name) {
-  int pid = 0;
+/// The process that "<kind>-<pid>.sock" names.
+std::optional<pid_t> owner_of(const std::string& name) {
+  pid_t pid = 0;
   const char* end = name.data() + name.size();
   const auto parsed = std::from_chars(name.data() + name.rfind('-') + 1, end, pid);
   const bool named = parsed.ec == std::errc() && std::string_view(parsed.ptr, end) == ".sock";
-  return named && pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH;
+  return named && pid > 0 ? std::optional(pid) : std::nullopt;
+}
+
+bool owner_is_dead(const std::string& name) {
+  const std::optional<pid_t> pid = owner_of(name);
+  return pid && ::kill(*pid, 0) != 0 && errno == ESRCH;
+}
+
+/// "tandem run squat.toml": its arguments, without its program's folder. Empty: nobody says.
+std::string command_line_of(pid_t pid) {
+  constexpr std::size_t kMost = 120;
+  std::ifstream file(fmt::format("/proc/{}/cmdline", pid), std::ios::binary);
+  std::string words{std::istreambuf_iterator<char>(file), {}};
+  while (!words.empty() && words.back() == '\0') words.pop_back();
+  const std::size_t program = words.substr(0, words.find('\0')).rfind('/');
+  if (program != std::string::npos) words.erase(0, program + 1);
+  for (char& c : words) {
+    if (c == '\0' || c == '\n') c = ' ';
+  }
+  if (words.size() > kMost) words = words.substr(0, kMost) + "...";
+  return words;
 }
 
 Error no_answer(std::chrono::milliseconds patience) {
@@ -110,6 +133,9 @@ Result<std::string> exchange(int fd, std::string out, std::chrono::milliseconds 
   }
   return in;
 }
+
+/// "tandem run"
+std::string name_of(const std::string& kind) { return kind.empty() ? "tandem" : "tandem " + kind; }
 
 /// A process that ends in order removes its socket; one that is killed leaves it.
 bool has_ended(const std::string& path) {
@@ -162,25 +188,39 @@ std::vector<std::string> running_control_sockets(const std::string& kind) {
   return found;
 }
 
-Result<std::string> find_control_socket(const std::string& path, const std::string& kind) {
-  if (!path.empty()) return path;
+std::string process_of(const std::string& path) {
+  const std::optional<pid_t> pid = owner_of(std::filesystem::path(path).filename().string());
+  if (!pid) return path;
+  const std::string command = command_line_of(*pid);
+  if (command.empty()) return fmt::format("process {}", *pid);
+  return fmt::format("{} (process {})", command, *pid);
+}
+
+Result<std::vector<std::string>> find_control_sockets(const std::string& kind) {
   std::error_code error;
   if (std::filesystem::exists(std::filesystem::symlink_status(control_folder(), error))) {
     if (const Status ours = check_private_folder(control_folder()); !ours) {
       return std::unexpected(ours.error());
     }
   }
-  const std::vector<std::string> running = running_control_sockets(kind);
-  if (running.size() == 1) return running.front();
-  const std::string what = kind.empty() ? "tandem" : "tandem " + kind;
-  if (running.empty()) {
-    return fail(fmt::format("no running `{}` in {}", what, control_folder()),
-                "start one, or name its socket with --socket");
-  }
+  std::vector<std::string> running = running_control_sockets(kind);
+  if (!running.empty()) return running;
+  return fail(fmt::format("no running `{}` in {}", name_of(kind), control_folder()),
+              "start one, or name its socket with --socket");
+}
+
+Result<std::string> find_control_socket(const std::string& path, const std::string& kind) {
+  if (!path.empty()) return path;
+  const Result<std::vector<std::string>> running = find_control_sockets(kind);
+  if (!running) return std::unexpected(running.error());
+  if (running->size() == 1) return running->front();
   std::string list;
-  for (const std::string& one : running) list += "\n  --socket " + one;
-  return fail(fmt::format("{} running `{}`, and none of them was asked", running.size(), what),
-              "say which:" + list);
+  for (const std::string& one : *running) {
+    list += fmt::format("\n  --socket {}  {}", one, process_of(one));
+  }
+  return fail(
+      fmt::format("{} running `{}`, and none of them was asked", running->size(), name_of(kind)),
+      "say which:" + list);
 }
 
 Result<Json> ask(const std::string& path, const Json& question) {

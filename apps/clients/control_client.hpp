@@ -22,8 +22,15 @@ namespace tandem::apps {
 /// @param kind  "run", "emulate"; empty: any
 [[nodiscard]] std::vector<std::string> running_control_sockets(const std::string& kind);
 
+/// The same, of a folder that nobody else may change. Errors: such a folder; none runs.
+[[nodiscard]] Result<std::vector<std::string>> find_control_sockets(const std::string& kind);
+
+/// Of a socket of running_control_sockets(): the command line and the number of its process,
+/// "tandem run squat.toml (process 17566)"; `path` when it does not name the process.
+[[nodiscard]] std::string process_of(const std::string& path);
+
 /// The one that is meant: `path` when it is not empty, else the only one of that kind.
-/// Errors: none runs; several do (they are listed).
+/// Errors: none runs; several do (they are listed, with process_of()).
 [[nodiscard]] Result<std::string> find_control_socket(const std::string& path,
                                                       const std::string& kind);
 

@@ -2,7 +2,10 @@
 #include <fmt/core.h>
 
 #include <chrono>
+#include <future>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "apps/clients/commands.hpp"
 #include "apps/clients/control_client.hpp"
@@ -140,6 +143,42 @@ Exit reset(const FaultOptions& options) {
   return nothing || kept || (done && !again) ? Exit::kDone : Exit::kFault;
 }
 
+/// @param who  of several runs: whose answer it is
+Exit tell_stop(const Result<Json>& answer, const Json& question, const std::string& who) {
+  if (!answer) {
+    Error error = answer.error();
+    if (!who.empty()) error.message = fmt::format("{}: {}", who, error.message);
+    print_errors({error});
+    return Exit::kFault;
+  }
+  const std::string category = answer->value("category", "?");
+  const bool no_retreat = question.value("category", -1) == 2 && category == "category1";
+  fmt::print("{}{}emergency stop, {}{}\n", who, who.empty() ? "" : ": ", category,
+             no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
+  if (answer->value("paused", false)) fmt::print("{}\n", kKept);
+  std::fflush(stdout);  // before an error of the next run
+  return Exit::kDone;
+}
+
+/// Stops every run of this user on this machine. All are asked at once: one that hangs must not
+/// delay the others.
+Exit stop_all(const Json& question) {
+  const Result<std::vector<std::string>> runs = find_control_sockets("run");
+  if (!runs) return tell_stop(std::unexpected(runs.error()), question, {});
+  const bool one = runs->size() == 1;
+  std::vector<std::string> who;  // while they run
+  for (const std::string& socket : *runs) who.push_back(one ? "" : process_of(socket));
+  std::vector<std::future<Result<Json>>> answers;
+  for (const std::string& socket : *runs) {
+    answers.push_back(std::async(std::launch::async, [&] { return ask(socket, question); }));
+  }
+  Exit exit = Exit::kDone;
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    if (tell_stop(answers[i].get(), question, who[i]) != Exit::kDone) exit = Exit::kFault;
+  }
+  return exit;
+}
+
 }  // namespace
 
 Exit fault_command(const FaultOptions& options) {
@@ -149,17 +188,8 @@ Exit fault_command(const FaultOptions& options) {
 Exit estop_command(const EstopOptions& options) {
   Json question{{"do", "estop"}};
   if (options.category) question["category"] = *options.category;
-  const Result<Json> answer = ask(options.target, "run", question);
-  if (!answer) {
-    print_errors({answer.error()});
-    return Exit::kFault;
-  }
-  const std::string category = answer->value("category", "?");
-  const bool no_retreat = options.category == 2 && category == "category1";
-  fmt::print("emergency stop, {}{}\n", category,
-             no_retreat ? ": no active controller can bring the robot to a safe posture" : "");
-  if (answer->value("paused", false)) fmt::print("{}\n", kKept);
-  return Exit::kDone;
+  if (!options.target.dds && options.target.socket.empty()) return stop_all(question);
+  return tell_stop(ask(options.target, "run", question), question, {});
 }
 
 }  // namespace tandem::apps

@@ -32,11 +32,13 @@ const char kFaultExamples[] = R"(Examples:
 Without --socket or --dds it is the only `tandem run` of this user.)";
 
 const char kEstopExamples[] = R"(Examples:
-  tandem estop                                       with the category of robot.toml's [safety]
+  tandem estop                                       every run of this user on this machine, with
+                                                     the category of robot.toml's [safety]
+  tandem estop --socket /tmp/run.sock                this one alone
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
-Exit status: 0 the loop has carried it out (or simulated time is paused, and it is next); 1 no stop
-is confirmed. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
+Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
+is not confirmed, or there is no run. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
 
 const char kClockExamples[] = R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed

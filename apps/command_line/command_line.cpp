@@ -146,7 +146,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
   commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
-  commands.add<EstopOptions>("estop", "Emergency stop of a running run");
+  commands.add<EstopOptions>("estop", "Emergency stop of every run of this user");
   commands.add<ControllerOptions>(
       "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
   commands.add<JointOptions>(
