@@ -19,9 +19,14 @@ struct Message {
 /// The first element whose bytes differ.
 Difference difference_in(const hal::Layout& layout, const RunInfo& info, const Message& a,
                          std::span<const std::byte> b) {
+  if (a.body.size() != b.size()) {
+    return {.signal = "length",
+            .a = static_cast<double>(a.body.size()),
+            .b = static_cast<double>(b.size())};
+  }
   for (const hal::Field& field : layout.fields()) {
     const std::size_t size = hal::size_of(field.type);
-    if (field.offset + field.count * size > std::min(a.body.size(), b.size())) break;
+    if (field.offset + field.count * size > b.size()) break;
     for (std::size_t i = 0; i < field.count; ++i) {
       const std::size_t at = field.offset + i * size;
       if (std::memcmp(a.body.data() + at, b.data() + at, size) == 0) continue;
@@ -30,7 +35,7 @@ Difference difference_in(const hal::Layout& layout, const RunInfo& info, const M
               .b = element(field, b, i)};
     }
   }
-  return {.signal = a.body.size() != b.size() ? "length" : "bytes"};
+  return {.signal = "bytes"};
 }
 
 Result<std::vector<Message>> messages_of(const LogFile& file, const std::string& topic) {

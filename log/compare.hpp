@@ -16,7 +16,7 @@ struct Difference {
   std::uint64_t message = 0;  ///< of the topic, from 0
   std::int64_t time_ns = 0;   ///< of the first log's message
   std::string signal;       ///< "position_rad.LHipSag"; "time", "length" or "bytes" without a field
-  double a = 0.0, b = 0.0;  ///< its values; 0 where the signal is none of the layout
+  double a = 0.0, b = 0.0;  ///< its values, or the lengths [bytes]; 0 of "bytes"
 };
 
 struct TopicComparison {

@@ -41,6 +41,8 @@ Error at(const std::string& file, std::string message, std::string hint = {}) {
   return {.message = std::move(message), .hint = std::move(hint), .file = file, .key = {}};
 }
 
+constexpr char kCutHint[] = "its run was killed, or the copy is not whole: copy it again";
+
 }  // namespace
 
 Result<LogFile> LogFile::open(const std::string& path) {
@@ -73,6 +75,13 @@ Result<LogFile> LogFile::open(const std::string& path) {
   log.info_.configuration = metadata_of(*reader, kConfigurationRecord);
   log.result_ = metadata_of(*reader, kResultRecord);
   log.truncated_ = reader->truncated();
+  log.bytes_ = reader->bytes();
+  if (log.truncated_ && log.topics_.empty() && reader->metadata().empty()) {
+    return std::unexpected(at(
+        path,
+        "the log is cut after " + std::to_string(log.bytes_) + " bytes, before anything of its run",
+        kCutHint));
+  }
   log.data_sha256_ = hash.finish();
   return log;
 }
@@ -92,6 +101,12 @@ std::uint64_t LogFile::messages() const {
 
 Result<const Topic*> LogFile::require(const std::string& name) const {
   if (const Topic* topic = find(name)) return topic;
+  if (truncated_) {
+    return std::unexpected(at(path_,
+                              "the log is cut after " + std::to_string(bytes_) +
+                                  " bytes, before a message of '" + name + "'",
+                              kCutHint));
+  }
   std::vector<std::string> names;
   for (const Topic& topic : topics_) names.push_back(topic.name);
   return std::unexpected(at(path_, "has no topic '" + name + "'", suggest(name, names)));

@@ -40,7 +40,8 @@ struct Table {
 
 class LogFile {
  public:
-  /// Reads the whole file once to count. Errors: as McapReader.
+  /// Reads the whole file once to count. Errors: as McapReader; a file that is cut before anything
+  /// of a run.
   [[nodiscard]] static Result<LogFile> open(const std::string& path);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -49,10 +50,13 @@ class LogFile {
   [[nodiscard]] const StringMap& result() const { return result_; }
   [[nodiscard]] const std::vector<Topic>& topics() const { return topics_; }
   [[nodiscard]] const Topic* find(std::string_view topic) const;
-  /// The same. Error: the log has no such topic.
+  /// The same. Error: the log has no such topic, or is cut before
+  /// its first message.
   [[nodiscard]] Result<const Topic*> require(const std::string& topic) const;
   /// True when the run was killed: the data end where its last chunk ended.
   [[nodiscard]] bool truncated() const { return truncated_; }
+  /// The file's size.
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t messages() const;
   /// SHA-256 over the messages as they stand in the file, as RecordingResult defines it.
   [[nodiscard]] const std::string& data_sha256() const { return data_sha256_; }
@@ -74,6 +78,7 @@ class LogFile {
   StringMap result_;
   std::vector<Topic> topics_;
   bool truncated_ = false;
+  std::uint64_t bytes_ = 0;
   std::string data_sha256_;
 };
 

@@ -57,7 +57,7 @@ Result<McapReader> McapReader::open(const std::string& path) {
   McapReader reader;
   reader.path_ = path;
   std::error_code error;
-  reader.left_ = std::filesystem::file_size(path, error);
+  reader.bytes_ = reader.left_ = std::filesystem::file_size(path, error);
   reader.file_ = std::make_unique<std::ifstream>(path, std::ios::binary);
   if (error || !*reader.file_) {
     return std::unexpected(

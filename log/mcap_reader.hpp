@@ -53,6 +53,8 @@ class McapReader {
   [[nodiscard]] const std::string& profile() const { return profile_; }
   /// The end of the data is missing: the run was killed, or is still being written.
   [[nodiscard]] bool truncated() const { return truncated_; }
+  /// Of the whole file.
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
   [[nodiscard]] Status read_record();
@@ -63,6 +65,7 @@ class McapReader {
 
   std::string path_, profile_;
   std::unique_ptr<std::ifstream> file_;
+  std::uint64_t bytes_ = 0;
   std::uint64_t left_ = 0;  // bytes of the file not read yet
   bool ended_ = false, truncated_ = false;
   Bytes record_, chunk_;

@@ -33,7 +33,9 @@ void add_faults(const RunData& run, const std::string& side, Facts& facts) {
 }
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
-  facts.emplace_back("log" + side, run.path + (run.truncated ? " (its run was killed)" : ""));
+  facts.emplace_back(
+      "log" + side,
+      run.path + (run.truncated ? " (cut: its run was killed, or the copy is not whole)" : ""));
   add_faults(run, side, facts);
   const std::size_t passive = run.robot.passive.size();
   facts.emplace_back(

@@ -44,9 +44,14 @@ Json info_json(const log::LogFile& file) {
   return json;
 }
 
+std::string cut_text(const log::LogFile& file) {
+  return fmt::format("cut after {} bytes: its run was killed, or the copy is not whole",
+                     file.bytes());
+}
+
 void print_info(const log::LogFile& file, std::FILE* out) {
   const log::RunInfo& info = file.info();
-  fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (its run was killed)" : "");
+  fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (" + cut_text(file) + ")" : "");
   Facts facts;
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
@@ -76,8 +81,10 @@ Status print_fields(const log::LogFile& file, const std::string& name, std::FILE
   const auto topic = file.require(name);
   if (!topic) return std::unexpected(topic.error());
   if ((*topic)->layout.fields().empty()) {
+    const bool events = name == "/tandem/event";
     return fail("the messages of " + name + " are no table of fields but " + (*topic)->type,
-                "open the log in a viewer: docs/log.md");
+                events ? "tandem log csv " + file.path() + " --topic event lists them"
+                       : "open the log in a viewer: docs/log.md");
   }
   Table table({"field", "values", "meaning"});
   table.align_left();
@@ -135,7 +142,11 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   Table table({"topic", "messages", "", "first difference"});
   for (const log::TopicComparison& topic : comparison.topics) {
     std::string where = topic.equal() ? "none" : "one log is shorter";
-    if (topic.first) {
+    if (topic.first && topic.first->signal == "length") {
+      where = fmt::format("message {} at {:.6f} s has {} and {} bytes", topic.first->message,
+                          static_cast<double>(topic.first->time_ns) * 1e-9, topic.first->a,
+                          topic.first->b);
+    } else if (topic.first) {
       where = fmt::format("message {} at {:.6f} s: {} is {} and {}", topic.first->message,
                           static_cast<double>(topic.first->time_ns) * 1e-9, topic.first->signal,
                           topic.first->a, topic.first->b);
@@ -153,11 +164,19 @@ void print_comparison(const log::Comparison& comparison, std::FILE* out) {
   fmt::print(out, "{}\n", comparison.equal() ? "the same, bit for bit" : "they differ");
 }
 
+/// Of logs that have other joints: their messages have other lengths, and no number in common.
+void print_robots(const log::RunInfo& a, const log::RunInfo& b, std::FILE* out) {
+  if (a.joints == b.joints) return;
+  fmt::print(out, "these are logs of different robots: {} with {}, {} with {}\n", a.robot,
+             counted(a.joints.size(), "joint"), b.robot, counted(b.joints.size(), "joint"));
+}
+
 Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
   const Result<log::LogFile> other = log::LogFile::open(options.other);
   if (!other) return std::unexpected(other.error());
   const Result<log::Comparison> comparison = log::compare(file, *other);
   if (!comparison) return std::unexpected(comparison.error());
+  print_robots(file.info(), other->info(), human_output(options.json));
   print_comparison(*comparison, human_output(options.json));
   const Status written = write_json(options.json, comparison_json(*comparison));
   if (!written) return std::unexpected(written.error());

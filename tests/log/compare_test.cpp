@@ -91,5 +91,27 @@ TEST_F(Compare, ATimeStampCountsToo) {
   EXPECT_EQ(state_of(result).first->message, 2U);
 }
 
+// It was "length is 0 and 0".
+TEST_F(Compare, MessagesOfOtherLengthsAreShownWithTheirBytes) {
+  const auto log_of = [this](const char* name, std::size_t joints) {
+    auto recorder = Recorder::open(folder_ / name, {.robot = name, .sensors = {}}, {});
+    hal::Layout layout;
+    layout.add("position_rad", hal::FieldType::kF64, joints, "");
+    const auto state = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", layout);
+    (*recorder)->start();
+    const std::vector<double> position_rad(joints);
+    (*recorder)->push(state, 0, std::as_bytes(std::span(position_rad)));
+    EXPECT_EQ((*recorder)->close().messages, 1U);
+    return LogFile::open(folder_ / name);
+  };
+  const auto result = compare(*log_of("a.mcap", 2), *log_of("b.mcap", 3));
+  ASSERT_TRUE(result);
+  const auto& first = state_of(*result).first;
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->signal, "length");
+  EXPECT_EQ(first->a, 16.0);
+  EXPECT_EQ(first->b, 24.0);
+}
+
 }  // namespace
 }  // namespace tandem::log

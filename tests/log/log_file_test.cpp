@@ -1,5 +1,7 @@
 #include "log/log_file.hpp"
 
+#include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "log/csv.hpp"
@@ -99,6 +101,44 @@ TEST_F(LogFileOfThree, WritesEventsAsCsv) {
   ASSERT_TRUE(write_csv(open(), "/tandem/event", 1, out));
   EXPECT_EQ(out.str(), "time_s,cycle,kind,joint,code,text\n0.5,2,shut down,-1,0,\"shut down\"\n");
   EXPECT_FALSE(write_csv(open(), "/nothing", 1, out));
+}
+
+std::string read_bytes(const std::string& log) {
+  std::ifstream in(log, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// `size` bytes of the log.
+std::string cut(const std::string& log, const std::string& to, std::size_t size) {
+  const std::string bytes = read_bytes(log).substr(0, size);
+  std::ofstream(to, std::ios::binary) << bytes;
+  return to;
+}
+
+// A log without a robot, and status 0.
+TEST_F(LogFileOfThree, IsRefusedWhenItIsCutBeforeAnythingOfItsRun) {
+  const auto log = LogFile::open(cut(path_, folder_ / "cut.mcap", 20));
+  ASSERT_FALSE(log);
+  EXPECT_EQ(log.error().message, "the log is cut after 20 bytes, before anything of its run");
+  EXPECT_NE(log.error().hint.find("the copy is not whole"), std::string::npos);
+}
+
+// "has no topic '/tandem/state'": whoever reads that looks for another topic.
+TEST_F(LogFileOfThree, SaysThatItIsCutWhereATopicIsMissing) {
+  const std::size_t chunk = read_bytes(path_).find("tandem/msg/State");
+  ASSERT_NE(chunk, std::string::npos);
+  const auto log = LogFile::open(cut(path_, folder_ / "cut.mcap", chunk));
+  ASSERT_TRUE(log) << log.error().to_string();
+  EXPECT_TRUE(log->truncated());
+  EXPECT_EQ(log->info().robot, "two");
+  const auto events = log->events();
+  ASSERT_FALSE(events);
+  EXPECT_EQ(events.error().message, "the log is cut after " + std::to_string(chunk) +
+                                        " bytes, before a message of '/tandem/event'");
+  std::ostringstream csv;
+  const Status written = write_csv(*log, "/tandem/state", 1, csv, {});
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().message.find("is cut after"), std::string::npos);
 }
 
 }  // namespace
