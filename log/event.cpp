@@ -51,6 +51,27 @@ bool is_fault(EventKind kind) noexcept {
 
 namespace {
 
+/// Whether faults of the kind strike a joint. Others strike frames, boards and buses.
+bool strikes_joint(hal::FaultKind kind) {
+  return kind >= hal::FaultKind::kEncoderFreeze && kind <= hal::FaultKind::kSpringBreak;
+}
+
+/// " of knee", " of board leg_1"; empty where the event names nobody.
+std::string whose(const Event& event, const EventNames& names) {
+  if (event.kind == EventKind::kSensorLost) {
+    const auto sensor = static_cast<std::size_t>(event.value);
+    return event.value >= 0.0F && sensor < names.sensors.size() ? ": " + names.sensors[sensor] : "";
+  }
+  const auto joint = static_cast<std::size_t>(event.joint);
+  if (event.joint < 0 || joint >= names.joints.size()) return "";
+  if (event.kind == EventKind::kInjected &&
+      !strikes_joint(static_cast<hal::FaultKind>(event.code))) {
+    return joint < names.boards.size() ? " of board " + names.boards[joint]
+                                       : " of the board of " + names.joints[joint];
+  }
+  return " of " + names.joints[joint];
+}
+
 /// ": to 0.5 rad (28.65 deg)", ": to 0.02 m".
 std::string target_text(const Event& event) {
   char text[64];
@@ -68,6 +89,7 @@ std::string target_text(const Event& event) {
 std::string text_of(const Event& event, bool has_joint) {
   switch (event.kind) {
     case EventKind::kOverrun: return ": " + std::to_string(event.code) + " cycles skipped";
+    case EventKind::kSensorLost:
     case EventKind::kFeedbackLost: return " for " + std::to_string(event.code) + " cycles";
     case EventKind::kInjected:
     case EventKind::kUnclaimed:
@@ -97,13 +119,14 @@ std::string text_of(const Event& event, bool has_joint) {
 
 }  // namespace
 
-std::string describe(const Event& event, std::span<const std::string> joints) {
+std::string describe(const Event& event, const EventNames& names) {
   std::string text = to_string(event.kind);
   if (event.kind == EventKind::kInjected) {
     text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
   }
-  const bool has_joint = event.joint >= 0 && static_cast<std::size_t>(event.joint) < joints.size();
-  if (has_joint) text += " of " + joints[static_cast<std::size_t>(event.joint)];
+  text += whose(event, names);
+  const bool has_joint =
+      event.joint >= 0 && static_cast<std::size_t>(event.joint) < names.joints.size();
   if (event.kind == EventKind::kEmergencyStop) {
     return text + (event.code == 1   ? " by a signal"
                    : event.code == 3 ? " by the watchdog"

@@ -29,7 +29,8 @@ Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const 
                                                  const RecorderOptions& options) {
   std::unique_ptr<Recorder> recorder(new Recorder);
   recorder->path_ = path;
-  recorder->joints_ = info.joints;
+  recorder->names_ = {.joints = info.joints, .boards = info.boards};
+  for (const SensorInfo& sensor : info.sensors) recorder->names_.sensors.push_back(sensor.name);
   recorder->view_ = RobotView(options.viewed, info.joints);
   recorder->ring_slots_ = options.ring_slots;
   McapWriter& writer = recorder->writer_;
@@ -106,7 +107,7 @@ void Recorder::write(std::span<const std::byte> slot) {
   if (head.channel == kEventChannel) {
     Event event;
     std::memcpy(&event, body.data(), sizeof event);
-    encode_event(event, describe(event, joints_), event_);
+    encode_event(event, describe(event, names_), event_);
     write(head.channel, head.time_ns, event_);
     return;
   }

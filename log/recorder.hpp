@@ -90,7 +90,7 @@ class Recorder {
   void stop_thread();
 
   std::string path_;
-  std::vector<std::string> joints_;
+  EventNames names_;
   McapWriter writer_;
   RobotView view_;
   Sha256 hash_;

@@ -43,7 +43,9 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
-    event(event_of(record.source), of_joint ? record.index : -1, record.code);
+    const bool of_sensor = record.source == FaultSource::kSensorLost;
+    log_.event(time_, event_of(record.source), of_joint ? record.index : -1, record.code,
+               of_sensor ? static_cast<float>(record.index) : 0.0F);
   }
   if (record.category == StopCategory::kCategory2 && !run_.in(RunPhase::kRetreating) &&
       !retreat()) {

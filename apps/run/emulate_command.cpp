@@ -181,16 +181,23 @@ void print_summary(const Emulation& e, std::FILE* out) {
   facts.print(out);
 }
 
+/// " of joint1", " of board leg_1"; empty of what strikes every frame.
+std::string whose(const sim::Fault& fault, const hal::RobotConfig& robot) {
+  const auto at = [](std::int32_t index) { return static_cast<std::size_t>(index); };
+  if (fault.joint >= 0) return " of " + robot.joints[at(fault.joint)].name;
+  if (fault.board >= 0) return " of board " + robot.boards[at(fault.board)].name;
+  if (fault.sensor >= 0) return " of sensor " + robot.sensors[at(fault.sensor)].name;
+  if (fault.bus >= 0) return " of bus " + robot.buses[at(fault.bus)].name;
+  return "";
+}
+
 /// Faults that have begun since.
 void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
   while (const sim::Fault* fault = e.robot->next_begun_fault()) {
     ++e.injected;
     if (quiet) continue;
-    const std::int32_t joint = e.robot->joint_of(*fault);
-    const auto& joints = e.subject.robot.joints;
     fmt::print(out, "{:.3f} s: injected {}{}\n", static_cast<double>(e.emulator->time_ns()) * 1e-9,
-               to_string(fault->kind),
-               joint < 0 ? "" : " of " + joints[static_cast<std::size_t>(joint)].name);
+               to_string(fault->kind), whose(*fault, e.subject.robot));
     std::fflush(out);
   }
 }

@@ -21,7 +21,10 @@ log::RunInfo info_of(const Composition& c) {
   info.version = TANDEM_VERSION;
   info.robot = e.robot.name;
   info.hal = hal_name(e.hal);
-  for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
+  for (const hal::JointConfig& joint : e.robot.joints) {
+    info.joints.push_back(joint.name);
+    info.boards.push_back(joint.board);
+  }
   for (const hal::SensorConfig& sensor : e.robot.sensors) {
     info.sensors.push_back({sensor.name, sensor.channels()});
   }

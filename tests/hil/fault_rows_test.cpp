@@ -168,7 +168,7 @@ TEST_F(HilRealTimeFault, AnInjectedDeathOfABoardStopsTheRun) {
   Process inject(tandem({"inject", "kind=board_kill", "board=board_1", "--socket", socket_}),
                  file("inject.txt"));
   EXPECT_EQ(inject.wait(), 0) << inject.output();
-  EXPECT_TRUE(robot_->says("injected board_kill of joint1")) << robot_->output();
+  EXPECT_TRUE(robot_->says("injected board_kill of board board_1")) << robot_->output();
   EXPECT_EQ(master_->wait(), 1) << master_->output();
   EXPECT_NE(faults_of("run.json").find("no feedback"), std::string::npos) << faults_of("run.json");
   EXPECT_EQ(robot_->interrupt(), 0) << robot_->output();

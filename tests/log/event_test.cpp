@@ -6,33 +6,45 @@
 namespace tandem::log {
 namespace {
 
-const std::vector<std::string> kJoints{"hip", "knee"};
+const EventNames kNames{
+    .joints = {"hip", "knee"}, .boards = {"leg_1", "leg_2"}, .sensors = {"foot", "imu"}};
 
 TEST(Event, SaysWhatHappenedInOneLine) {
   Event event{.code = 0x7310, .joint = 1, .kind = EventKind::kFault};
-  EXPECT_EQ(describe(event, kJoints), "fault of knee (0x7310)");
+  EXPECT_EQ(describe(event, kNames), "fault of knee (0x7310)");
   event = {.code = static_cast<std::uint32_t>(Code::kDiverged), .kind = EventKind::kFault};
-  EXPECT_EQ(describe(event, kJoints), "fault: Diverged");
+  EXPECT_EQ(describe(event, kNames), "fault: Diverged");
   event = {.code = 11, .joint = 0, .kind = EventKind::kFeedbackLost};
-  EXPECT_EQ(describe(event, kJoints), "fault: no feedback of hip for 11 cycles");
+  EXPECT_EQ(describe(event, kNames), "fault: no feedback of hip for 11 cycles");
   event = {.code = 1, .kind = EventKind::kFell};
-  EXPECT_EQ(describe(event, kJoints), "fault: the robot fell: its base is tilted");
+  EXPECT_EQ(describe(event, kNames), "fault: the robot fell: its base is tilted");
   event = {.code = 3, .kind = EventKind::kOverrun};
-  EXPECT_EQ(describe(event, kJoints), "overrun: 3 cycles skipped");
+  EXPECT_EQ(describe(event, kNames), "overrun: 3 cycles skipped");
   event = {.kind = EventKind::kBringUpDone};
-  EXPECT_EQ(describe(event, kJoints), "bring-up done");
+  EXPECT_EQ(describe(event, kNames), "bring-up done");
   event = {.code = static_cast<std::uint32_t>(hal::FaultKind::kEncoderFreeze),
            .joint = 1,
            .kind = EventKind::kInjected};
-  EXPECT_EQ(describe(event, kJoints), "injected encoder_freeze of knee");
+  EXPECT_EQ(describe(event, kNames), "injected encoder_freeze of knee");
+  // It had named the first joint of the board.
+  event.code = static_cast<std::uint32_t>(hal::FaultKind::kBoardKill);
+  EXPECT_EQ(describe(event, kNames), "injected board_kill of board leg_2");
+  event.code = static_cast<std::uint32_t>(hal::FaultKind::kFrameDrop);
+  EXPECT_EQ(describe(event, kNames), "injected frame_drop of board leg_2");
+  EXPECT_EQ(describe(event, {.joints = kNames.joints}), "injected frame_drop of the board of knee");
+  event.joint = -1;
+  EXPECT_EQ(describe(event, kNames), "injected frame_drop");
+  // It had been "sensor lost (0x000B)", whichever it was.
+  event = {.code = 11, .kind = EventKind::kSensorLost, .value = 1.0F};
+  EXPECT_EQ(describe(event, kNames), "sensor lost: imu for 11 cycles");
   event = {.joint = 1, .kind = EventKind::kMotionRequested, .value = -0.5F};
-  EXPECT_EQ(describe(event, kJoints), "motion requested of knee: to -0.5 rad (-28.65 deg)");
+  EXPECT_EQ(describe(event, kNames), "motion requested of knee: to -0.5 rad (-28.65 deg)");
   event.code = 1;  // it slides
-  EXPECT_EQ(describe(event, kJoints), "motion requested of knee: to -0.5 m");
+  EXPECT_EQ(describe(event, kNames), "motion requested of knee: to -0.5 m");
   event = {.joint = 0, .kind = EventKind::kMotionStopped};
-  EXPECT_EQ(describe(event, kJoints), "motion stopped of hip");
+  EXPECT_EQ(describe(event, kNames), "motion stopped of hip");
   event = {.joint = 0, .kind = EventKind::kRecoveryRequested};
-  EXPECT_EQ(describe(event, kJoints), "recovery requested of hip");
+  EXPECT_EQ(describe(event, kNames), "recovery requested of hip");
   EXPECT_FALSE(is_fault(event.kind));
 }
 
