@@ -195,7 +195,10 @@ bool TomlTable::check_number(std::string_view key, const toml::node& node, Range
     error(key, "must be finite");
     return false;
   }
-  if (value != 0.0 && (std::abs(value) > kLargest || std::abs(value) < 1.0 / kLargest)) {
+  const bool too_large =
+      range.max < kAnyNumber.max && value > range.max;  // its own limit says more
+  const bool far = std::abs(value) > kLargest || std::abs(value) < 1.0 / kLargest;
+  if (value != 0.0 && far && !too_large) {
     error(key, number_text(value) + " is far out of range", "give 0, or a size of 1e-30 to 1e30");
     return false;
   }

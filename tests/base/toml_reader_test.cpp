@@ -63,6 +63,15 @@ TEST(TomlReader, TakesNumbersBetweenTheSmallestAndTheLargestSize) {
   }
 }
 
+// duration_s = 1e300 was advised a size up to 1e30, and its range ends at 1e6.
+TEST(TomlReader, NamesTheRangeOfAKeyOfAnythingThatIsTooLarge) {
+  const TomlDocument document = parse("duration_s = 1e300\n");
+  TomlTable root = document.root();
+  (void)root.number("duration_s", {0.0, 1e6, true});
+  ASSERT_EQ(document.diagnostics().size(), 1U);
+  EXPECT_EQ(document.diagnostics()[0].hint, "must be greater than 0 and at most 1e+06");
+}
+
 TEST(TomlReader, RefusesIntegersThatNoDoubleHolds) {
   const TomlDocument document = parse(
       "kp = 9007199254740993\nlist = [1, 9007199254740993]\n"
