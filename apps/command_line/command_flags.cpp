@@ -1,5 +1,10 @@
 #include "apps/command_line/command_flags.hpp"
 
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+
 #include "rt/clock_control.hpp"
 
 namespace tandem::apps {
@@ -155,6 +160,31 @@ CLI::Validator a_duration() {
   return {check, "above 0, to 1e6"};
 }
 
+/// Of the whole of `text`; CLI11's own cast lets a number overflow.
+std::optional<std::int64_t> whole_number(const std::string& text) {
+  std::int64_t number = 0;
+  const char* end = text.data() + text.size();
+  const auto [last, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && last == end ? std::optional(number) : std::nullopt;
+}
+
+/// As an experiment's `seed`.
+CLI::Validator is_seed() {
+  const auto check = [](const std::string& text) -> std::string {
+    if (whole_number(text).value_or(-1) >= 0) return "";
+    return "'" + text + "' is no whole number from 0 to 9223372036854775807";
+  };
+  return {check, "0 to 9223372036854775807"};
+}
+
+CLI::Validator is_count() {
+  const auto check = [](const std::string& text) -> std::string {
+    if (whole_number(text).value_or(0) > 0) return "";
+    return "'" + text + "' is no whole number above 0";
+  };
+  return {check, "1 or more"};
+}
+
 /// What `run` and `serve` share.
 void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* rate = app.add_option("--rate", o.rate,
@@ -164,7 +194,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
          "--realtime", [&o] { o.rate = 1.0; }, "The same as --rate 1")
       ->excludes(rate);
   app.add_flag("--start-paused", o.start_paused, "Pause before the first cycle: tandem clock step");
-  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's");
+  app.add_option("--seed", o.seed, "Seed of noise, instead of the experiment's")->check(is_seed());
   app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--record-frames", o.record_frames,
                  "CAN: write every frame to this file, as candump -L does");
@@ -172,6 +202,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
   CLI::Option* log = app.add_option(
       "--log", o.log_folder,
       "Folder of the log, instead of the experiment's (else runs, below the current folder)");
+  log->check(is_given("name a folder, or leave it out"));
   app.add_flag("--no-log", o.no_log, "Write no log")->excludes(log);
   app.add_option("--kernel-variant", o.kernel_variant,
                  "Kernels to use: baseline, x86-64-v3, … (default: the best of this CPU)");
@@ -182,7 +213,7 @@ void add_loop_flags(CLI::App& app, RunOptions& o) {
       ->needs(trace)
       ->check(CLI::Range(1, 1'000'000));
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
   app.add_option("--domain", o.domain, "DDS domain, instead of the experiment's")
@@ -243,7 +274,8 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--delay-cycles", o.delay_cycles,
                  "Whole cycles between controllers and limits (default: the experiment's, or 0)")
       ->check(CLI::Range(0, 1000));
-  app.add_flag("--report", o.report, "Draw the report after the run");
+  app.add_flag("--report", o.report, "Draw the report after the run, from its log")
+      ->excludes("--no-log");
   app.add_option("--on-fault", o.on_fault,
                  "After a stop: end the run, or wait for `tandem fault reset` (default: wait on "
                  "the wall clock, else end)")
@@ -275,7 +307,7 @@ void add_flags(CLI::App& app, FaultOptions& o) {
   CLI::App* reset = app.add_subcommand("reset", "Clear latched faults and hold every joint");
   for (CLI::App* one : {show, reset}) {
     add_target(*one, o.target);
-    one->add_option("--json", o.json, kJsonHelp);
+    one->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   }
   show->callback([&o] { o.action = FaultOptions::Action::kShow; });
   reset->callback([&o] { o.action = FaultOptions::Action::kReset; });
@@ -295,7 +327,7 @@ void add_flags(CLI::App& app, ClockOptions& o) {
   const auto add = [&](const char* name, const char* doc, Action action) {
     CLI::App* one = app.add_subcommand(name, doc);
     add_target(*one, o.target);
-    one->add_option("--json", o.json, kJsonHelp);
+    one->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
     one->callback([&o, action] { o.action = action; });
     return one;
   };
@@ -329,7 +361,8 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
   app.add_option("--scenario", o.scenario, kScenarioHelp);
   app.add_option("--posture", o.posture,
                  "Start posture (default: the experiment's, or the robot's first)");
-  app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)");
+  app.add_option("--seed", o.seed, "Seed of noise (default: the experiment's, or 1)")
+      ->check(is_seed());
   app.add_option("--period-ns", o.period_ns,
                  "Period of a step (default: the experiment's, or 1 ms)")
       ->check(CLI::Range(10'000, 1'000'000'000));
@@ -340,7 +373,7 @@ void add_flags(CLI::App& app, EmulateOptions& o) {
   CLI::Option* socket = app.add_option("--socket", o.socket, kSocketHelp);
   app.add_flag("--no-socket", o.no_socket, "Open no control socket")->excludes(socket);
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kEmulateExamples);
 }
 
@@ -348,7 +381,7 @@ void add_flags(CLI::App& app, CheckOptions& o) {
   app.add_option("file", o.file, "Experiment or robot TOML")->required();
   app.add_flag("--bus", o.bus, "Show the load of every bus (a robot's: at 1 kHz)");
   app.add_flag("--repair", o.repair, "Read a robot as if it said inertia = \"repair\" in [model]");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kCheckExamples);
 }
 
@@ -363,7 +396,7 @@ void add_flags(CLI::App& app, ModelOptions& o) {
   CLI::App* info = app.add_subcommand("info", "Joints, mass, operation counts and sizes");
   info->add_option("robot", o.robot, "Robot TOML")->required();
   info->add_option("--kernel-variant", o.kernel_variant, "baseline, x86-64-v3, …");
-  info->add_option("--json", o.json, kJsonHelp);
+  info->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   info->footer(kModelInfoExamples);
   info->callback([&o] { o.action = ModelOptions::Action::kInfo; });
 }
@@ -377,7 +410,7 @@ void add_flags(CLI::App& app, NewOptions& o) {
       ->check(CLI::IsMember({"floating", "fixed"}));
   app.add_flag("--force", o.force,
                "Write into an existing folder; files that differ are kept as FILE~");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kNewExamples);
 }
 
@@ -386,21 +419,21 @@ void add_flags(CLI::App& app, LogOptions& o) {
   CLI::App* info = app.add_subcommand("info", "What a log holds");
   info->add_option("log", o.log, "MCAP file")->required();
   info->add_option("--topic", o.topic, "List the fields of this topic instead, with their units");
-  info->add_option("--json", o.json, kJsonHelp);
+  info->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   info->footer(kLogInfoExamples);
   info->callback([&o] { o.action = LogOptions::Action::kInfo; });
   CLI::App* csv = app.add_subcommand("csv", "One topic as comma-separated values");
   csv->add_option("log", o.log, "MCAP file")->required();
   csv->add_option("--topic", o.topic, "Topic to write (default: the state)");
   csv->add_option("--fields", o.fields, "Fields to write, by comma (default: all)")->delimiter(',');
-  csv->add_option("--every", o.every, "Write each n-th message")->check(CLI::PositiveNumber);
+  csv->add_option("--every", o.every, "Write each n-th message")->check(is_count());
   csv->add_option("-o,--output", o.output, "File to write (default: standard output)");
   csv->footer(kLogCsvExamples);
   csv->callback([&o] { o.action = LogOptions::Action::kCsv; });
   CLI::App* diff = app.add_subcommand("diff", "Compare two runs bit by bit");
   diff->add_option("log", o.log, "MCAP file")->required();
   diff->add_option("other", o.other, "MCAP file")->required();
-  diff->add_option("--json", o.json, kJsonHelp);
+  diff->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   diff->footer(kLogDiffExamples);
   diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
 }
@@ -408,7 +441,7 @@ void add_flags(CLI::App& app, LogOptions& o) {
 void add_flags(CLI::App& app, EdsOptions& o) {
   app.add_option("robot", o.robot, "Robot TOML")->required();
   app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kEdsExamples);
 }
 
@@ -416,7 +449,7 @@ void add_flags(CLI::App& app, ReportOptions& o) {
   app.add_option("log", o.log, "MCAP file")->required();
   app.add_option("other", o.other, "A second log, laid over the first");
   app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kReportExamples);
 }
 
@@ -444,14 +477,14 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
       ->excludes(load);
   app.add_option("-o,--output", o.output, "Folder of page and plots (default: runs/latency)");
   app.add_flag("--quiet,-q", o.quiet, "Neither progress nor table");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kLatencyExamples);
 }
 
 void add_flags(CLI::App& app, DoctorOptions& o) {
   app.add_option("robot", o.robot, "Robot TOML, to look at the CAN interfaces of its buses");
   app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
-  app.add_option("--json", o.json, kJsonHelp);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kDoctorExamples);
 }
 

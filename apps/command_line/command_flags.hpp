@@ -14,6 +14,8 @@ inline constexpr char kJsonHelp[] =
 inline constexpr char kSocketHelp[] =
     "Control socket (default: in $XDG_RUNTIME_DIR/tandem or /tmp/tandem-<uid>)";
 
+inline constexpr char kNameAFile[] = "name a file, or leave it out";
+
 /// Of an option whose text may not be empty.
 /// @param hint  what to give, or to leave out
 [[nodiscard]] CLI::Validator is_given(const std::string& hint);

@@ -21,6 +21,7 @@ const char kJointExamples[] = R"(Examples:
   tandem joint show LElbj                            its encoders, its drive, its fault
   tandem joint set LElbj --mode torque               a joint that no active controller claims
   tandem joint set LElbj --interaction compliant --stiffness 40 --damping 2
+  tandem controller stop hold                        first: frees the joints that it claims
   tandem joint move LElbj --to -30deg --speed 20deg/s
                                                      a free joint to a place, and `joint stop LElbj`
   tandem joint move LElbj --to 0 --wait              until it is there; Ctrl-C ends only the waiting
@@ -49,7 +50,7 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* doc, const ch
                       Options& o) {
   CLI::App* command = app.add_subcommand(name, doc);
   add_target(*command, o.target);
-  command->add_option("--json", o.json, kJsonHelp);
+  command->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   command->footer(examples);
   return command;
 }

@@ -1,0 +1,54 @@
+// Flags whose values would have been taken for something else, and what is advised instead.
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class RefusedFlags : public Program {
+ protected:
+  void refused(const std::string& command, const std::string& words) const {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 2) << command;
+    EXPECT_NE(outcome.err.find(words), std::string::npos) << command << ": " << outcome.err;
+  }
+};
+
+// -1 was the seed 18446744073709551615, which no experiment can have.
+TEST_F(RefusedFlags, SeedsBeyondThoseOfAnExperiment) {
+  for (const char* seed : {"-1", "9223372036854775808", "1.5", "many"}) {
+    for (const char* command : {"run hold.toml --no-log", "emulate hold.toml"}) {
+      refused(std::string(command) + " --seed " + seed,
+              "'" + std::string(seed) + "' is no whole number from 0 to 9223372036854775807");
+    }
+  }
+  EXPECT_EQ(tandem("run hold.toml --no-log --no-socket -q --duration 0.01 --seed "
+                   "9223372036854775807")
+                .status,
+            0);
+}
+
+TEST_F(RefusedFlags, AReportWithoutALog) {
+  refused("run hold.toml --no-log --report", "--no-log excludes --report");
+}
+
+TEST_F(RefusedFlags, FilesWithoutAName) {
+  refused("run hold.toml --log ''", "--log: is empty (name a folder, or leave it out)");
+  refused("run hold.toml --no-log --json ''", "--json: is empty (name a file, or leave it out)");
+  refused("check hold.toml --json ''", "--json: is empty");
+  EXPECT_FALSE(has_log());
+}
+
+TEST_F(RefusedFlags, OfALogSayWhatWouldDo) {
+  ASSERT_EQ(tandem("run hold.toml --log . --no-socket -q --duration 0.01").status, 0);
+  for (const char* every : {"0", "-1", "x"}) {
+    refused("log csv *.mcap --every " + std::string(every),
+            "'" + std::string(every) + "' is no whole number above 0");
+  }
+  refused("log info *.mcap --topic event", "--topic event lists them");
+  const Outcome events = tandem("log csv *.mcap --topic event");
+  EXPECT_EQ(events.status, 0);
+  EXPECT_NE(events.out.find("bring-up done"), std::string::npos) << events.out;
+}
+
+}  // namespace
+}  // namespace tandem::apps
