@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/nearest.hpp"
+#include "runtime/owner_controller.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -80,6 +81,10 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
       return {"the controller '" + one + "' is active, or is not, already",
               "tandem controller list shows which are"};
     case RejectReason::kClaimed:
+      if (one == kOwnerController) {
+        return {"is claimed by the owner of the robot in another process",
+                "ask that process, or end it: then the joint is free"};
+      }
       return {"is claimed by the controller '" + one + "', which sets its mode",
               "stop it first: tandem controller stop " + one};
     case RejectReason::kWithin:
