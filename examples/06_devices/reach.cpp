@@ -1,7 +1,7 @@
 // 06: a controller that uses the device interfaces (YARP's names: IPositionControl, IEncoders, …)
 // instead of the command image. One joint goes to a place and back at a speed of its own; another
 // is a spring that yields.
-//   cmake --build build/release --target tandem controller_reach    (`make demo` has done so)
+//   cmake --build build/release --target tandem controller_reach
 //   export TANDEM_CONTROLLERS=build/release/lib/examples
 //   build/release/bin/tandem run examples/06_devices/reach.toml
 #include <optional>
