@@ -55,7 +55,7 @@ TEST_F(JointAtRest, WhileTimeIsPausedIsKeptThereByAStop) {
   EXPECT_EQ(end(), 0);
 }
 
-// It had said that the joint brakes, and the log had had a stop.
+// It had said that the joint brakes.
 TEST_F(JointAtRest, DoesNotBrake) {
   begin("");
   EXPECT_EQ(to_run("controller stop hold").status, 0);
