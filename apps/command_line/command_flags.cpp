@@ -43,7 +43,8 @@ const char kEstopExamples[] = R"(Examples:
   tandem estop --category 0                          take the torque away at once
   tandem estop --category 2                          a safe posture first, where a controller has one
 Exit status: 0 each loop has carried it out (or simulated time is paused, and it is next); 1 a stop
-is not confirmed, or there is no run. `kill -USR1 PID` asks for the same without a socket, and gets no answer.)";
+is not confirmed, or there is no run. `kill -USR1 PID` asks for the same without a socket, and gets
+no answer.)";
 
 const char kClockExamples[] = R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed
