@@ -131,8 +131,7 @@ bool in_degrees(const JointOptions& options) { return options.to.find("deg") != 
 /// @param answer  the joint after the stop, where the stop is `done`
 const char* outcome_of_stop(bool done, const Json& answer) {
   if (!done) return "brakes then; a motion that has not begun is taken back";
-  return answer.value("moving", false) ? "brakes, and stays where it comes to rest"
-                                       : "does not move: there is nothing to stop";
+  return answer.value("moving", false) ? "brakes, and stays where it comes to rest" : "is at rest";
 }
 
 void print_answer(const JointOptions& options, const Json& answer, const Json& question) {
