@@ -40,7 +40,6 @@ Code PositionControl::position_move(std::size_t j, double target_rad) noexcept T
     motion.reference = {io_.command->position_rad()[j], 0.0};
     motion.hardest_rad_s2 = 0.0;
   }
-  motion.hardest_rad_s2 = std::max(motion.hardest_rad_s2, motion.acceleration_rad_s2);
   motion.target_rad = target_rad;
   motion.phase = kMoving;
   return Code::kOk;
@@ -110,6 +109,7 @@ void PositionControl::advance() noexcept TANDEM_RT {
       motion.phase = kResting;
       continue;
     }
+    motion.hardest_rad_s2 = std::max(motion.hardest_rad_s2, motion.acceleration_rad_s2);
     Trapezoid& reference = motion.reference;
     bool done = false;
     if (motion.phase == kMoving) {

@@ -116,6 +116,14 @@ TEST_F(FastMotion, IsStoppedWithItsBrakeByWhoeverHasAskedForASlowOne) {
   EXPECT_LE(command.position_rad()[0], fast_at_rad + 0.51);
 }
 
+TEST_F(FastMotion, BrakesHarderAsSoonAsItMay) {
+  ASSERT_EQ(motion.set_ref_acceleration(0, 8.0), Code::kOk);
+  advance();
+  ASSERT_EQ(motion.stop(0), Code::kOk);
+  rest();
+  EXPECT_LE(command.position_rad()[0], fast_at_rad + 0.26) << "a quarter of a radian, not a half";
+}
+
 /// The default is 1 rad/s^2 here: a quarter of 2 rad/s in half a second.
 TEST_F(DevicesTest, AStopBrakesAtLeastAsHardAsAnOrdinaryMotion) {
   mode(ControlMode::kPosition);
