@@ -22,7 +22,7 @@ namespace tandem::apps {
 /// @param kind  "run", "emulate"; empty: any
 [[nodiscard]] std::vector<std::string> running_control_sockets(const std::string& kind);
 
-/// The same, of a folder that nobody else may change. Errors: such a folder; none runs.
+/// The same. Errors: others may change the folder; none runs.
 [[nodiscard]] Result<std::vector<std::string>> find_control_sockets(const std::string& kind);
 
 /// Of a socket of running_control_sockets(): the command line and the number of its process,
