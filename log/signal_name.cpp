@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "hal/wire_name.hpp"
+
 namespace tandem::log {
 namespace {
 
@@ -23,7 +25,9 @@ constexpr Row kRows[] = {
 /// Whether the field has one element per joint. Of a field that is not ours its count says it.
 bool is_per_joint(const hal::Field& field, const RunInfo& info) {
   if (field.count != info.joints.size()) return false;
-  const auto* row = std::ranges::find(kRows, std::string_view(field.name), &Row::name);
+  const std::string name = hal::wire_name(field.name);
+  const auto* row =
+      std::ranges::find_if(kRows, [&](const Row& one) { return hal::wire_name(one.name) == name; });
   return row == std::end(kRows) || row->count == "joints";
 }
 

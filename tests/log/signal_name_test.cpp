@@ -15,6 +15,7 @@ TEST(SignalName, NamesAJointOnlyWhereThereIsOneNumberOfEach) {
   EXPECT_EQ(signal_name(field("position_rad", 6), 2, six), "position_rad.c");
   EXPECT_EQ(signal_name(field("base_velocity", 6), 2, six), "base_velocity.2");
   EXPECT_EQ(signal_name(field("foot_force_N", 6), 5, six), "foot_force_N.5");
+  EXPECT_EQ(signal_name(field("foot_force_n", 6), 5, six), "foot_force_n.5") << "as logs have it";
   EXPECT_EQ(signal_name(field("of_another_program", 6), 5, six), "of_another_program.f");
   const RunInfo three{.robot = "leg", .joints = {"a", "b", "c"}, .sensors = {}};
   EXPECT_EQ(signal_name(field("base_position_m", 3), 0, three), "base_position_m.0");
