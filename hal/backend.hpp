@@ -34,12 +34,6 @@ enum class Phase : std::uint8_t {
   kFault,        ///< latched; `status_text()` says the cause
 };
 
-/// An injected fault that has begun.
-struct InjectedFault {
-  FaultKind kind = FaultKind::kNone;
-  std::int32_t joint = -1;  ///< its own, or the first of its board; -1: of a sensor, frames or bus
-};
-
 /// A robot: simulated, emulated behind a bus, or real.
 class Backend {
  public:

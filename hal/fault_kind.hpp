@@ -41,6 +41,16 @@ inline constexpr std::array<std::string_view, 19> kFaultNames = {
     "supply_sag",     "encoder_freeze", "encoder_jump",    "encoder_unplug",
     "motor_overheat", "spring_break",   "bus_down"};
 
+/// What a fault strikes.
+enum class FaultTarget : std::uint8_t { kNone = 0, kJoint, kBoard, kSensor, kBus };
+
+/// An injected fault that has begun.
+struct InjectedFault {
+  FaultKind kind = FaultKind::kNone;
+  FaultTarget target = FaultTarget::kNone;  ///< kNone: frames of every bus
+  std::int32_t index = -1;                  ///< of the target, in the robot's configuration
+};
+
 /// As a scenario's `kind` says it.
 [[nodiscard]] constexpr std::string_view to_string(FaultKind kind) noexcept {
   const auto index = static_cast<std::size_t>(kind);

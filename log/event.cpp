@@ -7,7 +7,6 @@
 #include <string>
 
 #include "base/realtime.hpp"
-#include "hal/fault_kind.hpp"
 #include "log/cdr_writer.hpp"
 
 namespace tandem::log {
@@ -51,25 +50,21 @@ bool is_fault(EventKind kind) noexcept {
 
 namespace {
 
-/// Whether faults of the kind strike a joint. Others strike frames, boards and buses.
-bool strikes_joint(hal::FaultKind kind) {
-  return kind >= hal::FaultKind::kEncoderFreeze && kind <= hal::FaultKind::kSpringBreak;
+/// `before` and the name at `index`; empty where there is none.
+std::string named(const char* before, const std::vector<std::string>& names, double index) {
+  if (!(index >= 0.0) || index >= static_cast<double>(names.size())) return "";
+  return before + names[static_cast<std::size_t>(index)];
 }
 
 /// " of knee", " of board leg_1"; empty where the event names nobody.
 std::string whose(const Event& event, const EventNames& names) {
-  if (event.kind == EventKind::kSensorLost) {
-    const auto sensor = static_cast<std::size_t>(event.value);
-    return event.value >= 0.0F && sensor < names.sensors.size() ? ": " + names.sensors[sensor] : "";
+  if (event.kind == EventKind::kSensorLost) return named(": ", names.sensors, event.value);
+  switch (event.target) {
+    case hal::FaultTarget::kBoard: return named(" of board ", names.boards, event.value);
+    case hal::FaultTarget::kSensor: return named(" of sensor ", names.sensors, event.value);
+    case hal::FaultTarget::kBus: return named(" of bus ", names.buses, event.value);
+    default: return named(" of ", names.joints, event.joint);
   }
-  const auto joint = static_cast<std::size_t>(event.joint);
-  if (event.joint < 0 || joint >= names.joints.size()) return "";
-  if (event.kind == EventKind::kInjected &&
-      !strikes_joint(static_cast<hal::FaultKind>(event.code))) {
-    return joint < names.boards.size() ? " of board " + names.boards[joint]
-                                       : " of the board of " + names.joints[joint];
-  }
-  return " of " + names.joints[joint];
 }
 
 /// ": to 0.5 rad (28.65 deg)", ": to 0.02 m".

@@ -9,26 +9,26 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "hal/fault_kind.hpp"
 #include "log/bytes.hpp"
 
 namespace tandem::log {
 
 enum class EventKind : std::uint8_t {
-  kStarted = 0,      ///< the first cycle
-  kBringUpDone,      ///< every axis follows the command; controllers start
-  kControllersDone,  ///< the duration is over, or every controller is done
-  kFault,            ///< a joint, the backend or a controller is in fault
-  kSensorLost,       ///< a sensor's sample is too old
-  kLimited,          ///< a command was limited for the first time (per joint)
-  kOverrun,          ///< the loop skipped `code` cycles
-  kStopRequested,    ///< from outside: signal or caller
-  kShutDown,         ///< the drives are disabled
-  kInjected,         ///< a fault was injected: `code` is its hal::FaultKind. `joint`: its own, or
-                     ///< the first of its board
-  kEmergencyStop,    ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
-  kResetRequested,   ///< of the latched faults
-  kResetDone,        ///< every joint is enabled again
-  kResetFailed,      ///< a cause is still there
+  kStarted = 0,          ///< the first cycle
+  kBringUpDone,          ///< every axis follows the command; controllers start
+  kControllersDone,      ///< the duration is over, or every controller is done
+  kFault,                ///< a joint, the backend or a controller is in fault
+  kSensorLost,           ///< a sensor's sample is too old
+  kLimited,              ///< a command was limited for the first time (per joint)
+  kOverrun,              ///< the loop skipped `code` cycles
+  kStopRequested,        ///< from outside: signal or caller
+  kShutDown,             ///< the drives are disabled
+  kInjected,             ///< a fault was injected: `code` is its hal::FaultKind
+  kEmergencyStop,        ///< `code`: 1 by a signal, 2 on request, 3 by the watchdog
+  kResetRequested,       ///< of the latched faults
+  kResetDone,            ///< every joint is enabled again
+  kResetFailed,          ///< a cause is still there
   kControllersSwitched,  ///< on request: some were stopped, some started
   kJointSet,             ///< on request: a joint's mode, interaction or impedance
   kGainsSet,             ///< on request: gains of a joint's drive
@@ -53,16 +53,20 @@ struct Event {
   std::uint32_t code = 0;   ///< the drive's error code, a Code, a count: as the kind says
   std::int32_t joint = -1;  ///< index in the image; -1: none
   EventKind kind = EventKind::kStarted;
-  std::uint8_t padding[3] = {};
-  float value = 0.0F;  ///< of a motion: its target; of a lost sensor: its index. In the log's text
+  hal::FaultTarget target = hal::FaultTarget::kNone;  ///< of an injected fault
+  std::uint8_t padding[2] = {};
+  /// Of a motion: its target. Of a lost sensor, and of an injected fault's board, sensor or bus:
+  /// its index. In the log's text.
+  float value = 0.0F;
 };
 static_assert(std::is_trivially_copyable_v<Event> && sizeof(Event) == 32);
 
-/// Whose events they are, in the image's order.
+/// Whose events they are, in the order of the robot's configuration.
 struct EventNames {
   std::vector<std::string> joints;
-  std::vector<std::string> boards{};  ///< of each joint; may be empty
+  std::vector<std::string> boards{};
   std::vector<std::string> sensors{};
+  std::vector<std::string> buses{};
 };
 
 /// One line for people: "fault of LHipMot (0x7310)".

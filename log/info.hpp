@@ -29,7 +29,8 @@ struct RunInfo {
   std::string kernel_variant{};       ///< "x86-64-v3"; may change a result's last bits
   std::string description_hash{};     ///< of what the kernels were made from
   StringMap configuration{};          ///< path -> text of every file that was read
-  std::vector<std::string> boards{};  ///< of each joint, for events' texts: in no record
+  std::vector<std::string> boards{};  ///< for events' texts: in no record
+  std::vector<std::string> buses{};   ///< the same
 };
 
 /// Metadata records' names.

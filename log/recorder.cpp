@@ -29,7 +29,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(const std::string& path, const 
                                                  const RecorderOptions& options) {
   std::unique_ptr<Recorder> recorder(new Recorder);
   recorder->path_ = path;
-  recorder->names_ = {.joints = info.joints, .boards = info.boards};
+  recorder->names_ = {.joints = info.joints, .boards = info.boards, .buses = info.buses};
   for (const SensorInfo& sensor : info.sensors) recorder->names_.sensors.push_back(sensor.name);
   recorder->view_ = RobotView(options.viewed, info.joints);
   recorder->ring_slots_ = options.ring_slots;

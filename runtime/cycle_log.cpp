@@ -18,7 +18,25 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
                      std::uint32_t code, float value) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
-  recorder_->push(log::Event{time.cycle, time.time_ns, code, joint, kind, {}, value});
+  recorder_->push(log::Event{.cycle = time.cycle,
+                             .time_ns = time.time_ns,
+                             .code = code,
+                             .joint = joint,
+                             .kind = kind,
+                             .value = value});
+}
+
+void CycleLog::event(const hal::CycleTime& time,
+                     const hal::InjectedFault& fault) noexcept TANDEM_RT {
+  if (recorder_ == nullptr) return;
+  const bool of_joint = fault.target == hal::FaultTarget::kJoint;
+  recorder_->push(log::Event{.cycle = time.cycle,
+                             .time_ns = time.time_ns,
+                             .code = static_cast<std::uint32_t>(fault.kind),
+                             .joint = of_joint ? fault.index : -1,
+                             .kind = log::EventKind::kInjected,
+                             .target = fault.target,
+                             .value = static_cast<float>(fault.index)});
 }
 
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,

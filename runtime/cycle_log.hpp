@@ -4,6 +4,7 @@
 
 #include "base/realtime.hpp"
 #include "hal/cycle_time.hpp"
+#include "hal/fault_kind.hpp"
 #include "hal/image.hpp"
 #include "hal/truth.hpp"
 #include "log/recorder.hpp"
@@ -27,6 +28,7 @@ class CycleLog {
   /// @param value  of the kinds that have one
   void event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint = -1,
              std::uint32_t code = 0, float value = 0.0F) noexcept TANDEM_RT;
+  void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
               const hal::CommandImage& command, const hal::TruthImage* truth) noexcept TANDEM_RT;
   /// Messages that found no room.

@@ -82,7 +82,7 @@ void RobotCycle::read() noexcept TANDEM_RT {
   for (int most = 4; most > 0; --most) {  // of a cycle, for there is only so much room in the log
     const hal::InjectedFault injected = backend_->next_injected();
     if (injected.kind == hal::FaultKind::kNone) break;
-    event(EventKind::kInjected, injected.joint, static_cast<std::uint32_t>(injected.kind));
+    log_.event(time_, injected);
   }
   trace_.mark(CycleStage::kRead, *clock_);
 }

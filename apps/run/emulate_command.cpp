@@ -183,11 +183,15 @@ void print_summary(const Emulation& e, std::FILE* out) {
 
 /// " of joint1", " of board leg_1"; empty of what strikes every frame.
 std::string whose(const sim::Fault& fault, const hal::RobotConfig& robot) {
-  const auto at = [](std::int32_t index) { return static_cast<std::size_t>(index); };
-  if (fault.joint >= 0) return " of " + robot.joints[at(fault.joint)].name;
-  if (fault.board >= 0) return " of board " + robot.boards[at(fault.board)].name;
-  if (fault.sensor >= 0) return " of sensor " + robot.sensors[at(fault.sensor)].name;
-  if (fault.bus >= 0) return " of bus " + robot.buses[at(fault.bus)].name;
+  const hal::InjectedFault injected = sim::injected(fault);
+  const auto index = static_cast<std::size_t>(injected.index);
+  switch (injected.target) {
+    case hal::FaultTarget::kNone: return "";
+    case hal::FaultTarget::kJoint: return " of " + robot.joints[index].name;
+    case hal::FaultTarget::kBoard: return " of board " + robot.boards[index].name;
+    case hal::FaultTarget::kSensor: return " of sensor " + robot.sensors[index].name;
+    case hal::FaultTarget::kBus: return " of bus " + robot.buses[index].name;
+  }
   return "";
 }
 

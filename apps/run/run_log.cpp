@@ -21,10 +21,9 @@ log::RunInfo info_of(const Composition& c) {
   info.version = TANDEM_VERSION;
   info.robot = e.robot.name;
   info.hal = hal_name(e.hal);
-  for (const hal::JointConfig& joint : e.robot.joints) {
-    info.joints.push_back(joint.name);
-    info.boards.push_back(joint.board);
-  }
+  for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
+  for (const hal::BoardConfig& board : e.robot.boards) info.boards.push_back(board.name);
+  for (const hal::BusConfig& bus : e.robot.buses) info.buses.push_back(bus.name);
   for (const hal::SensorConfig& sensor : e.robot.sensors) {
     info.sensors.push_back({sensor.name, sensor.channels()});
   }

@@ -126,8 +126,6 @@ class EmulatedRobot {
   [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
   /// Every fault injected so far, and what it has done.
   [[nodiscard]] std::span<const FaultSlot> faults() const noexcept { return faults_.slots(); }
-  /// The joint that it is about: its own, or the first of its board; -1: none.
-  [[nodiscard]] std::int32_t joint_of(const Fault& fault) const noexcept TANDEM_RT;
   [[nodiscard]] const firmware::Board& board(std::size_t index) const noexcept {
     return *boards_[index].board;
   }

@@ -55,11 +55,6 @@ Code EmulatedRobot::inject(const Fault& fault) noexcept TANDEM_RT {
   return faults_.add(added) ? Code::kOk : Code::kQueueFull;
 }
 
-std::int32_t EmulatedRobot::joint_of(const Fault& fault) const noexcept TANDEM_RT {
-  if (fault.board < 0) return fault.joint;
-  return static_cast<std::int32_t>(boards_[static_cast<std::size_t>(fault.board)].joints.front());
-}
-
 /// Begins and ends what is due; then every active fault acts on what is whole.
 void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
   faults_.begin_step(time_ns - first_ns_, enabled_ns_);

@@ -56,6 +56,16 @@ struct Fault {
 };
 static_assert(sizeof(Fault) == 104);
 
+/// As the loop sees it: what it strikes, the narrowest that it names.
+[[nodiscard]] constexpr hal::InjectedFault injected(const Fault& fault) noexcept {
+  using hal::FaultTarget;
+  if (fault.joint >= 0) return {fault.kind, FaultTarget::kJoint, fault.joint};
+  if (fault.board >= 0) return {fault.kind, FaultTarget::kBoard, fault.board};
+  if (fault.sensor >= 0) return {fault.kind, FaultTarget::kSensor, fault.sensor};
+  if (fault.bus >= 0) return {fault.kind, FaultTarget::kBus, fault.bus};
+  return {.kind = fault.kind};
+}
+
 [[nodiscard]] constexpr bool is_frame_fault(hal::FaultKind kind) noexcept {
   return kind >= hal::FaultKind::kFrameDrop && kind <= hal::FaultKind::kFrameReorder;
 }

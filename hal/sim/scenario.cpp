@@ -88,7 +88,6 @@ void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
     };
     if (fault.board >= 0) of(robot.boards[static_cast<std::size_t>(fault.board)]);
     if (fault.sensor >= 0) of(robot.sensors[static_cast<std::size_t>(fault.sensor)]);
-    fault.board = fault.sensor = -1;
   }
   if (table.has("cob_id")) {
     fault.cob_id = static_cast<std::uint32_t>(table.integer("cob_id", 0, 0x7FF));

@@ -75,8 +75,7 @@ bool SimRobot::post(const Fault& fault) {
 
 hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
   const Fault* fault = robot_->next_begun_fault();
-  if (fault == nullptr) return {};
-  return {fault->kind, robot_->joint_of(*fault)};
+  return fault == nullptr ? hal::InjectedFault{} : injected(*fault);
 }
 
 bool SimRobot::archive(Archive& ar) {

@@ -7,7 +7,7 @@ namespace tandem::log {
 namespace {
 
 const EventNames kNames{
-    .joints = {"hip", "knee"}, .boards = {"leg_1", "leg_2"}, .sensors = {"foot", "imu"}};
+    .joints = {"hip", "knee"}, .boards = {"legs"}, .sensors = {"foot", "imu"}, .buses = {"can0"}};
 
 TEST(Event, SaysWhatHappenedInOneLine) {
   Event event{.code = 0x7310, .joint = 1, .kind = EventKind::kFault};
@@ -27,12 +27,22 @@ TEST(Event, SaysWhatHappenedInOneLine) {
            .kind = EventKind::kInjected};
   EXPECT_EQ(describe(event, kNames), "injected encoder_freeze of knee");
   // It had named the first joint of the board.
-  event.code = static_cast<std::uint32_t>(hal::FaultKind::kBoardKill);
-  EXPECT_EQ(describe(event, kNames), "injected board_kill of board leg_2");
+  event = {.code = static_cast<std::uint32_t>(hal::FaultKind::kBoardKill),
+           .kind = EventKind::kInjected,
+           .target = hal::FaultTarget::kBoard};
+  EXPECT_EQ(describe(event, kNames), "injected board_kill of board legs");
+  EXPECT_EQ(describe(event, {.joints = kNames.joints}), "injected board_kill");
+  // Sensors and buses had no names.
+  event.target = hal::FaultTarget::kSensor;
+  event.value = 1.0F;
+  EXPECT_EQ(describe(event, kNames), "injected board_kill of sensor imu");
+  event.code = static_cast<std::uint32_t>(hal::FaultKind::kBusDown);
+  event.target = hal::FaultTarget::kBus;
+  EXPECT_EQ(describe(event, kNames), "injected bus_down") << "there is no second bus";
+  event.value = 0.0F;
+  EXPECT_EQ(describe(event, kNames), "injected bus_down of bus can0");
   event.code = static_cast<std::uint32_t>(hal::FaultKind::kFrameDrop);
-  EXPECT_EQ(describe(event, kNames), "injected frame_drop of board leg_2");
-  EXPECT_EQ(describe(event, {.joints = kNames.joints}), "injected frame_drop of the board of knee");
-  event.joint = -1;
+  event.target = hal::FaultTarget::kNone;
   EXPECT_EQ(describe(event, kNames), "injected frame_drop");
   // It had been "sensor lost (0x000B)", whichever it was.
   event = {.code = 11, .kind = EventKind::kSensorLost, .value = 1.0F};

@@ -85,8 +85,7 @@ class FaultRobot final : public hal::Backend {
   }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
     const sim::Fault* fault = emulated->next_begun_fault();
-    if (fault == nullptr) return {};
-    return {fault->kind, emulated->joint_of(*fault)};
+    return fault == nullptr ? hal::InjectedFault{} : sim::injected(*fault);
   }
 
   /// A period passes without the master.
