@@ -1,39 +1,20 @@
 #include "apps/run/loop_thread.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <exception>
 #include <limits>
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/control/clock_commands.hpp"
+#include "apps/run/loop_crash.hpp"
 #include "apps/text/console.hpp"
 
 namespace tandem::apps {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
-
-thread_local bool is_loop = false;
-std::terminate_handler usual_end = nullptr;
-
-/// What is thrown in a controller ends here, as its functions are noexcept. The loop stands still
-/// instead of ending the process: what follows is the watchdog's, as for a loop that hangs.
-[[noreturn]] void stand_still() {
-  if (!is_loop) usual_end();
-  std::string what = "of an unknown type";
-  try {
-    if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
-  } catch (const std::exception& exception) {
-    what = exception.what();
-  } catch (...) {  // NOLINT(bugprone-empty-catch): `what` says so already
-  }
-  fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
-  while (true) ::pause();
-}
 
 std::string progress_note(const runtime::RobotCycle& cycle) {
   if (time_stands(cycle)) return "paused";
@@ -95,8 +76,7 @@ void warn_of_log(const log::Recorder& recorder) {
 }  // namespace
 
 void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config) {
-  is_loop = true;
-  usual_end = std::set_terminate(stand_still);
+  stand_still_on_crash(cycle.heartbeat());
   report_ = rt::set_up_thread(config);
   const double longest_s = longest_cycle_s(cycle);
   SteadyClock::time_point began = SteadyClock::now();

@@ -75,6 +75,29 @@ TEST_F(Stops, OfAControllerThatThrowsAreThoseOfOneThatHangs) {
   EXPECT_EQ(info.out.find("no index"), std::string::npos) << info.out;
 }
 
+// The process had ended by the signal, or with status 0: no controller's name, no NMT stop.
+TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
+  const std::pair<const char*, const char*> crashes[] = {
+      {"null", "fault: the loop crashed, and stands still: segmentation fault (SIGSEGV)"},
+      {"stack", "fault: the loop crashed, and stands still: segmentation fault (SIGSEGV)"},
+      {"abort", "fault: the loop crashed, and stands still: abort() (SIGABRT)"},
+      {"divide", "fault: the loop crashed, and stands still: arithmetic error (SIGFPE)"},
+      {"exit", "fault: exit() was called in the loop, which stands still"}};
+  hang("0.0", "crash = \"none\"\n[faults]\nwatchdog_s = 0.2\n");
+  std::string before = "none";
+  for (const auto& [crash, text] : crashes) {
+    edit("hold.toml", "crash = \"" + before + "\"", std::string("crash = \"") + crash + "\"");
+    before = crash;
+    const Outcome run = tandem("run hold.toml --no-socket -q --json run.json");
+    EXPECT_EQ(run.status, 1) << crash;
+    EXPECT_NE(run.err.find(text), std::string::npos) << run.err;
+    EXPECT_NE(run.err.find("the loop hung in the controller 'lazy' and did not come back"),
+              std::string::npos)
+        << run.err;
+    EXPECT_EQ(json("run.json")["ok"], false);
+  }
+}
+
 TEST_F(Stops, OfALoopThatComesBackEndTheRunInOrder) {
   hang("1.0", "[faults]\nwatchdog_s = 0.2\n");
   const Outcome run = tandem("run hold.toml --no-log --no-socket --json run.json");

@@ -1,6 +1,10 @@
-// A controller that holds its joints, until it does not return from one update, or throws in it.
+// A controller that holds its joints, until it does not return from one update, throws in it,
+// crashes, or ends the process.
 #include <chrono>
+#include <csignal>
+#include <cstdlib>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "controllers/controller.hpp"
@@ -18,6 +22,8 @@ class Hangs final : public Controller {
     after_ = setup.parameters.integer_or("after_cycles", 100, 0, 1'000'000'000);
     for_s_ = setup.parameters.number_or("for_s", 0.0, {0.0, 600.0});  // 0: for ever
     throws_ = setup.parameters.boolean_or("throws", false);
+    crash_ = setup.parameters.choice_or("crash", "no",
+                                        {"no", "null", "stack", "abort", "divide", "exit"});
     for (std::size_t j = 0; j < setup.robot.joints.size(); ++j) {
       setup.claim(j, hal::ControlMode::kPosition);
     }
@@ -29,15 +35,31 @@ class Hangs final : public Controller {
               hal::CommandImage&) noexcept TANDEM_RT override {
     if (++cycles_ != after_) return Code::kOk;
     if (throws_) complain();
+    crash();
     const auto until = SteadyClock::now() + std::chrono::duration<double>(for_s_);
     while (for_s_ == 0.0 || SteadyClock::now() < until) asm volatile("" ::: "memory");
     return Code::kOk;
   }
 
  private:
+  void crash() const {
+    if (crash_ == "null") *static_cast<volatile int*>(nowhere_) = 1;
+    if (crash_ == "stack") (void)fill(1);
+    if (crash_ == "abort") std::abort();
+    if (crash_ == "divide") std::raise(SIGFPE);  // as an integer's division by zero on x86
+    if (crash_ == "exit") std::exit(0);
+  }
+  static int fill(volatile int depth) {
+    volatile char room[4096] = {};
+    room[0] = static_cast<char>(depth);
+    return depth > 0 ? fill(depth + 1) + room[0] : 0;
+  }
+
+  void* nowhere_ = nullptr;
   std::int64_t after_ = 0, cycles_ = 0;
   double for_s_ = 0.0;
   bool throws_ = false;
+  std::string crash_;
 };
 
 }  // namespace

@@ -1,0 +1,93 @@
+#include "apps/run/loop_crash.hpp"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstddef>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <string>
+
+namespace tandem::apps {
+namespace {
+
+thread_local const runtime::Heartbeat* loop = nullptr;  // null: another thread
+std::terminate_handler usual_end = nullptr;
+/// For a signal handler when the loop's own stack is full.
+alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
+
+bool in_cycle() noexcept { return loop != nullptr && runtime::Heartbeat::at_work(loop->beats()); }
+
+[[noreturn]] void stand_still() {
+  while (true) ::pause();
+}
+
+/// What is thrown in a controller ends here, as its functions are noexcept.
+[[noreturn]] void on_exception() {
+  if (!in_cycle()) usual_end();
+  std::string what = "of an unknown type";
+  try {
+    if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::exception& exception) {
+    what = exception.what();
+  } catch (...) {  // NOLINT(bugprone-empty-catch): `what` says so already
+  }
+  fmt::print(stderr, "fault: an exception left the loop, which stands still: {}\n", what);
+  stand_still();
+}
+
+const char* name_of(int signal) {
+  switch (signal) {
+    case SIGSEGV: return "segmentation fault (SIGSEGV)";
+    case SIGBUS: return "bus error (SIGBUS)";
+    case SIGFPE: return "arithmetic error (SIGFPE)";
+    case SIGILL: return "illegal instruction (SIGILL)";
+    default: return "abort() (SIGABRT)";
+  }
+}
+
+/// Calls only what is safe in a signal handler.
+void write_text(const char* text) { (void)!::write(STDERR_FILENO, text, std::strlen(text)); }
+
+void on_signal(int signal) {
+  if (!in_cycle()) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+    return;
+  }
+  write_text("fault: the loop crashed, and stands still: ");
+  write_text(name_of(signal));
+  write_text("\n");
+  stand_still();
+}
+
+void on_exit() {
+  if (!in_cycle()) return;
+  write_text("fault: exit() was called in the loop, which stands still\n");
+  stand_still();
+}
+
+void handle(int signal) {
+  struct sigaction action {};
+  ::sigaction(signal, nullptr, &action);
+  if (action.sa_handler != SIG_DFL) return;
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_ONSTACK;
+  ::sigaction(signal, &action, nullptr);
+}
+
+}  // namespace
+
+void stand_still_on_crash(const runtime::Heartbeat& heartbeat) {
+  loop = &heartbeat;
+  usual_end = std::set_terminate(on_exception);
+  const stack_t stack{.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
+  ::sigaltstack(&stack, nullptr);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
+  std::atexit(on_exit);
+}
+
+}  // namespace tandem::apps
