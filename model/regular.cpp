@@ -2,12 +2,13 @@
 // postures; an error names the joints of the motion without energy.
 #include "model/regular.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 
 #include "model/dynamics.hpp"
+#include "model/symmetric_eigen.hpp"
 
 namespace tandem::model {
 namespace {
@@ -63,9 +64,9 @@ Eigen::VectorXd motion_without_energy(const RowMajor& M) {
   }
   const Eigen::VectorXd scale = diagonal.cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  if (solver.eigenvalues()[0] >= kSingular) return {};
-  return solver.eigenvectors().col(0);
+  const SymmetricEigen eigen = symmetric_eigen(scaled);
+  if (eigen.values[0] >= kSingular) return {};
+  return eigen.vectors.col(0);
 }
 
 /// "joint 'a'", "the joints 'a' and 'b'": those that take part.

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/symmetric_eigen.hpp"
+
 namespace tandem::scaffold {
 namespace {
 
@@ -33,8 +35,9 @@ double dexterity(const Posed& posed, const Tree& tree, int body) {
   for (std::size_t i = 0; i < path.size(); ++i) {
     J.col(static_cast<Eigen::Index>(i)) = all.col(path[i]);
   }
-  const Eigen::JacobiSVD<MatrixXd> svd(J);
-  return svd.singularValues().minCoeff() / std::max(J.norm(), 1e-9);
+  const MatrixXd squares = J.cols() < 3 ? MatrixXd(J.transpose() * J) : MatrixXd(J * J.transpose());
+  const double least = model::symmetric_eigenvalues(squares)[0];  // of the singular values' squares
+  return std::sqrt(std::max(least, 0.0)) / std::max(J.norm(), 1e-9);
 }
 
 /// Gravity's share of the joint's effort; 0 when the description gives no effort.

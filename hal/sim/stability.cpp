@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "model/symmetric_eigen.hpp"
+
 namespace tandem::sim {
 namespace {
 
@@ -113,11 +115,10 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   for (int halving = 0; halving < 60 && high - low > 1e-3 * high; ++halving) {
     const double u = low > 0.0 ? 0.5 * (low + high) : 0.1 * high;
     const Matrix A = u * u * K + u * D;
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(A, Eigen::EigenvaluesOnly);
-    (eigen.eigenvalues().maxCoeff() < 1.0 ? low : high) = u;
+    (model::symmetric_eigenvalues(A).maxCoeff() < 1.0 ? low : high) = u;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(high * high * K + high * D);
-  const Eigen::VectorXd mode = L.matrixU().solve(eigen.eigenvectors().rightCols(1));
+  const Matrix modes = model::symmetric_eigen(high * high * K + high * D).vectors;
+  const Eigen::VectorXd mode = L.matrixU().solve(modes.rightCols(1));
   Eigen::Index most = 0;
   mode.cwiseAbs().maxCoeff(&most);
   return {step_stretch(config.integrator) * low, place_of(k, most)};

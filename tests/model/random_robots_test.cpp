@@ -6,9 +6,10 @@
 
 #include "model/emit.hpp"
 #include "model/kernel_check.hpp"
+#include "model/symmetric_eigen.hpp"
 #include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
-#include "tests/model/sums_over_links.hpp"
+#include "tests/support/sums_over_links.hpp"
 
 namespace tandem::model {
 namespace {
@@ -62,8 +63,7 @@ double forward_tolerance(const SumsOverLinks& truth) {
   const Eigen::MatrixXd M = truth.mass_matrix().cast<double>();
   const Eigen::VectorXd scale = M.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * M * scale.asDiagonal();
-  const Eigen::VectorXd values =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scaled, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd values = symmetric_eigenvalues(scaled);
   const double condition = values.maxCoeff() / std::max(values.minCoeff(), 1e-300);
   return std::max(kTolerance, 16.0 * 2.2e-16 * condition);
 }

@@ -9,9 +9,10 @@
 #include "model/kernel_build.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
+#include "model/symmetric_eigen.hpp"
 #include "runtime/experiment.hpp"
 #include "tests/model/reference.hpp"
-#include "tests/model/sums_over_links.hpp"
+#include "tests/support/sums_over_links.hpp"
 
 namespace tandem::runtime {
 namespace {
@@ -47,8 +48,7 @@ class ShippedKernels : public testing::TestWithParam<const char*> {};
 double tolerance(Kernel kernel, const model::SumsOverLinks& truth) {
   if (kernel != Kernel::kForwardDynamics) return 1e-11;
   const Eigen::MatrixXd M = truth.mass_matrix().cast<double>();
-  const Eigen::VectorXd values =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(M, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd values = model::symmetric_eigenvalues(M);
   return std::max(1e-11, 2.2e-16 * values.maxCoeff() / values.minCoeff());
 }
 

@@ -1,4 +1,4 @@
-#include "tests/model/sums_over_links.hpp"
+#include "tests/support/sums_over_links.hpp"
 
 #include <tuple>
 
