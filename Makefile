@@ -32,8 +32,8 @@ demo:
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
 # What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
-# take one core, and beside them a minute of each fuzz target and the real-time proof. The last lines
-# say what ran and what did not. Strange surroundings want the build folder for themselves.
+# take one core, and beside them half a minute of each fuzz target and the real-time proof. The last
+# lines say what ran and what did not. Strange surroundings want the build folder for themselves.
 test:
 	@rm -f build/summary
 	@$(MAKE) --no-print-directory lint
@@ -50,6 +50,7 @@ test-all: test
 	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
 	@scripts/test-anywhere --paths
 	@scripts/test-build-types
+	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=600
 	@$(MAKE) --no-print-directory asan
 	@$(MAKE) --no-print-directory tsan
 	@$(MAKE) --no-print-directory tidy
@@ -74,7 +75,7 @@ hil:
 
 # One after the other: each takes two cores.
 sanitized:
-	@$(MAKE) --no-print-directory fuzz
+	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=30
 	@$(MAKE) --no-print-directory rtsan
 
 # One humanoid will do: WALK-MAN's runs take as long as COMAN's, and call nothing else. Nor does a
