@@ -59,11 +59,12 @@ function(tandem_install)
     INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tandem)
   set(package lib/cmake/tandem)
   install(EXPORT tandem NAMESPACE tandem:: FILE tandemTargets.cmake DESTINATION ${package})
+  # In a folder of its own: find_package() would find it in the build folder, whose bin/ is in PATH.
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/tandemConfig.cmake.in
-    ${PROJECT_BINARY_DIR}/tandemConfig.cmake INSTALL_DESTINATION ${package})
-  write_basic_package_version_file(${PROJECT_BINARY_DIR}/tandemConfigVersion.cmake
+    ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake INSTALL_DESTINATION ${package})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake
     COMPATIBILITY SameMinorVersion)
-  install(FILES ${PROJECT_BINARY_DIR}/tandemConfig.cmake
-    ${PROJECT_BINARY_DIR}/tandemConfigVersion.cmake cmake/TandemController.cmake
+  install(FILES ${PROJECT_BINARY_DIR}/installed/tandemConfig.cmake
+    ${PROJECT_BINARY_DIR}/installed/tandemConfigVersion.cmake cmake/TandemController.cmake
     DESTINATION ${package})
 endfunction()

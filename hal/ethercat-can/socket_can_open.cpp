@@ -53,7 +53,7 @@ Result<int> make_socket(const SocketCanOptions& options) {
     case EAFNOSUPPORT:
       return refuse(options, "this kernel has no CAN",
                     "sudo modprobe can_raw; if there is no such module, use a kernel with "
-                    "CONFIG_CAN, or run in process: leave --hal can out");
+                    "CONFIG_CAN. In process (tandem run without --hal can) no CAN is needed");
     case EPROTONOSUPPORT:
       return refuse(options, "this kernel has no raw CAN sockets", "sudo modprobe can_raw");
     case EPERM:
