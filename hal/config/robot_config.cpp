@@ -110,6 +110,7 @@ void read_sensor(TomlTable table, const std::string& bus, NodeIds& ids, RobotCon
   sensor.link = table.text("link");
   sensor.noise = read_channels(table, "noise", sensor.channels(), kNotNegative);
   sensor.bias = read_channels(table, "bias", sensor.channels(), kAnyNumber);
+  sensor.heartbeat_ms = read_heartbeat(table);
   table.finish();
   robot.sensors.push_back(sensor);
 }

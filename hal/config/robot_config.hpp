@@ -204,6 +204,7 @@ struct SensorConfig {
   std::string link;           ///< the frame it is expressed in
   std::vector<double> noise;  ///< standard deviation per channel; empty: none
   std::vector<double> bias;   ///< per channel; empty: none
+  int heartbeat_ms = 50;      ///< as a board's
   int line = 0;               ///< in the TOML, for messages
 
   [[nodiscard]] std::size_t channels() const { return channels_of(type); }

@@ -38,7 +38,7 @@ BoardConfig read_board(TomlTable& table) {
   BoardConfig board;
   board.control_period_ns =
       table.integer_or("control_period_ns", board.control_period_ns, 10'000, 100'000'000);
-  board.heartbeat_ms = static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
+  board.heartbeat_ms = read_heartbeat(table);
   board.command_timeout_cycles =
       static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
   board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));

@@ -36,6 +36,11 @@ inline std::string read_own_name(TomlTable& table) {
   return name;
 }
 
+/// Of a node.
+inline int read_heartbeat(TomlTable& table) {
+  return static_cast<int>(table.integer_or("heartbeat_ms", 50, 1, 20'000));
+}
+
 /// The bus of a board or sensor. @param bus  whose table holds this one; empty: `bus` names it
 inline std::string read_bus_name(TomlTable& table, const std::string& bus) {
   if (bus.empty()) return table.text("bus");

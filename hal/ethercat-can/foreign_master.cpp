@@ -23,9 +23,11 @@ const char* sent_by_master(const canopen::Frame& frame) noexcept {
 std::int64_t listening_ns(const RobotConfig& robot, std::int64_t period_ns) noexcept {
   constexpr std::int64_t kLeast_ns = 100'000'000, kMost_ns = 2'000'000'000;
   std::int64_t longest_ns = period_ns;
-  for (const BoardConfig& board : robot.boards) {
-    longest_ns = std::max(longest_ns, std::int64_t{board.heartbeat_ms} * 1'000'000);
-  }
+  const auto wait_for = [&](int heartbeat_ms) {
+    longest_ns = std::max(longest_ns, std::int64_t{heartbeat_ms} * 1'000'000);
+  };
+  for (const BoardConfig& board : robot.boards) wait_for(board.heartbeat_ms);
+  for (const SensorConfig& sensor : robot.sensors) wait_for(sensor.heartbeat_ms);
   return std::clamp(2 * longest_ns, kLeast_ns, kMost_ns);
 }
 

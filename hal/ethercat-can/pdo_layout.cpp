@@ -255,7 +255,10 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
 
 Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
   const SensorConfig& sensor = robot.sensors[index];
-  NodePlan node{.name = sensor.name, .id = sensor.node_id, .sensor = static_cast<int>(index)};
+  NodePlan node{.name = sensor.name,
+                .id = sensor.node_id,
+                .heartbeat_ms = sensor.heartbeat_ms,
+                .sensor = static_cast<int>(index)};
   const auto bus = attach(robot, sensor.bus, node);
   if (!bus) return std::unexpected(bus.error());
   const bool fd = (*bus)->fd;

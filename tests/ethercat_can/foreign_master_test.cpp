@@ -51,6 +51,8 @@ TEST(ForeignMaster, IsListenedForByItsPeriodAndHeartbeat) {
   robot.boards.assign(2, {});
   EXPECT_EQ(listening_ns(robot, 1'000'000), 100'000'000);
   EXPECT_EQ(listening_ns(robot, 200'000'000), 400'000'000);
+  robot.sensors.at(0).heartbeat_ms = 300;
+  EXPECT_EQ(listening_ns(robot, 1'000'000), 600'000'000);
   robot.boards.at(0).heartbeat_ms = 20'000;
   EXPECT_EQ(listening_ns(robot, 1'000'000), 2'000'000'000);
 }

@@ -74,9 +74,12 @@ TEST(PdoLayout, EightAxesTakeAllEightPdos) {
 }
 
 TEST(PdoLayout, ASensorSendsItsChannelsEverySync) {
-  const auto layout = make_pdo_layout(robot_config());
+  RobotConfig robot = robot_config();
+  robot.sensors.at(0).heartbeat_ms = 700;  // it had been 50, whatever the board's was
+  const auto layout = make_pdo_layout(robot);
   ASSERT_TRUE(layout);
   const NodePlan& node = layout->nodes[3];
+  EXPECT_EQ(node.heartbeat_ms, 700);
   EXPECT_EQ(node.sensor, 0);
   EXPECT_EQ(node.bus, 1u);
   EXPECT_EQ(ids_and_bytes(node), (std::vector<std::pair<std::uint32_t, int>>{{0x1A8, 24}}));

@@ -63,6 +63,7 @@ name = "imu"
 type = "imu"
 bus = "left"
 link = "pelvis"
+heartbeat_ms = 80
 )";
 
 std::string shortened(const std::string& from, const std::string& to) {
@@ -86,6 +87,8 @@ TEST(RobotConfigDefaults, StandForWhatATableDoesNotSay) {
   EXPECT_EQ(robot->buses[0].bitrate, 500'000);
   EXPECT_EQ(robot->boards[0].slow_pdo_every, 4);
   EXPECT_EQ(robot->boards[1].slow_pdo_every, 2);
+  EXPECT_EQ(robot->boards[1].heartbeat_ms, 50);
+  EXPECT_EQ(robot->sensors[0].heartbeat_ms, 80);
 }
 
 TEST(RobotConfigDefaults, OrderJointsByTheBoardsThatListThemThenByTheFile) {
