@@ -84,8 +84,12 @@ void handle(int signal) {
 void stand_still_on_crash(const runtime::Heartbeat& heartbeat) {
   loop = &heartbeat;
   usual_end = std::set_terminate(on_exception);
-  const stack_t stack{.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
-  ::sigaltstack(&stack, nullptr);
+  stack_t stack{};
+  ::sigaltstack(nullptr, &stack);
+  if ((stack.ss_flags & SS_DISABLE) != 0) {  // a sanitizer's is its own to free
+    stack = {.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
+    ::sigaltstack(&stack, nullptr);
+  }
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) handle(signal);
   std::atexit(on_exit);
 }
