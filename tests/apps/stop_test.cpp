@@ -86,6 +86,7 @@ TEST_F(Stops, OfAControllerThatCrashesAreThoseOfOneThatHangs) {
   hang("0.0", "crash = \"none\"\n[faults]\nwatchdog_s = 0.2\n");
   std::string before = "none";
   for (const auto& [crash, text] : crashes) {
+    if (TANDEM_SANITIZED != 0 && crash != std::string("exit")) continue;  // handles signals itself
     edit("hold.toml", "crash = \"" + before + "\"", std::string("crash = \"") + crash + "\"");
     before = crash;
     const Outcome run = tandem("run hold.toml --no-socket -q --json run.json");
