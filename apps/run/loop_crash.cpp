@@ -1,3 +1,4 @@
+// Handlers of std::terminate, of signals and of exit(), which stop the loop's thread in a cycle.
 #include "apps/run/loop_crash.hpp"
 
 #include <fmt/core.h>
@@ -83,7 +84,8 @@ void handle(int signal) {
 
 void stand_still_on_crash(const runtime::Heartbeat& heartbeat) {
   loop = &heartbeat;
-  usual_end = std::set_terminate(on_exception);
+  const std::terminate_handler before = std::set_terminate(on_exception);
+  if (before != on_exception) usual_end = before;  // else this is not the first run of the process
   stack_t stack{};
   ::sigaltstack(nullptr, &stack);
   if ((stack.ss_flags & SS_DISABLE) != 0) {  // a sanitizer's is its own to free

@@ -6,12 +6,11 @@
 
 namespace tandem::apps {
 
-/// To be called on the loop's thread, before its first cycle. From then on that thread stands still
-/// where an exception, a signal such as SIGSEGV or a call of exit() would have ended the process
-/// while the loop is at work, and says why. What follows is the watchdog's, as for a loop that
-/// hangs: emergency stop, NMT stop, the controller's name, a log that is whole. Elsewhere the
-/// process ends as usual. So it does by _exit(), and by a signal that something else, such as a
-/// sanitizer, handles already.
+/// Call it on the loop's thread, before the first cycle. While the loop is at work, an exception, a
+/// signal such as SIGSEGV and a call of exit() then no longer end the process: the thread says why,
+/// and stands still. The watchdog does the rest, as for a loop that hangs: it stops robot and
+/// nodes, names the controller and closes the log. Between two cycles the process ends as usual. It
+/// also ends by _exit(), and by a signal that a sanitizer, say, handles already.
 /// @param heartbeat  the loop's; outlives it
 void stand_still_on_crash(const runtime::Heartbeat& heartbeat);
 

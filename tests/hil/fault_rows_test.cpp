@@ -199,7 +199,7 @@ class HilComanFault : public HilFault {
     std::ofstream(file("robot.toml")) << robot;
     std::string hold = test::text_of(source / "hold.toml");
     replace(hold, "seed = 1", "seed = 1\nperiod_ns = 30_000_000");
-    // This damping goes through the loop and is made for 1 kHz: at 33 Hz the hips ring, and the
+    // This damping goes through the loop and is made for 1 kHz: at 50 Hz the hips ring, and the
     // boards stop them (FF03).
     replace(hold, "link_damping_Nms_rad = 12.0", "link_damping_Nms_rad = 0.0");
     std::ofstream(file("hold.toml")) << hold;
