@@ -54,10 +54,10 @@ DriveState drive_state(std::uint16_t word) noexcept TANDEM_RT {
 
 std::uint16_t controlword_towards_enabled(DriveState state) noexcept TANDEM_RT {
   switch (state) {
-    case DriveState::kSwitchOnDisabled: return kCommandShutdown;         // 2
-    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;          // 3
-    case DriveState::kSwitchedOn: return kCommandEnableOperation;        // 4
-    case DriveState::kOperationEnabled: return kCommandEnableOperation;  // stays
+    case DriveState::kSwitchOnDisabled: return kCommandShutdown;  // 2
+    case DriveState::kReadyToSwitchOn: return kCommandSwitchOn;   // 3
+    case DriveState::kSwitchedOn:                                 // 4
+    case DriveState::kOperationEnabled: return kCommandEnableOperation;
     case DriveState::kNotReadyToSwitchOn:   // transition 1 is the drive's own
     case DriveState::kQuickStopActive:      // transition 12
     case DriveState::kFaultReactionActive:  // transition 14 is the drive's own
@@ -162,12 +162,10 @@ void DriveMachine::command_brake(const DriveInputs& inputs, const DriveOptions& 
   const bool ramp = state_ == DriveState::kFaultReactionActive ||
                     (state_ == DriveState::kQuickStopActive && options.quick_stop < 5) ||
                     after_ramp_ != DriveState::kOperationEnabled;
-  if (motion_ == DriveMotion::kNone) {
+  if (motion_ == DriveMotion::kNone || (ramp && inputs.at_rest)) {
     brake_set_ = true;
   } else if (!ramp) {
     brake_set_ = false;
-  } else if (inputs.at_rest) {
-    brake_set_ = true;
   }
 }
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -53,7 +52,7 @@ bool holds_something_else(const std::string& file) {
 
 /// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
 ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
-  const int fd = static_cast<int>(reinterpret_cast<std::intptr_t>(cookie));
+  const int fd = *static_cast<const int*>(cookie);
   for (std::size_t done = 0; done < size;) {
     const ssize_t count = ::write(fd, text + done, size - done);
     if (count < 0 && errno == EINTR) continue;
@@ -68,8 +67,9 @@ ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
 
 /// A stream on a descriptor that never fails; the program's, so it is not closed.
 std::FILE* lasting(int fd, int buffering) {
-  void* cookie = reinterpret_cast<void*>(static_cast<std::intptr_t>(fd));
-  std::FILE* stream = ::fopencookie(cookie, "w", {nullptr, &write_or_lose, nullptr, nullptr});
+  static int descriptors[] = {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
+  std::FILE* stream =
+      ::fopencookie(&descriptors[fd], "w", {nullptr, &write_or_lose, nullptr, nullptr});
   if (stream == nullptr) return fd == STDERR_FILENO ? stderr : stdout;
   std::setvbuf(stream, nullptr, buffering, BUFSIZ);
   return stream;

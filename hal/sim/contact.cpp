@@ -12,7 +12,7 @@ std::unexpected<Error> bad(const char* key, const char* message, const char* hin
 
 }  // namespace
 
-Result<Contact> Contact::create(const hal::ContactConfig& config, std::vector<Foot> feet) {
+Result<Contact> Contact::create(const hal::ContactConfig& config, const std::vector<Foot>& feet) {
   Contact contact;
   contact.config_ = config;
   if (feet.empty()) return contact;

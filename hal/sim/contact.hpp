@@ -38,7 +38,7 @@ class Contact {
   Contact() = default;
   /// Errors: stiffness or friction that is not positive or finite, static below sliding.
   [[nodiscard]] static Result<Contact> create(const hal::ContactConfig& config,
-                                              std::vector<Foot> feet);
+                                              const std::vector<Foot>& feet);
 
   [[nodiscard]] std::size_t feet() const noexcept { return feet_.size(); }
   /// Index of foot `foot`'s sole among the kernels' sites.

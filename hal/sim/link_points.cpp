@@ -55,7 +55,7 @@ void add_shape(const Shape& shape, const model::Placement& at, std::vector<Vecto
 void add_equivalent_box(const model::Inertia& inertia, const model::Placement& at,
                         std::vector<Vector3d>& to) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(inertia.about_com_kg_m2);
-  const Vector3d moments = principal.eigenvalues();
+  const Vector3d& moments = principal.eigenvalues();
   Vector3d edge;
   for (int i = 0; i < 3; ++i) {
     const double square = 6.0 * (moments.sum() - 2.0 * moments[i]) / inertia.mass_kg;

@@ -155,7 +155,7 @@ Status Plant::place_contact(const PlantConfig& config) {
     feet.push_back(
         {static_cast<std::size_t>(site), static_cast<std::size_t>(wrench), foot.points_m});
   }
-  Result<Contact> contact = Contact::create(config.contact, std::move(feet));
+  Result<Contact> contact = Contact::create(config.contact, feet);
   if (!contact) return std::unexpected(contact.error());
   contact_ = std::move(*contact);
   return {};
