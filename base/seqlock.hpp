@@ -32,10 +32,12 @@ class Seqlock {
     const std::uint64_t before = count_.load(std::memory_order_relaxed);
     count_.store(before + 1, std::memory_order_relaxed);
     const auto* bytes = reinterpret_cast<const std::byte*>(values.data());
-    for (std::size_t i = 0; i < words_.size(); ++i) {
+    const std::span words(words_);  // a vector's ends would be read with each word
+    for (std::atomic<std::uint64_t>& to : words) {
       std::uint64_t word;
-      std::memcpy(&word, bytes + i * sizeof word, sizeof word);
-      words_[i].store(word, std::memory_order_release);  // not before the odd count
+      std::memcpy(&word, bytes, sizeof word);
+      to.store(word, std::memory_order_release);  // not before the odd count
+      bytes += sizeof word;
     }
     count_.store(before + 2, std::memory_order_release);
   }

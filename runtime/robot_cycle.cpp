@@ -333,28 +333,29 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
   const hal::CommandImage& wanted = controlling_ ? controlled() : command_;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const auto impedance = controllers_->wanted_impedance(j, wanted);
-    joints_[j] = {.cycle = time_.cycle,
-                  .position_rad = state_.position_rad()[j],
-                  .velocity_rad_s = state_.velocity_rad_s()[j],
-                  .torque_Nm = state_.torque_Nm()[j],
-                  .acceleration_rad_s2 = state_.acceleration_rad_s2()[j],
-                  .motor_position_rad = state_.motor_position_rad()[j],
-                  .motor_velocity_rad_s = state_.motor_velocity_rad_s()[j],
-                  .current_A = state_.current_A()[j],
-                  .voltage_V = state_.voltage_V()[j],
-                  .temperature_C = state_.temperature_C()[j],
-                  .commanded_rad = command_.position_rad()[j],
-                  .stiffness_Nm_rad = impedance.stiffness_Nm_rad,
-                  .damping_Nms_rad = impedance.damping_Nms_rad,
-                  .fault = state_.fault()[j],
-                  .age_cycles = state_.age_cycles()[j],
-                  .owner = controllers_->owner(j),
-                  .mode = wanted.mode()[j],
-                  .interaction = wanted.interaction()[j],
-                  .drive_mode = state_.mode()[j],
-                  .drive_state = state_.drive_state()[j],
-                  .moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0},
-                  .resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0}};
+    JointStatus& joint = joints_[j];  // all of it, but field by field: g++ clears a whole one first
+    joint.cycle = time_.cycle;
+    joint.position_rad = state_.position_rad()[j];
+    joint.velocity_rad_s = state_.velocity_rad_s()[j];
+    joint.torque_Nm = state_.torque_Nm()[j];
+    joint.acceleration_rad_s2 = state_.acceleration_rad_s2()[j];
+    joint.motor_position_rad = state_.motor_position_rad()[j];
+    joint.motor_velocity_rad_s = state_.motor_velocity_rad_s()[j];
+    joint.current_A = state_.current_A()[j];
+    joint.voltage_V = state_.voltage_V()[j];
+    joint.temperature_C = state_.temperature_C()[j];
+    joint.commanded_rad = command_.position_rad()[j];
+    joint.stiffness_Nm_rad = impedance.stiffness_Nm_rad;
+    joint.damping_Nms_rad = impedance.damping_Nms_rad;
+    joint.fault = state_.fault()[j];
+    joint.age_cycles = state_.age_cycles()[j];
+    joint.owner = controllers_->owner(j);
+    joint.mode = wanted.mode()[j];
+    joint.interaction = wanted.interaction()[j];
+    joint.drive_mode = state_.mode()[j];
+    joint.drive_state = state_.drive_state()[j];
+    joint.moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0};
+    joint.resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0};
   }
   services_.show(joints_);
 }
