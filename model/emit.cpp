@@ -107,7 +107,8 @@ class Emitter {
       angle_[nodes_[i].a] = static_cast<std::uint32_t>(angles_.size());
       angles_.push_back(nodes_[i].a);
     }
-    workspace_ = static_cast<std::uint32_t>(3 * angles_.size());
+    table_ = (static_cast<std::uint32_t>(angles_.size()) + 3) / 4 * 4;  // whole vectors
+    workspace_ = 3 * table_;
   }
 
   // Its sine or cosine was computed with all others before the first part.
@@ -151,7 +152,7 @@ class Emitter {
     if (node.op == Op::kInput)
       return kernel_.shape.inputs[node.a].name + "[" + std::to_string(node.b) + "]";
     if (is_tabulated(i)) {
-      const std::size_t table = (node.op == Op::kSin ? 1 : 2) * angles_.size();
+      const std::size_t table = (node.op == Op::kSin ? 1 : 2) * table_;
       return "w[" + std::to_string(table + angle_[node.a]) + "]";
     }
     if (!text_[i].empty()) return "(" + text_[i] + ")";
@@ -237,7 +238,7 @@ class Emitter {
   void write_entry() {
     std::string body;
     if (workspace_ > 0)
-      body += "  double w[" + std::to_string(workspace_) + "];\n";
+      body += "  alignas(32) double w[" + std::to_string(workspace_) + "];\n";
     else
       body += "  double* w = nullptr;\n";
     for (const KernelArray& out : kernel_.shape.outputs)
@@ -246,7 +247,9 @@ class Emitter {
                 "[i] = 0.0;\n";
     for (std::size_t k = 0; k < angles_.size(); ++k)
       body += "  w[" + std::to_string(k) + "] = " + early(angles_[k]) + ";\n";
-    const std::string n = std::to_string(angles_.size());
+    for (std::size_t k = angles_.size(); k < table_; ++k)
+      body += "  w[" + std::to_string(k) + "] = 0.0;\n";
+    const std::string n = std::to_string(table_);
     if (!angles_.empty())
       body += "  sines_and_cosines(" + n + ", w, w + " + n + ", w + 2 * " + n + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
@@ -276,6 +279,7 @@ class Emitter {
   std::vector<std::uint32_t> angles_;
   std::vector<std::vector<std::uint32_t>> parts_;
   std::uint32_t part_ = 0;
+  std::uint32_t table_ = 0;  // its length
   std::uint32_t workspace_ = 0;
   std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> free_;
   std::vector<std::uint32_t> taken_;

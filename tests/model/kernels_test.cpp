@@ -1,8 +1,10 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <optional>
 
 #include "model/emit.hpp"
@@ -131,7 +133,8 @@ TEST(Kernels, SinesAndCosinesAreThoseOfLibmWithinTwoUlp) {
   Array acceleration(6 * (*library)->sites);
   double worst = 0.0;
   for (int i = -40000; i <= 40000; ++i) {
-    const double angle = i < 20000 ? i * 1e-3 : i * 2.5;
+    // The largest are beyond the polynomials: libm's.
+    const double angle = i < 20000 ? i * 1e-3 : i < 39000 ? i * 2.5 : i * 1e4;
     const Array q{angle, 0.0};
     (*library)->site_motion(q.data(), v.data(), v.data(), pose.data(), twist.data(),
                             acceleration.data());
@@ -140,6 +143,30 @@ TEST(Kernels, SinesAndCosinesAreThoseOfLibmWithinTwoUlp) {
   }
   EXPECT_LE(worst, 2.3e-16);
 }
+
+#ifdef __x86_64__
+TEST(Kernels, SinesAndCosinesAreComputedWithVectors) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "code.txt";
+  ASSERT_EQ(std::system(
+                ("objdump -d --no-show-raw-insn '" + built_library("coman") + "' > '" + file + "'")
+                    .c_str()),
+            0);
+  std::ifstream code(file);
+  std::map<std::string, int> packed;  // instructions on two doubles and more, by function
+  std::string function;
+  for (std::string line; std::getline(code, line);) {
+    if (line.ends_with(">:")) {
+      function = line.find("sines_and_cosines") == std::string::npos ? "" : line;
+      if (!function.empty()) packed[function] = 0;
+    } else if (!function.empty() && line.find("pd ") != std::string::npos) {
+      ++packed[function];
+    }
+  }
+  EXPECT_EQ(packed.size(), 3u) << "a variant each";
+  for (const auto& [name, count] : packed) EXPECT_GE(count, 25) << name;
+}
+#endif
 
 TEST(Kernels, AStateThatIsNotFiniteGivesResultsThatAreNotFinite) {
   const auto library = load_kernels(built_library("ur5e"));
