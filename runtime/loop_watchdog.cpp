@@ -57,8 +57,10 @@ void LoopWatchdog::run() {
       continue;
     }
     const bool at_work = Heartbeat::at_work(beats);
-    const nanoseconds limit = at_work ? config_.limit : config_.wait_limit;
-    if (beats == 0 || limit == nanoseconds{}) continue;
+    const bool crashed = heartbeat_->stands_still();
+    nanoseconds limit = at_work ? config_.limit : config_.wait_limit;
+    if (beats == 0 || (limit == nanoseconds{} && !crashed)) continue;
+    if (crashed) limit = {};  // there is nothing to wait for
     silent += awake;
     if (!hung && silent > limit) {
       hung = true;

@@ -25,7 +25,8 @@ struct WatchdogConfig {
 class LoopWatchdog {
  public:
   struct Hooks {
-    /// The loop hangs. @param at_work  in its cycle, not in a wait
+    /// The loop hangs: after its limit, or at once when it stands still (Heartbeat).
+    /// @param at_work  in its cycle, not in a wait
     std::function<void(bool at_work)> on_hang;
     std::function<void()> on_return;    ///< it cycles again
     std::function<void()> on_given_up;  ///< it did not come back; the watchdog has ended

@@ -68,6 +68,7 @@ class RobotCycle {
 
   /// For any thread: whether the loop still cycles.
   [[nodiscard]] const Heartbeat& heartbeat() const noexcept { return heartbeat_; }
+  [[nodiscard]] Heartbeat& heartbeat() noexcept { return heartbeat_; }
 
   [[nodiscard]] const Progress& progress() const noexcept { return progress_; }
   [[nodiscard]] RunPhase phase() const noexcept { return run_.phase(); }

@@ -15,7 +15,7 @@
 namespace tandem::apps {
 namespace {
 
-thread_local const runtime::Heartbeat* loop = nullptr;  // null: another thread
+thread_local runtime::Heartbeat* loop = nullptr;  // null: another thread
 std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
@@ -23,6 +23,7 @@ alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
 bool in_cycle() noexcept { return loop != nullptr && runtime::Heartbeat::at_work(loop->beats()); }
 
 [[noreturn]] void stand_still() {
+  loop->stand_still();
   while (true) ::pause();
 }
 
@@ -82,7 +83,7 @@ void handle(int signal) {
 
 }  // namespace
 
-void stand_still_on_crash(const runtime::Heartbeat& heartbeat) {
+void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
   loop = &heartbeat;
   const std::terminate_handler before = std::set_terminate(on_exception);
   if (before != on_exception) usual_end = before;  // else this is not the first run of the process

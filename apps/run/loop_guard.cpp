@@ -78,10 +78,12 @@ void LoopGuard::on_hang(bool at_work) {
   } else {
     where_ = at_work ? "in its cycle, in no controller" : "between two cycles, in no controller";
   }
+  const bool crashed = cycle_->heartbeat().stands_still();
   say(
-      fmt::format("fault: the loop hangs: no cycle for {:g} s, it is {}. The emergency stop is "
-                  "latched{}; the process ends in {} s if the loop does not come back",
-                  limit_s_, where_, nodes, kGrace.count()));
+      fmt::format("fault: the loop {}, it is {}. The emergency stop is latched{}; the process ends "
+                  "in {} s{}",
+                  crashed ? "stands still" : fmt::format("hangs: no cycle for {:g} s", limit_s_),
+                  where_, nodes, kGrace.count(), crashed ? "" : " if the loop does not come back"));
 }
 
 std::string LoopGuard::stop_nodes() {

@@ -42,6 +42,16 @@ TEST_F(Watched, ALoopThatDoesNotLeaveItsCycleHangsAndIsGivenUpOnce) {
   EXPECT_EQ(returns, 0);
 }
 
+TEST_F(Watched, ALoopThatStandsStillIsNotWaitedFor) {
+  const LoopWatchdog watchdog(heartbeat,
+                              {.limit = std::chrono::hours(1), .grace = milliseconds(50)}, hooks());
+  cycles(3);
+  heartbeat.enter();
+  heartbeat.stand_still();
+  EXPECT_TRUE(tandem::test::eventually([&] { return given_up == 1; }));
+  EXPECT_EQ(hangs, 1);
+}
+
 TEST_F(Watched, ALoopThatComesBackIsToldAndWatchedOn) {
   const LoopWatchdog watchdog(heartbeat,
                               {.limit = milliseconds(30), .grace = std::chrono::hours(1)}, hooks());
