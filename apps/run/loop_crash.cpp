@@ -15,15 +15,17 @@
 namespace tandem::apps {
 namespace {
 
-thread_local runtime::Heartbeat* loop = nullptr;  // null: another thread
+thread_local runtime::Heartbeat* of_loop = nullptr;  // null: another thread
 std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
 
-bool in_cycle() noexcept { return loop != nullptr && runtime::Heartbeat::at_work(loop->beats()); }
+bool in_cycle() noexcept {
+  return of_loop != nullptr && runtime::Heartbeat::at_work(of_loop->beats());
+}
 
 [[noreturn]] void stand_still() {
-  loop->stand_still();
+  of_loop->stand_still();
   while (true) ::pause();
 }
 
@@ -84,7 +86,7 @@ void handle(int signal) {
 }  // namespace
 
 void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
-  loop = &heartbeat;
+  of_loop = &heartbeat;
   const std::terminate_handler before = std::set_terminate(on_exception);
   if (before != on_exception) usual_end = before;  // else this is not the first run of the process
   stack_t stack{};
