@@ -15,17 +15,17 @@
 namespace tandem::apps {
 namespace {
 
-thread_local runtime::Heartbeat* of_loop = nullptr;  // null: another thread
+thread_local runtime::Heartbeat* loop_heartbeat = nullptr;  // null: another thread
 std::terminate_handler usual_end = nullptr;
 /// For a signal handler when the loop's own stack is full.
 alignas(std::max_align_t) std::array<std::byte, 16384> signal_stack;
 
 bool in_cycle() noexcept {
-  return of_loop != nullptr && runtime::Heartbeat::at_work(of_loop->beats());
+  return loop_heartbeat != nullptr && runtime::Heartbeat::at_work(loop_heartbeat->beats());
 }
 
 [[noreturn]] void stand_still() {
-  of_loop->stand_still();
+  loop_heartbeat->stand_still();
   while (true) ::pause();
 }
 
@@ -86,7 +86,7 @@ void handle(int signal) {
 }  // namespace
 
 void stand_still_on_crash(runtime::Heartbeat& heartbeat) {
-  of_loop = &heartbeat;
+  loop_heartbeat = &heartbeat;
   const std::terminate_handler before = std::set_terminate(on_exception);
   if (before != on_exception) usual_end = before;  // else this is not the first run of the process
   stack_t stack{};

@@ -6,11 +6,11 @@
 
 namespace tandem::apps {
 
-/// Call it on the loop's thread, before the first cycle. While the loop is at work, an exception, a
-/// signal such as SIGSEGV and a call of exit() then no longer end the process: the thread says why,
-/// and stands still. The watchdog does the rest at once, as for a loop that hangs: it stops robot
-/// and nodes, names the controller and closes the log. Between two cycles the process ends as
-/// usual. It also ends by _exit(), and by a signal that a sanitizer, say, handles already.
+/// Keeps the process alive when the loop crashes. Call it on the loop's thread, before its first
+/// cycle. An exception, a signal such as SIGSEGV or exit() in the working part of a cycle then
+/// stops this thread only, which says why. The watchdog acts at once, as for a loop that hangs: it
+/// stops robot and nodes, names the controller and closes the log. The process still ends between
+/// two cycles, by _exit(), and by a signal that has another handler already, such as a sanitizer's.
 /// @param heartbeat  the loop's; outlives it
 void stand_still_on_crash(runtime::Heartbeat& heartbeat);
 
