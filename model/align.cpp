@@ -3,9 +3,11 @@
 // the tree picks the combination with the fewest operations, exactly.
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
+#include "model/limbs.hpp"
 #include "model/mechanism.hpp"
 
 namespace tandem::model {
@@ -23,6 +25,8 @@ constexpr double kTurnCost = 64.0;
 constexpr double kShiftCost = 43.0;
 constexpr double kOffsetCost = 1.0;
 constexpr double kMomentCost = 4.0;
+constexpr double kMismatchCost = 200.0;  // of a constant that is zero in one of two limbs
+constexpr double kZero = 1e-13;
 
 struct Line {
   Vector3d point;
@@ -131,6 +135,67 @@ double edge_cost(const Tree& tree, std::size_t joint, const Placement& parent,
   return cost;
 }
 
+// What a joint's constants are but for their signs.
+std::array<double, 15> sizes_of(const Tree& tree, std::size_t joint, const Placement& parent,
+                                const Placement& own) {
+  const Placement in_parent = tree.joints[joint].in_parent * own;
+  const Matrix3d R = parent.R.transpose() * in_parent.R;
+  const Vector3d p = parent.R.transpose() * (in_parent.p - parent.p);
+  const Vector3d com = own.R.transpose() * (tree.bodies[joint + 1].inertia.com_m - own.p);
+  std::array<double, 15> sizes;
+  for (int k = 0; k < 9; ++k) sizes[static_cast<std::size_t>(k)] = std::abs(R(k / 3, k % 3));
+  for (std::size_t k = 0; k < 3; ++k) {
+    sizes[9 + k] = std::abs(p[static_cast<int>(k)]);
+    sizes[12 + k] = std::abs(com[static_cast<int>(k)]);
+  }
+  return sizes;
+}
+
+// How far two joints are from taking the same operations: a constant that is zero in one of them
+// only costs what it costs there.
+double mismatch(const std::array<double, 15>& a, const std::array<double, 15>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const bool differs = (a[i] > kZero) != (b[i] > kZero);
+    sum += (differs ? kMismatchCost : 0.0) + kMismatchCost * 1e-3 * std::abs(a[i] - b[i]);
+  }
+  return sum;
+}
+
+// Frames of a second limb whose numbers are those of the first one's but for their signs, as far as
+// there are such: then the same operations serve both.
+struct Matched {
+  std::vector<Placement> frames;  // by joint of the limb
+  double mismatch = 0.0;
+};
+Matched match_frames(const Tree& tree, const LimbPair& limbs, const Placement& parent,
+                     const std::vector<Placement>& first) {
+  Matched result;
+  const auto parent_in = [&](const std::vector<int>& limb, const std::vector<Placement>& frames,
+                             int joint) {
+    const int body = tree.joints[static_cast<std::size_t>(joint)].parent;
+    const auto found = std::find(limb.begin(), limb.end(), body - 1);
+    return found == limb.end() ? parent : frames[static_cast<std::size_t>(found - limb.begin())];
+  };
+  for (std::size_t k = 0; k < limbs.first.size(); ++k) {
+    const auto wanted = sizes_of(tree, static_cast<std::size_t>(limbs.first[k]),
+                                 parent_in(limbs.first, first, limbs.first[k]), first[k]);
+    const auto second = static_cast<std::size_t>(limbs.second[k]);
+    const Placement above = parent_in(limbs.second, result.frames, limbs.second[k]);
+    double least = std::numeric_limits<double>::infinity();
+    Placement best;
+    for (const Placement& candidate : candidates(tree, second)) {
+      const double found = mismatch(wanted, sizes_of(tree, second, above, candidate));
+      if (found >= least - 1e-9) continue;
+      least = found;
+      best = candidate;
+    }
+    result.frames.push_back(best);
+    result.mismatch += least;
+  }
+  return result;
+}
+
 // Candidates of one body's frame, and the least that its subtree costs with each.
 struct Choice {
   std::vector<Placement> candidates;
@@ -146,40 +211,119 @@ std::vector<Placement> described_frames(const Tree& tree) {
   return result;
 }
 
-std::vector<Placement> align_frames(const Tree& tree) {
-  const std::size_t count = tree.joints.size();
-  std::vector<Choice> choice(count + 1);
-  choice[0] = {{Placement{}}, {0.0}};
-  for (std::size_t j = 0; j < count; ++j) {
-    choice[j + 1].candidates = candidates(tree, j);
-    choice[j + 1].subtree_cost.assign(choice[j + 1].candidates.size(), 0.0);
+namespace {
+
+class Alignment {
+ public:
+  explicit Alignment(const Tree& tree)
+      : tree_(tree),
+        limbs_(find_limb_pairs(tree)),
+        choice_(tree.joints.size() + 1),
+        best_of_parent_(tree.joints.size()),
+        cost_of_parent_(tree.joints.size()) {
+    choice_[0] = {{Placement{}}, {0.0}};
+    for (std::size_t j = 0; j < tree.joints.size(); ++j) {
+      choice_[j + 1].candidates = candidates(tree, j);
+      choice_[j + 1].subtree_cost.assign(choice_[j + 1].candidates.size(), 0.0);
+    }
   }
-  std::vector<std::vector<std::size_t>> best_of_parent(count);
-  for (std::size_t j = count; j-- > 0;) {
-    Choice& parent = choice[static_cast<std::size_t>(tree.joints[j].parent)];
-    const Choice& own = choice[j + 1];
-    for (std::size_t p = 0; p < parent.candidates.size(); ++p) {
+
+  std::vector<Placement> run() {
+    for (std::size_t j = tree_.joints.size(); j-- > 0;) {
+      find_best(j);
+      add_to_parent(j);
+    }
+    frames_.assign(tree_.joints.size() + 1, Placement{});
+    chosen_.assign(tree_.joints.size() + 1, 0);
+    for (std::size_t j = 0; j < tree_.joints.size(); ++j) take_best(j);
+    for (const LimbPair& limbs : limbs_) match(limbs);
+    return std::move(frames_);
+  }
+
+ private:
+  std::size_t parent_of(std::size_t joint) const {
+    return static_cast<std::size_t>(tree_.joints[joint].parent);
+  }
+
+  // For each frame of its parent: the joint's own with the cheapest subtree.
+  void find_best(std::size_t j) {
+    const Choice& own = choice_[j + 1];
+    for (const Placement& parent : choice_[parent_of(j)].candidates) {
       double best = std::numeric_limits<double>::infinity();
       std::size_t best_index = 0;
       for (std::size_t c = 0; c < own.candidates.size(); ++c) {
-        const double cost =
-            own.subtree_cost[c] + edge_cost(tree, j, parent.candidates[p], own.candidates[c]);
+        const double cost = own.subtree_cost[c] + edge_cost(tree_, j, parent, own.candidates[c]);
         if (cost < best - 1e-9) {
           best = cost;
           best_index = c;
         }
       }
-      best_of_parent[j].push_back(best_index);
-      parent.subtree_cost[p] += best;
+      best_of_parent_[j].push_back(best_index);
+      cost_of_parent_[j].push_back(best);
     }
   }
-  std::vector<Placement> result{Placement{}};
-  std::vector<std::size_t> chosen{0};
-  for (std::size_t j = 0; j < count; ++j) {
-    chosen.push_back(best_of_parent[j][chosen[static_cast<std::size_t>(tree.joints[j].parent)]]);
-    result.push_back(choice[j + 1].candidates[chosen.back()]);
+
+  // A limb whose frames match those of the one that it is paired with costs what does not match.
+  void add_to_parent(std::size_t j) {
+    Choice& parent = choice_[parent_of(j)];
+    const LimbPair* pair = nullptr;
+    for (const LimbPair& limbs : limbs_) {
+      if (limbs.second.front() == static_cast<int>(j)) return;  // added with the first
+      if (limbs.first.front() == static_cast<int>(j)) pair = &limbs;
+    }
+    for (std::size_t p = 0; p < parent.candidates.size(); ++p) {
+      parent.subtree_cost[p] += cost_of_parent_[j][p];
+      if (pair == nullptr) continue;
+      const double own = cost_of_parent_[static_cast<std::size_t>(pair->second.front())][p];
+      const Matched matched =
+          match_frames(tree_, *pair, parent.candidates[p], first_frames(*pair, p));
+      parent.subtree_cost[p] += std::min(own, matched.mismatch);
+    }
   }
-  return result;
-}
+
+  // The best frames of the first limb, with that frame of its parent.
+  std::vector<Placement> first_frames(const LimbPair& pair, std::size_t parent_frame) const {
+    std::vector<Placement> frames;
+    std::vector<std::size_t> chosen;
+    for (const int joint : pair.first) {
+      const auto j = static_cast<std::size_t>(joint);
+      const auto above =
+          std::find(pair.first.begin(), pair.first.end(), tree_.joints[j].parent - 1);
+      const bool is_root = above == pair.first.end();
+      const std::size_t p =
+          is_root ? parent_frame : chosen[static_cast<std::size_t>(above - pair.first.begin())];
+      chosen.push_back(best_of_parent_[j][p]);
+      frames.push_back(choice_[j + 1].candidates[chosen.back()]);
+    }
+    return frames;
+  }
+
+  void take_best(std::size_t j) {
+    chosen_[j + 1] = best_of_parent_[j][chosen_[parent_of(j)]];
+    frames_[j + 1] = choice_[j + 1].candidates[chosen_[j + 1]];
+  }
+
+  void match(const LimbPair& limbs) {
+    const std::size_t body = parent_of(static_cast<std::size_t>(limbs.first.front()));
+    const Matched matched =
+        match_frames(tree_, limbs, frames_[body], first_frames(limbs, chosen_[body]));
+    const auto second = static_cast<std::size_t>(limbs.second.front());
+    if (matched.mismatch > cost_of_parent_[second][chosen_[body]]) return;
+    for (std::size_t k = 0; k < limbs.second.size(); ++k)
+      frames_[static_cast<std::size_t>(limbs.second[k]) + 1] = matched.frames[k];
+  }
+
+  const Tree& tree_;
+  std::vector<LimbPair> limbs_;
+  std::vector<Choice> choice_;                            // per body
+  std::vector<std::vector<std::size_t>> best_of_parent_;  // per joint and frame of its parent
+  std::vector<std::vector<double>> cost_of_parent_;       // the same
+  std::vector<Placement> frames_;
+  std::vector<std::size_t> chosen_;
+};
+
+}  // namespace
+
+std::vector<Placement> align_frames(const Tree& tree) { return Alignment(tree).run(); }
 
 }  // namespace tandem::model

@@ -9,6 +9,8 @@
 #include <queue>
 #include <set>
 
+#include "model/lanes.hpp"
+
 namespace tandem::model {
 namespace {
 
@@ -26,13 +28,16 @@ std::string literal(double value) {
   return result;
 }
 
-// Writes one kernel. Nodes are emitted in the order in which the algorithm made them, which
-// walks limb by limb; a value that a later part needs goes through the workspace w.
+// Writes one kernel. A unit is an operation, or two of a pair, known by its node of the first limb.
+// Units are written in the order in which the algorithm made them, which walks limb by limb; a
+// value that a later part needs goes through the workspace w.
 class Emitter {
  public:
-  Emitter(const Graph& graph, const TracedKernel& kernel, std::uint32_t part_operations)
+  Emitter(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
+          std::uint32_t part_operations)
       : nodes_(graph.nodes()),
         kernel_(kernel),
+        lanes_(lanes),
         part_operations_(part_operations),
         live_(live_nodes(graph, kernel.outputs)),
         uses_(nodes_.size(), 0),
@@ -44,6 +49,7 @@ class Emitter {
         outputs_of_(nodes_.size()) {
     result_.name = kernel.shape.name;
     result_.count = count_operations(graph, kernel.outputs);
+    result_.count.pairs = lanes.operations;
   }
 
   EmittedKernel run() {
@@ -100,20 +106,41 @@ class Emitter {
     return nodes_[i].op == Op::kSin || nodes_[i].op == Op::kCos;
   }
 
+  // Those of pairs first, side by side.
   void find_angles() {
+    std::vector<std::uint32_t> single;
+    const auto add = [&](std::uint32_t angle) {
+      angle_[angle] = static_cast<std::uint32_t>(angles_.size());
+      angles_.push_back({angle, false});
+    };
     for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
       if (!live_[i] || !is_trigonometric(i) || !is_early(nodes_[i].a)) continue;
-      if (angle_[nodes_[i].a] != kNowhere) continue;
-      angle_[nodes_[i].a] = static_cast<std::uint32_t>(angles_.size());
-      angles_.push_back(nodes_[i].a);
+      const std::uint32_t angle = nodes_[i].a;
+      if (lanes_.first(i) != kNowhere) continue;  // with its partner
+      const std::uint32_t other = lanes_.second(i);
+      if (other == kNowhere || !is_early(nodes_[other].a)) {
+        single.push_back(angle);
+        continue;
+      }
+      if (angle_[angle] == kNowhere) {
+        add(angle);
+        add(nodes_[other].a);
+      }
+      if (nodes_[i].op == Op::kSin && lanes_.minus[i])
+        angles_[angle_[nodes_[other].a]].minus = true;
     }
-    table_ = (static_cast<std::uint32_t>(angles_.size()) + 3) / 4 * 4;  // whole vectors
+    for (const std::uint32_t angle : single)
+      if (angle_[angle] == kNowhere) add(angle);
+    table_ = (static_cast<std::uint32_t>(angles_.size()) + 3) / 4 * 4;  // whole vectors of four
     workspace_ = 3 * table_;
   }
 
   // Its sine or cosine was computed with all others before the first part.
   bool is_tabulated(std::uint32_t i) const {
     return is_trigonometric(i) && angle_[nodes_[i].a] != kNowhere;
+  }
+  std::uint32_t place_in_table(std::uint32_t i) const {
+    return (nodes_[i].op == Op::kSin ? 1 : 2) * table_ + angle_[nodes_[i].a];
   }
 
   void find_uses() {
@@ -126,11 +153,55 @@ class Emitter {
       uses_[i] += static_cast<std::uint32_t>(outputs_of_[i].size());
   }
 
+  bool is_written(std::uint32_t i) const {
+    return uses_[i] != 0 && is_operation(nodes_[i].op) && !is_tabulated(i);
+  }
+  bool is_pair(std::uint32_t i) const {
+    return lanes_.second(i) != kNowhere && is_written(i) && is_written(lanes_.second(i));
+  }
+  bool is_second(std::uint32_t i) const {
+    return lanes_.first(i) != kNowhere && is_pair(lanes_.first(i));
+  }
+  std::uint32_t unit_of(std::uint32_t i) const { return is_second(i) ? lanes_.first(i) : i; }
+
+  template <class Do>
+  void for_operands(std::uint32_t unit, const Do& act) const {
+    const auto of = [&](std::uint32_t i) {
+      act(nodes_[i].a);
+      if (is_binary(nodes_[i].op)) act(nodes_[i].b);
+    };
+    of(unit);
+    if (is_pair(unit)) of(lanes_.second(unit));
+  }
+
+  // Every unit after those that it needs, else in the order of the graph.
+  std::vector<std::uint32_t> order() const {
+    std::vector<std::uint32_t> missing(nodes_.size(), 0), result;
+    std::vector<std::vector<std::uint32_t>> users(nodes_.size());
+    std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> ready;
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+      if (!is_written(i) || is_second(i)) continue;
+      for_operands(i, [&](std::uint32_t operand) {
+        if (!is_written(operand)) return;
+        users[unit_of(operand)].push_back(i);
+        ++missing[i];
+      });
+      if (missing[i] == 0) ready.push(i);
+    }
+    while (!ready.empty()) {
+      const std::uint32_t unit = ready.top();
+      ready.pop();
+      result.push_back(unit);
+      for (const std::uint32_t user : users[unit])
+        if (--missing[user] == 0) ready.push(user);
+    }
+    return result;
+  }
+
   void schedule() {
     parts_.emplace_back();
     std::uint32_t operations = 0;
-    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
-      if (uses_[i] == 0 || !is_operation(nodes_[i].op) || is_tabulated(i)) continue;
+    for (const std::uint32_t i : order()) {
       if (operations == part_operations_) {
         result_.sizes.push_back(operations);
         parts_.emplace_back();
@@ -139,21 +210,29 @@ class Emitter {
       part_of_[i] = static_cast<std::uint32_t>(parts_.size() - 1);
       parts_.back().push_back(i);
       ++operations;
-      mark_used(nodes_[i].a, part_of_[i]);
-      if (is_binary(nodes_[i].op)) mark_used(nodes_[i].b, part_of_[i]);
+      for_operands(i, [&](std::uint32_t operand) { last_part_[unit_of(operand)] = part_of_[i]; });
     }
     result_.sizes.push_back(operations);
   }
-  void mark_used(std::uint32_t i, std::uint32_t part) { last_part_[i] = part; }
 
+  // A node's own value.
   std::string operand(std::uint32_t i) {
     const Node& node = nodes_[i];
     if (node.op == Op::kConstant) return literal(node.value);
     if (node.op == Op::kInput)
       return kernel_.shape.inputs[node.a].name + "[" + std::to_string(node.b) + "]";
     if (is_tabulated(i)) {
-      const std::size_t table = (node.op == Op::kSin ? 1 : 2) * table_;
-      return "w[" + std::to_string(table + angle_[node.a]) + "]";
+      const std::string value = "w[" + std::to_string(place_in_table(i)) + "]";
+      const bool minus = node.op == Op::kSin && angles_[angle_[node.a]].minus;
+      return minus ? "(-" + value + ")" : value;
+    }
+    const std::uint32_t unit = unit_of(i);
+    if (is_pair(unit)) {
+      const std::uint32_t lane = unit == i ? 0 : 1;
+      const std::string value = part_of_[unit] == part_
+                                    ? "p" + std::to_string(unit) + "[" + std::to_string(lane) + "]"
+                                    : "w[" + std::to_string(slot_[unit] + lane) + "]";
+      return lane == 1 && lanes_.minus[unit] ? "(-" + value + ")" : value;
     }
     if (!text_[i].empty()) return "(" + text_[i] + ")";
     if (part_of_[i] != part_) return "w[" + std::to_string(slot_[i]) + "]";
@@ -177,11 +256,75 @@ class Emitter {
     return a;
   }
 
+  // A vector of `first` and plus or minus `second`.
+  std::string vector(std::uint32_t first, std::uint32_t second, bool minus) {
+    const bool paired = lanes_.second(first) == second;
+    if (paired && is_tabulated(first) && is_tabulated(second)) {
+      const std::string pair = "pair(w + " + std::to_string(place_in_table(first)) + ")";
+      const bool held = nodes_[first].op == Op::kSin && angles_[angle_[nodes_[second].a]].minus;
+      return held == minus ? pair : "flip(" + pair + ")";
+    }
+    if (paired && is_pair(first)) {
+      const std::string pair = part_of_[first] == part_
+                                   ? "p" + std::to_string(first)
+                                   : "pair(w + " + std::to_string(slot_[first]) + ")";
+      return lanes_.minus[first] == minus ? pair : "flip(" + pair + ")";
+    }
+    return "two{" + operand(first) + ", " + (minus ? "-" : "") + operand(second) + "}";
+  }
+
+  // Two operations as one. Which operands correspond, and which signs lane 1 needs of them.
+  std::string pair_expression(std::uint32_t i) {
+    const std::uint32_t other = lanes_.second(i);
+    const Node& x = nodes_[i];
+    const Node& y = nodes_[other];
+    const bool swapped = x.op != Op::kDiv && !corresponds(x.a, y.a);
+    const std::uint32_t a = swapped ? y.b : y.a;
+    const std::uint32_t b = swapped ? y.a : y.b;
+    const bool minus = lanes_.minus[i];
+    if (x.op == Op::kAdd || x.op == Op::kSub) {
+      const bool minus_b = x.op == Op::kSub;
+      const bool second_minus_a = swapped && y.op == Op::kSub;
+      const bool second_minus_b = !swapped && y.op == Op::kSub;
+      return vector(x.a, a, minus != second_minus_a) + (minus_b ? " - " : " + ") +
+             vector(x.b, b, (minus != second_minus_b) != minus_b);
+    }
+    // The product's sign is on the operand whose sign is free, if any is.
+    const bool held_a = held_minus(x.a, a);
+    const bool a_is_free = is_free(x.a, a) && !is_free(x.b, b);
+    const bool minus_b = a_is_free ? held_minus(x.b, b) : minus != held_a;
+    const bool minus_a = minus != minus_b;
+    return vector(x.a, a, minus_a) + (x.op == Op::kDiv ? " / " : " * ") + vector(x.b, b, minus_b);
+  }
+  bool corresponds(std::uint32_t first, std::uint32_t second) const {
+    if (nodes_[first].op == Op::kConstant) return nodes_[second].op == Op::kConstant;
+    return lanes_.second(first) == second || (lanes_.second(first) == kNowhere && first == second);
+  }
+  // Not held as a vector: it is made where it is used, with either sign.
+  bool is_free(std::uint32_t first, std::uint32_t second) const {
+    const bool paired = lanes_.second(first) == second;
+    return !paired || !(is_pair(first) || (is_tabulated(first) && is_tabulated(second)));
+  }
+  bool held_minus(std::uint32_t first, std::uint32_t second) const {
+    if (is_free(first, second)) return false;
+    if (is_tabulated(first))
+      return nodes_[first].op == Op::kSin && angles_[angle_[nodes_[second].a]].minus;
+    return lanes_.minus[first];
+  }
+
   void write_part(std::uint32_t part) {
     part_ = part;
     release_slots(part);
     std::string body;
     for (const std::uint32_t i : parts_[part]) {
+      if (is_pair(i)) {
+        body += "  const two p" + std::to_string(i) + " = " + pair_expression(i) + ";\n";
+        body += assignments(i) + assignments(lanes_.second(i));
+        if (last_part_[i] > part)
+          body +=
+              "  pair(w + " + std::to_string(take_slots(i)) + ") = p" + std::to_string(i) + ";\n";
+        continue;
+      }
       const std::string value = expression(i);
       const bool crosses = last_part_[i] > part;
       if (uses_[i] == 1 && outputs_of_[i].empty() && !crosses && value.size() < kLongestInline) {
@@ -189,16 +332,22 @@ class Emitter {
         continue;
       }
       const std::string name = "t" + std::to_string(i);
-      body += "  const double " + name + " = " + value + ";\n";
-      for (const std::uint32_t output : outputs_of_[i])
-        body += "  " + output_names_[output] + " = " +
-                (kernel_.outputs[output].negative() ? "-" : "") + name + ";\n";
+      body += "  const double " + name + " = " + value + ";\n" + assignments(i);
       if (crosses) body += "  w[" + std::to_string(take_slot(i)) + "] = " + name + ";\n";
     }
     if (part + 1 == parts_.size()) body += plain_outputs();
     const std::string name = kernel_.shape.name + "_" + std::to_string(part);
     result_.declarations.push_back("void " + name + "(" + parameters_ + ");\n");
     result_.parts.push_back("void " + name + "(" + parameters_ + ") {\n" + body + "}\n");
+  }
+
+  // The outputs that are this node.
+  std::string assignments(std::uint32_t i) {
+    std::string body;
+    for (const std::uint32_t output : outputs_of_[i])
+      body += "  " + output_names_[output] + " = " +
+              (kernel_.outputs[output].negative() ? "-" : "") + operand(i) + ";\n";
+    return body;
   }
 
   // Outputs that are constants, inputs or tabulated.
@@ -209,7 +358,7 @@ class Emitter {
       if (cleared_outputs_[k]) continue;
       if (output.is_constant()) {
         body += "  " + output_names_[k] + " = " + literal(output.value()) + ";\n";
-      } else if (part_of_[output.node()] == kNowhere) {
+      } else if (!is_written(output.node())) {
         body += "  " + output_names_[k] + " = " + (output.negative() ? "-" : "") +
                 operand(output.node()) + ";\n";
       }
@@ -227,10 +376,23 @@ class Emitter {
     taken_.push_back(i);
     return slot_[i];
   }
+  // Of a pair: the first of two that are aligned.
+  std::uint32_t take_slots(std::uint32_t i) {
+    if (free_pairs_.empty()) {
+      if (workspace_ % 2 != 0) free_.push(workspace_++);
+      slot_[i] = workspace_;
+      workspace_ += 2;
+    } else {
+      slot_[i] = free_pairs_.top();
+      free_pairs_.pop();
+    }
+    taken_.push_back(i);
+    return slot_[i];
+  }
   void release_slots(std::uint32_t part) {
     std::erase_if(taken_, [&](std::uint32_t i) {
       if (last_part_[i] >= part) return false;
-      free_.push(slot_[i]);
+      (is_pair(i) ? free_pairs_ : free_).push(slot_[i]);
       return true;
     });
   }
@@ -245,13 +407,17 @@ class Emitter {
       if (cleared_.contains(out.name))
         body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
                 "[i] = 0.0;\n";
-    for (std::size_t k = 0; k < angles_.size(); ++k)
-      body += "  w[" + std::to_string(k) + "] = " + early(angles_[k]) + ";\n";
+    for (std::size_t k = 0; k < angles_.size(); ++k) {
+      const std::string value = early(angles_[k].node);
+      body += "  w[" + std::to_string(k) +
+              "] = " + (angles_[k].minus ? "-(" + value + ")" : value) + ";\n";
+    }
     for (std::size_t k = angles_.size(); k < table_; ++k)
       body += "  w[" + std::to_string(k) + "] = 0.0;\n";
     const std::string n = std::to_string(table_);
     if (!angles_.empty())
-      body += "  sines_and_cosines(" + n + ", w, w + " + n + ", w + 2 * " + n + ");\n";
+      body += "  sines_and_cosines(" + n + ", w, w + " + std::to_string(table_) + ", w + " +
+              std::to_string(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + kernel_.shape.name + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
     result_.entry =
@@ -260,14 +426,25 @@ class Emitter {
   // An angle in full, its operands too: nothing is computed before it.
   std::string early(std::uint32_t i) {
     const Node& node = nodes_[i];
-    if (!is_operation(node.op)) return operand(i);
-    for (const std::uint32_t k : {node.a, node.b})
-      text_[k] = is_operation(nodes_[k].op) ? early(k) : "";
-    return expression(i);
+    const auto value = [&](std::uint32_t k) {
+      return is_operation(nodes_[k].op) ? "(" + early(k) + ")" : operand(k);
+    };
+    switch (node.op) {
+      case Op::kAdd: return value(node.a) + " + " + value(node.b);
+      case Op::kSub: return value(node.a) + " - " + value(node.b);
+      case Op::kMul: return value(node.a) + " * " + value(node.b);
+      default: return operand(i);
+    }
   }
+
+  struct Angle {
+    std::uint32_t node;
+    bool minus;  // of lane 1: minus the angle, and so its sine, is what the table has
+  };
 
   std::span<const Node> nodes_;
   const TracedKernel& kernel_;
+  const Lanes& lanes_;
   std::uint32_t part_operations_;
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, part_of_, last_part_, slot_, angle_;
@@ -276,12 +453,13 @@ class Emitter {
   std::vector<std::string> output_names_;
   std::set<std::string> cleared_;      // outputs, mostly zeros, that a loop clears first
   std::vector<bool> cleared_outputs_;  // per output: nothing is left to write
-  std::vector<std::uint32_t> angles_;
+  std::vector<Angle> angles_;
+  std::uint32_t table_ = 0;  // angles, rounded up to whole vectors
   std::vector<std::vector<std::uint32_t>> parts_;
   std::uint32_t part_ = 0;
-  std::uint32_t table_ = 0;  // its length
   std::uint32_t workspace_ = 0;
-  std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>> free_;
+  using Slots = std::priority_queue<std::uint32_t, std::vector<std::uint32_t>, std::greater<>>;
+  Slots free_, free_pairs_;
   std::vector<std::uint32_t> taken_;
   std::string parameters_, arguments_;
   EmittedKernel result_;
@@ -325,9 +503,9 @@ TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
   return result;
 }
 
-EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
+EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
                           std::uint32_t part_operations) {
-  return Emitter(graph, kernel, part_operations).run();
+  return Emitter(graph, kernel, lanes, part_operations).run();
 }
 
 }  // namespace tandem::model

@@ -16,6 +16,8 @@ struct TracedKernel {
   std::vector<Expr> outputs;  ///< the output arrays, one after another
 };
 
+struct Lanes;
+
 /// Runs the kernel's algorithm over expressions in `graph`.
 [[nodiscard]] TracedKernel trace_kernel(Kernel kernel, const Mechanism& m, Graph& graph);
 
@@ -36,7 +38,8 @@ struct EmittedKernel {
 };
 
 /// @param part_operations  a part is closed once it holds this many additions and products.
+/// @param lanes            what is written as operations on vectors of two.
 [[nodiscard]] EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
-                                        std::uint32_t part_operations);
+                                        const Lanes& lanes, std::uint32_t part_operations);
 
 }  // namespace tandem::model

@@ -30,6 +30,7 @@ struct OperationCount {
   std::uint32_t div = 0;
   std::uint32_t sqrt = 0;
   std::uint32_t sincos = 0;  ///< sine and cosine of one angle count once
+  std::uint32_t pairs = 0;   ///< times that two of the others are one, on a vector
 };
 
 class Graph;

@@ -9,6 +9,7 @@
 #include "base/quoting.hpp"
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
+#include "model/lanes.hpp"
 
 namespace tandem::model {
 namespace {
@@ -26,6 +27,17 @@ constexpr std::uint32_t kMostMassMatrixOperations = 40'000;
 constexpr std::string_view kBanner =
     "// Made by `tandem model build`: change the robot's description instead.\n";
 
+// Vectors of two lanes.
+constexpr std::string_view kVectors =
+    R"(typedef double two __attribute__((vector_size(16), may_alias));
+typedef long long two_bits __attribute__((vector_size(16), may_alias));
+static inline two& pair(double* at) { return *reinterpret_cast<two*>(at); }
+static inline two flip(two x) {  // minus lane 1
+  const two_bits sign = {0, static_cast<long long>(0x8000000000000000u)};
+  return reinterpret_cast<two>(reinterpret_cast<two_bits>(x) ^ sign);
+}
+)";
+
 std::string name_table(const std::string& name, const std::vector<std::string>& values) {
   std::string text = fmt::format("const char* const {}[] = {{", name);
   for (const std::string& value : values) text += quoted_text(value) + ", ";
@@ -35,8 +47,8 @@ std::string name_table(const std::string& name, const std::vector<std::string>& 
 std::string count_table(const std::vector<KernelCount>& counts) {
   std::string text = "const tandem_kernel_count counts[] = {\n";
   for (const auto& [kernel, c] : counts)
-    text += fmt::format("    {{\"{}\", {}, {}, {}, {}, {}}},\n", kernel, c.add, c.mul, c.div,
-                        c.sqrt, c.sincos);
+    text += fmt::format("    {{\"{}\", {}, {}, {}, {}, {}, {}}},\n", kernel, c.add, c.mul, c.div,
+                        c.sqrt, c.sincos, c.pairs);
   return text + "};\n";
 }
 
@@ -66,6 +78,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
 std::string parts_header(const std::vector<EmittedKernel>& kernels) {
   std::string text{kBanner};
   text += "#pragma once\n#include \"kernels.h\"\n\nnamespace TANDEM_VARIANT {\n";
+  text += kVectors;
   for (const EmittedKernel& kernel : kernels)
     for (const std::string& declaration : kernel.declarations) text += declaration;
   return text + "}  // namespace TANDEM_VARIANT\n";
@@ -110,13 +123,18 @@ Status check_finite(const Graph& graph, const TracedKernel& kernel) {
 }
 
 OperationCount times(OperationCount count, std::uint32_t n) {
-  return {count.add * n, count.mul * n, count.div * n, count.sqrt * n, count.sincos * n};
+  return {count.add * n,  count.mul * n,    count.div * n,
+          count.sqrt * n, count.sincos * n, count.pairs * n};
+}
+
+EmittedKernel emit(const Graph& graph, const TracedKernel& kernel, const Mechanism& m) {
+  return emit_kernel(graph, kernel, pair_lanes(graph, kernel, m), kPartOperations);
 }
 
 // The mass matrix column by column.
 EmittedKernel mass_matrix_by_columns(const Mechanism& m) {
   Graph graph;
-  EmittedKernel kernel = emit_kernel(graph, trace_mass_times(m, graph), kPartOperations);
+  EmittedKernel kernel = emit(graph, trace_mass_times(m, graph), m);
   const int nv = kernel_shape(Kernel::kBias, m).outputs[0].size;
   kernel.name = kernel_shape(Kernel::kMassMatrix, m).name;
   kernel.count = times(kernel.count, static_cast<std::uint32_t>(nv));
@@ -180,7 +198,7 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
     if (Status status = check_finite(graph, kernel); !status)
       return std::unexpected(status.error());
-    kernels.push_back(emit_kernel(graph, kernel, kPartOperations));
+    kernels.push_back(emit(graph, kernel, *mechanism));
     if (static_cast<Kernel>(k) == Kernel::kMassMatrix &&
         kernels.back().count.add + kernels.back().count.mul > kMostMassMatrixOperations)
       kernels.back() = mass_matrix_by_columns(*mechanism);

@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define TANDEM_KERNELS_ABI 1u
+#define TANDEM_KERNELS_ABI 2u
 
 /* Operations of one kernel as emitted (before the compiler). */
 typedef struct tandem_kernel_count {
@@ -26,6 +26,7 @@ typedef struct tandem_kernel_count {
   uint32_t div;
   uint32_t sqrt;
   uint32_t sincos; /* sine and cosine of one angle count once */
+  uint32_t pairs;  /* times that two of these, of limbs that are alike, are one instruction */
 } tandem_kernel_count;
 
 typedef struct tandem_kernels {

@@ -272,6 +272,7 @@ Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec, Frames
   const bool chosen = frames == Frames::kFewestOperations;
   Maker maker{tree, spec, chosen ? align_frames(tree) : described_frames(tree), {}, {}, {}};
   maker.bodies();
+  maker.result.limbs = find_limb_pairs(tree);
   if (Status status = maker.armature(); !status) return std::unexpected(status.error());
   if (Status status = maker.sites(); !status) return std::unexpected(status.error());
   if (Status status = maker.sensors(); !status) return std::unexpected(status.error());

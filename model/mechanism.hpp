@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "model/limbs.hpp"
 #include "model/model_spec.hpp"
 #include "model/spatial.hpp"
 #include "model/tree.hpp"
@@ -67,6 +68,7 @@ struct Mechanism {
   std::vector<std::vector<int>> children;      ///< per body: the joints that start there
   std::vector<Moments<double>> moments;        ///< per body, regrouped
   std::vector<Moments<double>> true_moments;   ///< per body, as described
+  std::vector<LimbPair> limbs;                 ///< that are built alike
   std::vector<MechanismSite> sites;
   std::vector<MechanismSensor> sensors;
   int wrenches = 0;

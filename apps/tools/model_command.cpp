@@ -41,8 +41,9 @@ Status build(const RobotFiles& robot, const ModelOptions& options) {
 }
 
 Json kernel_json(const tandem_kernel_count& count, std::uint64_t text_bytes) {
-  return {{"add", count.add},   {"mul", count.mul},       {"div", count.div},
-          {"sqrt", count.sqrt}, {"sincos", count.sincos}, {"text_bytes", text_bytes}};
+  return {{"add", count.add},        {"mul", count.mul},       {"div", count.div},
+          {"sqrt", count.sqrt},      {"sincos", count.sincos}, {"pairs", count.pairs},
+          {"text_bytes", text_bytes}};
 }
 
 Status info(const RobotFiles& robot, const ModelOptions& options) {
@@ -73,12 +74,13 @@ Status info(const RobotFiles& robot, const ModelOptions& options) {
   if (Status status = add_right_angles(robot, facts, json); !status) return status;
   facts.print(out);
   fmt::print(out, "\n");
-  Table table({"kernel", "add", "mul", "div", "sqrt", "sincos", "code [bytes]"});
+  Table table({"kernel", "add", "mul", "div", "sqrt", "sincos", "pairs", "code [bytes]"});
   for (std::uint32_t i = 0; i < k.kernel_count; ++i) {
     const tandem_kernel_count& c = k.counts[i];
     const std::uint64_t text_bytes = (*bytes)[c.kernel];
     table.add({c.kernel, std::to_string(c.add), std::to_string(c.mul), std::to_string(c.div),
-               std::to_string(c.sqrt), std::to_string(c.sincos), std::to_string(text_bytes)});
+               std::to_string(c.sqrt), std::to_string(c.sincos), std::to_string(c.pairs),
+               std::to_string(text_bytes)});
     json["kernels"][c.kernel] = kernel_json(c, text_bytes);
   }
   table.print(out);

@@ -125,6 +125,7 @@ TEST_F(Model, InfoCountsOperationsAndMachineCode) {
     EXPECT_GT(k["add"].get<int>(), 0) << kernel;
     EXPECT_GT(k["mul"].get<int>(), 0) << kernel;
     EXPECT_TRUE(k.contains("div") && k.contains("sqrt") && k.contains("sincos")) << kernel;
+    EXPECT_EQ(k["pairs"], 0) << kernel << ": it has no limbs";
     EXPECT_GT(k["text_bytes"].get<int>(), 50) << kernel;
     EXPECT_LT(k["text_bytes"].get<int>(), 10'000) << kernel;
   }

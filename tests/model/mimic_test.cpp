@@ -8,6 +8,7 @@
 #include "model/emit.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_library.hpp"
+#include "model/lanes.hpp"
 #include "model/placements.hpp"
 #include "model/regular.hpp"
 #include "tests/model/reference.hpp"
@@ -162,16 +163,20 @@ TEST_P(Followers, HaveTheTreesOwnMassMatrixForcesAndJacobiansWithTheConstraintAp
               1e-14);
     const Arrays com = ours(Kernel::kCenterOfMass, {s.q, s.v});
     const Arrays com_of_tree = tree(Kernel::kCenterOfMass, {q, v});
-    EXPECT_EQ(com[0], com_of_tree[0]);
-    EXPECT_EQ(com[1], com_of_tree[1]);
+    EXPECT_LE(relative_error(com[0], com_of_tree[0]), 1e-14);
+    EXPECT_LE(relative_error(com[1], com_of_tree[1]), 1e-14);
     EXPECT_LE(relative_error(com[2], robot.columns(com_of_tree[2])), 1e-14);
-    EXPECT_EQ(ours(Kernel::kEnergy, {s.q, s.v}), tree(Kernel::kEnergy, {q, v}));
-    EXPECT_EQ(ours(Kernel::kCentroidalMomentum, {s.q, s.v}),
-              tree(Kernel::kCentroidalMomentum, {q, v}));
-    EXPECT_EQ(ours(Kernel::kSiteMotion, {s.q, s.v, s.vdot}),
-              tree(Kernel::kSiteMotion, {q, v, vdot}));
-    EXPECT_EQ(ours(Kernel::kSensorWrenches, {s.q, s.v, s.vdot, s.wrench}),
-              tree(Kernel::kSensorWrenches, {q, v, vdot, s.wrench}));
+    // The same algorithm, over frames that may differ: an arm with a follower is like no other.
+    const auto expect_equal = [&](Kernel kernel, const Arrays& in, const Arrays& in_tree) {
+      const Arrays expected = tree(kernel, in_tree);
+      const Arrays actual = ours(kernel, in);
+      for (std::size_t k = 0; k < expected.size(); ++k)
+        EXPECT_LE(relative_error(actual[k], expected[k]), 1e-14) << static_cast<int>(kernel);
+    };
+    expect_equal(Kernel::kEnergy, {s.q, s.v}, {q, v});
+    expect_equal(Kernel::kCentroidalMomentum, {s.q, s.v}, {q, v});
+    expect_equal(Kernel::kSiteMotion, {s.q, s.v, s.vdot}, {q, v, vdot});
+    expect_equal(Kernel::kSensorWrenches, {s.q, s.v, s.vdot, s.wrench}, {q, v, vdot, s.wrench});
   }
 }
 
@@ -273,8 +278,8 @@ TEST(Mimic, RobotsWithoutFollowersKeepTheArticulatedBodyAlgorithmToTheLastOperat
   }
   std::vector<std::vector<Expr>> out{std::vector<Expr>(static_cast<std::size_t>(m.nv()))};
   run_tree_kernel<Expr>(Kernel::kForwardDynamics, m, in, out);
-  EXPECT_EQ(emit_kernel(graph, kernel, 500).parts,
-            emit_kernel(tree_graph, {kernel.shape, out[0]}, 500).parts);
+  EXPECT_EQ(emit_kernel(graph, kernel, {}, 500).parts,
+            emit_kernel(tree_graph, {kernel.shape, out[0]}, {}, 500).parts);
 }
 
 TEST(Mimic, AFollowersMassIsEnoughForItsLeader) {

@@ -1,0 +1,430 @@
+// Which limb a node belongs to follows from the inputs that it depends on, or the outputs that
+// depend on it. Nodes of the second limb are looked up by their operands. The signs are the
+// solution of linear equations over {plus, minus}, one for each operand of a sum.
+#include "model/lanes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace tandem::model {
+namespace {
+
+constexpr std::uint32_t kNone = Lanes::kNone;
+
+// Of a kernel's operations in pairs: what is gathered from fewer of them into vectors costs as much
+// as the pairs save.
+constexpr double kLeastShare = 0.05;
+
+enum class Side : std::uint8_t { kTrunk, kFirst, kSecond };
+
+Side operator+(Side a, Side b) {
+  if (a == b || b == Side::kTrunk) return a;
+  return a == Side::kTrunk ? b : Side::kTrunk;
+}
+
+/// Where the elements of a kernel's arrays belong.
+class Elements {
+ public:
+  explicit Elements(const Mechanism& m)
+      : m_(m), side_(m.joints.size() + 1), partner_(side_.size()) {
+    for (const LimbPair& limb : m.limbs) {
+      for (std::size_t k = 0; k < limb.first.size(); ++k) {
+        const auto first = static_cast<std::size_t>(limb.first[k]) + 1;
+        const auto second = static_cast<std::size_t>(limb.second[k]) + 1;
+        side_[first] = Side::kFirst;
+        side_[second] = Side::kSecond;
+        partner_[first] = static_cast<int>(second);
+      }
+    }
+  }
+
+  Side side(const KernelArray& array, int element) const {
+    const int nv = m_.kernel_nv();
+    if (array.name == "q") return of_coordinate(element - m_.q_index(0));
+    if (array.name == "M") return of_rate(element / nv) + of_rate(element % nv);
+    if (array.name == "wrench") return side_[wrench_body(element / 6)];
+    if (array.name == "pose") return site(element / 12);
+    if (array.name == "twist" || array.name == "acceleration") return site(element / 6);
+    if (array.name == "out") return side_[sensor_body(element / 6)];
+    if (array.name == "J" && array.size != 3 * nv)
+      return site(element / (6 * nv)) + of_rate(element % nv);
+    if (array.name == "J") return of_rate(element % nv);
+    return array.size == nv ? of_rate(element) : Side::kTrunk;
+  }
+
+  /// The element of the second limb that corresponds to an input of the first; -1: none.
+  int partner(const KernelArray& array, int element) const {
+    if (array.name == "wrench") {
+      const int other = partner_wrench(element / 6);
+      return other < 0 ? -1 : 6 * other + element % 6;
+    }
+    const int base = array.name == "q" ? m_.q_index(0) : m_.v_index(0);
+    const int joint = joint_of(element - base);
+    if (joint < 0) return -1;
+    const int other = partner_[static_cast<std::size_t>(joint) + 1] - 1;
+    return base + m_.coordinate_of[static_cast<std::size_t>(other)].index;
+  }
+
+ private:
+  Side site(int index) const {
+    return side_[static_cast<std::size_t>(m_.sites[static_cast<std::size_t>(index)].body)];
+  }
+  /// The joint that has the coordinate, where it alone does.
+  int joint_of(int coordinate) const {
+    int found = -1;
+    for (std::size_t j = 0; j < m_.joints.size(); ++j) {
+      if (m_.coordinate_of[j].index != coordinate) continue;
+      if (found >= 0) return -1;
+      found = static_cast<int>(j);
+    }
+    return found;
+  }
+  Side of_coordinate(int coordinate) const {
+    if (coordinate < 0) return Side::kTrunk;
+    const int joint = joint_of(coordinate);
+    return joint < 0 ? Side::kTrunk : side_[static_cast<std::size_t>(joint) + 1];
+  }
+  Side of_rate(int index) const { return of_coordinate(index - m_.v_index(0)); }
+  std::size_t wrench_body(int wrench) const {
+    for (const MechanismSite& site : m_.sites)
+      if (site.wrench == wrench) return static_cast<std::size_t>(site.body);
+    return 0;
+  }
+  std::size_t sensor_body(int sensor) const {
+    return static_cast<std::size_t>(m_.sensors[static_cast<std::size_t>(sensor)].body);
+  }
+  /// The wrench that is as many on its body as this one is.
+  int partner_wrench(int wrench) const {
+    const std::size_t body = wrench_body(wrench);
+    int count = 0;
+    for (int w = 0; w < wrench; ++w) count += wrench_body(w) == body ? 1 : 0;
+    for (int w = 0; w < m_.wrenches; ++w) {
+      if (wrench_body(w) != static_cast<std::size_t>(partner_[body])) continue;
+      if (count-- == 0) return w;
+    }
+    return -1;
+  }
+
+  const Mechanism& m_;
+  std::vector<Side> side_;    // per body
+  std::vector<int> partner_;  // per body of a first limb
+};
+
+/// A system of linear equations over {0, 1}: each row is a sum of variables that is 0, or 1 where
+/// its first bit is set.
+class Parities {
+ public:
+  using Row = std::vector<std::uint64_t>;
+
+  static void add(Row& row, const Row& other) {
+    if (row.size() < other.size()) row.resize(other.size());
+    for (std::size_t k = 0; k < other.size(); ++k) row[k] ^= other[k];
+  }
+  static Row variable(std::uint32_t number) {
+    Row row(number / 64 + 1);
+    row[number / 64] = std::uint64_t{1} << number % 64;
+    return row;
+  }
+  [[nodiscard]] std::uint32_t new_variable() { return ++variables_; }
+  /// The constant 1.
+  static Row one() { return {1}; }
+
+  /// @return false: it contradicts the others, and is left out
+  bool require_zero(Row row) {
+    while (const std::uint32_t last = last_variable(row)) {
+      const auto known = rows_.find(last);
+      if (known == rows_.end()) {
+        rows_.emplace(last, std::move(row));
+        return true;
+      }
+      add(row, known->second);
+    }
+    return row.empty() || (row[0] & 1) == 0;
+  }
+  /// Variables that no equation determines are 0.
+  void solve() {
+    value_.assign(variables_ + 1, false);
+    value_[0] = true;
+    for (const auto& [last, row] : rows_) {  // each has smaller variables beside its own
+      value_[last] = false;
+      value_[last] = sum(row);
+    }
+  }
+  [[nodiscard]] bool sum(const Row& row) const {
+    bool result = false;
+    for (std::size_t k = 0; k < row.size(); ++k)
+      for (std::uint64_t bits = row[k]; bits != 0; bits &= bits - 1)
+        result ^= value_[64 * k + static_cast<std::size_t>(std::countr_zero(bits))];
+    return result;
+  }
+
+ private:
+  /// 0: it has none.
+  static std::uint32_t last_variable(const Row& row) {
+    for (std::size_t k = row.size(); k-- > 0;) {
+      const std::uint64_t bits = k == 0 ? row[0] & ~std::uint64_t{1} : row[k];
+      if (bits != 0) return static_cast<std::uint32_t>(64 * k + 63 - std::countl_zero(bits));
+    }
+    return 0;
+  }
+
+  std::map<std::uint32_t, Row> rows_;  // by their last variable
+  std::vector<bool> value_;
+  std::uint32_t variables_ = 0;
+};
+
+bool is_sum(Op op) { return op == Op::kAdd || op == Op::kSub; }
+
+class Pairing {
+ public:
+  Pairing(const Graph& graph, const TracedKernel& kernel, const Mechanism& m)
+      : nodes_(graph.nodes()),
+        kernel_(kernel),
+        elements_(m),
+        live_(live_nodes(graph, kernel.outputs)),
+        side_(nodes_.size(), Side::kTrunk) {
+    lanes_.second_of.assign(nodes_.size(), kNone);
+    lanes_.first_of.assign(nodes_.size(), kNone);
+    lanes_.minus.assign(nodes_.size(), false);
+  }
+
+  Lanes run() {
+    find_sides();
+    pair_inputs();
+    list_operations();
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i)
+      if (live_[i] && side_[i] == Side::kFirst) find_partner(i);
+    choose_signs();
+    return std::move(lanes_);
+  }
+
+ private:
+  using Key = std::array<std::uint32_t, 3>;
+
+  // A node belongs to a limb when it depends on that limb's inputs and not on the other's, when
+  // only that limb's outputs depend on it, or when only nodes of that limb use it.
+  void find_sides() {
+    std::vector<std::uint8_t> from(nodes_.size()), to(nodes_.size());
+    const auto bit = [](Side side) -> std::uint8_t {
+      return side == Side::kTrunk ? 4 : side == Side::kFirst ? 1 : 2;
+    };
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      const Node& node = nodes_[i];
+      if (node.op == Op::kInput)
+        from[i] = bit(elements_.side(kernel_.shape.inputs[node.a], static_cast<int>(node.b)));
+      if (!is_operation(node.op)) continue;
+      from[i] = from[node.a];
+      if (is_binary(node.op)) from[i] |= from[node.b];
+    }
+    std::size_t number = 0;
+    for (const KernelArray& array : kernel_.shape.outputs) {
+      for (int e = 0; e < array.size; ++e, ++number) {
+        const Expr& output = kernel_.outputs[number];
+        if (!output.is_constant()) to[output.node()] |= bit(elements_.side(array, e));
+      }
+    }
+    for (std::size_t i = nodes_.size(); i-- > 0;) {
+      if (!live_[i] || !is_operation(nodes_[i].op)) continue;
+      to[nodes_[i].a] |= to[i];
+      if (is_binary(nodes_[i].op)) to[nodes_[i].b] |= to[i];
+    }
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      const std::uint8_t limbs = from[i] & 3;
+      if (limbs == 1 || limbs == 2) {
+        side_[i] = limbs == 1 ? Side::kFirst : Side::kSecond;
+      } else if (is_operation(nodes_[i].op) && (to[i] == 1 || to[i] == 2)) {
+        side_[i] = to[i] == 1 ? Side::kFirst : Side::kSecond;
+      }
+    }
+    std::vector<std::uint8_t> used(nodes_.size());
+    for (const Expr& output : kernel_.outputs)
+      if (!output.is_constant()) used[output.node()] |= bit(side_[output.node()]);
+    for (std::size_t i = nodes_.size(); i-- > 0;) {
+      if (!live_[i] || !is_operation(nodes_[i].op)) continue;
+      if (side_[i] == Side::kTrunk && (used[i] == 1 || used[i] == 2))
+        side_[i] = used[i] == 1 ? Side::kFirst : Side::kSecond;
+      used[nodes_[i].a] |= bit(side_[i]);
+      if (is_binary(nodes_[i].op)) used[nodes_[i].b] |= bit(side_[i]);
+    }
+  }
+
+  void pair(std::uint32_t first, std::uint32_t second) {
+    lanes_.second_of[first] = second;
+    lanes_.first_of[second] = first;
+  }
+
+  void pair_inputs() {
+    std::map<std::array<std::uint32_t, 2>, std::uint32_t> inputs;
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i)
+      if (nodes_[i].op == Op::kInput) inputs[{nodes_[i].a, nodes_[i].b}] = i;
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+      const Node& node = nodes_[i];
+      if (node.op != Op::kInput || side_[i] != Side::kFirst) continue;
+      const int other = elements_.partner(kernel_.shape.inputs[node.a], static_cast<int>(node.b));
+      const auto found = inputs.find({node.a, static_cast<std::uint32_t>(other)});
+      if (other >= 0 && found != inputs.end()) pair(i, found->second);
+    }
+  }
+
+  // Operations by what they do to what. Constants differ between limbs, in size or sign.
+  static Key key(Op op, std::uint32_t a, std::uint32_t b) {
+    if (is_sum(op)) op = Op::kAdd;
+    if (op != Op::kDiv && a > b) std::swap(a, b);
+    return {static_cast<std::uint32_t>(op), a, b};
+  }
+  std::uint32_t no_constant(std::uint32_t i) const {
+    return nodes_[i].op == Op::kConstant ? kNone : i;
+  }
+  Key own_key(std::uint32_t i) const {
+    const Node& node = nodes_[i];
+    return key(node.op, no_constant(node.a), is_binary(node.op) ? no_constant(node.b) : 0);
+  }
+  void list_operations() {
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+      if (!live_[i] || side_[i] == Side::kTrunk || !is_operation(nodes_[i].op)) continue;
+      (side_[i] == Side::kFirst ? first_ : second_)[own_key(i)].push_back(i);
+    }
+  }
+
+  std::optional<std::uint32_t> image_of_first(std::uint32_t i) const {
+    if (nodes_[i].op == Op::kConstant) return kNone;
+    if (lanes_.second_of[i] != kNone) return lanes_.second_of[i];
+    if (side_[i] == Side::kTrunk) return i;
+    return std::nullopt;
+  }
+  double constant_of(std::uint32_t i) const {
+    const Node& node = nodes_[i];
+    if (nodes_[node.a].op == Op::kConstant) return nodes_[node.a].value;
+    if (is_binary(node.op) && nodes_[node.b].op == Op::kConstant) return nodes_[node.b].value;
+    return 0.0;
+  }
+
+  // Of several that differ in their constant alone: as the limbs are built alike, the algorithm
+  // makes them in the same order. Where it makes more of them for one limb than for the other, as
+  // some are equal, the one with the nearest constant.
+  void find_partner(std::uint32_t i) {
+    const Node& node = nodes_[i];
+    if (!is_operation(node.op)) return;
+    const auto a = image_of_first(node.a);
+    const auto b = is_binary(node.op) ? image_of_first(node.b) : 0;
+    if (!a || !b) return;
+    const auto found = second_.find(key(node.op, *a, *b));
+    if (found == second_.end()) return;
+    const std::vector<std::uint32_t>& own = first_.at(own_key(i));
+    const std::vector<std::uint32_t>& others = found->second;
+    std::uint32_t best = kNone;
+    if (own.size() == others.size()) {
+      best = others[static_cast<std::size_t>(std::ranges::find(own, i) - own.begin())];
+    } else {
+      best = nearest(constant_of(i), others);
+    }
+    if (best == kNone || lanes_.first_of[best] != kNone) return;
+    pair(i, best);
+    if (node.op != Op::kSin && node.op != Op::kCos) ++lanes_.operations;
+  }
+
+  // Of those that are not paired yet; kNone: all are.
+  std::uint32_t nearest(double constant, const std::vector<std::uint32_t>& candidates) const {
+    std::uint32_t best = kNone;
+    double least = 0.0;
+    for (const std::uint32_t candidate : candidates) {
+      if (lanes_.first_of[candidate] != kNone) continue;
+      const double other = constant_of(candidate);
+      const double far = std::abs(constant - other);
+      if (best != kNone && far >= least - 1e-9) continue;
+      best = candidate;
+      least = far;
+    }
+    return best;
+  }
+
+  // The second operands in the order of the first ones.
+  std::array<std::array<std::uint32_t, 2>, 2> operands(std::uint32_t i) const {
+    const Node& x = nodes_[i];
+    const Node& y = nodes_[lanes_.second_of[i]];
+    const auto a = image_of_first(x.a);
+    const bool straight = x.op == Op::kDiv || no_constant(y.a) == *a;
+    return straight ? std::array{std::array{x.a, y.a}, std::array{x.b, y.b}}
+                    : std::array{std::array{x.a, y.b}, std::array{x.b, y.a}};
+  }
+
+  // The sign of a vector's lane 1 as a sum of variables.
+  Parities::Row sign_of(std::uint32_t first) {
+    const auto known = sign_.find(first);
+    if (known != sign_.end()) return known->second;
+    return sign_[first] = Parities::variable(parities_.new_variable());
+  }
+
+  void choose_signs() {
+    std::vector<Parities::Row> wishes;
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+      if (lanes_.second_of[i] == kNone) continue;
+      const Op op = nodes_[i].op;
+      if (op == Op::kCos) {
+        sign_[i] = {};
+      } else if (op == Op::kInput || op == Op::kSin) {
+        wishes.push_back(sign_of(i));
+      } else if (is_operation(op)) {
+        sign_operation(i);
+      }
+    }
+    for (const Parities::Row& wish : wishes) (void)parities_.require_zero(wish);
+    parities_.solve();
+    for (const auto& [first, row] : sign_) lanes_.minus[first] = parities_.sum(row);
+  }
+
+  void sign_operation(std::uint32_t i) {
+    const Op first_op = nodes_[i].op;
+    const Op second_op = nodes_[lanes_.second_of[i]].op;
+    const auto pairs = operands(i);
+    const bool swapped = pairs[0][1] != nodes_[lanes_.second_of[i]].a;
+    Parities::Row own;
+    bool has_own = false;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto [x, y] = pairs[k];
+      const bool constant = nodes_[x].op == Op::kConstant;
+      if (!is_sum(first_op)) {  // a constant's sign is free
+        Parities::add(own, constant ? Parities::variable(parities_.new_variable()) : sign_of(x));
+        continue;
+      }
+      if (constant) continue;
+      const bool first_minus = k == 1 && first_op == Op::kSub;
+      const bool second_minus = (k == 1) != swapped && second_op == Op::kSub;
+      Parities::Row sign = sign_of(x);
+      if (first_minus != second_minus) Parities::add(sign, Parities::one());
+      if (has_own) {
+        Parities::add(sign, own);
+        (void)parities_.require_zero(sign);
+      } else {
+        own = std::move(sign);
+        has_own = true;
+      }
+    }
+    sign_[i] = std::move(own);
+  }
+
+  std::span<const Node> nodes_;
+  const TracedKernel& kernel_;
+  Elements elements_;
+  std::vector<bool> live_;
+  std::vector<Side> side_;
+  std::map<Key, std::vector<std::uint32_t>> first_, second_;  // operations of each limb
+  Parities parities_;
+  std::map<std::uint32_t, Parities::Row> sign_;  // of pairs, and of what both limbs share
+  Lanes lanes_;
+};
+
+}  // namespace
+
+Lanes pair_lanes(const Graph& graph, const TracedKernel& kernel, const Mechanism& m) {
+  Lanes lanes = Pairing(graph, kernel, m).run();
+  const OperationCount all = count_operations(graph, kernel.outputs);
+  const std::uint32_t operations = all.add + all.mul + all.div + all.sqrt;
+  return lanes.operations < kLeastShare * operations ? Lanes{} : lanes;
+}
+
+}  // namespace tandem::model

@@ -1,0 +1,169 @@
+// Limbs that are built alike, found and put into lanes: on robots at hand, and on random limbs and
+// what they are in a mirror.
+#include "model/lanes.hpp"
+
+#include <gtest/gtest.h>
+
+#include "model/kernel_build.hpp"
+#include "tests/model/random_robot.hpp"
+#include "tests/model/reference.hpp"
+#include "tests/support/scratch_folder.hpp"
+
+namespace tandem::model {
+namespace {
+
+// Seen in a mirror in the plane y = 0.
+const Eigen::Vector3d kMirror{1.0, -1.0, 1.0};
+Placement mirrored(const Placement& placement) {
+  return {kMirror.asDiagonal() * placement.R * kMirror.asDiagonal(),
+          kMirror.asDiagonal() * placement.p};
+}
+Inertia mirrored(const Inertia& inertia) {
+  return {inertia.mass_kg, kMirror.asDiagonal() * inertia.com_m,
+          kMirror.asDiagonal() * inertia.about_com_kg_m2 * kMirror.asDiagonal()};
+}
+
+// A random limb on a floating body, and after it the same limb in a mirror.
+Tree with_its_mirror(std::uint64_t seed, const RandomRobotOptions& options) {
+  const RandomRobot robot(seed, options);
+  auto read = parse_urdf(robot.urdf(), "random.urdf", {.floating_base = true});
+  if (!read) throw std::runtime_error(read.error().front().to_string());
+  Tree tree = std::move(read->tree);
+  const std::size_t joints = tree.joints.size();
+  const std::size_t links = tree.links.size();
+  for (std::size_t j = 0; j < joints; ++j) {
+    Joint joint = tree.joints[j];
+    joint.name += "_mirrored";
+    joint.parent += joint.parent == 0 ? 0 : static_cast<int>(joints);
+    joint.in_parent = mirrored(joint.in_parent);
+    // Whichever way round it is written, it is the same joint.
+    const double sign = j % 2 == 0 ? 1.0 : -1.0;
+    joint.axis = sign * (kMirror.asDiagonal() * joint.axis);
+    tree.joints.push_back(joint);
+    Body body = tree.bodies[j + 1];
+    body.name += "_mirrored";
+    body.inertia = mirrored(body.inertia);
+    tree.bodies.push_back(body);
+  }
+  for (std::size_t l = 1; l < links; ++l) {
+    Link link = tree.links[l];
+    if (link.body == 0) continue;
+    link.name += "_mirrored";
+    link.joint += "_mirrored";
+    link.body += static_cast<int>(joints);
+    link.in_body = mirrored(link.in_body);
+    link.inertia = mirrored(link.inertia);
+    link.parent =
+        tree.link_index(tree.links[static_cast<std::size_t>(link.parent)].name + "_mirrored");
+    link.moving += link.moving < 0 ? 0 : static_cast<int>(joints);
+    tree.links.push_back(link);
+  }
+  return tree;
+}
+
+// No axes that are parallel but for rounding: that of the mirrored limb has other last bits, which
+// may be one more turn to make.
+constexpr RandomRobotOptions kLimb{.joints = 7,
+                                   .floating_base = true,
+                                   .branching = 0.2,
+                                   .near_parallel = 0.0,
+                                   .right_angles = 1.0,
+                                   .digits = 17,
+                                   .mass_decades = 1.0};
+
+TEST(LimbPairs, OfARandomLimbAndItsMirrorAreAllTheirJoints) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    const Tree tree = with_its_mirror(seed, kLimb);
+    const int joints = static_cast<int>(tree.joints.size()) / 2;
+    int paired = 0;
+    for (const LimbPair& pair : find_limb_pairs(tree)) {
+      ASSERT_EQ(pair.first.size(), pair.second.size());
+      for (std::size_t k = 0; k < pair.first.size(); ++k, ++paired)
+        EXPECT_EQ(pair.second[k] - pair.first[k], joints) << "seed " << seed;
+    }
+    EXPECT_EQ(paired, joints) << "seed " << seed;
+  }
+}
+
+TEST(LimbPairs, NeedMassesThatDifferByATenthAtMost) {
+  Tree tree = with_its_mirror(3, kLimb);
+  const auto joints_in_pairs = [&] {
+    std::size_t count = 0;
+    for (const LimbPair& pair : find_limb_pairs(tree)) count += pair.first.size();
+    return count;
+  };
+  ASSERT_EQ(joints_in_pairs(), tree.joints.size() / 2);
+  tree.bodies.back().inertia.mass_kg *= 1.09;
+  EXPECT_EQ(joints_in_pairs(), tree.joints.size() / 2);
+  tree.bodies.back().inertia.mass_kg *= 1.09;
+  EXPECT_LT(joints_in_pairs(), tree.joints.size() / 2);
+}
+
+struct Kernels {
+  Mechanism m;
+  explicit Kernels(const std::string& robot) {
+    const ReferenceRobot& reference = reference_robot(robot);
+    m = *make_mechanism(reference_tree(reference), reference_spec(reference));
+  }
+  explicit Kernels(Mechanism mechanism) : m(std::move(mechanism)) {}
+  EmittedKernel emit(Kernel kernel) const {
+    Graph graph;
+    const TracedKernel traced = trace_kernel(kernel, m, graph);
+    return emit_kernel(graph, traced, pair_lanes(graph, traced, m), 500);
+  }
+  // Instructions left, of each operation without lanes.
+  double left(Kernel kernel) const {
+    const OperationCount count = emit(kernel).count;
+    return 1.0 - count.pairs / static_cast<double>(count.add + count.mul + count.div + count.sqrt);
+  }
+};
+
+TEST(Lanes, HoldTheLimbsOfTheRobotsThatHaveThem) {
+  const Kernels coman("coman");
+  EXPECT_LT(coman.left(Kernel::kForwardDynamics), 0.60);
+  EXPECT_LT(coman.left(Kernel::kInverseDynamics), 0.60);
+  EXPECT_LT(coman.left(Kernel::kMassMatrix), 0.55);
+  const Kernels walkman("walkman");
+  EXPECT_LT(walkman.left(Kernel::kForwardDynamics), 0.60);
+  EXPECT_LT(walkman.left(Kernel::kMassMatrix), 0.57);
+  EXPECT_LT(Kernels("anymal_c").left(Kernel::kForwardDynamics), 0.71);
+}
+
+bool has(const EmittedKernel& kernel, const std::string& word) {
+  for (const std::string& part : kernel.parts)
+    if (part.find(word) != std::string::npos) return true;
+  return false;
+}
+
+TEST(Lanes, AreNotWrittenForRobotsWithoutSuchLimbs) {
+  for (const char* robot : {"double_pendulum", "ur5e"}) {
+    const Kernels kernels(robot);
+    EXPECT_TRUE(kernels.m.limbs.empty()) << robot;
+    EXPECT_FALSE(has(kernels.emit(Kernel::kForwardDynamics), "two")) << robot;
+  }
+}
+
+// A vector's second lane is held with the sign that its uses want: none of them changes it.
+TEST(Lanes, HaveTheSignsThatTheirUsesNeed) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Kernels random(*make_mechanism(with_its_mirror(seed, kLimb), {}));
+    for (const Kernel kernel : {Kernel::kForwardDynamics, Kernel::kMassMatrix}) {
+      EXPECT_TRUE(has(random.emit(kernel), "two")) << "seed " << seed;
+      EXPECT_FALSE(has(random.emit(kernel), "flip(")) << "seed " << seed;
+      EXPECT_LT(random.left(kernel), 0.72) << "seed " << seed;
+    }
+  }
+}
+
+// Builds the library, which compares every kernel with the algorithms on the described frames.
+TEST(Lanes, ComputeWhatTheDescriptionsOfRandomMirroredRobotsSay) {
+  const test::ScratchFolder folder;
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    const std::string library = folder / ("random" + std::to_string(seed) + ".so");
+    const auto built = build_kernels(with_its_mirror(seed, kLimb), {}, {.library = library});
+    EXPECT_TRUE(built) << built.error().to_string();
+  }
+}
+
+}  // namespace
+}  // namespace tandem::model
