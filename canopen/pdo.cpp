@@ -109,11 +109,13 @@ void Pdo::written(const ObjectEntry& entry) noexcept TANDEM_RT {
 
 void Pdo::resolve() noexcept TANDEM_RT {
   mapped_bytes_ = 0;
-  objects_.fill(nullptr);
   for (std::size_t i = 0; i < count_; ++i) {
-    objects_[i] = od_->find(static_cast<std::uint16_t>(mapping_[i] >> 16),
-                            static_cast<std::uint8_t>(mapping_[i] >> 8));
-    mapped_bytes_ += objects_[i]->size;
+    const ObjectEntry* object = od_->find(static_cast<std::uint16_t>(mapping_[i] >> 16),
+                                          static_cast<std::uint8_t>(mapping_[i] >> 8));
+    copies_[i] = {.data = object->data,
+                  .offset = static_cast<std::uint8_t>(mapped_bytes_),
+                  .size = static_cast<std::uint8_t>(object->size)};
+    mapped_bytes_ += object->size;
   }
 }
 
@@ -142,10 +144,7 @@ bool RxPdo::sync() noexcept TANDEM_RT {
 }
 
 void RxPdo::apply(const std::uint8_t* bytes) noexcept {
-  for (std::size_t i = 0; i < count_; ++i) {
-    objects_[i]->decode(bytes);
-    bytes += objects_[i]->size;
-  }
+  for (std::size_t i = 0; i < count_; ++i) copies_[i].from_wire(bytes);
 }
 
 void RxPdo::archive(Archive& ar) {
@@ -174,11 +173,7 @@ void TxPdo::send(FrameSink& out) noexcept {
   frame.id = cob_id();
   frame.length = frame_length(mapped_bytes());
   if (frame.length > kClassicFrameBytes) frame.flags = kFlagFd | kFlagBrs;
-  std::uint8_t* bytes = frame.data.data();
-  for (std::size_t i = 0; i < count_; ++i) {
-    objects_[i]->encode(bytes);
-    bytes += objects_[i]->size;
-  }
+  for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(frame.data.data());
   out.push(frame);
   requested_ = false;
   syncs_ = 0;

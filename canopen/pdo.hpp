@@ -10,6 +10,7 @@
 #include "canopen/frame.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/pdo_copy.hpp"
 
 namespace tandem::canopen {
 
@@ -56,7 +57,7 @@ class Pdo : public ObjectOwner {
   std::uint8_t count_ = 0;
   std::uint16_t inhibit_100us_ = 0;
   std::uint16_t event_ms_ = 0;
-  std::array<const ObjectEntry*, kMaxMappedObjects> objects_{};
+  std::array<PdoCopy, kMaxMappedObjects> copies_{};  ///< the mapping, compiled
 
  private:
   AbortCode check_parameter(std::uint8_t sub, const std::uint8_t* bytes) const noexcept TANDEM_RT;

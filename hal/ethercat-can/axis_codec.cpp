@@ -11,9 +11,7 @@
 namespace tandem::hal::can {
 
 using canopen::clamp_round;
-using canopen::get;
 using canopen::Mode;
-using canopen::put;
 
 namespace {
 
@@ -43,20 +41,20 @@ AxisScale AxisScale::of(const JointConfig& joint) {
           .mille_per_Nm = 1.0e6 / rated_mNm};
 }
 
-void RawFeedback::decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
+void* RawFeedback::variable(WireField field) noexcept {
   switch (field) {
-    case WireField::kStatusword: statusword = get<std::uint16_t>(bytes); break;
-    case WireField::kPosition: position = get<std::int32_t>(bytes); break;
-    case WireField::kVelocity: velocity = get<std::int32_t>(bytes); break;
-    case WireField::kTorque: torque = get<std::int16_t>(bytes); break;
-    case WireField::kMotorPosition: motor_position = get<std::int32_t>(bytes); break;
-    case WireField::kMotorVelocity: motor_velocity = get<std::int32_t>(bytes); break;
-    case WireField::kCurrent: current = get<std::int16_t>(bytes); break;
-    case WireField::kVoltage: voltage = get<std::int16_t>(bytes); break;
-    case WireField::kTemperature: temperature = get<std::int16_t>(bytes); break;
-    case WireField::kModeDisplay: mode_display = get<std::int8_t>(bytes); break;
-    case WireField::kErrorCode: error_code = get<std::uint16_t>(bytes); break;
-    default: break;  // the others travel the other way
+    case WireField::kStatusword: return &statusword;
+    case WireField::kPosition: return &position;
+    case WireField::kVelocity: return &velocity;
+    case WireField::kTorque: return &torque;
+    case WireField::kMotorPosition: return &motor_position;
+    case WireField::kMotorVelocity: return &motor_velocity;
+    case WireField::kCurrent: return &current;
+    case WireField::kVoltage: return &voltage;
+    case WireField::kTemperature: return &temperature;
+    case WireField::kModeDisplay: return &mode_display;
+    case WireField::kErrorCode: return &error_code;
+    default: return nullptr;
   }
 }
 
@@ -68,18 +66,18 @@ void RawFeedback::adopt(const RawFeedback& sample) noexcept TANDEM_RT {
   motor_position = sample.motor_position;
 }
 
-void RawCommand::encode(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT {
+void* RawCommand::variable(WireField field) noexcept {
   switch (field) {
-    case WireField::kControlword: put(bytes, controlword); break;
-    case WireField::kMode: put(bytes, mode); break;
-    case WireField::kTargetPosition: put(bytes, target_position); break;
-    case WireField::kVelocityOffset: put(bytes, velocity_offset); break;
-    case WireField::kTorqueOffset: put(bytes, torque_offset); break;
-    case WireField::kTargetVoltage: put(bytes, target_voltage); break;
-    case WireField::kTargetCurrent: put(bytes, target_current); break;
-    case WireField::kStiffness: put(bytes, stiffness); break;
-    case WireField::kDamping: put(bytes, damping); break;
-    default: break;  // the others travel the other way
+    case WireField::kControlword: return &controlword;
+    case WireField::kMode: return &mode;
+    case WireField::kTargetPosition: return &target_position;
+    case WireField::kVelocityOffset: return &velocity_offset;
+    case WireField::kTorqueOffset: return &torque_offset;
+    case WireField::kTargetVoltage: return &target_voltage;
+    case WireField::kTargetCurrent: return &target_current;
+    case WireField::kStiffness: return &stiffness;
+    case WireField::kDamping: return &damping;
+    default: return nullptr;
   }
 }
 

@@ -45,7 +45,8 @@ struct RawFeedback {
   std::int16_t temperature = 0;
   std::int8_t mode_display = 0;
 
-  void decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT;
+  /// The variable of a feedback field; null: the field travels the other way.
+  [[nodiscard]] void* variable(WireField field) noexcept;
   /// Takes over the values that travel every SYNC.
   void adopt(const RawFeedback& sample) noexcept TANDEM_RT;
   void archive(Archive& ar);
@@ -63,7 +64,8 @@ struct RawCommand {
   std::int16_t target_current = 0;
   std::int8_t mode = 0;
 
-  void encode(WireField field, std::uint8_t* bytes) const noexcept TANDEM_RT;
+  /// The variable of a command field; null: the field travels the other way.
+  [[nodiscard]] void* variable(WireField field) noexcept;
   void archive(Archive& ar);
 };
 

@@ -46,14 +46,13 @@ class AxisMaster {
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
 
-  /// A field of a slow TPDO: counts at once.
-  void decode(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
-    feedback_.decode(field, bytes);
-  }
-  /// A field of an every-SYNC TPDO: counts when received() says that the sample is whole.
-  void take_sample(WireField field, const std::uint8_t* bytes) noexcept TANDEM_RT {
-    sample_.decode(field, bytes);
-  }
+  /// Where a field of a slow TPDO goes, which counts at once.
+  [[nodiscard]] void* slow_variable(WireField field) noexcept { return feedback_.variable(field); }
+  /// Where a field of an every-SYNC TPDO goes: it counts when received() says that the sample is
+  /// whole.
+  [[nodiscard]] void* sample_variable(WireField field) noexcept { return sample_.variable(field); }
+  /// Where a field of an RPDO comes from.
+  [[nodiscard]] void* command_variable(WireField field) noexcept { return raw_.variable(field); }
   /// The axis' error code from an emergency of its board.
   void on_emergency(std::uint16_t code) noexcept TANDEM_RT { emergency_code_ = code; }
   /// Once per cycle, after its frames. `fresh`: every part of a sample came in this cycle.

@@ -6,7 +6,6 @@
 #include <bit>
 
 #include "base/archive.hpp"
-#include "canopen/bytes.hpp"
 #include "canopen/messages.hpp"
 #include "hal/ethercat-can/drive_master_impl.hpp"
 
@@ -76,6 +75,36 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
     Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
     node.first_channel = channel;
     channel += node.channels.size();
+  }
+  for (Node& node : nodes) compile_exchanges(node);  // nodes and axes keep their places from now on
+}
+
+/// The variable behind a field of a PDO.
+void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedField& field) {
+  switch (field.field) {
+    case WireField::kSensorChannel: return &node.sample[field.axis];
+    case WireField::kCycleEcho: return &node.echo;
+    case WireField::kCycleCounter: return &counter;
+    default: break;
+  }
+  AxisMaster& axis = axes[node.plan.joints[field.axis]];
+  if (pdo.direction == PdoDirection::kReceive) return axis.command_variable(field.field);
+  return pdo.group == PdoGroup::kSlowFeedback ? axis.slow_variable(field.field)
+                                              : axis.sample_variable(field.field);
+}
+
+void DriveMaster::Impl::compile_exchanges(Node& node) {
+  for (const PdoPlan& pdo : node.plan.pdos) {
+    Exchange& exchange = node.exchanges.emplace_back();
+    for (const MappedField& field : pdo.fields) {
+      exchange.copies.push_back(
+          {.data = variable(node, pdo, field), .offset = field.offset, .size = field.size});
+      exchange.echo |= field.field == WireField::kCycleEcho;
+      if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
+      const std::size_t joint = node.plan.joints[field.axis];
+      if (std::ranges::find(exchange.joints, joint) == exchange.joints.end())
+        exchange.joints.push_back(joint);
+    }
   }
 }
 
@@ -152,19 +181,10 @@ void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
     node.next_part = pdo.part + 1;
   }
   const bool whole = node.next_part == node.plan.parts;
-  for (const MappedField& field : pdo.fields) {
-    const std::uint8_t* bytes = frame.data.data() + field.offset;
-    if (field.field == WireField::kSensorChannel) {
-      node.sample[field.axis] = canopen::get<float>(bytes);
-    } else if (field.field == WireField::kCycleEcho) {
-      on_echo(node, *bytes, at_ns);
-    } else if (sampled) {
-      axes[node.plan.joints[field.axis]].take_sample(field.field, bytes);
-      joint_fresh[node.plan.joints[field.axis]] = whole ? 1 : 0;
-    } else {
-      axes[node.plan.joints[field.axis]].decode(field.field, bytes);
-    }
-  }
+  const Exchange& exchange = node.exchanges[static_cast<std::size_t>(p)];
+  for (const canopen::PdoCopy& copy : exchange.copies) copy.from_wire(frame.data.data());
+  for (const std::size_t joint : exchange.joints) joint_fresh[joint] = whole ? 1 : 0;
+  if (exchange.echo) on_echo(node, node.echo, at_ns);
   if (pdo.group == PdoGroup::kSensor && whole) node.channels = node.sample;
 }
 
@@ -251,19 +271,18 @@ void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
     for (std::size_t p = 0; p < node.plan.pdos.size(); ++p) {
       const PdoPlan& pdo = node.plan.pdos[p];
       if (pdo.direction != PdoDirection::kReceive) continue;
-      Frame frame = node.frames[p];
-      for (const MappedField& field : pdo.fields) {
-        std::uint8_t* bytes = frame.data.data() + field.offset;
-        if (field.field == WireField::kCycleCounter) {
-          *bytes = counter;
-        } else {
-          axes[node.plan.joints[field.axis]].raw().encode(field.field, bytes);
-        }
+      Frame& last = node.frames[p];
+      const auto& copies = node.exchanges[p].copies;
+      if (pdo.group == PdoGroup::kCommand) {  // in every cycle
+        for (const canopen::PdoCopy& copy : copies) copy.to_wire(last.data.data());
+        (void)ports[node.plan.bus].sink.push(last);
+        continue;
       }
-      const bool due =
-          pdo.group == PdoGroup::kCommand || node.sent[p] == 0 || frame.data != node.frames[p].data;
+      Frame frame = last;
+      for (const canopen::PdoCopy& copy : copies) copy.to_wire(frame.data.data());
+      const bool due = node.sent[p] == 0 || frame.data != last.data;
       if (!due || !ports[node.plan.bus].sink.push(frame)) continue;
-      node.frames[p] = frame;
+      last = frame;
       node.sent[p] = 1;
     }
   }

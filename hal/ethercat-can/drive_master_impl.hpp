@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "canopen/frame.hpp"
+#include "canopen/pdo_copy.hpp"
 #include "hal/ethercat-can/axis_master.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/node_master.hpp"
@@ -39,12 +40,19 @@ struct DriveMaster::Impl {
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
   };
+  /// A PDO's plan, compiled: what each frame of it does.
+  struct Exchange {
+    std::vector<canopen::PdoCopy> copies;
+    std::vector<std::size_t> joints;  ///< TPDO of a sample: whose
+    bool echo = false;                ///< TPDO: one of the copies is Node::echo
+  };
   struct Node {
     Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
     NodePlan plan;
     NodeMaster master;
     int timeout_cycles;                              ///< without feedback; 0: never
     std::array<int, canopen::kPdosPerNode> tpdos{};  ///< by number - 1: index in plan.pdos, or -1
+    std::vector<Exchange> exchanges;                 ///< by plan.pdos
     std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
     std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
     std::vector<float> channels;                     ///< a sensor's
@@ -55,6 +63,7 @@ struct DriveMaster::Impl {
     std::uint32_t answers = 0;         ///< this cycle's first TPDOs
     std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them
     std::uint8_t counters_sent = 0;    ///< since its start; stays at 255
+    std::uint8_t echo = 0;             ///< the counter that came last; no state
     bool recovering = false;           ///< a lost node that is configured anew
     // Parameters at run time
     std::int16_t sending = -1;  ///< item under way: see parameter_items
@@ -66,6 +75,9 @@ struct DriveMaster::Impl {
   };
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
+
+  void compile_exchanges(Node& node);
+  [[nodiscard]] void* variable(Node& node, const PdoPlan& pdo, const MappedField& field);
 
   // Exchange: drive_master.cpp
   void begin(const CycleTime& time) noexcept TANDEM_RT;

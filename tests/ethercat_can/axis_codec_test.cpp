@@ -65,6 +65,10 @@ TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
 
 TEST_F(Codec, FeedbackFromLiteralBytes) {
   RawFeedback feedback;
+  const auto from_wire = [](void* variable, const auto& bytes) {
+    canopen::PdoCopy{.data = variable, .size = static_cast<std::uint8_t>(bytes.size())}.from_wire(
+        bytes.data());
+  };
   const std::array<std::uint8_t, 2> status{0x37, 0x12};
   const std::array<std::uint8_t, 4> position{0xD8, 0xDC, 0xFF, 0xFF};  // -9000
   const std::array<std::uint8_t, 4> velocity{0x64, 0x00, 0x00, 0x00};  // 100
@@ -74,15 +78,15 @@ TEST_F(Codec, FeedbackFromLiteralBytes) {
   const std::array<std::uint8_t, 2> voltage{0x60, 0x09};               // 2400
   const std::array<std::uint8_t, 2> temperature{0x6E, 0x01};           // 366
   const std::array<std::uint8_t, 1> mode{0xFF};                        // -1
-  feedback.decode(WireField::kStatusword, status.data());
-  feedback.decode(WireField::kPosition, position.data());
-  feedback.decode(WireField::kVelocity, velocity.data());
-  feedback.decode(WireField::kTorque, torque.data());
-  feedback.decode(WireField::kMotorPosition, motor.data());
-  feedback.decode(WireField::kCurrent, current.data());
-  feedback.decode(WireField::kVoltage, voltage.data());
-  feedback.decode(WireField::kTemperature, temperature.data());
-  feedback.decode(WireField::kModeDisplay, mode.data());
+  from_wire(feedback.variable(WireField::kStatusword), status);
+  from_wire(feedback.variable(WireField::kPosition), position);
+  from_wire(feedback.variable(WireField::kVelocity), velocity);
+  from_wire(feedback.variable(WireField::kTorque), torque);
+  from_wire(feedback.variable(WireField::kMotorPosition), motor);
+  from_wire(feedback.variable(WireField::kCurrent), current);
+  from_wire(feedback.variable(WireField::kVoltage), voltage);
+  from_wire(feedback.variable(WireField::kTemperature), temperature);
+  from_wire(feedback.variable(WireField::kModeDisplay), mode);
   decode_feedback(scale(), feedback, 0, state);
   EXPECT_DOUBLE_EQ(state.position_rad()[0], -std::numbers::pi / 2);
   EXPECT_DOUBLE_EQ(state.velocity_rad_s()[0], std::numbers::pi / 180.0);
@@ -105,11 +109,14 @@ TEST_F(Codec, CommandToLiteralBytes) {
   out.torque_offset = -250;
   out.stiffness = 1.0F;
   std::array<std::uint8_t, 16> bytes{};
-  out.encode(WireField::kControlword, &bytes[0]);
-  out.encode(WireField::kMode, &bytes[2]);
-  out.encode(WireField::kTargetPosition, &bytes[3]);
-  out.encode(WireField::kTorqueOffset, &bytes[7]);
-  out.encode(WireField::kStiffness, &bytes[9]);
+  for (const canopen::PdoCopy& copy : {
+           canopen::PdoCopy{out.variable(WireField::kControlword), 0, 2},
+           canopen::PdoCopy{out.variable(WireField::kMode), 2, 1},
+           canopen::PdoCopy{out.variable(WireField::kTargetPosition), 3, 4},
+           canopen::PdoCopy{out.variable(WireField::kTorqueOffset), 7, 2},
+           canopen::PdoCopy{out.variable(WireField::kStiffness), 9, 4},
+       })
+    copy.to_wire(bytes.data());
   EXPECT_EQ(bytes, (std::array<std::uint8_t, 16>{0x0F, 0x00, 0xFF, 0xD8, 0xDC, 0xFF, 0xFF, 0x06,
                                                  0xFF, 0x00, 0x00, 0x80, 0x3F}));
 }
