@@ -10,12 +10,13 @@ namespace tandem::canopen {
 
 namespace {
 
-constexpr std::uint32_t kFunctionMask = 0x780;
+constexpr std::uint32_t kNoCobId = 0xFFFFFFFF;
 
 }  // namespace
 
 Node::Node(const NodeConfig& config, ObjectDictionary& od) : config_(config), sdo_(od, config.id) {
   add_objects(od);
+  find_rpdos();
 }
 
 void Node::add_objects(ObjectDictionary& od) {
@@ -50,7 +51,7 @@ void Node::add_objects(ObjectDictionary& od) {
   }
 }
 
-NodeEvents Node::receive(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
+NodeEvents Node::take(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
   const auto id = static_cast<std::uint32_t>(config_.id);
   if (state_ == NmtState::kBootUp) return 0;  // not on the bus yet
   if (frame.id == cob::kNmt) return on_nmt(frame, out);
@@ -61,6 +62,7 @@ NodeEvents Node::receive(const Frame& frame, FrameSink& out) noexcept TANDEM_RT 
   if (frame.id == cob::kSync) return on_sync();
   if (frame.id == cob::kSdoRequest + id) {
     sdo_.receive(frame, out);
+    find_rpdos();  // it may have written their identifiers
     return 0;
   }
   if ((frame.id & kFunctionMask) == cob::kHeartbeat) {
@@ -122,19 +124,24 @@ NodeEvents Node::on_sync() noexcept {
 }
 
 NodeEvents Node::on_rpdo(const Frame& frame, FrameSink& out) noexcept {
-  for (int i = 0; i < kPdosPerNode; ++i) {
-    switch (rpdos_[i].receive(frame)) {
-      case RxPdo::Taken::kNotMine: continue;
-      case RxPdo::Taken::kLatched: return 0;
-      case RxPdo::Taken::kApplied:
-        applied_rpdos_ |= static_cast<std::uint8_t>(1u << i);
-        return kEventRpdo;
-      case RxPdo::Taken::kTooShort:
-        raise_error(ErrorCode::kPdoTooShort, error_register::kCommunication, 0, out);
-        return 0;
-    }
+  const int number = number_of_rpdo(frame.id);
+  if (number < 0) return 0;
+  switch (rpdos_[static_cast<std::size_t>(number)].receive(frame)) {
+    case RxPdo::Taken::kNotMine:
+    case RxPdo::Taken::kLatched: break;
+    case RxPdo::Taken::kApplied:
+      applied_rpdos_ |= static_cast<std::uint8_t>(1u << number);
+      return kEventRpdo;
+    case RxPdo::Taken::kTooShort:
+      raise_error(ErrorCode::kPdoTooShort, error_register::kCommunication, 0, out);
+      break;
   }
   return 0;
+}
+
+void Node::find_rpdos() noexcept {
+  for (std::size_t i = 0; i < rpdos_.size(); ++i)
+    rpdo_ids_[i] = rpdos_[i].in_use() ? rpdos_[i].cob_id() : kNoCobId;
 }
 
 void Node::on_heartbeat(const Frame& frame) noexcept {
@@ -194,6 +201,7 @@ void Node::reset_communication() noexcept TANDEM_RT {
   consumers_.fill({});
   for (RxPdo& pdo : rpdos_) pdo.reset();
   for (TxPdo& pdo : tpdos_) pdo.reset();
+  find_rpdos();
 }
 
 void Node::produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept {
@@ -257,6 +265,7 @@ void Node::archive(Archive& ar) {
   for (Consumer& c : consumers_) ar(c.object, c.heard, c.lost, c.silent_ns);
   for (RxPdo& pdo : rpdos_) ar(pdo);
   for (TxPdo& pdo : tpdos_) ar(pdo);
+  if (ar.reading()) find_rpdos();
 }
 
 }  // namespace tandem::canopen

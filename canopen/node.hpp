@@ -61,7 +61,16 @@ class Node final : private ObjectOwner {
   Node& operator=(const Node&) = delete;
 
   /// Takes a frame of the bus; those of others are passed over quickly.
-  NodeEvents receive(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
+  NodeEvents receive(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
+    return hears(frame.id) ? take(frame, out) : NodeEvents{0};
+  }
+  /// Whether frames with this COB-ID may concern the node: what a CAN controller's acceptance
+  /// filter would let through.
+  [[nodiscard]] bool hears(std::uint32_t id) const noexcept TANDEM_RT {
+    const bool broadcast = id <= cob::kSync || (id & kFunctionMask) == cob::kHeartbeat;
+    const bool to_it = (id & ~kFunctionMask) == static_cast<std::uint32_t>(config_.id);
+    return broadcast || to_it || number_of_rpdo(id) >= 0;
+  }
   /// Advances time: boot-up, heartbeats, SDO time-out, event-driven TPDOs.
   NodeEvents process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT;
   /// Sends the TPDOs that the SYNC just received makes due.
@@ -96,7 +105,17 @@ class Node final : private ObjectOwner {
     }
   };
 
+  static constexpr std::uint32_t kFunctionMask = 0x780;
+
   void add_objects(ObjectDictionary& od);
+  NodeEvents take(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
+  /// From 0; -1: no RPDO in use has this COB-ID.
+  [[nodiscard]] int number_of_rpdo(std::uint32_t id) const noexcept {
+    for (int i = 0; i < kPdosPerNode; ++i)
+      if (rpdo_ids_[static_cast<std::size_t>(i)] == id) return i;
+    return -1;
+  }
+  void find_rpdos() noexcept;
   NodeEvents on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
   NodeEvents on_sync() noexcept;
   NodeEvents on_rpdo(const Frame& frame, FrameSink& out) noexcept;
@@ -121,6 +140,7 @@ class Node final : private ObjectOwner {
   std::array<std::uint32_t, kErrorHistory> history_{};
   std::array<Consumer, kHeartbeatConsumers> consumers_{};
   SdoServer sdo_;
+  std::array<std::uint32_t, kPdosPerNode> rpdo_ids_{};  ///< kNoCobId: not in use
   std::array<RxPdo, kPdosPerNode> rpdos_;
   std::array<TxPdo, kPdosPerNode> tpdos_;
 };

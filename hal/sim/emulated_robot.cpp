@@ -153,6 +153,7 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
   for (std::size_t b = 0; b < robot.buses.size(); ++b) {
     buses_.push_back(std::make_unique<LoopbackBus>());
   }
+  attached_.resize(buses_.size());
   for (const hal::JointConfig& joint : robot.joints) {
     supply_V_.push_back(robot.actuator_of(joint).voltage_limit_V);
   }
@@ -167,6 +168,7 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
     boards_.push_back({std::make_unique<firmware::Board>(setup),
                        bus_index(robot, robot.boards[b].bus), joints_of(robot, robot.boards[b]),
                        sense_.size(), setup.product, setup.revision});
+    attached_[boards_[b].bus].boards.push_back(b);
     sense_.resize(sense_.size() + setup.axes.size());
   }
   drive_.resize(sense_.size());
@@ -178,6 +180,7 @@ Status EmulatedRobot::add_nodes(const hal::RobotConfig& robot, const SimRobotCon
     }
     sensor_nodes_.push_back({std::make_unique<firmware::SensorBoard>(setup),
                              bus_index(robot, robot.sensors[s].bus), channel, setup.channels});
+    attached_[sensor_nodes_[s].bus].sensors.push_back(s);
     channel += setup.channels;
   }
   Status added = add_faults(robot, config);
@@ -307,11 +310,11 @@ void EmulatedRobot::pass_to_boards(std::size_t bus, const canopen::Frame& frame)
 
 /// Everybody on the bus who has power hears it.
 void EmulatedRobot::receive(std::size_t bus, const canopen::Frame& frame) noexcept {
-  for (BoardNode& node : boards_) {
-    if (node.bus == bus && node.powered != 0) node.board->receive(frame);
+  for (const std::size_t b : attached_[bus].boards) {
+    if (boards_[b].powered != 0) boards_[b].board->receive(frame);
   }
-  for (SensorNode& node : sensor_nodes_) {
-    if (node.bus == bus && node.powered != 0) node.board->receive(frame);
+  for (const std::size_t s : attached_[bus].sensors) {
+    if (sensor_nodes_[s].powered != 0) sensor_nodes_[s].board->receive(frame);
   }
   for (Twin& twin : twins_) {
     if (twin.bus == bus && faults_.slots()[twin.slot].active != 0) twin.board->receive(frame);

@@ -209,7 +209,12 @@ class EmulatedRobot {
   std::vector<std::unique_ptr<hal::can::LoopbackBus>> buses_;
   std::vector<BoardNode> boards_;
   std::vector<SensorNode> sensor_nodes_;
-  std::vector<double> supply_V_;  // per joint
+  /// Who is on a bus: indices in boards_ and sensor_nodes_.
+  struct Attached {
+    std::vector<std::size_t> boards, sensors;
+  };
+  std::vector<Attached> attached_;  // per bus
+  std::vector<double> supply_V_;    // per joint
   std::vector<firmware::AxisSense> sense_;
   std::vector<firmware::AxisDrive> drive_;
   std::vector<double> sensor_truth_;
