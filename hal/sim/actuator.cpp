@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 namespace tandem::sim {
@@ -23,6 +24,9 @@ Status require_positive(const hal::ActuatorConfig& config, double value, const c
 double clamp_to(double value, double limit) {
   return limit > 0.0 ? std::clamp(value, -limit, limit) : value;
 }
+
+using View = Eigen::Map<const Eigen::ArrayXd>;
+using Out = Eigen::Map<Eigen::ArrayXd>;
 
 }  // namespace
 
@@ -83,23 +87,45 @@ Actuators::Actuators(std::vector<ActuatorModel> models, double ambient_C)
   brake_rad_.assign(n, 0.0);
   brake_Nm_.assign(n, 0.0);
   temperature_.assign(n, ambient_C);
-  bridge_.assign(n, 0);
-  braked_.assign(n, 0);
-  broken_.assign(n, 0);
+  bridge_.assign(n, 0.0);
+  free_.assign(n, 1.0);
+  whole_.assign(n, 1.0);
   cooling_.assign(n, 1.0);
   brakes_.resize(n);
   brake_states_.resize(n);
-  for (const ActuatorModel& model : models_) feeds_through_ |= model.order == 0;
+  for (const ActuatorModel& model : models_) {
+    feeds_through_ |= model.order == 0;
+    all_elastic_ &= model.order == 2;
+  }
+  const auto array = [&](auto value) {
+    Eigen::ArrayXd values(static_cast<Eigen::Index>(n));
+    std::ranges::transform(models_, values.begin(), value);
+    return values;
+  };
+  using Model = ActuatorModel;
+  elastic_ = {
+      .torque_per_A = array(&Model::torque_per_A),
+      .back_emf = array(&Model::back_emf_Vs_rad),
+      .friction = array(&Model::friction_Nms_rad),
+      .resistance = array(&Model::resistance_ohm),
+      .inertia = array(&Model::inertia_kg_m2),
+      .spring = array(&Model::spring_Nm_rad),
+      .spring_damping = array(&Model::spring_damping_Nms_rad),
+      .current_limit = array([](const Model& m) {
+        return m.current_limit_A > 0.0 ? m.current_limit_A
+                                       : std::numeric_limits<double>::infinity();
+      }),
+      .heating = array([](const Model& m) { return m.thermal_resistance_K_W * m.resistance_ohm; })};
 }
 
 void Actuators::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexcept TANDEM_RT {
   voltage_[joint] = bridge_on ? clamp_to(voltage_V, models_[joint].voltage_limit_V) : 0.0;
-  bridge_[joint] = bridge_on ? 1 : 0;
+  bridge_[joint] = bridge_on ? 1.0 : 0.0;
 }
 
 void Actuators::set_brake(std::size_t joint, bool engaged, double position_rad,
                           double load_Nm) noexcept TANDEM_RT {
-  braked_[joint] = engaged ? 1 : 0;
+  free_[joint] = engaged ? 0.0 : 1.0;
   brake_rad_[joint] = position_rad;
   brake_Nm_[joint] = load_Nm;
 }
@@ -162,7 +188,7 @@ double Actuators::brake_torque(std::size_t joint, double position_rad,
 }
 
 double Actuators::current(std::size_t joint, double velocity_rad_s) const noexcept {
-  if (bridge_[joint] == 0) return 0.0;
+  if (bridge_[joint] == 0.0) return 0.0;
   const ActuatorModel& m = models_[joint];
   const double i = (voltage_[joint] - m.back_emf_Vs_rad * velocity_rad_s) / m.resistance_ohm;
   return clamp_to(i, m.current_limit_A);
@@ -176,6 +202,7 @@ double Actuators::rigid_brake(std::size_t joint, double q, double qd) const noex
 
 void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
                          MotorState rate) const noexcept TANDEM_RT {
+  if (all_elastic()) return evaluate_elastic(q, qd, motor, torque_Nm, rate);
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     const double velocity = m.elastic() ? motor.velocity_rad_s[j] : qd[j];
@@ -183,7 +210,7 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
     rate.current_A[j] = 0.0;
     if (!m.current_is_state()) {
       i = current(j, velocity);
-    } else if (bridge_[j] != 0) {
+    } else if (bridge_[j] != 0.0) {
       i = motor.current_A[j];
       rate.current_A[j] =
           (voltage_[j] - m.resistance_ohm * i - m.back_emf_Vs_rad * velocity) / m.inductance_H;
@@ -195,16 +222,14 @@ void Actuators::evaluate(const double* q, const double* qd, MotorStateView motor
     if (!m.elastic()) {
       rate.position_rad[j] = 0.0;
       rate.velocity_rad_s[j] = 0.0;
-      torque_Nm[j] = braked_[j] != 0 ? rigid_brake(j, q[j], qd[j]) : drive;
+      torque_Nm[j] = braked(j) ? rigid_brake(j, q[j], qd[j]) : drive;
       continue;
     }
-    const double spring = broken_[j] != 0 ? 0.0
-                                          : m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
-                                                m.spring_damping_Nms_rad * (velocity - qd[j]);
+    const double spring = whole_[j] * (m.spring_Nm_rad * (motor.position_rad[j] - q[j]) +
+                                       m.spring_damping_Nms_rad * (velocity - qd[j]));
     torque_Nm[j] = spring;
-    const bool held = braked_[j] != 0;
-    rate.position_rad[j] = held ? 0.0 : velocity;
-    rate.velocity_rad_s[j] = held ? 0.0 : (drive - spring) / m.inertia_kg_m2;
+    rate.position_rad[j] = free_[j] * velocity;
+    rate.velocity_rad_s[j] = free_[j] * ((drive - spring) / m.inertia_kg_m2);
   }
 }
 
@@ -216,7 +241,7 @@ void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
       motor.current_A[j] +=
           h_s * rate.current_A[j] / (1.0 + h_s * m.resistance_ohm / m.inductance_H);
     }
-    if (m.elastic() && braked_[j] == 0) {
+    if (m.elastic() && !braked(j)) {
       motor.velocity_rad_s[j] += h_s * rate.velocity_rad_s[j];
       motor.position_rad[j] += h_s * motor.velocity_rad_s[j];
     }
@@ -225,29 +250,65 @@ void Actuators::step_semi_implicit(double h_s, MotorStateView rate,
 
 void Actuators::finish_step(double h_s, const double* q, const double* qd,
                             MotorState motor) noexcept TANDEM_RT {
-  if (h_s != cooling_h_s_) {
-    cooling_h_s_ = h_s;
-    for (std::size_t j = 0; j < models_.size(); ++j) {
-      cooling_[j] = std::exp(-h_s / models_[j].thermal_time_constant_s);
-    }
-  }
+  cool(h_s);
+  if (all_elastic()) return finish_elastic(motor);
   for (std::size_t j = 0; j < models_.size(); ++j) {
     const ActuatorModel& m = models_[j];
     if (!m.elastic()) {
       motor.position_rad[j] = q[j];
       motor.velocity_rad_s[j] = qd[j];
-    } else if (braked_[j] != 0) {
+    } else if (braked(j)) {
       motor.velocity_rad_s[j] = 0.0;
     }
     double& i = motor.current_A[j];
     if (!m.current_is_state()) {
       i = current(j, motor.velocity_rad_s[j]);
     } else {
-      i = bridge_[j] != 0 ? clamp_to(i, m.current_limit_A) : 0.0;
+      i = bridge_[j] != 0.0 ? clamp_to(i, m.current_limit_A) : 0.0;
     }
     const double warm = ambient_C_ + m.thermal_resistance_K_W * m.resistance_ohm * i * i;
     temperature_[j] = warm + (temperature_[j] - warm) * cooling_[j];
   }
+}
+
+void Actuators::cool(double h_s) noexcept {
+  if (h_s == cooling_h_s_) return;
+  cooling_h_s_ = h_s;
+  for (std::size_t j = 0; j < models_.size(); ++j) {
+    cooling_[j] = std::exp(-h_s / models_[j].thermal_time_constant_s);
+  }
+}
+
+void Actuators::evaluate_elastic(const double* q, const double* qd, MotorStateView motor,
+                                 double* torque_Nm, MotorState rate) const noexcept {
+  const auto n = static_cast<Eigen::Index>(models_.size());
+  const View position(motor.position_rad, n), velocity(motor.velocity_rad_s, n);
+  const View free(free_.data(), n);
+  const Elastic& m = elastic_;
+  Out current(rate.current_A, n), torque(torque_Nm, n), speed_up(rate.velocity_rad_s, n);
+  current =
+      View(bridge_.data(), n) * ((View(voltage_.data(), n) - m.back_emf * velocity) / m.resistance)
+                                    .max(-m.current_limit)
+                                    .min(m.current_limit);
+  torque = View(whole_.data(), n) *
+           (m.spring * (position - View(q, n)) + m.spring_damping * (velocity - View(qd, n)));
+  speed_up = free * ((m.torque_per_A * current - m.friction * velocity - torque) / m.inertia);
+  Out(rate.position_rad, n) = free * velocity;
+  current.setZero();  // it is no state: nothing of it changes by itself
+}
+
+void Actuators::finish_elastic(MotorState motor) noexcept {
+  const auto n = static_cast<Eigen::Index>(models_.size());
+  const Elastic& m = elastic_;
+  Out velocity(motor.velocity_rad_s, n), current(motor.current_A, n);
+  Out temperature(temperature_.data(), n);
+  velocity *= View(free_.data(), n);
+  current =
+      View(bridge_.data(), n) * ((View(voltage_.data(), n) - m.back_emf * velocity) / m.resistance)
+                                    .max(-m.current_limit)
+                                    .min(m.current_limit);
+  const auto warm = ambient_C_ + m.heating * current * current;
+  temperature = warm + (temperature - warm) * View(cooling_.data(), n);
 }
 
 }  // namespace tandem::sim

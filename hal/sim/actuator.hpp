@@ -2,6 +2,7 @@
 // Layer: hal/sim.  Thread: create non-RT; evaluate and step RT.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -86,7 +87,7 @@ class Actuators {
   /// `load_Nm` compensated), or lets it go.
   void set_brake(std::size_t joint, bool engaged, double position_rad,
                  double load_Nm) noexcept TANDEM_RT;
-  [[nodiscard]] bool braked(std::size_t joint) const noexcept { return braked_[joint] != 0; }
+  [[nodiscard]] bool braked(std::size_t joint) const noexcept { return free_[joint] == 0.0; }
 
   /// Fits a motor brake: dry friction on the rotor that holds up to torque_Nm and slips above.
   ///
@@ -110,7 +111,7 @@ class Actuators {
 
   /// The series spring of `joint` parts, for good: nothing passes between motor and link any more.
   /// What the spring had stored is lost; energy does not appear. @pre the actuator is elastic
-  void break_spring(std::size_t joint) noexcept TANDEM_RT { broken_[joint] = 1; }
+  void break_spring(std::size_t joint) noexcept TANDEM_RT { whole_[joint] = 0.0; }
   /// The winding is at least so hot now, from outside; it cools by itself.
   void heat(std::size_t joint, double at_least_C) noexcept TANDEM_RT {
     temperature_[joint] = std::max(temperature_[joint], at_least_C);
@@ -134,7 +135,7 @@ class Actuators {
   [[nodiscard]] std::span<const double> temperature_C() const noexcept { return temperature_; }
 
   void archive(Archive& ar) {
-    ar(voltage_, bridge_, braked_, broken_, brake_rad_, brake_Nm_, temperature_, brake_states_);
+    ar(voltage_, bridge_, free_, whole_, brake_rad_, brake_Nm_, temperature_, brake_states_);
   }
 
  private:
@@ -154,9 +155,25 @@ class Actuators {
   [[nodiscard]] double current(std::size_t joint, double velocity_rad_s) const noexcept;
   [[nodiscard]] double rigid_brake(std::size_t joint, double q, double qd) const noexcept;
 
+  /// A robot's actuators are all of order 2 and without brakes as a rule: then all joints at once,
+  /// with the bits of the loops over joints. One array for each constant of ActuatorModel.
+  struct Elastic {
+    Eigen::ArrayXd torque_per_A, back_emf, friction, resistance, inertia, spring, spring_damping;
+    Eigen::ArrayXd current_limit;  ///< infinite where there is none
+    Eigen::ArrayXd heating;        ///< thermal_resistance_K_W * resistance_ohm
+  };
+  [[nodiscard]] bool all_elastic() const noexcept { return all_elastic_ && !any_brake_; }
+  void evaluate_elastic(const double* q, const double* qd, MotorStateView motor, double* torque_Nm,
+                        MotorState rate) const noexcept;
+  void finish_elastic(MotorState motor) noexcept;
+  void cool(double h_s) noexcept;
+
   std::vector<ActuatorModel> models_;
+  Elastic elastic_;
+  bool all_elastic_ = true;
   std::vector<double> voltage_, brake_rad_, brake_Nm_, temperature_;
-  std::vector<std::uint8_t> bridge_, braked_, broken_;
+  // 1 or 0, as factors: the bridge is on; the rotor is not held; the spring is whole.
+  std::vector<double> bridge_, free_, whole_;
   std::vector<Brake> brakes_;
   std::vector<BrakeState> brake_states_;
   bool any_brake_ = false;
