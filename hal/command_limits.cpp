@@ -227,7 +227,7 @@ void CommandLimits::rated(std::size_t joint, double& value, double& last, double
   ++counters_[joint].too_fast;
 }
 
-void CommandLimits::bounded(std::size_t joint, double& value, double& last, double min,
+void CommandLimits::correct(std::size_t joint, double& value, double last, double min,
                             double max) noexcept TANDEM_RT {
   if (!std::isfinite(value)) {
     value = last;
@@ -239,7 +239,6 @@ void CommandLimits::bounded(std::size_t joint, double& value, double& last, doub
     ++counters_[joint].out_of_range;
     if (codes_[joint] == Code::kOk) codes_[joint] = Code::kOutOfRange;
   }
-  last = value;
 }
 
 void CommandLimits::archive(Archive& ar) { ar(last_, position_, velocity_, counters_, codes_); }

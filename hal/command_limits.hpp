@@ -2,6 +2,7 @@
 // Layer: hal.  Thread: RT (made non-RT).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -98,6 +99,12 @@ class CommandLimits {
   void rated(std::size_t joint, double& value, double& last, double from,
              double step) noexcept TANDEM_RT;
   void bounded(std::size_t joint, double& value, double& last, double min,
+               double max) noexcept TANDEM_RT {
+    if (!(std::isfinite(value) && value >= min && value <= max)) [[unlikely]]
+      correct(joint, value, last, min, max);
+    last = value;
+  }
+  void correct(std::size_t joint, double& value, double last, double min,
                double max) noexcept TANDEM_RT;
 
   double period_s_;

@@ -2,6 +2,7 @@
 #include "runtime/robot_cycle.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "rt/scoped_realtime.hpp"
 
@@ -331,29 +332,40 @@ void RobotCycle::show() noexcept TANDEM_RT {
 /// What is asked of a joint is what its owner wants, before a delay and a transfer.
 void RobotCycle::show_joints() noexcept TANDEM_RT {
   const hal::CommandImage& wanted = controlling_ ? controlled() : command_;
+  const hal::StateImage& state = state_;
+  const auto position = state.position_rad(), velocity = state.velocity_rad_s();
+  const auto torque = state.torque_Nm(), acceleration = state.acceleration_rad_s2();
+  const auto motor_position = state.motor_position_rad();
+  const auto motor_velocity = state.motor_velocity_rad_s();
+  const auto current = state.current_A(), voltage = state.voltage_V();
+  const auto temperature = state.temperature_C();
+  const auto commanded = std::as_const(command_).position_rad();
+  const auto fault = state.fault(), age = state.age_cycles();
+  const auto drive_mode = state.mode();
+  const auto drive_state = state.drive_state();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const auto impedance = controllers_->wanted_impedance(j, wanted);
     JointStatus& joint = joints_[j];  // all of it, but field by field: g++ clears a whole one first
     joint.cycle = time_.cycle;
-    joint.position_rad = state_.position_rad()[j];
-    joint.velocity_rad_s = state_.velocity_rad_s()[j];
-    joint.torque_Nm = state_.torque_Nm()[j];
-    joint.acceleration_rad_s2 = state_.acceleration_rad_s2()[j];
-    joint.motor_position_rad = state_.motor_position_rad()[j];
-    joint.motor_velocity_rad_s = state_.motor_velocity_rad_s()[j];
-    joint.current_A = state_.current_A()[j];
-    joint.voltage_V = state_.voltage_V()[j];
-    joint.temperature_C = state_.temperature_C()[j];
-    joint.commanded_rad = command_.position_rad()[j];
+    joint.position_rad = position[j];
+    joint.velocity_rad_s = velocity[j];
+    joint.torque_Nm = torque[j];
+    joint.acceleration_rad_s2 = acceleration[j];
+    joint.motor_position_rad = motor_position[j];
+    joint.motor_velocity_rad_s = motor_velocity[j];
+    joint.current_A = current[j];
+    joint.voltage_V = voltage[j];
+    joint.temperature_C = temperature[j];
+    joint.commanded_rad = commanded[j];
     joint.stiffness_Nm_rad = impedance.stiffness_Nm_rad;
     joint.damping_Nms_rad = impedance.damping_Nms_rad;
-    joint.fault = state_.fault()[j];
-    joint.age_cycles = state_.age_cycles()[j];
+    joint.fault = fault[j];
+    joint.age_cycles = age[j];
     joint.owner = controllers_->owner(j);
     joint.mode = wanted.mode()[j];
     joint.interaction = wanted.interaction()[j];
-    joint.drive_mode = state_.mode()[j];
-    joint.drive_state = state_.drive_state()[j];
+    joint.drive_mode = drive_mode[j];
+    joint.drive_state = drive_state[j];
     joint.moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0};
     joint.resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0};
   }
