@@ -102,7 +102,7 @@ Status check_regular(const Tree& tree, const ModelSpec& spec,
     return refuse("the description has no joint that moves, so there are no dynamics to generate",
                   "check the types of its joints and [model.lock]", -1);
   }
-  const Result<Mechanism> m = make_mechanism(tree, spec);
+  const Result<Mechanism> m = make_mechanism(tree, spec, Frames::kAsDescribed);
   if (!m) return std::unexpected(m.error());
   for (const NamedPosition& one : all_positions(tree, positions)) {
     const RowMajor M = mass_matrix(tree, *m, one.position);

@@ -156,7 +156,7 @@ class Study {
 LoopStudy study_loops(const hal::RobotConfig& robot, const model::Tree& tree,
                       std::span<const std::string> postures) {
   if (robot.loops.empty()) return {};
-  auto mechanism = model::make_mechanism(tree, sim::model_spec(robot));
+  auto mechanism = model::make_mechanism(tree, sim::model_spec(robot), model::Frames::kAsDescribed);
   if (!mechanism) return {.postures = {}, .errors = {mechanism.error()}};
   const model::InterpretedKernels kernels(std::move(*mechanism), robot.name);
   return Study(robot, *kernels.get()).run(postures);

@@ -55,7 +55,7 @@ std::vector<double> torques_at_rest(const hal::RobotConfig& robot, const tandem_
 }
 
 std::vector<Weak> weak_joints(const RobotFiles& robot, const hal::PostureConfig* posture) {
-  auto mechanism = model::make_mechanism(robot.tree, robot.spec);
+  auto mechanism = model::make_mechanism(robot.tree, robot.spec, model::Frames::kAsDescribed);
   if (!mechanism) return {};  // is said when the kernels are made
   const model::InterpretedKernels kernels(std::move(*mechanism), robot.config.name);
   const std::vector<double> torques = torques_at_rest(robot.config, *kernels.get(), posture);

@@ -1,4 +1,4 @@
-// The mass matrix and its Cholesky factor in a fixed, low-discrepancy sequence of postures: a joint
+// The mass matrix and its inverse in a fixed, low-discrepancy sequence of postures: a joint
 // is lightest with all others free, 1 / (M^-1)_ii, and heaviest with them locked, M_ii.
 #include "hal/sim/apparent_inertia.hpp"
 
@@ -26,9 +26,8 @@ Posture posture_at(const tandem_kernels& kernels, std::vector<double> q) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   RowMajor M(kernels.nv, kernels.nv);
   kernels.mass_matrix(q.data(), M.data());
-  Posture posture{std::move(q), M, {}};
-  posture.factor.compute(posture.M);
-  return posture;
+  const Eigen::LLT<Eigen::MatrixXd> factor(M);
+  return {std::move(q), M, factor.solve(Eigen::MatrixXd::Identity(kernels.nv, kernels.nv))};
 }
 
 }  // namespace
@@ -65,19 +64,20 @@ std::vector<JointInertia> joint_inertias(const tandem_kernels& kernels,
   const Eigen::Index base = kernels.nv - kernels.joints;
   std::vector<JointInertia> all(kernels.joints, {std::numeric_limits<double>::infinity(), 0.0});
   for (const Posture& posture : postures) {
-    const Eigen::MatrixXd inverse =
-        posture.factor.solve(Eigen::MatrixXd::Identity(kernels.nv, kernels.nv));
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Eigen::Index at = base + static_cast<Eigen::Index>(i);
-      all[i].least = std::min(all[i].least, 1.0 / inverse(at, at));
+      all[i].least = std::min(all[i].least, 1.0 / posture.mobility(at, at));
       all[i].most = std::max(all[i].most, posture.M(at, at));
     }
   }
   return all;
 }
 
-double point_mass(const Posture& posture, const Eigen::MatrixXd& J) {
-  const Eigen::Matrix3d mobility = J * posture.factor.solve(J.transpose());
+double point_mass(const Posture& posture, const PointJacobian& J) {
+  PointJacobian moved(J.rows(), 3);  // by a unit force along each axis
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    moved.col(axis).noalias() = posture.mobility * J.col(axis);
+  const Eigen::Matrix3d mobility = J.transpose() * moved;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(mobility, Eigen::EigenvaluesOnly);
   return 1.0 / eigen.eigenvalues()(2);
 }

@@ -22,11 +22,11 @@ struct JointRange {
   double effort_Nm = std::numeric_limits<double>::infinity();  ///< that its drive can push with
 };
 
-/// A posture and its mass matrix, factored.
+/// A posture, its mass matrix, and the inverse of that.
 struct Posture {
   std::vector<double> q;  ///< (nq)
   Eigen::MatrixXd M;      ///< (nv, nv)
-  Eigen::LLT<Eigen::MatrixXd> factor;
+  Eigen::MatrixXd mobility;
 };
 
 /// `start` (nq) and `more`, drawn from a generator with a fixed seed: each joint evenly within
@@ -46,8 +46,11 @@ struct JointInertia {
 [[nodiscard]] std::vector<JointInertia> joint_inertias(const tandem_kernels& kernels,
                                                        std::span<const Posture> postures);
 
-/// The mass that a point with Jacobian `J` (3, nv) shows where it is lightest [kg].
-[[nodiscard]] double point_mass(const Posture& posture, const Eigen::MatrixXd& J);
+/// A point's Jacobian, transposed: (nv, 3), a column for each axis of W.
+using PointJacobian = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
+/// The mass that a point shows where it is lightest [kg].
+[[nodiscard]] double point_mass(const Posture& posture, const PointJacobian& J);
 
 /// The kernels' joint of this name; `kernels.joints` when there is none.
 [[nodiscard]] std::size_t joint_of(const tandem_kernels& kernels, const std::string& name);

@@ -158,7 +158,7 @@ void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> po
     place(posture.q.data(), rest.data());
     for (const Group& group : groups_) {
       for (std::size_t i = group.begin; i < group.end; ++i) {
-        Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, kernels.nv);
+        PointJacobian J = PointJacobian::Zero(kernels.nv, 3);
         const Vec3 lever = rotate(bodies_[group.body].R.data(), points_[i].data());
         const Vec3 at = sum(bodies_[group.body].p, lever);
         const auto to = [&at](const Body& body) -> Vec3 {
@@ -168,15 +168,15 @@ void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> po
           const Joint& joint = joints_[body - 1];
           const Vec3& axis = bodies_[body].axis;
           const Vec3 way = joint.prismatic ? axis : cross(axis, to(bodies_[body]));
-          J.col(static_cast<Eigen::Index>(base + joint.coordinate)) +=
-              joint.multiplier * Eigen::Vector3d(way.data());
+          J.row(static_cast<Eigen::Index>(base + joint.coordinate)) +=
+              joint.multiplier * Eigen::RowVector3d(way.data());
         }
         for (std::size_t axis = 0; axis < base / 2; ++axis) {
           const Mat3& R = bodies_[0].R;
           const Vec3 along{R[axis], R[3 + axis], R[6 + axis]};
-          J.col(static_cast<Eigen::Index>(axis)) = Eigen::Vector3d(along.data());
-          J.col(static_cast<Eigen::Index>(3 + axis)) =
-              Eigen::Vector3d(cross(along, to(bodies_[0])).data());
+          J.row(static_cast<Eigen::Index>(axis)) = Eigen::RowVector3d(along.data());
+          J.row(static_cast<Eigen::Index>(3 + axis)) =
+              Eigen::RowVector3d(cross(along, to(bodies_[0])).data());
         }
         mass[i] = std::min(mass[i], point_mass(posture, J));
       }
