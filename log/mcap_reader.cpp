@@ -2,7 +2,7 @@
 // read up to the last whole one.
 #include "log/mcap_reader.hpp"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <cstring>
 #include <filesystem>
@@ -146,7 +146,7 @@ Status McapReader::open_chunk(std::span<const std::byte> content) {
     return damaged(done.error().message);
   }
   chunk_at_ = 0;
-  const auto found = crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size());
+  const std::uint32_t found = libdeflate_crc32(0, chunk_.data(), chunk_.size());
   if (crc != 0 && crc != found) return damaged("a chunk's checksum does not fit");
   return {};
 }

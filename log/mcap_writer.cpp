@@ -3,10 +3,10 @@
 #include "log/mcap_writer.hpp"
 
 #include <fcntl.h>
+#include <libdeflate.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -18,8 +18,8 @@ namespace {
 constexpr std::uint64_t kSpaceNeeded = 1024 * 1024;  // less on the disk is a full disk
 
 std::uint32_t crc(std::uint32_t before, std::span<const std::byte> bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  if (bytes.empty()) return before;  // libdeflate begins anew at a null pointer
+  return libdeflate_crc32(before, bytes.data(), bytes.size());
 }
 
 void append_record(Bytes& out, Opcode opcode, std::span<const std::byte> content) {
@@ -90,10 +90,6 @@ Status McapWriter::open(const std::string& path, const WriterOptions& options) {
 
 void McapWriter::emit(std::span<const std::byte> bytes) {
   crc_ = crc(crc_, bytes);
-  emit_raw(bytes);
-}
-
-void McapWriter::emit_raw(std::span<const std::byte> bytes) {
   struct stat found {};
   if (!failed() && ::fstat(file_, &found) == 0 && S_ISREG(found.st_mode) && found.st_nlink == 0) {
     deleted_ = true;
@@ -202,8 +198,7 @@ void McapWriter::finish_chunk() {
   append(head, chunk.start_time);
   append(head, chunk.end_time);
   append(head, chunk.uncompressed);
-  const std::uint32_t chunk_crc = crc(0, chunk_);
-  append(head, chunk_crc);
+  append(head, crc(0, chunk_));
   append(head, mcap_name(options_.compression));
   append(head, chunk.compressed);
   Bytes record;
@@ -211,13 +206,7 @@ void McapWriter::finish_chunk() {
   append(record, static_cast<std::uint64_t>(head.size() + records.size()));
   append(record, head);
   emit(record);
-  if (options_.compression == Compression::kNone) {  // the same bytes: their CRC is known
-    crc_ = static_cast<std::uint32_t>(
-        crc32_combine(crc_, chunk_crc, static_cast<z_off_t>(chunk_.size())));
-    emit_raw(records);
-  } else {
-    emit(records);
-  }
+  emit(records);
   chunk.length = offset_ - chunk.offset;
   write_indices(chunk);
   chunks_.push_back(std::move(chunk));

@@ -75,8 +75,7 @@ class McapWriter {
     std::map<std::uint16_t, std::uint64_t> per_channel;
   };
 
-  void emit(std::span<const std::byte> bytes);      // to the file, into the CRC
-  void emit_raw(std::span<const std::byte> bytes);  // to the file only
+  void emit(std::span<const std::byte> bytes);  // to the file, into the CRC
   void emit_record(Opcode opcode, const Bytes& content);
   void finish_chunk();
   void write_indices(Chunk& chunk);
