@@ -7,12 +7,13 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request sample frames mcap
 
-.PHONY: demo test test-all unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
+.PHONY: demo test test-all bench unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
+	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
 	@echo "make fuzz   the fuzzers, a minute each, four at a time; FUZZ_RUNS=1000000: so many inputs each"
 	@echo "make mutations  whether the tests notice 200 broken lines (hours)"
 	@echo "make format  lay out every source; make lint: whether they are (part of make test)"
@@ -54,6 +55,14 @@ test-all: test
 	@$(MAKE) --no-print-directory asan
 	@$(MAKE) --no-print-directory tsan
 	@$(MAKE) --no-print-directory tidy
+
+# On a machine that does nothing else. Both builds need their benchmarks: -DTANDEM_BENCH=ON.
+AGAINST ?=
+bench:
+	@scripts/install-dependencies optional
+	@cmake --preset release -DTANDEM_BENCH=ON --log-level=WARNING
+	@cmake --build --preset release --parallel $(JOBS)
+	@bench/compare $(AGAINST) --row
 
 unit:
 	@scripts/install-dependencies test
