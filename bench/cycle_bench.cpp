@@ -10,9 +10,7 @@
 #include <numeric>
 #include <vector>
 
-#include "bench/rig.hpp"
-#include "rt/clock.hpp"
-#include "runtime/robot_cycle.hpp"
+#include "bench/sim_rig.hpp"
 
 namespace tandem::bench {
 namespace {
@@ -63,35 +61,6 @@ void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
   const auto work = cycle.loop().work.percentiles();
   fmt::print("\ncycle p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us\n", us(work.p50), us(work.p99),
              us(work.max));
-}
-
-/// A run of the simulated robot but its loop.
-struct SimRig {
-  std::unique_ptr<Rig> run;
-  std::unique_ptr<sim::SimRobot> robot;
-  rt::WallClock clock;
-
-  std::unique_ptr<runtime::RobotCycle> cycle(std::size_t trace_cycles, log::Recorder* recorder) {
-    const runtime::Experiment& e = run->experiment;
-    const runtime::CycleParts parts{e.robot, *robot, *run->host, clock, recorder, &robot->truth()};
-    return std::make_unique<runtime::RobotCycle>(
-        parts, runtime::CycleConfig{.loop = e.loop,
-                                    .running_cycles = e.cycles(),
-                                    .settle_cycles = e.settle_cycles(),
-                                    .trace_cycles = trace_cycles});
-  }
-};
-
-Result<std::unique_ptr<SimRig>> make_sim_rig(const std::string& file, const std::string& library) {
-  auto run = make_rig(file, library);
-  if (!run) return std::unexpected(run.error());
-  const runtime::Experiment& e = (*run)->experiment;
-  auto robot = sim::SimRobot::create(e.robot, (*run)->kernels.get(), e.sim_robot_config());
-  if (!robot) return std::unexpected(robot.error());
-  auto rig = std::make_unique<SimRig>();
-  rig->run = std::move(*run);
-  rig->robot = std::move(*robot);
-  return rig;
 }
 
 /// One run, printed. @return the exit status.

@@ -160,7 +160,9 @@ TEST(Lanes, ComputeWhatTheDescriptionsOfRandomMirroredRobotsSay) {
   const test::ScratchFolder folder;
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
     const std::string library = folder / ("random" + std::to_string(seed) + ".so");
-    const auto built = build_kernels(with_its_mirror(seed, kLimb), {}, {.library = library});
+    const auto built = build_kernels(
+        with_its_mirror(seed, kLimb), {},
+        {.library = library, .compiler = {}, .jobs = 0, .progress = {}, .waiting = {}});
     EXPECT_TRUE(built) << built.error().to_string();
   }
 }
