@@ -33,7 +33,7 @@ demo:
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
 
 # What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
-# take one core, and beside them half a minute of each fuzz target and the real-time proof. The last
+# take one core, and beside them twenty seconds of each fuzz target and the real-time proof. The last
 # lines say what ran and what did not. Strange surroundings want the build folder for themselves.
 test:
 	@rm -f build/summary
@@ -84,7 +84,7 @@ hil:
 
 # One after the other: each takes two cores.
 sanitized:
-	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=30
+	@$(MAKE) --no-print-directory fuzz FUZZ_SECONDS=20
 	@$(MAKE) --no-print-directory rtsan
 
 # One humanoid will do: WALK-MAN's runs take as long as COMAN's, and call nothing else. Nor does a

@@ -34,11 +34,15 @@ std::string literal(double value) {
 class Emitter {
  public:
   Emitter(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
-          std::uint32_t part_operations)
+          std::uint32_t part_operations, bool batch)
       : nodes_(graph.nodes()),
         kernel_(kernel),
         lanes_(lanes),
         part_operations_(part_operations),
+        number_(batch ? "four" : "double"),
+        array_(batch ? "four_at" : "double"),
+        name_(kernel.shape.name + (batch ? "_four" : "")),
+        batch_(batch),
         live_(live_nodes(graph, kernel.outputs)),
         uses_(nodes_.size(), 0),
         part_of_(nodes_.size(), kNowhere),
@@ -47,7 +51,7 @@ class Emitter {
         angle_(nodes_.size(), kNowhere),
         text_(nodes_.size()),
         outputs_of_(nodes_.size()) {
-    result_.name = kernel.shape.name;
+    result_.name = name_;
     result_.count = count_operations(graph, kernel.outputs);
     result_.count.pairs = lanes.operations;
   }
@@ -65,16 +69,16 @@ class Emitter {
  private:
   void name_arguments() {
     for (const KernelArray& in : kernel_.shape.inputs) {
-      parameters_ += "const double* __restrict " + in.name + ", ";
+      parameters_ += "const " + array_ + "* __restrict " + in.name + ", ";
       arguments_ += in.name + ", ";
       result_.parameters += (result_.parameters.empty() ? "" : ", ");
-      result_.parameters += "const double* " + in.name;
+      result_.parameters += "const " + array_ + "* " + in.name;
     }
     for (std::uint32_t a = 0, first = 0; a < kernel_.shape.outputs.size(); ++a) {
       const KernelArray& out = kernel_.shape.outputs[a];
-      parameters_ += "double* __restrict " + out.name + ", ";
+      parameters_ += array_ + "* __restrict " + out.name + ", ";
       arguments_ += out.name + ", ";
-      result_.parameters += ", double* " + out.name;
+      result_.parameters += ", " + array_ + "* " + out.name;
       int zeros = 0;
       for (int i = 0; i < out.size; ++i) zeros += is_zero(first + static_cast<std::uint32_t>(i));
       if (zeros > kMostZeros) cleared_.insert(out.name);
@@ -85,7 +89,7 @@ class Emitter {
         if (!output.is_constant()) outputs_of_[output.node()].push_back(first);
       }
     }
-    parameters_ += "double* __restrict w";
+    parameters_ += number_ + "* __restrict w";
     arguments_ += "w";
   }
 
@@ -131,7 +135,8 @@ class Emitter {
     }
     for (const std::uint32_t angle : single)
       if (angle_[angle] == kNowhere) add(angle);
-    table_ = (static_cast<std::uint32_t>(angles_.size()) + 3) / 4 * 4;  // whole vectors of four
+    const auto angles = static_cast<std::uint32_t>(angles_.size());
+    table_ = batch_ ? angles : (angles + 3) / 4 * 4;  // whole vectors of four
     workspace_ = 3 * table_;
   }
 
@@ -247,9 +252,9 @@ class Emitter {
       case Op::kSub: return a + " - " + operand(node.b);
       case Op::kMul: return a + " * " + operand(node.b);
       case Op::kDiv: return a + " / " + operand(node.b);
-      case Op::kSqrt: return "__builtin_sqrt(" + a + ")";
-      case Op::kSin: return "__builtin_sin(" + a + ")";
-      case Op::kCos: return "__builtin_cos(" + a + ")";
+      case Op::kSqrt: return "root(" + a + ")";
+      case Op::kSin: return "sine(" + a + ")";
+      case Op::kCos: return "cosine(" + a + ")";
       case Op::kInput:
       case Op::kConstant: break;
     }
@@ -332,11 +337,11 @@ class Emitter {
         continue;
       }
       const std::string name = "t" + std::to_string(i);
-      body += "  const double " + name + " = " + value + ";\n" + assignments(i);
+      body += "  const " + number_ + " " + name + " = " + value + ";\n" + assignments(i);
       if (crosses) body += "  w[" + std::to_string(take_slot(i)) + "] = " + name + ";\n";
     }
     if (part + 1 == parts_.size()) body += plain_outputs();
-    const std::string name = kernel_.shape.name + "_" + std::to_string(part);
+    const std::string name = name_ + "_" + std::to_string(part);
     result_.declarations.push_back("void " + name + "(" + parameters_ + ");\n");
     result_.parts.push_back("void " + name + "(" + parameters_ + ") {\n" + body + "}\n");
   }
@@ -357,13 +362,17 @@ class Emitter {
       const Expr& output = kernel_.outputs[k];
       if (cleared_outputs_[k]) continue;
       if (output.is_constant()) {
-        body += "  " + output_names_[k] + " = " + literal(output.value()) + ";\n";
+        body += "  " + output_names_[k] + " = " + constant(output.value()) + ";\n";
       } else if (!is_written(output.node())) {
         body += "  " + output_names_[k] + " = " + (output.negative() ? "-" : "") +
                 operand(output.node()) + ";\n";
       }
     }
     return body;
+  }
+
+  std::string constant(double value) const {
+    return batch_ ? "four{} + " + literal(value) : literal(value);
   }
 
   std::uint32_t take_slot(std::uint32_t i) {
@@ -400,13 +409,13 @@ class Emitter {
   void write_entry() {
     std::string body;
     if (workspace_ > 0)
-      body += "  alignas(32) double w[" + std::to_string(workspace_) + "];\n";
+      body += "  alignas(32) " + number_ + " w[" + std::to_string(workspace_) + "];\n";
     else
-      body += "  double* w = nullptr;\n";
+      body += "  " + number_ + "* w = nullptr;\n";
     for (const KernelArray& out : kernel_.shape.outputs)
       if (cleared_.contains(out.name))
         body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
-                "[i] = 0.0;\n";
+                "[i] = " + constant(0.0) + ";\n";
     for (std::size_t k = 0; k < angles_.size(); ++k) {
       const std::string value = early(angles_[k].node);
       body += "  w[" + std::to_string(k) +
@@ -414,14 +423,16 @@ class Emitter {
     }
     for (std::size_t k = angles_.size(); k < table_; ++k)
       body += "  w[" + std::to_string(k) + "] = 0.0;\n";
-    const std::string n = std::to_string(table_);
+    const auto doubles = [&](std::uint32_t at) {
+      const std::string from = "w + " + std::to_string(at);
+      return batch_ ? "reinterpret_cast<double*>(" + from + ")" : from;
+    };
     if (!angles_.empty())
-      body += "  sines_and_cosines(" + n + ", w, w + " + std::to_string(table_) + ", w + " +
-              std::to_string(2 * table_) + ");\n";
+      body += "  sines_and_cosines(" + std::to_string((batch_ ? 4 : 1) * table_) + ", " +
+              doubles(0) + ", " + doubles(table_) + ", " + doubles(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
-      body += "  " + kernel_.shape.name + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
-    result_.entry =
-        "void " + kernel_.shape.name + "(" + result_.parameters + ") {\n" + body + "}\n";
+      body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
+    result_.entry = "void " + name_ + "(" + result_.parameters + ") {\n" + body + "}\n";
   }
   // An angle in full, its operands too: nothing is computed before it.
   std::string early(std::uint32_t i) {
@@ -444,8 +455,10 @@ class Emitter {
 
   std::span<const Node> nodes_;
   const TracedKernel& kernel_;
-  const Lanes& lanes_;
+  Lanes lanes_;
   std::uint32_t part_operations_;
+  std::string number_, array_, name_;  // types of a number and of what arguments point at
+  bool batch_;                         // four states at once
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, part_of_, last_part_, slot_, angle_;
   std::vector<std::string> text_;                       // written where it is used
@@ -505,7 +518,12 @@ TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
 
 EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
                           std::uint32_t part_operations) {
-  return Emitter(graph, kernel, lanes, part_operations).run();
+  return Emitter(graph, kernel, lanes, part_operations, false).run();
+}
+
+EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel,
+                         std::uint32_t part_operations) {
+  return Emitter(graph, kernel, {}, part_operations, true).run();
 }
 
 }  // namespace tandem::model

@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/quoting.hpp"
 #include "model/emit.hpp"
@@ -27,7 +29,11 @@ constexpr std::uint32_t kMostMassMatrixOperations = 40'000;
 constexpr std::string_view kBanner =
     "// Made by `tandem model build`: change the robot's description instead.\n";
 
-// Vectors of two lanes.
+// Beyond so many operations of forward dynamics a batch calls the kernel for one state after
+// another: as fast, where code is far larger than the caches, and half as much to compile.
+constexpr std::uint32_t kMostBatchOperations = 20'000;
+
+// Vectors of two lanes, and of four states.
 constexpr std::string_view kVectors =
     R"(typedef double two __attribute__((vector_size(16), may_alias));
 typedef long long two_bits __attribute__((vector_size(16), may_alias));
@@ -35,6 +41,26 @@ static inline two& pair(double* at) { return *reinterpret_cast<two*>(at); }
 static inline two flip(two x) {  // minus lane 1
   const two_bits sign = {0, static_cast<long long>(0x8000000000000000u)};
   return reinterpret_cast<two>(reinterpret_cast<two_bits>(x) ^ sign);
+}
+typedef double four __attribute__((vector_size(32), may_alias));
+typedef double four_at __attribute__((vector_size(32), may_alias, aligned(8)));
+static inline double root(double x) { return __builtin_sqrt(x); }
+static inline double sine(double x) { return __builtin_sin(x); }
+static inline double cosine(double x) { return __builtin_cos(x); }
+static inline four root(four x) { return four{root(x[0]), root(x[1]), root(x[2]), root(x[3])}; }
+static inline four sine(four x) { return four{sine(x[0]), sine(x[1]), sine(x[2]), sine(x[3])}; }
+static inline four cosine(four x) {
+  return four{cosine(x[0]), cosine(x[1]), cosine(x[2]), cosine(x[3])};
+}
+template <class T>
+static inline T get(const double* from) {
+  T value;
+  __builtin_memcpy(&value, from, sizeof value);
+  return value;
+}
+template <class T>
+static inline void put(double* to, T value) {
+  __builtin_memcpy(to, &value, sizeof value);
 }
 )";
 
@@ -52,14 +78,60 @@ std::string count_table(const std::vector<KernelCount>& counts) {
   return text + "};\n";
 }
 
+// With shorter vectors four states at once are slower than one after another.
+constexpr std::string_view kIfFourLanes = "#ifdef __AVX2__\n";
+
+constexpr Kernel kBatches[] = {Kernel::kForwardDynamics, Kernel::kInverseDynamics};
+
+// A kernel's function for many states, `four` at a time or one by one, in arrays of its own but for
+// exactly four, which stand as they are wanted.
+std::string batch_source(const KernelShape& shape, bool four) {
+  const std::string number = four ? "four" : "double";
+  std::string parameters, arrays, in, out, own, given;
+  const auto add = [&](const KernelArray& array, bool output) {
+    const int size = std::max(array.size, 1);
+    const std::string& name = array.name;
+    parameters += fmt::format(", {}double* {}", output ? "" : "const ", name);
+    arrays += fmt::format("    {} {}_[{}];\n", number, name, size);
+    const std::string copy =
+        output ? fmt::format("put({0} + i * states + s, {0}_[i])", name)
+               : fmt::format("{0}_[i] = get<{1}>({0} + i * states + s)", name, number);
+    (output ? out : in) += fmt::format("    for (int i = 0; i < {}; ++i) {};\n", array.size, copy);
+    const auto argument = [&](const std::string& from) {
+      return !four ? from
+                   : fmt::format("reinterpret_cast<{}four_at*>({})", output ? "" : "const ", from);
+    };
+    given += (given.empty() ? "" : ", ") + argument(name);
+    own += (own.empty() ? "" : ", ") + argument(name + "_");
+  };
+  for (const KernelArray& array : shape.inputs) add(array, false);
+  for (const KernelArray& array : shape.outputs) add(array, true);
+  const std::string call = shape.name + (four ? "_four" : "");
+  std::string text = fmt::format("void {}_batch(uint32_t states{}) {{\n", shape.name, parameters);
+  if (four) text += fmt::format("  if (states == 4) return {}({});\n", call, given);
+  text += fmt::format("  for (uint32_t s = 0; s + {0} <= states; s += {0}) {{\n", four ? 4 : 1);
+  return text + arrays + in + "    " + call + "(" + own + ");\n" + out + "  }\n}\n\n";
+}
+
 // The entries of one variant and its table.
 std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
-                           const std::vector<EmittedKernel>& kernels) {
+                           const std::vector<EmittedKernel>& kernels,
+                           const std::vector<EmittedKernel>& batches) {
   std::string text{kBanner};
   text += "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\nnamespace {\n\n";
   text += kTrigSource;
   text += "\n";
   for (const EmittedKernel& kernel : kernels) text += kernel.entry + "\n";
+  if (batches.empty()) {
+    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), false);
+  } else {
+    text += kIfFourLanes;
+    for (const EmittedKernel& kernel : batches) text += kernel.entry + "\n";
+    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), true);
+    text += "#else\n";
+    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), false);
+    text += "#endif\n";
+  }
   text += name_table("joints", m.joint_names) + name_table("sites", m.site_names) +
           name_table("wrenches", m.wrench_names) + name_table("sensors", m.sensor_names) +
           count_table(result.counts) + "\n}  // namespace\n\n";
@@ -72,20 +144,24 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
   text += fmt::format("    {:.17g}, {{{:.17g}, {:.17g}, {:.17g}}},\n    counts, {},\n", m.mass_kg,
                       m.gravity[0], m.gravity[1], m.gravity[2], result.counts.size());
   for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + ",\n";
+  for (const Kernel kernel : kBatches) text += "    " + kernel_shape(kernel, m).name + "_batch,\n";
   return text + "};\n\n}  // namespace TANDEM_VARIANT\n";
 }
 
-std::string parts_header(const std::vector<EmittedKernel>& kernels) {
+std::string parts_header(const std::vector<EmittedKernel>& kernels,
+                         const std::vector<EmittedKernel>& batches) {
   std::string text{kBanner};
   text += "#pragma once\n#include \"kernels.h\"\n\nnamespace TANDEM_VARIANT {\n";
   text += kVectors;
-  for (const EmittedKernel& kernel : kernels)
-    for (const std::string& declaration : kernel.declarations) text += declaration;
+  for (const auto* some : {&kernels, &batches})
+    for (const EmittedKernel& kernel : *some)
+      for (const std::string& declaration : kernel.declarations) text += declaration;
   return text + "}  // namespace TANDEM_VARIANT\n";
 }
 
 // The parts, gathered into files of about the same length.
-void add_part_files(const std::vector<EmittedKernel>& kernels, GeneratedKernels& result) {
+void add_part_files(const std::vector<EmittedKernel>& kernels,
+                    const std::vector<EmittedKernel>& batches, GeneratedKernels& result) {
   std::string body;
   std::uint32_t operations = 0;
   int number = 0;
@@ -99,12 +175,15 @@ void add_part_files(const std::vector<EmittedKernel>& kernels, GeneratedKernels&
     body.clear();
     operations = 0;
   };
-  for (const EmittedKernel& kernel : kernels)
-    for (std::size_t part = 0; part < kernel.parts.size(); ++part) {
-      if (operations + kernel.sizes[part] > kFileOperations) close();
-      body += kernel.parts[part] + "\n";
-      operations += kernel.sizes[part];
-    }
+  for (const auto* some : {&kernels, &batches})
+    for (const EmittedKernel& kernel : *some)
+      for (std::size_t part = 0; part < kernel.parts.size(); ++part) {
+        if (operations + kernel.sizes[part] > kFileOperations) close();
+        if (some == &batches) body += kIfFourLanes;
+        body += kernel.parts[part] + "\n";
+        if (some == &batches) body += "#endif\n";
+        operations += kernel.sizes[part];
+      }
   close();
 }
 
@@ -192,7 +271,7 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   GeneratedKernels result;
   result.robot = spec.robot;
   result.hash = description_hash(tree, spec);
-  std::vector<EmittedKernel> kernels;
+  std::vector<EmittedKernel> kernels, batches;
   for (int k = 0; k < kKernels; ++k) {
     Graph graph;
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
@@ -203,11 +282,15 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
         kernels.back().count.add + kernels.back().count.mul > kMostMassMatrixOperations)
       kernels.back() = mass_matrix_by_columns(*mechanism);
     result.counts.push_back({kernels.back().name, kernels.back().count});
+    if (std::ranges::find(kBatches, static_cast<Kernel>(k)) != std::end(kBatches) &&
+        kernels.front().count.add + kernels.front().count.mul <= kMostBatchOperations)
+      batches.push_back(emit_batch(graph, kernel, kPartOperations));
   }
   result.headers.push_back({"kernels.h", std::string(kKernelsHeader), false});
-  result.headers.push_back({"parts.h", parts_header(kernels), false});
-  add_part_files(kernels, result);
-  result.sources.push_back({"variant.cpp", variant_source(*mechanism, result, kernels), true});
+  result.headers.push_back({"parts.h", parts_header(kernels, batches), false});
+  add_part_files(kernels, batches, result);
+  result.sources.push_back(
+      {"variant.cpp", variant_source(*mechanism, result, kernels, batches), true});
   result.sources.push_back(
       {"library.cpp", std::string(kBanner) + std::string(kLibrarySource), false});
   return result;

@@ -77,6 +77,27 @@ Arrays call_kernel(const tandem_kernels& k, Kernel kernel, const Mechanism& m, c
   return out;
 }
 
+std::vector<Arrays> call_batch(const tandem_kernels& k, Kernel kernel, const Mechanism& m,
+                               const std::vector<Arrays>& in) {
+  const std::size_t states = in.size();
+  Arrays arrays;  // element i of state s at [i * states + s]
+  for (std::size_t a = 0; a < in[0].size(); ++a) {
+    arrays.emplace_back();
+    for (std::size_t i = 0; i < in[0][a].size(); ++i)
+      for (const Arrays& state : in) arrays.back().push_back(state[a][i]);
+  }
+  const auto size = static_cast<std::size_t>(kernel_shape(kernel, m).outputs[0].size);
+  std::vector<double> out(size * states, std::numeric_limits<double>::quiet_NaN());
+  const auto function =
+      kernel == Kernel::kForwardDynamics ? k.forward_dynamics_batch : k.inverse_dynamics_batch;
+  function(static_cast<std::uint32_t>(states), arrays[0].data(), arrays[1].data(), arrays[2].data(),
+           arrays[3].data(), out.data());
+  std::vector<Arrays> result(states, Arrays(1));
+  for (std::size_t i = 0; i < size; ++i)
+    for (std::size_t s = 0; s < states; ++s) result[s][0].push_back(out[i * states + s]);
+  return result;
+}
+
 SeededState::SeededState(const Mechanism& m, unsigned seed) {
   std::mt19937 generator(seed);
   const auto array = [&](int size, double range) {
@@ -168,6 +189,14 @@ Status check_kernels(const std::string& library, const Tree& tree, const ModelSp
         const double error = worst_error(kernel, *m, actual, expected.outputs[state]);
         if (!(error <= expected.allowed))
           return disagreement(kernel_shape(kernel, *m).name, variant, error, expected.allowed);
+      }
+      if (kernel != Kernel::kForwardDynamics && kernel != Kernel::kInverseDynamics) continue;
+      const auto batch = call_batch(**loaded, kernel, *m, expected.inputs);
+      for (unsigned state = 0; state < kStates; ++state) {
+        const double error = worst_error(kernel, *m, batch[state], expected.outputs[state]);
+        if (!(error <= expected.allowed))
+          return disagreement(kernel_shape(kernel, *m).name + "_batch", variant, error,
+                              expected.allowed);
       }
     }
   }

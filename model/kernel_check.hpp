@@ -19,6 +19,12 @@ namespace tandem::model {
     const tandem_kernels& kernels, Kernel kernel, const Mechanism& m,
     const std::vector<std::vector<double>>& in);
 
+/// Runs a kernel that has a batch (forward and inverse dynamics) at several states in one call.
+/// `in` holds the inputs of each state. @pre a multiple of four states
+[[nodiscard]] std::vector<std::vector<std::vector<double>>> call_batch(
+    const tandem_kernels& kernels, Kernel kernel, const Mechanism& m,
+    const std::vector<std::vector<std::vector<double>>>& in);
+
 /// Inputs of every kernel at one state: joints in ±3 rad or m, a base anywhere. The same on every
 /// machine.
 struct SeededState {

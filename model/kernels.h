@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define TANDEM_KERNELS_ABI 2u
+#define TANDEM_KERNELS_ABI 3u
 
 /* Operations of one kernel as emitted (before the compiler). */
 typedef struct tandem_kernel_count {
@@ -75,6 +75,14 @@ typedef struct tandem_kernels {
    * sensor's frame. In the foot of a standing robot the force points up: + weight / 2. */
   void (*sensor_wrenches)(const double* q, const double* v, const double* vdot,
                           const double* wrench, double* out);
+
+  /* Several states in a call, for sweeps, predictions and differences: element i of state s stands
+   * at [i * states + s] of every array. `states` is a multiple of four, and what exceeds one is
+   * left out; four at once is the fastest. Never null in a library. */
+  void (*forward_dynamics_batch)(uint32_t states, const double* q, const double* v,
+                                 const double* tau, const double* wrench, double* vdot);
+  void (*inverse_dynamics_batch)(uint32_t states, const double* q, const double* v,
+                                 const double* vdot, const double* wrench, double* tau);
 } tandem_kernels;
 
 /* The library's only symbol. Never null. `variant` may be NULL (the best one this CPU runs) or

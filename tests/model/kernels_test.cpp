@@ -88,6 +88,27 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
   }
 }
 
+// However many states there are, and whatever the others are.
+TEST_P(CompiledKernels, ComputeBatchesAsTheyComputeOneState) {
+  for (const Kernel kernel : {Kernel::kForwardDynamics, Kernel::kInverseDynamics}) {
+    std::vector<Arrays> states;
+    for (unsigned seed = 11; seed < 23; ++seed)
+      states.push_back(SeededState(mechanism, seed).of(kernel));
+    std::vector<Arrays> four;
+    for (std::size_t i = 0; i < states.size(); i += 4) {
+      const auto some = call_batch(*library, kernel, mechanism, {&states[i], &states[i] + 4});
+      four.insert(four.end(), some.begin(), some.end());
+    }
+    EXPECT_EQ(call_batch(*library, kernel, mechanism, states), four) << "twelve at once";
+    EXPECT_EQ(call_batch(*library, kernel, mechanism, {states.begin(), states.begin() + 8}),
+              (std::vector<Arrays>{four.begin(), four.begin() + 8}));
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      const Array one = call_kernel(*library, kernel, mechanism, states[i])[0];
+      EXPECT_LE(relative_error(four[i][0], one), 1e-11) << "state " << i;
+    }
+  }
+}
+
 TEST_P(CompiledKernels, SayWhatTheyAre) {
   EXPECT_EQ(library->abi, TANDEM_KERNELS_ABI);
   EXPECT_STREQ(library->robot, GetParam().robot);
