@@ -41,7 +41,7 @@ struct SeededState {
 [[nodiscard]] double kernel_error(Kernel kernel, double mass_kg, const std::vector<double>& actual,
                                   const std::vector<double>& expected);
 
-/// Compares every variant of a library that this CPU runs, on seeded states.
+/// Compares every variant of a library that this CPU runs, on seeded states; batches too.
 ///
 /// Allowed is 1e-11, or 64 times what the same algorithm on doubles is off by, where the condition
 /// of the mass matrix asks for more.

@@ -56,6 +56,25 @@ TEST_F(NodeTest, ItsObjectsFitTheCapacityThatItNames) {
   EXPECT_NE(od.find(0x1A03, 32), nullptr) << "the last one that is added";
 }
 
+TEST_F(NodeTest, HearsAnRpdoWhereverItsMasterPutIt) {
+  wait(0);
+  out.take();
+  EXPECT_FALSE(node->hears(0x305));
+  map_and_start();
+  on(wire(0x000, {0x80, 0x03}));
+  configure({0x23, 0x00, 0x14, 1, 0x03, 0x02, 0, 0x80});  // 1400:1 = 80000203: not in use
+  configure({0x23, 0x00, 0x14, 1, 0x05, 0x03, 0, 0});     // 305: as of another node
+  on(wire(0x000, {0x01, 0x03}));
+  EXPECT_TRUE(node->hears(0x305));
+  EXPECT_FALSE(node->hears(0x205));
+  on(wire(0x305, {0x0D, 0x0C, 0x0B, 0x0A}));
+  EXPECT_EQ(on(wire(0x080, {})), kEventSync | kEventRpdo);
+  EXPECT_EQ(target, 0x0A0B0C0D);
+  on(wire(0x203, {0x00, 0x00, 0x00, 0x00}));  // where it was before
+  on(wire(0x080, {}));
+  EXPECT_EQ(target, 0x0A0B0C0D);
+}
+
 TEST_F(NodeTest, FollowsNmtForItselfAndForAll) {
   wait(0);
   EXPECT_EQ(on(wire(0x000, {0x01, 0x04})), 0) << "for another";
