@@ -32,6 +32,10 @@ function(tandem_install)
   foreach(name IN LISTS TANDEM_BUNDLED_CONTROLLERS)
     install(TARGETS controller_${name} DESTINATION lib/tandem/controllers)
   endforeach()
+  get_property(engines GLOBAL PROPERTY TANDEM_ENGINES)
+  foreach(name IN LISTS engines)
+    install(TARGETS engine_${name} DESTINATION lib/tandem/engines)
+  endforeach()
   install(DIRECTORY ${PROJECT_BINARY_DIR}/lib/models/ DESTINATION lib/tandem/models
     FILES_MATCHING PATTERN "*_kernels.so")
   install(DIRECTORY config/ DESTINATION share/tandem/config

@@ -47,6 +47,7 @@ HalOptions read_hal(TomlTable table, const SimOptions& sim) {
 
 SimOptions read_sim(TomlTable table) {
   SimOptions sim;
+  sim.engine = table.choice_or("engine", sim.engine, sim::known_engines());
   sim.integrator = read_choice(table, "integrator", {"semi_implicit", "rk4"}, sim.integrator);
   sim.substep_ns = table.integer_or("substep_ns", sim.substep_ns, 1'000, 100'000'000);
   sim.order = static_cast<int>(table.integer_or("order", -1, 0, 3));
@@ -331,6 +332,7 @@ FallLimits Experiment::fall_limits() const {
 
 sim::SimRobotConfig Experiment::sim_robot_config() const {
   return {.period_ns = loop.period_ns,
+          .engine = sim.engine,
           .integrator = sim.integrator,
           .substep_ns = sim.substep_ns,
           .posture = posture,

@@ -267,11 +267,12 @@ Diagnostics add_simulation(Composition& c, const std::string& scenario) {
   }
   auto backend = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
   if (!backend) {
-    const bool of_experiment = backend.error().key == "sim.substep_ns";
     Error error = backend.error();
+    constexpr std::string_view kOurs = "sim.";  // keys of the experiment
+    const bool of_experiment = error.key.starts_with(kOurs);
     error.file = of_experiment ? e.file : e.robot.file;
     if (of_experiment) {
-      error.line = e.document.root().table_or_empty("sim").line("substep_ns");
+      error.line = e.document.root().table_or_empty("sim").line(error.key.substr(kOurs.size()));
     }
     return {error};
   }

@@ -2,6 +2,7 @@
 #include "hal/sim/contact.hpp"
 
 #include "hal/sim/ground_law.hpp"
+#include "hal/sim/rotation.hpp"
 
 namespace tandem::sim {
 namespace {
@@ -85,14 +86,37 @@ void Contact::evaluate(const double* pose, const double* twist, bool move_anchor
       M[1] += z * force_W[0] - x * force_W[2];
       M[2] += x * force_W[1] - y * force_W[0];
     }
-    double* out = wrench + 6 * foot.wrench;
-    double* out_W = wrench_W_.data() + 6 * f;
-    for (int axis = 0; axis < 3; ++axis) {
-      out[axis] = R[axis] * F[0] + R[3 + axis] * F[1] + R[6 + axis] * F[2];
-      out[3 + axis] = R[axis] * M[0] + R[3 + axis] * M[1] + R[6 + axis] * M[2];
-      out_W[axis] = F[axis];
-      out_W[3 + axis] = M[axis];
+    write(f, R, F, M, wrench);
+  }
+}
+
+void Contact::take(const double* pose, const double* forces_W, double* wrench) noexcept {
+  for (std::size_t f = 0; f < feet_.size(); ++f) {
+    const double* R = pose + 12 * feet_[f].site;
+    Vec3 F{}, M{};
+    for (std::size_t i = feet_[f].begin; i < feet_[f].end; ++i) {
+      const double in_site[3] = {x_[i], y_[i], z_[i]};
+      const auto [x, y, z] = rotate(R, in_site);
+      const double* force = forces_W + 3 * i;
+      for (std::size_t axis = 0; axis < 3; ++axis) F[axis] += force[axis];
+      M[0] += y * force[2] - z * force[1];
+      M[1] += z * force[0] - x * force[2];
+      M[2] += x * force[1] - y * force[0];
+      touching_[i] = force[2] > 0.0 ? 1 : 0;
     }
+    write(f, R, F.data(), M.data(), wrench);
+  }
+}
+
+void Contact::write(std::size_t f, const double* R, const double* F, const double* M,
+                    double* wrench) noexcept {
+  double* out = wrench + 6 * feet_[f].wrench;
+  double* out_W = wrench_W_.data() + 6 * f;
+  for (int axis = 0; axis < 3; ++axis) {
+    out[axis] = R[axis] * F[0] + R[3 + axis] * F[1] + R[6 + axis] * F[2];
+    out[3 + axis] = R[axis] * M[0] + R[3 + axis] * M[1] + R[6 + axis] * M[2];
+    out_W[axis] = F[axis];
+    out_W[3 + axis] = M[axis];
   }
 }
 

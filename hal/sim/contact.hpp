@@ -54,6 +54,10 @@ class Contact {
   void evaluate(const double* pose, const double* twist, bool move_anchors,
                 double* wrench) noexcept TANDEM_RT;
 
+  /// The same from the ground's force on every point, which somebody else computed.
+  /// @param forces_W  (3 per point) in W
+  void take(const double* pose, const double* forces_W, double* wrench) noexcept;
+
   /// Force on each foot and moment about its site's origin, in W axes, of the last evaluation.
   [[nodiscard]] std::span<const double> wrench_W() const noexcept { return wrench_W_; }
   /// Energy in the normal and tangential springs at the last evaluation [J].
@@ -67,6 +71,10 @@ class Contact {
   struct Range {
     std::size_t site, wrench, begin, end;
   };
+
+  /// Writes the force F and moment M on foot `f`, both in W, M about the site's origin.
+  void write(std::size_t f, const double* R, const double* F, const double* M,
+             double* wrench) noexcept;
 
   hal::ContactConfig config_;
   std::vector<Range> feet_;

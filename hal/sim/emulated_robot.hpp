@@ -25,6 +25,7 @@ namespace tandem::sim {
 /// How to simulate; [sim] of an experiment.
 struct SimRobotConfig {
   std::int64_t period_ns = 1'000'000;  ///< of the loop
+  std::string engine = kOwnEngine;     ///< another one needs `tree`
   Integrator integrator = Integrator::kSemiImplicitEuler;
   std::int64_t substep_ns = 250'000;
   std::string posture;                      ///< where the robot starts; empty: every joint at 0

@@ -64,6 +64,7 @@ Result<Plant> Plant::create(const PlantConfig& config) {
   }
   if (Status status = plant.place_contact(config); !status) return std::unexpected(status.error());
   if (Status status = plant.make_loops(config); !status) return std::unexpected(status.error());
+  if (Status status = plant.open_engine(config); !status) return std::unexpected(status.error());
   if (Status status = plant.start(config); !status) return std::unexpected(status.error());
   return plant;
 }
@@ -135,6 +136,26 @@ Status Plant::make_loops(const PlantConfig& config) {
   auto loops = model::ClosedLoops::create(config.loops, passive, *kernels_);
   if (!loops) return std::unexpected(loops.error());
   loops_ = LoopForces(std::move(*loops), *kernels_);
+  return {};
+}
+
+Status Plant::open_engine(const PlantConfig& config) {
+  if (config.engine == kOwnEngine) return {};
+  if (config.integrator != Integrator::kSemiImplicitEuler) {
+    return std::unexpected(Error{.message = "is for Tandem's own engine",
+                                 .hint = "leave it out: '" + config.engine + "' has its own",
+                                 .file = {},
+                                 .key = "sim.integrator"});
+  }
+  if (config.robot == nullptr || config.tree == nullptr) {
+    return fail("the engine '" + config.engine + "' needs the robot's description",
+                "give PlantConfig its robot and tree");
+  }
+  auto engine = make_engine(config.engine, *config.robot, *config.tree,
+                            static_cast<double>(config.substep_ns) * 1e-9);
+  if (!engine) return std::unexpected(engine.error());
+  engine_ = std::move(*engine);
+  point_forces_W_.assign(3 * contact_.points(), 0.0);
   return {};
 }
 
@@ -259,6 +280,8 @@ void Plant::set_state(std::span<const double> q, std::span<const double> v) noex
   loops_.changed();
   bodies_.lost();
   light_.lost();
+  if (engine_) engine_->set_state(q.data(), v.data());
+  std::fill(point_forces_W_.begin(), point_forces_W_.end(), 0.0);
   contact_fresh_ = vdot_fresh_ = 0;
 }
 
@@ -305,7 +328,8 @@ std::string Plant::diverged_text() const {
 void Plant::archive(Archive& ar) {
   ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
      motor_rate_, pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
-     diverged_rate_);
+     diverged_rate_, point_forces_W_);
+  if (engine_) engine_->archive(ar);
 }
 
 MotorState Plant::motor(double* x) const noexcept {

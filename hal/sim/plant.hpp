@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "hal/sim/body_contact.hpp"
 #include "hal/sim/contact.hpp"
 #include "hal/sim/end_stops.hpp"
+#include "hal/sim/engine_loader.hpp"
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/light_joints.hpp"
 #include "hal/sim/loop_forces.hpp"
@@ -45,6 +47,8 @@ struct PlantJoint {
 
 struct PlantConfig {
   const tandem_kernels* kernels = nullptr;
+  /// kOwnEngine, or who else moves the bodies and holds the soles up; then with `robot` and `tree`.
+  std::string engine = kOwnEngine;
   std::vector<PlantJoint> joints;
   hal::ContactConfig contact;
   double base_height_m = 0.0;  ///< of the floating base at the start, upright at x = y = 0
@@ -88,11 +92,15 @@ struct JointReading {
 /// ones (whose motor's state is that of the link) among them.
 ///
 /// Loops: the state lies on the closed loops, to LoopForces' bound, after every sub-step.
+///
+/// With another engine that one moves q and v, by its own integrator and with its own ground under
+/// the soles; vdot and the soles' wrenches are means over the last sub-step then. It allocates.
 class Plant {
  public:
   /// Errors: kernels of another ABI, a joint the kernels lack or that has no [[joint]], a foot
   /// that is no wrench site, a bad actuator or contact, a sub-step that is not positive, a loop
-  /// that the passive joints cannot close from the start's posture.
+  /// that the passive joints cannot close from the start's posture; those of make_engine(), and
+  /// rk4 for another engine.
   [[nodiscard]] static Result<Plant> create(const PlantConfig& config);
 
   /// What joint `joint`'s drive applies from now on.
@@ -169,6 +177,7 @@ class Plant {
   Status map_joints(const PlantConfig& config);
   Status place_contact(const PlantConfig& config);
   Status make_loops(const PlantConfig& config);
+  Status open_engine(const PlantConfig& config);
   Status start(const PlantConfig& config);
   void place_surroundings(const PlantConfig& config);
   Status close_loops(double* q);
@@ -181,6 +190,8 @@ class Plant {
   void accelerate(const double* q, const double* v, const double* forces) noexcept;
   void step_semi_implicit(double h_s) noexcept;
   void step_runge_kutta(double h_s) noexcept;
+  void step_engine(double h_s) noexcept;
+  void step_motors(double h_s) noexcept;
   void state_rate(const double* x, double* rate) noexcept;
   [[nodiscard]] bool plausible() noexcept;
   [[nodiscard]] MotorState motor(double* x) const noexcept;
@@ -201,6 +212,7 @@ class Plant {
   LightJoints light_;
   Hoist hoist_;
   LoopForces loops_;
+  std::unique_ptr<Engine> engine_;  // null: our own
 
   std::vector<double> x_;       // q, v, th, th', i
   std::vector<double> tau_;     // of actuators, joint friction and hoist
@@ -208,6 +220,7 @@ class Plant {
   std::vector<double> applied_tau_, vdot_, wrench_, motor_rate_;
   std::vector<double> pose_, twist_, acceleration_;  // scratch of the sites kernel
   std::vector<double> stage_, k1_, k2_, k3_, k4_;    // scratch of Runge-Kutta
+  std::vector<double> point_forces_W_;               // of another engine's last step
   std::int64_t time_ns_ = 0;
   std::uint8_t held_ = 0, released_ = 0;
   std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;  // evaluated at the present state

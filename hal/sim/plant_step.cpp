@@ -13,6 +13,7 @@ void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
   if (contact_.feet() == 0) return;
   kernels_->site_motion(x, x + kernels_->nq, vdot_.data(), pose_.data(), twist_.data(),
                         acceleration_.data());
+  if (engine_) return contact_.take(pose_.data(), point_forces_W_.data(), wrench_.data());
   contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
 }
 
@@ -47,6 +48,7 @@ const std::vector<double>& Plant::with_ends_and_ground(const double* q, const do
 
 // The loops' forces stand in the wrenches for the sensors; without them here, the tree is open.
 void Plant::accelerate(const double* q, const double* v, const double* forces) noexcept {
+  if (engine_) return;  // as its last step left them
   if (loops_.none()) {
     return kernels_->forward_dynamics(q, v, forces, wrench_.data(), vdot_.data());
   }
@@ -73,7 +75,9 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     }
     const std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
     const double h_s = static_cast<double>(step_ns) * 1e-9;
-    if (integrator_ == Integrator::kRungeKutta4) {
+    if (engine_) {
+      step_engine(h_s);
+    } else if (integrator_ == Integrator::kRungeKutta4) {
       step_runge_kutta(h_s);
     } else {
       step_semi_implicit(h_s);
@@ -102,9 +106,22 @@ void Plant::step_semi_implicit(double h_s) noexcept {
     turn_quaternion(q + 3, v + 3, h_s);
   }
   for (std::size_t i = 0; i < kernels_->joints; ++i) q[base_q_ + i] += h_s * v[base_v_ + i];
+  step_motors(h_s);
+}
+
+void Plant::step_motors(double h_s) noexcept {
   const std::size_t n = kernels_->joints;
   const double* rate = motor_rate_.data();
   actuators_.step_semi_implicit(h_s, {rate, rate + n, rate + 2 * n}, motor(x_.data()));
+}
+
+void Plant::step_engine(double h_s) noexcept {
+  double* q = x_.data();
+  double* v = q + kernels_->nq;
+  std::copy_n(v, kernels_->nv, vdot_.begin());
+  engine_->step(h_s, applied_tau_.data(), q, v, point_forces_W_.data());
+  for (std::size_t i = 0; i < kernels_->nv; ++i) vdot_[i] = (v[i] - vdot_[i]) / h_s;
+  step_motors(h_s);
 }
 
 /// The whole state's rate of change at `x`, forces given. A quaternion off unit length turns as

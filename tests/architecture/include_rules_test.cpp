@@ -29,6 +29,7 @@ const Rules& rules() {
       {"hal/ethercat-can", {"base", "canopen", "hal", "hal/config", "rt/histogram.hpp"}},
       {"hal/sim",
        {"base", "model", "canopen", "firmware_emu", "hal", "hal/config", "hal/ethercat-can"}},
+      {"hal/sim/engines", {"base", "model/tree.hpp", "hal/sim/engine.hpp"}},
       {"hal/remote", {"base", "hal", "dds", "rt/histogram.hpp"}},
       {"dds", {"base", "hal", "hal/config", "model", "rt/histogram.hpp"}},
       {"controllers", {"base", "hal", "model/kernels.h", "model/closed_loops.hpp"}},

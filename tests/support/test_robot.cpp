@@ -32,6 +32,7 @@ TestRobot load_test_robot(const std::string& name) {
   out.kernels =
       take(model::load_kernels(model::library_path(folder, out.robot.name),
                                model::description_hash(urdf.tree, sim::model_spec(out.robot))));
+  out.tree = std::make_shared<const model::Tree>(urdf.tree);
   return out;
 }
 

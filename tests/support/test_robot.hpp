@@ -2,16 +2,19 @@
 // Layer: tests.  Thread: any.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "hal/config/robot_config.hpp"
 #include "model/kernel_library.hpp"
+#include "model/tree.hpp"
 
 namespace tandem::test {
 
 struct TestRobot {
   hal::RobotConfig robot;  ///< complete with its description's limits
   model::KernelLibrary kernels;
+  std::shared_ptr<const model::Tree> tree;  ///< the description
 };
 
 /// config/NAME/robot.toml. Throws std::runtime_error with the message of what went wrong.

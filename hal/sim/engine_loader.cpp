@@ -1,0 +1,180 @@
+// Search beside the program, trusted-code check, dlopen, version; then the engine's model from the
+// robot's description and its soles.
+#include "hal/sim/engine_loader.hpp"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+
+#include "base/nearest.hpp"
+#include "base/trusted_code.hpp"
+#include "hal/sim/actuator.hpp"
+#include "model/placements.hpp"
+
+namespace tandem::sim {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Known {
+  const char* name;
+  const char* package;  // Debian's
+};
+constexpr Known kEngines[] = {{"mujoco", "libmujoco-dev"},
+                              {"dart", "libdart-dev"},
+                              {"bullet", "libbullet-dev"},
+                              {"ode", "libode-dev"},
+                              {"simbody", "libsimbody-dev"}};
+
+std::unexpected<Error> refuse(std::string message, std::string hint, std::string key) {
+  return std::unexpected(Error{
+      .message = std::move(message), .hint = std::move(hint), .file = {}, .key = std::move(key)});
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// The engine's library, or empty.
+std::string library_of(const std::string& name) {
+  std::error_code ignored;
+  const fs::path prefix = fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
+  for (const char* folder : {"lib/engines", "lib/tandem/engines"}) {
+    const fs::path file = prefix / folder / (name + ".so");
+    if (fs::is_regular_file(file, ignored)) return file.string();
+  }
+  return {};
+}
+
+Result<const EnginePlugin*> open(const std::string& name, const std::string& file) {
+  if (const Status mine = check_trusted_code(file); !mine) {
+    return refuse(mine.error().message, mine.error().hint, name);
+  }
+  void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (library == nullptr) {
+    return refuse("cannot be loaded: " + std::string(dlerror()), "build it again", name);
+  }
+  using Entry = const EnginePlugin* (*)();
+  const auto entry = reinterpret_cast<Entry>(dlsym(library, "tandem_engine_plugin"));
+  const EnginePlugin* plugin = entry == nullptr ? nullptr : entry();
+  if (plugin == nullptr || plugin->interface != kEngineInterface ||
+      std::strcmp(plugin->compiler, __VERSION__) != 0) {
+    return refuse(file + " is of another version of Tandem or of another compiler",
+                  "build it again, with this program", name);
+  }
+  return plugin;
+}
+
+Status check_tree(const EnginePlugin& plugin, const hal::RobotConfig& robot,
+                  const model::Tree& tree) {
+  const std::string name = plugin.name;
+  if (!robot.loops.empty()) {
+    return refuse("the engine '" + name + "' cannot close the loop '" + robot.loops[0].name + "'",
+                  "only Tandem's own engine does closed loops", "sim.engine");
+  }
+  for (const model::Joint& joint : tree.joints) {
+    if (!joint.follows()) continue;
+    return refuse("the engine '" + name + "' cannot let '" + joint.name + "' follow another joint",
+                  "only Tandem's own engine does mimic joints", "sim.engine");
+  }
+  return {};
+}
+
+Result<std::vector<double>> armatures(const EnginePlugin& plugin, const hal::RobotConfig& robot,
+                                      const model::Tree& tree) {
+  std::vector<double> values(tree.joints.size(), 0.0);
+  for (const hal::JointConfig& joint : robot.joints) {
+    const int at = tree.joint_index(joint.name);
+    if (at < 0) continue;
+    const double value = armature(robot.actuator_of(joint));
+    if (value > 0.0 && !plugin.armature) {
+      return refuse("the engine '" + std::string(plugin.name) + "' cannot turn the rotor of '" +
+                        joint.name + "', whose drive is rigid",
+                    "give the actuator a spring (order 2), or take an engine that can: mujoco, "
+                    "tandem",
+                    "sim.engine");
+    }
+    values[static_cast<std::size_t>(at)] = value;
+  }
+  return values;
+}
+
+std::vector<EngineModel::Point> sole_points(const hal::RobotConfig& robot,
+                                            const model::Tree& tree) {
+  std::vector<EngineModel::Point> points;
+  for (const hal::Foot& foot : robot.contact.feet) {
+    const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);
+    const auto& link = tree.links[static_cast<std::size_t>(tree.link_index(site->link))];
+    const model::Placement sole = link.in_body * model::placement_of(site->xyz_m, site->rpy_rad);
+    for (const auto& [x, y, z] : foot.points_m) {
+      points.push_back({link.body, sole.R * Eigen::Vector3d(x, y, z) + sole.p});
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+const std::vector<std::string>& known_engines() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all{kOwnEngine};
+    for (const Known& engine : kEngines) all.emplace_back(engine.name);
+    return all;
+  }();
+  return names;
+}
+
+std::vector<std::string> installed_engines() {
+  std::vector<std::string> names;
+  for (const Known& engine : kEngines) {
+    if (!library_of(engine.name).empty()) names.emplace_back(engine.name);
+  }
+  return names;
+}
+
+Result<const EnginePlugin*> load_engine(const std::string& name) {
+  const Known* known = std::ranges::find(kEngines, name, &Known::name);
+  if (known == std::end(kEngines)) {
+    return refuse("there is no engine '" + name + "'", suggest(name, known_engines()),
+                  "sim.engine");
+  }
+  const std::string file = library_of(name);
+  if (file.empty()) {
+    return refuse("the engine '" + name + "' is not installed",
+                  "installed: " + joined(installed_engines()) +
+                      (installed_engines().empty() ? "" : ", ") + kOwnEngine +
+                      "; apt-get install " + known->package + ", then run CMake and build again",
+                  "sim.engine");
+  }
+  return open(name, file);
+}
+
+Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const hal::RobotConfig& robot,
+                                            const model::Tree& tree, double step_s) {
+  const Result<const EnginePlugin*> plugin = load_engine(name);
+  if (!plugin) return std::unexpected(plugin.error());
+  if (Status fits = check_tree(**plugin, robot, tree); !fits) {
+    return std::unexpected(fits.error());
+  }
+  Result<std::vector<double>> armature = armatures(**plugin, robot, tree);
+  if (!armature) return std::unexpected(armature.error());
+  const EngineModel model{.tree = tree,
+                          .armature_kg_m2 = std::move(*armature),
+                          .gravity_m_s2 = robot.model.gravity_m_s2,
+                          .points = sole_points(robot, tree),
+                          .ground_m = robot.contact.height_m,
+                          .friction = robot.contact.static_friction,
+                          .step_s = step_s};
+  Result<std::unique_ptr<Engine>> engine = (*plugin)->create(model);
+  if (!engine) {
+    return refuse("the engine '" + name + "' does not take the robot: " + engine.error().message,
+                  engine.error().hint, "sim.engine");
+  }
+  return engine;
+}
+
+}  // namespace tandem::sim
