@@ -70,26 +70,31 @@ template <class S>
   return result;
 }
 
-/// Solves A x = b in place for a symmetric positive definite A (row-major, overwritten), as
-/// L^T D L from the last row to the first (Featherstone 2008, section 6.5): coordinates of
-/// different limbs do not meet, so that, over expressions, A's zeros stay and cost nothing.
+/// Solves A X = B in place for a symmetric positive definite A (row-major, overwritten) and a B of
+/// so many columns (row-major), as L^T D L from the last row to the first (Featherstone 2008,
+/// section 6.5): coordinates of different limbs do not meet, so that, over expressions, A's zeros
+/// stay and cost nothing.
 template <class S>
-void solve_from_leaves(std::vector<S>& A, std::vector<S>& b) {
-  const int n = static_cast<int>(b.size());
+void solve_from_leaves(std::vector<S>& A, std::vector<S>& B, int columns = 1) {
+  const int n = static_cast<int>(B.size()) / columns;
   const auto at = [&](int i, int j) -> S& { return A[static_cast<std::size_t>(i * n + j)]; };
-  std::vector<S> reciprocal(b.size());
+  const auto row = [&](int i) { return B.begin() + static_cast<std::ptrdiff_t>(i) * columns; };
+  const auto subtract = [&](int i, const S& factor, int k) {
+    for (int c = 0; c < columns; ++c) row(i)[c] -= factor * row(k)[c];
+  };
+  std::vector<S> reciprocal(static_cast<std::size_t>(n));
   for (int k = n - 1; k >= 0; --k) {
     reciprocal[k] = S(1.0) / at(k, k);
     for (int i = k - 1; i >= 0; --i) {
       const S l = at(k, i) * reciprocal[k];
       for (int j = i; j >= 0; --j) at(i, j) -= l * at(k, j);
-      b[i] -= l * b[k];
+      subtract(i, l, k);
       at(i, k) = l;
     }
   }
   for (int k = 0; k < n; ++k) {
-    b[k] *= reciprocal[k];
-    for (int i = 0; i < k; ++i) b[k] -= at(i, k) * b[i];
+    for (int c = 0; c < columns; ++c) row(k)[c] *= reciprocal[k];
+    for (int i = 0; i < k; ++i) subtract(k, at(i, k), i);
   }
 }
 

@@ -52,6 +52,7 @@ std::string text_of(const ModelSpec& spec) {
   }
   for (const SensorSpec& s : spec.sensors)
     text += fmt::format("sensor '{}' '{}' '{}'\n", s.name, s.joint, s.frame_link);
+  if (spec.derivatives) text += "derivatives\n";
   for (const auto& [joint, value] : spec.armature)
     text += fmt::format("armature '{}' {:a}\n", joint, value);
   return text;

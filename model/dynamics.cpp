@@ -29,6 +29,14 @@ KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
       return {"sensor_wrenches",
               {q, v, vdot, wrench},
               {{"out", 6 * static_cast<int>(m.sensors.size())}}};
+    case Kernel::kInverseDynamicsDerivatives:
+      return {"inverse_dynamics_derivatives",
+              {q, v, vdot, wrench},
+              {{"dtau_dq", nv * nv}, {"dtau_dv", nv * nv}, {"dtau_dvdot", nv * nv}}};
+    case Kernel::kForwardDynamicsDerivatives:
+      return {"forward_dynamics_derivatives",
+              {q, v, tau, wrench},
+              {{"dvdot_dq", nv * nv}, {"dvdot_dv", nv * nv}, {"dvdot_dtau", nv * nv}}};
   }
   return {};
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "model/coordinates.hpp"
+#include "model/derivatives.hpp"
 #include "model/forward_dynamics.hpp"
 #include "model/inverse_dynamics.hpp"
 #include "model/momentum.hpp"
@@ -23,8 +24,11 @@ enum class Kernel : std::uint8_t {
   kSiteMotion,
   kSiteJacobians,
   kSensorWrenches,
+  kInverseDynamicsDerivatives,
+  kForwardDynamicsDerivatives,
 };
-inline constexpr int kKernels = 10;
+inline constexpr int kKernels = 10;     ///< in every library
+inline constexpr int kAllKernels = 12;  ///< where ModelSpec::derivatives asks for them
 
 /// One array argument of a kernel.
 struct KernelArray {
@@ -40,7 +44,8 @@ struct KernelShape {
 };
 [[nodiscard]] KernelShape kernel_shape(Kernel kernel, const Mechanism& m);
 
-/// Runs one kernel as if every joint had a coordinate of its own.
+/// Runs one kernel as if every joint had a coordinate of its own. Derivatives of forward dynamics
+/// are run_kernel()'s.
 template <class S>
 void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
                      std::vector<std::vector<S>>& out) {
@@ -57,6 +62,9 @@ void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::v
     case Kernel::kSiteMotion: return site_motion<S>(m, i(0), i(1), i(2), o(0), o(1), o(2));
     case Kernel::kSiteJacobians: return site_jacobians<S>(m, i(0), o(0));
     case Kernel::kSensorWrenches: return SensorWrenches<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
+    case Kernel::kInverseDynamicsDerivatives:
+      return RneaDerivatives<S>(m, i(0), i(1), i(2), i(3), o(0), o(1), o(2)).run();
+    case Kernel::kForwardDynamicsDerivatives: return;
   }
 }
 
@@ -85,6 +93,11 @@ class FollowerKernels {
       case Kernel::kEnergy:
       case Kernel::kSiteMotion:
       case Kernel::kSensorWrenches: out = on_tree(kernel, in); return;
+      case Kernel::kInverseDynamicsDerivatives:
+        out = on_tree(kernel, in);
+        for (std::vector<S>& matrix : out) matrix = gather_both(matrix);
+        return;
+      case Kernel::kForwardDynamicsDerivatives: return;
     }
   }
 
@@ -110,15 +123,20 @@ class FollowerKernels {
     for (const KernelArray& array : shape.outputs) sizes.push_back(array.size);
     const int nv = m_.nv();
     if (kernel == Kernel::kMassMatrix) sizes[0] = nv * nv;
+    if (kernel == Kernel::kInverseDynamicsDerivatives) sizes.assign(3, nv * nv);
     if (kernel == Kernel::kInverseDynamics || kernel == Kernel::kBias) sizes[0] = nv;
     if (kernel == Kernel::kSiteJacobians) sizes[0] = 6 * static_cast<int>(m_.sites.size()) * nv;
     if (kernel == Kernel::kCenterOfMass) sizes[2] = 3 * nv;
     return sizes;
   }
 
+  // G^T A G
+  std::vector<S> gather_both(const std::vector<S>& A) const {
+    return gather_rows<S>(m_, gather_columns<S>(m_, A));
+  }
+
   void mass_matrix(const Arrays& in, std::vector<S>& M) const {
-    const std::vector<S> rows = gather_columns<S>(m_, on_tree(Kernel::kMassMatrix, in)[0]);
-    M = gather_rows<S>(m_, rows);
+    M = gather_both(on_tree(Kernel::kMassMatrix, in)[0]);
   }
 
   void forward_dynamics(const Arrays& in, std::vector<S>& vdot) const {
@@ -134,10 +152,35 @@ class FollowerKernels {
   const Mechanism& m_;
 };
 
+template <class S>
+void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
+                std::vector<std::vector<S>>& out);
+
+/// d vdot / d q and d v by the implicit function tau(q, v, vdot(q, v, tau)) = tau: -M^-1 times the
+/// derivatives of inverse dynamics at this vdot; d vdot / d tau is M^-1.
+template <class S>
+void forward_dynamics_derivatives(const Mechanism& m, const std::vector<std::vector<S>>& in,
+                                  std::vector<std::vector<S>>& out) {
+  const auto nv = static_cast<std::size_t>(m.kernel_nv());
+  std::vector<std::vector<S>> vdot(1, std::vector<S>(nv, S(0.0)));
+  run_kernel<S>(Kernel::kForwardDynamics, m, in, vdot);
+  run_kernel<S>(Kernel::kInverseDynamicsDerivatives, m, {in[0], in[1], vdot[0], in[3]}, out);
+  const std::vector<S> M = out[2];
+  for (S& entry : out[2]) entry = S(0.0);
+  for (std::size_t i = 0; i < nv; ++i) out[2][i * nv + i] = S(-1.0);
+  for (std::vector<S>& matrix : out) {
+    std::vector<S> factor = M;
+    solve_from_leaves<S>(factor, matrix, m.kernel_nv());
+    for (S& entry : matrix) entry = -entry;
+  }
+}
+
 /// Runs one kernel. `in` and `out` hold an array for each argument of its shape.
 template <class S>
 void run_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::vector<S>>& in,
                 std::vector<std::vector<S>>& out) {
+  if (kernel == Kernel::kForwardDynamicsDerivatives)
+    return forward_dynamics_derivatives<S>(m, in, out);
   if (!m.has_followers()) return run_tree_kernel<S>(kernel, m, in, out);
   FollowerKernels<S>(m).run(kernel, in, out);
 }

@@ -31,6 +31,11 @@ struct OperationCount {
   std::uint32_t sqrt = 0;
   std::uint32_t sincos = 0;  ///< sine and cosine of one angle count once
   std::uint32_t pairs = 0;   ///< times that two of the others are one, on a vector
+
+  [[nodiscard]] OperationCount operator+(const OperationCount& other) const {
+    return {add + other.add,   mul + other.mul,       div + other.div,
+            sqrt + other.sqrt, sincos + other.sincos, pairs + other.pairs};
+  }
 };
 
 class Graph;

@@ -12,6 +12,7 @@
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
 #include "model/lanes.hpp"
+#include "model/solve_source.hpp"
 
 namespace tandem::model {
 namespace {
@@ -33,7 +34,7 @@ constexpr std::string_view kBanner =
 // another: as fast, where code is far larger than the caches, and half as much to compile.
 constexpr std::uint32_t kMostBatchOperations = 20'000;
 
-// Vectors of two lanes, and of four states.
+// Vectors of two lanes, of four states, and as wide as the variant has them.
 constexpr std::string_view kVectors =
     R"(typedef double two __attribute__((vector_size(16), may_alias));
 typedef long long two_bits __attribute__((vector_size(16), may_alias));
@@ -52,6 +53,14 @@ static inline four sine(four x) { return four{sine(x[0]), sine(x[1]), sine(x[2])
 static inline four cosine(four x) {
   return four{cosine(x[0]), cosine(x[1]), cosine(x[2]), cosine(x[3])};
 }
+#if defined(__AVX512F__)
+typedef double wide __attribute__((vector_size(64), may_alias));
+#elif defined(__AVX2__)
+typedef four wide;
+#else
+typedef two wide;
+#endif
+constexpr int lanes = sizeof(wide) / sizeof(double);
 template <class T>
 static inline T get(const double* from) {
   T value;
@@ -63,6 +72,13 @@ static inline void put(double* to, T value) {
   __builtin_memcpy(to, &value, sizeof value);
 }
 )";
+
+/// Everything that a library holds.
+struct Emitted {
+  std::vector<EmittedKernel> kernels;      // by number
+  std::vector<EmittedKernel> batches;      // may be empty
+  std::vector<EmittedKernel> derivatives;  // of inverse and forward dynamics, or none
+};
 
 std::string name_table(const std::string& name, const std::vector<std::string>& values) {
   std::string text = fmt::format("const char* const {}[] = {{", name);
@@ -114,14 +130,14 @@ std::string batch_source(const KernelShape& shape, bool four) {
 }
 
 // The entries of one variant and its table.
-std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
-                           const std::vector<EmittedKernel>& kernels,
-                           const std::vector<EmittedKernel>& batches) {
+std::string variant_source(const Mechanism& m, const GeneratedKernels& result, const Emitted& all) {
+  const auto& [kernels, batches, derivatives] = all;
   std::string text{kBanner};
   text += "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\nnamespace {\n\n";
   text += kTrigSource;
   text += "\n";
-  for (const EmittedKernel& kernel : kernels) text += kernel.entry + "\n";
+  for (const auto* some : {&kernels, &derivatives})
+    for (const EmittedKernel& kernel : *some) text += kernel.entry + "\n";
   if (batches.empty()) {
     for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), false);
   } else {
@@ -145,23 +161,22 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result,
                       m.gravity[0], m.gravity[1], m.gravity[2], result.counts.size());
   for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + ",\n";
   for (const Kernel kernel : kBatches) text += "    " + kernel_shape(kernel, m).name + "_batch,\n";
+  for (const EmittedKernel& kernel : derivatives) text += "    " + kernel.name + ",\n";
   return text + "};\n\n}  // namespace TANDEM_VARIANT\n";
 }
 
-std::string parts_header(const std::vector<EmittedKernel>& kernels,
-                         const std::vector<EmittedKernel>& batches) {
+std::string parts_header(const Emitted& all) {
   std::string text{kBanner};
   text += "#pragma once\n#include \"kernels.h\"\n\nnamespace TANDEM_VARIANT {\n";
   text += kVectors;
-  for (const auto* some : {&kernels, &batches})
+  for (const auto* some : {&all.kernels, &all.batches, &all.derivatives})
     for (const EmittedKernel& kernel : *some)
       for (const std::string& declaration : kernel.declarations) text += declaration;
   return text + "}  // namespace TANDEM_VARIANT\n";
 }
 
 // The parts, gathered into files of about the same length.
-void add_part_files(const std::vector<EmittedKernel>& kernels,
-                    const std::vector<EmittedKernel>& batches, GeneratedKernels& result) {
+void add_part_files(const Emitted& all, GeneratedKernels& result) {
   std::string body;
   std::uint32_t operations = 0;
   int number = 0;
@@ -175,13 +190,13 @@ void add_part_files(const std::vector<EmittedKernel>& kernels,
     body.clear();
     operations = 0;
   };
-  for (const auto* some : {&kernels, &batches})
+  for (const auto* some : {&all.kernels, &all.batches, &all.derivatives})
     for (const EmittedKernel& kernel : *some)
       for (std::size_t part = 0; part < kernel.parts.size(); ++part) {
         if (operations + kernel.sizes[part] > kFileOperations) close();
-        if (some == &batches) body += kIfFourLanes;
+        if (some == &all.batches) body += kIfFourLanes;
         body += kernel.parts[part] + "\n";
-        if (some == &batches) body += "#endif\n";
+        if (some == &all.batches) body += "#endif\n";
         operations += kernel.sizes[part];
       }
   close();
@@ -233,6 +248,22 @@ void {0}(const double* q, double* M) {{
   return kernel;
 }
 
+// Those of inverse dynamics are expressions; those of forward dynamics solve with their mass
+// matrix.
+Status add_derivatives(const Mechanism& m, Emitted& all) {
+  Graph graph;
+  const TracedKernel inverse = trace_kernel(Kernel::kInverseDynamicsDerivatives, m, graph);
+  if (Status status = check_finite(graph, inverse); !status) return status;
+  all.derivatives.push_back(emit(graph, inverse, m));
+  Graph factor_graph;
+  const TracedKernel factor = trace_mass_factor(inverse, m, factor_graph);
+  EmittedKernel forward =
+      emit_forward_derivatives(inverse, m, emit(factor_graph, factor, m), kPartOperations);
+  forward.count = forward.count + all.kernels.front().count + all.derivatives.front().count;
+  all.derivatives.push_back(std::move(forward));
+  return {};
+}
+
 constexpr std::string_view kLibrarySource = R"(#include "kernels.h"
 
 namespace baseline { extern const tandem_kernels table; }
@@ -271,7 +302,8 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   GeneratedKernels result;
   result.robot = spec.robot;
   result.hash = description_hash(tree, spec);
-  std::vector<EmittedKernel> kernels, batches;
+  Emitted all;
+  auto& [kernels, batches, derivatives] = all;
   for (int k = 0; k < kKernels; ++k) {
     Graph graph;
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
@@ -286,11 +318,16 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
         kernels.front().count.add + kernels.front().count.mul <= kMostBatchOperations)
       batches.push_back(emit_batch(graph, kernel, kPartOperations));
   }
+  if (spec.derivatives) {
+    if (Status status = add_derivatives(*mechanism, all); !status)
+      return std::unexpected(status.error());
+    for (const EmittedKernel& kernel : derivatives)
+      result.counts.push_back({kernel.name, kernel.count});
+  }
   result.headers.push_back({"kernels.h", std::string(kKernelsHeader), false});
-  result.headers.push_back({"parts.h", parts_header(kernels, batches), false});
-  add_part_files(kernels, batches, result);
-  result.sources.push_back(
-      {"variant.cpp", variant_source(*mechanism, result, kernels, batches), true});
+  result.headers.push_back({"parts.h", parts_header(all), false});
+  add_part_files(all, result);
+  result.sources.push_back({"variant.cpp", variant_source(*mechanism, result, all), true});
   result.sources.push_back(
       {"library.cpp", std::string(kBanner) + std::string(kLibrarySource), false});
   return result;

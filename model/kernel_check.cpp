@@ -73,6 +73,12 @@ Arrays call_kernel(const tandem_kernels& k, Kernel kernel, const Mechanism& m, c
     case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
     case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
     case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
+    case Kernel::kInverseDynamicsDerivatives:
+      k.inverse_dynamics_derivatives(i(0), i(1), i(2), i(3), o(0), o(1), o(2));
+      break;
+    case Kernel::kForwardDynamicsDerivatives:
+      k.forward_dynamics_derivatives(i(0), i(1), i(2), i(3), o(0), o(1), o(2));
+      break;
   }
   return out;
 }
@@ -118,8 +124,10 @@ SeededState::SeededState(const Mechanism& m, unsigned seed) {
 
 Arrays SeededState::of(Kernel kernel) const {
   switch (kernel) {
-    case Kernel::kForwardDynamics: return {q, v, tau, wrench};
+    case Kernel::kForwardDynamics:
+    case Kernel::kForwardDynamicsDerivatives: return {q, v, tau, wrench};
     case Kernel::kInverseDynamics:
+    case Kernel::kInverseDynamicsDerivatives:
     case Kernel::kSensorWrenches: return {q, v, vdot, wrench};
     case Kernel::kMassMatrix:
     case Kernel::kSiteJacobians: return {q};
@@ -140,7 +148,8 @@ double kernel_error(Kernel kernel, double mass_kg, const std::vector<double>& ac
     case Kernel::kInverseDynamics:
     case Kernel::kBias:
     case Kernel::kEnergy:
-    case Kernel::kSensorWrenches: scale = 0.1 * mass_kg; break;
+    case Kernel::kSensorWrenches:
+    case Kernel::kInverseDynamicsDerivatives: scale = 0.1 * mass_kg; break;
     case Kernel::kMassMatrix:
     case Kernel::kCentroidalMomentum: scale = 0.01 * mass_kg; break;
     default: break;
@@ -178,7 +187,7 @@ Status check_kernels(const std::string& library, const Tree& tree, const ModelSp
   const Result<Mechanism> m = make_mechanism(tree, spec, Frames::kAsDescribed);
   if (!m) return std::unexpected(m.error());
   if (const auto best = load_kernels(library); !best) return std::unexpected(best.error());
-  for (int k = 0; k < kKernels; ++k) {
+  for (int k = 0; k < (spec.derivatives ? kAllKernels : kKernels); ++k) {
     const Kernel kernel = static_cast<Kernel>(k);
     const Expected expected(kernel, *m);
     for (const char* variant : kVariantNames) {

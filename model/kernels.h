@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define TANDEM_KERNELS_ABI 3u
+#define TANDEM_KERNELS_ABI 4u
 
 /* Operations of one kernel as emitted (before the compiler). */
 typedef struct tandem_kernel_count {
@@ -83,6 +83,20 @@ typedef struct tandem_kernels {
                                  const double* tau, const double* wrench, double* vdot);
   void (*inverse_dynamics_batch)(uint32_t states, const double* q, const double* v,
                                  const double* vdot, const double* wrench, double* tau);
+
+  /* Derivatives, each nv*nv, row-major: row i, column j is that of element i to element j. The
+   * columns of a floating base's q are a displacement in the order of v, in the base's own frame:
+   * translation t, then rotation by the vector r; p <- p + R t, R <- R exp(r). Wrenches stay as
+   * they are in their sites' frames. Null in a library that was not asked for them: robot.toml,
+   * [model] derivatives = true. */
+  /* of tau; dtau_dvdot is M */
+  void (*inverse_dynamics_derivatives)(const double* q, const double* v, const double* vdot,
+                                       const double* wrench, double* dtau_dq, double* dtau_dv,
+                                       double* dtau_dvdot);
+  /* of vdot; dvdot_dtau is M^-1 */
+  void (*forward_dynamics_derivatives)(const double* q, const double* v, const double* tau,
+                                       const double* wrench, double* dvdot_dq, double* dvdot_dv,
+                                       double* dvdot_dtau);
 } tandem_kernels;
 
 /* The library's only symbol. Never null. `variant` may be NULL (the best one this CPU runs) or

@@ -45,7 +45,8 @@ class Elements {
   Side side(const KernelArray& array, int element) const {
     const int nv = m_.kernel_nv();
     if (array.name == "q") return of_coordinate(element - m_.q_index(0));
-    if (array.name == "M") return of_rate(element / nv) + of_rate(element % nv);
+    if (array.name == "M" || array.name.starts_with("dtau_"))
+      return of_rate(element / nv) + of_rate(element % nv);
     if (array.name == "wrench") return side_[wrench_body(element / 6)];
     if (array.name == "pose") return site(element / 12);
     if (array.name == "twist" || array.name == "acceleration") return site(element / 6);
@@ -61,6 +62,11 @@ class Elements {
     if (array.name == "wrench") {
       const int other = partner_wrench(element / 6);
       return other < 0 ? -1 : 6 * other + element % 6;
+    }
+    if (array.name == "M") {  // its lower triangle
+      const int row = partner_rate(element / m_.kernel_nv());
+      const int column = partner_rate(element % m_.kernel_nv());
+      return std::max(row, column) * m_.kernel_nv() + std::min(row, column);
     }
     const int base = array.name == "q" ? m_.q_index(0) : m_.v_index(0);
     const int joint = joint_of(element - base);
@@ -87,6 +93,13 @@ class Elements {
     if (coordinate < 0) return Side::kTrunk;
     const int joint = joint_of(coordinate);
     return joint < 0 ? Side::kTrunk : side_[static_cast<std::size_t>(joint) + 1];
+  }
+  /// The same rate where it is not that of a joint of a first limb.
+  int partner_rate(int index) const {
+    const int joint = joint_of(index - m_.v_index(0));
+    const int other = joint < 0 ? 0 : partner_[static_cast<std::size_t>(joint) + 1];
+    if (other == 0) return index;
+    return m_.v_index(m_.coordinate_of[static_cast<std::size_t>(other - 1)].index);
   }
   Side of_rate(int index) const { return of_coordinate(index - m_.v_index(0)); }
   std::size_t wrench_body(int wrench) const {

@@ -37,6 +37,7 @@ struct ModelSpec {
   std::array<double, 3> gravity_m_s2{0.0, 0.0, -9.81};
   std::vector<SiteSpec> sites;
   std::vector<SensorSpec> sensors;
+  bool derivatives = false;  ///< kernels of the derivatives of inverse and forward dynamics, too
   /// Rotor inertia on the link side [kg m^2 or kg] by joint, added to M's diagonal; joints not
   /// named have none. A joint behind a spring has none: its motor is a state of its own.
   std::vector<std::pair<std::string, double>> armature;

@@ -58,6 +58,7 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
   model.repair_inertia = table.choice_or("inertia", "strict", {"strict", "repair"}) == "repair";
   model.exact_right_angles =
       table.choice_or("right_angles", "as_written", {"as_written", "exact"}) == "exact";
+  model.derivatives = table.boolean_or("derivatives", false);
   model.gravity_m_s2 = vector3(table, "gravity_m_s2", model.gravity_m_s2);
   model.gravity_line = table.line("gravity_m_s2");
   TomlTable lock = table.table_or_empty("lock");

@@ -43,6 +43,7 @@ struct ModelConfig {
   bool mimic_independent = false;   ///< mimic = "independent"; the default is "follow"
   bool repair_inertia = false;      ///< inertia = "repair"; the default "strict" is an error
   bool exact_right_angles = false;  ///< right_angles = "exact"; the default is "as_written"
+  bool derivatives = false;         ///< the library holds kernels of the dynamics' derivatives
   std::vector<std::pair<std::string, double>> lock;  ///< joint -> fixed position [rad or m]
   std::map<std::string, int> lock_lines;  ///< joint of it -> line in the TOML, for messages
   std::vector<LinkConfig> links;

@@ -84,6 +84,7 @@ model::ModelSpec model_spec(const hal::RobotConfig& robot) {
   spec.urdf = robot.model.urdf;
   spec.floating_base = robot.model.floating_base;
   spec.mimic_independent = robot.model.mimic_independent;
+  spec.derivatives = robot.model.derivatives;
   spec.lock = robot.model.lock;
   spec.gravity_m_s2 = robot.model.gravity_m_s2;
   for (const hal::SiteConfig& site : robot.model.sites) {

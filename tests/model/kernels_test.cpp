@@ -75,14 +75,19 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
                           {q, v},
                           {q, v, a},
                           {q},
-                          {q, v, a, wrench}};
-    for (int k = 0; k < kKernels; ++k) {
+                          {q, v, a, wrench},
+                          {q, v, a, wrench},
+                          {q, v, flat(state["tau"]), wrench}};
+    for (int k = 0; k < static_cast<int>(library->kernel_count); ++k) {
       const Kernel kernel = static_cast<Kernel>(k);
       const Arrays expected = evaluate_kernel(kernel, mechanism, all[k]);
       const Arrays actual = compiled(kernel, all[k]);
       for (std::size_t i = 0; i < expected.size(); ++i)
-        EXPECT_LE(relative_error(actual[i], expected[i]),
-                  kernel == Kernel::kForwardDynamics ? 1e-10 : 1e-13)
+        EXPECT_LE(
+            relative_error(actual[i], expected[i]),
+            kernel == Kernel::kForwardDynamics || kernel == Kernel::kForwardDynamicsDerivatives
+                ? 1e-10
+                : 1e-13)
             << kernel_shape(kernel, mechanism).name;
     }
   }
@@ -125,8 +130,12 @@ TEST_P(CompiledKernels, SayWhatTheyAre) {
   EXPECT_EQ(library->sensors, mechanism.sensor_names.size());
   EXPECT_EQ(library->mass_kg, mechanism.mass_kg);
   EXPECT_EQ(library->gravity_m_s2[2], -9.81);
-  ASSERT_EQ(library->kernel_count, static_cast<std::uint32_t>(kKernels));
-  for (int k = 0; k < kKernels; ++k)
+  const bool derivatives = reference_spec(reference_robot(GetParam().robot)).derivatives;
+  const int kernels = derivatives ? kAllKernels : kKernels;
+  EXPECT_EQ(library->inverse_dynamics_derivatives != nullptr, derivatives);
+  EXPECT_EQ(library->forward_dynamics_derivatives != nullptr, derivatives);
+  ASSERT_EQ(library->kernel_count, static_cast<std::uint32_t>(kernels));
+  for (int k = 0; k < kernels; ++k)
     EXPECT_EQ(library->counts[k].kernel, kernel_shape(static_cast<Kernel>(k), mechanism).name);
 }
 
@@ -238,6 +247,9 @@ TEST(Generator, HashFollowsWhatMattersAndNothingElse) {
   tree = reference_tree(robot);
   spec.armature.emplace_back("elbow_joint", 0.1);
   EXPECT_NE(description_hash(tree, spec), hash);
+  spec = reference_spec(robot);
+  spec.derivatives = !spec.derivatives;
+  EXPECT_NE(description_hash(tree, spec), hash);
 }
 
 TEST(KernelLibrary, SaysWhatIsWrongWithAFileAndWhatToDo) {
@@ -343,14 +355,18 @@ TEST(KernelBuild, WaitsForAnotherBuilderOfTheSameLibrary) {
   EXPECT_EQ(waited, 1);
 }
 
+// With a base that floats and derivatives, which build_kernels() checks like any other kernel.
 TEST(KernelBuild, CompilesEveryFileAgainWhenForced) {
   const BuildFolder folder;
   const ReferenceRobot& robot = reference_robot("double_pendulum");
+  Tree tree = reference_tree(robot);
+  ModelSpec spec = reference_spec(robot);
+  tree.floating_base = spec.floating_base = spec.derivatives = true;
   BuildOptions options = folder.options();
-  const auto first = build_kernels(reference_tree(robot), reference_spec(robot), options);
-  ASSERT_TRUE(first);
+  const auto first = build_kernels(tree, spec, options);
+  ASSERT_TRUE(first) << first.error().to_string();
   options.force = true;
-  const auto second = build_kernels(reference_tree(robot), reference_spec(robot), options);
+  const auto second = build_kernels(tree, spec, options);
   ASSERT_TRUE(second);
   EXPECT_EQ(second->compiled, first->compiled);
 }

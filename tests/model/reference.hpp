@@ -73,11 +73,13 @@ inline Tree reference_tree(const ReferenceRobot& robot) {
   if (!model) throw std::runtime_error(model.error().front().to_string());
   return std::move(model->tree);
 }
-// The reference's frames as sites where wrenches may act; on COMAN two sensors besides.
+// The reference's frames as sites where wrenches may act; on COMAN two sensors besides, of the UR5e
+// derivatives.
 inline ModelSpec reference_spec(const ReferenceRobot& robot) {
   ModelSpec spec;
   spec.robot = robot.name;
   spec.floating_base = robot.floating;
+  spec.derivatives = spec.robot == "ur5e";
   const nlohmann::json reference = read_reference(robot.name);
   for (const nlohmann::json& frame : reference["frames"])
     spec.sites.push_back({frame, frame, {}, {}, true});

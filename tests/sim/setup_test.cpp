@@ -61,6 +61,13 @@ TEST(Setup, ModelHasRotorsOfRigidActuatorsOnly) {
   EXPECT_EQ(spec.armature[0], (std::pair<std::string, double>{"LHipSag", 0.1387}));
 }
 
+TEST(Setup, ModelHasDerivativesWhereTheRobotAsksForThem) {
+  hal::RobotConfig coman = robot();
+  EXPECT_FALSE(model_spec(coman).derivatives);
+  coman.model.derivatives = true;
+  EXPECT_TRUE(model_spec(coman).derivatives);
+}
+
 TEST(Setup, ModelHasASiteForEveryImuAndAForceSensorForEveryJoint) {
   hal::RobotConfig coman = robot();
   model::ModelSpec spec = model_spec(coman);
