@@ -100,6 +100,56 @@ Status print_row(const Robot& robot, const fs::path& folder, bool cost) {
   return {};
 }
 
+/// Operations of the derivatives of inverse dynamics; their time, and that of those of forward
+/// dynamics, in multiples of forward dynamics': medians of batches side by side.
+Status print_derivatives(Robot robot, const fs::path& folder) {
+  robot.spec.derivatives = true;
+  const std::string library = (folder / (robot.name + "_derivatives.so")).string();
+  const auto built = model::build_kernels(
+      robot.tree, robot.spec,
+      {.library = library, .compiler = {}, .jobs = 0, .progress = {}, .waiting = {}});
+  if (!built) return std::unexpected(built.error());
+  const auto kernels = model::load_kernels(library);
+  if (!kernels) return std::unexpected(kernels.error());
+  const auto m = model::make_mechanism(robot.tree, robot.spec);
+  if (!m) return std::unexpected(m.error());
+  const tandem_kernels& k = **kernels;
+  const model::SeededState s(*m, 1);
+  const std::size_t size = std::size_t{k.nv} * k.nv;
+  std::vector<double> a(size), b(size), c(size);
+  const auto batch_ns = [](const auto& call) {
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < 32; ++i) call();
+    return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start)
+        .count();
+  };
+  std::vector<double> inverse, forward;
+  for (int batch = 0; batch < 401; ++batch) {
+    const double dynamics = batch_ns([&] {
+      k.forward_dynamics(s.q.data(), s.v.data(), s.tau.data(), s.wrench.data(), a.data());
+    });
+    inverse.push_back(batch_ns([&] {
+                        k.inverse_dynamics_derivatives(s.q.data(), s.v.data(), s.vdot.data(),
+                                                       s.wrench.data(), a.data(), b.data(),
+                                                       c.data());
+                      }) /
+                      dynamics);
+    forward.push_back(batch_ns([&] {
+                        k.forward_dynamics_derivatives(s.q.data(), s.v.data(), s.tau.data(),
+                                                       s.wrench.data(), a.data(), b.data(),
+                                                       c.data());
+                      }) /
+                      dynamics);
+  }
+  for (auto* ratios : {&inverse, &forward})
+    std::ranges::nth_element(*ratios, ratios->begin() + 200);
+  const tandem_kernel_count& count = k.counts[model::kKernels];
+  fmt::print("| {} | {} ({}) | {:.1f} | {:.1f} |\n", robot.name, count.add + count.mul,
+             count.add + count.mul - count.pairs, inverse[200], forward[200]);
+  std::fflush(stdout);
+  return {};
+}
+
 /// Equal links of 1 kg whose axes are x, y, z in turn; each link carries `branches` more.
 Robot regular(const std::string& kind, int joints, int branches) {
   std::string urdf = "<robot name=\"regular\"><link name=\"link0\"/>";
@@ -133,16 +183,23 @@ int fail_with(const Error& error) {
 int run(const fs::path& folder) {
   fs::create_directories(folder);
   ::setenv("CCACHE_DISABLE", "1", 1);  // what compiling costs without a cache
-  fmt::print(
-      "| robot | joints | FD operations | [us] | ID operations | [us] | M operations | [us] |\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  std::vector<Robot> robots;
   for (const fs::path& file : bundled()) {
     auto read = runtime::read_robot(file.string());
     if (!read) return fail_with(read.error().front());
-    const Robot robot{read->config.name, std::move(read->description.tree),
-                      sim::model_spec(read->config)};
-    if (const Status row = print_row(robot, folder, false); !row) return fail_with(row.error());
+    robots.push_back(
+        {read->config.name, std::move(read->description.tree), sim::model_spec(read->config)});
   }
+  fmt::print(
+      "| robot | joints | FD operations | [us] | ID operations | [us] | M operations | [us] |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  for (const Robot& robot : robots)
+    if (const Status row = print_row(robot, folder, false); !row) return fail_with(row.error());
+  fmt::print(
+      "\n| robot | operations of ID's derivatives | time / FD | of FD's derivatives, time / FD |\n"
+      "| --- | --- | --- | --- |\n");
+  for (const Robot& robot : robots)
+    if (const Status row = print_derivatives(robot, folder); !row) return fail_with(row.error());
   fmt::print(
       "\n| kind | joints | FD operations | [us] | ID operations | [us] | M operations | [us] "
       "| compiling, CPU [s] | memory [MB] | library [KB] |\n"
