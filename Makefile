@@ -46,6 +46,9 @@ test:
 
 # What takes too long for every change.
 test-all: test
+	@scripts/install-dependencies engines
+	@cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel $(JOBS)
+	@build/release/bin/engines_test --gtest_brief=1
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_DERIVATIVES_ALL=1 build/release/bin/model_test --gtest_filter='Derivatives.OfAHumanoid*' --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1

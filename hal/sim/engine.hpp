@@ -34,6 +34,7 @@ struct EngineModel {
   double ground_m = 0.0;
   double friction = 0.0;  ///< Coulomb's coefficient
   double step_s = 0.0;    ///< the longest that is asked for
+  bool rk4 = false;       ///< the engine's Runge-Kutta of order 4 instead of its usual integrator
 };
 
 /// One robot in somebody's engine. It keeps the state; q and v are the kernels' (model/kernels.h).
@@ -70,9 +71,10 @@ struct EnginePlugin {
   const char* compiler;     ///< __VERSION__: both sides share C++ types
   const char* name;         ///< "mujoco"
   const char* version;      ///< of the engine
-  const char* integrator;   ///< in words
+  const char* integrator;   ///< its usual one, in words
   const char* settings;     ///< every setting that is not the engine's own default, in words
   bool armature;            ///< it can do rotors of rigid drives
+  bool rk4;                 ///< it has a Runge-Kutta integrator of order 4 as well
   /// Errors: what the engine says of a model that it does not take.
   Result<std::unique_ptr<Engine>> (*create)(const EngineModel& model);
 };

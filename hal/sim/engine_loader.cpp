@@ -18,16 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Known {
-  const char* name;
-  const char* package;  // Debian's
-};
-constexpr Known kEngines[] = {{"mujoco", "libmujoco-dev"},
-                              {"dart", "libdart-dev"},
-                              {"bullet", "libbullet-dev"},
-                              {"ode", "libode-dev"},
-                              {"simbody", "libsimbody-dev"}};
-
 std::unexpected<Error> refuse(std::string message, std::string hint, std::string key) {
   return std::unexpected(Error{
       .message = std::move(message), .hint = std::move(hint), .file = {}, .key = std::move(key)});
@@ -95,7 +85,7 @@ Result<std::vector<double>> armatures(const EnginePlugin& plugin, const hal::Rob
       return refuse("the engine '" + std::string(plugin.name) + "' cannot turn the rotor of '" +
                         joint.name + "', whose drive is rigid",
                     "give the actuator a spring (order 2), or take an engine that can: mujoco, "
-                    "tandem",
+                    "dart, ode, simbody, tandem",
                     "sim.engine");
     }
     values[static_cast<std::size_t>(at)] = value;
@@ -119,44 +109,39 @@ std::vector<EngineModel::Point> sole_points(const hal::RobotConfig& robot,
 
 }  // namespace
 
-const std::vector<std::string>& known_engines() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all{kOwnEngine};
-    for (const Known& engine : kEngines) all.emplace_back(engine.name);
-    return all;
-  }();
-  return names;
-}
-
 std::vector<std::string> installed_engines() {
-  std::vector<std::string> names;
-  for (const Known& engine : kEngines) {
-    if (!library_of(engine.name).empty()) names.emplace_back(engine.name);
-  }
+  std::vector<std::string> names = known_engines();
+  std::erase_if(names, [](const std::string& name) { return library_of(name).empty(); });
   return names;
 }
 
 Result<const EnginePlugin*> load_engine(const std::string& name) {
-  const Known* known = std::ranges::find(kEngines, name, &Known::name);
-  if (known == std::end(kEngines)) {
-    return refuse("there is no engine '" + name + "'", suggest(name, known_engines()),
+  const std::vector<std::string> known = known_engines();
+  if (name == kOwnEngine || std::ranges::count(known, name) == 0) {
+    return refuse("there is no engine '" + name + "' beside Tandem's own", suggest(name, known),
                   "sim.engine");
   }
   const std::string file = library_of(name);
   if (file.empty()) {
+    std::vector<std::string> there = installed_engines();
+    there.emplace_back(kOwnEngine);
     return refuse("the engine '" + name + "' is not installed",
-                  "installed: " + joined(installed_engines()) +
-                      (installed_engines().empty() ? "" : ", ") + kOwnEngine +
-                      "; apt-get install " + known->package + ", then run CMake and build again",
+                  "installed: " + joined(there) + "; apt-get install lib" + name +
+                      "-dev, then run CMake and build again",
                   "sim.engine");
   }
   return open(name, file);
 }
 
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const hal::RobotConfig& robot,
-                                            const model::Tree& tree, double step_s) {
+                                            const model::Tree& tree, double step_s, bool rk4) {
   const Result<const EnginePlugin*> plugin = load_engine(name);
   if (!plugin) return std::unexpected(plugin.error());
+  if (rk4 && !(*plugin)->rk4) {
+    return refuse("the engine '" + name + "' has no rk4",
+                  "leave it out: its own is " + std::string((*plugin)->integrator),
+                  "sim.integrator");
+  }
   if (Status fits = check_tree(**plugin, robot, tree); !fits) {
     return std::unexpected(fits.error());
   }
@@ -168,7 +153,8 @@ Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const hal::
                           .points = sole_points(robot, tree),
                           .ground_m = robot.contact.height_m,
                           .friction = robot.contact.static_friction,
-                          .step_s = step_s};
+                          .step_s = step_s,
+                          .rk4 = rk4};
   Result<std::unique_ptr<Engine>> engine = (*plugin)->create(model);
   if (!engine) {
     return refuse("the engine '" + name + "' does not take the robot: " + engine.error().message,

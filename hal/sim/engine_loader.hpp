@@ -15,8 +15,11 @@ namespace tandem::sim {
 /// Tandem's own engine: the generated kernels, the plant's integrators and its ground.
 inline constexpr const char* kOwnEngine = "tandem";
 
-/// The names that `[sim] engine` knows, installed or not; kOwnEngine first.
-[[nodiscard]] const std::vector<std::string>& known_engines();
+/// The names that `[sim] engine` knows, installed or not; kOwnEngine first. Debian's package of
+/// another one is libNAME-dev.
+[[nodiscard]] inline std::vector<std::string> known_engines() {
+  return {kOwnEngine, "mujoco", "dart", "bullet", "ode", "simbody"};
+}
 /// Those that were built with this program, in the same order, without kOwnEngine.
 [[nodiscard]] std::vector<std::string> installed_engines();
 
@@ -27,9 +30,10 @@ inline constexpr const char* kOwnEngine = "tandem";
 
 /// The robot in the engine `name`. @param tree  the robot's description
 /// Errors: those of load_engine(); what this engine cannot do, by name: closed loops, followers,
-/// rotors of rigid drives; what the engine says of the model.
+/// rotors of rigid drives, `rk4`; what the engine says of the model.
 [[nodiscard]] Result<std::unique_ptr<Engine>> make_engine(const std::string& name,
                                                           const hal::RobotConfig& robot,
-                                                          const model::Tree& tree, double step_s);
+                                                          const model::Tree& tree, double step_s,
+                                                          bool rk4 = false);
 
 }  // namespace tandem::sim

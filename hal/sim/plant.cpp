@@ -141,18 +141,13 @@ Status Plant::make_loops(const PlantConfig& config) {
 
 Status Plant::open_engine(const PlantConfig& config) {
   if (config.engine == kOwnEngine) return {};
-  if (config.integrator != Integrator::kSemiImplicitEuler) {
-    return std::unexpected(Error{.message = "is for Tandem's own engine",
-                                 .hint = "leave it out: '" + config.engine + "' has its own",
-                                 .file = {},
-                                 .key = "sim.integrator"});
-  }
   if (config.robot == nullptr || config.tree == nullptr) {
     return fail("the engine '" + config.engine + "' needs the robot's description",
                 "give PlantConfig its robot and tree");
   }
   auto engine = make_engine(config.engine, *config.robot, *config.tree,
-                            static_cast<double>(config.substep_ns) * 1e-9);
+                            static_cast<double>(config.substep_ns) * 1e-9,
+                            config.integrator == Integrator::kRungeKutta4);
   if (!engine) return std::unexpected(engine.error());
   engine_ = std::move(*engine);
   point_forces_W_.assign(3 * contact_.points(), 0.0);

@@ -99,8 +99,7 @@ class Plant {
  public:
   /// Errors: kernels of another ABI, a joint the kernels lack or that has no [[joint]], a foot
   /// that is no wrench site, a bad actuator or contact, a sub-step that is not positive, a loop
-  /// that the passive joints cannot close from the start's posture; those of make_engine(), and
-  /// rk4 for another engine.
+  /// that the passive joints cannot close from the start's posture; those of make_engine().
   [[nodiscard]] static Result<Plant> create(const PlantConfig& config);
 
   /// What joint `joint`'s drive applies from now on.

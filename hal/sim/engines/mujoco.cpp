@@ -1,4 +1,4 @@
-// MuJoCo: the robot as an MJCF document, stepped by mj_forward() and mj_Euler().
+// MuJoCo: the robot as an MJCF document, stepped by mj_forward() and its integrators.
 // Layer: hal/sim/engines.  Thread: one.
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
@@ -121,6 +121,7 @@ class Mujoco final : public Engine {
     engine->data_.reset(mj_makeData(engine->model_.get()));
     if (!engine->data_) return fail("MuJoCo has no memory for it", "free some");
     engine->floating_ = model.tree.floating_base;
+    engine->rk4_ = model.rk4;
     engine->number(model);
     return engine;
   }
@@ -135,7 +136,11 @@ class Mujoco final : public Engine {
     load(tau);
     mj_forward(model_.get(), data_.get());
     read_forces(forces_W);
-    mj_Euler(model_.get(), data_.get());
+    if (rk4_) {
+      mj_RungeKutta(model_.get(), data_.get(), 4);
+    } else {
+      mj_Euler(model_.get(), data_.get());
+    }
     read_state(q, v);
   }
 
@@ -246,7 +251,7 @@ class Mujoco final : public Engine {
   std::vector<JointAt> joints_;
   std::vector<int> point_of_;  // of a shape; -1: none
   std::size_t points_ = 0;
-  bool floating_ = false;
+  bool floating_ = false, rk4_ = false;
 };
 
 }  // namespace
@@ -259,4 +264,5 @@ TANDEM_ENGINE({.interface = tandem::sim::kEngineInterface,
                .integrator = "semi-implicit Euler, order 1",
                .settings = "cone = elliptic (default: pyramidal), balanceinertia = false",
                .armature = true,
+               .rk4 = true,
                .create = tandem::sim::Mujoco::create})
