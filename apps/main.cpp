@@ -1,6 +1,7 @@
 // The program `tandem`: reads its command line and calls the command.
 #include <string_view>
 
+#include "apps/bench/commands.hpp"
 #include "apps/clients/commands.hpp"
 #include "apps/machine/commands.hpp"
 #include "apps/run/commands.hpp"
@@ -60,6 +61,7 @@ int main(int argc, char** argv) {
                      [](const DoctorOptions& options) { return doctor_command(options); },
                      [](const TopicOptions& options) { return topic_command(options); },
                      [](const LatencyOptions& options) { return latency_command(options); },
+                     [](const BenchOptions& options) { return bench_command(options); },
                  },
                  command);
   if (exit == Exit::kUsage) write_failure(json_argument(argc, argv));

@@ -14,17 +14,18 @@ inline constexpr double kDegrees = 180.0 / std::numbers::pi;  ///< of a radian
 
 /// What a curve is, which decides how it looks.
 enum class CurveStyle : std::uint8_t {
-  kMeasured,     ///< solid, blue
-  kReference,    ///< dashed, orange: what was asked for
-  kComputed,     ///< dashed, orange: what a model says
-  kSecond,       ///< solid, purple: the other side, or the other log
-  kThird,        ///< solid, grey
-  kFourth,       ///< solid, green
-  kFifth,        ///< solid, brown
-  kSixth,        ///< solid, light blue
-  kStick,        ///< solid with round joints, blue
-  kStickSecond,  ///< the same, dark grey
-  kStickThird,   ///< the same, light grey
+  kMeasured,      ///< solid, blue
+  kReference,     ///< dashed, orange: what was asked for
+  kComputed,      ///< dashed, orange: what a model says
+  kSecond,        ///< solid, purple: the other side, or the other log
+  kThird,         ///< solid, grey
+  kFourth,        ///< solid, green
+  kFifth,         ///< solid, brown
+  kSixth,         ///< solid, light blue
+  kSecondDashed,  ///< dashed, purple
+  kStick,         ///< solid with round joints, blue
+  kStickSecond,   ///< the same, dark grey
+  kStickThird,    ///< the same, light grey
 };
 
 struct Curve {
@@ -58,10 +59,10 @@ struct Figure {
   std::string title;
   std::string x_label;  ///< with unit
   std::string y_label;  ///< with unit
-  std::vector<Curve> curves;
-  std::vector<Level> levels;
-  std::vector<Mark> marks;
-  std::vector<Note> notes;
+  std::vector<Curve> curves{};
+  std::vector<Level> levels{};
+  std::vector<Mark> marks{};
+  std::vector<Note> notes{};
   double range_until_x = std::numeric_limits<double>::infinity();  ///< what lies beyond it, as what
                                                                    ///< follows a fault, does not
                                                                    ///< widen the range of y

@@ -36,11 +36,12 @@ set style line 5 lw 1.6 lc rgb '#8a939e' dt solid
 set style line 6 lw 2.0 lc rgb '#3d8b57' dt solid
 set style line 7 lw 2.0 lc rgb '#a0612b' dt solid
 set style line 8 lw 2.0 lc rgb '#5cb3d6' dt solid
-set style line 9 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
-set style line 10 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
-set style line 11 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
-set style line 12 lw 1.8 lc rgb "#3a424c" dt (3,4)
-set style line 13 lw 1.8 lc rgb "#c0392b" dt solid
+set style line 9 lw 1.7 lc rgb '#8e4aa8' dt (8,6)
+set style line 10 lw 3.0 lc rgb '#1f5fa8' dt solid pt 7 ps 0.7
+set style line 11 lw 3.0 lc rgb '#3a424c' dt solid pt 7 ps 0.7
+set style line 12 lw 3.0 lc rgb '#b4bcc6' dt solid pt 7 ps 0.7
+set style line 13 lw 1.8 lc rgb "#3a424c" dt (3,4)
+set style line 14 lw 1.8 lc rgb "#c0392b" dt solid
 )";
 
 int line_style(CurveStyle style) { return static_cast<int>(style) + 1; }
@@ -93,10 +94,10 @@ std::string plot_command(const Figure& figure, std::size_t index) {
         curve.label);
   }
   for (const Level& level : figure.levels) {
-    add(fmt::format("{:.9g} with lines ls 12", level.y), level.label);
+    add(fmt::format("{:.9g} with lines ls 13", level.y), level.label);
   }
   for (const Mark& mark : figure.marks) {  // the line itself is an arrow; this is its key
-    if (!mark.label.empty()) add("NaN with lines ls 13", mark.label);
+    if (!mark.label.empty()) add("NaN with lines ls 14", mark.label);
   }
   return out + "\n";
 }
@@ -145,7 +146,7 @@ std::string body(const Figure& figure, std::size_t index, const Cell& cell) {
                        quoted(note.text), note.x, note.y);
   }
   for (const Mark& mark : figure.marks) {
-    out += fmt::format("set arrow from {0:.9g}, graph 0 to {0:.9g}, graph 1 nohead ls 13 front\n",
+    out += fmt::format("set arrow from {0:.9g}, graph 0 to {0:.9g}, graph 1 nohead ls 14 front\n",
                        mark.x);
   }
   out += fmt::format("set xlabel {} noenhanced\n", quoted(figure.x_label));

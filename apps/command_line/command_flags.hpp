@@ -46,6 +46,7 @@ void add_flags(CLI::App& app, LogOptions& o);
 void add_flags(CLI::App& app, EdsOptions& o);
 void add_flags(CLI::App& app, ReportOptions& o);
 void add_flags(CLI::App& app, LatencyOptions& o);
+void add_flags(CLI::App& app, BenchOptions& o);
 void add_flags(CLI::App& app, DoctorOptions& o);
 void add_flags(CLI::App& app, TopicOptions& o);
 

@@ -158,6 +158,7 @@ Command parse_command_line(int argc, const char* const* argv) {
                               "Inject a fault into a running emulated or simulated robot");
   commands.add<AskOptions>("ask", "Ask a running process, in JSON");
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
+  commands.add<BenchOptions>("bench", "Measure this build: engines");
   commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
 
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);

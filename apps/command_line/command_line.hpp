@@ -224,6 +224,15 @@ struct LatencyOptions {
   std::string json;
 };
 
+/// tandem bench engines
+struct BenchOptions {
+  std::vector<std::string> engines;   ///< besides Tandem's own; empty: all that are installed
+  std::vector<std::string> scenes;    ///< empty: all
+  std::string output = "runs/bench";  ///< folder of the page and its figures
+  bool quiet = false;
+  std::string json;
+};
+
 /// tandem doctor [ROBOT]
 struct DoctorOptions {
   std::string robot;       ///< robot.toml, whose CAN interfaces are looked at; may be empty
@@ -250,7 +259,7 @@ using Command =
     std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
                  ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
                  ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
-                 DoctorOptions, EmulateOptions, TopicOptions, SensorOptions>;
+                 DoctorOptions, EmulateOptions, TopicOptions, SensorOptions, BenchOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

@@ -12,6 +12,7 @@
 #include "apps/can/round_trips.hpp"
 #include "apps/run/remote_link.hpp"
 #include "base/counted.hpp"
+#include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -263,6 +264,7 @@ Json RunSummary::json() const {
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
   json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
+  json["engine"] = composition.sim == nullptr ? Json() : Json(e.sim.engine);
   return json;
 }
 
@@ -282,6 +284,9 @@ void RunSummary::print(std::FILE* out) const {
   add_timing_facts(*this, facts);
   add_remote_facts(server, composition.remote, facts);
   facts.add("kernels", composition.kernels->variant);
+  if (const std::string& engine = composition.experiment.sim.engine;
+      composition.sim != nullptr && engine != sim::kOwnEngine)
+    facts.add("engine", engine + " " + sim::load_engine(engine).value()->version);
   add_output_facts(*this, facts);
   add_bus_facts(composition.can_buses(), facts);
   add_frame_facts(*this, facts);

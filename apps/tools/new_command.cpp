@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "apps/robot/bundled.hpp"
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
@@ -35,14 +36,6 @@ std::string plain_name(std::string name) {
   std::ranges::replace_if(
       name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; }, '_');
   return name.empty() ? "robot" : name;
-}
-
-/// Where bundled robots stand: beside the working directory, the build, or an installation.
-std::vector<fs::path> robot_folders() {
-  std::error_code problem;
-  const fs::path program = fs::read_symlink("/proc/self/exe", problem);
-  const fs::path root = program.parent_path().parent_path();
-  return {"config", root.parent_path().parent_path() / "config", root / "share/tandem/config"};
 }
 
 std::vector<std::string> bundled_robots() {

@@ -50,6 +50,9 @@ const Rules& rules() {
       {"apps/clients",
        {"base", "rt", "hal/sim", "dds", "runtime", "apps/text", "apps/command_line", "apps/control",
         "apps/transport"}},
+      {"apps/bench",
+       {"base", "model", "hal", "hal/config", "hal/sim", "report", "apps/text", "apps/command_line",
+        "apps/robot"}},
       {"apps/machine",
        {"base", "rt", "hal", "hal/config", "report", "apps/text", "apps/command_line",
         "apps/robot"}},
@@ -80,8 +83,8 @@ const Rules& rules() {
         "apps/clients",
         "apps/tools/draw_report.hpp"}},
       {"apps",
-       {"base", "apps/text", "apps/command_line", "apps/clients", "apps/machine", "apps/tools",
-        "apps/run"}},
+       {"base", "apps/text", "apps/command_line", "apps/bench", "apps/clients", "apps/machine",
+        "apps/tools", "apps/run"}},
   };
   return table;
 }

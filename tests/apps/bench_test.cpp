@@ -1,0 +1,50 @@
+// `tandem bench engines`: what it measures of Tandem's own engine, its page, and what it refuses.
+#include <map>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Bench : public Program {
+ protected:
+  [[nodiscard]] std::string cache() const {
+    return "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
+  }
+};
+
+TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
+  const Outcome outcome =
+      tandem("bench engines --engines tandem --scenes box -o out --json box.json", cache());
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  std::map<std::string, std::map<double, double>> error;
+  const nlohmann::json measured = json("box.json");
+  for (const nlohmann::json& row : measured["results"])
+    error[row["engine"]][row["step_ms"]] = row["error_rad"];
+  ASSERT_EQ(error.size(), 2U);
+  EXPECT_NEAR(error["tandem"][4.0] / error["tandem"][2.0], 2.0, 0.2);
+  EXPECT_NEAR(error["tandem rk4"][4.0] / error["tandem rk4"][2.0], 16.0, 2.0);
+  EXPECT_LT(error["tandem rk4"][1.0], 1e-9);
+  const std::string page = read_text(folder_ / "out/engines.md");
+  EXPECT_NE(page.find("| tandem rk4 | this build | Runge-Kutta, order 4 |"), std::string::npos);
+  EXPECT_NE(page.find("**tandem rk4** needs least"), std::string::npos) << page;
+  EXPECT_NE(page.find("![A box tumbles](engines/box.png)"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/engines/box.png"));
+}
+
+TEST_F(Bench, RefusesAnEngineThatIsNotThereBeforeItMeasures) {
+  const Outcome outcome = tandem("bench engines --engines havok -o out", cache());
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("there is no engine 'havok' beside"), std::string::npos)
+      << outcome.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
+TEST_F(Bench, RefusesASceneThatThereIsNot) {
+  const Outcome outcome = tandem("bench engines --scenes boxes", cache());
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("boxes"), std::string::npos) << outcome.err;
+}
+
+}  // namespace
+}  // namespace tandem::apps
