@@ -20,11 +20,7 @@ namespace {
 
 class EngineMechanics : public testing::TestWithParam<std::string> {
  protected:
-  void SetUp() override {
-    if (std::ranges::count(installed_engines(), GetParam()) == 0)
-      GTEST_SKIP() << GetParam() << " is not installed (scripts/install-dependencies engines)";
-    plugin_ = load_engine(GetParam()).value();
-  }
+  void SetUp() override { plugin_ = load_engine(GetParam()).value(); }
 
   void compare();
 
@@ -172,7 +168,14 @@ TEST_P(EngineMechanics, SayTheForcesThatMoveTheRobot) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, EngineMechanics, testing::Values("mujoco", "dart", "bullet"),
+/// Those with joints' coordinates and rigid contact, as far as they are installed.
+std::vector<std::string> judged() {
+  std::vector<std::string> names = installed_engines();
+  std::erase_if(names, [](const std::string& name) { return name == "ode" || name == "simbody"; });
+  return names;
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, EngineMechanics, testing::ValuesIn(judged()),
                          [](const auto& engine) { return engine.param; });
 
 }  // namespace
