@@ -165,6 +165,12 @@ Status write_page(const EnginePage& page, const fs::path& output) {
   return write_file(output / "engines.md", page.text("engines"));
 }
 
+/// Without Markdown's marks.
+std::string plain(std::string text) {
+  std::erase(text, '*');
+  return text;
+}
+
 Status compare(const BenchOptions& options) {
   const auto entries = engine_entries(options.engines);
   if (!entries) return std::unexpected(entries.error());
@@ -176,7 +182,7 @@ Status compare(const BenchOptions& options) {
     if (!options.quiet) fmt::print(stderr, "{} …\n", scene.name);
     if (Status done = scene.run(*entries, page); !done) return done;
     for (std::size_t i = before; i < page.verdicts().size() && !options.quiet; ++i)
-      fmt::print(out, "  {}\n", page.verdicts()[i]);
+      fmt::print(out, "  {}\n", plain(page.verdicts()[i]));
     std::fflush(out);
   }
   if (Status written = write_page(page, options.output); !written) return written;

@@ -127,7 +127,7 @@ Result<const EnginePlugin*> load_engine(const std::string& name) {
     there.emplace_back(kOwnEngine);
     return refuse("the engine '" + name + "' is not installed",
                   "installed: " + joined(there) + "; apt-get install lib" + name +
-                      "-dev, then run CMake and build again",
+                      "-dev, then run CMake again and build the target engines",
                   "sim.engine");
   }
   return open(name, file);
