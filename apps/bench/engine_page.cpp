@@ -108,10 +108,8 @@ void EnginePage::judge(const std::string& title, const std::string& error, const
 void EnginePage::add(const std::string& title, const std::vector<AccelerationRow>& rows) {
   sections_ += fmt::format(
       "\n## {}\nForward dynamics at 1,000 random states and torques, without ground. The "
-      "difference "
-      "is that to the generated kernels, over the state's largest acceleration. ODE has no "
-      "function "
-      "for it: three of its steps are extrapolated.\n",
+      "difference is that to the generated kernels, over the state's largest acceleration. ODE "
+      "has no function for it: three of its steps are extrapolated.\n",
       title);
   sections_ += header({"engine", "worst difference", "one evaluation [us]"});
   std::vector<Price> prices;

@@ -106,6 +106,7 @@ struct FreeData {
 class Mujoco final : public Engine {
  public:
   static Result<std::unique_ptr<Engine>> create(const EngineModel& model) {
+    mju_user_warning = [](const char*) {};  // else it writes a file where the program stands
     auto engine = std::make_unique<Mujoco>();
     const std::string document = Document(model).text_of_robot();
     const auto files = std::make_unique<mjVFS>();  // megabytes
