@@ -27,15 +27,17 @@ StringMap to_map(const RunInfo& info) {
   for (const SensorInfo& sensor : info.sensors) {
     sensors += sensor.name + " " + std::to_string(sensor.channels) + "\n";
   }
-  return {{"version", info.version},
-          {"robot", info.robot},
-          {"hal", info.hal},
-          {"joints", joints},
-          {"sensors", sensors},
-          {"seed", std::to_string(info.seed)},
-          {"period_ns", std::to_string(info.period_ns)},
-          {"kernel_variant", info.kernel_variant},
-          {"description_hash", info.description_hash}};
+  StringMap map{{"version", info.version},
+                {"robot", info.robot},
+                {"hal", info.hal},
+                {"joints", joints},
+                {"sensors", sensors},
+                {"seed", std::to_string(info.seed)},
+                {"period_ns", std::to_string(info.period_ns)},
+                {"kernel_variant", info.kernel_variant},
+                {"description_hash", info.description_hash}};
+  if (!info.engine.empty()) map.emplace_back("engine", info.engine);
+  return map;
 }
 
 RunInfo info_from(const StringMap& map) {
@@ -51,6 +53,7 @@ RunInfo info_from(const StringMap& map) {
   }
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
+  info.engine = value_of(map, "engine");
   info.kernel_variant = value_of(map, "kernel_variant");
   info.description_hash = value_of(map, "description_hash");
   return info;

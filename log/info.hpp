@@ -26,9 +26,10 @@ struct RunInfo {
   std::vector<SensorInfo> sensors{};  ///< the image's order
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
-  std::string kernel_variant{};       ///< "x86-64-v3"; may change a result's last bits
-  std::string description_hash{};     ///< of what the kernels were made from
-  StringMap configuration{};          ///< path -> text of every file that was read
+  std::string engine{};            ///< "mujoco 2.2.2", which moved the bodies; empty: Tandem's own
+  std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
+  std::string description_hash{};  ///< of what the kernels were made from
+  StringMap configuration{};       ///< path -> text of every file that was read
   std::vector<std::string> boards{};  ///< for events' texts: in no record
   std::vector<std::string> buses{};   ///< the same
 };

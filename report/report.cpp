@@ -53,6 +53,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
   facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", ran_s));
+  if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
   for (const auto& [key, value] : run.result) {

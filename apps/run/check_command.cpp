@@ -14,6 +14,7 @@
 #include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
+#include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -53,6 +54,18 @@ void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& ro
   }
 }
 
+/// Who moves the bodies, how, and in which steps.
+void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
+  std::string integrator = "semi-implicit Euler";
+  if (e.hal.backend == runtime::BackendKind::kSim && e.sim.engine != sim::kOwnEngine) {
+    facts.add("engine", sim::engine_text(e.sim.engine));
+    integrator = sim::load_engine(e.sim.engine).value()->integrator;
+  }
+  if (e.sim.integrator == sim::Integrator::kRungeKutta4) integrator = "Runge-Kutta 4";
+  facts.add("integrator", fmt::format("{}, {} us steps", integrator,
+                                      static_cast<double>(e.sim.substep_ns) * 1e-3));
+}
+
 /// What a run would do.
 void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
@@ -71,11 +84,7 @@ void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
   }
   facts.add("loop", fmt::format("{:.3g} kHz, {}, {:.3f} s after bring-up", 1e-3 / period_s,
                                 counted(e.cycles(), "cycle"), e.duration_s));
-  facts.add("integrator",
-            fmt::format("{}, {} us steps",
-                        e.sim.integrator == sim::Integrator::kRungeKutta4 ? "Runge-Kutta 4"
-                                                                          : "semi-implicit Euler",
-                        static_cast<double>(e.sim.substep_ns) * 1e-3));
+  add_simulation_facts(e, facts);
   facts.add("seed", std::to_string(e.seed));
   facts.add("log", e.log.folder + "/");
   fmt::print(out, "{} is right. It would run:\n", e.file);
@@ -155,6 +164,7 @@ Diagnostics check_experiment(const CheckOptions& options, std::FILE* out, Diagno
   const LoopStudy loops = study_loops(e.robot, (*composition)->tree, {&e.posture, 1});
   add_loop_json(e.robot, loops, json);
   print_plan(**composition, loops, out);
+  add_engine_json(e, json);
   json["kernels"] = (*composition)->kernels.path();
   return {};
 }

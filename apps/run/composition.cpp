@@ -15,6 +15,7 @@
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
+#include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
 #include "rt/stop_signal.hpp"
 
@@ -192,6 +193,13 @@ std::string hal_name(const runtime::HalOptions& hal) {
   return hal.lockstep ? name + " lockstep" : name;
 }
 
+void add_engine_json(const runtime::Experiment& e, Json& json) {
+  const bool here = e.hal.backend == runtime::BackendKind::kSim;
+  const std::string version = here ? sim::engine_version(e.sim.engine) : "";
+  json["engine"] = here ? Json(e.sim.engine) : Json();
+  json["engine_version"] = version.empty() ? Json() : Json(version);
+}
+
 namespace {
 
 /// What the command line wants of the experiment.
@@ -240,6 +248,17 @@ void keep_to_own_end(runtime::Experiment& e, const Overrides& overrides) {
   e.hal.settle_s = 0.0;   // bring-up and settling are the server's
 }
 
+/// An error of the simulation, with the place of its key.
+Error in_its_file(Error error, const runtime::Experiment& e) {
+  constexpr std::string_view kOurs = "sim.";  // keys of the experiment
+  const bool of_experiment = error.key.starts_with(kOurs);
+  error.file = of_experiment ? e.file : e.robot.file;
+  if (of_experiment) {
+    error.line = e.document.root().table_or_empty("sim").line(error.key.substr(kOurs.size()));
+  }
+  return error;
+}
+
 /// What the description says of the robot and of where it starts.
 void add_description(Composition& c, const RobotFiles& robot, Collector& errors) {
   runtime::Experiment& e = c.experiment;
@@ -249,6 +268,8 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
     if (auto error = wrong_start_height(robot, e.posture)) errors.add(std::move(*error), {}, 0);
     c.warnings = buried_links(robot, e.posture);
     errors.add(study_loops(e.robot, robot.tree, {&e.posture, 1}).errors);
+    const Status engine = sim::check_engine(e.robot, e.sim_robot_config());
+    if (!engine) errors.add(in_its_file(engine.error(), e), {}, 0);
   }
   if (e.hal.backend != runtime::BackendKind::kDds) {
     std::ranges::move(start_warnings(robot, e.posture), std::back_inserter(c.warnings));
@@ -266,16 +287,7 @@ Diagnostics add_simulation(Composition& c, const std::string& scenario) {
     sim.faults = std::move(*faults);
   }
   auto backend = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
-  if (!backend) {
-    Error error = backend.error();
-    constexpr std::string_view kOurs = "sim.";  // keys of the experiment
-    const bool of_experiment = error.key.starts_with(kOurs);
-    error.file = of_experiment ? e.file : e.robot.file;
-    if (of_experiment) {
-      error.line = e.document.root().table_or_empty("sim").line(error.key.substr(kOurs.size()));
-    }
-    return {error};
-  }
+  if (!backend) return {in_its_file(backend.error(), e)};
   c.sim = backend->get();
   c.master = &c.sim->master();
   c.backend = std::move(*backend);

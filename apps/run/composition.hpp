@@ -13,6 +13,7 @@
 #include "apps/can/can_sockets.hpp"
 #include "apps/robot/kernel_supply.hpp"
 #include "apps/robot/robot_files.hpp"
+#include "apps/text/console.hpp"
 #include "base/result.hpp"
 #include "dds/domain.hpp"
 #include "dds/participant.hpp"
@@ -77,6 +78,9 @@ struct Composition {
 
 /// "sim", "can", "can lockstep", "dds", "dds lockstep", for logs and summaries.
 [[nodiscard]] std::string hal_name(const runtime::HalOptions& hal);
+
+/// The keys `engine` and `engine_version` of JSON; null where no plant is in this process.
+void add_engine_json(const runtime::Experiment& e, Json& json);
 
 /// Reads an experiment with all its files and composes it. Every error that can be found without
 /// running is found here: experiment, robot, description, kernels, backend, plugins, parameters,

@@ -100,11 +100,14 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
       !loops.errors.empty()) {
     return std::unexpected(std::move(loops.errors));
   }
+  e->subject.sim.tree = std::make_shared<const model::Tree>(description->tree);
+  if (const Status engine = sim::check_engine(robot, e->subject.sim); !engine) {
+    return std::unexpected(in_file(engine.error(), options.file));
+  }
   auto kernels = supply_kernels(*description, options.kernel_variant,
                                 missing_kernels(options.no_build, options.quiet));
   if (!kernels) return std::unexpected(in_file(kernels.error(), robot.file));
   e->kernels = std::move(*kernels);
-  e->subject.sim.tree = std::make_shared<const model::Tree>(description->tree);
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
   if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
   e->robot = std::move(*emulated);

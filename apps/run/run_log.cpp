@@ -10,6 +10,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "hal/sim/engine_loader.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -29,6 +31,7 @@ log::RunInfo info_of(const Composition& c) {
   }
   info.seed = e.seed;
   info.period_ns = e.loop.period_ns;
+  if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;
   for (const std::string& file : {e.file, e.robot.file, e.robot.model.urdf}) {

@@ -264,7 +264,7 @@ Json RunSummary::json() const {
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
   json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
-  json["engine"] = composition.sim == nullptr ? Json() : Json(e.sim.engine);
+  add_engine_json(e, json);
   return json;
 }
 
@@ -284,9 +284,8 @@ void RunSummary::print(std::FILE* out) const {
   add_timing_facts(*this, facts);
   add_remote_facts(server, composition.remote, facts);
   facts.add("kernels", composition.kernels->variant);
-  if (const std::string& engine = composition.experiment.sim.engine;
-      composition.sim != nullptr && engine != sim::kOwnEngine)
-    facts.add("engine", engine + " " + sim::load_engine(engine).value()->version);
+  const std::string engine = sim::engine_text(composition.experiment.sim.engine);
+  if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);
   add_output_facts(*this, facts);
   add_bus_facts(composition.can_buses(), facts);
   add_frame_facts(*this, facts);

@@ -7,6 +7,7 @@
 
 #include "base/archive.hpp"
 #include "base/nearest.hpp"
+#include "hal/sim/engine_loader.hpp"
 #include "hal/sim/setup.hpp"
 #include "hal/sim/stability.hpp"
 
@@ -121,6 +122,15 @@ Status named(Status status, const std::string& key) {
 }
 
 }  // namespace
+
+Status check_engine(const hal::RobotConfig& robot, const SimRobotConfig& config) {
+  if (config.engine == kOwnEngine) return {};
+  const auto engine =
+      make_engine(config.engine, robot, *config.tree, static_cast<double>(config.substep_ns) * 1e-9,
+                  config.integrator == Integrator::kRungeKutta4);
+  if (!engine) return std::unexpected(engine.error());
+  return {};
+}
 
 Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotConfig& robot,
                                                              const tandem_kernels* kernels,

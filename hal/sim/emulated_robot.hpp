@@ -42,6 +42,10 @@ struct SimRobotConfig {
   std::shared_ptr<const model::Tree> tree = {};
 };
 
+/// What the engine refuses of the robot: make_engine()'s errors, which need no kernels.
+/// @pre  another engine than kOwnEngine has `tree`
+[[nodiscard]] Status check_engine(const hal::RobotConfig& robot, const SimRobotConfig& config);
+
 /// The stages of a cycle of the simulated robot, from cycle k-1 to cycle k.
 enum class SimStage : std::uint8_t {
   kMasterSync,    ///< the master sends SYNC k

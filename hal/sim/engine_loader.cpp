@@ -59,17 +59,16 @@ Result<const EnginePlugin*> open(const std::string& name, const std::string& fil
   return plugin;
 }
 
-Status check_tree(const EnginePlugin& plugin, const hal::RobotConfig& robot,
-                  const model::Tree& tree) {
-  const std::string name = plugin.name;
+/// What no engine but our own does, installed or not.
+Status check_tree(const std::string& name, const hal::RobotConfig& robot, const model::Tree& tree) {
   if (!robot.loops.empty()) {
     return refuse("the engine '" + name + "' cannot close the loop '" + robot.loops[0].name + "'",
-                  "only Tandem's own engine does closed loops", "sim.engine");
+                  "set engine = \"tandem\": only Tandem's own does closed loops", "sim.engine");
   }
   for (const model::Joint& joint : tree.joints) {
     if (!joint.follows()) continue;
     return refuse("the engine '" + name + "' cannot let '" + joint.name + "' follow another joint",
-                  "only Tandem's own engine does mimic joints", "sim.engine");
+                  "set engine = \"tandem\": only Tandem's own does mimic joints", "sim.engine");
   }
   return {};
 }
@@ -133,17 +132,26 @@ Result<const EnginePlugin*> load_engine(const std::string& name) {
   return open(name, file);
 }
 
+std::string engine_version(const std::string& name) {
+  if (name == kOwnEngine) return {};
+  const Result<const EnginePlugin*> plugin = load_engine(name);
+  return plugin ? (*plugin)->version : "";
+}
+
+std::string engine_text(const std::string& name) {
+  const std::string version = engine_version(name);
+  return version.empty() ? "" : name + " " + version;
+}
+
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const hal::RobotConfig& robot,
                                             const model::Tree& tree, double step_s, bool rk4) {
+  if (Status fits = check_tree(name, robot, tree); !fits) return std::unexpected(fits.error());
   const Result<const EnginePlugin*> plugin = load_engine(name);
   if (!plugin) return std::unexpected(plugin.error());
   if (rk4 && !(*plugin)->rk4) {
     return refuse("the engine '" + name + "' has no rk4",
                   "leave it out: its own is " + std::string((*plugin)->integrator),
                   "sim.integrator");
-  }
-  if (Status fits = check_tree(**plugin, robot, tree); !fits) {
-    return std::unexpected(fits.error());
   }
   Result<std::vector<double>> armature = armatures(**plugin, robot, tree);
   if (!armature) return std::unexpected(armature.error());

@@ -28,6 +28,11 @@ inline constexpr const char* kOwnEngine = "tandem";
 /// it needs; a library that others may change, that cannot be loaded or is of another version.
 [[nodiscard]] Result<const EnginePlugin*> load_engine(const std::string& name);
 
+/// "2.2.2"; empty for kOwnEngine, and for one that cannot be loaded.
+[[nodiscard]] std::string engine_version(const std::string& name);
+/// "mujoco 2.2.2"; empty as engine_version() is.
+[[nodiscard]] std::string engine_text(const std::string& name);
+
 /// The robot in the engine `name`. @param tree  the robot's description
 /// Errors: those of load_engine(); what this engine cannot do, by name: closed loops, followers,
 /// rotors of rigid drives, `rk4`; what the engine says of the model.
