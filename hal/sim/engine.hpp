@@ -48,8 +48,8 @@ class Engine {
   /// Puts the robot where `q` (nq) and `v` (nv) say, and forgets what was kept between steps.
   virtual void set_state(const double* q, const double* v) = 0;
 
-  /// Advances by `step_s` with the engine's own integrator and contact. It may not throw: one that
-  /// lost its way answers NaN, and the plant ends the run.
+  /// Advances by `step_s` with the engine's own integrator and contact. One that lost its way
+  /// answers NaN, or throws, and the plant ends the run.
   /// @param tau  (nv) generalised forces, held; of a floating base a wrench in its own frame
   /// @param q, v  (nq), (nv) out: the state after it
   /// @param forces_W  (3 per point) out: the ground's force on every point in the step, mean, in W

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "hal/sim/plant.hpp"
 #include "hal/sim/rotation.hpp"
@@ -119,7 +120,11 @@ void Plant::step_engine(double h_s) noexcept {
   double* q = x_.data();
   double* v = q + kernels_->nq;
   std::copy_n(v, kernels_->nv, vdot_.begin());
-  engine_->step(h_s, applied_tau_.data(), q, v, point_forces_W_.data());
+  try {
+    engine_->step(h_s, applied_tau_.data(), q, v, point_forces_W_.data());
+  } catch (...) {  // whatever its library throws: a state that is not plausible ends the run
+    std::fill_n(v, kernels_->nv, std::numeric_limits<double>::quiet_NaN());
+  }
   for (std::size_t i = 0; i < kernels_->nv; ++i) vdot_[i] = (v[i] - vdot_[i]) / h_s;
   step_motors(h_s);
 }
