@@ -13,9 +13,8 @@
 #include "apps/robot/kernel_supply.hpp"
 #include "apps/text/console.hpp"
 #include "base/process.hpp"
-#include "hal/config/capabilities.hpp"
+#include "hal/sim/held_robot.hpp"
 #include "hal/sim/rotation.hpp"
-#include "hal/sim/sim_robot.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -74,43 +73,6 @@ HumanoidRow row_of(const EngineEntry& entry, const Json& run) {
   return row;
 }
 
-/// COMAN, its boards and its master; every joint holds the posture.
-class Stand {
- public:
-  Stand(const RobotFiles& coman, std::unique_ptr<sim::SimRobot> robot)
-      : robot_(std::move(robot)),
-        state_(coman.config.shape()),
-        command_(coman.config.shape()),
-        parameters_(hal::initial_parameters(coman.config)) {
-    const std::vector<double>& posture = coman.config.posture("stand")->position_rad;
-    for (std::size_t j = 0; j < posture.size(); ++j) {
-      command_.position_rad()[j] = posture[j];
-      command_.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    }
-  }
-  /// @return false when the simulation or a drive gave up
-  bool step() {
-    constexpr std::size_t kLegJoints = 12;  // the first
-    constexpr double kLinkDamping_Nms_rad = 12.0;
-    time_.time_ns = static_cast<std::int64_t>(time_.cycle) * time_.period_ns;
-    bool fine = robot_->read(time_, state_) == Code::kOk;
-    for (std::size_t j = 0; j < kLegJoints; ++j)
-      command_.torque_Nm()[j] = -kLinkDamping_Nms_rad * state_.velocity_rad_s()[j];
-    fine = robot_->write(command_, parameters_) == Code::kOk && fine;
-    ++time_.cycle;
-    return fine && robot_->phase() != hal::Phase::kFault;
-  }
-  [[nodiscard]] const hal::TruthImage& truth() const { return robot_->truth(); }
-  [[nodiscard]] std::string status() const { return robot_->status_text(); }
-
- private:
-  std::unique_ptr<sim::SimRobot> robot_;
-  hal::StateImage state_;
-  hal::CommandImage command_;
-  hal::ParameterImage parameters_;
-  hal::CycleTime time_;
-};
-
 double most_moved_mm(std::span<const double> from, std::span<const double> to) {
   double most = 0.0;
   for (std::size_t i = 0; i < from.size(); ++i) most = std::max(most, std::abs(to[i] - from[i]));
@@ -123,19 +85,25 @@ double turned_deg(std::span<const double> from, std::span<const double> to) {
   return 2.0 * kDegrees * std::hypot(turn[0], turn[1], turn[2]);
 }
 
-StandRow stand(const EngineEntry& entry, Stand& coman, double weight_N) {
+/// One cycle; a row that has no refusal yet gets one when the simulation or a drive gave up.
+void step(sim::HeldRobot& coman, StandRow& row) {
+  const bool fine = coman.step() == Code::kOk && coman.robot->phase() != hal::Phase::kFault;
+  if (!fine) row.refusal = coman.robot->status_text();
+}
+
+StandRow stand(const EngineEntry& entry, sim::HeldRobot coman, double weight_N) {
   StandRow row{.entry = &entry};
   const auto cycles = std::lround(1e3 * kStandTime_s);
   for (long i = 0; i < cycles; ++i) {
-    if (!coman.step()) row.refusal = coman.status();
+    step(coman, row);
     if (!row.refusal.empty()) return row;
   }
-  const hal::TruthImage start = coman.truth();
-  const hal::TruthImage& now = coman.truth();
+  const hal::TruthImage start = coman.robot->truth();
+  const hal::TruthImage& now = coman.robot->truth();
   double force_N = 0.0;
   const double before = thread_time_s();
   for (long i = 0; i < cycles && row.refusal.empty(); ++i) {
-    if (!coman.step()) row.refusal = coman.status();
+    step(coman, row);
     force_N += (now.foot_force_N()[2] + now.foot_force_N()[5]) / static_cast<double>(cycles);
     row.foot_mm =
         std::max(row.foot_mm, most_moved_mm(start.foot_position_m(), now.foot_position_m()));
@@ -169,8 +137,8 @@ Result<std::vector<StandRow>> measure_stand(const std::vector<EngineEntry>& entr
       rows.push_back({.entry = &entry, .refusal = robot.error().message});
       continue;
     }
-    Stand standing(*coman, std::move(*robot));
-    rows.push_back(stand(entry, standing, (*kernels)->mass_kg * 9.81));
+    rows.push_back(
+        stand(entry, {coman->config, std::move(*robot), "stand"}, (*kernels)->mass_kg * 9.81));
   }
   return rows;
 }

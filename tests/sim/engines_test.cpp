@@ -8,10 +8,9 @@
 #include <random>
 
 #include "base/archive.hpp"
-#include "hal/config/capabilities.hpp"
 #include "hal/sim/engine_loader.hpp"
+#include "hal/sim/held_robot.hpp"
 #include "hal/sim/rotation.hpp"
-#include "hal/sim/sim_robot.hpp"
 #include "model/interpreted_kernels.hpp"
 #include "tests/support/test_robot.hpp"
 
@@ -180,31 +179,12 @@ TEST_P(Engines, MoveSlidersAndRotorsOnAnyBase) {
 }
 
 /// COMAN with its boards, whose drives hold the posture "stand".
-class Standing {
+class Standing : public HeldRobot {
  public:
-  explicit Standing(const std::string& engine)
-      : coman(test::load_test_robot("coman")),
-        state(coman.robot.shape()),
-        command(coman.robot.shape()),
-        parameters(hal::initial_parameters(coman.robot)) {
-    auto made = SimRobot::create(
-        coman.robot, coman.kernels.get(),
-        {.engine = engine, .posture = "stand", .release_ns = 200'000'000, .tree = coman.tree});
-    if (!made) throw std::runtime_error(made.error().to_string());
-    robot = std::move(*made);
-    const std::vector<double>& posture = coman.robot.posture("stand")->position_rad;
-    for (std::size_t j = 0; j < posture.size(); ++j) {
-      command.position_rad()[j] = posture[j];
-      command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    }
-  }
+  explicit Standing(const std::string& engine, const test::TestRobot& robot)
+      : HeldRobot(robot.robot, made(engine, robot), "stand") {}
   void run(int cycles) {
-    for (int i = 0; i < cycles; ++i) {
-      time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
-      ASSERT_EQ(robot->read(time, state), Code::kOk) << robot->status_text();
-      ASSERT_EQ(robot->write(command, parameters), Code::kOk);
-      ++time.cycle;
-    }
+    for (int i = 0; i < cycles; ++i) ASSERT_EQ(step(), Code::kOk) << robot->status_text();
   }
   std::vector<std::byte> snapshot() {
     Archive ar;
@@ -212,19 +192,22 @@ class Standing {
     return {ar.bytes().begin(), ar.bytes().end()};
   }
 
-  test::TestRobot coman;
-  hal::StateImage state;
-  hal::CommandImage command;
-  hal::ParameterImage parameters;
-  hal::CycleTime time;
-  std::unique_ptr<SimRobot> robot;
+ private:
+  static std::unique_ptr<SimRobot> made(const std::string& engine, const test::TestRobot& coman) {
+    auto robot = SimRobot::create(
+        coman.robot, coman.kernels.get(),
+        {.engine = engine, .posture = "stand", .release_ns = 200'000'000, .tree = coman.tree});
+    if (!robot) throw std::runtime_error(robot.error().to_string());
+    return std::move(*robot);
+  }
 };
 
 TEST_P(Engines, LetComanStand) {
-  Standing standing(GetParam());
+  const test::TestRobot coman = test::load_test_robot("coman");
+  Standing standing(GetParam(), coman);
   standing.run(3'000);
   ASSERT_TRUE(standing.robot->plant().released());
-  const double weight = standing.coman.kernels->mass_kg * 9.81;
+  const double weight = coman.kernels->mass_kg * 9.81;
   double ground = 0.0, felt = 0.0;
   constexpr int kCycles = 500;
   const double height = standing.robot->truth().base_position_m()[2];
@@ -234,7 +217,7 @@ TEST_P(Engines, LetComanStand) {
     ground += (force[2] + force[5]) / kCycles;
     for (const char* foot : {"left_foot", "right_foot"})
       felt += standing.state.sensor_values(
-                  static_cast<std::size_t>(standing.coman.robot.sensor_index(foot)))[2] /
+                  static_cast<std::size_t>(coman.robot.sensor_index(foot)))[2] /
               kCycles;
   }
   EXPECT_NEAR(ground, weight, 0.01 * weight);
@@ -244,7 +227,8 @@ TEST_P(Engines, LetComanStand) {
 }
 
 TEST_P(Engines, GoOnFromASnapshotWithTheSameBits) {
-  Standing first(GetParam()), second(GetParam());
+  const test::TestRobot coman = test::load_test_robot("coman");
+  Standing first(GetParam(), coman), second(GetParam(), coman);
   first.run(2'500);
   const hal::CycleTime time = first.time;
   const std::vector<std::byte> before = first.snapshot();

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "hal/config/capabilities.hpp"
-#include "hal/sim/sim_robot.hpp"
+#include "hal/sim/held_robot.hpp"
 #include "rt/scoped_realtime.hpp"
 #include "tests/support/rt_trap.hpp"
 #include "tests/support/test_robot.hpp"
@@ -12,40 +11,25 @@
 namespace tandem::sim {
 namespace {
 
-constexpr double kLinkDamping_Nms_rad = 12.0;  // of the legs, as config/coman/hold.toml has it
+// The robot, which keeps the configuration that the simulation points to.
+struct Coman {
+  test::TestRobot coman = test::load_test_robot("coman");
+};
 
-// The robot in its loop. Every joint holds the posture "stand", as the controller `hold` does it.
-class Standing {
+// It holds the posture "stand".
+class Standing : public Coman, public HeldRobot {
  public:
-  static constexpr std::size_t kLegJoints = 12;  // the first of the image
-  explicit Standing(SimRobotConfig config = {.substep_ns = 250'000, .posture = "stand"})
-      : coman(test::load_test_robot("coman")),
-        state(coman.robot.shape()),
-        command(coman.robot.shape()),
-        parameters(hal::initial_parameters(coman.robot)) {
-    auto made = SimRobot::create(coman.robot, coman.kernels.get(), config);
-    EXPECT_TRUE(made.has_value()) << made.error().to_string();
-    robot = std::move(*made);
-    const std::vector<double>& posture = coman.robot.posture("stand")->position_rad;
-    for (std::size_t j = 0; j < posture.size(); ++j) {
-      command.position_rad()[j] = posture[j];
-      command.mode()[j] = static_cast<std::int8_t>(hal::ControlMode::kPosition);
-    }
-  }
+  explicit Standing(const SimRobotConfig& config = {.substep_ns = 250'000, .posture = "stand"})
+      : HeldRobot(coman.robot, SimRobot::create(coman.robot, coman.kernels.get(), config).value(),
+                  "stand") {}
   void step() {
     const rt::ScopedRealtime in_cycle;
-    time.time_ns = static_cast<std::int64_t>(time.cycle) * time.period_ns;
-    read = robot->read(time, state);
-    for (std::size_t j = 0; j < kLegJoints; ++j) {
-      command.torque_Nm()[j] = -kLinkDamping_Nms_rad * state.velocity_rad_s()[j];
-    }
-    written = robot->write(command, parameters);
-    ++time.cycle;
+    done = HeldRobot::step();
   }
   void run(double seconds) {
     const auto cycles = static_cast<int>(std::lround(seconds * 1e3));
     for (int i = 0; i < cycles; ++i) step();
-    ASSERT_EQ(read, Code::kOk) << robot->status_text();
+    ASSERT_EQ(done, Code::kOk) << robot->status_text();
   }
   void bring_up() {
     for (int i = 0; i < 10'000 && robot->phase() != hal::Phase::kOperational; ++i) step();
@@ -67,13 +51,7 @@ class Standing {
     return -out[6 * sensor + 2];
   }
 
-  test::TestRobot coman;
-  hal::StateImage state;
-  hal::CommandImage command;
-  hal::ParameterImage parameters;
-  hal::CycleTime time;
-  std::unique_ptr<SimRobot> robot;
-  Code read = Code::kOk, written = Code::kOk;
+  Code done = Code::kOk;
 };
 
 double turned_deg(std::span<const double> from, std::span<const double> to) {
