@@ -13,6 +13,14 @@ namespace tandem::apps {
 namespace {
 
 constexpr const char* kCost = "us per simulated ms";
+constexpr const char* kDriftCost = "mm us per simulated ms";
+constexpr const char* kAccuracy = "most accurate in the shortest steps";
+
+#ifdef __clang__
+constexpr const char* kCompiler = __VERSION__;
+#else
+constexpr const char* kCompiler = "g++ " __VERSION__;
+#endif
 
 std::string number(double value) {
   if (std::isnan(value)) return "diverged";
@@ -88,21 +96,34 @@ std::string file_name(std::string title) {
 
 }  // namespace
 
-void EnginePage::judge(const std::string& title, const std::string& error, const std::string& unit,
-                       std::vector<Price> prices) {
+std::string EnginePage::most_accurate(const Words& words, const std::vector<Price>& prices) {
+  const auto worse = [](const Price& a, const Price& b) {  // NaN is the worst
+    return a.error < b.error || (std::isnan(b.error) && !std::isnan(a.error));
+  };
+  const auto best = std::ranges::min_element(prices, worse);
+  if (best == prices.end() || std::isnan(best->error)) return "";
+  std::string names;
+  for (const Price& price : prices)
+    if (price.printed == best->printed)
+      names += fmt::format("{}**{}**", names.empty() ? "" : ", ", price.entry->label);
+  return fmt::format("; {}: {}, {}{}", words.accuracy, names, best->printed, words.error);
+}
+
+void EnginePage::judge(const std::string& title, const Words& words, std::vector<Price> prices) {
+  const std::string accurate = most_accurate(words, prices);
   std::string missing;
   for (const Price& price : prices)
     if (std::isnan(price.cost)) missing += (missing.empty() ? "" : ", ") + price.entry->label;
   std::erase_if(prices, [](const Price& price) { return std::isnan(price.cost); });
   if (prices.empty()) return;
   std::ranges::sort(prices, {}, &Price::cost);
-  std::string line = fmt::format("{}, {}: **{}** needs least, {} {}", title, error,
-                                 prices[0].entry->label, number(prices[0].cost), unit);
+  std::string line = fmt::format("{}, {}: **{}** needs least, {} {}", title, words.target,
+                                 prices[0].entry->label, number(prices[0].cost), words.unit);
   for (std::size_t i = 1; i < prices.size(); ++i)
     line += fmt::format("{} {} {:.1f}", i == 1 ? "; times as much:" : ",", prices[i].entry->label,
                         prices[i].cost / prices[0].cost);
   if (!missing.empty()) line += "; not reached by " + missing;
-  verdicts_.push_back(line);
+  verdicts_.push_back(line + accurate);
 }
 
 void EnginePage::add(const std::string& title, const std::vector<AccelerationRow>& rows) {
@@ -121,13 +142,14 @@ void EnginePage::add(const std::string& title, const std::vector<AccelerationRow
     sections_ += fmt::format("| {} | {} | {} |\n", row.entry->label,
                              row.entry->ours() ? "0" : fmt::format("{:.1e}", row.worst),
                              fmt::format("{:.3g}", row.cost_us));
-    prices.push_back({row.entry, row.cost_us});
+    const double error = row.entry->ours() ? std::nan("") : row.worst;  // the kernels are ours
+    prices.push_back({row.entry, row.cost_us, error, fmt::format("{:.1e}", error)});
     json_.push_back({{"scene", "accelerations"},
                      {"engine", row.entry->label},
                      {"worst_difference", row.worst},
                      {"evaluation_us", row.cost_us}});
   }
-  judge(title, "one evaluation", "us", std::move(prices));
+  judge(title, {"one evaluation", "us", "nearest to the kernels", ""}, std::move(prices));
 }
 
 void EnginePage::add(const Flight& flight, const std::vector<FlightRow>& rows,
@@ -159,11 +181,14 @@ void EnginePage::add(const Flight& flight, const std::vector<FlightRow>& rows,
     if (flight.keeps_energy) line += " | " + fmt::format("{:.1e}", at_1ms.energy_drift);
     if (flight.keeps_momentum) line += " | " + fmt::format("{:.1e}", at_1ms.momentum_drift);
     sections_ += line + fmt::format(" | {:.3g} |\n", at_1ms.cost_us_per_ms);
-    prices.push_back({row.entry, price(row, kFlightTarget_rad, flight_error)});
+    const double shortest = row.steps.back().error_rad;
+    prices.push_back(
+        {row.entry, price(row, kFlightTarget_rad, flight_error), shortest, number(shortest)});
   }
   figures_.push_back(
       curves(flight.name, flight.title, "error at the end [rad]", rows, flight_error));
-  judge(flight.title, fmt::format("for an error of {} rad", kFlightTarget_rad), kCost,
+  judge(flight.title,
+        {fmt::format("for an error of {} rad", kFlightTarget_rad), kCost, kAccuracy, " rad"},
         std::move(prices));
 }
 
@@ -195,10 +220,13 @@ void EnginePage::add(const Slope& slope, const std::vector<SlopeRow>& rows) {
     const SlopeResult& at_1ms = row.steps[std::min<std::size_t>(1, row.steps.size() - 1)];
     sections_ +=
         line + fmt::format(" | {} | {:.3g} |\n", number(at_1ms.sideways_mm), at_1ms.cost_us_per_ms);
-    prices.push_back({row.entry, price(row, kSlopeTarget_mm, slope_error)});
+    const double shortest = row.steps.back().error_mm;
+    prices.push_back(
+        {row.entry, price(row, kSlopeTarget_mm, slope_error), shortest, number(shortest)});
   }
   figures_.push_back(curves(name, title, "error after 1 s [mm]", rows, slope_error));
-  judge(title, fmt::format("for an error of {} mm", kSlopeTarget_mm), kCost, std::move(prices));
+  judge(title, {fmt::format("for an error of {} mm", kSlopeTarget_mm), kCost, kAccuracy, " mm"},
+        std::move(prices));
 }
 
 void EnginePage::add(const std::vector<DropRow>& rows) {
@@ -237,10 +265,12 @@ void EnginePage::add(const std::vector<StandRow>& rows) {
     sections_ += fmt::format("| {} | {} | {} | {} | {:+.3f} % | {:.3g} | {} |\n", row.entry->label,
                              number(row.foot_mm), number(row.base_mm), number(row.turn_deg),
                              100.0 * row.force_error, row.cost_us_per_ms, row.refusal);
-    if (row.refusal.empty()) prices.push_back({row.entry, row.cost_us_per_ms * row.foot_mm});
+    if (row.refusal.empty())
+      prices.push_back(
+          {row.entry, row.cost_us_per_ms * row.foot_mm, row.foot_mm, number(row.foot_mm)});
     note("stand", *row.entry, 0.25, "error_mm", row.foot_mm, row.cost_us_per_ms);
   }
-  judge(title, "foot's drift times cost", "mm us per simulated ms", std::move(prices));
+  judge(title, {"foot's drift times cost", kDriftCost, "least drift", " mm"}, std::move(prices));
 }
 
 void EnginePage::add(const std::string& title, const std::vector<HumanoidRow>& rows) {
@@ -258,10 +288,12 @@ void EnginePage::add(const std::string& title, const std::vector<HumanoidRow>& r
         fmt::format("| {} | {:.3f} | {:.2f} | {:.3f} | {:+.3f} % | {:.2f} | {:.3g} | {} |\n",
                     row.entry->label, row.slip_mm, row.height_mm, row.tilt_deg,
                     100.0 * row.force_error, row.tracking_deg, row.cost_us_per_ms, row.refusal);
-    if (row.refusal.empty()) prices.push_back({row.entry, row.cost_us_per_ms * row.slip_mm});
+    if (row.refusal.empty())
+      prices.push_back({row.entry, row.cost_us_per_ms * row.slip_mm, row.slip_mm,
+                        fmt::format("{:.3f}", row.slip_mm)});
     note("squat", *row.entry, 0.25, "error_mm", row.slip_mm, row.cost_us_per_ms);
   }
-  judge(title, "foot's slip times cost", "mm us per simulated ms", std::move(prices));
+  judge(title, {"foot's slip times cost", kDriftCost, "least slip", " mm"}, std::move(prices));
 }
 
 void EnginePage::note(const std::string& scene, const EngineEntry& entry, double step_ms,
@@ -278,23 +310,22 @@ std::string EnginePage::text(const std::string& folder) const {
       "Written by `tandem bench engines` on {:%Y-%m-%d}; write it anew with that command on your "
       "own machine. One core of: {}; compiler of Tandem: {}. The other engines are Debian's "
       "packages, built as Debian builds them.\n\n",
-      fmt::gmtime(std::time(nullptr)), cpu(), __VERSION__);
+      fmt::gmtime(std::time(nullptr)), cpu(), kCompiler);
   page +=
       "All engines get the same bodies and joints, from Tandem's reader of the description, behind "
-      "the same interface ([simulation.md](simulation.md#engines-of-others)), and are asked for "
-      "the same steps; a cost is the processor time of the whole plant. What is compared is these "
+      "the same interface (\"Engines of others\" of docs/simulation.md), and are asked for the "
+      "same steps; a cost is the processor time of the whole plant. What is compared is these "
       "engines as adapted here: a user who tunes one of them for one scene may do better, and so "
-      "may "
-      "a newer version. The settings of Bullet, DART, ODE and Simbody were chosen on COMAN's "
-      "squat, "
-      "which flatters them there; MuJoCo's and Tandem's were not.\n";
+      "may a newer version. The settings of Bullet, DART, ODE and Simbody were chosen on COMAN's "
+      "squat, which flatters them there; MuJoCo's and Tandem's were not.\n";
   page += header({"engine", "version", "integrator", "settings that are not its defaults"});
   for (const EngineEntry& entry : entries_)
     page += fmt::format("| {} | {} | {} | {} |\n", entry.label, entry.version, entry.method,
                         entry.settings);
   page +=
       "\n## In short\nWhat it costs to come within an error: of the steps that do, the "
-      "cheapest.\n\n";
+      "cheapest. Then who is the most accurate, whatever the cost; several are, where the table "
+      "shows the same.\n\n";
   for (const std::string& verdict : verdicts_) page += "- " + verdict + ".\n";
   std::string sections = sections_;
   for (const std::string mark = "{folder}"; sections.find(mark) != std::string::npos;)

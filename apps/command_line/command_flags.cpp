@@ -69,12 +69,6 @@ const char kCheckExamples[] = R"(Examples:
   tandem check my_robot.toml --repair                what inertia = "repair" would make of it
   tandem check my_robot.toml --json -                errors with file, line, key and hint)";
 
-const char kBenchEnginesExamples[] =
-    R"(
-Examples:
-  tandem bench engines                               all scenes, every engine that is installed
-  tandem bench engines --scenes box,chains --engines mujoco -o runs/two
-Engines are installed by scripts/install-dependencies engines, before CMake runs.)";
 const char kNewExamples[] = R"(Examples:
   tandem new my_robot.urdf                           writes my_robot/, then
   tandem run my_robot/hold.toml                      the robot holds a posture, or stands
@@ -458,27 +452,6 @@ void add_flags(CLI::App& app, ReportOptions& o) {
   app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kReportExamples);
-}
-
-void add_flags(CLI::App& app, BenchOptions& o) {
-  app.require_subcommand(1);
-  CLI::App* engines =
-      app.add_subcommand("engines", "Multibody engines on the same scenes: error against cost");
-  engines
-      ->add_option("--engines", o.engines,
-                   "Beside Tandem's own: mujoco,dart,bullet,ode,simbody (default: the installed)")
-      ->delimiter(',');
-  engines
-      ->add_option("--scenes", o.scenes,
-                   "accelerations,box,chains,flight,fall,slope,drop,stand,squat (default: all)")
-      ->delimiter(',')
-      ->check(CLI::IsMember(
-          {"accelerations", "box", "chains", "flight", "fall", "slope", "drop", "stand", "squat"}));
-  engines->add_option("-o,--output", o.output,
-                      "Folder of engines.md and its figures (default: runs/bench)");
-  engines->add_flag("--quiet,-q", o.quiet, "Neither progress nor verdicts");
-  engines->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  engines->footer(kBenchEnginesExamples);
 }
 
 void add_flags(CLI::App& app, LatencyOptions& o) {

@@ -53,12 +53,28 @@ std::vector<std::string> subcommands_of(const CLI::App& app) {
   return names;
 }
 
+/// A flag whose list of values, in braces, has `word`; empty: none.
+std::string flag_that_takes(const CLI::App& app, const std::string& word) {
+  for (const CLI::Option* option : app.get_options()) {
+    std::string values = option->get_type_name();
+    std::ranges::replace_if(
+        values, [](char c) { return c == '{' || c == '}'; }, ',');
+    const bool named = !option->get_lnames().empty();
+    if (named && values.contains("," + word + ",")) return "--" + option->get_lnames().front();
+  }
+  return {};
+}
+
 /// The message for words that fit nowhere, with the nearest that would.
 std::string unknown_word(const CLI::App& app, const std::string& word) {
   const bool flag = word.starts_with('-');
   const std::vector<std::string> known = flag ? flags_of(app) : subcommands_of(app);
   const std::string name = word.substr(0, word.find('='));
-  if (!flag && known.empty()) return fmt::format("'{}' is one argument too many", word);
+  if (!flag && known.empty()) {
+    const std::string takes = flag_that_takes(app, word);
+    return fmt::format("'{}' is one argument too many{}", word,
+                       takes.empty() ? "" : fmt::format(": did you mean {} {}?", takes, word));
+  }
   return fmt::format("unknown {} '{}': {}", flag ? "flag" : "command", name, suggest(name, known));
 }
 

@@ -28,6 +28,9 @@ TEST_F(Bench, EnginesConvergeWithTheOrderOfTheirIntegrator) {
   const std::string page = read_text(folder_ / "out/engines.md");
   EXPECT_NE(page.find("| tandem rk4 | this build | Runge-Kutta, order 4 |"), std::string::npos);
   EXPECT_NE(page.find("**tandem rk4** needs least"), std::string::npos) << page;
+  EXPECT_NE(page.find("; most accurate in the shortest steps: **tandem rk4**, "), std::string::npos)
+      << page;
+  EXPECT_EQ(page.find(".md#"), std::string::npos) << "no link to a page that is not beside it";
   EXPECT_NE(page.find("![A box tumbles](engines/box.png)"), std::string::npos);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/engines/box.png"));
 }
@@ -44,6 +47,14 @@ TEST_F(Bench, RefusesASceneThatThereIsNot) {
   const Outcome outcome = tandem("bench engines --scenes boxes", cache());
   EXPECT_EQ(outcome.status, 2);
   EXPECT_NE(outcome.err.find("boxes"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Bench, TellsOfASceneWithoutItsFlag) {
+  const Outcome outcome = tandem("bench engines box", cache());
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.err,
+            "tandem: 'box' is one argument too many: did you mean --scenes box?\n"
+            "Try `tandem bench engines --help`.\n");
 }
 
 }  // namespace
