@@ -17,12 +17,21 @@ TEST_F(Model, BuildsALibraryAndLeavesItAloneTheSecondTime) {
 }
 
 TEST_F(Model, AUsersOwnRobotRunsFromTheCacheFolder) {
-  edit("robot.toml", "inertia_kg_m2 = 0.002", "inertia_kg_m2 = 0.003");
+  edit("robot.toml", "base = \"fixed\"", "base = \"fixed\"\nderivatives = true");
   const std::string cache = "XDG_CACHE_HOME='" + folder_.string() + "/cache'";
   ASSERT_EQ(tandem("model build robot.toml", cache).status, 0);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "cache/tandem/models"));
   const Outcome run = tandem("run hold.toml --duration 0.05 --no-log", cache);
   EXPECT_EQ(run.status, 0) << run.err;
+  // Operations and code of forward dynamics' derivatives are both with the kernels they call.
+  ASSERT_EQ(tandem("model info robot.toml --json info.json", cache).status, 0);
+  const nlohmann::json kernels = json("info.json")["kernels"];
+  for (const char* key : {"add", "mul", "text_bytes"}) {
+    const auto of = [&](const char* kernel) { return kernels[kernel][key].get<int>(); };
+    EXPECT_GT(of("forward_dynamics_derivatives"),
+              of("forward_dynamics") + of("inverse_dynamics_derivatives"))
+        << key;
+  }
 }
 
 /// Kernel libraries in the cache folder of a test.
