@@ -1,6 +1,7 @@
 // 07: how accelerations change near a state, as predictive control asks for it. robot.toml of the
 // double pendulum needs `derivatives = true` in [model]; then
-//   tandem model build robot.toml -o kernels.so && build/release/bin/example_07_derivatives kernels.so
+//   tandem model build robot.toml -o kernels.so
+//   build/release/bin/example_07_derivatives kernels.so
 #include <array>
 #include <cmath>
 #include <cstdio>
