@@ -1,5 +1,5 @@
-// exchange() sends SYNC and waits for the first TPDO of every running node, or for TIME in
-// lockstep; the drive master then works on the frames that it collected.
+// exchange() sends SYNC and waits for the sample of every running node, or for TIME in lockstep;
+// the drive master then works on the frames that it collected.
 #include "hal/ethercat-can/can_backend.hpp"
 
 #include <algorithm>
@@ -18,21 +18,17 @@ constexpr std::size_t kBatch = 64;
 /// Lockstep: how long to wait for an answer once the process was asked to stop.
 constexpr std::int64_t kPatienceNs = 500'000'000;
 
-bool is_first_tpdo(const Frame& frame) noexcept {
-  return (frame.id & 0x780) == canopen::cob::tpdo(1, 0) && (frame.id & 0x7F) != 0;
-}
-
 }  // namespace
 
-CanBackend::Collected::Collected(Bus& bus)
-    : bus_(&bus), frames_(kCollected), frames_ns_(kCollected) {}
+CanBackend::Collected::Collected(Bus& bus, std::size_t index)
+    : bus_(&bus), index_(index), frames_(kCollected), frames_ns_(kCollected) {}
 
 void CanBackend::Collected::begin_cycle() noexcept {
   times_ = 0;
-  feedback_ = 0;
+  sampled_.reset();
 }
 
-void CanBackend::Collected::collect() noexcept {
+void CanBackend::Collected::collect(const DriveMaster& master) noexcept {
   if (first_ > 0) {
     std::copy_n(frames_.begin() + static_cast<std::ptrdiff_t>(first_), count_, frames_.begin());
     std::copy_n(frames_ns_.begin() + static_cast<std::ptrdiff_t>(first_), count_,
@@ -50,7 +46,7 @@ void CanBackend::Collected::collect() noexcept {
         ++times_;
         continue;
       }
-      if (is_first_tpdo(batch[i])) ++feedback_;
+      sampled_.set(master.completes(index_, batch[i]));
       frames_ns_[kept] = i < stamps.size() ? stamps[i] : 0;
       frames_[kept++] = batch[i];
     }
@@ -59,8 +55,8 @@ void CanBackend::Collected::collect() noexcept {
   }
 }
 
-void CanBackend::Collected::forget() noexcept {
-  collect();
+void CanBackend::Collected::forget(const DriveMaster& master) noexcept {
+  collect(master);
   first_ = 0;
   count_ = 0;
 }
@@ -80,7 +76,7 @@ Result<std::unique_ptr<CanBackend>> CanBackend::create(const RobotConfig& robot,
   std::vector<std::unique_ptr<Collected>> collected;
   std::vector<Bus*> ends;
   for (Bus* bus : buses) {
-    collected.push_back(std::make_unique<Collected>(*bus));
+    collected.push_back(std::make_unique<Collected>(*bus, collected.size()));
     ends.push_back(collected.back().get());
   }
   auto master = DriveMaster::create(robot, ends);
@@ -109,14 +105,15 @@ std::string CanBackend::status_text() const {
 
 bool CanBackend::answered(std::size_t bus) const noexcept {
   return config_.lockstep ? buses_[bus]->answered()
-                          : buses_[bus]->feedback() >= master_->nodes_in_operation(bus);
+                          : (master_->in_operation(bus) & ~buses_[bus]->sampled()).none();
 }
 
 void CanBackend::exchange(const CycleTime& time) noexcept {
   if (silent_) return;
   for (const auto& bus : buses_) {
-    if (!begun_) bus->forget();             // what was said before there was a master
-    if (!config_.lockstep) bus->collect();  // late answers to the last SYNC are none to this one
+    if (!begun_) bus->forget(*master_);  // what was said before there was a master
+    if (!config_.lockstep)
+      bus->collect(*master_);  // late answers to the last SYNC are none to this one
     bus->begin_cycle();
   }
   begun_ = true;
@@ -127,7 +124,7 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
   master_->cycle_begin(time);
   // One bus after the other, the last first: its answers come last, and the others' with them.
   for (std::size_t waiting = buses_.size(); waiting > 0;) {
-    buses_[waiting - 1]->collect();
+    buses_[waiting - 1]->collect(*master_);
     if (answered(waiting - 1)) {
       --waiting;
       continue;

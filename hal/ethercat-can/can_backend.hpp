@@ -24,10 +24,10 @@ struct CanBackendConfig {
 
 /// exchange() sends SYNC and collects the answers; read() decodes them, write() sends commands.
 ///
-/// In real time the wait ends when every node that is in operation has sent its first TPDO, or when
-/// the answer window is over: what comes later counts in the next cycle, as a sample that is a
-/// cycle old. In lockstep it ends when TIME (COB-ID 100) has come on every bus, by which an
-/// emulated robot says that it has answered.
+/// In real time the wait ends when every node that is in operation has sent its sample, on classic
+/// CAN in several TPDOs, or when the answer window is over: a sample that comes whole after it
+/// counts in the next cycle, as one that is a cycle old. In lockstep it ends when TIME (COB-ID 100)
+/// has come on every bus, by which an emulated robot says that it has answered.
 class CanBackend final : public Backend {
  public:
   /// @param buses  the master's end of each of robot.buses, in that order; outlive it
@@ -67,12 +67,12 @@ class CanBackend final : public Backend {
   /// A bus whose frames exchange() has taken already. Sending goes straight on.
   class Collected final : public Bus {
    public:
-    explicit Collected(Bus& bus);
+    Collected(Bus& bus, std::size_t index);
     /// Takes what has come. @return how many frames are new.
-    void collect() noexcept;
-    void forget() noexcept;  ///< everything that has come so far
+    void collect(const DriveMaster& master) noexcept;
+    void forget(const DriveMaster& master) noexcept;  ///< everything that has come so far
     [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
-    [[nodiscard]] std::size_t feedback() const noexcept { return feedback_; }
+    [[nodiscard]] const DriveMaster::NodeSet& sampled() const noexcept { return sampled_; }
     void begin_cycle() noexcept;
 
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
@@ -91,12 +91,13 @@ class CanBackend final : public Backend {
 
    private:
     Bus* bus_;
+    std::size_t index_;  ///< of the bus
     std::vector<canopen::Frame> frames_;
     std::vector<std::int64_t> frames_ns_;
     std::span<const std::int64_t> given_ns_;
     std::size_t first_ = 0, count_ = 0;
-    std::size_t times_ = 0;     ///< TIMEs since begin_cycle()
-    std::size_t feedback_ = 0;  ///< first TPDOs since begin_cycle()
+    std::size_t times_ = 0;         ///< TIMEs since begin_cycle()
+    DriveMaster::NodeSet sampled_;  ///< samples since begin_cycle(); [0]: of nobody
   };
 
   CanBackend(std::vector<std::unique_ptr<Collected>> buses, std::unique_ptr<DriveMaster> master,

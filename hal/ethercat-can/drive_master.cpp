@@ -68,6 +68,12 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
         port.heartbeat_ns == 0 ? heartbeat_ns : std::min(port.heartbeat_ns, heartbeat_ns);
     port.nodes[static_cast<std::size_t>(plan.id)] = static_cast<std::int16_t>(nodes.size());
     for (const std::size_t joint : plan.joints) joint_node[joint] = nodes.size();
+    for (const PdoPlan& pdo : plan.pdos) {
+      const bool sampled = pdo.group == PdoGroup::kFeedback || pdo.group == PdoGroup::kSensor;
+      if (!sampled || pdo.part + 1 != plan.parts) continue;
+      std::uint32_t& last = port.last_tpdo[static_cast<std::size_t>(plan.id)];
+      last = std::max(last, canopen::cob::tpdo(pdo.number, 0));
+    }
     auto steps = make_configuration(robot, plan);
     const int timeout =
         plan.board < 0 ? kSensorTimeoutCycles
@@ -391,10 +397,20 @@ Phase DriveMaster::phase() const noexcept {
   return Phase::kFault;
 }
 
-std::size_t DriveMaster::nodes_in_operation(std::size_t bus) const noexcept TANDEM_RT {
-  return static_cast<std::size_t>(std::ranges::count_if(impl_->nodes, [bus](const auto& node) {
-    return node.plan.bus == bus && node.master.running();
-  }));
+DriveMaster::NodeSet DriveMaster::in_operation(std::size_t bus) const noexcept TANDEM_RT {
+  NodeSet nodes;
+  for (const Impl::Node& node : impl_->nodes) {
+    if (node.plan.bus == bus && node.master.running()) {
+      nodes.set(static_cast<std::size_t>(node.plan.id));
+    }
+  }
+  return nodes;
+}
+
+std::size_t DriveMaster::completes(std::size_t bus, const Frame& frame) const noexcept TANDEM_RT {
+  if (frame.id > canopen::cob::kIdMask) return 0;
+  const std::size_t node = frame.id & 0x7F;
+  return impl_->ports[bus].last_tpdo[node] == (frame.id & 0x780) ? node : 0;
 }
 
 double DriveMaster::progress() const noexcept { return impl_->progress(); }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -107,8 +108,14 @@ class DriveMaster {
   [[nodiscard]] FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT;
   /// A drive's error code: "following error (error code 0x8611)".
   [[nodiscard]] static std::string error_text(std::uint32_t code);
+  /// By node-ID.
+  using NodeSet = std::bitset<128>;
   /// Nodes on bus `bus` that answer every SYNC with their TPDOs.
-  [[nodiscard]] std::size_t nodes_in_operation(std::size_t bus) const noexcept TANDEM_RT;
+  [[nodiscard]] NodeSet in_operation(std::size_t bus) const noexcept TANDEM_RT;
+  /// The node on bus `bus` whose answer to SYNC is whole with `frame`, the last TPDO of its sample;
+  /// 0: nobody's.
+  [[nodiscard]] std::size_t completes(std::size_t bus,
+                                      const canopen::Frame& frame) const noexcept TANDEM_RT;
   /// Share of the bring-up that is done, 0 to 1.
   [[nodiscard]] double progress() const noexcept;
   /// What bring-up waits for, or the cause of a fault: names node, board, joint and object.

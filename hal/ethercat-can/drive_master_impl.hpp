@@ -36,6 +36,8 @@ struct DriveMaster::Impl {
     std::vector<canopen::Frame> storage;
     canopen::FrameSink sink;
     std::array<std::int16_t, canopen::kMaxNodeId + 1> nodes{};  ///< by id: index in `nodes`
+    /// By id: the function code of the TPDO that ends a sample, the one with the highest number.
+    std::array<std::uint32_t, canopen::kMaxNodeId + 1> last_tpdo{};
     std::array<std::int64_t, 256> sent_ns{};  ///< by counter: when its commands were handed over
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
