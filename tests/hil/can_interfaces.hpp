@@ -94,9 +94,14 @@ class RawCan {
   [[nodiscard]] std::vector<canfd_frame> kept() const {
     std::vector<canfd_frame> frames;
     canfd_frame frame{};
-    while (::recv(socket_, &frame, sizeof(frame), MSG_DONTWAIT) > 0) frames.push_back(frame);
+    while (receive(frame) > 0) frames.push_back(frame);
     return frames;
   }
+  /// Without waiting. @return as recv(2).
+  [[nodiscard]] ssize_t receive(canfd_frame& frame) const {
+    return ::recv(socket_, &frame, sizeof(frame), MSG_DONTWAIT);
+  }
+  [[nodiscard]] int descriptor() const { return socket_; }
   /// @return bytes that the kernel gave: 16 or 72; 0 when nothing came for five seconds.
   [[nodiscard]] std::size_t read(canfd_frame& frame) const {
     frame = {};

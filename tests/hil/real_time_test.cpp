@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/hil/relay.hpp"
 #include "tests/hil/witness.hpp"
 
 namespace tandem::test {
@@ -21,16 +22,23 @@ class RealTime : public OwnFolder {
   void SetUp() override {
     const std::filesystem::path source = TANDEM_SOURCE_DIR "/config/double_pendulum";
     std::filesystem::copy_file(source / "double_pendulum.urdf", folder_ / "double_pendulum.urdf");
-    write("robot.toml", text_of(source / "robot.toml"), "slow_pdo_every = 4",
-          "slow_pdo_every = 4\nheartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
+    write_robot(text_of(source / "robot.toml"));
     write("hold.toml", text_of(source / "hold.toml"), "seed = 1",
           "seed = 1\nperiod_ns = 10_000_000");
   }
+  void write_robot(const std::string& text) const {
+    write("robot.toml", text, "slow_pdo_every = 4",
+          "slow_pdo_every = 4\nheartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
+  }
+  /// Every `from` becomes `to`.
   void write(const std::string& name, std::string text, const std::string& from,
              const std::string& to) const {
-    const std::size_t at = text.find(from);
+    std::size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << name << " has no '" << from << "'";
-    std::ofstream(folder_ / name) << text.replace(at, from.size(), to);
+    for (; at != std::string::npos; at = text.find(from, at + to.size())) {
+      text.replace(at, from.size(), to);
+    }
+    std::ofstream(folder_ / name) << text;
   }
   [[nodiscard]] std::vector<std::string> run_words(const std::string& duration_s) const {
     return tandem({"run", file("hold.toml"), "--hal", "can", "--on-fault", "end", "--no-log",
@@ -39,6 +47,8 @@ class RealTime : public OwnFolder {
   [[nodiscard]] std::vector<std::string> emulate_words() const {
     return tandem({"emulate", file("hold.toml"), "--no-socket", "--json", file("emulate.json")});
   }
+  /// A run of a second, on a wire that passes one frame after the other.
+  void expect_a_run_over_a_wire(const hal::can::BitRates& rates);
   [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] nlohmann::json json(const std::string& name) const {
     return nlohmann::json::parse(text_of(folder_ / name));
@@ -85,6 +95,31 @@ TEST_F(RealTime, SyncFollowsTheWallClockAndEveryNodeAnswers) {
   for (std::size_t i = 100; i < syncs.size(); ++i) {  // late ones and no burst that makes up for it
     ASSERT_GT(syncs[i] - syncs[i - 100], 0.5 * 100.0 * kPeriodS) << "SYNC " << i;
   }
+}
+
+void RealTime::expect_a_run_over_a_wire(const hal::can::BitRates& rates) {
+  const Relay wire("can0", "can1", rates);
+  std::vector<std::string> words = emulate_words();
+  words.insert(words.end(), {"--interface", "can0=can1"});
+  Process robot(words, folder_ / "emulate.txt");
+  ASSERT_TRUE(robot.says("Ctrl-C ends it")) << robot.output();
+  Process master(run_words("1"), folder_ / "run.txt");
+  EXPECT_EQ(master.wait(), 0) << master.output();
+  EXPECT_GT(json("run.json")["cycles"].get<int>(), 0) << master.output();
+  EXPECT_EQ(robot.interrupt(), 0) << robot.output();
+  EXPECT_GT(wire.passed(), 100U);
+}
+
+TEST_F(RealTime, RunsOverAWireThatPassesOneFrameAtATime) {
+  expect_a_run_over_a_wire({.nominal = 1'000'000, .data = 8'000'000});
+}
+
+// A board's sample takes two frames there; the second had always been taken for late.
+TEST_F(RealTime, RunsOverAClassicWireThatPassesOneFrameAtATime) {
+  std::string robot = text_of(TANDEM_SOURCE_DIR "/config/double_pendulum_classic/robot.toml");
+  const std::string urdf = "../double_pendulum/double_pendulum.urdf";
+  write_robot(robot.replace(robot.find(urdf), urdf.size(), "double_pendulum.urdf"));
+  expect_a_run_over_a_wire({.nominal = 1'000'000, .data = 1'000'000});
 }
 
 // It had been let in, had reset the nodes, and had taken the torque from the running robot.

@@ -39,8 +39,8 @@ class WiredRobot final : private hal::can::FrameWait {
       near.push_back(&near_.emplace_back(std::make_unique<LoopbackBus>())->master());
       far.push_back(&far_.emplace_back(std::make_unique<LoopbackBus>())->boards());
     }
-    emulator_ = std::make_unique<sim::Emulator>(
-        *boards_, far, boards_clock_, sim::EmulatorConfig{.period_ns = config.period_ns});
+    emulator_ = std::make_unique<sim::Emulator>(*boards_, far, boards_clock_,
+                                                sim::EmulatorConfig{.period_ns = config.period_ns});
     backend = hal::can::CanBackend::create(e.robot, near, *this, {}).value();
     pass_until(kPowerOnNs);
   }
