@@ -178,11 +178,14 @@ struct BusConfig {
   int line = 0;           ///< in the TOML, for messages
 };
 
+/// Under which the master sends its heartbeat: no node of a bus has it.
+inline constexpr int kMasterNodeId = 127;
+
 /// [[board]]
 struct BoardConfig {
   std::string name;
   std::string bus;
-  int node_id = 0;                             ///< 1 to 127
+  int node_id = 0;                             ///< 1 to 126
   std::int64_t control_period_ns = 1'000'000;  ///< of its joint controllers
   int heartbeat_ms = 50;                       ///< both ways; time-out is three of them
   int command_timeout_cycles = 10;             ///< SYNCs without a command until the safe state

@@ -106,9 +106,9 @@ class NodeIds {
  public:
   int read(TomlTable& table, const std::string& bus) {
     int& last = last_[bus];
-    const int id = static_cast<int>(table.integer_or("node_id", last + 1, 1, 127));
-    if (id > 127) {
-      table.error("node_id", "no node id is left after 127 on bus '" + bus + "'",
+    const int id = static_cast<int>(table.integer_or("node_id", last + 1, 1, kMasterNodeId - 1));
+    if (id >= kMasterNodeId) {
+      table.error("node_id", "no node id is left after 126 on bus '" + bus + "'",
                   "set node_id, here or of the node before");
     } else if (!bus.empty() && !used_.emplace(bus, id).second) {
       table.error("node_id", "node id " + std::to_string(id) + " is taken on bus '" + bus + "'",

@@ -25,9 +25,6 @@ class Archive;
 
 namespace tandem::hal::can {
 
-/// Node id under which the master's heartbeat is sent.
-inline constexpr int kMasterNodeId = 127;
-
 /// How long a board's answers to commands took since the start; its slow TPDO echoes the counter
 /// of the command in force.
 struct RoundTrip {

@@ -127,10 +127,10 @@ TEST(RobotConfigDefaults, CountNodeIdsUpOnEachBus) {
 }
 
 TEST(RobotConfigDefaults, HaveNoNodeIdAfterTheLast) {
-  expect_error(shortened("joints = [\"ankle\"]", "joints = [\"ankle\"], node_id = 127"),
-               "robots/leg.toml:34: board[0].node_id: no node id is left after 127 on bus 'left' "
+  expect_error(shortened("joints = [\"ankle\"]", "joints = [\"ankle\"], node_id = 126"),
+               "robots/leg.toml:34: board[0].node_id: no node id is left after 126 on bus 'left' "
                "(set node_id, here or of the node before)\n"
-               "robots/leg.toml:52: sensor[0].node_id: no node id is left after 127 on bus 'left' "
+               "robots/leg.toml:52: sensor[0].node_id: no node id is left after 126 on bus 'left' "
                "(set node_id, here or of the node before)");
 }
 

@@ -273,8 +273,11 @@ TEST(RobotConfig, RefusesEncodersWithoutCounts) {
 }
 
 TEST(RobotConfig, RefusesNodeIdsOffTheBus) {
-  expect_error(with("node_id = 3", "node_id = 128"),
-               "robots/leg.toml:33: board[0].node_id: 128 is out of range (must be 1 to 127)");
+  for (const std::string id : {"0", "127", "128"}) {  // 127 is the master's
+    expect_error(
+        with("node_id = 3", "node_id = " + id),
+        "robots/leg.toml:33: board[0].node_id: " + id + " is out of range (must be 1 to 126)");
+  }
 }
 
 TEST(RobotConfig, RefusesASensorWithABoardsNodeId) {
