@@ -30,8 +30,8 @@ constexpr std::uint32_t kMostMassMatrixOperations = 40'000;
 constexpr std::string_view kBanner =
     "// Made by `tandem model build`: change the robot's description instead.\n";
 
-// Beyond so many operations of forward dynamics a batch calls the kernel for one state after
-// another: as fast, where code is far larger than the caches, and half as much to compile.
+// Beyond so many operations of forward dynamics code is far larger than the caches. A batch then
+// calls the kernel for one state after another: as fast, and half as much to compile.
 constexpr std::uint32_t kMostBatchOperations = 20'000;
 
 // Vectors of two lanes, of four states, and as wide as the variant has them.
@@ -175,8 +175,10 @@ std::string parts_header(const Emitted& all) {
   return text + "}  // namespace TANDEM_VARIANT\n";
 }
 
-// The parts, gathered into files of about the same length.
+// The parts, gathered into files of about the same length. Straight-line code that has outgrown the
+// caches gains nothing from -O2; the derivatives' parts have loops, which do.
 void add_part_files(const Emitted& all, GeneratedKernels& result) {
+  const bool light = all.batches.empty() && all.derivatives.empty();
   std::string body;
   std::uint32_t operations = 0;
   int number = 0;
@@ -186,7 +188,7 @@ void add_part_files(const Emitted& all, GeneratedKernels& result) {
                               std::string(kBanner) +
                                   "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\n\n" + body +
                                   "}  // namespace TANDEM_VARIANT\n",
-                              true});
+                              true, light});
     body.clear();
     operations = 0;
   };

@@ -20,6 +20,7 @@ struct SourceFile {
   std::string name;
   std::string text;
   bool per_variant = false;  ///< compiled once for each variant, with TANDEM_VARIANT defined
+  bool light = false;        ///< straight-line code, for which few optimisations are enough
 };
 
 /// Operations of one kernel.

@@ -223,6 +223,24 @@ TEST(Generator, WritesTheSameTextTwice) {
     EXPECT_TRUE(first->sources[i].text == second->sources[i].text) << first->sources[i].name;
 }
 
+// What is compiled with few optimisations is straight-line code of robots with many joints alone.
+TEST(Generator, MarksPartsOfLargeRobotsAsLight) {
+  const auto light = [](const Tree& tree, const ModelSpec& spec) {
+    std::vector<std::string> names;
+    for (const SourceFile& source : generate_kernels(tree, spec)->sources)
+      if (source.light) names.push_back(source.name);
+    return names;
+  };
+  const ReferenceRobot& coman = reference_robot("coman");
+  EXPECT_TRUE(light(reference_tree(coman), reference_spec(coman)).empty());
+  const RandomRobot robot(3, {.joints = 100, .branching = 1.0});
+  const Tree tree = parse_urdf(robot.urdf(), "large.urdf", {})->tree;
+  const std::vector<std::string> names = light(tree, {});
+  EXPECT_GT(names.size(), 10u);
+  for (const std::string& name : names) EXPECT_TRUE(name.starts_with("part_")) << name;
+  EXPECT_TRUE(light(tree, {.derivatives = true}).empty());  // their parts have loops
+}
+
 TEST(Generator, StaysBelowTheOperationGoals) {
   for (const auto& [name, goal] : {std::pair("coman", 10000u), {"walkman", 11500u}}) {
     const Mechanism m = reference_mechanism(reference_robot(name));
