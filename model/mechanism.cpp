@@ -20,6 +20,11 @@ using Eigen::Vector3d;
 // What a length that is the difference of longer ones, or a sum over links, may be off by.
 constexpr double kRounding = 4.0 * std::numeric_limits<double>::epsilon();
 
+// Lengths [m] and angles [rad] that are rounding of a description's numbers, and one of which no
+// result changes.
+constexpr double kRounded = 1e-7;
+constexpr double kNothing = 1e-30;
+
 Placement inverse(const Placement& a) { return {a.R.transpose(), -(a.R.transpose() * a.p)}; }
 
 // The components of a shift; `size` is that of the lengths that it is the difference of.
@@ -88,6 +93,42 @@ void regroup(Mechanism& mechanism, std::vector<RoundedMoments> moments) {
     add_to(moments[joint.parent], moved);
   }
   for (const RoundedMoments& x : moments) mechanism.moments.push_back(without_noise(x));
+}
+
+// Gives `x` the turns that `like` has more of, as turns by kNothing, where their cosines are 1.
+void turn_alike(FixedRotation& x, const FixedRotation& like) {
+  std::vector<AxisRotation<double>> turns;
+  std::size_t own = 0;
+  for (const AxisRotation<double>& turn : like.turns) {
+    if (own < x.turns.size() && x.turns[own].axis == turn.axis) {
+      turns.push_back(x.turns[own++]);
+    } else if (turn.c == 1.0) {
+      turns.push_back({turn.axis, 1.0, kNothing, 2.0});
+    } else {
+      return;
+    }
+  }
+  if (own == x.turns.size()) x.turns = std::move(turns);
+}
+
+// What descriptions round differs between limbs that are alike: an axis that is off by 1e-9 takes a
+// turn that the other limb does not need. There it becomes one that changes no digit, so that the
+// same operations serve both.
+void match_rounding(Mechanism& mechanism) {
+  for (const LimbPair& limbs : mechanism.limbs) {
+    for (std::size_t k = 0; k < limbs.first.size(); ++k) {
+      FixedPlacement& a = mechanism.joints[static_cast<std::size_t>(limbs.first[k])].in_parent;
+      FixedPlacement& b = mechanism.joints[static_cast<std::size_t>(limbs.second[k])].in_parent;
+      if (a.R.from == b.R.from) {
+        turn_alike(a.R, b.R);
+        turn_alike(b.R, a.R);
+      }
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (a.p[i] == 0.0 && std::abs(b.p[i]) < kRounded) a.p[i] = b.p[i] == 0.0 ? 0.0 : kNothing;
+        if (b.p[i] == 0.0 && std::abs(a.p[i]) < kRounded) b.p[i] = a.p[i] == 0.0 ? 0.0 : kNothing;
+      }
+    }
+  }
 }
 
 std::vector<std::string> link_names(const Tree& tree) {
@@ -278,6 +319,7 @@ Result<Mechanism> make_mechanism(const Tree& tree, const ModelSpec& spec, Frames
   if (Status status = maker.sensors(); !status) return std::unexpected(status.error());
   if (chosen) {
     regroup(maker.result, std::move(maker.moments));
+    match_rounding(maker.result);
   } else {
     maker.result.moments = maker.result.true_moments;
   }

@@ -227,7 +227,8 @@ TEST(Generator, WritesTheSameTextTwice) {
 TEST(Generator, MarksPartsOfLargeRobotsAsLight) {
   const auto light = [](const Tree& tree, const ModelSpec& spec) {
     std::vector<std::string> names;
-    for (const SourceFile& source : generate_kernels(tree, spec)->sources)
+    const auto generated = generate_kernels(tree, spec);
+    for (const SourceFile& source : generated->sources)
       if (source.light) names.push_back(source.name);
     return names;
   };
@@ -238,7 +239,9 @@ TEST(Generator, MarksPartsOfLargeRobotsAsLight) {
   const std::vector<std::string> names = light(tree, {});
   EXPECT_GT(names.size(), 10u);
   for (const std::string& name : names) EXPECT_TRUE(name.starts_with("part_")) << name;
-  EXPECT_TRUE(light(tree, {.derivatives = true}).empty());  // their parts have loops
+  ModelSpec spec;
+  spec.derivatives = true;  // their parts have loops
+  EXPECT_TRUE(light(tree, spec).empty());
 }
 
 TEST(Generator, StaysBelowTheOperationGoals) {

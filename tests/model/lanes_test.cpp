@@ -126,7 +126,10 @@ TEST(Lanes, HoldTheLimbsOfTheRobotsThatHaveThem) {
   const Kernels walkman("walkman");
   EXPECT_LT(walkman.left(Kernel::kForwardDynamics), 0.60);
   EXPECT_LT(walkman.left(Kernel::kMassMatrix), 0.57);
-  EXPECT_LT(Kernels("anymal_c").left(Kernel::kForwardDynamics), 0.71);
+  EXPECT_LT(Kernels("anymal_c").left(Kernel::kForwardDynamics), 0.63);
+  const Kernels icub("icub");  // axes of one limb are off by 1e-9 rad
+  EXPECT_LT(icub.left(Kernel::kForwardDynamics), 0.72);
+  EXPECT_LT(icub.left(Kernel::kMassMatrix), 0.70);
 }
 
 bool has(const EmittedKernel& kernel, const std::string& word) {
