@@ -33,6 +33,7 @@ enum class AbortCode : std::uint32_t {
   kCannotStore = 0x08000020,
   kLocalControl = 0x08000021,
   kDeviceState = 0x08000022,
+  kNoData = 0x08000024,
 };
 
 /// The code in words ("object does not exist"); "unknown abort code" for any other number.

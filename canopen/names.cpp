@@ -32,6 +32,7 @@ const char* to_string(AbortCode code) noexcept {
     case AbortCode::kCannotStore: return "data cannot be transferred or stored";
     case AbortCode::kLocalControl: return "data cannot be stored because of local control";
     case AbortCode::kDeviceState: return "data cannot be stored in the present device state";
+    case AbortCode::kNoData: return "no data available";
   }
   return "unknown abort code";
 }

@@ -25,7 +25,7 @@ void Node::add_objects(ObjectDictionary& od) {
   od.add(object::kErrorRegister, 0, error_register_, kReadTpdo);
   od.add(object::kErrorHistory, 0, history_count_, kReadWrite, {0, 0}, this);
   for (std::size_t i = 0; i < history_.size(); ++i) {
-    od.add(object::kErrorHistory, static_cast<std::uint8_t>(i + 1), history_[i], kRead);
+    od.add(object::kErrorHistory, static_cast<std::uint8_t>(i + 1), history_[i], kRead, {}, this);
   }
   od.add_value<std::uint32_t>(kSyncId, 0, cob::kSync);
   od.add(kSyncPeriod, 0, sync_period_us_, kReadWrite);
@@ -46,8 +46,8 @@ void Node::add_objects(ObjectDictionary& od) {
   od.add_value<std::uint8_t>(kErrorBehaviour, 0, 1);
   od.add(kErrorBehaviour, 1, error_behaviour_, kReadWrite, {0, 2});
   for (int i = 0; i < kPdosPerNode; ++i) {
-    rpdos_[i].add_to(od, PdoDirection::kReceive, i + 1, config_.id);
-    tpdos_[i].add_to(od, PdoDirection::kTransmit, i + 1, config_.id);
+    rpdos_[i].add_to(od, PdoDirection::kReceive, i + 1, config_.id, config_.max_pdo_bytes);
+    tpdos_[i].add_to(od, PdoDirection::kTransmit, i + 1, config_.id, config_.max_pdo_bytes);
   }
 }
 
@@ -90,6 +90,15 @@ NodeEvents Node::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT 
 void Node::transmit_synchronous(FrameSink& out) noexcept TANDEM_RT {
   if (state_ != NmtState::kOperational) return;
   for (TxPdo& pdo : tpdos_) pdo.sync(out);
+}
+
+bool Node::answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT {
+  if (state_ != NmtState::kOperational) return false;
+  return std::ranges::any_of(tpdos_, [&](const TxPdo& pdo) { return pdo.answer_remote(id, out); });
+}
+
+bool Node::heartbeat_lost() const noexcept {
+  return std::ranges::any_of(consumers_, &Consumer::lost);
 }
 
 NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
@@ -231,6 +240,12 @@ void Node::clear_errors(FrameSink& out) noexcept TANDEM_RT {
   error_register_ = 0;
   if (state_ == NmtState::kStopped || state_ == NmtState::kBootUp) return;
   out.push(make_emergency({.node = static_cast<std::uint8_t>(config_.id)}));
+}
+
+// The history's entries exist as far as it is filled.
+AbortCode Node::check_read(const ObjectEntry& entry) const noexcept TANDEM_RT {
+  const bool empty = entry.index == object::kErrorHistory && entry.sub > history_count_;
+  return empty ? AbortCode::kNoData : AbortCode::kNone;
 }
 
 AbortCode Node::check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT {

@@ -29,7 +29,8 @@ struct NodeConfig {
   std::uint32_t product = 0;
   std::uint32_t revision = kTandemRevision;
   std::uint32_t serial = 0;
-  std::string_view name;  ///< 1008; outlives the node
+  std::string_view name;                       ///< 1008; outlives the node
+  std::size_t max_pdo_bytes = kMaxFrameBytes;  ///< that its bus carries in a frame: 8 or 64
 };
 
 /// What the node asks its application to do, or lets it know. Bits of a set.
@@ -71,6 +72,8 @@ class Node final : private ObjectOwner {
     const bool to_it = (id & ~kFunctionMask) == static_cast<std::uint32_t>(config_.id);
     return broadcast || to_it || number_of_rpdo(id) >= 0;
   }
+  /// A remote request for identifier `id`. @return whether one of the node's TPDOs answers it.
+  bool answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT;
   /// Advances time: boot-up, heartbeats, SDO time-out, event-driven TPDOs.
   NodeEvents process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT;
   /// Sends the TPDOs that the SYNC just received makes due.
@@ -85,10 +88,11 @@ class Node final : private ObjectOwner {
   void clear_errors(FrameSink& out) noexcept TANDEM_RT;
 
   [[nodiscard]] NmtState state() const noexcept { return state_; }
+  /// A monitored heartbeat has stopped and was not heard since.
+  [[nodiscard]] bool heartbeat_lost() const noexcept;
   [[nodiscard]] int id() const noexcept { return config_.id; }
   /// Bit n-1: RPDO n took effect at the last SYNC or since (event-driven ones).
   [[nodiscard]] std::uint8_t applied_rpdos() const noexcept { return applied_rpdos_; }
-  [[nodiscard]] TxPdo& tpdo(int number) noexcept { return tpdos_[number - 1]; }
 
   /// Everything but the application's variables and the dictionary's own values.
   void archive(Archive& ar);
@@ -125,6 +129,7 @@ class Node final : private ObjectOwner {
   NodeEvents communication_error() noexcept;
   void reset_communication() noexcept TANDEM_RT;
   void produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept;
+  [[nodiscard]] AbortCode check_read(const ObjectEntry& entry) const noexcept TANDEM_RT override;
   AbortCode check(const ObjectEntry& entry, const std::uint8_t* bytes) noexcept TANDEM_RT override;
   void written(const ObjectEntry& entry) noexcept TANDEM_RT override;
 

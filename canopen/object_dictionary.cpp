@@ -129,6 +129,10 @@ AbortCode ObjectDictionary::read(std::uint16_t index, std::uint8_t sub, std::spa
   if (entry == nullptr) return exists(index, sub);
   if ((entry->access & kRead) == 0) return AbortCode::kWriteOnly;
   if (entry->size > out.size()) return AbortCode::kOutOfMemory;
+  if (entry->owner != nullptr) {
+    const AbortCode answer = entry->owner->check_read(*entry);
+    if (answer != AbortCode::kNone) return answer;
+  }
   entry->encode(out.data());
   length = entry->size;
   return AbortCode::kNone;

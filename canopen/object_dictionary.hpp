@@ -48,9 +48,15 @@ struct ObjectRange {
 
 struct ObjectEntry;
 
-/// Called before and after a write by SDO; for objects that are more than a variable.
+/// Called before and after a write by SDO, and before a read; for objects that are more than a
+/// variable.
 class ObjectOwner {
  public:
+  /// Whether there is anything to read now. kNone: there is.
+  [[nodiscard]] virtual AbortCode check_read(
+      const ObjectEntry& /*entry*/) const noexcept TANDEM_RT {
+    return AbortCode::kNone;
+  }
   /// `bytes` has the entry's size and lies in its range. kNone accepts.
   [[nodiscard]] virtual AbortCode check(const ObjectEntry& entry,
                                         const std::uint8_t* bytes) noexcept TANDEM_RT = 0;
@@ -152,7 +158,8 @@ class ObjectDictionary {
   [[nodiscard]] AbortCode exists(std::uint16_t index, std::uint8_t sub) const noexcept TANDEM_RT;
 
   /// What an SDO upload does: at most out.size() bytes, little-endian.
-  /// @return kNone, kNoObject, kNoSubIndex, kWriteOnly, kOutOfMemory (out is too small).
+  /// @return kNone, kNoObject, kNoSubIndex, kWriteOnly, kOutOfMemory (out is too small), or what
+  ///         the entry's owner answers.
   [[nodiscard]] AbortCode read(std::uint16_t index, std::uint8_t sub, std::span<std::uint8_t> out,
                                std::size_t& length) const noexcept TANDEM_RT;
   /// What an SDO download does.

@@ -16,6 +16,7 @@ inline constexpr std::uint32_t kSdoResponse = 0x580;  ///< server to client
 inline constexpr std::uint32_t kSdoRequest = 0x600;   ///< client to server
 inline constexpr std::uint32_t kHeartbeat = 0x700;
 inline constexpr std::uint32_t kInvalid = 0x80000000;  ///< bit 31 of a COB-ID object: not in use
+inline constexpr std::uint32_t kNoRtr = 0x40000000;    ///< bit 30 of a TPDO's: no remote request
 inline constexpr std::uint32_t kIdMask = 0x7FF;
 
 /// Transmit (node to master) PDO `number` of node `id`. @pre 1 <= number <= 4
@@ -25,6 +26,12 @@ inline constexpr std::uint32_t kIdMask = 0x7FF;
 /// Receive (master to node) PDO `number` of node `id`. @pre 1 <= number <= 4
 [[nodiscard]] constexpr std::uint32_t rpdo(int number, int id) noexcept {
   return 0x200u + 0x100u * static_cast<std::uint32_t>(number - 1) + static_cast<std::uint32_t>(id);
+}
+/// Whether CiA 301 keeps an identifier for itself, so that no PDO may have it: NMT, the default
+/// SDOs, heartbeats and what is reserved.
+[[nodiscard]] constexpr bool restricted(std::uint32_t id) noexcept {
+  return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5FF) ||
+         (id >= 0x601 && id <= 0x67F) || (id >= 0x6E0 && id <= 0x6FF) || id >= 0x701;
 }
 }  // namespace cob
 

@@ -11,23 +11,24 @@ namespace tandem::canopen {
 
 namespace {
 
-constexpr std::uint32_t kNoRtr = 0x40000000;       // bit 30 of a TPDO's COB-ID
-constexpr std::uint32_t kExtendedId = 0x20000000;  // bit 29: 29-bit identifiers, which we lack
+constexpr std::uint32_t kExtended = 0x3FFFF800;  // bit 29 and 29-bit identifiers, which we lack
 
 enum ParameterSub : std::uint8_t { kCobId = 1, kType = 2, kInhibit = 3, kEvent = 5 };
 
 }  // namespace
 
-bool Pdo::add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id) {
+bool Pdo::add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id,
+                 std::size_t max_bytes) {
   using namespace object;
   const bool receive = direction == PdoDirection::kReceive;
   const auto offset = static_cast<std::uint16_t>(number - 1);
   od_ = &od;
+  max_bytes_ = max_bytes;
   direction_ = direction;
   parameter_index_ =
       static_cast<std::uint16_t>((receive ? kRpdoParameter : kTpdoParameter) + offset);
-  default_cob_id_ =
-      cob::kInvalid | (receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id) | kNoRtr);
+  default_cob_id_ = cob::kInvalid | (receive ? cob::rpdo(number, node_id)
+                                             : cob::tpdo(number, node_id) | cob::kNoRtr);
   reset();
   const std::uint16_t p = parameter_index_;
   bool ok = od.add_value<std::uint8_t>(p, 0, receive ? kType : kEvent);
@@ -65,8 +66,10 @@ AbortCode Pdo::check_parameter(std::uint8_t sub,
                                const std::uint8_t* bytes) const noexcept TANDEM_RT {
   if (sub == kCobId) {
     const auto wanted = get<std::uint32_t>(bytes);
-    if ((wanted & kExtendedId) != 0) return AbortCode::kRange;
-    const bool stays_in_use = in_use() && (wanted & cob::kInvalid) == 0;
+    const bool to_be_used = (wanted & cob::kInvalid) == 0;
+    if ((wanted & kExtended) != 0) return AbortCode::kRange;
+    if (to_be_used && cob::restricted(wanted & cob::kIdMask)) return AbortCode::kRange;
+    const bool stays_in_use = in_use() && to_be_used;
     if (stays_in_use && (wanted & cob::kIdMask) != cob_id()) return AbortCode::kRange;
   }
   if (sub == kType && bytes[0] > 240 && bytes[0] < kEventManufacturer) return AbortCode::kRange;
@@ -86,7 +89,7 @@ AbortCode Pdo::check_mapping(std::uint8_t sub, const std::uint8_t* bytes) const 
     if (code != AbortCode::kNone) return code;
     bits += mapping_[i] & 0xFF;
   }
-  return bits > 8 * kMaxFrameBytes ? AbortCode::kMappingTooLong : AbortCode::kNone;
+  return bits > 8 * max_bytes_ ? AbortCode::kMappingTooLong : AbortCode::kNone;
 }
 
 AbortCode Pdo::check_mapped(std::uint32_t mapped) const noexcept TANDEM_RT {
@@ -154,41 +157,58 @@ void RxPdo::archive(Archive& ar) {
 
 void TxPdo::sync(FrameSink& out) noexcept TANDEM_RT {
   if (!in_use() || !synchronous()) return;
-  if (type_ == kSynchronousAcyclic) {
-    if (requested_) send(out);
+  if (type_ != kSynchronousAcyclic) {
+    if (++syncs_ >= type_) send(frame(), out);
     return;
   }
-  if (++syncs_ >= type_) send(out);
+  const Frame now = frame();
+  if (changed(now)) send(now, out);
 }
 
 void TxPdo::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
   if (!in_use() || synchronous()) return;
   since_sent_ns_ += dt_ns;
-  if (event_ms_ != 0 && since_sent_ns_ >= event_ms_ * kNsPerMs) requested_ = true;
-  if (requested_ && since_sent_ns_ >= inhibit_100us_ * (kNsPerMs / 10)) send(out);
+  if (since_sent_ns_ < inhibit_100us_ * (kNsPerMs / 10)) return;
+  const bool timed = event_ms_ != 0 && since_sent_ns_ >= event_ms_ * kNsPerMs;
+  const Frame now = frame();
+  if (timed || changed(now)) send(now, out);
 }
 
-void TxPdo::send(FrameSink& out) noexcept {
+bool TxPdo::answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT {
+  const bool asked = in_use() && allows_remote() && id == cob_id();
+  if (!asked || mapped_bytes() > kClassicFrameBytes) return false;
+  out.push(frame());
+  return true;
+}
+
+Frame TxPdo::frame() const noexcept {
   Frame frame;
   frame.id = cob_id();
   frame.length = frame_length(mapped_bytes());
   if (frame.length > kClassicFrameBytes) frame.flags = kFlagFd | kFlagBrs;
   for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(frame.data.data());
-  out.push(frame);
-  requested_ = false;
+  return frame;
+}
+
+bool TxPdo::changed(const Frame& now) const noexcept { return !sent_ || now.data != last_; }
+
+void TxPdo::send(const Frame& now, FrameSink& out) noexcept {
+  out.push(now);
+  if (!synchronous() || type_ == kSynchronousAcyclic) last_ = now.data;
+  sent_ = true;
   syncs_ = 0;
   since_sent_ns_ = 0;
 }
 
 void TxPdo::restart() noexcept TANDEM_RT {
-  requested_ = false;
+  sent_ = false;
   syncs_ = 0;
   since_sent_ns_ = INT64_MAX / 2;  // the inhibit time counts from a transmission
 }
 
 void TxPdo::archive(Archive& ar) {
   Pdo::archive(ar);
-  ar(requested_, syncs_, since_sent_ns_);
+  ar(sent_, syncs_, since_sent_ns_, last_);
 }
 
 }  // namespace tandem::canopen

@@ -31,15 +31,19 @@ enum class PdoDirection : std::uint8_t { kReceive, kTransmit };
 class Pdo : public ObjectOwner {
  public:
   /// Adds the PDO's objects to `od`. Nothing is mapped and the PDO is not in use.
-  /// @param number  1 to kPdosPerNode
+  /// @param number     1 to kPdosPerNode
+  /// @param max_bytes  that a frame of the bus carries; a longer mapping is refused
   /// @return false when `od` is full.
-  bool add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id);
+  bool add_to(ObjectDictionary& od, PdoDirection direction, int number, int node_id,
+              std::size_t max_bytes = kMaxFrameBytes);
   /// Power-on values.
   void reset() noexcept TANDEM_RT;
 
   [[nodiscard]] bool in_use() const noexcept { return (cob_id_ & cob::kInvalid) == 0; }
   [[nodiscard]] std::uint32_t cob_id() const noexcept { return cob_id_ & cob::kIdMask; }
   [[nodiscard]] bool synchronous() const noexcept { return type_ <= 240; }
+  /// A TPDO's bit 30 is clear: a remote request asks for it.
+  [[nodiscard]] bool allows_remote() const noexcept { return (cob_id_ & cob::kNoRtr) == 0; }
   /// Bytes mapped, not rounded up to a frame's length.
   [[nodiscard]] std::size_t mapped_bytes() const noexcept { return mapped_bytes_; }
 
@@ -71,6 +75,7 @@ class Pdo : public ObjectOwner {
   std::uint32_t default_cob_id_ = cob::kInvalid;
   std::uint32_t cob_id_ = cob::kInvalid;
   std::size_t mapped_bytes_ = 0;
+  std::size_t max_bytes_ = kMaxFrameBytes;
   std::array<std::uint32_t, kMaxMappedObjects> mapping_{};
 };
 
@@ -96,24 +101,30 @@ class RxPdo final : public Pdo {
   std::array<std::uint8_t, kMaxFrameBytes> latched_{};
 };
 
-/// Node to master.
+/// Node to master. The event of types 0, 254 and 255 is a change of a mapped value since it was
+/// sent last; the first values after the PDO came into use are one.
 class TxPdo final : public Pdo {
  public:
   /// At a SYNC, after the application has sampled: sends what is due (types 0 to 240).
   void sync(FrameSink& out) noexcept TANDEM_RT;
-  /// Types 254 and 255: sends when asked for or when the event timer says so, and not before the
+  /// Types 254 and 255: sends at an event or when the event timer says so, and not before the
   /// inhibit time has passed.
   void process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT;
-  /// The application has an event: send at the next occasion (types 0, 254, 255).
-  void request() noexcept TANDEM_RT { requested_ = true; }
+  /// A remote request for identifier `id`: sends the values of now.
+  /// @return false when it asks for another PDO, for one that forbids it (bit 30), or for one that
+  ///         only CAN FD carries, which has no remote requests.
+  bool answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT;
   void restart() noexcept TANDEM_RT override;
   void archive(Archive& ar);
 
  private:
-  void send(FrameSink& out) noexcept;
+  [[nodiscard]] Frame frame() const noexcept;
+  [[nodiscard]] bool changed(const Frame& now) const noexcept;
+  void send(const Frame& now, FrameSink& out) noexcept;
 
-  bool requested_ = false;
+  bool sent_ = false;  ///< since it came into use
   std::uint8_t syncs_ = 0;
+  std::array<std::uint8_t, kMaxFrameBytes> last_{};  ///< sent
   std::int64_t since_sent_ns_ = 0;
 };
 

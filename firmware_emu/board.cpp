@@ -141,7 +141,8 @@ Board::Board(const BoardSetup& setup)
              .product = setup_.product,
              .revision = setup_.revision,
              .serial = setup_.serial,
-             .name = setup_.name},
+             .name = setup_.name,
+             .max_pdo_bytes = setup_.max_pdo_bytes},
             od_),
       sync_period_us_(
           static_cast<const std::uint32_t*>(od_.find(canopen::object::kSyncPeriod, 0)->data)),
@@ -152,11 +153,16 @@ Board::Board(const BoardSetup& setup)
 
 void Board::receive(const Frame& frame) noexcept TANDEM_RT {
   if (!is_data_frame(frame)) {
-    ++ignored_frames_;
+    const bool answered = is_remote_request(frame) && node_.answer_remote(frame.id, outbox_);
+    if (!answered) ++ignored_frames_;
     return;
   }
-  if (heartbeat_lost_) heard_heartbeat(frame);
-  take(node_.receive(frame, outbox_));
+  const NodeEvents events = node_.receive(frame, outbox_);
+  if (heartbeat_lost_ && !node_.heartbeat_lost()) {
+    heartbeat_lost_ = false;
+    clear_when_well();
+  }
+  take(events);
 }
 
 void Board::take(NodeEvents events) noexcept {
@@ -176,7 +182,10 @@ void Board::take(NodeEvents events) noexcept {
   }
   if ((events & kEventOperational) != 0) {
     offline_ = false;
-    heartbeat_lost_ = false;
+    if (heartbeat_lost_) {
+      heartbeat_lost_ = false;
+      clear_when_well();
+    }
     find_command_rpdos();
   }
   if ((events & kEventLeftOperational) != 0) offline_ = true;
@@ -203,13 +212,12 @@ void Board::find_command_rpdos() noexcept {
   }
 }
 
-void Board::heard_heartbeat(const Frame& frame) noexcept {
-  const auto heartbeat = parse_heartbeat(frame);
-  if (!heartbeat) return;
-  for (std::uint8_t sub = 1; sub <= kHeartbeatConsumers; ++sub) {
-    const auto consumer = od_.value<std::uint32_t>(canopen::object::kHeartbeatConsumer, sub);
-    if ((consumer >> 16) == heartbeat->node) heartbeat_lost_ = false;
-  }
+// The register shows what is wrong now: a lost heartbeat that is back is not, when no axis took it
+// for a fault.
+void Board::clear_when_well() noexcept {
+  const bool all_clear =
+      std::ranges::all_of(axes_, [](const auto& one) { return one->objects().error_code == 0; });
+  if (all_clear && !heartbeat_lost_) node_.clear_errors(outbox_);
 }
 
 ErrorCode Board::connection(std::size_t axis) const noexcept {
@@ -231,10 +239,7 @@ void Board::supervise(std::size_t axis) noexcept {
   if (events.raised != ErrorCode::kNone && events.raised != ErrorCode::kHeartbeatLost) {
     node_.raise_error(events.raised, register_bits(events.raised), static_cast<int>(axis), outbox_);
   }
-  if (!events.reset) return;
-  const bool all_clear =
-      std::ranges::all_of(axes_, [](const auto& one) { return one->objects().error_code == 0; });
-  if (all_clear) node_.clear_errors(outbox_);
+  if (events.reset) clear_when_well();
 }
 
 void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,

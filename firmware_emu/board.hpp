@@ -88,7 +88,7 @@ class Board {
 
   void take(canopen::NodeEvents events) noexcept;
   void find_command_rpdos() noexcept;
-  void heard_heartbeat(const canopen::Frame& frame) noexcept;
+  void clear_when_well() noexcept;
   [[nodiscard]] canopen::ErrorCode connection(std::size_t axis) const noexcept;
   void supervise(std::size_t axis) noexcept;
 

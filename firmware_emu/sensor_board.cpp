@@ -74,12 +74,14 @@ SensorBoard::SensorBoard(const SensorSetup& setup)
              .device_type = kSensorDeviceType,
              .product = kSensorProduct,
              .serial = setup_.serial,
-             .name = setup_.name},
+             .name = setup_.name,
+             .max_pdo_bytes = setup_.max_pdo_bytes},
             od_),
       outbox_storage_(kSensorOutboxFrames),
       outbox_(outbox_storage_) {}
 
 void SensorBoard::receive(const Frame& frame) noexcept TANDEM_RT {
+  if (is_remote_request(frame)) (void)node_.answer_remote(frame.id, outbox_);
   if (!is_data_frame(frame)) return;
   if ((node_.receive(frame, outbox_) & kEventSync) != 0) sync_pending_ = true;
 }

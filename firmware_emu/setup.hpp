@@ -70,6 +70,7 @@ struct BoardSetup {
   std::uint32_t revision = canopen::kTandemRevision;
   std::uint32_t serial = 0;
   std::int64_t control_period_ns = 1'000'000;
+  std::size_t max_pdo_bytes = 64;  ///< 8 on a bus without CAN FD
   int command_timeout_syncs = 10;  ///< 2032; 0: never
   std::uint64_t seed = 1;          ///< of the torque sensors' noise
   std::vector<AxisSetup> axes;
@@ -81,8 +82,9 @@ struct SensorSetup {
   std::string name = "tandem sensor";
   std::uint32_t serial = 0;
   std::size_t channels = 6;
-  std::vector<double> noise;  ///< standard deviation per channel, SI; empty: none
-  std::vector<double> bias;   ///< per channel, SI; empty: none
+  std::size_t max_pdo_bytes = 64;  ///< 8 on a bus without CAN FD
+  std::vector<double> noise;       ///< standard deviation per channel, SI; empty: none
+  std::vector<double> bias;        ///< per channel, SI; empty: none
   std::uint64_t seed = 1;
 };
 

@@ -21,6 +21,12 @@ namespace tandem::firmware {
   return frame.fd() || frame.length <= canopen::kClassicFrameBytes;
 }
 
+/// Whether `frame` is a classic remote request, which asks for the PDO of its identifier.
+[[nodiscard]] inline bool is_remote_request(const canopen::Frame& frame) noexcept TANDEM_RT {
+  return frame.id <= canopen::cob::kIdMask && frame.flags == canopen::kFlagRtr &&
+         frame.length <= canopen::kClassicFrameBytes;
+}
+
 /// Archives the frames that wait in `outbox`, of which there are at most `capacity`.
 void archive_outbox(Archive& ar, canopen::FrameSink& outbox, std::size_t capacity);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "canopen/frame.hpp"
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/sensors.hpp"
 
@@ -20,6 +21,12 @@ std::uint64_t seed_of(std::uint64_t seed, std::uint64_t kind, std::size_t index)
 // torque's noise, and the spring's damping, which the comparison leaves out.
 constexpr double kMismatchWindow_rad = 0.02;
 constexpr double kUndervoltageShare = 0.6;  // of the supply
+
+/// What a frame of the bus carries.
+std::size_t pdo_bytes(const hal::RobotConfig& robot, const std::string& name) {
+  const hal::BusConfig* bus = robot.bus(name);
+  return bus == nullptr || bus->fd ? canopen::kMaxFrameBytes : canopen::kClassicFrameBytes;
+}
 
 firmware::Pid::Config pid(const hal::PidConfig& config, double limit) {
   return {.kp = config.gains.kp,
@@ -157,6 +164,7 @@ firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t inde
   board.revision = config.revision.value_or(board.revision);
   board.serial = config.serial.value_or(static_cast<std::uint32_t>(index + 1));
   board.control_period_ns = config.control_period_ns;
+  board.max_pdo_bytes = pdo_bytes(robot, config.bus);
   board.command_timeout_syncs = config.command_timeout_cycles;
   board.seed = seed_of(seed, 1, index);
   for (const std::size_t joint : joints_of(robot, config)) {
@@ -173,6 +181,7 @@ firmware::SensorSetup sensor_setup(const hal::RobotConfig& robot, std::size_t in
   sensor.name = config.name;
   sensor.serial = static_cast<std::uint32_t>(index + 1);
   sensor.channels = config.channels();
+  sensor.max_pdo_bytes = pdo_bytes(robot, config.bus);
   sensor.noise = config.noise;
   sensor.bias = config.bias;
   sensor.seed = seed_of(seed, 2, index);

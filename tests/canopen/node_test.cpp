@@ -200,6 +200,20 @@ TEST_F(NodeTest, KeepsTheErrorHistoryNewestFirst) {
   EXPECT_EQ(od.value<std::uint32_t>(0x1003, 1), 0u);
 }
 
+TEST_F(NodeTest, HasNoDataInAnEmptyErrorHistory) {
+  wait(0);
+  (void)out.take();
+  const Frame read = wire(0x603, {0x40, 0x03, 0x10, 0x01, 0, 0, 0, 0});
+  on(read);
+  EXPECT_EQ(out.take(), Frames{wire(0x583, {0x80, 0x03, 0x10, 0x01, 0x24, 0, 0, 0x08})});
+  on(wire(0x603, {0x40, 0x03, 0x10, 0x00, 0, 0, 0, 0}));
+  EXPECT_EQ(out.take(), Frames{wire(0x583, {0x4F, 0x03, 0x10, 0x00, 0, 0, 0, 0})});
+  node->raise_error(ErrorCode::kI2t, error_register::kCurrent, 0, out.sink());
+  (void)out.take();
+  on(read);
+  EXPECT_EQ(out.take(), Frames{wire(0x583, {0x43, 0x03, 0x10, 0x01, 0x50, 0x23, 0, 0})});
+}
+
 TEST_F(NodeTest, ResetForgetsTheConfigurationAndBootsUp) {
   wait(0);
   (void)out.take();

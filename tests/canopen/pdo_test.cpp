@@ -99,15 +99,35 @@ TEST_F(PdoFixture, TpdoIsSentEverySyncOrEveryThird) {
   EXPECT_EQ(sent, (std::vector<std::size_t>{0, 0, 1, 0, 0, 1}));
 }
 
-TEST_F(PdoFixture, AcyclicTpdoWaitsForAnEventAndTheSync) {
+TEST_F(PdoFixture, AcyclicTpdoIsSentAtTheSyncAfterAChange) {
   map_tpdo(0);
-  tpdo.sync(out.sink());
-  EXPECT_TRUE(out.take().empty());
-  tpdo.request();
-  tpdo.process(1'000'000, out.sink());
-  EXPECT_TRUE(out.take().empty());
-  tpdo.sync(out.sink());
-  EXPECT_EQ(out.take(), Frames{kFeedback});
+  std::vector<std::size_t> sent;
+  for (int i = 0; i < 6; ++i) {
+    if (i == 3) actual = 7;
+    tpdo.process(1'000'000, out.sink());
+    EXPECT_TRUE(out.take().empty()) << "not without a SYNC";
+    tpdo.sync(out.sink());
+    sent.push_back(out.take().size());
+  }
+  EXPECT_EQ(sent, (std::vector<std::size_t>{1, 0, 0, 1, 0, 0})) << "when it comes into use, too";
+}
+
+TEST_F(PdoFixture, EventTpdoIsSentWhenAValueChanges) {
+  for (const std::uint8_t type : {kEventManufacturer, kEventProfile}) {
+    ASSERT_EQ(write32(0x1800, 1, 0xC0000185), AbortCode::kNone);
+    ASSERT_EQ(write8(0x1A00, 0, 0), AbortCode::kNone);
+    map_tpdo(type);
+    std::vector<int> sent;
+    for (int ms = 0; ms < 20; ++ms) {
+      if (ms == 4) status = 0x0218;
+      if (ms == 9) actual = type;
+      tpdo.sync(out.sink());
+      tpdo.process(1'000'000, out.sink());
+      if (!out.take().empty()) sent.push_back(ms);
+    }
+    EXPECT_EQ(sent, (std::vector<int>{0, 4, 9})) << int{type};
+    status = 0x1637;
+  }
 }
 
 TEST_F(PdoFixture, EventTpdoKeepsItsInhibitTimeAndEventTimer) {
@@ -118,7 +138,7 @@ TEST_F(PdoFixture, EventTpdoKeepsItsInhibitTimeAndEventTimer) {
   map_tpdo(255);
   std::vector<int> sent;
   for (int ms = 0; ms < 40; ++ms) {
-    if (ms == 2 || ms == 3) tpdo.request();
+    if (ms == 2 || ms == 3) ++actual;
     tpdo.process(1'000'000, out.sink());
     if (!out.take().empty()) sent.push_back(ms);
   }
@@ -169,6 +189,37 @@ TEST_F(PdoFixture, RefusesWhatCannotBeMapped) {
     ASSERT_EQ(write32(0x1A00, static_cast<std::uint8_t>(i + 1), 0x21000120), AbortCode::kNone);
   }
   EXPECT_EQ(write8(0x1A00, 0, 17), AbortCode::kMappingTooLong) << "68 bytes";
+}
+
+TEST_F(PdoFixture, MapsNoMoreThanAFrameOfItsBusCarries) {
+  ObjectDictionary classic{200};
+  TxPdo small;
+  ASSERT_TRUE(classic.add(0x2100, 1, wide[0], kReadTpdo));
+  ASSERT_TRUE(small.add_to(classic, PdoDirection::kTransmit, 1, 5, kClassicFrameBytes));
+  for (std::uint8_t i = 1; i <= 3; ++i) {
+    ASSERT_EQ(classic.write(0x1A00, i, std::array<std::uint8_t, 4>{0x20, 1, 0, 0x21}),
+              AbortCode::kNone);
+  }
+  EXPECT_EQ(classic.write(0x1A00, 0, std::array<std::uint8_t, 1>{3}), AbortCode::kMappingTooLong);
+  EXPECT_EQ(classic.write(0x1A00, 0, std::array<std::uint8_t, 1>{2}), AbortCode::kNone);
+}
+
+TEST_F(PdoFixture, RefusesIdentifiersThatCiA301KeepsForItself) {
+  for (const std::uint32_t id : {0x000u, 0x001u, 0x07Fu, 0x101u, 0x180u, 0x581u, 0x5FFu, 0x601u,
+                                 0x67Fu, 0x6E0u, 0x6FFu, 0x701u, 0x77Fu, 0x780u, 0x7E4u, 0x7FFu}) {
+    EXPECT_EQ(write32(0x1400, 1, id), AbortCode::kRange) << std::hex << id;
+    EXPECT_EQ(write32(0x1800, 1, 0x40000000 | id), AbortCode::kRange) << std::hex << id;
+  }
+  for (const std::uint32_t id : {0x181u, 0x300u, 0x580u, 0x680u}) {
+    EXPECT_EQ(write32(0x1400, 1, id), AbortCode::kNone) << std::hex << id;
+    EXPECT_EQ(write32(0x1400, 1, 0x80000000), AbortCode::kNone) << "not in use: nobody's";
+  }
+}
+
+TEST_F(PdoFixture, RefusesThePartsOfA29BitIdentifierWithoutItsBit) {
+  EXPECT_EQ(write32(0x1400, 1, 0x20000205), AbortCode::kRange);
+  EXPECT_EQ(write32(0x1400, 1, 0x00000A05), AbortCode::kRange) << "bit 11";
+  EXPECT_EQ(write32(0x1800, 1, 0xD0000185), AbortCode::kRange) << "bit 28";
 }
 
 TEST_F(PdoFixture, RefusesReservedTransmissionTypes) {

@@ -100,6 +100,39 @@ TEST(Board, IgnoresAndCountsWhatIsNoDataFrame) {
   EXPECT_EQ(rig.board.nmt_state(), canopen::NmtState::kOperational);
 }
 
+TEST(Board, AnswersARemoteRequestWhereItsTpdoAllowsOne) {
+  Rig rig;
+  rig.start();
+  rig.map(0x1801, 0x1A01, 0x285, {0x60410010, 0x60770010});
+  rig.write<std::uint32_t>(0x1802, 1, 0xC0000385);
+  rig.map(0x1802, 0x1A02, 0x40000385, {0x60410010});
+  rig.cycles(2);
+  const auto answers = [&rig](std::uint32_t id) {
+    rig.seen.clear();
+    rig.give({.id = id, .length = 4, .flags = canopen::kFlagRtr});
+    return rig.frames_of(id);
+  };
+  ASSERT_EQ(answers(0x285).size(), 1U);
+  EXPECT_EQ(answers(0x285)[0], canopen::make_frame(0x285, std::array<std::uint8_t, 4>{0x50, 2}));
+  EXPECT_EQ(answers(0x385).size(), 0U) << "bit 30: not allowed";
+  EXPECT_EQ(answers(0x185).size(), 0U) << "16 bytes travel in CAN FD, which has no requests";
+  EXPECT_EQ(rig.object<std::uint32_t>(0x2050), 2U);
+  rig.nmt(128);
+  EXPECT_EQ(answers(0x285).size(), 0U) << "not operational";
+}
+
+TEST(Board, OnAClassicBusMapsNoMoreThanEightBytes) {
+  BoardSetup setup = board_setup();
+  setup.max_pdo_bytes = 8;
+  Rig rig(setup);
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1A00, 1, 0x60640020), 0U);
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1A00, 2, 0x606C0020), 0U);
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1A00, 3, 0x20000020), 0U);
+  EXPECT_EQ(rig.write<std::uint8_t>(0x1A00, 0, 3), 0x06040042U);
+  EXPECT_EQ(rig.write<std::uint8_t>(0x1A00, 0, 2), 0U);
+}
+
 TEST(Board, DoesNotProcessAPdoThatIsTooShort) {
   Rig rig;
   rig.start();

@@ -293,6 +293,51 @@ TEST_F(Guard, StopsWhenTheMastersHeartbeatStays) {
   EXPECT_TRUE(reset(rig));
 }
 
+TEST_F(Guard, ShowsALostHeartbeatOnlyUntilItIsBackWhenNoAxisTookItForAFault) {
+  for (const bool started : {false, true}) {
+    Rig r;
+    r.step();
+    ASSERT_EQ(r.write<std::uint32_t>(0x1016, 1, 0x007F0032), 0U);
+    r.start();
+    heartbeat(r);
+    r.cycles(60);
+    EXPECT_EQ(r.error(), 0) << "it is disabled";
+    EXPECT_EQ(r.object<std::uint8_t>(0x1001), 0x11);
+    r.seen.clear();
+    if (started) {
+      r.nmt(1);
+    } else {
+      heartbeat(r);
+    }
+    EXPECT_EQ(r.object<std::uint8_t>(0x1001), 0);
+    const auto emergencies = r.frames_of(0x085);
+    ASSERT_EQ(emergencies.size(), 1U);
+    EXPECT_EQ(emergencies[0].data, (std::array<std::uint8_t, 64>{}));
+  }
+}
+
+TEST_F(Guard, KeepsItsFaultWhileOneOfTwoHeartbeatsIsLost) {
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1016, 1, 0x007F0032), 0U);
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1016, 2, 0x00110032), 0U);
+  ASSERT_EQ(rig.write<std::uint8_t>(0x1029, 1, 1), 0U);  // stay operational
+  rig.start();
+  heartbeat(rig);
+  rig.send(0x711, {0x05});
+  rig.enable();
+  for (int k = 0; k < 10; ++k) {
+    heartbeat(rig);
+    rig.cycles(10);
+  }
+  EXPECT_EQ(rig.error(), 0x8130) << "node 17's, while the master's comes";
+  rig.cycles(1100);
+  heartbeat(rig);
+  EXPECT_FALSE(reset(rig)) << "node 17 is still silent";
+  heartbeat(rig);
+  rig.send(0x711, {0x05});
+  EXPECT_TRUE(reset(rig));
+}
+
 TEST_F(Guard, DisablesWithoutAFaultOnALostHeartbeatByOption) {
   rig.step();
   ASSERT_EQ(rig.write<std::uint32_t>(0x1016, 1, 0x007F0032), 0U);
