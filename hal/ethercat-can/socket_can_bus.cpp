@@ -133,8 +133,13 @@ std::size_t SocketCanBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
 void SocketCanBus::take(std::size_t at, std::span<Frame> frames) noexcept {
   const canfd_frame& in = in_->frames[at];
   take_control(at);
-  switch (from_kernel(in, in_->messages[at].msg_len, frames[received_])) {
+  KernelFrame kind = from_kernel(in, in_->messages[at].msg_len, frames[received_]);
+  if (kind == KernelFrame::kRemote && options_.side != SocketSide::kBoards) {
+    kind = KernelFrame::kIgnored;
+  }
+  switch (kind) {
     case KernelFrame::kData:
+    case KernelFrame::kRemote:
       if (controller_ == BusState::kBusOff) change(link_, BusState::kActive);
       ++statistics_.received;
       ++received_;

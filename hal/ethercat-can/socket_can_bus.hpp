@@ -22,7 +22,7 @@ namespace tandem::hal::can {
 /// Who is at this end: decides which frames the kernel lets through.
 enum class SocketSide : std::uint8_t {
   kMaster,   ///< what nodes send: emergencies, TPDOs, SDO answers, heartbeats, TIME
-  kBoards,   ///< what a master sends: NMT, SYNC, RPDOs, SDO requests, the master's heartbeat
+  kBoards,   ///< NMT, SYNC, RPDOs, SDO requests, every heartbeat, remote requests for TPDOs
   kWitness,  ///< every frame
   kSender,   ///< nothing: for who only sends
 };
@@ -41,7 +41,8 @@ struct SocketCanOptions {
 /// that is down, or was removed and comes back under its name. While it is away one look in 100 ms
 /// is all that it costs. docs/can.md explains each state and how to set an interface up.
 ///
-/// Remote requests, 29-bit identifiers and error frames never come out of receive().
+/// 29-bit identifiers and error frames never come out of receive(); remote requests only at the
+/// boards' side.
 class SocketCanBus final : public Bus {
  public:
   /// Most frames that one receive() gives.

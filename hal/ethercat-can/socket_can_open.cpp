@@ -123,11 +123,12 @@ Status size_queues(const SocketCanOptions& options, int socket) {
   return {};
 }
 
-/// What the kernel lets through; to master and boards only data frames with 11-bit identifiers.
+/// What the kernel lets through: only 11-bit identifiers, and data frames but for the remote
+/// requests that a board may have to answer. A board hears every heartbeat: 1016 may name any node.
 std::vector<can_filter> filters(SocketSide side) {
   std::vector<can_filter> all;
-  const auto let = [&](std::uint32_t id, std::uint32_t mask) {
-    all.push_back({.can_id = id, .can_mask = mask | CAN_EFF_FLAG | CAN_RTR_FLAG});
+  const auto let = [&](std::uint32_t id, std::uint32_t mask, std::uint32_t remote = 0) {
+    all.push_back({.can_id = id | remote, .can_mask = mask | CAN_EFF_FLAG | CAN_RTR_FLAG});
   };
   if (side == SocketSide::kMaster) {
     // 081 to 0FF, without SYNC: by the highest bit of the node id
@@ -145,9 +146,10 @@ std::vector<can_filter> filters(SocketSide side) {
     let(cob::kSync, cob::kIdMask);
     for (int number = 1; number <= canopen::kPdosPerNode; ++number) {
       let(cob::rpdo(number, 0), kFunctionMask);
+      let(cob::tpdo(number, 0), kFunctionMask, CAN_RTR_FLAG);
     }
     let(cob::kSdoRequest, kFunctionMask);
-    let(cob::kHeartbeat + kMasterNodeId, cob::kIdMask);
+    let(cob::kHeartbeat, kFunctionMask);
   } else if (side == SocketSide::kWitness) {
     all.push_back({.can_id = 0, .can_mask = 0});
   }

@@ -1,4 +1,5 @@
-// Lengths that CAN cannot have, remote and 29-bit frames are refused here, in both directions.
+// Lengths that CAN cannot have and 29-bit frames are refused here, in both directions; remote
+// requests are only received.
 #include "hal/ethercat-can/socket_frame.hpp"
 
 #include <linux/can/error.h>
@@ -36,11 +37,16 @@ KernelFrame from_kernel(const canfd_frame& in, std::size_t bytes, Frame& out) no
   const bool fd = bytes == CANFD_MTU;
   if (!fd && bytes != CAN_MTU) return KernelFrame::kIgnored;
   if ((in.can_id & CAN_ERR_FLAG) != 0) return KernelFrame::kError;
-  if ((in.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG)) != 0) return KernelFrame::kIgnored;
+  const bool remote = (in.can_id & CAN_RTR_FLAG) != 0;
+  if ((in.can_id & CAN_EFF_FLAG) != 0 || (remote && fd)) return KernelFrame::kIgnored;
   if (!length_exists(in.len, fd)) return KernelFrame::kIgnored;
   out = {};
   out.id = in.can_id & CAN_SFF_MASK;
   out.length = in.len;
+  if (remote) {
+    out.flags = canopen::kFlagRtr;
+    return KernelFrame::kRemote;
+  }
   if (fd) out.flags = canopen::kFlagFd;
   if (fd && (in.flags & CANFD_BRS) != 0) out.flags |= canopen::kFlagBrs;
   std::copy_n(in.data, in.len, out.data.begin());

@@ -25,12 +25,13 @@ namespace tandem::hal::can {
 enum class KernelFrame : std::uint8_t {
   kData,     ///< `out` is filled
   kError,    ///< read_error_frame() says more
-  kIgnored,  ///< 29-bit identifier, remote request, wrong size or length
+  kRemote,   ///< a remote request: `out` is filled, without data
+  kIgnored,  ///< 29-bit identifier, wrong size or length
 };
 
 /// Reads what the kernel gave.
 /// @param bytes  that it wrote: a classic frame is shorter than an FD frame
-/// @param out    written when the answer is kData
+/// @param out    written when the answer is kData or kRemote
 [[nodiscard]] KernelFrame from_kernel(const canfd_frame& in, std::size_t bytes,
                                       canopen::Frame& out) noexcept TANDEM_RT;
 

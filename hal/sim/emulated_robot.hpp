@@ -180,6 +180,7 @@ class EmulatedRobot {
   void pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept;
   void receive(std::size_t bus, const canopen::Frame& frame) noexcept;
   void run_boards() noexcept;
+  void pass_heartbeat(std::size_t bus, const canopen::Frame& frame) noexcept;
   void answer(std::size_t bus, std::size_t sender, std::span<const canopen::Frame> frames) noexcept;
   void put_out(std::size_t bus, std::size_t sender,
                std::span<const canopen::Frame> frames) noexcept;

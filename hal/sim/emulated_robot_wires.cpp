@@ -1,4 +1,5 @@
-// The step's frames when [sim] bus_timing is on: each takes its time in a WireModel per bus.
+// The step's frames on their way out: to the master, heartbeats also to the other nodes; when [sim]
+// bus_timing is on each takes its time in a WireModel per bus.
 #include <algorithm>
 
 #include "hal/sim/emulated_robot.hpp"
@@ -43,6 +44,7 @@ void EmulatedRobot::carry(std::size_t bus, std::int64_t until_ns, bool to_sync) 
   while (wire.model.next(until_ns, delivery)) {
     if (delivery.sender != kMasterSender) {
       (void)buses_[bus]->boards().send({&delivery.frame, 1});
+      pass_heartbeat(bus, delivery.frame);
       continue;
     }
     pass_to_boards(bus, delivery.frame);
@@ -58,11 +60,27 @@ void EmulatedRobot::put_out(std::size_t bus, std::size_t sender,
                             std::span<const canopen::Frame> frames) noexcept {
   if (wires_.empty()) {
     (void)buses_[bus]->boards().send(frames);
+    for (const canopen::Frame& frame : frames) pass_heartbeat(bus, frame);
     return;
   }
   Wire& wire = wires_[bus];
   for (const canopen::Frame& frame : frames) {
     (void)wire.model.push(sender, frame, wire.answers_ns);
+  }
+}
+
+/// The other nodes of a bus hear a node's heartbeat: their 1016 may name it.
+void EmulatedRobot::pass_heartbeat(std::size_t bus, const canopen::Frame& frame) noexcept {
+  constexpr std::uint32_t kNodeBits = 0x7F;
+  if ((frame.id & ~kNodeBits) != canopen::cob::kHeartbeat) return;
+  const auto from = static_cast<int>(frame.id & kNodeBits);
+  for (const std::size_t b : attached_[bus].boards) {
+    const bool hears = boards_[b].powered != 0 && boards_[b].board->node_id() != from;
+    if (hears) boards_[b].board->receive(frame);
+  }
+  for (const std::size_t s : attached_[bus].sensors) {
+    const bool hears = sensor_nodes_[s].powered != 0 && sensor_nodes_[s].board->node_id() != from;
+    if (hears) sensor_nodes_[s].board->receive(frame);
   }
 }
 

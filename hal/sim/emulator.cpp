@@ -1,9 +1,11 @@
 // A step is due when SYNC is on every bus, or in real time half a period after the first SYNC, or a
-// period and a half after the last step. TIME ends the answers in lockstep.
+// period and a half after the last step. A step without SYNC is a period after the one before,
+// however late it is made. TIME ends the answers in lockstep.
 #include "hal/sim/emulator.hpp"
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "canopen/messages.hpp"
 #include "canopen/objects.hpp"
@@ -68,11 +70,17 @@ Emulator::Due Emulator::due(std::int64_t now_ns) const noexcept {
 }
 
 /// How many periods have passed since the last step, as far as they are made up. In lockstep: 1.
+/// With SYNC the nearest number, and the time of the last step is now; without it whole periods,
+/// and that time advances by them alone: the boards' clocks run on at their own rate.
 std::int64_t Emulator::periods_to(std::int64_t now_ns) noexcept {
+  const std::int64_t before_ns = std::exchange(stepped_ns_, now_ns);
   if (config_.lockstep || !running_) return 1;
-  const std::int64_t half_ns = config_.period_ns / 2;
-  const std::int64_t passed = (now_ns - stepped_ns_ + half_ns) / config_.period_ns;
+  const bool synced = first_sync_ns_ != 0;
+  const std::int64_t half_ns = synced ? config_.period_ns / 2 : 0;
+  const std::int64_t passed = (now_ns - before_ns + half_ns) / config_.period_ns;
   if (passed > kMostBehind) statistics_.slipped += static_cast<std::uint64_t>(passed - kMostBehind);
+  const bool all = passed >= 1 && passed <= kMostBehind;
+  if (!synced && all) stepped_ns_ = before_ns + passed * config_.period_ns;
   return std::clamp<std::int64_t>(passed, 1, kMostBehind);
 }
 
@@ -81,7 +89,6 @@ Code Emulator::step(std::int64_t now_ns) noexcept {
   if (first_sync_ns_ == 0 && !config_.lockstep) {
     statistics_.steps_without_sync += static_cast<std::uint64_t>(periods);
   }
-  stepped_ns_ = now_ns;
   running_ = true;
   first_sync_ns_ = 0;
   for (; periods > 0; --periods) {

@@ -45,7 +45,8 @@ struct EmulatorStatistics {
 /// every bus. Without a master time stands still.
 ///
 /// In real time a step is made when SYNC has come on every bus, or half a period after the first of
-/// them; and when none came for a period and a half, because the boards have clocks of their own.
+/// them; and when none came for a period and a half, because the boards have clocks of their own:
+/// from then on one a period.
 /// Periods that the process slept through are made up, a few at most.
 class Emulator {
  public:

@@ -75,11 +75,18 @@ TEST(SocketFrame, ReadsWithoutWhatStandsBehindTheData) {
 TEST(SocketFrame, IgnoresWhatNoNodeSends) {
   Frame out;
   EXPECT_EQ(from_kernel(received(0x18A | CAN_EFF_FLAG, 8), CAN_MTU, out), KernelFrame::kIgnored);
-  EXPECT_EQ(from_kernel(received(0x18A | CAN_RTR_FLAG, 8), CAN_MTU, out), KernelFrame::kIgnored);
+  EXPECT_EQ(from_kernel(received(0x18A | CAN_RTR_FLAG, 8), CANFD_MTU, out), KernelFrame::kIgnored)
+      << "CAN FD has no remote requests";
   EXPECT_EQ(from_kernel(received(0x18A, 9), CAN_MTU, out), KernelFrame::kIgnored);
   EXPECT_EQ(from_kernel(received(0x18A, 63), CANFD_MTU, out), KernelFrame::kIgnored);
   EXPECT_EQ(from_kernel(received(0x18A, 255), CANFD_MTU, out), KernelFrame::kIgnored);
   EXPECT_EQ(from_kernel(received(0x18A, 8), 12, out), KernelFrame::kIgnored) << "cut short";
+}
+
+TEST(SocketFrame, ReadsARemoteRequestWithoutData) {
+  Frame out = make_frame(0x7FF, std::array<std::uint8_t, 8>{9, 9, 9, 9, 9, 9, 9, 9});
+  ASSERT_EQ(from_kernel(received(0x18A | CAN_RTR_FLAG, 8), CAN_MTU, out), KernelFrame::kRemote);
+  EXPECT_EQ(out, (Frame{.id = 0x18A, .length = 8, .flags = canopen::kFlagRtr}));
 }
 
 TEST(SocketFrame, GoesThereAndBackForEveryLength) {

@@ -5,6 +5,7 @@
 
 #include "canopen/messages.hpp"
 #include "hal/config/capabilities.hpp"
+#include "hal/sim/emulator.hpp"
 #include "tests/sim/swing_loop.hpp"
 
 namespace tandem::sim {
@@ -225,6 +226,79 @@ TEST(SimRobot, AnUnknownPostureSuggestsTheNearest) {
       SimRobot::create(swing_robot(), swing_kernels(2), SimRobotConfig{.posture = "upp"});
   ASSERT_FALSE(made.has_value());
   EXPECT_NE(made.error().to_string().find("up"), std::string::npos);
+}
+
+/// The robot alone, and what it says to whom writes to it byte by byte.
+struct BareRobot {
+  explicit BareRobot(bool bus_timing = false) {
+    SimRobotConfig config{.posture = "up"};
+    config.bus_timing = bus_timing;
+    auto made = EmulatedRobot::create(swing_robot(), swing_kernels(2), config);
+    EXPECT_TRUE(made.has_value());
+    robot = std::move(*made);
+    step(3);
+  }
+  void send(std::uint32_t id, const std::vector<std::uint8_t>& bytes) {
+    const std::array frames{canopen::make_frame(id, bytes)};
+    (void)robot->bus(0).master().send(frames);
+    step(2);
+  }
+  void step(int steps) {
+    for (int i = 0; i < steps; ++i) {
+      EXPECT_EQ(robot->step(time_ns), Code::kOk);
+      time_ns += 1'000'000;
+      std::array<canopen::Frame, 64> batch;
+      const std::size_t count = robot->bus(0).master().receive(batch);
+      seen.insert(seen.end(), batch.begin(), batch.begin() + count);
+    }
+  }
+  [[nodiscard]] auto count(std::uint32_t id) const {
+    return std::ranges::count(seen, id, &canopen::Frame::id);
+  }
+  std::unique_ptr<EmulatedRobot> robot;
+  std::vector<canopen::Frame> seen;
+  std::int64_t time_ns = 0;
+};
+
+TEST(SimRobot, ABoardHearsTheHeartbeatOfAnotherNodeThat1016Names) {
+  for (const bool timed : {false, true}) {
+    BareRobot bare(timed);
+    bare.send(0x614, {0x2B, 0x17, 0x10, 0, 20, 0, 0, 0});      // node 20: a heartbeat every 20 ms
+    bare.send(0x601, {0x23, 0x16, 0x10, 1, 100, 0, 0x14, 0});  // node 1: node 20's, 100 ms
+    bare.step(300);
+    EXPECT_GE(bare.count(0x714), 10) << "timed: " << timed;
+    EXPECT_EQ(bare.count(0x081), 0) << "timed: " << timed;
+    bare.send(0x000, {0x82, 20});  // node 20 forgets its heartbeat
+    bare.step(150);
+    ASSERT_EQ(bare.count(0x081), 1) << "timed: " << timed;
+    const auto emergency = std::ranges::find(bare.seen, 0x081u, &canopen::Frame::id);
+    EXPECT_EQ(emergency->data[0] | emergency->data[1] << 8, 0x8130);
+  }
+}
+
+/// A clock that waiting moves on.
+struct PlayedWait final : hal::can::FrameWait {
+  std::int64_t now_ns() noexcept override { return time_ns; }
+  void wait(std::int64_t at_most_ns, int) noexcept override { time_ns += at_most_ns; }
+  std::int64_t time_ns = 1;
+};
+
+TEST(Emulator, WithoutSyncTheBoardsTimeIsThatOfTheClock) {
+  BareRobot bare;
+  hal::can::LoopbackBus wire;
+  std::array<hal::can::Bus*, 1> far{&wire.boards()};
+  PlayedWait clock;
+  Emulator emulator(*bare.robot, far, clock, {.period_ns = 1'000'000});
+  while (clock.time_ns < 1'000'000'000) (void)emulator.poll(100'000);
+  EXPECT_NEAR(static_cast<double>(emulator.statistics().steps), 1000.0, 1.0);
+  EXPECT_EQ(emulator.statistics().slipped, 0u);
+  const std::array sync{canopen::make_sync()};
+  for (int cycle = 0; cycle < 1000; ++cycle) {
+    (void)wire.master().send(sync);
+    const std::int64_t until_ns = clock.time_ns + 1'000'000;
+    while (clock.time_ns < until_ns) (void)emulator.poll(until_ns - clock.time_ns);
+  }
+  EXPECT_NEAR(static_cast<double>(emulator.statistics().steps), 2000.0, 2.0);
 }
 
 }  // namespace
