@@ -71,6 +71,7 @@ constexpr std::array kNames{
     ObjectName{0x2041, "Refused values"},
     ObjectName{0x2050, "Ignored frames"},
     ObjectName{0x2051, "Cycle counter"},
+    ObjectName{0x2052, "SYNC time-out"},
     ObjectName{0x2100, "Sensor channels"},
     ObjectName{0x6007, "Abort connection option code"},
     ObjectName{0x603F, "Error code"},

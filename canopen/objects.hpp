@@ -130,6 +130,7 @@ inline constexpr std::uint16_t kBrake = 0x203A;             // u16: BrakeSub
 
 // The manufacturer's, of a board
 inline constexpr std::uint16_t kCycleCounter = 0x2051;  // u8: by RPDO, echoed by TPDO
+inline constexpr std::uint16_t kSyncTimeout = 0x2052;   // u32 [us], 0: by 1006 and 2032
 
 // The manufacturer's, of a sensor node
 inline constexpr std::uint16_t kSensorChannels = 0x2100;  // f32[]: sub 1 to n, SI units

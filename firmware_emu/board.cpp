@@ -16,7 +16,7 @@ using namespace canopen;
 
 constexpr std::string_view kSoftwareVersion = "tandem firmware 1.0";
 constexpr std::string_view kHardwareVersion = "emulated";
-constexpr std::size_t kBoardEntries = 4;
+constexpr std::size_t kBoardEntries = 5;
 constexpr std::int64_t kNsPerUs = 1000;
 
 std::uint8_t register_bits(ErrorCode code) noexcept {
@@ -121,11 +121,13 @@ std::vector<std::unique_ptr<Axis>> make_axes(const BoardSetup& setup, ObjectDict
 /// Adds the board's own entries before the node resolves anything.
 std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDictionary& od,
                                               std::uint32_t& ignored_frames,
+                                              std::uint32_t& sync_timeout_us,
                                               std::uint8_t& cycle_counter) {
   od.add_string(canopen::object::kHardwareVersion, 0, kHardwareVersion);
   od.add_string(canopen::object::kSoftwareVersion, 0, kSoftwareVersion);
   od.add(object::kIgnoredFrames, 0, ignored_frames, kReadTpdo);
   od.add(canopen::object::kCycleCounter, 0, cycle_counter, kWriteRpdo | kMapTpdo);
+  od.add(canopen::object::kSyncTimeout, 0, sync_timeout_us, kReadWrite);
   return make_axes(setup, od);
 }
 
@@ -134,7 +136,7 @@ std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDic
 Board::Board(const BoardSetup& setup)
     : setup_(setup),
       od_(kNodeObjects + kBoardEntries + setup.axes.size() * kAxisEntries),
-      axes_(make_board(setup_, od_, ignored_frames_, cycle_counter_)),
+      axes_(make_board(setup_, od_, ignored_frames_, sync_timeout_us_, cycle_counter_)),
       node_({.id = setup_.node_id,
              .device_type = kDriveDeviceType,
              .vendor = setup_.vendor,
@@ -192,6 +194,7 @@ void Board::take(NodeEvents events) noexcept {
   if ((events & kEventHeartbeatLost) != 0) heartbeat_lost_ = true;
   if ((events & kEventResetNode) != 0) {
     cycle_counter_ = 0;
+    sync_timeout_us_ = 0;
     for (const auto& axis : axes_) axis->power_on();
   }
 }
@@ -222,8 +225,9 @@ void Board::clear_when_well() noexcept {
 
 ErrorCode Board::connection(std::size_t axis) const noexcept {
   const std::uint32_t allowed = axes_[axis]->objects().command_timeout;
-  const std::int64_t period_ns = *sync_period_us_ * kNsPerUs;
-  const bool silent = allowed != 0 && period_ns > 0 && since_sync_ns_ > (allowed + 1) * period_ns;
+  const std::int64_t by_period_us = std::int64_t{allowed + 1} * *sync_period_us_;
+  const std::int64_t most_us = sync_timeout_us_ != 0 ? sync_timeout_us_ : by_period_us;
+  const bool silent = allowed != 0 && most_us > 0 && since_sync_ns_ > most_us * kNsPerUs;
   // A master whose SYNC is lost may stop the node for it: SYNC is the cause.
   if (offline_ && !heartbeat_lost_) {
     return silent ? ErrorCode::kSyncLost : ErrorCode::kCommandTimeout;
@@ -266,8 +270,8 @@ void Board::step(std::int64_t dt_ns, std::span<const AxisSense> sense,
 void Board::archive(Archive& ar) {
   ar(od_, node_);
   for (const auto& axis : axes_) axis->archive(ar);
-  ar(commands_, ignored_frames_, cycle_counter_, until_control_ns_, since_sync_ns_, offline_,
-     heartbeat_lost_, sync_pending_);
+  ar(commands_, ignored_frames_, sync_timeout_us_, cycle_counter_, until_control_ns_,
+     since_sync_ns_, offline_, heartbeat_lost_, sync_pending_);
   for (AxisDrive& drive : drives_) ar(drive.voltage_V, drive.enabled, drive.brake_open);
   archive_outbox(ar, outbox_, kOutboxFrames);
 }

@@ -102,7 +102,8 @@ class Board {
   std::vector<Commands> commands_;
   std::vector<AxisDrive> drives_;
   std::uint32_t ignored_frames_ = 0;
-  std::uint8_t cycle_counter_ = 0;  ///< 2051: the master's, echoed
+  std::uint32_t sync_timeout_us_ = 0;  ///< 2052
+  std::uint8_t cycle_counter_ = 0;     ///< 2051: the master's, echoed
   std::int64_t until_control_ns_ = 0;
   std::int64_t since_sync_ns_ = 0;
   bool offline_ = true;          ///< not operational: no command can come

@@ -53,8 +53,16 @@ class AxisMaster {
   [[nodiscard]] void* sample_variable(WireField field) noexcept { return sample_.variable(field); }
   /// Where a field of an RPDO comes from.
   [[nodiscard]] void* command_variable(WireField field) noexcept { return raw_.variable(field); }
-  /// The axis' error code from an emergency of its board.
-  void on_emergency(std::uint16_t code) noexcept TANDEM_RT { emergency_code_ = code; }
+  /// The axis' error code from an emergency of its board; `named`: the board says which axis.
+  void on_emergency(std::uint16_t code, bool named) noexcept TANDEM_RT {
+    emergency_code_ = code;
+    if (named && code != 0) last_emergency_ = code;
+  }
+  /// The code of the last emergency that named the axis, if the axis has had no fault with it; 0:
+  /// none.
+  [[nodiscard]] std::uint16_t emergency_without_fault() const noexcept {
+    return last_emergency_ == fault_code_ ? std::uint16_t{0} : last_emergency_;
+  }
   /// Once per cycle, after its frames. `fresh`: every part of a sample came in this cycle.
   void received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT;
   /// Looks for a fault in what was received. @return true when it is a new one.
@@ -110,6 +118,7 @@ class AxisMaster {
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
   std::uint16_t emergency_code_ = 0;
+  std::uint16_t last_emergency_ = 0;  ///< for a warning; no state
   std::uint32_t age_cycles_ = 0;
   std::uint32_t reset_cycles_ = 0;
   std::int32_t previous_velocity_ = 0;

@@ -119,7 +119,8 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
   now_ns = time.time_ns;
   if (!begun) {
     for (Node& node : nodes) {
-      node.master.set_sync_period(time.period_ns);
+      const int periods = node.timeout_cycles == 0 ? 0 : node.timeout_cycles + 1;
+      node.master.set_sync_timeout(periods * time.period_ns);
       node.master.restart(now_ns);
     }
     for (Port& port : ports) port.next_heartbeat_ns = now_ns;
@@ -203,15 +204,21 @@ void DriveMaster::Impl::on_echo(Node& node, std::uint8_t echo,
   if (trip == 1 && sent_ns != 0 && at_ns > sent_ns) node.trip_time.record(at_ns - sent_ns);
 }
 
+/// Byte 3 is the axis on our boards, and the maker's own on others: without an axis of that number
+/// it may be of any of them, and is kept for warnings().
 void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TANDEM_RT {
   const auto message = canopen::parse_emergency(frame);
   if (!message) return;
   const auto code = static_cast<std::uint16_t>(message->code);
+  const bool of_axis = message->manufacturer[0] < node.plan.joints.size();
   for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
-    if (code == 0 || message->manufacturer[0] == axis) {
-      axes[node.plan.joints[axis]].on_emergency(code);
+    if (code == 0 || !of_axis || message->manufacturer[0] == axis) {
+      axes[node.plan.joints[axis]].on_emergency(code, of_axis);
     }
   }
+  if (code == 0 || of_axis) return;
+  ++node.emergencies;
+  node.emergency = *message;
 }
 
 /// A late answer and the next may come in one cycle; time and again it is two nodes that answer.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "canopen/frame.hpp"
+#include "canopen/messages.hpp"
 #include "canopen/pdo_copy.hpp"
 #include "hal/ethercat-can/axis_master.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
@@ -73,7 +74,9 @@ struct DriveMaster::Impl {
     // Measurements, no state
     std::array<std::uint64_t, RoundTrip::kMostCycles> trip_cycles{};
     rt::Histogram trip_time;
-    std::uint64_t missed = 0;  ///< cycles of operation without its whole feedback
+    std::uint64_t missed = 0;             ///< cycles of operation without its whole feedback
+    std::uint64_t emergencies = 0;        ///< that name none of its axes
+    canopen::EmergencyMessage emergency;  ///< the last of them
   };
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
@@ -130,6 +133,7 @@ struct DriveMaster::Impl {
   [[nodiscard]] std::string axis_text(std::size_t joint) const;
   [[nodiscard]] std::string joint_name(std::size_t joint) const;
   [[nodiscard]] std::vector<std::string> warnings() const;
+  void add_emergencies(std::vector<std::string>& texts) const;
   [[nodiscard]] std::string refused_text() const;
   [[nodiscard]] double progress() const noexcept;
 

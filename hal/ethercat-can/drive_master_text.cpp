@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "hal/ethercat-can/drive_master_impl.hpp"
 
@@ -177,10 +178,32 @@ std::vector<std::string> DriveMaster::Impl::warnings() const {
                                 node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
                                 node.missed));
   }
+  add_emergencies(texts);
   if (unsent > 0)
     texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));
   if (refused_node >= 0) texts.push_back("a value was refused: " + refused_text());
   return texts;
+}
+
+/// What boards told that no fault of a joint has told already.
+void DriveMaster::Impl::add_emergencies(std::vector<std::string>& texts) const {
+  for (const Node& node : nodes) {
+    if (node.emergencies > 0) {
+      const canopen::EmergencyMessage& last = node.emergency;
+      texts.push_back(
+          fmt::format("{} (node {} on bus {}): emergencies that name no axis: {}; the last: {}, "
+                      "register 0x{:02X}, then {:02X}",
+                      node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
+                      node.emergencies, error_text(static_cast<std::uint32_t>(last.code)),
+                      last.error_register, fmt::join(last.manufacturer, " ")));
+    }
+    for (const std::size_t joint : node.plan.joints) {
+      const std::uint16_t code = axes[joint].emergency_without_fault();
+      if (code == 0) continue;
+      texts.push_back(
+          fmt::format("{}: an emergency without a fault: {}", joint_name(joint), error_text(code)));
+    }
+  }
 }
 
 std::string DriveMaster::Impl::refused_text() const {

@@ -20,11 +20,11 @@ NodeMaster::NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps)
       steps_(std::move(steps)),
       sdo_(id) {}
 
-void NodeMaster::set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT {
+void NodeMaster::set_sync_timeout(std::int64_t timeout_ns) noexcept TANDEM_RT {
   for (SdoStep& step : steps_) {
-    if (step.index != canopen::object::kSyncPeriod) continue;
+    if (step.index != canopen::object::kSyncTimeout) continue;
     canopen::put(step.bytes.data(),
-                 canopen::clamp_round<std::uint32_t>(static_cast<double>(period_ns) / 1000.0));
+                 canopen::clamp_round<std::uint32_t>(static_cast<double>(timeout_ns) / 1000.0));
   }
 }
 

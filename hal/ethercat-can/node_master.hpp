@@ -48,8 +48,8 @@ class NodeMaster {
 
   NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps);
 
-  /// The value for object 1006. Before the first restart().
-  void set_sync_period(std::int64_t period_ns) noexcept TANDEM_RT;
+  /// The value for object 2052; 0: none. Before the first restart().
+  void set_sync_timeout(std::int64_t timeout_ns) noexcept TANDEM_RT;
   /// Begins, or begins again, with a reset of the node.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;
   void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;

@@ -48,7 +48,9 @@ void add_pdo(Steps& steps, const PdoPlan& pdo) {
       (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
   const auto mapping =
       static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
-  steps.push_back(write_step(parameter, 1, pdo.cob_id | cob::kInvalid));
+  // Nobody asks for a TPDO by a remote request: it would come beside the cycle.
+  const std::uint32_t cob_id = receive ? pdo.cob_id : pdo.cob_id | cob::kNoRtr;
+  steps.push_back(write_step(parameter, 1, cob_id | cob::kInvalid));
   steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
   std::uint8_t count = 0;
   for (const MappedField& field : pdo.fields) {
@@ -57,7 +59,7 @@ void add_pdo(Steps& steps, const PdoPlan& pdo) {
   }
   steps.push_back(write_step(mapping, 0, count));
   steps.push_back(write_step(parameter, 2, pdo.transmission));
-  steps.push_back(write_step(parameter, 1, pdo.cob_id));
+  steps.push_back(write_step(parameter, 1, cob_id));
 }
 
 /// Adds steps for the objects of one axis.
@@ -168,7 +170,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   }
   for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo);
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
-  steps.push_back(write_step(object::kSyncPeriod, 0, std::uint32_t{0}));
+  if (node.board >= 0) steps.push_back(write_step(object::kSyncTimeout, 0, std::uint32_t{0}));
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
   steps.push_back(write_step(object::kHeartbeatConsumer, 1,
                              static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));

@@ -47,7 +47,7 @@ template <class T>
 }
 
 /// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent.
-/// The SYNC's period (1006) is left 0: it is known when the first cycle begins.
+/// A board's SYNC time-out (2052) is left 0: the period is known when the first cycle begins.
 [[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,
                                                       const NodePlan& node);
 

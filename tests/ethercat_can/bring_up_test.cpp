@@ -45,7 +45,9 @@ TEST(BringUp, ConfiguresScalesLimitsGainsAndHeartbeats) {
   const canopen::ObjectDictionary& od = rig.boards[1]->dictionary();
   EXPECT_EQ(od.value<std::uint32_t>(0x1016, 1), 0x007F0096u) << "the master, 150 ms";
   EXPECT_EQ(od.value<std::uint16_t>(0x1017, 0), 50);
-  EXPECT_EQ(od.value<std::uint32_t>(0x1006, 0), 1000u) << "SYNC period in us";
+  EXPECT_EQ(od.value<std::uint32_t>(0x1006, 0), 0u) << "others stop 1.5 of it after a SYNC";
+  EXPECT_EQ(od.value<std::uint32_t>(0x2052, 0), 11000u) << "ten cycles without SYNC are borne";
+  EXPECT_EQ(od.value<std::uint32_t>(0x1800, 1), 0x4000018Bu) << "no remote requests";
 }
 
 TEST(BringUp, NamesABoardThatDoesNotAnswer) {

@@ -1,5 +1,6 @@
 #include <cstring>
 
+#include "tests/canopen/wire.hpp"
 #include "tests/ethercat_can/rig.hpp"
 
 namespace tandem::hal::can {
@@ -170,6 +171,46 @@ TEST(Exchange, FeedbackThatDoesNotComeIsCountedByNode) {
   EXPECT_EQ(rig.master->warnings()[0],
             "board_1 (node 11 on bus legs): 3 cycles without its feedback");
   EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+}
+
+TEST(Exchange, AnEmergencyThatNamesNoAxisIsTold) {
+  Rig rig;
+  rig.bring_up();
+  // A vendor's own byte 3, from a board and from the sensor; then one that names an axis.
+  const std::array arms{canopen::wire(0x0A8, {0x00, 0x50, 0x81, 0xA0, 1, 2, 3, 4})};
+  const std::array legs{canopen::wire(0x08B, {0x40, 0x81, 0x11, 0xA0, 0xFF, 0, 0, 0}),
+                        canopen::wire(0x08B, {0x10, 0x81, 0x11, 0x02, 0, 0, 0, 9}),
+                        canopen::wire(0x08C, {0x10, 0x82, 0x11, 0x01, 0, 0, 0, 0})};
+  (void)rig.legs.boards().send(legs);
+  (void)rig.arms.boards().send(arms);
+  rig.steps(2);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+  EXPECT_EQ(rig.master->warnings(),
+            (std::vector<std::string>{
+                "board_1 (node 11 on bus legs): emergencies that name no axis: 2; the last: "
+                "frames were lost (error code 0x8110), register 0x11, then 02 00 00 00 09",
+                "joint Joint5 (board board_2, node 12, axis 1): an emergency without a fault: "
+                "PDO too short (error code 0x8210)",
+                "foot (node 40 on bus arms): emergencies that name no axis: 1; the last: error "
+                "(error code 0x5000), register 0x81, then A0 01 02 03 04"}));
+}
+
+TEST(Exchange, AFaultIsNamedByAnEmergencyThatNamesNoAxis) {
+  Rig rig;
+  rig.bring_up();
+  rig.present[1] = false;  // in its place, byte by byte: an emergency, and both axes in fault
+  std::array<std::uint8_t, 32> feedback{};
+  feedback[0] = feedback[16] = 0x18;
+  feedback[1] = feedback[17] = 0x02;
+  const std::array frames{canopen::wire(0x08B, {0x31, 0x23, 0x11, 0xA0, 0, 0, 0, 0}),
+                          canopen::make_frame(0x18B, feedback)};
+  (void)rig.legs.boards().send(frames);
+  rig.step();
+  const std::string text = rig.master->status_text();
+  for (const char* joint : {"Joint2 (board board_1, node 11, axis 0): error (error code 0x2331)",
+                            "Joint3 (board board_1, node 11, axis 1): error (error code 0x2331)"}) {
+    EXPECT_NE(text.find(joint), std::string::npos) << text;
+  }
 }
 
 TEST(Exchange, CommandsThatABusDoesNotTakeAreCounted) {

@@ -267,6 +267,19 @@ TEST_F(Guard, StopsWhenSyncItselfStays) {
   expect_fault(rig, 0x8700, 0x10);
 }
 
+TEST_F(Guard, StopsWithoutSyncAfterATimeOfItsOwn) {
+  rig.step();
+  ASSERT_EQ(rig.write<std::uint32_t>(0x1006, 0, 1000), 0U);
+  ASSERT_EQ(rig.write<std::uint32_t>(0x2052, 0, 40'000), 0U);
+  rig.start();
+  rig.enable();
+  rig.send_sync = false;
+  EXPECT_NEAR(until_fault(rig, 100), 41, 1);
+  expect_fault(rig, 0x8700, 0x10);
+  rig.nmt(129);
+  EXPECT_EQ(rig.object<std::uint32_t>(0x2052), 0U);
+}
+
 /// The master's heartbeat: node 127, 50 ms.
 void heartbeat(Rig& r) { r.send(0x77F, {0x05}); }
 
