@@ -10,15 +10,20 @@ namespace {
 
 using namespace controlword;
 
-// The commands of CiA 402, by the bits that each looks at.
-bool disables_voltage(std::uint16_t word) noexcept { return (word & kEnableVoltage) == 0; }
-bool quick_stops(std::uint16_t word) noexcept {
-  return (word & (kEnableVoltage | kQuickStop)) == kEnableVoltage;
+// The commands of CiA 402, by the bits that each looks at. Bit 7 is 0 in every one.
+constexpr std::uint16_t kVoltageBits = kFaultReset | kEnableVoltage;
+constexpr std::uint16_t kStopBits = kVoltageBits | kQuickStop;
+constexpr std::uint16_t kSwitchBits = kStopBits | kSwitchOn;
+constexpr std::uint16_t kAllBits = kSwitchBits | kEnableOperation;
+
+bool disables_voltage(std::uint16_t word) noexcept { return (word & kVoltageBits) == 0; }
+bool quick_stops(std::uint16_t word) noexcept { return (word & kStopBits) == kCommandQuickStop; }
+bool shuts_down(std::uint16_t word) noexcept { return (word & kSwitchBits) == kCommandShutdown; }
+bool switches_on(std::uint16_t word) noexcept { return (word & kSwitchBits) == kCommandSwitchOn; }
+bool enables(std::uint16_t word) noexcept { return (word & kAllBits) == kCommandEnableOperation; }
+bool disables_operation(std::uint16_t word) noexcept {
+  return (word & kAllBits) == kCommandSwitchOn;
 }
-bool shuts_down(std::uint16_t word) noexcept { return (word & 0x07) == kCommandShutdown; }
-bool switches_on(std::uint16_t word) noexcept { return (word & 0x07) == kCommandSwitchOn; }
-bool enables(std::uint16_t word) noexcept { return (word & 0x0F) == kCommandEnableOperation; }
-bool disables_operation(std::uint16_t word) noexcept { return (word & 0x0F) == kCommandSwitchOn; }
 
 }  // namespace
 
@@ -74,13 +79,14 @@ DriveState DriveMachine::step(std::uint16_t word, const DriveInputs& inputs,
     const bool powered = motion_ != DriveMotion::kNone;
     enter(DriveState::kFaultReactionActive);
     if (powered && options.fault_reaction == 1) motion_ = DriveMotion::kSlowDown;
-    if (powered && options.fault_reaction >= 2) motion_ = DriveMotion::kQuickStop;
+    if (powered && options.fault_reaction == 2) motion_ = DriveMotion::kQuickStop;
+    if (powered && options.fault_reaction == -1) motion_ = DriveMotion::kShorted;
   } else {
     follow(word, inputs, options);
   }
   command_brake(inputs, options);
   last_reset_bit_ = (word & kFaultReset) != 0;
-  compose_statusword(inputs);
+  compose_statusword(inputs, options);
   return state_;
 }
 
@@ -175,8 +181,12 @@ void DriveMachine::quick_stop(const DriveOptions& options) noexcept {
     return;
   }
   enter(DriveState::kQuickStopActive);
-  const bool slow = options.quick_stop == 1 || options.quick_stop == 5;
-  motion_ = slow ? DriveMotion::kSlowDown : DriveMotion::kQuickStop;
+  switch (options.quick_stop) {
+    case 1:
+    case 5: motion_ = DriveMotion::kSlowDown; break;
+    case -1: motion_ = DriveMotion::kShorted; break;
+    default: motion_ = DriveMotion::kQuickStop; break;
+  }
 }
 
 void DriveMachine::slow_down_to(DriveState state, std::int16_t option) noexcept {
@@ -201,7 +211,15 @@ void DriveMachine::enter(DriveState state) noexcept {
   motion_ = state == DriveState::kOperationEnabled ? DriveMotion::kFollow : DriveMotion::kNone;
 }
 
-void DriveMachine::compose_statusword(const DriveInputs& inputs) noexcept {
+/// Halt, or a quick stop that waits for a command.
+bool DriveMachine::stop_stays(const DriveOptions& options) const noexcept {
+  if (state_ == DriveState::kQuickStopActive) return options.quick_stop >= 5;
+  return state_ == DriveState::kOperationEnabled && motion_ != DriveMotion::kFollow &&
+         after_ramp_ == DriveState::kOperationEnabled;
+}
+
+void DriveMachine::compose_statusword(const DriveInputs& inputs,
+                                      const DriveOptions& options) noexcept {
   using namespace statusword;
   std::uint16_t word = kRemote | kVoltageEnabled;
   switch (state_) {
@@ -224,6 +242,7 @@ void DriveMachine::compose_statusword(const DriveInputs& inputs) noexcept {
   }
   if (inputs.warning) word |= kWarning;
   if (inputs.internal_limit) word |= kInternalLimit;
+  if (inputs.standstill && stop_stays(options)) word |= kTargetReached;
   if (state_ == DriveState::kOperationEnabled) {
     if (inputs.follows_command && motion_ == DriveMotion::kFollow) word |= kFollowsCommand;
     if (inputs.following_error) word |= statusword::kFollowingError;

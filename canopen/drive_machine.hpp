@@ -39,22 +39,25 @@ enum class DriveMotion : std::uint8_t {
   kNone,       ///< no torque
   kFollow,     ///< follow the mode of operation's reference
   kSlowDown,   ///< come to rest on the slow-down ramp
-  kQuickStop,  ///< come to rest on the quick-stop ramp
+  kQuickStop,  ///< come to rest on the quick-stop ramp (6085)
+  kShorted,    ///< brake by the shorted winding
 };
 
-/// Option codes, with the profile's defaults.
+/// Option codes, with the profile's defaults but for the fault reaction. -1 is ours: the winding is
+/// shorted, which needs neither sensors nor gains.
 struct DriveOptions {
-  std::int16_t quick_stop = 2;         ///< 605A: 0 disable; 1, 2 slow, quick ramp; 5, 6 and stay
-  std::int16_t shutdown = 0;           ///< 605B: 0 disable; 1 slow-down ramp
+  std::int16_t quick_stop = 2;  ///< 605A: 0 disable; 1, 2 slow, quick ramp; 5, 6 and stay; -1
+  std::int16_t shutdown = 0;    ///< 605B: 0 disable; 1 slow-down ramp
   std::int16_t disable_operation = 1;  ///< 605C: 0 disable; 1 slow-down ramp
   std::int16_t halt = 1;               ///< 605D: 1 slow-down ramp; 2 quick-stop ramp
-  std::int16_t fault_reaction = 2;     ///< 605E: 0 disable; 1, 2 slow, quick ramp
+  std::int16_t fault_reaction = -1;    ///< 605E: 0 disable; 1, 2 slow, quick ramp; -1
 };
 
 /// What the drive knows when the machine is stepped.
 struct DriveInputs {
   bool fault = false;            ///< a fault is present now
   bool at_rest = false;          ///< a ramp has ended; looked at only during one
+  bool standstill = false;       ///< the same, and not for want of time
   bool internal_limit = false;   ///< statusword bit 11
   bool follows_command = false;  ///< statusword bit 12, shown in Operation Enabled
   bool following_error = false;  ///< statusword bit 13
@@ -63,7 +66,12 @@ struct DriveInputs {
   bool brake_moved = true;       ///< it has had the time that it needs to obey brake_set()
 };
 
-/// The drive's side: transitions 0 to 16, at most one per step.
+/// The drive's side: transitions 0 to 16, at most one per step. A controlword with bit 7 is no
+/// command, whatever the other bits say: only its rising edge counts, and halt.
+///
+/// Bit 10 of the statusword, target reached: the modes here are cyclic and have no target that they
+/// reach by themselves. So it is set where a stop that stays enabled has come to rest: halt, and
+/// quick stop with option 5 or 6.
 ///
 /// A brake delays two of them. Enabling (4) holds the axis in Switched On, its bridge closed, until
 /// the brake is open. A ramp that ends in an open bridge sets the brake when the axis is at rest,
@@ -100,9 +108,10 @@ class DriveMachine {
   void quick_stop(const DriveOptions& options) noexcept;
   void slow_down_to(DriveState state, std::int16_t option) noexcept;
   void enter(DriveState state) noexcept;
+  [[nodiscard]] bool stop_stays(const DriveOptions& options) const noexcept;
   [[nodiscard]] bool ramp_ended(const DriveInputs& inputs) const noexcept;
   void command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept;
-  void compose_statusword(const DriveInputs& inputs) noexcept;
+  void compose_statusword(const DriveInputs& inputs, const DriveOptions& options) noexcept;
 
   DriveState state_ = DriveState::kNotReadyToSwitchOn;
   DriveState after_ramp_ = DriveState::kOperationEnabled;  ///< where a ramp in progress leads

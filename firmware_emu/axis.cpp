@@ -154,7 +154,7 @@ ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
            objects_.motor_data[canopen::kMotorTorqueConstant - 1] * measured_.current_A,
        .sensors_valid = sensors_valid_,
        .powered = powered(),
-       .drives = action() == Action::kFollow || action() == Action::kHold,
+       .drives = action() != Action::kOff && action() != Action::kBrake,
        .follows_position = follows},
       period_s_);
   const bool interlock = (objects_.digital_inputs & canopen::digital_input::kInterlock) != 0;
@@ -185,6 +185,7 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   const DriveState now = machine_.step(objects_.controlword,
                                        {.fault = cause != ErrorCode::kNone,
                                         .at_rest = stopped(),
+                                        .standstill = resting_s_ >= kRestTime_s,
                                         .internal_limit = controller_.limited(),
                                         .follows_command = mode_ != Mode::kNone,
                                         .following_error = protection_.lagging(),
@@ -217,7 +218,7 @@ void Axis::seed_references() noexcept {
 
 void Axis::watch_stop() noexcept {
   const bool stops =
-      machine_.motion() == DriveMotion::kSlowDown || machine_.motion() == DriveMotion::kQuickStop;
+      machine_.motion() != DriveMotion::kNone && machine_.motion() != DriveMotion::kFollow;
   const bool rests = std::abs(measured_.motor_velocity_rad_s) < kRestVelocity_rad_s;
   stopping_s_ = stops ? stopping_s_ + period_s_ : 0.0;
   resting_s_ = stops && rests ? resting_s_ + period_s_ : 0.0;
@@ -251,10 +252,26 @@ Action Axis::action() const noexcept {
   switch (machine_.motion()) {
     case DriveMotion::kNone: return Action::kOff;
     case DriveMotion::kFollow: return mode_ == Mode::kNone ? Action::kBrake : Action::kFollow;
-    case DriveMotion::kSlowDown: return sensors_valid_ ? Action::kHold : Action::kBrake;
-    case DriveMotion::kQuickStop: return Action::kBrake;
+    case DriveMotion::kSlowDown: return can_ramp() ? Action::kHold : Action::kBrake;
+    case DriveMotion::kQuickStop: return can_ramp() ? Action::kRamp : Action::kBrake;
+    case DriveMotion::kShorted: return Action::kBrake;
   }
   return Action::kOff;
+}
+
+// A stop by the position loop needs its gain, the sensors and the supply, and a loop that is not
+// itself the fault.
+bool Axis::can_ramp() const noexcept {
+  if (!sensors_valid_ || !(objects_.gains[0][kPidKp - 1] > 0.0F)) return false;
+  if (machine_.state() != DriveState::kFaultReactionActive) return true;
+  switch (static_cast<ErrorCode>(objects_.error_code)) {
+    case ErrorCode::kPositionSensor:
+    case ErrorCode::kSensorMismatch:
+    case ErrorCode::kVoltage:
+    case ErrorCode::kOscillation:
+    case ErrorCode::kFollowingError: return false;
+    default: return true;
+  }
 }
 
 Reference Axis::reference() const noexcept {

@@ -72,6 +72,7 @@ class Axis final : private canopen::ObjectOwner {
   [[nodiscard]] double mismatch_rad() const noexcept;
   [[nodiscard]] Reference reference() const noexcept;
   [[nodiscard]] Action action() const noexcept;
+  [[nodiscard]] bool can_ramp() const noexcept;
   [[nodiscard]] bool powered() const noexcept {
     return machine_.motion() != canopen::DriveMotion::kNone;
   }

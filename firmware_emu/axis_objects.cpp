@@ -55,6 +55,8 @@ AxisObjects AxisObjects::from(const AxisSetup& setup, int command_timeout_syncs)
   o.rated_torque_mNm = std::max(1U, clamp_round<std::uint32_t>(setup.rated_torque_Nm * 1.0e3));
   o.torque_slope =
       std::max(1U, clamp_round<std::uint32_t>(c.torque_slope_Nm_s * 1.0e3 / setup.rated_torque_Nm));
+  o.quick_stop_deceleration =
+      std::max(1U, clamp_round<std::uint32_t>(setup.quick_stop_rad_s2 * counts_per_rad));
   o.link_counts = clamp_round<std::uint32_t>(setup.link_counts_per_rev);
   o.motor_counts = clamp_round<std::uint32_t>(setup.motor_counts_per_rev);
   o.stiffness = real32(setup.stiffness_Nm_rad);
@@ -109,6 +111,7 @@ ControllerConfig AxisObjects::controller() const noexcept TANDEM_RT {
           .velocity_limit_rad_s = limits[kVelocityLimit - 1],
           .min_position_rad = below ? -kInfinity : min_position * rad_per_count(),
           .max_position_rad = above ? kInfinity : max_position * rad_per_count(),
+          .stop_deceleration_rad_s2 = quick_stop_deceleration * rad_per_count(),
           .transfer_time_s = transfer_time_s,
           .position_feedback = static_cast<PositionFeedback>(position_feedback)};
 }
@@ -124,11 +127,14 @@ bool AxisObjects::add_profile(ObjectDictionary& od, int axis, ObjectOwner& owner
          od.add(at(co::kErrorCode), 0, error_code, kReadTpdo) &&
          od.add(at(co::kControlword), 0, controlword, kWriteRpdo) &&
          od.add(at(co::kStatusword), 0, statusword, kReadTpdo) &&
-         od.add(at(co::kQuickStopOption), 0, options.quick_stop, kReadWrite, {0, 6}, &owner) &&
+         od.add(at(co::kQuickStopOption), 0, options.quick_stop, kReadWrite, {-1, 6}, &owner) &&
          od.add(at(co::kShutdownOption), 0, options.shutdown, kReadWrite, {0, 1}) &&
          od.add(at(co::kDisableOption), 0, options.disable_operation, kReadWrite, {0, 1}) &&
          od.add(at(co::kHaltOption), 0, options.halt, kReadWrite, {1, 2}) &&
-         od.add(at(co::kFaultReactionOption), 0, options.fault_reaction, kReadWrite, {0, 2}) &&
+         od.add(at(co::kFaultReactionOption), 0, options.fault_reaction, kReadWrite, {-1, 2}) &&
+         od.add_value<std::uint8_t>(at(co::kInterpolationPeriod), 0, 2) &&
+         od.add(at(co::kInterpolationPeriod), 1, interpolation_units, kReadWrite, {1, 255}) &&
+         od.add(at(co::kInterpolationPeriod), 2, interpolation_power, kReadWrite, {-128, 63}) &&
          od.add(at(co::kMode), 0, mode, kWriteRpdo, {-4, 10}, &owner) &&
          od.add(at(co::kModeDisplay), 0, mode_display, kReadTpdo) &&
          od.add_value(at(co::kSupportedModes), 0, kModes);
@@ -140,6 +146,8 @@ bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner)
          od.add(at(co::kFollowingErrorTimeout), 0, following_timeout_ms, kReadWrite, {}, &owner) &&
          od.add(at(co::kMaxTorque), 0, max_torque, kReadWrite, {}, &owner) &&
          od.add(at(co::kRatedTorque), 0, rated_torque_mNm, kReadWrite, {1, 4294967295.0}, &owner) &&
+         od.add(at(co::kQuickStopDeceleration), 0, quick_stop_deceleration, kReadWrite,
+                {1, 4294967295.0}, &owner) &&
          od.add(at(co::kTorqueSlope), 0, torque_slope, kReadWrite, {1, 4294967295.0}, &owner) &&
          od.add_value<std::uint8_t>(at(co::kSoftwareLimits), 0, 2) &&
          od.add(at(co::kSoftwareLimits), 1, min_position, kReadWrite, {}, &owner) &&

@@ -50,7 +50,7 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 114;
+inline constexpr std::size_t kAxisEntries = 118;
 
 /// 6087: the torque reference may change as it likes.
 inline constexpr std::uint32_t kNoTorqueSlope = std::numeric_limits<std::uint32_t>::max();
@@ -72,6 +72,7 @@ struct AxisObjects {
   std::uint32_t following_window = 0;
   std::uint32_t rated_torque_mNm = 1000;
   std::uint32_t torque_slope = kNoTorqueSlope;  ///< [per mille of rated / s]
+  std::uint32_t quick_stop_deceleration = 1;    ///< [counts/s^2]
   std::uint32_t link_counts = 1;
   std::uint32_t motor_counts = 1;
   std::uint32_t refused_values = 0;
@@ -115,7 +116,9 @@ struct AxisObjects {
   std::int8_t mode = 0;
   std::int8_t mode_display = 0;
   std::uint8_t position_feedback = 0;
-  std::array<std::uint8_t, 1> reserved{};  ///< no padding in a snapshot
+  std::uint8_t interpolation_units = 1;  ///< 60C2: 1 ms; nothing is interpolated
+  std::int8_t interpolation_power = -3;
+  std::array<std::uint8_t, 3> reserved{};  ///< no padding in a snapshot
 
   /// Power-on values.
   [[nodiscard]] static AxisObjects from(const AxisSetup& setup, int command_timeout_syncs);

@@ -71,6 +71,7 @@ Status check_axis(const AxisSetup& axis, const std::string& key) {
                              axis.thermal_time_s,
                              axis.undervoltage_V,
                              axis.stop_time_s,
+                             axis.quick_stop_rad_s2,
                              axis.mismatch_window_rad,
                              axis.mismatch_timeout_s,
                              axis.oscillation_limit_Nm,

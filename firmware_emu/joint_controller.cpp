@@ -18,7 +18,7 @@ void JointController::configure(const ControllerConfig& config,
 }
 
 bool JointController::cascaded() const noexcept {
-  if (action_ == Action::kHold) return true;
+  if (action_ == Action::kHold || action_ == Action::kRamp) return true;
   return action_ == Action::kFollow && mode_ != Mode::kOpenLoop && mode_ != Mode::kCurrent &&
          mode_ != Mode::kNone;
 }
@@ -76,7 +76,16 @@ void JointController::begin(Action action, Mode mode, const Measurement& measure
   velocity_.reset();
   current_.reset();
   terms_.held_position_rad = measured.link_position_rad;
+  terms_.ramp_velocity_rad_s = measured.link_velocity_rad_s;
   terms_.last_position_rad = measured.link_position_rad;
+}
+
+/// One period nearer to rest. The position is that of the mean velocity: exact on the ramp.
+void JointController::advance_ramp() noexcept {
+  const double before = terms_.ramp_velocity_rad_s;
+  const double slower = std::abs(before) - config_.stop_deceleration_rad_s2 * period_s_;
+  terms_.ramp_velocity_rad_s = slower > 0.0 ? std::copysign(slower, before) : 0.0;
+  terms_.held_position_rad += 0.5 * (before + terms_.ramp_velocity_rad_s) * period_s_;
 }
 
 double JointController::limited_position(double position_rad) noexcept {
@@ -148,6 +157,11 @@ JointController::Outer JointController::outer_loop(const Reference& reference,
   terms_.position_error_rad = 0.0;
   if (action_ == Action::kHold) {
     return position_outer(terms_.held_position_rad, 0.0, reference.torque_Nm, measured);
+  }
+  if (action_ == Action::kRamp) {
+    advance_ramp();
+    return position_outer(terms_.held_position_rad, terms_.ramp_velocity_rad_s, reference.torque_Nm,
+                          measured);
   }
   switch (mode_) {
     case Mode::kCsp:

@@ -36,7 +36,8 @@ struct ControllerConfig {
   double velocity_limit_rad_s = 0.0;  ///< of velocity references; 0: none
   double min_position_rad = -std::numeric_limits<double>::infinity();  ///< of references
   double max_position_rad = std::numeric_limits<double>::infinity();
-  double transfer_time_s = 0.02;  ///< in which the voltage step of a mode change decays
+  double stop_deceleration_rad_s2 = 20.0;  ///< of kRamp
+  double transfer_time_s = 0.02;           ///< in which the voltage step of a mode change decays
   PositionFeedback position_feedback = PositionFeedback::kLink;
 };
 
@@ -70,6 +71,7 @@ enum class Action : std::uint8_t {
   kOff,     ///< bridge open
   kFollow,  ///< the mode's reference
   kHold,    ///< the position where this action began, by the position loop
+  kRamp,    ///< from the velocity where this action began to rest, by the position loop
   kBrake,   ///< winding shorted through the bridge (0 V): needs neither sensor nor gain
 };
 
@@ -82,7 +84,8 @@ class JointController {
     double voltage_V = 0.0;               ///< after every limit
     double transfer_V = 0.0;              ///< what is left of a mode change's step
     double position_error_rad = 0.0;      ///< of the limited reference, on the link
-    double held_position_rad = 0.0;       ///< kHold's, and the integrated one of -4
+    double held_position_rad = 0.0;       ///< kHold's, and the integrated one of kRamp and -4
+    double ramp_velocity_rad_s = 0.0;     ///< kRamp's
     double last_position_rad = 0.0;       ///< reference of position control; first: measured
     std::int32_t voltage_saturation = 0;  ///< Saturation, by the voltage or current limit
     std::int32_t torque_saturation = 0;   ///< Saturation, by the torque's limit or slope
@@ -144,6 +147,7 @@ class JointController {
   [[nodiscard]] double impedance_torque(double position_rad, double velocity_rad_s,
                                         const Reference& reference,
                                         const Measurement& measured) noexcept;
+  void advance_ramp() noexcept;
   [[nodiscard]] double limited_position(double position_rad) noexcept;
   [[nodiscard]] double limited_velocity(double velocity_rad_s, double position_rad) noexcept;
   void cascade(const Reference& reference, const Measurement& measured, bool change,

@@ -58,6 +58,7 @@ struct AxisSetup {
   bool brake = false;                       ///< 203A:1: the motor has a spring-applied brake
   std::uint16_t brake_release_ms = 0;       ///< 203A:2
   std::uint16_t brake_engage_ms = 0;        ///< 203A:3
+  double quick_stop_rad_s2 = 20.0;          ///< 6085
   double stop_time_s = 1.0;                 ///< 2036: longest stop until the bridge opens
 };
 

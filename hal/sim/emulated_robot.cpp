@@ -244,7 +244,8 @@ bool EmulatedRobot::safe(std::size_t board) const noexcept TANDEM_RT {
   if (node.powered == 0) return true;
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
     const canopen::DriveMotion motion = node.board->axis(axis).machine().motion();
-    const bool brakes = motion == canopen::DriveMotion::kQuickStop;
+    const bool brakes =
+        motion == canopen::DriveMotion::kQuickStop || motion == canopen::DriveMotion::kShorted;
     if (!brakes && motion != canopen::DriveMotion::kNone) return false;
   }
   return true;

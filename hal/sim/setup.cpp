@@ -21,6 +21,7 @@ std::uint64_t seed_of(std::uint64_t seed, std::uint64_t kind, std::size_t index)
 // torque's noise, and the spring's damping, which the comparison leaves out.
 constexpr double kMismatchWindow_rad = 0.02;
 constexpr double kUndervoltageShare = 0.6;  // of the supply
+constexpr double kQuickestStop_s = 0.25;    // from the largest velocity to rest
 
 /// What a frame of the bus carries.
 std::size_t pdo_bytes(const hal::RobotConfig& robot, const std::string& name) {
@@ -59,6 +60,7 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
     axis.brake_release_ms = static_cast<std::uint16_t>(joint.brake->release_ms);
     axis.brake_engage_ms = static_cast<std::uint16_t>(joint.brake->engage_ms);
   }
+  axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
   c.position = pid(gains.position, joint.max_torque_Nm);

@@ -119,12 +119,77 @@ TEST_F(Drive, QuickStopOptionsChooseTheRampAndWhereItEnds) {
   EXPECT_EQ(step(0x0F), kOperationEnabled);  // 16
 }
 
+TEST_F(Drive, StopsOnTheWindingWhereOptionMinusOneSaysSo) {
+  options.quick_stop = -1;
+  enable();
+  EXPECT_EQ(step(0x02), kQuickStopActive);
+  EXPECT_EQ(drive.motion(), DriveMotion::kShorted);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x0F), kSwitchOnDisabled);
+  options.fault_reaction = 2;
+  enable();
+  inputs.fault = true;
+  step(0x0F);
+  EXPECT_EQ(drive.motion(), DriveMotion::kQuickStop);
+}
+
+/// CiA 402's table of commands has bit 7 at 0 in every row but the fault reset's.
+TEST_F(Drive, WithBit7NoOtherBitIsACommand) {
+  options.quick_stop = 6;
+  for (const std::vector<int>& path : {std::vector<int>{0x00},
+                                       {0x00, 0x06},
+                                       {0x00, 0x06, 0x07},
+                                       {0x00, 0x06, 0x07, 0x0F},
+                                       {0x00, 0x06, 0x07, 0x0F, 0x02}}) {
+    for (int bits = 0; bits < 0x10; ++bits) {
+      drive.reset();
+      for (const int word : path) step(word);
+      const DriveState before = drive.state();
+      const DriveMotion motion = drive.motion();
+      for (int k = 0; k < 3; ++k) step(0x80 | bits);
+      EXPECT_EQ(drive.state(), before) << std::hex << bits;
+      EXPECT_EQ(drive.motion(), motion) << std::hex << bits;
+    }
+  }
+}
+
+TEST_F(Drive, AStopUnderWayEndsWhateverBit7Says) {
+  enable();
+  step(0x02);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x8F), kSwitchOnDisabled);
+}
+
+TEST_F(Drive, ShowsTargetReachedWhereAStopThatStaysHasComeToRest) {
+  constexpr int kBit10 = 0x0400;
+  const auto reached = [&](int word) {
+    step(word);
+    return (drive.statusword() & kBit10) != 0;
+  };
+  options.quick_stop = 5;
+  enable();
+  inputs.standstill = true;
+  EXPECT_FALSE(reached(0x0F)) << "a cyclic mode";
+  inputs.standstill = false;
+  EXPECT_FALSE(reached(0x10F)) << "halt, still moving";
+  inputs.standstill = true;
+  EXPECT_TRUE(reached(0x10F)) << "halt";
+  EXPECT_TRUE(reached(0x02)) << "quick stop that stays";
+  inputs.standstill = false;
+  enable();
+  inputs.standstill = true;
+  EXPECT_FALSE(reached(0x07)) << "disable operation: on its way";
+  options.quick_stop = 2;
+  enable();
+  EXPECT_FALSE(reached(0x02)) << "on its way";
+}
+
 TEST_F(Drive, AFaultReactsLatchesAndNeedsARisingEdge) {
   enable();
   inputs.fault = true;
   EXPECT_EQ(step(0x0F), kFaultReactionActive);  // 13
   EXPECT_EQ(drive.statusword(), 0x021F);
-  EXPECT_EQ(drive.motion(), DriveMotion::kQuickStop);
+  EXPECT_EQ(drive.motion(), DriveMotion::kShorted);
   EXPECT_EQ(step(0x0F), kFaultReactionActive);
   inputs.at_rest = true;
   EXPECT_EQ(step(0x0F), kFault);  // 14

@@ -192,7 +192,7 @@ TEST(Fault, ABoardThatCountsAsLostButStillHearsIsStoppedWithTheNextSync) {
   rig.master->stop(StopCategory::kCategory0);
   rig.steps(1);
   for (const std::size_t j : {4u, 5u}) {
-    EXPECT_EQ(rig.axis(j).machine().motion(), canopen::DriveMotion::kQuickStop) << j;
+    EXPECT_EQ(rig.axis(j).machine().motion(), canopen::DriveMotion::kShorted) << j;
   }
   rig.steps(1500);
   rig.master->reset();

@@ -119,6 +119,77 @@ TEST_F(Drive, StaysInQuickStopByOptionAndComesBack) {  // 16, option 605A = 6
   EXPECT_EQ(state(), DriveState::kOperationEnabled);
 }
 
+/// A link with inertia that a load pulls, in velocity control at 0.5 rad/s upwards.
+struct Loaded {
+  explicit Loaded(std::uint16_t option_object, std::int16_t option) {
+    rig.joints[0].link_inertia = 0.5;
+    rig.joints[0].load_Nm = -15.0;
+    rig.joints[0].th = -15.0 / rig.joints[0].Ks;
+    rig.start();
+    EXPECT_EQ(rig.write<std::int16_t>(option_object, 0, option), 0U);
+    EXPECT_EQ(rig.write<std::uint32_t>(0x6085, 0, Rig::counts(1.0)), 0U);  // 1 rad/s^2
+    rig.enable(9);
+    rig.commands[0].velocity_offset = Rig::counts(0.5);
+    rig.cycles(1500);
+    EXPECT_NEAR(rig.joints[0].v, 0.5, 0.05);
+  }
+  /// @return how far the link goes in `ms` from now on
+  double travel(std::uint16_t word, int ms) {
+    rig.commands[0].controlword = word;
+    const double from = rig.joints[0].q;
+    rig.cycles(ms);
+    return rig.joints[0].q - from;
+  }
+  Rig rig;
+};
+
+constexpr double kRampWay_rad = 0.5 * 0.5 / (2.0 * 1.0);  // v^2 / 2a
+
+TEST(QuickStop, RampsDownAtTheDecelerationOf6085AndHolds) {
+  Loaded one(0x605A, 6);
+  const double first = one.travel(0x02, 250);
+  EXPECT_NEAR(one.rig.joints[0].v, 0.25, 0.1) << "half of the ramp";
+  EXPECT_NEAR(first + one.travel(0x02, 750), kRampWay_rad, 0.03);
+  EXPECT_EQ(one.rig.state(), DriveState::kQuickStopActive);
+  EXPECT_NEAR(one.travel(0x02, 500), 0.0, 0.005) << "the load does not move it";
+  EXPECT_EQ(one.rig.statusword() & 0x0400, 0x0400);
+}
+
+TEST(QuickStop, KeepsTheTorqueWhileItRampsAndThenDisables) {
+  Loaded one(0x605A, 2);
+  double way = 0.0;
+  int ms = 0;
+  for (; ms < 2000 && one.rig.drives[0].enabled; ++ms) way += one.travel(0x02, 1);
+  EXPECT_EQ(one.rig.state(), DriveState::kSwitchOnDisabled);
+  EXPECT_NEAR(way, kRampWay_rad, 0.03);
+  EXPECT_GT(ms, 400);
+}
+
+TEST(QuickStop, HaltOnTheRampHoldsInVelocityControl) {
+  Loaded one(0x605D, 2);
+  one.travel(0x10F, 1000);
+  EXPECT_EQ(one.rig.state(), DriveState::kOperationEnabled);
+  EXPECT_NEAR(one.travel(0x10F, 500), 0.0, 0.005);
+  EXPECT_EQ(one.rig.statusword() & 0x0400, 0x0400);
+  EXPECT_GT(one.travel(0x0F, 1500), 0.3) << "and goes on";
+}
+
+TEST(QuickStop, ShortsTheWindingWithoutSensorsOrGains) {
+  Loaded blind(0x605A, 6);
+  ASSERT_EQ(blind.rig.write(0x2020, 1, 0.0F), 0U);
+  blind.rig.cycle();
+  blind.travel(0x02, 20);
+  const double sinks = blind.travel(0x02, 1000);
+  EXPECT_LT(sinks, -0.1) << "nothing but the winding brakes it";
+}
+
+TEST_F(Drive, HasAnInterpolationPeriod) {
+  EXPECT_EQ(rig.read<std::uint8_t>(0x60C2, 1), 1U);
+  EXPECT_EQ(rig.read<std::int8_t>(0x60C2, 2), -3);
+  EXPECT_EQ(rig.write<std::uint8_t>(0x60C2, 1, 4), 0U);
+  EXPECT_EQ(rig.read<std::uint8_t>(0x60C2, 1), 4U);
+}
+
 TEST_F(Drive, DisablesAtOnceOnQuickStopByOption) {  // 11 with option 605A = 0
   ASSERT_EQ(rig.write<std::int16_t>(0x605A, 0, 0), 0U);
   rig.enable();

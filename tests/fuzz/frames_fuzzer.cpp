@@ -357,10 +357,11 @@ class Play {
     require(limits.current_limit_A <= actuator.current_limit_A + kRounding);
     require(limits.voltage_limit_V <= actuator.voltage_limit_V + kRounding);
     if (!stopped_) return;
-    // Whatever the master hears, no motor drives: its bridge is open, or brakes for the board's own
-    // reasons.
+    // Whatever the master hears, no motor drives: its bridge is open, or it brakes for the board's
+    // own reasons.
     const canopen::DriveMotion motion = wires_.axis(joint).machine().motion();
-    require(motion == canopen::DriveMotion::kNone || motion == canopen::DriveMotion::kQuickStop);
+    require(motion == canopen::DriveMotion::kNone || motion == canopen::DriveMotion::kQuickStop ||
+            motion == canopen::DriveMotion::kShorted);
   }
 
   Wires& wires_;

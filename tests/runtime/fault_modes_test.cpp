@@ -50,7 +50,7 @@ TEST_P(EveryMode, BoardsReachTheirSafeStateWithoutCommandsSyncOrHeartbeat) {
       (void)made->write(command, parameters);
       if (noticed < 0 && axis.objects().error_code != 0) {
         noticed = i;
-        EXPECT_EQ(axis.machine().motion(), DriveMotion::kQuickStop) << "safe in the same cycle";
+        EXPECT_EQ(axis.machine().motion(), DriveMotion::kShorted) << "safe in the same cycle";
       }
       const sim::JointReading joint = made->emulated->plant().joint(0);
       if (noticed >= 0 && joint.current_A == 0.0 && joint.voltage_V == 0.0) open = i;
