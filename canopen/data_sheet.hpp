@@ -2,6 +2,7 @@
 // Layer: canopen.  Thread: non-RT only.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,7 +15,7 @@ namespace tandem::canopen {
 
 /// A number of a sheet, which may depend on the node's id: "$NODEID+0x180".
 struct SheetValue {
-  std::int64_t number = 0;    ///< as a bit pattern for unsigned 64 bit
+  std::int64_t number = 0;    ///< as a bit pattern for unsigned 64 bit and for reals
   bool plus_node_id = false;  ///< the node's id is added
 
   [[nodiscard]] std::int64_t of(int node_id) const noexcept {
@@ -32,9 +33,9 @@ struct SheetEntry {
   bool constant = false;    ///< AccessType const: the value is the same in every device
   std::string name;         ///< ParameterName
   std::optional<SheetValue> value;  ///< ParameterValue (DCF), else DefaultValue; none: unknown
-  std::optional<std::int64_t> low;  ///< LowLimit
+  std::optional<std::int64_t> low;  ///< LowLimit; none for reals and texts
   std::optional<std::int64_t> high;
-  std::string text;  ///< the value of a string type, as written
+  std::string text;  ///< the value of a string, domain, time or unknown type, as written
   int line = 0;      ///< of its section
 
   /// Bytes on the wire by its type; 0: not fixed (strings, domains).
@@ -54,6 +55,8 @@ struct DataSheet {
   std::optional<int> node_id;          ///< a DCF's own
   std::optional<int> bit_rate_kbit_s;  ///< a DCF's own
   bool lss = false;                    ///< its id can be set over the bus
+  std::optional<int> granularity;      ///< of PDO mappings [bit]; 0: they cannot be changed
+  std::vector<std::uint16_t> dummies;  ///< data types that an RPDO may have as filler
   std::vector<SheetEntry> entries;
   /// What contradicts itself or CiA 306 and was read all the same: "line 12: …".
   std::vector<std::string> remarks;
@@ -61,10 +64,14 @@ struct DataSheet {
   [[nodiscard]] const SheetEntry* find(std::uint16_t index, std::uint8_t sub = 0) const noexcept;
   /// Whether any sub-index of the object is there.
   [[nodiscard]] bool has(std::uint16_t index) const noexcept;
-  /// The entry's value with this node's id; none: no entry, or the sheet does not tell.
+  /// The entry's value for a node of this id; none: no entry, or the sheet does not tell.
   [[nodiscard]] std::optional<std::int64_t> value(std::uint16_t index, std::uint8_t sub,
-                                                  int node_id) const noexcept;
+                                                  int id) const noexcept;
 };
+
+/// The most that a sheet may have; those of real drives have up to 0.2 MB and 1,200 entries.
+inline constexpr std::size_t kMaxSheetBytes = 4'000'000;
+inline constexpr std::size_t kMaxSheetEntries = 100'000;
 
 /// Reads the text of an EDS or DCF.
 ///
@@ -72,7 +79,12 @@ struct DataSheet {
 /// @param file  name for errors; nothing is opened.
 /// Errors, with line and "[section] key": not a sheet at all, an object twice with different
 /// contents, a number that is none or does not fit its type, an unknown access or object type;
-/// the file ends in the middle of a section.
+/// the file ends in the middle of a section, or lacks more than a tenth of the objects that it
+/// lists; it is larger than kMaxSheetBytes or kMaxSheetEntries.
 [[nodiscard]] Result<DataSheet> read_data_sheet(std::string_view text, std::string_view file);
+
+/// Reads the file. Errors: those of read_data_sheet(); there is no such file, it is none, or it is
+/// larger than kMaxSheetBytes, of which nothing is read.
+[[nodiscard]] Result<DataSheet> load_data_sheet(const std::string& file);
 
 }  // namespace tandem::canopen
