@@ -31,12 +31,12 @@ struct SheetEntry {
   std::uint16_t type = 0;   ///< data type's number in CiA 301; may be one that DataType has not
   std::uint8_t access = 0;  ///< Access bits, kMapRpdo and kMapTpdo as PDOMapping and access allow
   bool constant = false;    ///< AccessType const: the value is the same in every device
-  std::string name;         ///< ParameterName
-  std::optional<SheetValue> value;  ///< ParameterValue (DCF), else DefaultValue; none: unknown
-  std::optional<std::int64_t> low;  ///< LowLimit; none for reals and texts
-  std::optional<std::int64_t> high;
-  std::string text;  ///< the value of a string, domain, time or unknown type, as written
-  int line = 0;      ///< of its section
+  std::string name{};       ///< ParameterName
+  std::optional<SheetValue> value{};  ///< ParameterValue (DCF), else DefaultValue; none: unknown
+  std::optional<std::int64_t> low{};  ///< LowLimit; none for reals and texts
+  std::optional<std::int64_t> high{};
+  std::string text{};  ///< the value of a string, domain, time or unknown type, as written
+  int line = 0;        ///< of its section
 
   /// Bytes on the wire by its type; 0: not fixed (strings, domains).
   [[nodiscard]] int size() const noexcept;
@@ -55,6 +55,7 @@ struct DataSheet {
   std::optional<int> node_id;          ///< a DCF's own
   std::optional<int> bit_rate_kbit_s;  ///< a DCF's own
   bool lss = false;                    ///< its id can be set over the bus
+  int most_pdo_bytes = 8;              ///< 64: frames of CAN FD; CiA 306 has no word for that
   std::optional<int> granularity;      ///< of PDO mappings [bit]; 0: they cannot be changed
   std::vector<std::uint16_t> dummies;  ///< data types that an RPDO may have as filler
   std::vector<SheetEntry> entries;

@@ -294,6 +294,10 @@ std::string head_text(const EdsDevice& device) {
 
 }  // namespace
 
+std::string entry_name(std::uint16_t index, std::uint8_t sub) {
+  return sub == 0 ? object_name(index) : sub_name(index, sub);
+}
+
 std::string make_eds(const ObjectDictionary& od, const EdsDevice& device,
                      const EdsDefaults& defaults) {
   std::vector<std::uint16_t> mandatory, optional, manufacturer;

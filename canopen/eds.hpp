@@ -26,6 +26,9 @@ struct EdsDevice {
 /// them ("0x60400010", "$NODEID+0x200").
 using EdsDefaults = std::map<std::pair<std::uint16_t, std::uint8_t>, std::string>;
 
+/// CiA's or our own name of a sub-index, as our sheets write it; sub 0: of the object.
+[[nodiscard]] std::string entry_name(std::uint16_t index, std::uint8_t sub);
+
 /// The sheet's text. Objects come in the dictionary's order, with type, access, whether a PDO may
 /// carry them, limits and the present value as default; CiA's and our own names. The same
 /// dictionary gives the same text: the creation date is a fixed one.

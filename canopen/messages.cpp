@@ -71,6 +71,12 @@ Frame make_heartbeat(int node, NmtState state) noexcept TANDEM_RT {
   return frame;
 }
 
+Frame make_guard_request(int node) noexcept TANDEM_RT {
+  Frame frame = short_frame(cob::kHeartbeat + static_cast<std::uint32_t>(node), 1);
+  frame.flags = kFlagRtr;
+  return frame;
+}
+
 std::optional<HeartbeatMessage> parse_heartbeat(const Frame& frame) noexcept TANDEM_RT {
   const std::uint8_t node = node_of(frame, cob::kHeartbeat);
   if (node == 0 || frame.length != 1) return std::nullopt;

@@ -51,6 +51,8 @@ struct HeartbeatMessage {
   NmtState state = NmtState::kBootUp;
 };
 [[nodiscard]] Frame make_heartbeat(int node, NmtState state) noexcept TANDEM_RT;
+/// Node guarding: the remote request that node `node` answers with its state.
+[[nodiscard]] Frame make_guard_request(int node) noexcept TANDEM_RT;
 [[nodiscard]] std::optional<HeartbeatMessage> parse_heartbeat(
     const Frame& frame) noexcept TANDEM_RT;
 

@@ -59,6 +59,8 @@ inline constexpr std::uint16_t kSyncPeriod = 0x1006;         // u32 [us]
 inline constexpr std::uint16_t kDeviceName = 0x1008;         // string
 inline constexpr std::uint16_t kHardwareVersion = 0x1009;    // string
 inline constexpr std::uint16_t kSoftwareVersion = 0x100A;    // string
+inline constexpr std::uint16_t kGuardTime = 0x100C;          // u16 [ms]
+inline constexpr std::uint16_t kLifeTimeFactor = 0x100D;     // u8: guard times without a request
 inline constexpr std::uint16_t kEmergencyId = 0x1014;        // u32
 inline constexpr std::uint16_t kHeartbeatConsumer = 0x1016;  // u32[]: node << 16 | time [ms]
 inline constexpr std::uint16_t kHeartbeatProducer = 0x1017;  // u16 [ms]
@@ -94,14 +96,17 @@ inline constexpr std::uint16_t kSoftwareLimits = 0x607D;         // i32: 1 min, 
 inline constexpr std::uint16_t kQuickStopDeceleration = 0x6085;  // u32 [link counts/s^2]
 inline constexpr std::uint16_t kTorqueSlope = 0x6087;            // u32 [per mille of rated / s]
 inline constexpr std::uint16_t kEncoderResolution = 0x608F;      // u32: 1 counts, 2 per revolutions
-inline constexpr std::uint16_t kVelocityOffset = 0x60B1;         // i32 [link counts/s]
-inline constexpr std::uint16_t kTorqueOffset = 0x60B2;           // i16 [per mille of rated]
-inline constexpr std::uint16_t kInterpolationPeriod = 0x60C2;    // u8 units, i8 power of ten [s]
-inline constexpr std::uint16_t kFollowingError = 0x60F4;         // i32 [link counts]
-inline constexpr std::uint16_t kDigitalInputs = 0x60FD;          // u32: digital_input
-inline constexpr std::uint16_t kDigitalOutputs = 0x60FE;         // u32: 1 digital_output
-inline constexpr std::uint16_t kTargetVelocity = 0x60FF;         // i32 [link counts/s]
-inline constexpr std::uint16_t kSupportedModes = 0x6502;         // u32
+inline constexpr std::uint16_t kGearRatio = 0x6091;            // u32: 1 motor, 2 shaft revolutions
+inline constexpr std::uint16_t kFeedConstant = 0x6092;         // u32: 1 feed, 2 shaft revolutions
+inline constexpr std::uint16_t kVelocityOffset = 0x60B1;       // i32 [link counts/s]
+inline constexpr std::uint16_t kTorqueOffset = 0x60B2;         // i16 [per mille of rated]
+inline constexpr std::uint16_t kInterpolationData = 0x60C1;    // i32: 1 the position
+inline constexpr std::uint16_t kInterpolationPeriod = 0x60C2;  // u8 units, i8 power of ten [s]
+inline constexpr std::uint16_t kFollowingError = 0x60F4;       // i32 [link counts]
+inline constexpr std::uint16_t kDigitalInputs = 0x60FD;        // u32: digital_input
+inline constexpr std::uint16_t kDigitalOutputs = 0x60FE;       // u32: 1 digital_output
+inline constexpr std::uint16_t kTargetVelocity = 0x60FF;       // i32 [link counts/s]
+inline constexpr std::uint16_t kSupportedModes = 0x6502;       // u32
 
 // The manufacturer's, axis 0
 inline constexpr std::uint16_t kMotorPosition = 0x2000;     // i32 [motor counts]
@@ -144,6 +149,13 @@ inline constexpr std::uint16_t kAxisStride = 0x800;
   return static_cast<std::uint16_t>(index + kAxisStride * axis);
 }
 
+/// Sub-indices of a PDO's communication parameter, 1400.. and 1800...
+enum PdoParameterSub : std::uint8_t {
+  kPdoCobId = 1,
+  kPdoType = 2,
+  kPdoInhibit = 3,  ///< [100 us]
+  kPdoEvent = 5,    ///< [ms]
+};
 /// Sub-indices of the gain objects.
 enum PidSub : std::uint8_t { kPidKp = 1, kPidKi, kPidKd, kPidOutputLimit };
 /// Sub-indices of object::kFeedForward.
@@ -198,10 +210,18 @@ enum class Mode : std::int8_t {
   kOpenLoop = -2,   ///< motor voltage
   kImpedance = -1,  ///< spring and damper about the position reference
   kNone = 0,
+  kIp = 7,    ///< interpolated position, target 60C1:1
   kCsp = 8,   ///< cyclic synchronous position
   kCsv = 9,   ///< cyclic synchronous velocity
   kCst = 10,  ///< cyclic synchronous torque
 };
+
+/// Bit of mode `mode` in 6502. @pre mode >= 1
+[[nodiscard]] constexpr std::uint32_t mode_bit(Mode mode) noexcept {
+  return 1u << (static_cast<int>(mode) - 1);
+}
+/// 6502 of our boards: CSP, CSV and CST; bits 16 to 19 are the manufacturer's modes -1 to -4.
+inline constexpr std::uint32_t kTandemModes = 0x7U << 7 | 0xFU << 16;
 
 /// Bits of the controlword (6040).
 namespace controlword {
@@ -209,7 +229,8 @@ inline constexpr std::uint16_t kSwitchOn = 1u << 0;
 inline constexpr std::uint16_t kEnableVoltage = 1u << 1;
 inline constexpr std::uint16_t kQuickStop = 1u << 2;  ///< active low
 inline constexpr std::uint16_t kEnableOperation = 1u << 3;
-inline constexpr std::uint16_t kFaultReset = 1u << 7;  ///< rising edge
+inline constexpr std::uint16_t kEnableInterpolation = 1u << 4;  ///< mode 7: follow 60C1
+inline constexpr std::uint16_t kFaultReset = 1u << 7;           ///< rising edge
 inline constexpr std::uint16_t kHalt = 1u << 8;
 
 // The commands of CiA 402

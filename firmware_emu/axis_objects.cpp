@@ -19,9 +19,6 @@ namespace own = firmware::object;
 constexpr ObjectRange kNotNegative{0.0, 3.0e38};
 constexpr double kLongestBrake_ms = 10'000.0;
 
-/// CSP, CSV and CST are bits 7 to 9 of 6502; the manufacturer's modes -1 to -4 bits 16 to 19.
-constexpr std::uint32_t kModes = 0x7U << 7 | 0xFU << 16;
-
 float real32(double value) { return static_cast<float>(value); }
 
 std::array<float, 4> gains_of(const Pid::Config& pid) {
@@ -137,7 +134,7 @@ bool AxisObjects::add_profile(ObjectDictionary& od, int axis, ObjectOwner& owner
          od.add(at(co::kInterpolationPeriod), 2, interpolation_power, kReadWrite, {-128, 63}) &&
          od.add(at(co::kMode), 0, mode, kWriteRpdo, {-4, 10}, &owner) &&
          od.add(at(co::kModeDisplay), 0, mode_display, kReadTpdo) &&
-         od.add_value(at(co::kSupportedModes), 0, kModes);
+         od.add_value(at(co::kSupportedModes), 0, kTandemModes);
 }
 
 bool AxisObjects::add_limits(ObjectDictionary& od, int axis, ObjectOwner& owner) {

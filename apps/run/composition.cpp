@@ -17,6 +17,7 @@
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
+#include "hal/sim/setup.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -268,6 +269,9 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
     if (auto error = wrong_start_height(robot, e.posture)) errors.add(std::move(*error), {}, 0);
     c.warnings = buried_links(robot, e.posture);
     errors.add(study_loops(e.robot, robot.tree, {&e.posture, 1}).errors);
+    if (const Status boards = sim::check_firmware(e.robot); !boards) {
+      errors.add(boards.error(), {}, 0);
+    }
     const Status engine = sim::check_engine(e.robot, e.sim_robot_config());
     if (!engine) errors.add(in_its_file(engine.error(), e), {}, 0);
   }

@@ -17,6 +17,7 @@
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
 #include "hal/sim/scenario.hpp"
+#include "hal/sim/setup.hpp"
 #include "rt/stop_signal.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/experiment.hpp"
@@ -101,6 +102,9 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
     return std::unexpected(std::move(loops.errors));
   }
   e->subject.sim.tree = std::make_shared<const model::Tree>(description->tree);
+  if (const Status boards = sim::check_firmware(robot); !boards) {
+    return std::unexpected(Diagnostics{boards.error()});
+  }
   if (const Status engine = sim::check_engine(robot, e->subject.sim); !engine) {
     return std::unexpected(in_file(engine.error(), options.file));
   }

@@ -5,10 +5,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "canopen/drive_abilities.hpp"
+
 namespace tandem::hal {
 namespace {
 
+using canopen::Mode;
+
 bool any(const PidGains& gains) { return gains.kp != 0.0 || gains.ki != 0.0 || gains.kd != 0.0; }
+
+/// A joint that is on no board yet is taken for one of ours.
+canopen::DriveAbilities drive_of(const RobotConfig& robot, const JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  static const auto own = canopen::tandem_board_sheet();
+  return canopen::abilities_of(board != nullptr ? *board->sheet : *own,
+                               board != nullptr ? joint.axis : 0);
+}
 
 std::uint8_t bit(Capability capability, bool set) {
   return set ? static_cast<std::uint8_t>(capability) : std::uint8_t{0};
@@ -57,15 +69,19 @@ JointCapabilities capabilities_of(const RobotConfig& robot, const JointConfig& j
   out.max_velocity_rad_s = joint.max_velocity_rad_s;
   out.max_acceleration_rad_s2 = joint.max_acceleration_rad_s2;
   out.max_jerk_rad_s3 = joint.max_jerk_rad_s3;
-  const bool torque =
-      joint.max_torque_Nm > 0.0 && (any(gains.torque.gains) || gains.torque_feedforward > 0.0);
+  const canopen::DriveAbilities drive = drive_of(robot, joint);
+  const bool told = drive.settings;  // the gains tables are what its loops have
+  const bool torque = joint.max_torque_Nm > 0.0 &&
+                      (!told || any(gains.torque.gains) || gains.torque_feedforward > 0.0);
   const bool current = actuator.current_limit_A > 0.0 && any(gains.current.gains);
+  const auto loop = [&](const PidConfig& pid) { return torque && (!told || any(pid.gains)); };
   out.bits = static_cast<std::uint8_t>(
-      bit(Capability::kPosition, torque && any(gains.position.gains)) |
-      bit(Capability::kVelocity, torque && any(gains.velocity.gains)) |
-      bit(Capability::kTorque, torque) | bit(Capability::kCompliant, torque) |
-      bit(Capability::kOpenLoop, actuator.voltage_limit_V > 0.0) |
-      bit(Capability::kCurrent, current));
+      bit(Capability::kPosition, drive.position != Mode::kNone && loop(gains.position)) |
+      bit(Capability::kVelocity, drive.velocity != Mode::kNone && loop(gains.velocity)) |
+      bit(Capability::kTorque, drive.torque != Mode::kNone && torque) |
+      bit(Capability::kCompliant, drive.impedance && torque) |
+      bit(Capability::kOpenLoop, drive.open_loop && actuator.voltage_limit_V > 0.0) |
+      bit(Capability::kCurrent, drive.current && current));
   out.max_voltage_V = actuator.voltage_limit_V;
   out.max_current_A = actuator.current_limit_A;
   if (torque) {
@@ -92,6 +108,16 @@ Status check_capability(const RobotConfig& robot, std::size_t joint, ControlMode
                         InteractionMode interaction) {
   const JointConfig& config = robot.joints.at(joint);
   if (capabilities_of(robot, config).can(mode, interaction)) return {};
+  const BoardConfig* board = robot.board(config.board);
+  if (board != nullptr && !board->eds.empty()) {
+    return std::unexpected(
+        Error{.message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
+                         to_string(interaction) + "): its drive has no such mode",
+              .hint = "`tandem eds show " + board->eds + "` lists its modes; ask for another",
+              .file = robot.file,
+              .line = board->line,
+              .key = "board." + board->name});
+  }
   Error error{.message = "joint '" + config.name + "' has no " + to_string(mode) + " control (" +
                          to_string(interaction) + ")",
               .hint = "give [gains." + config.gains + "] the loop, or ask for another mode",

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,6 +15,8 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "canopen/board_sheet.hpp"
+#include "canopen/data_sheet.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "hal/stop_category.hpp"
@@ -139,7 +142,9 @@ struct JointConfig {
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
   std::optional<BrakeConfig> brake = {};
-  bool slides = false;  ///< prismatic: m and N; the URDF's, by complete_from_description()
+  bool counts_of_sheet = false;  ///< encoder_counts_per_rev is what the drive's sheet says
+  bool torque_of_sheet = false;  ///< rated_torque_Nm is
+  bool slides = false;           ///< prismatic: m and N; the URDF's, by complete_from_description()
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int on_fault_line = 0;                             ///< in the TOML, for messages
   int line = 0;                                      ///< the same
@@ -189,9 +194,11 @@ struct BoardConfig {
   std::int64_t control_period_ns = 1'000'000;  ///< of its joint controllers
   int heartbeat_ms = 50;                       ///< both ways; time-out is three of them
   int command_timeout_cycles = 10;             ///< SYNCs without a command until the safe state
+  std::int64_t boot_time_ns = 1'500'000'000;   ///< from a reset to the boot-up message, at most
   int slow_pdo_every = 1;                      ///< motor velocity, current, … every n-th SYNC
-  // 1018, as the board has to identify itself; without a value that of the emulated boards, or any
-  // serial
+  std::string eds;  ///< path of its data sheet, against the TOML's folder; empty: one of our own
+  std::shared_ptr<const canopen::DataSheet> sheet = canopen::tandem_board_sheet();
+  // 1018, as the board has to identify itself; without a value that of the sheet, or any serial
   std::optional<std::uint32_t> vendor_id, product_code;
   std::optional<std::uint32_t> revision;  ///< major << 16 | minor: that major, at least that minor
   std::optional<std::uint32_t> serial;

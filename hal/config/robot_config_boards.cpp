@@ -1,11 +1,16 @@
 // [[bus]] and [[board]]: node ids that count up along a bus, and the axes of the joints that they
 // list.
+#include <cmath>
+#include <filesystem>
+
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
 namespace {
 
 constexpr std::size_t kMostAxes = 8;
+constexpr double kOwnBoot_s = 1.5;
+constexpr double kSheetBoot_s = 6.0;  // drives that need five are known
 
 BusConfig read_bus(TomlTable& table) {
   BusConfig bus;
@@ -42,10 +47,27 @@ BoardConfig read_board(TomlTable& table) {
   board.command_timeout_cycles =
       static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
   board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
+  board.eds = table.text_or("eds", "");
+  const double usual_s = board.eds.empty() ? kOwnBoot_s : kSheetBoot_s;
+  board.boot_time_ns = std::llround(1e9 * table.number_or("boot_time_s", usual_s, {0.1, 60.0}));
   board.vendor_id = read_identity(table, "vendor_id");
   board.product_code = read_identity(table, "product_code");
   board.revision = read_identity(table, "revision");
   return board;
+}
+
+/// Reads the data sheet that the board names.
+void read_sheet(TomlTable& table, const std::string& robot_file, BoardConfig& board) {
+  if (board.eds.empty()) return;
+  namespace fs = std::filesystem;
+  const std::string path = (fs::path(robot_file).parent_path() / board.eds).string();
+  auto sheet = canopen::load_data_sheet(path);
+  if (!sheet) {
+    table.error("eds", sheet.error().to_string(), "`tandem eds show` checks a sheet by itself");
+    return;
+  }
+  board.eds = path;
+  board.sheet = std::make_shared<const canopen::DataSheet>(std::move(*sheet));
 }
 
 /// The joints that the board lists: each once, and on this board alone.
@@ -78,6 +100,7 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
   board.line = table.line();
   board.name = read_own_name(table);
   check_unique(table, robot.boards, board.name, "board");
+  read_sheet(table, robot.file, board);
   board.bus = read_bus_name(table, bus);
   check_reference(table, "bus", board.bus, robot.buses, "bus");
   board.node_id = ids.read(table, board.bus);

@@ -1,6 +1,8 @@
 // [[joint]]: limits, brake, encoders and reaction to faults, for one joint or for a list of them.
+#include <cmath>
 #include <limits>
 
+#include "canopen/drive_abilities.hpp"
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -54,8 +56,9 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   check_reference(table, "actuator", joint.actuator, robot.actuators, "actuator");
   joint.gains = table.text_or("gains", joint.actuator);
   read_limits(table, joint);
-  joint.encoder_counts_per_rev = table.number("encoder_counts_per_rev", kCounts);
-  joint.motor_encoder_counts_per_rev = table.number("motor_encoder_counts_per_rev", kCounts);
+  joint.encoder_counts_per_rev = table.number_or("encoder_counts_per_rev", kUnset, kCounts);
+  joint.motor_encoder_counts_per_rev =
+      table.number_or("motor_encoder_counts_per_rev", kUnset, kCounts);
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
   joint.following_error_rad =
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
@@ -124,6 +127,43 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
   }
 }
 
+/// The units of a drive of another make: the table's, else those of its sheet.
+void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  if (board == nullptr || board->eds.empty()) {
+    for (const char* key : {"encoder_counts_per_rev", "motor_encoder_counts_per_rev"}) {
+      if (!table.has(key)) (void)table.number(key);  // says that it is missing
+    }
+    return;
+  }
+  if (board->sheet == canopen::tandem_board_sheet()) return;  // its own could not be read
+  const canopen::DriveUnits units = canopen::units_of(*board->sheet, joint.axis);
+  if (std::isnan(joint.encoder_counts_per_rev)) {
+    // Many sheets say 1, which the drive replaces when it is commissioned.
+    const double counts = units.counts_per_rev.value_or(0.0);
+    joint.counts_of_sheet = counts >= kCounts.min && counts <= kCounts.max;
+    joint.encoder_counts_per_rev = joint.counts_of_sheet ? counts : kUnset;
+    if (!joint.counts_of_sheet) {
+      table.error("encoder_counts_per_rev",
+                  "neither this table nor the drive's sheet says what the counts of joint '" +
+                      joint.name + "' are: 608F, 6091 and 6092 have no use in " + board->eds,
+                  "set it to the position units per revolution of the joint");
+    }
+  }
+  if (std::isnan(joint.motor_encoder_counts_per_rev)) {
+    joint.motor_encoder_counts_per_rev = joint.encoder_counts_per_rev;
+  }
+  if (!std::isnan(joint.rated_torque_Nm)) return;
+  joint.rated_torque_Nm = units.rated_torque_Nm.value_or(kUnset);
+  joint.torque_of_sheet = units.rated_torque_Nm.has_value();
+  if (!joint.torque_of_sheet) {
+    table.error("rated_torque_Nm",
+                "neither this table nor the drive's sheet says what the torques of joint '" +
+                    joint.name + "' are per mille of: 6076 has no value in " + board->eds,
+                "set it to the motor's rated torque times the gear ratio");
+  }
+}
+
 void check_joint(TomlTable& table, const JointConfig& joint, const RobotConfig& robot) {
   const char* key = table.has("names") ? "names" : "name";
   for (const JointConfig& other : robot.joints) {
@@ -158,6 +198,7 @@ void add_joints(TomlTable& table, std::span<const AxisAssignment> listed, RobotC
     JointConfig joint = common;
     joint.name = name;
     read_axis(table, listed, robot, joint, loose);
+    complete_units(table, robot, joint);
     check_joint(table, joint, robot);
     robot.joints.push_back(joint);
   }

@@ -81,11 +81,11 @@ void* RawCommand::variable(WireField field) noexcept {
   }
 }
 
-Mode wire_mode(ControlMode mode, InteractionMode interaction) noexcept TANDEM_RT {
+Mode wire_mode(ControlMode mode, InteractionMode interaction, Mode position) noexcept TANDEM_RT {
   const bool compliant = interaction == InteractionMode::kCompliant;
   switch (mode) {
     case ControlMode::kIdle: return Mode::kNone;
-    case ControlMode::kPosition: return compliant ? Mode::kImpedance : Mode::kCsp;
+    case ControlMode::kPosition: return compliant ? Mode::kImpedance : position;
     case ControlMode::kVelocity: return compliant ? Mode::kVelocityImpedance : Mode::kCsv;
     case ControlMode::kTorque: return Mode::kCst;
     case ControlMode::kOpenLoop: return Mode::kOpenLoop;
@@ -97,6 +97,7 @@ Mode wire_mode(ControlMode mode, InteractionMode interaction) noexcept TANDEM_RT
 std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TANDEM_RT {
   constexpr auto kStiff = InteractionMode::kStiff;
   switch (static_cast<Mode>(mode)) {
+    case Mode::kIp:
     case Mode::kCsp: return {ControlMode::kPosition, kStiff};
     case Mode::kImpedance: return {ControlMode::kPosition, InteractionMode::kCompliant};
     case Mode::kCsv: return {ControlMode::kVelocity, kStiff};
@@ -109,11 +110,11 @@ std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TA
   return {ControlMode::kIdle, kStiff};
 }
 
-void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
-                    RawCommand& raw) noexcept TANDEM_RT {
+void encode_command(const AxisScale& scale, Mode position, const CommandImage& command,
+                    std::size_t joint, RawCommand& raw) noexcept TANDEM_RT {
   const auto mode = static_cast<ControlMode>(command.mode()[joint]);
   const auto interaction = static_cast<InteractionMode>(command.interaction()[joint]);
-  const Mode wire = wire_mode(mode, interaction);
+  const Mode wire = wire_mode(mode, interaction, position);
   if (wire != Mode::kNone) raw.mode = static_cast<std::int8_t>(wire);
   raw.target_position =
       clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad);

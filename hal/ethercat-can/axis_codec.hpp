@@ -70,15 +70,17 @@ struct RawCommand {
 };
 
 /// The mode of operation for what the image asks; kNone for kIdle.
-[[nodiscard]] canopen::Mode wire_mode(ControlMode mode,
-                                      InteractionMode interaction) noexcept TANDEM_RT;
+/// @param position  the drive's mode for stiff positions: kCsp, or kIp where it has no other
+[[nodiscard]] canopen::Mode wire_mode(ControlMode mode, InteractionMode interaction,
+                                      canopen::Mode position) noexcept TANDEM_RT;
 /// The way back, for the mode display; kIdle for a mode that is none of ours.
 [[nodiscard]] std::pair<ControlMode, InteractionMode> image_mode(
     std::int8_t mode) noexcept TANDEM_RT;
 
 /// Everything but the controlword: references, feed-forward and mode (kIdle: the mode stays).
-void encode_command(const AxisScale& scale, const CommandImage& command, std::size_t joint,
-                    RawCommand& raw) noexcept TANDEM_RT;
+/// @param position  as wire_mode() takes it
+void encode_command(const AxisScale& scale, canopen::Mode position, const CommandImage& command,
+                    std::size_t joint, RawCommand& raw) noexcept TANDEM_RT;
 /// The drive's values into the image, but acceleration, fault and age.
 void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t joint,
                      StateImage& state) noexcept TANDEM_RT;

@@ -15,8 +15,14 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
     ++age_cycles_;
     return;
   }
+  const std::int32_t last_position = feedback_.position;
   feedback_.adopt(sample_);
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
+  if (!traits_.tells_velocity && heard_ && elapsed_ns > 0) {
+    const double counts = static_cast<double>(feedback_.position) - last_position;
+    feedback_.velocity =
+        canopen::clamp_round<std::int32_t>(counts * 1.0e9 / static_cast<double>(elapsed_ns));
+  }
   if (heard_ && elapsed_ns > 0) {
     const double change = static_cast<double>(feedback_.velocity) - previous_velocity_;
     acceleration_rad_s2_ = change / scale_.counts_per_rad * 1.0e9 / static_cast<double>(elapsed_ns);
@@ -84,11 +90,10 @@ bool AxisMaster::command(const CommandImage* image, std::size_t joint,
     case TargetState::kQuickStop: raw_.controlword = controlword::kCommandQuickStop; return false;
     case TargetState::kHold:
       // A drive that is not enabled stays as it is: holding must not switch anything on.
-      raw_.controlword =
-          was_enabled_ ? controlword::kCommandEnableOperation : controlword::kCommandDisableVoltage;
+      raw_.controlword = was_enabled_ ? enable_operation() : controlword::kCommandDisableVoltage;
       return false;
-    case TargetState::kBringUp: walk_up(true); return enable_is_late(now_ns);
-    case TargetState::kEnable: walk_up(false); return enable_is_late(now_ns);
+    case TargetState::kBringUp: walk_up(true, now_ns); return enable_is_late(now_ns);
+    case TargetState::kEnable: walk_up(false, now_ns); return enable_is_late(now_ns);
     case TargetState::kReset: raw_.controlword = reset_controlword(); return reset_is_late(now_ns);
     case TargetState::kFollow:
       if (image != nullptr) follow(*image, joint, now_ns);
@@ -107,15 +112,15 @@ void AxisMaster::follow(const CommandImage& image, std::size_t joint,
   }
   if (was_enabled_ || enabled()) {
     was_enabled_ = true;
-    raw_.controlword = controlword::kCommandEnableOperation;
-    encode_command(scale_, image, joint, raw_);
+    encode_command(scale_, traits_.can.position, image, joint, raw_);
+    raw_.controlword = enable_operation();
     return;
   }
-  walk_up(false);
+  walk_up(false, now_ns);
 }
 
 /// One transition nearer to Operation Enabled, with the measured position as target.
-void AxisMaster::walk_up(bool clears_faults) noexcept {
+void AxisMaster::walk_up(bool clears_faults, std::int64_t now_ns) noexcept {
   const WireState state = drive();
   if (!heard_) {
     raw_.controlword = controlword::kCommandDisableVoltage;
@@ -129,10 +134,21 @@ void AxisMaster::walk_up(bool clears_faults) noexcept {
   if (state == WireState::kFault && clears_faults) {
     raw_.controlword = reset_controlword();
   } else if (state == WireState::kQuickStopActive) {
-    raw_.controlword = controlword::kCommandQuickStop;  // the ramp ends by itself (605A = 2)
+    // The ramp ends by itself (605A = 2). A drive that stays, as 605A = 5 to 8 have it, is let go.
+    const bool stays = now_ns - since_ns_ >= kEnableTimeoutNs / 2;
+    raw_.controlword = stays ? controlword::kCommandDisableVoltage : controlword::kCommandQuickStop;
+  } else if (state == WireState::kOperationEnabled) {
+    raw_.controlword = enable_operation();
   } else {
     raw_.controlword = canopen::controlword_towards_enabled(state);
   }
+}
+
+/// Interpolated position waits for bit 4 before it follows.
+std::uint16_t AxisMaster::enable_operation() const noexcept {
+  const bool interpolates = raw_.mode == static_cast<std::int8_t>(canopen::Mode::kIp);
+  return static_cast<std::uint16_t>(controlword::kCommandEnableOperation |
+                                    (interpolates ? controlword::kEnableInterpolation : 0u));
 }
 
 /// Bit 7 off and on in turns: whenever the drive looks, there is an edge to come.
@@ -142,7 +158,7 @@ std::uint16_t AxisMaster::reset_controlword() noexcept {
 }
 
 void AxisMaster::seed() noexcept {
-  raw_.mode = static_cast<std::int8_t>(canopen::Mode::kCsp);
+  raw_.mode = static_cast<std::int8_t>(canopen::first_mode(traits_.can));
   raw_.target_position = feedback_.position;
   raw_.velocity_offset = 0;
   raw_.torque_offset = 0;
@@ -178,6 +194,15 @@ bool AxisMaster::off() const noexcept TANDEM_RT {
 void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDEM_RT {
   if (heard_) {
     decode_feedback(scale_, feedback_, joint, state);
+    if (!traits_.tells_mode && enabled()) {
+      const auto [mode, interaction] = image_mode(raw_.mode);
+      state.mode()[joint] = static_cast<std::int8_t>(mode);
+      state.interaction()[joint] = static_cast<std::uint8_t>(interaction);
+    }
+    if (!traits_.tells_motor) {
+      state.motor_position_rad()[joint] = state.position_rad()[joint];
+      state.motor_velocity_rad_s()[joint] = state.velocity_rad_s()[joint];
+    }
   } else {
     state.drive_state()[joint] = static_cast<std::uint8_t>(DriveState::kUnknown);
     state.mode()[joint] = static_cast<std::int8_t>(ControlMode::kIdle);

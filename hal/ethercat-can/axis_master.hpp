@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "base/realtime.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/drive_machine.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/image.hpp"
@@ -19,6 +20,17 @@ enum class AxisError : std::uint8_t {
   kNotEnabled,   ///< it did not reach Operation Enabled in time
   kLeftEnabled,  ///< it left Operation Enabled by itself
   kNodeLost,     ///< its board is not in operation any more
+};
+
+/// What a drive tells and can, where drives differ.
+struct AxisTraits {
+  canopen::DriveAbilities can{.machine = true,
+                              .position = canopen::Mode::kCsp,
+                              .velocity = canopen::Mode::kCsv,
+                              .torque = canopen::Mode::kCst};
+  bool tells_velocity = true;  ///< else it is the positions' difference
+  bool tells_mode = true;      ///< else an enabled axis is in the mode that was sent
+  bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
 };
 
 class AxisMaster {
@@ -40,8 +52,9 @@ class AxisMaster {
   static constexpr std::uint32_t kResetToggleCycles = 4;
 
   /// @param stiffness, damping  of the impedance mode until a command says otherwise
-  AxisMaster(const AxisScale& scale, double stiffness_Nm_rad, double damping_Nms_rad) noexcept
-      : scale_(scale) {
+  AxisMaster(const AxisScale& scale, const AxisTraits& traits, double stiffness_Nm_rad,
+             double damping_Nms_rad) noexcept
+      : scale_(scale), traits_(traits) {
     raw_.stiffness = static_cast<float>(stiffness_Nm_rad);
     raw_.damping = static_cast<float>(damping_Nms_rad);
   }
@@ -102,13 +115,15 @@ class AxisMaster {
 
  private:
   void follow(const CommandImage& image, std::size_t joint, std::int64_t now_ns) noexcept;
-  void walk_up(bool clears_faults) noexcept;
+  void walk_up(bool clears_faults, std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::uint16_t enable_operation() const noexcept;
   [[nodiscard]] std::uint16_t reset_controlword() noexcept;
   void seed() noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
   bool reset_is_late(std::int64_t now_ns) noexcept;
 
   AxisScale scale_;
+  AxisTraits traits_;
   RawFeedback feedback_;
   RawFeedback sample_;  ///< what has come of this cycle's sample; no state
   RawCommand raw_;

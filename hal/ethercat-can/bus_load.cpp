@@ -14,6 +14,9 @@
 namespace tandem::hal::can {
 namespace {
 
+/// Time for one SDO exchange of every node is kept free so often.
+constexpr double kSdoEveryNs = 100e6;
+
 using Kind = BusLoadRow::Kind;
 using Nodes = std::vector<const NodePlan*>;
 
@@ -81,7 +84,7 @@ BusLoad load_of(const BusConfig& bus, const Nodes& nodes, std::int64_t period_ns
   if (shortest_ms > 0) sum.frame(1, period_ms / shortest_ms);
   sum.row("heartbeats", Kind::kMean);
   // Every node's exchange within the time that the master waits for an answer.
-  const double exchanges = static_cast<double>(period_ns) / NodeMaster::kSdoAnswerNs;
+  const double exchanges = static_cast<double>(period_ns) / kSdoEveryNs;
   for (std::size_t n = 0; n < nodes.size(); ++n) sum.frame(8, 2.0 * exchanges);
   sum.row("SDO, reserved", Kind::kMean);
   sum.pdos(nodes, PdoGroup::kSlowCommand, "slow commands", Kind::kOnChange);

@@ -21,11 +21,25 @@ constexpr int kSensorTimeoutCycles = 10;
 /// Cycles in succession with two answers of one node that are tolerated.
 constexpr std::uint32_t kDoubledCycles = 10;
 
+/// Of each joint, by what its board's PDOs carry.
+std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& layout) {
+  std::vector<AxisTraits> traits(robot.joints.size());
+  for (const NodePlan& node : layout.nodes) {
+    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      traits[node.joints[axis]] = {.can = node.abilities[axis],
+                                   .tells_velocity = node.carries(axis, WireField::kVelocity),
+                                   .tells_mode = node.carries(axis, WireField::kModeDisplay),
+                                   .tells_motor = node.carries(axis, WireField::kMotorPosition)};
+    }
+  }
+  return traits;
+}
+
 }  // namespace
 
 DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
     : plan(std::move(node_plan)),
-      master(plan.id, plan.heartbeat_ms, std::move(steps)),
+      master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps)),
       timeout_cycles(timeout),
       frames(plan.pdos.size()),
       sent(plan.pdos.size()) {
@@ -51,9 +65,11 @@ DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
       sent_revision(robot.joints.size()) {
   const std::size_t frames = 16 + layout.nodes.size() * 8;
   for (Bus* bus : buses) ports.emplace_back(*bus, frames);
-  for (const JointConfig& joint : robot.joints) {
-    const GainsConfig& gains = robot.gains_of(joint);
-    axes.emplace_back(AxisScale::of(joint), gains.stiffness_Nm_rad, gains.damping_Nms_rad);
+  const std::vector<AxisTraits> traits = traits_of(robot, layout);
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    const GainsConfig& gains = robot.gains_of(robot.joints[j]);
+    axes.emplace_back(AxisScale::of(robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
+                      gains.damping_Nms_rad);
     for (const PidConfig* loop :
          {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
       file_gains.push_back(loop->gains);
@@ -111,6 +127,8 @@ void DriveMaster::Impl::compile_exchanges(Node& node) {
       if (std::ranges::find(exchange.joints, joint) == exchange.joints.end())
         exchange.joints.push_back(joint);
     }
+    // A sample of several parts is that of all axes, and its last part makes it whole.
+    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) exchange.joints = node.plan.joints;
   }
 }
 
@@ -120,7 +138,7 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
   if (!begun) {
     for (Node& node : nodes) {
       const int periods = node.timeout_cycles == 0 ? 0 : node.timeout_cycles + 1;
-      node.master.set_sync_timeout(periods * time.period_ns);
+      node.master.set_times(time.period_ns, periods * time.period_ns);
       node.master.restart(now_ns);
     }
     for (Port& port : ports) port.next_heartbeat_ns = now_ns;

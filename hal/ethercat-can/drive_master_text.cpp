@@ -29,6 +29,11 @@ const char* identity_name(const SdoStep& step) {
   }
 }
 
+const char* allowed(SdoUse use) {
+  if (use == SdoUse::kCheckRevision) return " or a later minor of it";
+  return use == SdoUse::kCheckProfile ? " (profile 402 in its lower half)" : "";
+}
+
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 }  // namespace
@@ -59,7 +64,7 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
   const NodeMaster& m = node.master;
   const std::string who = fmt::format("{} {} (node {}, bus {})", label(node.plan), node.plan.name,
                                       node.plan.id, robot.buses[node.plan.bus].name);
-  const double limit_s = seconds(NodeMaster::kBootTimeoutNs);
+  const double limit_s = seconds(2 * node.plan.boot_time_ns);
   switch (m.error()) {
     case NodeError::kNone: break;
     case NodeError::kNoBootUp:
@@ -69,9 +74,22 @@ std::string DriveMaster::Impl::node_text(const Node& node) const {
           who, limit_s, node.plan.id);
     case NodeError::kWrongIdentity: {
       const SdoStep& step = m.steps()[m.step()];
+      if (step.use == SdoUse::kCheckBits) {
+        return fmt::format(
+            "{}: the drive has not the modes that its sheet makes the master use: {} is 0x{:X}, "
+            "and "
+            "the bits 0x{:X} are needed",
+            who, step_text(node, step), m.read_value(), number(step));
+      }
+      if (step.axis >= 0) {
+        return fmt::format(
+            "{}: {} is {}, and its sheet says {}: the joint's scale would be wrong; set "
+            "encoder_counts_per_rev and rated_torque_Nm in robot.toml",
+            who, step_text(node, step), m.read_value(), number(step));
+      }
       return fmt::format("{}: wrong {}: object {:04X}:{:02X} is 0x{:X} instead of 0x{:X}{}", who,
                          identity_name(step), step.index, step.sub, m.read_value(), number(step),
-                         step.use == SdoUse::kCheckRevision ? " or a later minor of it" : "");
+                         allowed(step.use));
     }
     case NodeError::kSdoAbort: {
       const SdoStep& step = m.steps()[m.step()];

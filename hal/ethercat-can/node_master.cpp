@@ -14,17 +14,50 @@ using canopen::FrameSink;
 using canopen::NmtState;
 using canopen::SdoClient;
 
-NodeMaster::NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps)
+namespace {
+
+/// 60C2 as mantissa and power of ten: the fewest digits that tell the period in a byte.
+/// @return false when none does.
+bool interpolation_period(std::int64_t period_ns, std::uint8_t& units, std::int8_t& power) {
+  std::int64_t unit_ns = 1'000'000;  // 10^-3 s: what drives know best
+  for (power = -3; power >= -6; --power, unit_ns /= 10) {
+    if (period_ns % unit_ns != 0 || period_ns / unit_ns > 0xFF) continue;
+    units = static_cast<std::uint8_t>(period_ns / unit_ns);
+    return true;
+  }
+  return false;
+}
+
+bool is_interpolation_period(std::uint16_t index) noexcept {
+  return index >= 0x6000 && index < 0xA000 &&
+         (index - 0x6000) % canopen::kAxisStride == canopen::object::kInterpolationPeriod - 0x6000;
+}
+
+}  // namespace
+
+NodeMaster::NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, NodeWatch watch,
+                       std::vector<SdoStep> steps)
     : id_(id),
       heartbeat_timeout_ns_(std::int64_t{kHeartbeatPeriods} * heartbeat_ms * 1'000'000),
+      boot_time_ns_(boot_time_ns),
+      watch_(watch),
       steps_(std::move(steps)),
       sdo_(id) {}
 
-void NodeMaster::set_sync_timeout(std::int64_t timeout_ns) noexcept TANDEM_RT {
+void NodeMaster::set_times(std::int64_t period_ns,
+                           std::int64_t sync_timeout_ns) noexcept TANDEM_RT {
+  std::uint8_t units = 0;
+  std::int8_t power = 0;
+  const bool told = interpolation_period(period_ns, units, power);
   for (SdoStep& step : steps_) {
+    const bool writes = step.use == SdoUse::kWrite;
+    if (told && writes && is_interpolation_period(step.index)) {
+      if (step.sub == 1) canopen::put(step.bytes.data(), units);
+      if (step.sub == 2) canopen::put(step.bytes.data(), power);
+    }
     if (step.index != canopen::object::kSyncTimeout) continue;
-    canopen::put(step.bytes.data(),
-                 canopen::clamp_round<std::uint32_t>(static_cast<double>(timeout_ns) / 1000.0));
+    canopen::put(step.bytes.data(), canopen::clamp_round<std::uint32_t>(
+                                        static_cast<double>(sync_timeout_ns) / 1000.0));
   }
 }
 
@@ -63,14 +96,16 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
                          FrameSink& out) noexcept TANDEM_RT {
   switch (stage_) {
     case NodeStage::kWaitBootUp:
-      if (now_ns - since_ns_ >= kBootTimeoutNs) return fail(NodeError::kNoBootUp, now_ns);
+      if (now_ns - since_ns_ >= 2 * boot_time_ns_) return fail(NodeError::kNoBootUp, now_ns);
       if (now_ns < next_reset_ns_) return;
       out.push(canopen::make_nmt(canopen::NmtCommand::kResetNode, id_));
-      next_reset_ns_ = now_ns + kResetEveryNs;
+      next_reset_ns_ = now_ns + boot_time_ns_;
       return;
     case NodeStage::kConfigure: return configure(now_ns, dt_ns, out);
-    case NodeStage::kReady: return watch_heartbeat(now_ns);
+    case NodeStage::kReady: guard(now_ns, out); return watch_heartbeat(now_ns);
     case NodeStage::kStarting:
+      if (watch_ == NodeWatch::kNothing) return enter(NodeStage::kRunning, now_ns);
+      guard(now_ns, out);
       watch_heartbeat(now_ns);
       if (stage_ == NodeStage::kStarting && now_ns - since_ns_ >= kStartTimeoutNs) {
         fail(NodeError::kNotOperational, now_ns);
@@ -78,6 +113,7 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
       return;
     case NodeStage::kRunning:
       sdo_.process(dt_ns, kSdoAnswerNs, out);
+      guard(now_ns, out);
       return watch_heartbeat(now_ns);
     case NodeStage::kDown: return;
   }
@@ -104,11 +140,19 @@ void NodeMaster::request(FrameSink& out) noexcept {
 void NodeMaster::step_answered(std::int64_t now_ns) noexcept {
   if (sdo_.status() == SdoClient::Status::kAborted) {
     abort_code_ = sdo_.abort_code();
-    if (abort_code_ == AbortCode::kTimeout && ++tries_ < kSdoTries) return;  // a frame was lost
-    return fail(NodeError::kSdoAbort, now_ns);
+    if (abort_code_ == AbortCode::kTimeout) {
+      // A frame was lost; or the boot-up was that of power-on, and the node is in its reset.
+      if (++tries_ < kSdoTries || now_ns < next_reset_ns_) return;
+    }
+    const bool need_not_exist = steps_[step_].use == SdoUse::kCheckBits;
+    if (!need_not_exist || abort_code_ != AbortCode::kNoObject) {
+      return fail(NodeError::kSdoAbort, now_ns);
+    }
+    abort_code_ = AbortCode::kNone;
   }
   const SdoStep& step = steps_[step_];
-  if (step.use != SdoUse::kWrite && !step.accepts(sdo_.value())) {
+  const bool answered = sdo_.status() != SdoClient::Status::kAborted;
+  if (answered && step.use != SdoUse::kWrite && !step.accepts(sdo_.value())) {
     std::array<std::uint8_t, 4> bytes{};
     std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()), bytes.begin());
     read_value_ = canopen::get<std::uint32_t>(bytes.data());
@@ -126,7 +170,15 @@ void NodeMaster::start(std::int64_t now_ns, FrameSink& out) noexcept TANDEM_RT {
   enter(NodeStage::kStarting, now_ns);
 }
 
+/// Asks for the node's state: an RTR frame under its heartbeat's identifier.
+void NodeMaster::guard(std::int64_t now_ns, FrameSink& out) noexcept {
+  if (watch_ != NodeWatch::kGuarding || now_ns < next_guard_ns_) return;
+  out.push(canopen::make_guard_request(id_));
+  next_guard_ns_ = now_ns + heartbeat_timeout_ns_ / kHeartbeatPeriods;
+}
+
 void NodeMaster::watch_heartbeat(std::int64_t now_ns) noexcept {
+  if (watch_ == NodeWatch::kNothing) return;
   if (now_ns - heard_ns_ >= heartbeat_timeout_ns_) fail(NodeError::kHeartbeatLost, now_ns);
 }
 
@@ -148,7 +200,7 @@ void NodeMaster::enter(NodeStage stage, std::int64_t now_ns) noexcept {
 
 void NodeMaster::archive(Archive& ar) {
   ar(stage_, error_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
-     heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
+     next_guard_ns_, heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
 }
 
 }  // namespace tandem::hal::can

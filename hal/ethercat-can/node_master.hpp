@@ -39,17 +39,19 @@ enum class NodeStage : std::uint8_t {
 /// Non-blocking: frames and time in, frames out, at most one SDO request per call.
 class NodeMaster {
  public:
-  static constexpr std::int64_t kBootTimeoutNs = 3'000'000'000;
-  static constexpr std::int64_t kResetEveryNs = 500'000'000;
-  static constexpr std::int64_t kSdoAnswerNs = 100'000'000;
+  static constexpr std::int64_t kSdoAnswerNs = 500'000'000;
   static constexpr int kSdoTries = 3;
   static constexpr std::int64_t kStartTimeoutNs = 1'000'000'000;
   static constexpr int kReboots = 3;
 
-  NodeMaster(int id, int heartbeat_ms, std::vector<SdoStep> steps);
+  /// @param boot_time_ns  from a reset to the node's boot-up at most; after it the node is reset
+  ///                      once more, after twice the time it is given up
+  NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, NodeWatch watch,
+             std::vector<SdoStep> steps);
 
-  /// The value for object 2052; 0: none. Before the first restart().
-  void set_sync_timeout(std::int64_t timeout_ns) noexcept TANDEM_RT;
+  /// The values for the objects 60C2 (the period) and 2052 (the time-out; 0: none). Before the
+  /// first restart().
+  void set_times(std::int64_t period_ns, std::int64_t sync_timeout_ns) noexcept TANDEM_RT;
   /// Begins, or begins again, with a reset of the node.
   void restart(std::int64_t now_ns) noexcept TANDEM_RT;
   void on_heartbeat(canopen::NmtState state, std::int64_t now_ns) noexcept TANDEM_RT;
@@ -82,10 +84,13 @@ class NodeMaster {
   void step_answered(std::int64_t now_ns) noexcept;
   void request(canopen::FrameSink& out) noexcept;
   void watch_heartbeat(std::int64_t now_ns) noexcept;
+  void guard(std::int64_t now_ns, canopen::FrameSink& out) noexcept;
   void enter(NodeStage stage, std::int64_t now_ns) noexcept;
 
   int id_;
   std::int64_t heartbeat_timeout_ns_;
+  std::int64_t boot_time_ns_;
+  NodeWatch watch_;
   std::vector<SdoStep> steps_;
 
   NodeStage stage_ = NodeStage::kWaitBootUp;
@@ -97,6 +102,7 @@ class NodeMaster {
   std::size_t step_ = 0;
   std::int64_t since_ns_ = 0;  ///< when the stage began
   std::int64_t next_reset_ns_ = 0;
+  std::int64_t next_guard_ns_ = 0;
   std::int64_t heard_ns_ = 0;    ///< last heartbeat
   std::int64_t booted_ns_ = -1;  ///< last boot-up
   std::int64_t trouble_ns_ = 0;

@@ -8,6 +8,7 @@
 
 #include "canopen/frame.hpp"
 #include "canopen/objects.hpp"
+#include "hal/ethercat-can/pdo_packer.hpp"
 
 namespace tandem::hal::can {
 
@@ -16,166 +17,41 @@ namespace {
 namespace object = canopen::object;
 using canopen::PdoDirection;
 
-struct FieldSpec {
-  WireField field;
-  std::uint16_t index;  // of axis 0
-  std::uint8_t size;
-};
+// In the order in which they are packed.
+constexpr std::array kCommandBlock{WireField::kControlword, WireField::kMode,
+                                   WireField::kTargetPosition, WireField::kVelocityOffset,
+                                   WireField::kTorqueOffset};
+constexpr std::array kFeedbackBlock{WireField::kStatusword, WireField::kPosition,
+                                    WireField::kVelocity, WireField::kTorque,
+                                    WireField::kMotorPosition};
+// The same where they fill frames of eight bytes.
+constexpr std::array kShortCommands{WireField::kControlword, WireField::kTargetPosition,
+                                    WireField::kTorqueOffset, WireField::kVelocityOffset,
+                                    WireField::kMode};
+constexpr std::array kShortFeedback{WireField::kStatusword, WireField::kPosition,
+                                    WireField::kTorque, WireField::kVelocity,
+                                    WireField::kMotorPosition};
+constexpr std::array kSlowCommands{WireField::kTargetVoltage, WireField::kTargetCurrent,
+                                   WireField::kStiffness, WireField::kDamping};
+constexpr std::array kSlowFeedback{WireField::kMotorVelocity, WireField::kCurrent,
+                                   WireField::kVoltage,       WireField::kTemperature,
+                                   WireField::kModeDisplay,   WireField::kErrorCode};
 
-constexpr std::array kCommandFields{
-    FieldSpec{WireField::kControlword, object::kControlword, 2},
-    FieldSpec{WireField::kMode, object::kMode, 1},
-    FieldSpec{WireField::kTargetPosition, object::kTargetPosition, 4},
-    FieldSpec{WireField::kVelocityOffset, object::kVelocityOffset, 4},
-    FieldSpec{WireField::kTorqueOffset, object::kTorqueOffset, 2},
-};
-constexpr std::array kSlowCommandFields{
-    FieldSpec{WireField::kTargetVoltage, object::kTargetVoltage, 2},
-    FieldSpec{WireField::kTargetCurrent, object::kTargetCurrent, 2},
-    FieldSpec{WireField::kStiffness, object::kStiffness, 4},
-    FieldSpec{WireField::kDamping, object::kDamping, 4},
-};
-constexpr std::array kFeedbackFields{
-    FieldSpec{WireField::kStatusword, object::kStatusword, 2},
-    FieldSpec{WireField::kPosition, object::kPosition, 4},
-    FieldSpec{WireField::kVelocity, object::kVelocity, 4},
-    FieldSpec{WireField::kTorque, object::kTorque, 2},
-    FieldSpec{WireField::kMotorPosition, object::kMotorPosition, 4},
-};
-constexpr std::array kSlowFeedbackFields{
-    FieldSpec{WireField::kMotorVelocity, object::kMotorVelocity, 4},
-    FieldSpec{WireField::kCurrent, object::kCurrent, 2},
-    FieldSpec{WireField::kVoltage, object::kVoltage, 2},
-    FieldSpec{WireField::kTemperature, object::kTemperature, 2},
-    FieldSpec{WireField::kModeDisplay, object::kModeDisplay, 1},
-    FieldSpec{WireField::kErrorCode, object::kErrorCode, 2},
-};
-
-// Classic CAN: one axis, a PDO each.
-constexpr std::array kClassicCommand1{kCommandFields[0], kCommandFields[2], kCommandFields[4]};
-constexpr std::array kClassicCommand2{kCommandFields[3], kCommandFields[1]};
-constexpr std::array kClassicSlowCommand1{kSlowCommandFields[0], kSlowCommandFields[1],
-                                          kSlowCommandFields[2]};
-constexpr std::array kClassicSlowCommand2{kSlowCommandFields[3]};
-constexpr std::array kClassicFeedback1{kFeedbackFields[0], kFeedbackFields[1], kFeedbackFields[3]};
-constexpr std::array kClassicFeedback2{kFeedbackFields[2], kFeedbackFields[4]};
-constexpr std::array kClassicSlowFeedback1{kSlowFeedbackFields[0], kSlowFeedbackFields[1],
-                                           kSlowFeedbackFields[2]};
-constexpr std::array kClassicSlowFeedback2{kSlowFeedbackFields[3], kSlowFeedbackFields[4],
-                                           kSlowFeedbackFields[5]};
-
-std::size_t most_bytes(bool fd) {
-  return fd ? canopen::kMaxFrameBytes : canopen::kClassicFrameBytes;
-}
-
-/// Appends blocks to a node's PDOs: one block stays whole.
-class Packer {
- public:
-  Packer(NodePlan& node, PdoDirection direction, bool fd)
-      : node_(node), direction_(direction), most_bytes_(most_bytes(fd)) {}
-
-  /// The next block opens a PDO.
-  void begin(PdoGroup group, std::uint8_t transmission) {
-    group_ = group;
-    transmission_ = transmission;
-    current_ = nullptr;
-  }
-  void add(std::span<const MappedField> block) {
-    std::size_t bytes = 0;
-    for (const MappedField& field : block) bytes += field.size;
-    const bool fits = current_ != nullptr && current_->bytes + bytes <= most_bytes_ &&
-                      current_->fields.size() + block.size() <= canopen::kMaxMappedObjects;
-    if (!fits) open();
-    for (const MappedField& field : block) append(*current_, field);
-  }
-  [[nodiscard]] bool ok() const { return number_ <= canopen::kPdosPerNode; }
-
-  static void append(PdoPlan& pdo, MappedField field) {
-    field.offset = pdo.bytes;
-    pdo.bytes = static_cast<std::uint8_t>(pdo.bytes + field.size);
-    pdo.fields.push_back(field);
-  }
-
- private:
-  void open() {
-    ++number_;
-    PdoPlan pdo;
-    pdo.group = group_;
-    pdo.direction = direction_;
-    pdo.number = number_;
-    pdo.cob_id = direction_ == PdoDirection::kReceive ? canopen::cob::rpdo(number_, node_.id)
-                                                      : canopen::cob::tpdo(number_, node_.id);
-    pdo.transmission = transmission_;
-    current_ = &node_.pdos.emplace_back(std::move(pdo));
-  }
-
-  NodePlan& node_;
-  PdoDirection direction_;
-  std::size_t most_bytes_;
-  PdoGroup group_ = PdoGroup::kCommand;
-  std::uint8_t transmission_ = canopen::kEverySync;
-  int number_ = 0;
-  PdoPlan* current_ = nullptr;
-};
-
-void add_axes(Packer& packer, std::size_t axes, std::span<const FieldSpec> specs) {
-  for (std::size_t axis = 0; axis < axes; ++axis) {
-    std::vector<MappedField> block;
-    for (const FieldSpec& spec : specs) {
-      block.push_back({.field = spec.field,
-                       .axis = static_cast<std::uint8_t>(axis),
-                       .size = spec.size,
-                       .index = canopen::of_axis(spec.index, static_cast<int>(axis))});
-    }
-    packer.add(block);
-  }
-}
-
-/// Several axes share a frame.
-void lay_out_fd(NodePlan& node, std::uint8_t slow) {
-  const std::size_t axes = node.joints.size();
-  Packer receive(node, PdoDirection::kReceive, true);
-  receive.begin(PdoGroup::kCommand, canopen::kEverySync);
-  add_axes(receive, axes, kCommandFields);
-  receive.begin(PdoGroup::kSlowCommand, canopen::kEverySync);
-  add_axes(receive, axes, kSlowCommandFields);
-  Packer transmit(node, PdoDirection::kTransmit, true);
-  transmit.begin(PdoGroup::kFeedback, canopen::kEverySync);
-  add_axes(transmit, axes, kFeedbackFields);
-  transmit.begin(PdoGroup::kSlowFeedback, slow);
-  add_axes(transmit, axes, kSlowFeedbackFields);
-}
-
-/// One axis takes every PDO.
-void lay_out_classic(NodePlan& node, std::uint8_t slow) {
-  using Pdo = std::pair<PdoGroup, std::span<const FieldSpec>>;
-  Packer receive(node, PdoDirection::kReceive, false);
-  for (const auto& [group, fields] :
-       {Pdo{PdoGroup::kCommand, kClassicCommand1}, Pdo{PdoGroup::kCommand, kClassicCommand2},
-        Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand1},
-        Pdo{PdoGroup::kSlowCommand, kClassicSlowCommand2}}) {
-    receive.begin(group, canopen::kEverySync);
-    add_axes(receive, 1, fields);
-  }
-  Packer transmit(node, PdoDirection::kTransmit, false);
-  for (const auto& [group, fields] :
-       {Pdo{PdoGroup::kFeedback, kClassicFeedback1}, Pdo{PdoGroup::kFeedback, kClassicFeedback2},
-        Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback1},
-        Pdo{PdoGroup::kSlowFeedback, kClassicSlowFeedback2}}) {
-    transmit.begin(group, group == PdoGroup::kFeedback ? canopen::kEverySync : slow);
-    add_axes(transmit, 1, fields);
-  }
-  node.parts = 2;
+/// In frames of eight bytes a sample is made of all its TPDOs; on CAN FD every axis is whole in
+/// one.
+void number_parts(NodePlan& node) {
+  int parts = 0;
   for (PdoPlan& pdo : node.pdos) {
-    if (pdo.group == PdoGroup::kFeedback) pdo.part = static_cast<std::uint8_t>(pdo.number - 1);
+    if (pdo.group == PdoGroup::kFeedback) pdo.part = static_cast<std::uint8_t>(parts++);
   }
+  node.parts = std::max(1, parts);
 }
 
 /// The counter ends the first frame of its group that has a byte left.
 void add_counter(NodePlan& node, PdoGroup group, WireField field, bool fd) {
   for (PdoPlan& pdo : node.pdos) {
     if (pdo.group != group || pdo.bytes >= most_bytes(fd)) continue;
-    Packer::append(pdo, {.field = field, .size = 1, .index = object::kCycleCounter});
+    PdoPacker::append(pdo, {.field = field, .size = 1, .index = object::kCycleCounter});
     return;
   }
 }
@@ -201,7 +77,7 @@ Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& nam
   return bus;
 }
 
-Status assign_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
+Status assign_axes(const RobotConfig& robot, NodePlan& node) {
   std::vector<std::pair<int, std::size_t>> axes;
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     if (robot.joints[j].board == node.name) axes.emplace_back(robot.joints[j].axis, j);
@@ -218,16 +94,83 @@ Status assign_axes(const RobotConfig& robot, bool fd, NodePlan& node) {
     return std::unexpected(
         node_error(robot, node, "has more than 8 axes", "move joints to another board"));
   }
-  if (!fd && axes.size() > 1) {
-    return std::unexpected(node_error(
-        robot, node,
-        "has " + std::to_string(axes.size()) + " axes, and its bus is classic CAN: in frames of " +
-            "8 bytes one axis takes all eight PDOs of a node",
-        "give each axis a board of its own, or set fd = true for the bus '" +
-            robot.buses[node.bus].name + "' (line " + std::to_string(robot.buses[node.bus].line) +
-            ")"));
+  return {};
+}
+
+/// A heartbeat each way is best; a drive that consumes none may be guarded.
+NodeWatch watch_of(const canopen::DataSheet& sheet) {
+  const bool produces = writable(sheet, object::kHeartbeatProducer, 0);
+  const bool consumes = writable(sheet, object::kHeartbeatConsumer, 1);
+  const bool guarded =
+      writable(sheet, object::kGuardTime, 0) && writable(sheet, object::kLifeTimeFactor, 0);
+  if (produces && (consumes || !guarded)) return NodeWatch::kHeartbeat;
+  return guarded ? NodeWatch::kGuarding : NodeWatch::kNothing;
+}
+
+/// Errors: an axis cannot be switched on, seen or moved with what the PDOs carry.
+Status check_drive(const RobotConfig& robot, const NodePlan& node,
+                   const canopen::DataSheet& sheet) {
+  using canopen::Mode;
+  for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+    const canopen::DriveAbilities& can = node.abilities[axis];
+    const auto has = [&](WireField field) { return node.carries(axis, field); };
+    const bool seen =
+        has(WireField::kControlword) && has(WireField::kStatusword) && has(WireField::kPosition);
+    const bool moves = canopen::first_mode(can) != Mode::kNone;
+    if (seen && moves) continue;
+    std::string what = seen ? "no position, velocity or torque target of a cyclic mode"
+                            : "not 6040, 6041 and 6064";
+    return std::unexpected(node_error(robot, node,
+                                      "cannot be driven in every cycle: the PDOs of its sheet " +
+                                          sheet.file + " carry " + what + " of axis " +
+                                          std::to_string(axis),
+                                      "`tandem eds show` lists what the drive offers"));
   }
   return {};
+}
+
+/// The sheet's PDOs are too few, or too short, for what the axes need.
+Status too_narrow(const RobotConfig& robot, const NodePlan& node, bool fd) {
+  const std::size_t axes = node.joints.size();
+  if (fd || axes < 2) {
+    return std::unexpected(node_error(robot, node,
+                                      "offers too few PDOs for its commands and feedback",
+                                      "`tandem eds show` lists the PDOs of its sheet"));
+  }
+  return std::unexpected(node_error(
+      robot, node,
+      "has " + std::to_string(axes) + " axes, and its bus is classic CAN: in frames of " +
+          "8 bytes one axis takes all eight PDOs of a node",
+      "give each axis a board of its own, or set fd = true for the bus '" +
+          robot.buses[node.bus].name + "' (line " + std::to_string(robot.buses[node.bus].line) +
+          ")"));
+}
+
+Status pack_board(const RobotConfig& robot, const BoardConfig& board, bool fd, NodePlan& node) {
+  using enum canopen::Access;
+  const canopen::DataSheet& sheet = *board.sheet;
+  const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
+  BoardPacker receive(node, sheet, PdoDirection::kReceive, fd);
+  receive.add(PdoGroup::kCommand, canopen::kEverySync,
+              fd ? std::span(kCommandBlock) : std::span(kShortCommands));
+  receive.add(PdoGroup::kSlowCommand, canopen::kEverySync, kSlowCommands);
+  if (receive.has_mappable() && !receive.left().empty()) return too_narrow(robot, node, fd);
+  receive.use_fixed(PdoGroup::kCommand);
+  BoardPacker transmit(node, sheet, PdoDirection::kTransmit, fd);
+  transmit.add(PdoGroup::kFeedback, canopen::kEverySync,
+               fd ? std::span(kFeedbackBlock) : std::span(kShortFeedback));
+  if (transmit.has_mappable() && !transmit.left().empty()) return too_narrow(robot, node, fd);
+  transmit.add(PdoGroup::kSlowFeedback, slow, kSlowFeedback);
+  transmit.use_fixed(PdoGroup::kFeedback);
+  if (!fd) number_parts(node);
+  const auto type = canopen::DataType::kUnsigned8;
+  if (canopen::mappable(sheet, object::kCycleCounter, 0, type, kMapRpdo)) {
+    add_counter(node, PdoGroup::kCommand, WireField::kCycleCounter, fd);
+    add_counter(node, PdoGroup::kSlowFeedback, WireField::kCycleEcho, fd);
+  }
+  node.watch = watch_of(sheet);
+  node.boot_time_ns = board.boot_time_ns;
+  return check_drive(robot, node, sheet);
 }
 
 Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
@@ -238,19 +181,28 @@ Result<NodePlan> plan_board(const RobotConfig& robot, std::size_t index) {
                 .board = static_cast<int>(index)};
   const auto bus = attach(robot, board.bus, node);
   if (!bus) return std::unexpected(bus.error());
-  const bool fd = (*bus)->fd;
-  if (auto assigned = assign_axes(robot, fd, node); !assigned) {
+  if (auto assigned = assign_axes(robot, node); !assigned) {
     return std::unexpected(assigned.error());
   }
-  const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
-  if (fd) {
-    lay_out_fd(node, slow);
-  } else if (!node.joints.empty()) {
-    lay_out_classic(node, slow);
+  for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+    node.abilities.push_back(canopen::abilities_of(*board.sheet, static_cast<int>(axis)));
   }
-  add_counter(node, PdoGroup::kCommand, WireField::kCycleCounter, fd);
-  add_counter(node, PdoGroup::kSlowFeedback, WireField::kCycleEcho, fd);
+  const bool fd = (*bus)->fd && board.sheet->most_pdo_bytes > 8;
+  if (auto packed = pack_board(robot, board, fd, node); !packed) {
+    return std::unexpected(packed.error());
+  }
   return node;
+}
+
+/// A sensor of ours has all four TPDOs to be mapped.
+std::vector<PdoSlot> sensor_slots() {
+  std::vector<PdoSlot> slots(canopen::kPdosPerNode);
+  for (int number = 1; number <= canopen::kPdosPerNode; ++number) {
+    PdoSlot& slot = slots[static_cast<std::size_t>(number - 1)];
+    slot.number = number;
+    slot.most_entries = static_cast<std::uint8_t>(canopen::kMaxMappedObjects);
+  }
+  return slots;
 }
 
 Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
@@ -262,17 +214,18 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
   const auto bus = attach(robot, sensor.bus, node);
   if (!bus) return std::unexpected(bus.error());
   const bool fd = (*bus)->fd;
-  Packer transmit(node, PdoDirection::kTransmit, fd);
+  PdoPacker transmit(node, PdoDirection::kTransmit, most_bytes(fd), sensor_slots());
   transmit.begin(PdoGroup::kSensor, canopen::kEverySync);
+  bool fits = true;
   for (std::size_t channel = 0; channel < sensor.channels(); ++channel) {
     const MappedField field{.field = WireField::kSensorChannel,
                             .axis = static_cast<std::uint8_t>(channel),
                             .size = 4,
                             .index = object::kSensorChannels,
                             .sub = static_cast<std::uint8_t>(channel + 1)};
-    transmit.add({&field, 1});
+    fits = transmit.add({&field, 1}) && fits;
   }
-  if (!transmit.ok()) {
+  if (!fits) {
     const std::size_t most = canopen::kPdosPerNode * most_bytes(fd) / 4;
     return std::unexpected(
         node_error(robot, node,
@@ -286,6 +239,13 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
 }
 
 }  // namespace
+
+bool NodePlan::carries(std::size_t axis, WireField field) const {
+  return std::ranges::any_of(pdos, [&](const PdoPlan& pdo) {
+    return std::ranges::any_of(
+        pdo.fields, [&](const MappedField& f) { return f.axis == axis && f.field == field; });
+  });
+}
 
 Result<PdoLayout> make_pdo_layout(const RobotConfig& robot) {
   PdoLayout layout;

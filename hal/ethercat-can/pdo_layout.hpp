@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "canopen/drive_abilities.hpp"
 #include "canopen/pdo.hpp"
 #include "hal/config/robot_config.hpp"
 
@@ -48,6 +49,13 @@ enum class WireField : std::uint8_t {
 /// When a PDO is sent.
 enum class PdoGroup : std::uint8_t { kCommand, kSlowCommand, kFeedback, kSlowFeedback, kSensor };
 
+/// How master and node know that the other is there.
+enum class NodeWatch : std::uint8_t {
+  kHeartbeat,  ///< the node produces one (1017), and consumes the master's where it can (1016)
+  kGuarding,   ///< the master asks, the node answers, and misses being asked (100C, 100D)
+  kNothing,    ///< only its TPDOs tell that the node is there
+};
+
 /// One mapped object.
 struct MappedField {
   WireField field = WireField::kControlword;
@@ -67,6 +75,9 @@ struct PdoPlan {
   std::uint8_t transmission = canopen::kEverySync;
   std::uint8_t bytes = 0;  ///< mapped; the frame may be longer
   std::uint8_t part = 0;   ///< feedback, sensor: of the NodePlan::parts of a sample, from 0
+  bool id_written = true;  ///< its COB-ID object can be written; else it is the right one already
+  bool type_written = true;
+  bool mapping_written = true;
   std::vector<MappedField> fields;
 };
 
@@ -80,7 +91,15 @@ struct NodePlan {
   int sensor = -1;                    ///< index in RobotConfig::sensors; -1: a board
   int parts = 1;                      ///< TPDOs that one sample of an axis, or of the sensor, takes
   std::vector<std::size_t> joints{};  ///< by axis: index in RobotConfig::joints
-  std::vector<PdoPlan> pdos{};  ///< commands first, then slow commands, feedback, slow feedback
+  std::vector<PdoPlan> pdos{};    ///< commands first, then slow commands, feedback, slow feedback
+  std::vector<PdoPlan> unused{};  ///< in use from power-on: bring-up switches them off
+  /// By axis: what its sheet offers.
+  std::vector<canopen::DriveAbilities> abilities{};
+  std::int64_t boot_time_ns = 1'500'000'000;  ///< from a reset to its boot-up, at most
+  NodeWatch watch = NodeWatch::kHeartbeat;
+
+  /// Whether a PDO has this field of an axis.
+  [[nodiscard]] bool carries(std::size_t axis, WireField field) const;
 };
 
 /// Every node, boards first, in the configuration's order.
@@ -88,11 +107,15 @@ struct PdoLayout {
   std::vector<NodePlan> nodes;
 };
 
-/// Lays the PDOs of every board and sensor out; numbers and COB-IDs are the pre-defined ones. On
-/// CAN FD an axis' block stays whole, and blocks follow one another in frames of at most 64 bytes.
-/// On classic CAN one axis takes all eight PDOs of its board, two of them for each sample.
-/// Errors: axes of a board with gaps, more axes or channels than a node's four PDOs each way can
-/// carry on its bus.
+/// Lays the PDOs of every board and sensor out; numbers and COB-IDs are the pre-defined ones. A
+/// board's fields are those that its sheet has objects for, in the PDOs that the sheet offers.
+///
+/// On CAN FD an axis' block stays whole, and blocks follow one another in frames of at most 64
+/// bytes. In frames of eight bytes the fields fill one PDO after the other; one axis of our own
+/// boards takes all eight PDOs, two of them for each sample. Where a PDO's mapping cannot be
+/// written, it is used as it is.
+/// Errors: axes of a board with gaps, more axes or channels than a node's PDOs can carry on its
+/// bus, a sheet that describes no CiA 402 drive with a cyclic mode.
 [[nodiscard]] Result<PdoLayout> make_pdo_layout(const RobotConfig& robot);
 
 }  // namespace tandem::hal::can

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
@@ -25,13 +26,19 @@ void add_check(Steps& steps, std::uint16_t index, std::uint8_t sub, std::uint32_
   steps.back().use = use;
 }
 
+/// What the configuration says, else the sheet; what neither tells is not looked at.
 void add_identity(Steps& steps, const BoardConfig& board) {
-  add_check(steps, object::kDeviceType, 0, kDriveDeviceType);
-  add_check(steps, object::kIdentity, kVendor, board.vendor_id.value_or(kTandemVendor));
-  add_check(steps, object::kIdentity, kProduct, board.product_code.value_or(kBoardProduct));
-  add_check(steps, object::kIdentity, kRevision, board.revision.value_or(kTandemRevision),
-            SdoUse::kCheckRevision);
-  if (board.serial) add_check(steps, object::kIdentity, kSerial, *board.serial);
+  const DataSheet& sheet = *board.sheet;
+  add_check(steps, object::kDeviceType, 0, kDriveDeviceType, SdoUse::kCheckProfile);
+  const auto check = [&](IdentitySub sub, std::optional<std::uint32_t> configured,
+                         std::optional<std::uint32_t> of_sheet, SdoUse use) {
+    const auto wanted = configured ? configured : of_sheet;
+    if (wanted) add_check(steps, object::kIdentity, sub, *wanted, use);
+  };
+  check(kVendor, board.vendor_id, sheet.vendor, SdoUse::kCheck);
+  check(kProduct, board.product_code, sheet.product, SdoUse::kCheck);
+  check(kRevision, board.revision, sheet.revision, SdoUse::kCheckRevision);
+  check(kSerial, board.serial, {}, SdoUse::kCheck);
 }
 
 void add_sensor_identity(Steps& steps) {
@@ -41,7 +48,9 @@ void add_sensor_identity(Steps& steps) {
 }
 
 /// CiA 301's procedure: out of use, no entries, the entries, their number, in use.
-void add_pdo(Steps& steps, const PdoPlan& pdo) {
+///
+/// @param sheet  of the board, or null: a sensor of ours
+void add_pdo(Steps& steps, const PdoPlan& pdo, const DataSheet* sheet) {
   const bool receive = pdo.direction == PdoDirection::kReceive;
   const auto offset = static_cast<std::uint16_t>(pdo.number - 1);
   const auto parameter = static_cast<std::uint16_t>(
@@ -50,16 +59,31 @@ void add_pdo(Steps& steps, const PdoPlan& pdo) {
       static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
   // Nobody asks for a TPDO by a remote request: it would come beside the cycle.
   const std::uint32_t cob_id = receive ? pdo.cob_id : pdo.cob_id | cob::kNoRtr;
-  steps.push_back(write_step(parameter, 1, cob_id | cob::kInvalid));
-  steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
-  std::uint8_t count = 0;
-  for (const MappedField& field : pdo.fields) {
-    steps.push_back(
-        write_step(mapping, ++count, mapping_entry(field.index, field.sub, field.size)));
+  if (pdo.id_written) steps.push_back(write_step(parameter, kPdoCobId, cob_id | cob::kInvalid));
+  if (pdo.mapping_written) {
+    steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
+    std::uint8_t count = 0;
+    for (const MappedField& field : pdo.fields) {
+      steps.push_back(
+          write_step(mapping, ++count, mapping_entry(field.index, field.sub, field.size)));
+    }
+    steps.push_back(write_step(mapping, 0, count));
   }
-  steps.push_back(write_step(mapping, 0, count));
-  steps.push_back(write_step(parameter, 2, pdo.transmission));
-  steps.push_back(write_step(parameter, 1, cob_id));
+  if (pdo.type_written) steps.push_back(write_step(parameter, kPdoType, pdo.transmission));
+  // An inhibit time or an event timer from power-on would hold answers to SYNC back or add others.
+  for (const PdoParameterSub sub : {kPdoInhibit, kPdoEvent}) {
+    const bool set = sheet != nullptr && writable(*sheet, parameter, sub) &&
+                     sheet->value(parameter, sub, 0).value_or(1) != 0;
+    if (set) steps.push_back(write_step(parameter, sub, std::uint16_t{0}));
+  }
+  if (pdo.id_written) steps.push_back(write_step(parameter, kPdoCobId, cob_id));
+}
+
+void switch_off(Steps& steps, const PdoPlan& pdo) {
+  const bool receive = pdo.direction == PdoDirection::kReceive;
+  const auto parameter = static_cast<std::uint16_t>(
+      (receive ? object::kRpdoParameter : object::kTpdoParameter) + pdo.number - 1);
+  steps.push_back(write_step(parameter, kPdoCobId, pdo.cob_id | cob::kInvalid));
 }
 
 /// Adds steps for the objects of one axis.
@@ -135,11 +159,10 @@ void add_protections(AxisSteps& add, const JointConfig& joint, const ActuatorCon
   add(object::kBrake, kBrakeEngage, static_cast<std::uint16_t>(joint.brake->engage_ms));
 }
 
-void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
-  const JointConfig& joint = robot.joints[node.joints[axis]];
+/// What a robot.toml sets in our own boards. Another drive keeps what it was commissioned with.
+void add_settings(AxisSteps& add, const RobotConfig& robot, const NodePlan& node,
+                  const JointConfig& joint) {
   const ActuatorConfig& motor = robot.actuator_of(joint);
-  AxisSteps add(steps, static_cast<int>(axis));
-  add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
   add_scales(add, joint);
   add_loops(add, joint, motor, robot.gains_of(joint));
   add(object::kLimits, kVoltageLimit, to_float(motor.voltage_limit_V));
@@ -151,31 +174,111 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   add(object::kCommandTimeout, 0, clamp_round<std::uint16_t>(board.command_timeout_cycles));
 }
 
+/// The cyclic modes that the axis is used in must be among those that the drive itself names.
+void add_mode_check(Steps& steps, const DriveAbilities& can, int axis) {
+  std::uint32_t wanted = 0;
+  for (const Mode mode : {can.position, can.velocity, can.torque}) {
+    if (mode != Mode::kNone) wanted |= mode_bit(mode);
+  }
+  add_check(steps, of_axis(object::kSupportedModes, axis), 0, wanted, SdoUse::kCheckBits);
+  steps.back().axis = static_cast<std::int8_t>(axis);
+}
+
+/// What a joint's scales were computed from must be what the drive has.
+void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& joint) {
+  const DriveUnits units = units_of(sheet, joint.axis);
+  const auto check = [&](const std::vector<UnitObject>& objects) {
+    for (const UnitObject& unit : objects) {
+      add_check(steps, unit.index, unit.sub, unit.value);
+      steps.back().axis = static_cast<std::int8_t>(joint.axis);
+    }
+  };
+  if (joint.counts_of_sheet) check(units.position);
+  if (joint.torque_of_sheet) check(units.torque);
+}
+
+void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
+  const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
+  const DataSheet& sheet = *board.sheet;
+  const DriveAbilities& can = node.abilities[axis];
+  AxisSteps add(steps, static_cast<int>(axis));
+  const auto takes = [&](std::uint16_t index, std::uint8_t sub) {
+    return writable(sheet, of_axis(index, static_cast<int>(axis)), sub);
+  };
+  if (takes(object::kQuickStopOption, 0)) {
+    add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
+  }
+  if (can.settings) return add_settings(add, robot, node, robot.joints[node.joints[axis]]);
+  add_mode_check(steps, can, static_cast<int>(axis));
+  add_unit_checks(steps, sheet, robot.joints[node.joints[axis]]);
+  if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
+    add(object::kInterpolationPeriod, 1, std::uint8_t{0});
+    add(object::kInterpolationPeriod, 2, std::int8_t{0});
+  }
+  // What moves with an offset alone has no other target.
+  if (takes(object::kTargetVelocity, 0)) add(object::kTargetVelocity, 0, std::int32_t{0});
+  if (takes(object::kTargetTorque, 0)) add(object::kTargetTorque, 0, std::int16_t{0});
+  const auto reaction =
+      sheet.value(of_axis(object::kAbortConnectionOption, static_cast<int>(axis)), 0, node.id);
+  const bool does_nothing = reaction.value_or(0) == 0;
+  if (takes(object::kAbortConnectionOption, 0) && does_nothing) {
+    add(object::kAbortConnectionOption, 0, std::int16_t{3});  // quick stop
+  }
+  if (can.one_mode && takes(object::kMode, 0)) {
+    add(object::kMode, 0, static_cast<std::int8_t>(first_mode(can)));
+  }
+}
+
 }  // namespace
 
 bool SdoStep::accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_RT {
-  if (use != SdoUse::kCheckRevision) return std::ranges::equal(read, value());
+  if (use == SdoUse::kCheck) return std::ranges::equal(read, value());
   if (read.size() != sizeof(std::uint32_t) || size != sizeof(std::uint32_t)) return false;
   const auto found = get<std::uint32_t>(read.data());
   const auto wanted = get<std::uint32_t>(bytes.data());
-  return found >> 16 == wanted >> 16 && found >= wanted;
+  switch (use) {
+    case SdoUse::kCheckRevision: return found >> 16 == wanted >> 16 && found >= wanted;
+    case SdoUse::kCheckProfile: return (found & 0xFFFF) == (wanted & 0xFFFF);
+    case SdoUse::kCheckBits: return (found & wanted) == wanted;
+    default: return false;
+  }
 }
 
 std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan& node) {
   Steps steps;
-  if (node.board >= 0) {
-    add_identity(steps, robot.boards[static_cast<std::size_t>(node.board)]);
+  const BoardConfig* board =
+      node.board >= 0 ? &robot.boards[static_cast<std::size_t>(node.board)] : nullptr;
+  const DataSheet* sheet = board != nullptr ? board->sheet.get() : nullptr;
+  if (board != nullptr) {
+    add_identity(steps, *board);
   } else {
     add_sensor_identity(steps);
   }
-  for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo);
+  for (const PdoPlan& pdo : node.unused) switch_off(steps, pdo);
+  for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo, sheet);
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
-  if (node.board >= 0) steps.push_back(write_step(object::kSyncTimeout, 0, std::uint32_t{0}));
+  const auto takes = [&](std::uint16_t index, std::uint8_t sub) {
+    return sheet == nullptr || writable(*sheet, index, sub);
+  };
+  if (sheet != nullptr && offered(*sheet, object::kSyncTimeout, 0, DataType::kUnsigned32)) {
+    steps.push_back(write_step(object::kSyncTimeout, 0, std::uint32_t{0}));
+  }
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
-  steps.push_back(write_step(object::kHeartbeatConsumer, 1,
-                             static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));
-  steps.push_back(
-      write_step(object::kHeartbeatProducer, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
+  if (node.watch == NodeWatch::kGuarding) {
+    steps.push_back(
+        write_step(object::kGuardTime, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
+    steps.push_back(
+        write_step(object::kLifeTimeFactor, 0, static_cast<std::uint8_t>(kHeartbeatPeriods)));
+    return steps;
+  }
+  if (takes(object::kHeartbeatConsumer, 1)) {
+    steps.push_back(write_step(object::kHeartbeatConsumer, 1,
+                               static_cast<std::uint32_t>(kMasterNodeId << 16 | timeout_ms)));
+  }
+  if (takes(object::kHeartbeatProducer, 0)) {
+    steps.push_back(
+        write_step(object::kHeartbeatProducer, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
+  }
   return steps;
 }
 

@@ -18,6 +18,8 @@ enum class SdoUse : std::uint8_t {
   kWrite,          ///< download
   kCheck,          ///< upload, and compare with `bytes`
   kCheckRevision,  ///< the same, but a later minor (the lower 16 bits) is right too
+  kCheckProfile,   ///< the lower 16 bits are compared: the profile's number in 1000
+  kCheckBits,      ///< every bit of `bytes` is set; an object that is not there passes
 };
 
 /// One transfer of 1 to 4 bytes.
@@ -46,8 +48,10 @@ template <class T>
   return step;
 }
 
-/// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent.
-/// A board's SYNC time-out (2052) is left 0: the period is known when the first cycle begins.
+/// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent; of
+/// all that a board's sheet lacks there is no step.
+/// A board's SYNC time-out (2052) and interpolation period (60C2) are left 0: the period is known
+/// when the first cycle begins.
 [[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,
                                                       const NodePlan& node);
 

@@ -87,6 +87,19 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
 
 }  // namespace
 
+Status check_firmware(const hal::RobotConfig& robot) {
+  const auto foreign = std::ranges::find_if(
+      robot.boards, [](const hal::BoardConfig& board) { return !board.eds.empty(); });
+  if (foreign == robot.boards.end()) return {};
+  return std::unexpected(Error{
+      .message =
+          "is a drive of another make (" + foreign->eds + "), and only our own boards are emulated",
+      .hint = "run with --hal can on its bus, or leave `eds` out to simulate one of our boards",
+      .file = robot.file,
+      .line = foreign->line,
+      .key = "board '" + foreign->name + "'"});
+}
+
 model::ModelSpec model_spec(const hal::RobotConfig& robot) {
   model::ModelSpec spec;
   spec.robot = robot.name;

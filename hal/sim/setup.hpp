@@ -13,6 +13,9 @@
 
 namespace tandem::sim {
 
+/// Only our own boards' firmware is emulated. Error: a board that is of another make, by its sheet.
+[[nodiscard]] Status check_firmware(const hal::RobotConfig& robot);
+
 /// What the robot's kernels are generated from: its sites, its sensors (an IMU is a site, see
 /// imu_site; a loop's sites take wrenches), and the rotors of rigid actuators as armature.
 [[nodiscard]] model::ModelSpec model_spec(const hal::RobotConfig& robot);

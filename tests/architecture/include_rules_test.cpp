@@ -25,7 +25,7 @@ const Rules& rules() {
       {"canopen", {"base"}},
       {"firmware_emu", {"base", "canopen"}},
       {"hal", {"base", "model/loop_spec.hpp"}},
-      {"hal/config", {"base", "hal", "model/loop_spec.hpp"}},
+      {"hal/config", {"base", "canopen", "hal", "model/loop_spec.hpp"}},
       {"hal/ethercat-can", {"base", "canopen", "hal", "hal/config", "rt/histogram.hpp"}},
       {"hal/sim",
        {"base", "model", "canopen", "firmware_emu", "hal", "hal/config", "hal/ethercat-can"}},

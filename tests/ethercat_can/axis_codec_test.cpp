@@ -32,7 +32,7 @@ TEST_F(Codec, CommandsBecomeCountsAndPerMille) {
   command.voltage_V()[0] = 24.0;
   command.current_A()[0] = -0.014;
   command.stiffness_Nm_rad()[0] = 300.0;
-  encode_command(scale(), command, 0, raw);
+  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   EXPECT_EQ(raw.mode, 8);
   EXPECT_EQ(raw.target_position, -9000);
   EXPECT_EQ(raw.velocity_offset, 100);
@@ -48,7 +48,7 @@ TEST_F(Codec, CommandsAreClampedAndNeverWrapped) {
   command.torque_Nm()[0] = 1.0e9;
   command.current_A()[0] = std::nan("");
   command.stiffness_Nm_rad()[0] = 1.0e300;
-  encode_command(scale(), command, 0, raw);
+  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   EXPECT_EQ(raw.target_position, std::numeric_limits<std::int32_t>::max());
   EXPECT_EQ(raw.velocity_offset, std::numeric_limits<std::int32_t>::min());
   EXPECT_EQ(raw.torque_offset, 32767);
@@ -56,10 +56,16 @@ TEST_F(Codec, CommandsAreClampedAndNeverWrapped) {
   EXPECT_TRUE(std::isfinite(raw.stiffness));
 }
 
+TEST_F(Codec, PositionsGoByInterpolationWhereADriveHasNoCsp) {
+  encode_command(scale(), canopen::Mode::kIp, command, 0, raw);
+  EXPECT_EQ(raw.mode, 7);
+  EXPECT_EQ(image_mode(7).first, ControlMode::kPosition);
+}
+
 TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
-  encode_command(scale(), command, 0, raw);
+  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   command.mode()[0] = static_cast<std::int8_t>(ControlMode::kIdle);
-  encode_command(scale(), command, 0, raw);
+  encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   EXPECT_EQ(raw.mode, 8);
 }
 

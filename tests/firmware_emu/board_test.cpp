@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "canopen/board_sheet.hpp"
 #include "rig.hpp"
 
 namespace tandem::firmware::testing {
@@ -24,6 +25,21 @@ TEST(Board, SaysBootUpAndAnswersWhoItIs) {
   EXPECT_EQ(rig.read<std::uint32_t>(0x1018, 1), 0x7A4DU);
   EXPECT_EQ(rig.read<std::uint32_t>(0x1018, 4), 0x12345678U);
   EXPECT_EQ(rig.read<std::uint32_t>(0x6502, 0), 0x000F0380U);
+}
+
+/// The master takes a board without a sheet at this one's word.
+TEST(Board, HasWhatTheSheetOfOurBoardsSays) {
+  BoardSetup setup;
+  setup.axes.resize(canopen::kMaxAxes);
+  const Board board(setup);
+  const auto sheet = canopen::tandem_board_sheet();
+  ASSERT_GT(sheet->entries.size(), 400U);
+  for (const canopen::SheetEntry& entry : sheet->entries) {
+    const canopen::ObjectEntry* object = board.dictionary().find(entry.index, entry.sub);
+    ASSERT_NE(object, nullptr) << std::hex << entry.index << ':' << int{entry.sub};
+    EXPECT_EQ(static_cast<int>(object->type), entry.type) << std::hex << entry.index;
+    EXPECT_EQ(object->access, entry.access) << std::hex << entry.index << ':' << int{entry.sub};
+  }
 }
 
 TEST(Board, TellsItsFirmwareVersion) {

@@ -1,0 +1,131 @@
+// Modes from 6502, or from the objects that each needs.
+#include "canopen/drive_abilities.hpp"
+
+#include "canopen/eds.hpp"
+
+namespace tandem::canopen {
+
+using enum DataType;
+
+const SheetEntry* offered(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub,
+                          DataType type) {
+  const SheetEntry* entry = sheet.find(index, sub);
+  if (entry == nullptr || entry->type != static_cast<std::uint16_t>(type)) return nullptr;
+  const bool manufacturer = index >= 0x2000 && index < 0x6000;
+  return manufacturer && entry->name != entry_name(index, sub) ? nullptr : entry;
+}
+
+namespace {
+
+/// Whether one of the first PDOs of a direction can be mapped, or has the entry from power-on.
+bool carried(const DataSheet& sheet, const SheetEntry& entry, Access right) {
+  const std::uint16_t first = right == kMapRpdo ? object::kRpdoMapping : object::kTpdoMapping;
+  for (int i = 0; i < kPdosPerNode; ++i) {
+    const auto mapping = static_cast<std::uint16_t>(first + i);
+    if (writable(sheet, mapping, 0) && writable(sheet, mapping, 1)) return true;
+    const auto count = sheet.value(mapping, 0, 0).value_or(0);
+    for (int sub = 1; sub <= count; ++sub) {
+      const auto mapped = sheet.value(mapping, static_cast<std::uint8_t>(sub), 0).value_or(0);
+      if (mapped >> 8 == (entry.index << 8 | entry.sub)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+bool mappable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub, DataType type,
+              Access right) {
+  const SheetEntry* entry = offered(sheet, index, sub, type);
+  return entry != nullptr && (entry->access & right) != 0 && carried(sheet, *entry, right);
+}
+
+bool writable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub) {
+  const SheetEntry* entry = sheet.find(index, sub);
+  return entry != nullptr && (entry->access & kWrite) != 0;
+}
+
+DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
+  const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
+  const auto by_rpdo = [&](std::uint16_t index, std::uint8_t sub, DataType type) {
+    return mappable(sheet, at(index), sub, type, kMapRpdo);
+  };
+  const SheetEntry* supported = sheet.find(at(object::kSupportedModes));
+  const bool told = supported != nullptr && supported->value && supported->value->number != 0;
+  const auto has = [&](Mode mode) {
+    return !told || (supported->value->number & mode_bit(mode)) != 0;
+  };
+  const bool period = sheet.has(at(object::kInterpolationPeriod));
+  const bool velocity_offset = by_rpdo(object::kVelocityOffset, 0, kInteger32);
+  const bool torque_offset = by_rpdo(object::kTorqueOffset, 0, kInteger16);
+  // Without 6502, targets alone may be those of the profile modes: the cyclic ones have an
+  // interpolation period or offsets.
+  const bool cyclic = told || period || velocity_offset;
+
+  DriveAbilities can;
+  can.machine = by_rpdo(object::kControlword, 0, kUnsigned16) &&
+                mappable(sheet, at(object::kStatusword), 0, kUnsigned16, kMapTpdo) &&
+                mappable(sheet, at(object::kPosition), 0, kInteger32, kMapTpdo);
+  can.one_mode = !by_rpdo(object::kMode, 0, kInteger8);
+  if (cyclic && has(Mode::kCsp) && by_rpdo(object::kTargetPosition, 0, kInteger32)) {
+    can.position = Mode::kCsp;
+  } else if (has(Mode::kIp) && by_rpdo(object::kInterpolationData, 1, kInteger32)) {
+    can.position = Mode::kIp;
+  }
+  if (cyclic && has(Mode::kCsv) &&
+      (velocity_offset || by_rpdo(object::kTargetVelocity, 0, kInteger32))) {
+    can.velocity = Mode::kCsv;
+  }
+  if (cyclic && has(Mode::kCst) &&
+      (torque_offset || by_rpdo(object::kTargetTorque, 0, kInteger16))) {
+    can.torque = Mode::kCst;
+  }
+  if (can.one_mode) {
+    if (can.position != Mode::kNone) can.velocity = Mode::kNone;
+    if (first_mode(can) != can.torque) can.torque = Mode::kNone;
+  }
+  can.impedance = by_rpdo(object::kStiffness, 0, kReal32) && by_rpdo(object::kDamping, 0, kReal32);
+  can.open_loop = by_rpdo(object::kTargetVoltage, 0, kInteger16);
+  can.current = by_rpdo(object::kTargetCurrent, 0, kInteger16);
+  can.settings = offered(sheet, at(object::kMotorResolution), 0, kUnsigned32) != nullptr;
+  return can;
+}
+
+namespace {
+
+/// The quotient of an object's sub 1 and 2, where both have values.
+std::optional<double> ratio(const DataSheet& sheet, std::uint16_t index,
+                            std::vector<UnitObject>& used) {
+  const auto over = sheet.value(index, 1, 0).value_or(0);
+  const auto under = sheet.value(index, 2, 0).value_or(0);
+  if (over <= 0 || under <= 0) return {};
+  used.push_back({index, 1, static_cast<std::uint32_t>(over)});
+  used.push_back({index, 2, static_cast<std::uint32_t>(under)});
+  return static_cast<double>(over) / static_cast<double>(under);
+}
+
+}  // namespace
+
+DriveUnits units_of(const DataSheet& sheet, int axis) {
+  const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
+  DriveUnits units;
+  std::vector<UnitObject> of_gear;
+  const double gear = ratio(sheet, at(object::kGearRatio), of_gear).value_or(1.0);
+  units.counts_per_rev = ratio(sheet, at(object::kFeedConstant), units.position);
+  if (!units.counts_per_rev) {
+    units.counts_per_rev = ratio(sheet, at(object::kEncoderResolution), units.position);
+    if (units.counts_per_rev) {
+      *units.counts_per_rev *= gear;
+      units.position.insert(units.position.end(), of_gear.begin(), of_gear.end());
+    }
+  }
+  const auto rated_mNm = sheet.value(at(object::kRatedTorque), 0, 0).value_or(0);
+  if (rated_mNm > 0) {
+    units.rated_torque_Nm = 1e-3 * static_cast<double>(rated_mNm) * gear;
+    units.torque = of_gear;
+    units.torque.push_back({at(object::kRatedTorque), 0, static_cast<std::uint32_t>(rated_mNm)});
+  }
+  return units;
+}
+
+}  // namespace tandem::canopen

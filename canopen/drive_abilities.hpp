@@ -1,0 +1,74 @@
+// What a CiA 402 drive can do for a cyclic master, as its data sheet tells.
+// Layer: canopen.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "canopen/data_sheet.hpp"
+#include "canopen/object_dictionary.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::canopen {
+
+/// The entry, if the sheet has it with this type. A manufacturer's object (2000 to 5FFF) must also
+/// have the name that our boards' sheets give it: every maker has other objects there.
+[[nodiscard]] const SheetEntry* offered(const DataSheet& sheet, std::uint16_t index,
+                                        std::uint8_t sub, DataType type);
+/// The same, and a PDO may carry it. @param right  kMapRpdo or kMapTpdo
+[[nodiscard]] bool mappable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub,
+                            DataType type, Access right);
+/// Whether a master may write the entry by SDO, whatever its type.
+[[nodiscard]] bool writable(const DataSheet& sheet, std::uint16_t index, std::uint8_t sub);
+
+/// Of one axis.
+struct DriveAbilities {
+  bool machine = false;  ///< 6040 and 6041 can be in PDOs: it is a CiA 402 drive
+  /// For positions, kCsp or kIp; for velocities kCsv; for torques kCst; each kNone: not at all.
+  Mode position = Mode::kNone;
+  Mode velocity = Mode::kNone;
+  Mode torque = Mode::kNone;
+  // Our own firmware's extras, which no CiA standard has
+  bool impedance = false;
+  bool open_loop = false;
+  bool current = false;
+  bool settings = false;  ///< it takes a robot.toml's scales, gains and protections
+  /// 6060 cannot be in a PDO: the mode is set at start-up and stays.
+  bool one_mode = false;
+};
+
+/// The mode in which an axis is switched on: of positions where it has one, else of velocities,
+/// else of torques.
+[[nodiscard]] constexpr Mode first_mode(const DriveAbilities& can) noexcept {
+  return can.position != Mode::kNone   ? can.position
+         : can.velocity != Mode::kNone ? can.velocity
+                                       : can.torque;
+}
+
+/// A value of the drive that a scale was computed from.
+struct UnitObject {
+  std::uint16_t index = 0;
+  std::uint8_t sub = 0;
+  std::uint32_t value = 0;
+};
+
+/// What an axis' numbers mean, as far as the sheet has values for it.
+struct DriveUnits {
+  /// Position units (6064, 607A) per revolution of the driven shaft: 6092:1 / 6092:2, or without
+  /// them 608F:1 / 608F:2 times the gear 6091:1 / 6091:2.
+  std::optional<double> counts_per_rev;
+  /// 6076, at the motor, times the gear.
+  std::optional<double> rated_torque_Nm;
+  std::vector<UnitObject> position;  ///< what counts_per_rev was computed from
+  std::vector<UnitObject> torque;    ///< what rated_torque_Nm was computed from
+};
+
+/// @param axis  from 0
+[[nodiscard]] DriveUnits units_of(const DataSheet& sheet, int axis);
+
+/// Modes go by 6502 where the sheet has its value; else a mode is there when its objects are.
+/// @param axis  from 0
+[[nodiscard]] DriveAbilities abilities_of(const DataSheet& sheet, int axis);
+
+}  // namespace tandem::canopen

@@ -1,0 +1,191 @@
+// First fit in order, as the order decides which fields share a frame.
+#include "hal/ethercat-can/pdo_packer.hpp"
+
+#include <algorithm>
+
+#include "canopen/frame.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::PdoDirection;
+
+namespace {
+
+/// CiA 301: up to these indices an entry of a mapping stands for bits that nobody reads.
+constexpr std::uint32_t kLastDummy = 0x0007;
+
+std::uint32_t entry_of(const MappedField& field) {
+  return canopen::mapping_entry(field.index, field.sub, field.size);
+}
+
+const MappedField* find(const std::vector<MappedField>& in, std::uint32_t entry) {
+  const auto found = std::ranges::find(in, entry, entry_of);
+  return found != in.end() ? &*found : nullptr;
+}
+
+}  // namespace
+
+std::size_t most_bytes(bool fd) {
+  return fd ? canopen::kMaxFrameBytes : canopen::kClassicFrameBytes;
+}
+
+PdoPacker::PdoPacker(NodePlan& node, PdoDirection direction, std::size_t most_bytes,
+                     std::vector<PdoSlot> slots)
+    : node_(node), direction_(direction), most_bytes_(most_bytes), slots_(std::move(slots)) {}
+
+void PdoPacker::begin(PdoGroup group, std::uint8_t transmission) {
+  group_ = group;
+  transmission_ = transmission;
+  current_ = nullptr;
+}
+
+bool PdoPacker::add(std::span<const MappedField> block) {
+  std::size_t bytes = 0;
+  for (const MappedField& field : block) bytes += field.size;
+  const auto fits = [&] {
+    return current_ != nullptr && current_->bytes + bytes <= most_bytes_ &&
+           current_->fields.size() + block.size() <= most_entries_;
+  };
+  while (!fits()) {
+    if (!open()) return false;
+  }
+  for (const MappedField& field : block) append(*current_, field);
+  return true;
+}
+
+void PdoPacker::add_fixed(const PdoSlot& slot, PdoGroup group, std::vector<MappedField> fields,
+                          std::uint8_t bytes) {
+  begin(group, canopen::kEverySync);
+  PdoPlan& pdo = start(slot);
+  pdo.mapping_written = false;
+  pdo.fields = std::move(fields);
+  pdo.bytes = bytes;
+  current_ = nullptr;
+}
+
+void PdoPacker::switch_off_the_rest() {
+  for (const PdoSlot& slot : slots_) {
+    if (slot.on && slot.id_writable && !used(slot)) node_.unused.push_back(plan(slot));
+  }
+}
+
+bool PdoPacker::used(const PdoSlot& slot) const {
+  return std::ranges::any_of(node_.pdos, [&](const PdoPlan& pdo) {
+    return pdo.direction == direction_ && pdo.number == slot.number;
+  });
+}
+
+void PdoPacker::append(PdoPlan& pdo, MappedField field) {
+  field.offset = pdo.bytes;
+  pdo.bytes = static_cast<std::uint8_t>(pdo.bytes + field.size);
+  pdo.fields.push_back(field);
+}
+
+bool PdoPacker::open() {
+  while (next_ < slots_.size() && !slots_[next_].mappable) ++next_;
+  if (next_ >= slots_.size()) return false;
+  start(slots_[next_++]);
+  return true;
+}
+
+PdoPlan& PdoPacker::start(const PdoSlot& slot) {
+  most_entries_ = slot.most_entries;
+  current_ = &node_.pdos.emplace_back(plan(slot));
+  return *current_;
+}
+
+PdoPlan PdoPacker::plan(const PdoSlot& slot) const {
+  PdoPlan pdo;
+  pdo.group = group_;
+  pdo.direction = direction_;
+  pdo.number = slot.number;
+  pdo.cob_id = direction_ == PdoDirection::kReceive ? canopen::cob::rpdo(slot.number, node_.id)
+                                                    : canopen::cob::tpdo(slot.number, node_.id);
+  pdo.transmission = slot.type_writable ? transmission_ : slot.type;
+  pdo.id_written = slot.id_writable;
+  pdo.type_written = slot.type_writable;
+  return pdo;
+}
+
+BoardPacker::BoardPacker(NodePlan& node, const canopen::DataSheet& sheet, PdoDirection direction,
+                         bool fd)
+    : node_(node),
+      sheet_(sheet),
+      blocks_(fd),
+      packer_(node, direction, most_bytes(fd), pdo_slots(sheet, direction, node.id)) {}
+
+void BoardPacker::add(PdoGroup group, std::uint8_t transmission,
+                      std::span<const WireField> fields) {
+  packer_.begin(group, transmission);
+  for (std::size_t axis = 0; axis < node_.joints.size(); ++axis) {
+    std::vector<MappedField> block;
+    for (const WireField field : fields) {
+      const auto found = object_of(sheet_, node_.abilities[axis], field, static_cast<int>(axis));
+      if (!found) continue;
+      block.push_back(*found);
+      known_.push_back(*found);
+    }
+    if (blocks_) {
+      pack(block);
+    } else {
+      for (const MappedField& field : block) pack({&field, 1});
+    }
+  }
+}
+
+void BoardPacker::pack(std::span<const MappedField> block) {
+  if (block.empty()) return;
+  if (!packer_.add(block)) left_.insert(left_.end(), block.begin(), block.end());
+}
+
+void BoardPacker::use_fixed(PdoGroup group) {
+  for (;;) {
+    const PdoSlot* best = nullptr;
+    std::size_t most = 0;
+    for (const PdoSlot& slot : packer_.slots()) {
+      if (slot.mappable || packer_.used(slot) || !fills(slot, group)) continue;
+      const std::size_t takes = taken_by(slot);
+      if (takes > most) best = &slot;
+      most = std::max(most, takes);
+    }
+    if (best == nullptr) break;
+    take_fixed(*best, group);
+  }
+  packer_.switch_off_the_rest();
+}
+
+bool BoardPacker::has_mappable() const {
+  return std::ranges::any_of(packer_.slots(), &PdoSlot::mappable);
+}
+
+/// Whether the master can send or take every byte of the PDO.
+bool BoardPacker::fills(const PdoSlot& slot, PdoGroup group) const {
+  std::size_t bits = 0;
+  bool known = true;
+  for (const std::uint32_t entry : slot.mapping) {
+    bits += entry & 0xFF;
+    known = known && (find(known_, entry) != nullptr || entry >> 16 <= kLastDummy);
+  }
+  return bits <= 8 * canopen::kClassicFrameBytes && (known || group != PdoGroup::kCommand);
+}
+
+std::size_t BoardPacker::taken_by(const PdoSlot& slot) const {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      slot.mapping, [&](std::uint32_t entry) { return find(left_, entry) != nullptr; }));
+}
+
+void BoardPacker::take_fixed(const PdoSlot& slot, PdoGroup group) {
+  std::vector<MappedField> fields;
+  std::size_t bits = 0;
+  for (const std::uint32_t entry : slot.mapping) {
+    if (const MappedField* found = find(known_, entry)) {
+      fields.push_back(*found);
+      fields.back().offset = static_cast<std::uint8_t>(bits / 8);
+    }
+    bits += entry & 0xFF;
+    std::erase_if(left_, [&](const MappedField& field) { return entry_of(field) == entry; });
+  }
+  packer_.add_fixed(slot, group, std::move(fields), static_cast<std::uint8_t>(bits / 8));
+}
+
+}  // namespace tandem::hal::can

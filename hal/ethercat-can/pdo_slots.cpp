@@ -1,0 +1,162 @@
+// Reads 14xx to 1Axx of a sheet, and finds the objects behind the image's fields in it.
+#include "hal/ethercat-can/pdo_slots.hpp"
+
+#include <array>
+
+#include "canopen/objects.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using namespace canopen;
+namespace object = canopen::object;
+using enum canopen::DataType;
+
+struct PlainField {
+  WireField field;
+  std::uint16_t index;  // of axis 0
+  DataType type;
+};
+constexpr std::array kPlainCommands{
+    PlainField{WireField::kControlword, object::kControlword, kUnsigned16},
+    PlainField{WireField::kMode, object::kMode, kInteger8},
+    PlainField{WireField::kTargetVoltage, object::kTargetVoltage, kInteger16},
+    PlainField{WireField::kTargetCurrent, object::kTargetCurrent, kInteger16},
+    PlainField{WireField::kStiffness, object::kStiffness, kReal32},
+    PlainField{WireField::kDamping, object::kDamping, kReal32},
+};
+constexpr std::array kFeedback{
+    PlainField{WireField::kStatusword, object::kStatusword, kUnsigned16},
+    PlainField{WireField::kPosition, object::kPosition, kInteger32},
+    PlainField{WireField::kVelocity, object::kVelocity, kInteger32},
+    PlainField{WireField::kTorque, object::kTorque, kInteger16},
+    PlainField{WireField::kMotorPosition, object::kMotorPosition, kInteger32},
+    PlainField{WireField::kMotorVelocity, object::kMotorVelocity, kInteger32},
+    PlainField{WireField::kCurrent, object::kCurrent, kInteger16},
+    PlainField{WireField::kVoltage, object::kVoltage, kInteger16},
+    PlainField{WireField::kTemperature, object::kTemperature, kInteger16},
+    PlainField{WireField::kModeDisplay, object::kModeDisplay, kInteger8},
+    PlainField{WireField::kErrorCode, object::kErrorCode, kUnsigned16},
+};
+
+std::uint8_t bytes_of(DataType type) {
+  switch (type) {
+    case kInteger8:
+    case kUnsigned8: return 1;
+    case kInteger16:
+    case kUnsigned16: return 2;
+    default: return 4;
+  }
+}
+
+/// Finds the objects of one axis.
+class Finder {
+ public:
+  Finder(const DataSheet& sheet, int axis) : sheet_(sheet), axis_(axis) {}
+
+  [[nodiscard]] std::optional<MappedField> operator()(WireField field, std::uint16_t index,
+                                                      std::uint8_t sub, DataType type,
+                                                      Access right) const {
+    const std::uint16_t at = of_axis(index, axis_);
+    if (!mappable(sheet_, at, sub, type, right)) return {};
+    return MappedField{.field = field,
+                       .axis = static_cast<std::uint8_t>(axis_),
+                       .size = bytes_of(type),
+                       .index = at,
+                       .sub = sub};
+  }
+
+ private:
+  const DataSheet& sheet_;
+  int axis_;
+};
+
+/// @param number  of the node's value, without its id where the sheet leaves that to the node
+std::uint32_t identifier(const SheetEntry* entry, std::uint32_t otherwise, int node_id) {
+  return entry != nullptr && entry->value ? static_cast<std::uint32_t>(entry->value->of(node_id))
+                                          : otherwise;
+}
+
+std::vector<std::uint32_t> default_mapping(const DataSheet& sheet, std::uint16_t mapping) {
+  std::vector<std::uint32_t> entries;
+  const auto count = sheet.value(mapping, 0, 0).value_or(0);
+  for (int sub = 1; sub <= count; ++sub) {
+    const auto entry = sheet.value(mapping, static_cast<std::uint8_t>(sub), 0);
+    if (!entry) return {};
+    entries.push_back(static_cast<std::uint32_t>(*entry));
+  }
+  return entries;
+}
+
+std::uint8_t entries_of(const DataSheet& sheet, std::uint16_t mapping) {
+  std::uint8_t most = 0;
+  while (most < kMaxMappedObjects && sheet.find(mapping, most + 1u) != nullptr) ++most;
+  return most;
+}
+
+}  // namespace
+
+std::vector<PdoSlot> pdo_slots(const DataSheet& sheet, PdoDirection direction, int node_id) {
+  const bool receive = direction == PdoDirection::kReceive;
+  std::vector<PdoSlot> slots;
+  for (int number = 1; number <= kPdosPerNode; ++number) {
+    const auto offset = static_cast<std::uint16_t>(number - 1);
+    const auto parameter = static_cast<std::uint16_t>(
+        (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
+    const auto mapping = static_cast<std::uint16_t>(
+        (receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
+    const SheetEntry* id = sheet.find(parameter, 1);
+    if (id == nullptr) continue;
+    const std::uint32_t own = receive ? cob::rpdo(number, node_id) : cob::tpdo(number, node_id);
+    const std::uint32_t from_power_on = identifier(id, own | cob::kInvalid, node_id);
+    PdoSlot slot{.number = number,
+                 .mappable = writable(sheet, mapping, 0) && writable(sheet, mapping, 1),
+                 .on = (from_power_on & cob::kInvalid) == 0,
+                 .id_writable = writable(sheet, parameter, 1),
+                 .type_writable = writable(sheet, parameter, 2),
+                 .type = static_cast<std::uint8_t>(
+                     sheet.value(parameter, 2, node_id).value_or(kEventProfile)),
+                 .most_entries = entries_of(sheet, mapping),
+                 .mapping = default_mapping(sheet, mapping)};
+    const bool ours = slot.on && (from_power_on & cob::kIdMask) == own;
+    if (!slot.id_writable && !ours) continue;
+    if (slot.mappable ? slot.most_entries == 0 : slot.mapping.empty()) continue;
+    slots.push_back(std::move(slot));
+  }
+  return slots;
+}
+
+std::optional<MappedField> object_of(const DataSheet& sheet, const DriveAbilities& can,
+                                     WireField field, int axis) {
+  const Finder find(sheet, axis);
+  const bool follows = can.position == Mode::kCsp;
+  switch (field) {
+    case WireField::kTargetPosition:
+      if (follows) return find(field, object::kTargetPosition, 0, kInteger32, kMapRpdo);
+      if (can.position == Mode::kIp)
+        return find(field, object::kInterpolationData, 1, kInteger32, kMapRpdo);
+      return {};
+    case WireField::kVelocityOffset: {
+      if (!follows && can.velocity == Mode::kNone) return {};
+      auto found = find(field, object::kVelocityOffset, 0, kInteger32, kMapRpdo);
+      if (found || can.velocity == Mode::kNone) return found;
+      return find(field, object::kTargetVelocity, 0, kInteger32, kMapRpdo);
+    }
+    case WireField::kTorqueOffset: {
+      if (!follows && can.velocity == Mode::kNone && can.torque == Mode::kNone) return {};
+      auto found = find(field, object::kTorqueOffset, 0, kInteger16, kMapRpdo);
+      if (found || can.torque == Mode::kNone) return found;
+      return find(field, object::kTargetTorque, 0, kInteger16, kMapRpdo);
+    }
+    default: break;
+  }
+  for (const PlainField& plain : kPlainCommands) {
+    if (plain.field == field) return find(field, plain.index, 0, plain.type, kMapRpdo);
+  }
+  for (const PlainField& plain : kFeedback) {
+    if (plain.field == field) return find(field, plain.index, 0, plain.type, kMapTpdo);
+  }
+  return {};
+}
+
+}  // namespace tandem::hal::can

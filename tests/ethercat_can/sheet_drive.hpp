@@ -1,0 +1,234 @@
+// A CiA 402 drive that does what its sheet says and nothing else: written apart from the project's
+// own node and firmware, so that the master meets a stranger.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "canopen/bytes.hpp"
+#include "canopen/data_sheet.hpp"
+#include "canopen/frame.hpp"
+#include "canopen/object_dictionary.hpp"
+
+namespace tandem::hal::can::test {
+
+using canopen::DataSheet;
+using canopen::Frame;
+using canopen::SheetEntry;
+
+/// Numbers in, frames out. Its motor is where it is told to be.
+class SheetDrive {
+ public:
+  SheetDrive(DataSheet sheet, int node) : sheet_(std::move(sheet)), node_(node) { power_on(); }
+
+  int boot_ms = 2;            ///< from a reset to the boot-up message
+  bool answers_late = false;  ///< every SDO answer comes a second time, later
+  bool emergency_at_boot = false;
+  std::vector<std::uint32_t> aborts;  ///< that it answered
+
+  [[nodiscard]] std::int64_t& value(int index, int sub = 0) {
+    return values_[{static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)}];
+  }
+  [[nodiscard]] bool operational() const { return nmt_ == 5; }
+  [[nodiscard]] bool enabled() const { return state_ == 4; }
+  [[nodiscard]] int guarded() const { return guarded_; }
+  void fault() { state_ = 5; }
+
+  void receive(const Frame& frame) {
+    const auto id = static_cast<int>(frame.id);
+    if (id == 0 && (frame.data[1] == 0 || frame.data[1] == node_)) return on_nmt(frame.data[0]);
+    if (boot_in_ms_ > 0) return;
+    if (id == 0x600 + node_) return on_sdo(frame);
+    if (id == 0x700 + node_ && (frame.flags & canopen::kFlagRtr) != 0) {
+      ++guarded_;
+      toggle_ ^= 0x80;
+      return send(0x700 + node_, {static_cast<std::uint8_t>(toggle_ | nmt_)});
+    }
+    if (nmt_ != 5) return;
+    if (id == 0x80) return on_sync();
+    for (int n = 0; n < 4; ++n) {
+      const auto cob = value(0x1400 + n, 1);
+      if ((cob & 0x80000000) == 0 && (cob & 0x7FF) == id) take_rpdo(n, frame);
+    }
+  }
+  /// A millisecond passes.
+  void tick() {
+    if (boot_in_ms_ > 0 && --boot_in_ms_ == 0) {
+      send(0x700 + node_, {0});
+      nmt_ = 127;
+      if (emergency_at_boot) send(0x80 + node_, {0x10, 0x81, 0x11, 0, 0, 0, 0, 0});
+    }
+    if (answers_late && !late_.empty()) {
+      out.push_back(late_.front());
+      late_.erase(late_.begin());
+    }
+    const std::int64_t every_ms = has(0x1017) ? value(0x1017) : 0;
+    if (every_ms != 0 && nmt_ != 0 && ++since_heartbeat_ms_ >= every_ms) {
+      since_heartbeat_ms_ = 0;
+      send(0x700 + node_, {static_cast<std::uint8_t>(nmt_)});
+    }
+  }
+
+  std::vector<Frame> out;
+
+ private:
+  [[nodiscard]] bool has(int index, int sub = 0) const {
+    return sheet_.find(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)) !=
+           nullptr;
+  }
+  void power_on() {
+    values_.clear();
+    for (const SheetEntry& entry : sheet_.entries) {
+      value(entry.index, entry.sub) = entry.value ? entry.value->of(node_) : 0;
+    }
+    state_ = 1;
+    nmt_ = 0;
+    boot_in_ms_ = boot_ms;
+  }
+  void send(int id, std::initializer_list<std::uint8_t> bytes) {
+    Frame frame;
+    frame.id = static_cast<std::uint32_t>(id);
+    frame.length = static_cast<std::uint8_t>(bytes.size());
+    std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+    out.push_back(frame);
+  }
+  void on_nmt(int command) {
+    if (command == 0x81 || command == 0x82) power_on();
+    if (command == 1) nmt_ = 5;
+    if (command == 2) nmt_ = 4;
+    if (command == 0x80) nmt_ = 127;
+  }
+  void on_sdo(const Frame& request) {
+    const auto index = canopen::get<std::uint16_t>(&request.data[1]);
+    const std::uint8_t sub = request.data[3];
+    Frame answer;
+    answer.id = static_cast<std::uint32_t>(0x580 + node_);
+    answer.length = 8;
+    answer.data[1] = request.data[1];
+    answer.data[2] = request.data[2];
+    answer.data[3] = sub;
+    const SheetEntry* entry = sheet_.find(index, sub);
+    std::uint32_t abort = 0;
+    if (entry == nullptr) abort = sheet_.has(index) ? 0x06090011 : 0x06020000;
+    if (abort == 0 && request.data[0] == 0x40) {
+      answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - size_of(*entry)) << 2);
+      canopen::put(&answer.data[4], static_cast<std::uint32_t>(value(index, sub)));
+      for (int i = size_of(*entry); i < 4; ++i) answer.data[4u + i] = 0xA5;  // rubbish, as seen
+    } else if (abort == 0) {
+      abort = write(*entry, request);
+      answer.data[0] = 0x60;
+    }
+    if (abort != 0) {
+      answer.data[0] = 0x80;
+      canopen::put(&answer.data[4], abort);
+      aborts.push_back(abort);
+    }
+    out.push_back(answer);
+    if (answers_late) late_.push_back(answer);
+  }
+  [[nodiscard]] static int size_of(const SheetEntry& entry) {
+    return entry.type == 2 || entry.type == 5 ? 1 : entry.type == 3 || entry.type == 6 ? 2 : 4;
+  }
+  std::uint32_t write(const SheetEntry& entry, const Frame& request) {
+    const int size = 4 - (request.data[0] >> 2 & 3);
+    if ((entry.access & canopen::kWrite) == 0) return 0x06010002;
+    if (size != size_of(entry)) return 0x06070010;
+    const bool mapping = (entry.index & 0xF800) == 0x1000 && (entry.index & 0x0600) == 0x0600;
+    const bool maps = mapping || (entry.index >= 0x1A00 && entry.index < 0x1A04);
+    if (maps) {
+      const int parameter = entry.index - 0x200;
+      if (has(parameter, 1) && (value(parameter, 1) & 0x80000000) == 0) return 0x06010000;
+      if (entry.sub != 0 && value(entry.index) != 0) return 0x06010000;
+    }
+    const auto raw = canopen::get<std::uint32_t>(&request.data[4]);
+    const std::uint32_t mask = size == 4 ? 0xFFFFFFFF : (1u << 8 * size) - 1;
+    value(entry.index, entry.sub) = raw & mask;
+    return 0;
+  }
+  void take_rpdo(int n, const Frame& frame) {
+    std::size_t offset = 0;
+    const bool at_once = value(0x1400 + n, 2) > 240;
+    for (int sub = 1; sub <= value(0x1600 + n); ++sub) {
+      const auto mapped = static_cast<std::uint32_t>(value(0x1600 + n, sub));
+      const std::size_t size = (mapped & 0xFF) / 8;
+      std::int64_t number = 0;
+      for (std::size_t i = 0; i < size; ++i) {
+        number |= std::int64_t{frame.data[offset + i]} << 8 * i;
+      }
+      offset += size;
+      auto& to = at_once ? values_ : pending_;
+      to[{static_cast<std::uint16_t>(mapped >> 16), static_cast<std::uint8_t>(mapped >> 8)}] =
+          number;
+    }
+  }
+  void on_sync() {
+    for (const auto& [key, number] : pending_) values_[key] = number;
+    pending_.clear();
+    machine();
+    move();
+    for (int n = 0; n < 4; ++n) {
+      const auto cob = value(0x1800 + n, 1);
+      const auto type = value(0x1800 + n, 2);
+      if (!has(0x1800 + n, 1) || (cob & 0x80000000) != 0 || type == 0 || type > 240) continue;
+      if (++syncs_[n] % type != 0) continue;
+      Frame frame;
+      frame.id = static_cast<std::uint32_t>(cob & 0x7FF);
+      for (int sub = 1; sub <= value(0x1A00 + n); ++sub) {
+        const auto mapped = static_cast<std::uint32_t>(value(0x1A00 + n, sub));
+        const auto number = value(static_cast<int>(mapped >> 16), mapped >> 8 & 0xFF);
+        for (std::size_t i = 0; i < (mapped & 0xFF) / 8; ++i) {
+          frame.data[frame.length++] = static_cast<std::uint8_t>(number >> 8 * i);
+        }
+      }
+      out.push_back(frame);
+    }
+  }
+  /// CiA 402's states: 1 switch-on disabled, 2 ready, 3 switched on, 4 enabled, 5 fault.
+  void machine() {
+    const auto cw = static_cast<unsigned>(value(0x6040));
+    if (state_ == 5) {
+      if ((cw & 0x80) != 0 && (last_controlword_ & 0x80) == 0) state_ = 1;
+    } else if ((cw & 0x02) == 0 || (cw & 0x04) == 0) {
+      state_ = 1;
+    } else if ((cw & 0x0F) == 0x06 && state_ <= 3) {
+      state_ = 2;
+    } else if ((cw & 0x0F) == 0x07 && state_ >= 2) {
+      state_ = 3;
+    } else if ((cw & 0x0F) == 0x0F && state_ >= 3) {
+      state_ = 4;
+    }
+    last_controlword_ = cw;
+    constexpr std::array<int, 6> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218};
+    value(0x6041) = kStatusword[static_cast<std::size_t>(state_)];
+    value(0x603F) = state_ == 5 ? 0x8611 : 0;
+  }
+  void move() {
+    const auto mode = static_cast<std::int8_t>(value(0x6060));
+    value(0x6061) = mode;
+    const auto i32 = [&](int index, int sub = 0) {
+      return has(index, sub) ? static_cast<std::int32_t>(value(index, sub)) : 0;
+    };
+    if (state_ != 4) return;
+    if (mode == 8) value(0x6064) = i32(0x607A);
+    if (mode == 7 && (last_controlword_ & 0x10) != 0) value(0x6064) = i32(0x60C1, 1);
+    if (mode == 9) value(0x6064) += (i32(0x60FF) + i32(0x60B1)) / 1000;
+    if (mode == 10) value(0x6077) = value(0x6071) + value(0x60B2);
+  }
+
+  DataSheet sheet_;
+  int node_;
+  int nmt_ = 0;
+  int state_ = 1;
+  int boot_in_ms_ = 0;
+  int guarded_ = 0;
+  int toggle_ = 0x80;
+  std::int64_t since_heartbeat_ms_ = 0;
+  unsigned last_controlword_ = 0;
+  std::array<int, 4> syncs_{};
+  std::map<std::pair<std::uint16_t, std::uint8_t>, std::int64_t> values_, pending_;
+  std::vector<Frame> late_;
+};
+
+}  // namespace tandem::hal::can::test

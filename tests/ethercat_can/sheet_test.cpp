@@ -1,0 +1,363 @@
+// The master against drives of others: what their sheets offer is what it uses.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "rig.hpp"
+#include "sheet_drive.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+using canopen::DataType;
+using test::DataSheet;
+using test::Frame;
+using test::SheetDrive;
+using test::SheetEntry;
+using enum canopen::DataType;
+
+/// A sheet, entry by entry.
+struct Sheet {
+  DataSheet sheet;
+
+  Sheet& add(int index, int sub, DataType type, int access, std::optional<std::int64_t> value = {},
+             bool plus_id = false) {
+    SheetEntry entry{.index = static_cast<std::uint16_t>(index),
+                     .sub = static_cast<std::uint8_t>(sub),
+                     .type = static_cast<std::uint16_t>(type),
+                     .access = static_cast<std::uint8_t>(access)};
+    if (value) entry.value = canopen::SheetValue{.number = *value, .plus_node_id = plus_id};
+    std::erase_if(sheet.entries, [&](const SheetEntry& e) {
+      return e.index == entry.index && e.sub == entry.sub;
+    });
+    sheet.entries.push_back(std::move(entry));
+    std::ranges::sort(sheet.entries, {}, [](const SheetEntry& e) { return e.index << 8 | e.sub; });
+    return *this;
+  }
+  Sheet& remove(int index) {
+    std::erase_if(sheet.entries, [&](const SheetEntry& e) { return e.index == index; });
+    return *this;
+  }
+};
+
+constexpr int kDemand = canopen::kWriteRpdo;
+constexpr int kActual = canopen::kReadTpdo;
+constexpr int kSetting = canopen::kReadWrite;
+
+/// What nearly every drive has: four PDOs of eight entries each way, all in use from power-on.
+Sheet common(int pdos = 4) {
+  Sheet s;
+  s.sheet.file = "drive.eds";
+  s.sheet.vendor = 0x99;
+  s.sheet.product = 0x123;
+  s.add(0x1000, 0, kUnsigned32, canopen::kRead, 0x00060192);
+  s.add(0x1017, 0, kUnsigned16, kSetting, 0);
+  s.add(0x1018, 1, kUnsigned32, canopen::kRead, 0x99);
+  s.add(0x1018, 2, kUnsigned32, canopen::kRead, 0x123);
+  for (int n = 0; n < pdos; ++n) {
+    s.add(0x1400 + n, 1, kUnsigned32, kSetting, 0x200 + 0x100 * n, true);
+    s.add(0x1400 + n, 2, kUnsigned8, kSetting, 255);
+    s.add(0x1800 + n, 1, kUnsigned32, kSetting, 0x180 + 0x100 * n, true);
+    s.add(0x1800 + n, 2, kUnsigned8, kSetting, 255);
+    s.add(0x1800 + n, 3, kUnsigned16, kSetting, 300);
+    s.add(0x1800 + n, 5, kUnsigned16, kSetting, 0);
+    for (const int map : {0x1600, 0x1A00}) {
+      s.add(map + n, 0, kUnsigned8, kSetting, 0);
+      for (int sub = 1; sub <= 8; ++sub) s.add(map + n, sub, kUnsigned32, kSetting, 0);
+    }
+  }
+  s.add(0x6040, 0, kUnsigned16, kDemand, 0);
+  s.add(0x6041, 0, kUnsigned16, kActual);
+  s.add(0x605A, 0, kInteger16, kSetting, 6);
+  s.add(0x6060, 0, kInteger8, kDemand, 0);
+  s.add(0x6061, 0, kInteger8, kActual);
+  s.add(0x6064, 0, kInteger32, kActual);
+  s.add(0x606C, 0, kInteger32, kActual);
+  s.add(0x6077, 0, kInteger16, kActual);
+  s.add(0x603F, 0, kUnsigned16, kActual);
+  return s;
+}
+
+/// A servo drive with every cyclic mode, and offsets.
+Sheet servo() {
+  Sheet s = common();
+  s.add(0x1016, 1, kUnsigned32, kSetting, 0);
+  s.add(0x6007, 0, kInteger16, kSetting, 0);
+  s.add(0x6071, 0, kInteger16, kDemand, 0);
+  s.add(0x607A, 0, kInteger32, kDemand, 0);
+  s.add(0x60B1, 0, kInteger32, kDemand, 0);
+  s.add(0x60B2, 0, kInteger16, kDemand, 0);
+  s.add(0x60C2, 1, kUnsigned8, kSetting, 0);
+  s.add(0x60C2, 2, kInteger8, kSetting, -3);
+  s.add(0x60FF, 0, kInteger32, kDemand, 0);
+  s.add(0x6502, 0, kUnsigned32, canopen::kRead, 0x3EF);
+  return s;
+}
+
+/// Interpolated position only, two RPDOs, no heartbeat consumer but guarding.
+Sheet interpolating() {
+  Sheet s = common(2);
+  s.add(0x100C, 0, kUnsigned16, kSetting, 0);
+  s.add(0x100D, 0, kUnsigned8, kSetting, 0);
+  s.add(0x60C1, 1, kInteger32, kDemand, 0);
+  s.add(0x6502, 0, kUnsigned32, canopen::kRead, 0x43);
+  return s;
+}
+
+/// One joint on such a drive, node 5, and the master.
+struct SheetRig {
+  explicit SheetRig(const Sheet& s)
+      : robot(config(s)),
+        drive(s.sheet, 5),
+        state(robot.shape()),
+        command(robot.shape()),
+        parameters(test::Rig::file_gains(robot)) {
+    const std::array<Bus*, 2> ends{&bus.master(), &other.master()};
+    auto created = DriveMaster::create(robot, ends);
+    if (!created) {
+      error = created.error().to_string();
+      return;
+    }
+    master = std::move(*created);
+    ask(ControlMode::kPosition);
+  }
+  static RobotConfig config(const Sheet& s) {
+    RobotConfig robot = test::classic_config();
+    robot.sensors.clear();
+    robot.joints.resize(1);
+    robot.boards.resize(1);
+    robot.boards[0].node_id = 5;
+    robot.boards[0].eds = "drive.eds";
+    robot.boards[0].boot_time_ns = 6'000'000'000;
+    robot.boards[0].sheet = std::make_shared<const DataSheet>(s.sheet);
+    return robot;
+  }
+  void ask(ControlMode mode) { command.mode()[0] = static_cast<std::int8_t>(mode); }
+  void step() {
+    const CycleTime time{.cycle = cycle, .time_ns = static_cast<std::int64_t>(cycle) * 1'000'000};
+    ++cycle;
+    master->cycle_begin(time);
+    drive.tick();
+    for (const Frame& frame : bus.to_boards()) {
+      drive.receive(frame);
+      if (frame.length > 8) too_long = true;
+    }
+    bus.take_to_boards(bus.to_boards().size());
+    (void)bus.boards().send(drive.out);
+    drive.out.clear();
+    (void)master->receive(state);
+    (void)master->send(command, parameters);
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) step();
+  }
+  [[nodiscard]] testing::AssertionResult bring_up(int most = 3000) {
+    if (!master) return testing::AssertionFailure() << error;
+    for (int i = 0; i < most && master->phase() == Phase::kBringUp; ++i) step();
+    if (master->phase() == Phase::kOperational) return testing::AssertionSuccess();
+    return testing::AssertionFailure() << master->status_text();
+  }
+
+  RobotConfig robot;
+  SheetDrive drive;
+  LoopbackBus bus, other;
+  StateImage state;
+  CommandImage command;
+  ParameterImage parameters;
+  std::unique_ptr<DriveMaster> master;
+  std::string error;
+  std::uint64_t cycle = 0;
+  bool too_long = false;
+};
+
+constexpr double kRadPerCount = 2.0 * test::kPi / 36000.0;
+
+TEST(Sheet, AServoDriveIsBroughtUpAndFollowsInEveryCyclicMode) {
+  SheetRig rig(servo());
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_TRUE(rig.drive.aborts.empty()) << "it was asked for what it has not";
+  rig.command.position_rad()[0] = 100 * kRadPerCount;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6060), 8);
+  EXPECT_EQ(rig.drive.value(0x6064), 100);
+  EXPECT_NEAR(rig.state.position_rad()[0], 100 * kRadPerCount, 1e-12);
+  EXPECT_EQ(rig.state.motor_position_rad()[0], rig.state.position_rad()[0]) << "it has no other";
+  rig.ask(ControlMode::kVelocity);
+  rig.command.velocity_rad_s()[0] = 2000 * kRadPerCount;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6060), 9);
+  EXPECT_GT(rig.drive.value(0x6064), 103);
+  rig.ask(ControlMode::kTorque);
+  rig.command.torque_Nm()[0] = 12.5;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6060), 10);
+  EXPECT_NEAR(rig.state.torque_Nm()[0], 12.5, 0.05);
+  EXPECT_EQ(static_cast<ControlMode>(rig.state.mode()[0]), ControlMode::kTorque);
+}
+
+TEST(Sheet, TheDriveKnowsTheCycleAndWatchesTheMaster) {
+  SheetRig rig(servo());
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_EQ(rig.drive.value(0x60C2, 1), 1) << "1 ms";
+  EXPECT_EQ(static_cast<std::int8_t>(rig.drive.value(0x60C2, 2)), -3);
+  EXPECT_EQ(rig.drive.value(0x1016, 1), 0x7F0096) << "node 127, 150 ms";
+  EXPECT_EQ(rig.drive.value(0x1017), 50);
+  EXPECT_EQ(rig.drive.value(0x6007), 3) << "it did nothing when its master died";
+  EXPECT_EQ(rig.drive.value(0x605A), 2);
+}
+
+TEST(Sheet, PdosThatAreNotUsedAreSwitchedOff) {
+  SheetRig rig(servo());
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_EQ(rig.drive.value(0x1403, 1) & 0x80000000, 0x80000000);
+  EXPECT_EQ(rig.drive.value(0x1803, 1) & 0x80000000, 0x80000000);
+  EXPECT_EQ(rig.drive.value(0x1800, 3), 0) << "an inhibit time of 30 ms hides states";
+  EXPECT_EQ(rig.drive.value(0x1800, 2), 1);
+  EXPECT_FALSE(rig.too_long);
+}
+
+TEST(Sheet, ADriveWithoutCspInterpolates) {
+  SheetRig rig(interpolating());
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_TRUE(rig.drive.aborts.empty());
+  rig.command.position_rad()[0] = -250 * kRadPerCount;
+  rig.steps(5);
+  EXPECT_EQ(rig.drive.value(0x6060), 7);
+  EXPECT_EQ(rig.drive.value(0x6040) & 0x1F, 0x1F) << "bit 4: follow";
+  EXPECT_NEAR(rig.state.position_rad()[0], -250 * kRadPerCount, 1e-12);
+}
+
+TEST(Sheet, ADriveThatHearsNoHeartbeatIsGuarded) {
+  SheetRig rig(interpolating());
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_EQ(rig.drive.value(0x100C), 50);
+  EXPECT_EQ(rig.drive.value(0x100D), 3);
+  const int before = rig.drive.guarded();
+  rig.steps(500);
+  EXPECT_NEAR(rig.drive.guarded() - before, 10, 1);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+}
+
+TEST(Sheet, ADriveWithNeitherIsWatchedByItsTpdos) {
+  SheetRig rig(servo().remove(0x1016).remove(0x1017));
+  ASSERT_TRUE(rig.bring_up());
+  rig.steps(500);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational);
+}
+
+TEST(Sheet, AMappingThatCannotBeWrittenIsUsedAsItIs) {
+  Sheet s = servo();
+  for (const int map : {0x1600, 0x1601, 0x1602, 0x1603, 0x1A00, 0x1A01, 0x1A02, 0x1A03}) {
+    for (int sub = 0; sub <= 8; ++sub) {
+      s.add(map, sub, sub == 0 ? kUnsigned8 : kUnsigned32, canopen::kRead, 0);
+    }
+  }
+  const auto map = [&](int index, std::initializer_list<std::int64_t> entries) {
+    s.add(index, 0, kUnsigned8, canopen::kRead, static_cast<std::int64_t>(entries.size()));
+    int sub = 0;
+    for (const std::int64_t entry : entries)
+      s.add(index, ++sub, kUnsigned32, canopen::kRead, entry);
+  };
+  map(0x1600, {0x60400010});
+  map(0x1601, {0x60400010, 0x60810020});  // 6081: nobody here could fill it
+  map(0x1602, {0x60400010, 0x607A0020});
+  map(0x1A00, {0x60410010});
+  map(0x1A01, {0x60410010, 0x60640020});
+  SheetRig rig(s);
+  ASSERT_TRUE(rig.bring_up());
+  rig.command.position_rad()[0] = 100 * kRadPerCount;
+  rig.steps(5);
+  EXPECT_NEAR(rig.state.position_rad()[0], 100 * kRadPerCount, 1e-12);
+  EXPECT_EQ(rig.drive.value(0x6060), 8) << "set at start-up, as no PDO has it";
+  EXPECT_EQ(rig.drive.value(0x1401, 1) & 0x80000000, 0x80000000) << "nobody fills it";
+}
+
+TEST(Sheet, VelocityIsThePositionsDifferenceWhereTheDriveTellsNone) {
+  SheetRig rig(servo().remove(0x606C));
+  ASSERT_TRUE(rig.bring_up());
+  for (int i = 1; i <= 20; ++i) {
+    rig.command.position_rad()[0] = 3 * i * kRadPerCount;
+    rig.step();
+  }
+  EXPECT_NEAR(rig.state.velocity_rad_s()[0], 3000 * kRadPerCount, 1e-9);
+}
+
+TEST(Sheet, ADriveThatBootsInFiveSecondsAndAnswersTwiceIsBroughtUp) {
+  SheetRig rig(servo());
+  rig.drive.boot_ms = 5000;
+  rig.drive.answers_late = true;
+  rig.drive.emergency_at_boot = true;
+  ASSERT_TRUE(rig.bring_up(20000));
+}
+
+TEST(Sheet, ADriveThatDoesNotNameItsModesIsTakenAtItsSheetsWord) {
+  SheetRig rig(servo().remove(0x6502));
+  ASSERT_TRUE(rig.bring_up()) << "6502 is asked for, and need not exist";
+}
+
+TEST(Sheet, ADriveWithoutAModeOfItsSheetIsRefused) {
+  SheetRig poor(servo());
+  poor.drive =
+      SheetDrive(Sheet(servo()).add(0x6502, 0, kUnsigned32, canopen::kRead, 0x65).sheet, 5);
+  EXPECT_FALSE(poor.bring_up());
+  EXPECT_NE(poor.master->status_text().find("has not the modes"), std::string::npos)
+      << poor.master->status_text();
+}
+
+TEST(Sheet, AnotherDriveIsRefused) {
+  SheetRig rig(servo());
+  rig.drive =
+      SheetDrive(Sheet(servo()).add(0x1018, 2, kUnsigned32, canopen::kRead, 0x124).sheet, 5);
+  EXPECT_FALSE(rig.bring_up());
+  EXPECT_NE(rig.master->status_text().find("0x124 instead of 0x123"), std::string::npos)
+      << rig.master->status_text();
+}
+
+TEST(Sheet, AProfileWithAdditionalInformationIsADrive) {
+  for (const std::int64_t type : {0x00000192LL, 0x00020192LL, 0x00420192LL, 0xFFFF0192LL}) {
+    SheetRig rig(servo().add(0x1000, 0, kUnsigned32, canopen::kRead, type));
+    EXPECT_TRUE(rig.bring_up()) << type;
+  }
+  SheetRig other(servo().add(0x1000, 0, kUnsigned32, canopen::kRead, 0x00020191));
+  EXPECT_FALSE(other.bring_up());
+}
+
+TEST(Sheet, ManufacturersObjectsOfTheSameNumberAreLeftAlone) {
+  Sheet s = servo();
+  for (const int index : {0x2010, 0x2011, 0x2020, 0x2033, 0x2051}) {
+    s.add(index, 0, kReal32, kDemand, 7);
+  }
+  SheetRig rig(s);
+  ASSERT_TRUE(rig.bring_up());
+  rig.steps(20);
+  for (const int index : {0x2010, 0x2011, 0x2020, 0x2033, 0x2051}) {
+    EXPECT_EQ(rig.drive.value(index), 7) << index;
+  }
+}
+
+TEST(Sheet, WithoutTheCyclicObjectsItIsRefusedBeforeAnythingIsSent) {
+  const SheetRig no_target(
+      servo().remove(0x607A).remove(0x60FF).remove(0x6071).remove(0x60B1).remove(0x60B2));
+  EXPECT_NE(no_target.error.find("no position, velocity or torque target"), std::string::npos)
+      << no_target.error;
+  const SheetRig no_status(servo().remove(0x6041));
+  EXPECT_NE(no_status.error.find("not 6040, 6041 and 6064"), std::string::npos) << no_status.error;
+}
+
+TEST(Sheet, AFaultOfTheDriveIsLatchedAndResetByAnEdge) {
+  SheetRig rig(servo());
+  ASSERT_TRUE(rig.bring_up());
+  rig.steps(5);
+  rig.drive.fault();
+  rig.steps(5);
+  EXPECT_EQ(rig.master->phase(), Phase::kFault);
+  EXPECT_EQ(rig.state.fault()[0], 0x8611u);
+  rig.master->reset();
+  rig.steps(50);
+  EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+}
+
+}  // namespace
+}  // namespace tandem::hal::can
