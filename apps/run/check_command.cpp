@@ -13,7 +13,7 @@
 #include "apps/text/console.hpp"
 #include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
-#include "hal/ethercat-can/pdo_layout.hpp"
+#include "hal/ethercat-can/drive_use.hpp"
 #include "hal/sim/engine_loader.hpp"
 
 namespace tandem::apps {
@@ -138,10 +138,10 @@ Diagnostics check_robot(const CheckOptions& options, std::FILE* out, Diagnostics
                         Json& json) {
   const auto robot = read_robot(options.file, options.repair);
   if (!robot) return robot.error();
-  if (const auto layout = hal::can::make_pdo_layout(robot->config); !layout) {
-    return {layout.error()};
-  }
+  const auto of_drives = hal::can::drive_warnings(robot->config);
+  if (!of_drives) return {of_drives.error()};
   warnings = warnings_of(*robot);
+  warnings.insert(warnings.end(), of_drives->begin(), of_drives->end());
   print_warnings(warnings);
   const LoopStudy loops = study_loops(robot->config, robot->tree, postures_of(robot->config));
   add_loop_json(robot->config, loops, json);

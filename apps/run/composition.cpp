@@ -15,6 +15,7 @@
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
+#include "hal/ethercat-can/drive_use.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
 #include "hal/sim/setup.hpp"
@@ -277,6 +278,9 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
   }
   if (e.hal.backend != runtime::BackendKind::kDds) {
     std::ranges::move(start_warnings(robot, e.posture), std::back_inserter(c.warnings));
+    if (auto drives = hal::can::drive_warnings(e.robot)) {
+      std::ranges::move(*drives, std::back_inserter(c.warnings));
+    }
   }
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
 }

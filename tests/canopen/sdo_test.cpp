@@ -184,15 +184,36 @@ TEST_F(ClientTest, AbortsWhenNoAnswerComes) {
   EXPECT_EQ(out.take(), request({0x80, 0x18, 0x10, 0x01, 0x00, 0x00, 0x04, 0x05}));
 }
 
-TEST_F(ClientTest, AbortsOnAWrongToggleAndOnAWrongCommand) {
+TEST_F(ClientTest, AbortsOnAWrongToggle) {
   client.upload(0x1008, 0, out.sink());
   (void)on({0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0});
   EXPECT_EQ(on({0x10, 'l', 'e', 'f', 't', ' ', 'l', 'e'}),
             request({0x80, 0x08, 0x10, 0x00, 0x00, 0x00, 0x03, 0x05}));
+}
+
+TEST_F(ClientTest, PassesOverAnswersOfAnotherKind) {
   client.upload(0x1008, 0, out.sink());
   (void)out.take();
-  EXPECT_EQ(on({0x60, 0x08, 0x10, 0x00, 0, 0, 0, 0}),
-            request({0x80, 0x08, 0x10, 0x00, 0x01, 0x00, 0x04, 0x05}));
+  EXPECT_TRUE(on({0x60, 0x08, 0x10, 0x00, 0, 0, 0, 0}).empty()) << "a download's";
+  EXPECT_TRUE(on({0x20, 0x00, 0x00, 0x00, 0, 0xC0, 0, 0}).empty()) << "a segment's";
+  EXPECT_EQ(client.status(), SdoClient::Status::kBusy);
+  (void)on({0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0});
+  EXPECT_TRUE(on({0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0}).empty()) << "the same once more";
+  EXPECT_EQ(client.status(), SdoClient::Status::kBusy);
+}
+
+TEST_F(ClientTest, TakesAnAnswerWithoutSizeAndOneThatEndsWithItsValue) {
+  client.upload(0x6041, 0, out.sink());
+  (void)on({0x42, 0x41, 0x60, 0x00, 0x37, 0x02, 0, 0});
+  EXPECT_EQ(client.value().size(), 4U);
+  client.upload(0x1402, 2, out.sink());
+  (void)on({0x4F, 0x02, 0x14, 0x02, 0xFE});
+  ASSERT_EQ(client.status(), SdoClient::Status::kDone);
+  ASSERT_EQ(client.value().size(), 1U);
+  EXPECT_EQ(client.value()[0], 0xFE);
+  client.upload(0x1402, 1, out.sink());
+  (void)on({0x43, 0x02, 0x14, 0x01, 0x05});
+  EXPECT_EQ(client.value().size(), 1U) << "it says four bytes and has one";
 }
 
 TEST_F(ClientTest, PassesOverLateAnswersAboutAnotherObject) {

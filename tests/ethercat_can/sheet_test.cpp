@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "hal/ethercat-can/drive_use.hpp"
 #include "rig.hpp"
 #include "sheet_drive.hpp"
 
@@ -357,6 +358,39 @@ TEST(Sheet, AFaultOfTheDriveIsLatchedAndResetByAnEdge) {
   rig.master->reset();
   rig.steps(50);
   EXPECT_EQ(rig.master->phase(), Phase::kOperational) << rig.master->status_text();
+}
+
+TEST(Sheet, IsToldInWords) {
+  const auto use = use_of(interpolating().sheet);
+  ASSERT_TRUE(use) << use.error().to_string();
+  const auto how = [&](const char* what) {
+    const auto found = std::ranges::find(use->does, what, &DriveFact::what);
+    return found != use->does.end() ? found->how : "";
+  };
+  EXPECT_EQ(how("position"), "mode 7 (interpolated position), target 60C1:01");
+  EXPECT_EQ(how("RPDO 1"), "6040 60C1:01 6060 (7 bytes)");
+  EXPECT_EQ(how("TPDO 1"), "6041 6064 6077 (8 bytes)");
+  EXPECT_EQ(how("watching"), "node guarding");
+  const auto misses = [&](const char* begin) {
+    return std::ranges::any_of(use->misses,
+                               [&](const std::string& text) { return text.starts_with(begin); });
+  };
+  EXPECT_TRUE(misses("velocity control"));
+  EXPECT_TRUE(misses("compliant joints"));
+  EXPECT_FALSE(misses("velocity feedback"));
+  EXPECT_FALSE(use_of(DataSheet{}));
+}
+
+TEST(Sheet, OfADriveThatMissesADeadMasterIsWarnedOf) {
+  SheetRig rig(servo().remove(0x1016));
+  const auto warnings = drive_warnings(rig.robot);
+  ASSERT_TRUE(warnings);
+  ASSERT_EQ(warnings->size(), 1U);
+  EXPECT_NE((*warnings)[0].to_string().find("does not notice when the master dies"),
+            std::string::npos);
+  EXPECT_EQ((*warnings)[0].key, "board 'board_0'");
+  EXPECT_TRUE(drive_warnings(SheetRig(servo()).robot)->empty());
+  EXPECT_TRUE(drive_warnings(test::classic_config())->empty()) << "our own boards";
 }
 
 }  // namespace

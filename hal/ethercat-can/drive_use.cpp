@@ -1,0 +1,155 @@
+// The layout of PDOs and the abilities, told.
+#include "hal/ethercat-can/drive_use.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "canopen/drive_abilities.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::hal::can {
+namespace {
+
+namespace object = canopen::object;
+using canopen::DataSheet;
+using canopen::Mode;
+
+std::string object_text(const MappedField& field) {
+  return field.sub == 0 ? fmt::format("{:04X}", field.index)
+                        : fmt::format("{:04X}:{:02X}", field.index, field.sub);
+}
+
+/// The object that carries the field of the first axis; "" when none does.
+std::string carrier(const NodePlan& node, WireField field) {
+  for (const PdoPlan& pdo : node.pdos) {
+    for (const MappedField& mapped : pdo.fields) {
+      if (mapped.axis == 0 && mapped.field == field) return object_text(mapped);
+    }
+  }
+  return {};
+}
+
+std::string mode_text(Mode mode, const char* name, const std::string& target) {
+  return fmt::format("mode {} ({}), target {}", static_cast<int>(mode), name, target);
+}
+
+void tell_modes(const NodePlan& node, DriveUse& use) {
+  const canopen::DriveAbilities& can = node.abilities[0];
+  const auto tell = [&](const char* what, Mode mode, const char* name, WireField field) {
+    if (mode == Mode::kNone) {
+      use.misses.push_back(fmt::format("{} control: no cyclic mode for it", what));
+    } else {
+      use.does.push_back({what, mode_text(mode, name, carrier(node, field))});
+    }
+  };
+  tell("position", can.position, can.position == Mode::kIp ? "interpolated position" : "CSP",
+       WireField::kTargetPosition);
+  tell("velocity", can.velocity, "CSV", WireField::kVelocityOffset);
+  tell("torque", can.torque, "CST", WireField::kTorqueOffset);
+  if (can.one_mode) {
+    use.misses.push_back("change of mode: 6060 cannot be in a PDO, the first mode stays");
+  }
+  if (!can.impedance) use.misses.push_back("compliant joints: no object for a stiffness");
+}
+
+void tell_pdos(const NodePlan& node, DriveUse& use) {
+  for (const PdoPlan& pdo : node.pdos) {
+    std::string text;
+    for (const MappedField& field : pdo.fields) {
+      text += (text.empty() ? "" : " ") + object_text(field);
+    }
+    const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
+    use.does.push_back(
+        {fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number),
+         fmt::format("{} ({} bytes{})", text, pdo.bytes, pdo.mapping_written ? "" : ", as it is")});
+  }
+}
+
+void tell_feedback(const NodePlan& node, DriveUse& use) {
+  const auto miss = [&](WireField field, const char* text) {
+    if (!node.carries(0, field)) use.misses.emplace_back(text);
+  };
+  miss(WireField::kVelocity, "velocity feedback: it is the difference of positions");
+  miss(WireField::kTorque, "torque feedback: it stays 0");
+  miss(WireField::kModeDisplay, "the mode's display: it is taken to be the one that was sent");
+  miss(WireField::kErrorCode, "the error code: a fault's cause is its emergency message's");
+}
+
+/// What would let a joint move on unseen.
+std::vector<std::string> unwatched(const NodePlan& node, const DataSheet& sheet) {
+  std::vector<std::string> out;
+  if (node.watch == NodeWatch::kNothing) {
+    out.emplace_back(
+        "the drive does not notice when the master dies, and the master watches its TPDOs alone: "
+        "it has neither heartbeats (1016, 1017) nor guarding (100C, 100D)");
+  } else if (node.watch == NodeWatch::kHeartbeat &&
+             !canopen::writable(sheet, object::kHeartbeatConsumer, 1)) {
+    out.emplace_back(
+        "the drive does not notice when the master dies: it has no heartbeat consumer "
+        "(1016) and no guarding (100C, 100D)");
+  }
+  const bool has_reaction = sheet.find(object::kAbortConnectionOption) != nullptr;
+  if (!has_reaction) {
+    out.emplace_back("what the drive does when the connection is lost is its own: no 6007");
+  }
+  return out;
+}
+
+}  // namespace
+
+DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
+  DriveUse use;
+  tell_modes(node, use);
+  tell_pdos(node, use);
+  use.does.push_back({"watching", node.watch == NodeWatch::kHeartbeat  ? "heartbeats"
+                                  : node.watch == NodeWatch::kGuarding ? "node guarding"
+                                                                       : "its TPDOs alone"});
+  tell_feedback(node, use);
+  for (std::string& text : unwatched(node, sheet)) use.misses.push_back(std::move(text));
+  return use;
+}
+
+Result<DriveUse> use_of(const DataSheet& sheet) {
+  RobotConfig robot;
+  robot.buses.push_back({.name = "bus", .interface = "can0", .fd = false});
+  BoardConfig board;
+  board.name = "drive";
+  board.bus = "bus";
+  board.node_id = 1;
+  board.eds = sheet.file;
+  board.sheet = std::make_shared<const DataSheet>(sheet);
+  robot.boards.push_back(std::move(board));
+  JointConfig joint;
+  joint.name = "joint";
+  joint.board = "drive";
+  robot.joints.push_back(joint);
+  const auto layout = make_pdo_layout(robot);
+  if (!layout) {
+    Error error = layout.error();
+    error.key.clear();
+    return std::unexpected(std::move(error));
+  }
+  return use_of(layout->nodes[0], sheet);
+}
+
+Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
+  const auto layout = make_pdo_layout(robot);
+  if (!layout) return std::unexpected(layout.error());
+  Diagnostics warnings;
+  for (const NodePlan& node : layout->nodes) {
+    if (node.board < 0) continue;
+    const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
+    if (board.eds.empty()) continue;
+    for (std::string& text : unwatched(node, *board.sheet)) {
+      warnings.push_back({.message = std::move(text),
+                          .hint = "set the drive's own time-out",
+                          .file = robot.file,
+                          .line = board.line,
+                          .key = "board '" + board.name + "'"});
+    }
+  }
+  return warnings;
+}
+
+}  // namespace tandem::hal::can
