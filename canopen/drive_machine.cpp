@@ -120,7 +120,7 @@ void DriveMachine::follow(std::uint16_t word, const DriveInputs& inputs,
     case DriveState::kOperationEnabled: from_enabled(word, inputs, options); break;
     case DriveState::kQuickStopActive: from_quick_stop(word, inputs, options); break;
     case DriveState::kFaultReactionActive:
-      if (motion_ == DriveMotion::kNone || ramp_ended(inputs)) enter(DriveState::kFault);  // 14
+      if (motion_ == DriveMotion::kNone || stop_ended(inputs)) enter(DriveState::kFault);  // 14
       break;
     case DriveState::kFault:
       if ((word & kFaultReset) != 0 && !last_reset_bit_ && !inputs.fault) {
@@ -153,11 +153,19 @@ void DriveMachine::from_enabled(std::uint16_t word, const DriveInputs& inputs,
 void DriveMachine::from_quick_stop(std::uint16_t word, const DriveInputs& inputs,
                                    const DriveOptions& options) noexcept {
   const bool stays = options.quick_stop >= 5;
-  if (disables_voltage(word) || (!stays && ramp_ended(inputs))) {
+  if (disables_voltage(word) || (!stays && stop_ended(inputs))) {
     enter(DriveState::kSwitchOnDisabled);  // 12
   } else if (stays && enables(word)) {
     enter(DriveState::kOperationEnabled);  // 16
   }
+}
+
+/// Of a stop that opens the bridge. A ramp that came to rest goes on with the shorted winding.
+bool DriveMachine::stop_ended(const DriveInputs& inputs) noexcept {
+  if (!ramp_ended(inputs)) return false;
+  if (motion_ != DriveMotion::kQuickStop || inputs.has_brake || !inputs.standstill) return true;
+  motion_ = DriveMotion::kShorted;
+  return false;
 }
 
 bool DriveMachine::ramp_ended(const DriveInputs& inputs) const noexcept {

@@ -73,6 +73,9 @@ struct DriveInputs {
 /// reach by themselves. So it is set where a stop that stays enabled has come to rest: halt, and
 /// quick stop with option 5 or 6.
 ///
+/// A quick stop ramp that ends in an open bridge leads there by the shorted winding, when there is
+/// no brake: a load that the drive held then sinks, and does not fall.
+///
 /// A brake delays two of them. Enabling (4) holds the axis in Switched On, its bridge closed, until
 /// the brake is open. A ramp that ends in an open bridge sets the brake when the axis is at rest,
 /// and the bridge stays closed until the brake holds. What opens the bridge at once is not delayed:
@@ -109,6 +112,7 @@ class DriveMachine {
   void slow_down_to(DriveState state, std::int16_t option) noexcept;
   void enter(DriveState state) noexcept;
   [[nodiscard]] bool stop_stays(const DriveOptions& options) const noexcept;
+  [[nodiscard]] bool stop_ended(const DriveInputs& inputs) noexcept;
   [[nodiscard]] bool ramp_ended(const DriveInputs& inputs) const noexcept;
   void command_brake(const DriveInputs& inputs, const DriveOptions& options) noexcept;
   void compose_statusword(const DriveInputs& inputs, const DriveOptions& options) noexcept;

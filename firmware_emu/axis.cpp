@@ -49,6 +49,7 @@ void Axis::power_on() noexcept TANDEM_RT {
   slowest_rad_s_ = 0.0;
   stalled_s_ = 0.0;
   brake_periods_ = 0;
+  stop_ = DriveMotion::kNone;
   apply_settings();
   take_demands();
 }
@@ -219,6 +220,8 @@ void Axis::seed_references() noexcept {
 void Axis::watch_stop() noexcept {
   const bool stops =
       machine_.motion() != DriveMotion::kNone && machine_.motion() != DriveMotion::kFollow;
+  if (machine_.motion() != stop_) resting_s_ = 0.0;
+  stop_ = machine_.motion();
   const bool rests = std::abs(measured_.motor_velocity_rad_s) < kRestVelocity_rad_s;
   stopping_s_ = stops ? stopping_s_ + period_s_ : 0.0;
   resting_s_ = stops && rests ? resting_s_ + period_s_ : 0.0;
@@ -355,8 +358,8 @@ void Axis::archive(Archive& ar) {
   settings_changed_ = changed;
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
-     damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_, brake_periods_, mode_,
-     sensors_valid_);
+     damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_, brake_periods_, stop_,
+     mode_, sensors_valid_);
 }
 
 }  // namespace tandem::firmware

@@ -94,11 +94,12 @@ class Axis final : private canopen::ObjectOwner {
   double temperature_C_ = 0.0;
   double stiffness_Nm_rad_ = 0.0;  ///< the last one that was a number and not negative
   double damping_Nms_rad_ = 0.0;
-  double stopping_s_ = 0.0;         ///< since the stop in progress began
-  double resting_s_ = 0.0;          ///< since the motor came to rest in it
-  double slowest_rad_s_ = 0.0;      ///< of the motor, in it
-  double stalled_s_ = 0.0;          ///< since it last became slower
-  std::int64_t brake_periods_ = 0;  ///< since the brake's command changed
+  double stopping_s_ = 0.0;                                  ///< since the stop in progress began
+  double resting_s_ = 0.0;                                   ///< since the motor came to rest in it
+  double slowest_rad_s_ = 0.0;                               ///< of the motor, in it
+  double stalled_s_ = 0.0;                                   ///< since it last became slower
+  std::int64_t brake_periods_ = 0;                           ///< since the brake's command changed
+  canopen::DriveMotion stop_ = canopen::DriveMotion::kNone;  ///< the one whose rest is timed
   canopen::Mode mode_ = canopen::Mode::kNone;
   bool sensors_valid_ = true;
   bool settings_changed_ = false;

@@ -119,6 +119,18 @@ TEST_F(Drive, QuickStopOptionsChooseTheRampAndWhereItEnds) {
   EXPECT_EQ(step(0x0F), kOperationEnabled);  // 16
 }
 
+TEST_F(Drive, ARampThatHasComeToRestGoesOnWithTheShortedWinding) {
+  enable();
+  step(0x02);
+  inputs.at_rest = inputs.standstill = true;
+  EXPECT_EQ(step(0x02), kQuickStopActive);
+  EXPECT_EQ(drive.motion(), DriveMotion::kShorted);
+  inputs.at_rest = inputs.standstill = false;  // the load moves it
+  EXPECT_EQ(step(0x02), kQuickStopActive);
+  inputs.at_rest = true;
+  EXPECT_EQ(step(0x02), kSwitchOnDisabled);
+}
+
 TEST_F(Drive, StopsOnTheWindingWhereOptionMinusOneSaysSo) {
   options.quick_stop = -1;
   enable();

@@ -155,14 +155,21 @@ TEST(QuickStop, RampsDownAtTheDecelerationOf6085AndHolds) {
   EXPECT_EQ(one.rig.statusword() & 0x0400, 0x0400);
 }
 
-TEST(QuickStop, KeepsTheTorqueWhileItRampsAndThenDisables) {
+TEST(QuickStop, KeepsTheTorqueWhileItRampsThenSinksAndIsDisabled) {
   Loaded one(0x605A, 2);
-  double way = 0.0;
+  const auto motion = [&one] { return one.rig.board.axis(0).machine().motion(); };
+  double way = one.travel(0x02, 2);
   int ms = 0;
-  for (; ms < 2000 && one.rig.drives[0].enabled; ++ms) way += one.travel(0x02, 1);
-  EXPECT_EQ(one.rig.state(), DriveState::kSwitchOnDisabled);
+  for (; ms < 2000 && motion() == canopen::DriveMotion::kQuickStop; ++ms) {
+    way += one.travel(0x02, 1);
+  }
   EXPECT_NEAR(way, kRampWay_rad, 0.03);
   EXPECT_GT(ms, 400);
+  EXPECT_EQ(motion(), canopen::DriveMotion::kShorted);
+  EXPECT_EQ(one.rig.state(), DriveState::kQuickStopActive);
+  one.travel(0x02, 1000);
+  EXPECT_EQ(one.rig.state(), DriveState::kSwitchOnDisabled);
+  EXPECT_FALSE(one.rig.drives[0].enabled);
 }
 
 TEST(QuickStop, HaltOnTheRampHoldsInVelocityControl) {
