@@ -78,6 +78,7 @@ class SheetReader {
       return fail("has no section of an object, such as [1000]: it is no data sheet",
                   "name the EDS or DCF of the device");
     }
+    if (Status keys = check_keys(sections_, remarks_); !keys) return keys;
     if (Status whole = check_last_section(sections_.back(), objects_); !whole) return whole;
     auto entries = make_entries(objects_, remarks_);
     if (!entries) return std::unexpected(std::move(entries.error()));
@@ -112,8 +113,9 @@ class SheetReader {
       return std::unexpected(list.error({}, "the file ends in the middle of this list",
                                         "it seems to be cut off: get the whole file"));
     }
-    remarks_.add(list.line, "[" + printable(list.name) + "] SupportedObjects is not the " +
-                                std::to_string(count) + " that are listed");
+    remarks_.add(list.line, "[" + printable(list.name) + "] SupportedObjects is '" +
+                                printable(list.value("SupportedObjects")) + "'; listed are " +
+                                std::to_string(count));
     return {};
   }
 

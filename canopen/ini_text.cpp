@@ -33,7 +33,7 @@ class IniReader {
       const Status taken = line.front() == '[' ? open_section(line) : add_pair(line);
       if (!taken) return taken;
     }
-    return finish_section();
+    return {};
   }
   [[nodiscard]] std::vector<IniSection> take() { return std::move(sections_); }
 
@@ -61,7 +61,6 @@ class IniReader {
   Status open_section(std::string_view line) {
     const std::size_t end = line.find(']');
     if (end == std::string_view::npos) return not_a_line(line);
-    if (const Status finished = finish_section(); !finished) return finished;
     sections_.push_back({.name = trimmed(line.substr(1, end - 1)), .line = number_, .pairs = {}});
     return {};
   }
@@ -79,36 +78,37 @@ class IniReader {
     return {};
   }
 
-  /// Keys that the last section has twice: the same value is tolerated.
-  Status finish_section() {
-    if (sections_.empty()) return {};
-    IniSection& section = sections_.back();
-    std::vector<std::pair<std::string, const IniPair*>> keys;
-    keys.reserve(section.pairs.size());
-    for (const IniPair& pair : section.pairs) keys.emplace_back(small_letters(pair.key), &pair);
-    std::ranges::stable_sort(keys, {}, &std::pair<std::string, const IniPair*>::first);
-    for (std::size_t i = 1; i < keys.size(); ++i) {
-      if (keys[i].first != keys[i - 1].first) continue;
-      const IniPair& first = *keys[i - 1].second;
-      const IniPair& second = *keys[i].second;
-      if (first.value != second.value) {
-        number_ = second.line;
-        return wrong("the key '" + printable(second.key) + "' is here twice, as '" +
-                         printable(first.value) + "' in line " + std::to_string(first.line) +
-                         " and as '" + printable(second.value) + "'",
-                     "keep one of them");
-      }
-      remarks_.add(second.line, "the key '" + printable(second.key) + "' comes again");
-    }
-    return {};
-  }
-
   std::string_view rest_;
   Remarks& remarks_;
   int number_ = 0;
   bool whole_line_ = true;  // with its end
   std::vector<IniSection> sections_;
 };
+
+/// Keys that a section has twice: the same value is tolerated.
+Status check_keys_of(const IniSection& section, Remarks& remarks) {
+  std::vector<std::pair<std::string, const IniPair*>> keys;
+  keys.reserve(section.pairs.size());
+  for (const IniPair& pair : section.pairs) keys.emplace_back(small_letters(pair.key), &pair);
+  std::ranges::stable_sort(keys, {}, &std::pair<std::string, const IniPair*>::first);
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].first != keys[i - 1].first) continue;
+    const IniPair& first = *keys[i - 1].second;
+    const IniPair& second = *keys[i].second;
+    if (first.value == second.value) {
+      remarks.add(second.line, "the key '" + printable(second.key) + "' comes again");
+      continue;
+    }
+    Error error =
+        section.error(second.key,
+                      "is here twice, as '" + printable(first.value) + "' in line " +
+                          std::to_string(first.line) + " and as '" + printable(second.value) + "'",
+                      "keep one of them");
+    error.line = second.line;
+    return std::unexpected(std::move(error));
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -194,6 +194,13 @@ Result<std::vector<IniSection>> read_ini(std::string_view text, Remarks& remarks
   IniReader reader(text, remarks);
   if (Status read = reader.read(); !read) return std::unexpected(std::move(read.error()));
   return reader.take();
+}
+
+Status check_keys(std::span<const IniSection> sections, Remarks& remarks) {
+  for (const IniSection& section : sections) {
+    if (Status checked = check_keys_of(section, remarks); !checked) return checked;
+  }
+  return {};
 }
 
 }  // namespace tandem::canopen

@@ -2,6 +2,7 @@
 // Layer: canopen.  Thread: non-RT only.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,11 +45,13 @@ class Remarks {
 };
 
 /// The sections in the order of the text, which must outlive them. Lines end with LF or CR LF;
-/// those that begin with ; or # are comments. A section may come twice: who reads it decides.
-/// Errors: a zero byte; a bracket that is not closed; a key twice in a section with different
-/// values; the text ends in the middle of a line.
+/// those that begin with ; or # are comments. A section or key may come twice.
+/// Errors: a zero byte; a bracket that is not closed; the text ends in the middle of a line.
 /// @param remarks  takes what else is odd
 [[nodiscard]] Result<std::vector<IniSection>> read_ini(std::string_view text, Remarks& remarks);
+
+/// Errors: a key twice in a section with different values.
+[[nodiscard]] Status check_keys(std::span<const IniSection> sections, Remarks& remarks);
 
 /// Whether both are the same but for the case of ASCII letters.
 [[nodiscard]] bool same_word(std::string_view a, std::string_view b) noexcept;

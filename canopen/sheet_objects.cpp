@@ -6,6 +6,7 @@
 #include <charconv>
 #include <utility>
 
+#include "base/counted.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/sheet_number.hpp"
 
@@ -144,8 +145,8 @@ class EntryMaker {
     if (!count) return std::unexpected(count.error());
     if (*count != object.subs.size()) {
       remarks_.add(section.line, called(section) + "SubNumber is " + std::to_string(*count) +
-                                     ", and there are " + std::to_string(object.subs.size()) +
-                                     " sub-indices");
+                                     "; the sheet has " +
+                                     counted(object.subs.size(), "sub-index", "sub-indices"));
     } else if (object.subs.empty()) {
       remarks_.add(section.line, called(section) + "has no sub-indices");
     }

@@ -347,11 +347,11 @@ TEST(DataSheet, RemarksWhatContradictsItself) {
            {with(kSheet, "1=0x6040", "1=0x6040\n2=0x6406"), "listed, but not defined: 6406"},
            {with(kSheet, "1=0x6040", "1=0x6040\n2=0x6040"), "6040 is listed twice"},
            {with(kSheet, "SupportedObjects=1", "SupportedObjects=7"),
-            "line 23: [OptionalObjects] SupportedObjects is not the 1 that are listed"},
+            "line 23: [OptionalObjects] SupportedObjects is '7'; listed are 1"},
            {with(kSheet, "[ManufacturerObjects]\nSupportedObjects=0\n", ""),
             "there is no section [ManufacturerObjects]"},
            {with(kSheet, "SubNumber=2", "SubNumber=5"),
-            "line 41: [1018] SubNumber is 5, and there are 2 sub-indices"},
+            "line 41: [1018] SubNumber is 5; the sheet has 2 sub-indices"},
            {with(kSheet, "VendorNumber=0x7A4E", "VendorNumber=101"),
             "1018:1 is 31310, and VendorNumber is 101"},
            {with(kSheet, "Granularity=8", "NrOfRXPDO=4"),
@@ -394,7 +394,7 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
   };
   for (const Row& row : std::initializer_list<Row>{
            {"", "drive.eds: has no section of an object, such as [1000]: it is no data sheet"},
-           {"[model]\nurdf = \"arm.urdf\"\n", "it is no data sheet"},
+           {"[model]\nurdf = \"arm.urdf\"\nurdf = 2\n[[bus]]\n", "it is no data sheet"},
            {std::string("[1000]\0\n", 8), "drive.eds: has a zero byte"},
            {with(kSheet, "ObjectType=0x9", "ObjectType=0x1"),
             "drive.eds:43: [1018] ObjectType: '0x1' is no type of object (expected is 0x7"},
@@ -418,7 +418,7 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
            {plus("[1018Sub01]\nDataType=0x0006\nAccessType=ro\n"),
             "[1018Sub01]: is here twice with different contents, first in line 51"},
            {with(kSheet, "AccessType=rww", "AccessType=rww\naccesstype=ro"),
-            "drive.eds:62: [6040]: the key 'accesstype' is here twice, as 'rww' in line 61 and as "
+            "drive.eds:62: [6040] accesstype: is here twice, as 'rww' in line 61 and as "
             "'ro'"},
        }) {
     const std::string error = refusal(row.text);
