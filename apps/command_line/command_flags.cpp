@@ -102,7 +102,12 @@ Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
 
 const char kEdsExamples[] = R"(Examples:
   tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
-  tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for)";
+  tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for
+  tandem eds show drive.eds                          what the drive of a sheet is and can)";
+
+const char kEdsShowExamples[] = R"(Examples:
+  tandem eds show drive.eds                          identity, modes, PDOs, units, oddities
+  tandem eds show drive.dcf --json - | jq .modes     the same for programs)";
 
 const char kReportExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
@@ -440,10 +445,20 @@ void add_flags(CLI::App& app, LogOptions& o) {
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {
-  app.add_option("robot", o.robot, "Robot TOML")->required();
-  app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
-  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  CLI::Option* robot = app.add_option("robot", o.robot, "Robot TOML, needed without `show`");
+  CLI::Option* output = app.add_option("-o,--output", o.output, "Folder to write (default: eds)");
+  CLI::Option* json = app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kEdsExamples);
+  CLI::App* show = app.add_subcommand("show", "What the drive of a sheet is and can");
+  show->add_option("sheet", o.sheet, "EDS or DCF")->required();
+  show->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  show->footer(kEdsShowExamples);
+  show->excludes(robot)->excludes(output)->excludes(json);
+  show->callback([&o] { o.action = EdsOptions::Action::kShow; });
+  // A positional that is required would take the word `show`.
+  app.callback([robot, show] {
+    if (!show->parsed() && robot->empty()) throw CLI::RequiredError(robot->get_name());
+  });
 }
 
 void add_flags(CLI::App& app, ReportOptions& o) {

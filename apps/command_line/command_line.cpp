@@ -65,12 +65,19 @@ std::string flag_that_takes(const CLI::App& app, const std::string& word) {
   return {};
 }
 
+/// Whether an argument has been given that is no flag: `tandem eds ROBOT`.
+bool has_its_argument(const CLI::App& app) {
+  const auto options = app.get_options(
+      [](const CLI::Option* option) { return option->get_positional() && !option->empty(); });
+  return !options.empty();
+}
+
 /// The message for words that fit nowhere, with the nearest that would.
 std::string unknown_word(const CLI::App& app, const std::string& word) {
   const bool flag = word.starts_with('-');
   const std::vector<std::string> known = flag ? flags_of(app) : subcommands_of(app);
   const std::string name = word.substr(0, word.find('='));
-  if (!flag && known.empty()) {
+  if (!flag && (known.empty() || has_its_argument(app))) {
     const std::string takes = flag_that_takes(app, word);
     return fmt::format("'{}' is one argument too many{}", word,
                        takes.empty() ? "" : fmt::format(": did you mean {} {}?", takes, word));
@@ -160,7 +167,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<LogOptions>("log", "Logs: info, csv, diff");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
-  commands.add<EdsOptions>("eds", "Write the electronic data sheets of a robot's nodes (CiA 306)");
+  commands.add<EdsOptions>("eds", "Data sheets (CiA 306): write those of a robot's nodes, show one");
   commands.add<FaultOptions>("fault", "Faults of a running run: show, reset");
   commands.add<EstopOptions>("estop", "Emergency stop of every run of this user");
   commands.add<ControllerOptions>(

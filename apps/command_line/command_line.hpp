@@ -194,9 +194,11 @@ struct LogOptions {
   std::string json;
 };
 
-/// tandem eds ROBOT
+/// tandem eds ROBOT, tandem eds show SHEET
 struct EdsOptions {
+  enum class Action : std::uint8_t { kWrite, kShow } action = Action::kWrite;
   std::string robot;           ///< robot.toml
+  std::string sheet;           ///< show: EDS or DCF
   std::string output = "eds";  ///< folder
   std::string json;
 };

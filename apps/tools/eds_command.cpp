@@ -9,6 +9,7 @@
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/eds_files.hpp"
+#include "apps/tools/eds_show.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -37,6 +38,7 @@ Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files)
 }  // namespace
 
 Exit eds_command(const EdsOptions& options) {
+  if (options.action == EdsOptions::Action::kShow) return eds_show(options);
   std::vector<EdsFile> files;
   Diagnostics errors = write_sheets(options, files);
   Json json = Json::array();

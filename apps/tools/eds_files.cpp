@@ -13,36 +13,18 @@ namespace tandem::apps {
 namespace {
 
 using hal::can::NodePlan;
-using hal::can::PdoPlan;
 namespace object = canopen::object;
 
-/// What the master writes at bring-up, as the sheet's defaults.
-canopen::EdsDefaults defaults_of(const NodePlan& node) {
+/// COB-IDs after power-on, which depend on the node's id: of the emergencies, and of PDOs, all off.
+canopen::EdsDefaults cob_ids() {
   canopen::EdsDefaults defaults;
   defaults[{object::kEmergencyId, 0}] = "$NODEID+0x80";
-  for (int n = 0; n < canopen::kPdosPerNode; ++n) {  // those that are not used
+  for (int n = 0; n < canopen::kPdosPerNode; ++n) {
     const auto offset = static_cast<std::uint16_t>(n);
     const auto rpdo = static_cast<std::uint16_t>(object::kRpdoParameter + offset);
     const auto tpdo = static_cast<std::uint16_t>(object::kTpdoParameter + offset);
     defaults[{rpdo, 1}] = fmt::format("$NODEID+0x{:X}", 0x80000200U + 0x100U * offset);
     defaults[{tpdo, 1}] = fmt::format("$NODEID+0x{:X}", 0xC0000180U + 0x100U * offset);
-  }
-  for (const PdoPlan& pdo : node.pdos) {
-    const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
-    const auto offset = static_cast<std::uint16_t>(pdo.number - 1);
-    const auto parameter = static_cast<std::uint16_t>(
-        (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
-    const auto mapping = static_cast<std::uint16_t>(
-        (receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
-    const std::uint32_t base = pdo.cob_id - static_cast<std::uint32_t>(node.id);
-    defaults[{parameter, 1}] = fmt::format("$NODEID+0x{:X}", base);
-    defaults[{parameter, 2}] = std::to_string(pdo.transmission);
-    defaults[{mapping, 0}] = std::to_string(pdo.fields.size());
-    std::uint8_t sub = 0;
-    for (const hal::can::MappedField& field : pdo.fields) {
-      const std::uint32_t entry = canopen::mapping_entry(field.index, field.sub, field.size);
-      defaults[{mapping, ++sub}] = fmt::format("0x{:08X}", entry);
-    }
   }
   return defaults;
 }
@@ -68,7 +50,7 @@ EdsFile board_sheet(const hal::RobotConfig& robot, const NodePlan& node, bool fd
   return {.name = name,
           .nodes = {node.name},
           .objects = board.dictionary().entries().size(),
-          .text = canopen::make_eds(board.dictionary(), device, defaults_of(node))};
+          .text = canopen::make_eds(board.dictionary(), device, cob_ids())};
 }
 
 EdsFile sensor_sheet(const hal::RobotConfig& robot, const NodePlan& node, bool fd,
@@ -88,7 +70,7 @@ EdsFile sensor_sheet(const hal::RobotConfig& robot, const NodePlan& node, bool f
   return {.name = name,
           .nodes = {node.name},
           .objects = board.dictionary().entries().size(),
-          .text = canopen::make_eds(board.dictionary(), device, defaults_of(node))};
+          .text = canopen::make_eds(board.dictionary(), device, cob_ids())};
 }
 
 /// "board_2_axes_fd", "imu_fd".
@@ -112,7 +94,7 @@ Result<std::vector<EdsFile>> make_eds_files(const hal::RobotConfig& robot) {
   for (const NodePlan& node : layout->nodes) {
     const bool fd = robot.buses[node.bus].fd;
     const std::string type = type_name(robot, node, fd);
-    // Equal but for their PDOs or identity: the second kind is type_2, and so on.
+    // Equal but for their identity: the second kind is type_2, and so on.
     for (int kind = 1;; ++kind) {
       const std::string name = type + (kind > 1 ? fmt::format("_{}", kind) : "") + ".eds";
       EdsFile sheet = node.board >= 0 ? board_sheet(robot, node, fd, name)

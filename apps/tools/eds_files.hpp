@@ -18,8 +18,8 @@ struct EdsFile {
   std::string text;
 };
 
-/// From the firmware's own object dictionary, with the robot's PDO mapping as default. Nodes whose
-/// sheets are equal are of one type.
+/// From the firmware's own object dictionary, with its values after power-on as defaults. Nodes
+/// whose sheets are equal are of one type.
 /// Errors: those of make_pdo_layout().
 [[nodiscard]] Result<std::vector<EdsFile>> make_eds_files(const hal::RobotConfig& robot);
 
