@@ -9,6 +9,7 @@
 #include "canopen/data_sheet.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
+#include "hal/ethercat-can/drive_use.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -147,10 +148,24 @@ void print_units(std::FILE* out, const SheetFacts& facts) {
   table.print(out);
 }
 
-void print_sheet(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts) {
+void print_use(std::FILE* out, const Result<hal::can::DriveUse>& use) {
+  if (!use) {
+    fmt::print(out, "\nTandem's master cannot drive it: {}\n", use.error().message);
+    return;
+  }
+  fmt::print(out, "\nWhat Tandem's master does with it:\n");
+  Facts table;
+  for (const hal::can::DriveFact& fact : use->does) table.add(fact.what, fact.how);
+  table.print(out);
+  fmt::print(out, "\nWhat it misses:{}\n", use->misses.empty() ? " nothing" : "");
+  for (const std::string& text : use->misses) fmt::print(out, "  {}\n", text);
+}
+
+void print_sheet(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts,
+                 const Result<hal::can::DriveUse>& use) {
   print_facts(out, sheet, facts);
   print_modes(out, facts);
-  // What our master does with the drive, and misses, belongs here: after what it can.
+  print_use(out, use);
   print_pdos(out, facts);
   print_list(out, "Into RPDOs:", facts.into_rpdo);
   print_list(out, "Into TPDOs:", facts.into_tpdo);
@@ -204,7 +219,18 @@ Json objects_json(const std::vector<const SheetEntry*>& entries) {
   return list;
 }
 
-Json sheet_json(const DataSheet& sheet, const SheetFacts& facts) {
+Json use_json(const Result<hal::can::DriveUse>& use) {
+  if (!use)
+    return {{"refused", use.error().message}, {"does", Json::array()}, {"misses", Json::array()}};
+  Json does = Json::array();
+  for (const hal::can::DriveFact& fact : use->does) {
+    does.push_back({{"what", fact.what}, {"how", fact.how}});
+  }
+  return {{"refused", nullptr}, {"does", does}, {"misses", use->misses}};
+}
+
+Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
+                const Result<hal::can::DriveUse>& use) {
   Json json{{"file", sheet.file},
             {"vendor_name", sheet.vendor_name},
             {"product_name", sheet.product_name},
@@ -225,6 +251,7 @@ Json sheet_json(const DataSheet& sheet, const SheetFacts& facts) {
   json["modes_said"] = facts.modes_said;
   json["modes"] = modes_json(facts);
   json["own_modes"] = facts.own_modes;
+  json["master"] = use_json(use);
   json["pdos"] = pdos_json(facts);
   json["into_rpdo"] = objects_json(facts.into_rpdo);
   json["into_tpdo"] = objects_json(facts.into_tpdo);
@@ -239,8 +266,9 @@ Exit eds_show(const EdsOptions& options) {
   const auto sheet = canopen::load_data_sheet(options.sheet);
   if (!sheet) return refuse(sheet.error());
   const SheetFacts facts = sheet_facts(*sheet);
-  print_sheet(human_output(options.json), *sheet, facts);
-  const Status written = write_json(options.json, sheet_json(*sheet, facts));
+  const auto use = hal::can::use_of(*sheet);
+  print_sheet(human_output(options.json), *sheet, facts, use);
+  const Status written = write_json(options.json, sheet_json(*sheet, facts, use));
   return written ? Exit::kDone : refuse(written.error());
 }
 

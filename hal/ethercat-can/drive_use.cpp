@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "base/counted.hpp"
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
 
@@ -17,7 +18,7 @@ using canopen::Mode;
 
 std::string object_text(const MappedField& field) {
   return field.sub == 0 ? fmt::format("{:04X}", field.index)
-                        : fmt::format("{:04X}:{:02X}", field.index, field.sub);
+                        : fmt::format("{:04X}:{:X}", field.index, field.sub);
 }
 
 /// The object that carries the field of the first axis; "" when none does.
@@ -62,7 +63,7 @@ void tell_pdos(const NodePlan& node, DriveUse& use) {
     const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
     use.does.push_back(
         {fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number),
-         fmt::format("{} ({} bytes{})", text, pdo.bytes, pdo.mapping_written ? "" : ", as it is")});
+         fmt::format("{} ({}{})", text, counted(pdo.bytes, "byte"), pdo.mapping_written ? "" : ", as it is")});
   }
 }
 

@@ -367,8 +367,8 @@ TEST(Sheet, IsToldInWords) {
     const auto found = std::ranges::find(use->does, what, &DriveFact::what);
     return found != use->does.end() ? found->how : "";
   };
-  EXPECT_EQ(how("position"), "mode 7 (interpolated position), target 60C1:01");
-  EXPECT_EQ(how("RPDO 1"), "6040 60C1:01 6060 (7 bytes)");
+  EXPECT_EQ(how("position"), "mode 7 (interpolated position), target 60C1:1");
+  EXPECT_EQ(how("RPDO 1"), "6040 60C1:1 6060 (7 bytes)");
   EXPECT_EQ(how("TPDO 1"), "6041 6064 6077 (8 bytes)");
   EXPECT_EQ(how("watching"), "node guarding");
   const auto misses = [&](const char* begin) {
