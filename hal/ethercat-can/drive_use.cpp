@@ -61,9 +61,9 @@ void tell_pdos(const NodePlan& node, DriveUse& use) {
       text += (text.empty() ? "" : " ") + object_text(field);
     }
     const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
-    use.does.push_back(
-        {fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number),
-         fmt::format("{} ({}{})", text, counted(pdo.bytes, "byte"), pdo.mapping_written ? "" : ", as it is")});
+    use.does.push_back({fmt::format("{} {}", receive ? "RPDO" : "TPDO", pdo.number),
+                        fmt::format("{} ({}{})", text, counted(pdo.bytes, "byte"),
+                                    pdo.mapping_written ? "" : ", as it is")});
   }
 }
 
