@@ -90,7 +90,7 @@ Status check_keys_of(const IniSection& section, Remarks& remarks) {
   std::vector<std::pair<std::string, const IniPair*>> keys;
   keys.reserve(section.pairs.size());
   for (const IniPair& pair : section.pairs) keys.emplace_back(small_letters(pair.key), &pair);
-  std::ranges::stable_sort(keys, {}, &std::pair<std::string, const IniPair*>::first);
+  std::ranges::sort(keys);  // those of a key in the order of the lines
   for (std::size_t i = 1; i < keys.size(); ++i) {
     if (keys[i].first != keys[i - 1].first) continue;
     const IniPair& first = *keys[i - 1].second;
@@ -165,7 +165,7 @@ Error IniSection::error(std::string_view key, std::string message, std::string h
   error.key = "[" + printable(name) + "]";
   error.line = line;
   if (key.empty()) return error;
-  error.key += " " + std::string(key);
+  error.key += " " + printable(key);
   if (const IniPair* pair = find(key)) error.line = pair->line;
   return error;
 }

@@ -357,7 +357,7 @@ Result<std::vector<SheetEntry>> make_entries(const SheetObjects& objects, Remark
     }
   }
   std::vector<SheetEntry> entries = maker.take();
-  std::ranges::stable_sort(entries, {}, [](const SheetEntry& entry) {
+  std::ranges::sort(entries, {}, [](const SheetEntry& entry) {
     return std::pair{entry.index, entry.sub};
   });
   return entries;

@@ -417,6 +417,8 @@ TEST(DataSheet, RefusesWithFileLineSectionAndKey) {
             "drive.eds:63: [6040]: is here twice with different contents, first in line 57"},
            {plus("[1018Sub01]\nDataType=0x0006\nAccessType=ro\n"),
             "[1018Sub01]: is here twice with different contents, first in line 51"},
+           {with(kSheet, "AccessType=rww", "AccessType=rww\n\xB5=1\n\xB5=2"),
+            "drive.eds:63: [6040] \xC2\xB5: is here twice, as '1' in line 62 and as '2'"},
            {with(kSheet, "AccessType=rww", "AccessType=rww\naccesstype=ro"),
             "drive.eds:62: [6040] accesstype: is here twice, as 'rww' in line 61 and as "
             "'ro'"},
