@@ -91,6 +91,9 @@ void print_modes(std::FILE* out, const SheetFacts& facts) {
                joined(mode.also)});
   }
   table.print(out);
+  if (!facts.lacks.empty()) {
+    fmt::print(out, "  every mode needs, and the drive lacks: {}\n", fmt::join(facts.lacks, ", "));
+  }
   if (!facts.own_modes.empty()) {
     fmt::print(out, "  and the manufacturer's own: bits {} of 6502\n",
                fmt::join(facts.own_modes, ", "));
@@ -252,6 +255,7 @@ Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
   json["modes"] = modes_json(facts);
   json["own_modes"] = facts.own_modes;
   json["master"] = use_json(use);
+  json["lacks"] = facts.lacks;
   json["pdos"] = pdos_json(facts);
   json["into_rpdo"] = objects_json(facts.into_rpdo);
   json["into_tpdo"] = objects_json(facts.into_tpdo);

@@ -59,6 +59,10 @@ constexpr std::array kModes{
               {0x60B2, 0x60C2}},
 };
 
+/// What every mode needs: controlword, statusword, the mode and its display.
+constexpr std::array<Need, 4> kEveryMode{
+    {{0x6040, 0, canopen::kMapRpdo}, {0x6041, 0, canopen::kMapTpdo}, {0x6060}, {0x6061}}};
+
 /// Rated current and torque, polarity, encoders, gear, feed, SI units of position and velocity; and
 /// of the profile's first edition: notations, dimensions, factors.
 constexpr std::array<std::uint16_t, 18> kUnits{0x6075, 0x6076, 0x607E, 0x6089, 0x608A, 0x608B,
@@ -69,19 +73,21 @@ std::string text_of(std::uint16_t index, std::uint8_t sub) {
   return sub == 0 ? fmt::format("{:04X}", index) : fmt::format("{:04X}:{:X}", index, sub);
 }
 
+/// Whether the drive has it, as SheetMode::lacks names it otherwise.
+std::optional<std::string> lack(const DataSheet& sheet, const Need& need) {
+  const std::string name = text_of(need.index, need.sub);
+  const SheetEntry* entry = sheet.find(need.index, need.sub);
+  if (entry == nullptr)
+    return need.mapped == 0 && sheet.has(need.index) ? std::nullopt : std::optional(name);
+  if (need.mapped == 0 || (entry->access & need.mapped) != 0) return std::nullopt;
+  return fmt::format("{} in {}", name, need.mapped == canopen::kMapRpdo ? "an RPDO" : "a TPDO");
+}
+
 SheetMode mode_of(const DataSheet& sheet, const ModeFacts& facts) {
   SheetMode mode{.number = facts.number, .name = facts.name, .needs = {}, .also = {}, .lacks = {}};
   for (const Need& need : facts.needs) {
-    const std::string name = text_of(need.index, need.sub);
-    mode.needs.push_back(name);
-    const SheetEntry* entry = sheet.find(need.index, need.sub);
-    const bool there = entry != nullptr || (need.mapped == 0 && sheet.has(need.index));
-    if (!there) {
-      mode.lacks.push_back(name);
-    } else if (need.mapped != 0 && (entry->access & need.mapped) == 0) {
-      const char* pdo = need.mapped == canopen::kMapRpdo ? "an RPDO" : "a TPDO";
-      mode.lacks.push_back(fmt::format("{} in {}", name, pdo));
-    }
+    mode.needs.push_back(text_of(need.index, need.sub));
+    if (auto missing = lack(sheet, need)) mode.lacks.push_back(std::move(*missing));
   }
   for (const std::uint16_t index : facts.also) {
     if (index != 0 && sheet.has(index)) mode.also.push_back(text_of(index, 0));
@@ -98,6 +104,9 @@ bool may_exist(const DataSheet& sheet, const SheetMode& mode) {
 
 void add_modes(const DataSheet& sheet, SheetFacts& facts) {
   if (facts.axes == 0) return;
+  for (const Need& need : kEveryMode) {
+    if (auto missing = lack(sheet, need)) facts.lacks.push_back(std::move(*missing));
+  }
   const auto bits = sheet.value(object::kSupportedModes, 0, 0);
   facts.modes_said = bits.value_or(0) != 0;
   for (const ModeFacts& known : kModes) {

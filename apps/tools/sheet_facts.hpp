@@ -38,6 +38,7 @@ struct SheetPdo {
 struct SheetFacts {
   std::optional<std::uint32_t> device_type;  ///< 1000; its low 16 bits are the profile's number
   int axes = 0;                              ///< those with a controlword
+  std::vector<std::string> lacks;            ///< of what every mode needs, as SheetMode::lacks
   bool modes_said = false;                   ///< by 6502; else they are guessed from the objects
   std::vector<SheetMode> modes;
   std::vector<int> own_modes;  ///< the manufacturer's bits of 6502, 16 to 31

@@ -171,6 +171,22 @@ TEST_F(DataSheets, WithoutSupportedModesShowThoseThatTheObjectsAllow) {
   EXPECT_NE(outcome.err.find("is told by its 6502 alone"), std::string::npos) << outcome.err;
 }
 
+TEST_F(DataSheets, ShowWhatAModeLacks) {
+  write_text(folder_ / "mover.dcf", read_text(kMover));
+  edit("mover.dcf", "[6061]", "[6062]");
+  const std::size_t set_point = read_text(folder_ / "mover.dcf").find("[60C1sub1]");
+  std::string text = read_text(folder_ / "mover.dcf");
+  text.replace(text.find("PDOMapping=1", set_point), 12, "PDOMapping=0");
+  write_text(folder_ / "mover.dcf", text);
+  const Outcome outcome = tandem("eds show mover.dcf --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["modes"][3]["mode"], 7);
+  EXPECT_EQ(json["modes"][3]["lacks"], nlohmann::json::array({"60C1:1 in an RPDO"}));
+  EXPECT_EQ(json["lacks"], nlohmann::json::array({"6061"}));
+  EXPECT_NE(outcome.err.find("every mode needs, and the drive lacks: 6061"), std::string::npos);
+}
+
 TEST_F(DataSheets, BeyondUseAreRefusedWithOneMessage) {
   struct Row {
     const char* arguments;
