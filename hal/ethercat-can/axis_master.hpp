@@ -66,12 +66,12 @@ class AxisMaster {
   [[nodiscard]] void* sample_variable(WireField field) noexcept { return sample_.variable(field); }
   /// Where a field of an RPDO comes from.
   [[nodiscard]] void* command_variable(WireField field) noexcept { return raw_.variable(field); }
-  /// The axis' error code from an emergency of its board; `named`: the board says which axis.
-  void on_emergency(std::uint16_t code, bool named) noexcept TANDEM_RT {
+  /// The axis' error code from an emergency of its board; `told`: warnings may tell it.
+  void on_emergency(std::uint16_t code, bool told) noexcept TANDEM_RT {
     emergency_code_ = code;
-    if (named && code != 0) last_emergency_ = code;
+    if (told && code != 0) last_emergency_ = code;
   }
-  /// The code of the last emergency that named the axis, if the axis has had no fault with it; 0:
+  /// The code of the last emergency that may be told, if the axis has had no fault with it; 0:
   /// none.
   [[nodiscard]] std::uint16_t emergency_without_fault() const noexcept {
     return last_emergency_ == fault_code_ ? std::uint16_t{0} : last_emergency_;

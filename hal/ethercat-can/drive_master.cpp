@@ -229,9 +229,10 @@ void DriveMaster::Impl::on_emergency(Node& node, const Frame& frame) noexcept TA
   if (!message) return;
   const auto code = static_cast<std::uint16_t>(message->code);
   const bool of_axis = message->manufacturer[0] < node.plan.joints.size();
+  const bool told = of_axis && !shutting_down;  // a robot that sinks at its end is no news
   for (std::size_t axis = 0; axis < node.plan.joints.size(); ++axis) {
     if (code == 0 || !of_axis || message->manufacturer[0] == axis) {
-      axes[node.plan.joints[axis]].on_emergency(code, of_axis);
+      axes[node.plan.joints[axis]].on_emergency(code, told);
     }
   }
   if (code == 0 || of_axis) return;

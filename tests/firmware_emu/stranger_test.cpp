@@ -15,6 +15,7 @@
 
 #include "canopen/eds.hpp"
 #include "rig.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::firmware::testing {
 namespace {
@@ -103,8 +104,8 @@ TEST(Stranger, ReadsTheBoardByItsSheetAndExchangesAPdo) {
   setup.name = "left leg of the robot";
   Rig rig(setup);
   rig.joints[0].q = rig.joints[0].th = 0.5;
-  const std::string sheet =
-      ::testing::TempDir() + "stranger_" + std::to_string(::getpid()) + ".eds";
+  const test::ScratchFolder folder;
+  const std::string sheet = folder / "board.eds";
   canopen::EdsDevice device;
   device.file_name = "board.eds";
   std::ofstream(sheet) << canopen::make_eds(rig.board.dictionary(), device, {});
@@ -112,7 +113,6 @@ TEST(Stranger, ReadsTheBoardByItsSheetAndExchangesAPdo) {
   rig.seen.clear();
   Script script({kNode, kFolder + "/read_board.mjs", sheet, "5"});
   const nlohmann::json found = carry(script, rig);
-  std::filesystem::remove(sheet);
   ASSERT_TRUE(found.is_object()) << "it has failed: see above";
   EXPECT_EQ(found["name"], "left leg of the robot") << "segmented";
   nlohmann::json wrong = nlohmann::json::array();
