@@ -12,7 +12,8 @@
 
 namespace tandem::hal {
 
-/// One thing that a joint may be able to do. Bits of JointCapabilities::bits.
+/// One thing that a joint may be able to do. Bits of JointCapabilities::bits. Of a drive of another
+/// maker its data sheet decides, not the gains table: its loops are its own.
 enum class Capability : std::uint8_t {
   kPosition = 1 << 0,   ///< its gains table has a position loop and a torque loop under it
   kVelocity = 1 << 1,   ///< its gains table has a velocity loop and a torque loop under it

@@ -142,6 +142,8 @@ struct JointConfig {
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
   std::optional<BrakeConfig> brake = {};
+  bool reversed = false;         ///< the drive counts down as the joint's angle grows
+  std::int32_t zero_counts = 0;  ///< what the drive counts where the joint is at 0
   bool counts_of_sheet = false;  ///< encoder_counts_per_rev is what the drive's sheet says
   bool torque_of_sheet = false;  ///< rated_torque_Nm is
   bool slides = false;           ///< prismatic: m and N; the URDF's, by complete_from_description()

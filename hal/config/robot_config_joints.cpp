@@ -59,6 +59,10 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.encoder_counts_per_rev = table.number_or("encoder_counts_per_rev", kUnset, kCounts);
   joint.motor_encoder_counts_per_rev =
       table.number_or("motor_encoder_counts_per_rev", kUnset, kCounts);
+  joint.reversed = table.boolean_or("reversed", false);
+  joint.zero_counts = static_cast<std::int32_t>(
+      table.integer_or("zero_counts", 0, std::numeric_limits<std::int32_t>::min(),
+                       std::numeric_limits<std::int32_t>::max()));
   joint.torque_noise_Nm = table.number_or("torque_noise_Nm", 0.0, kNotNegative);
   joint.following_error_rad =
       table.number_or("following_error_rad", joint.following_error_rad, kNotNegative);
@@ -131,6 +135,11 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
 void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint) {
   const BoardConfig* board = robot.board(joint.board);
   if (board == nullptr || board->eds.empty()) {
+    for (const char* key : {"reversed", "zero_counts"}) {
+      if (!table.has(key)) continue;
+      table.error(key, "is for drives of other makers: our own boards count along the joint",
+                  "give its board an `eds`, or remove this key");
+    }
     for (const char* key : {"encoder_counts_per_rev", "motor_encoder_counts_per_rev"}) {
       if (!table.has(key)) (void)table.number(key);  // says that it is missing
     }

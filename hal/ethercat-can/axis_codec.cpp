@@ -36,9 +36,11 @@ AxisScale AxisScale::of(const JointConfig& joint) {
   const auto counts = clamp_round<std::uint32_t>(joint.encoder_counts_per_rev);
   const auto motor_counts = clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev);
   const auto rated_mNm = clamp_round<std::uint32_t>(1000.0 * joint.rated_torque_Nm);
-  return {.counts_per_rad = counts / kRadPerRev,
+  const double sign = joint.reversed ? -1.0 : 1.0;
+  return {.counts_per_rad = sign * counts / kRadPerRev,
           .motor_counts_per_rad = motor_counts / kRadPerRev,
-          .mille_per_Nm = 1.0e6 / rated_mNm};
+          .mille_per_Nm = sign * 1.0e6 / rated_mNm,
+          .zero_counts = joint.zero_counts};
 }
 
 void* RawFeedback::variable(WireField field) noexcept {
@@ -116,8 +118,8 @@ void encode_command(const AxisScale& scale, Mode position, const CommandImage& c
   const auto interaction = static_cast<InteractionMode>(command.interaction()[joint]);
   const Mode wire = wire_mode(mode, interaction, position);
   if (wire != Mode::kNone) raw.mode = static_cast<std::int8_t>(wire);
-  raw.target_position =
-      clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad);
+  raw.target_position = scale.to_drive(
+      clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad));
   raw.velocity_offset =
       clamp_round<std::int32_t>(command.velocity_rad_s()[joint] * scale.counts_per_rad);
   raw.torque_offset = clamp_round<std::int16_t>(command.torque_Nm()[joint] * scale.mille_per_Nm);
@@ -131,7 +133,7 @@ void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t
                      StateImage& state) noexcept TANDEM_RT {
   const double rad = 1.0 / scale.counts_per_rad;
   const double motor_rad = 1.0 / scale.motor_counts_per_rad;
-  state.position_rad()[joint] = raw.position * rad;
+  state.position_rad()[joint] = scale.from_zero(raw.position) * rad;
   state.velocity_rad_s()[joint] = raw.velocity * rad;
   state.torque_Nm()[joint] = raw.torque / scale.mille_per_Nm;
   state.motor_position_rad()[joint] = raw.motor_position * motor_rad;

@@ -20,10 +20,21 @@ namespace tandem::hal::can {
 
 /// Factors of one joint's wire units.
 struct AxisScale {
-  double counts_per_rad = 1.0;        ///< link encoder, 608F / 2 pi
+  double counts_per_rad = 1.0;        ///< link encoder, 608F / 2 pi; negative: it counts down
   double motor_counts_per_rad = 1.0;  ///< motor encoder reflected to the link, 2033 / 2 pi
-  double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076)
+  double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076); negative with the counts
+  std::int32_t zero_counts = 0;       ///< the drive's count at 0 rad
 
+  /// A drive's count from the joint's zero, and back. Both wrap around as the drive's counter does:
+  /// the joint's range is less than the counter's, so that a count means one angle.
+  [[nodiscard]] std::int32_t from_zero(std::int32_t count) const noexcept TANDEM_RT {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(count) -
+                                     static_cast<std::uint32_t>(zero_counts));
+  }
+  [[nodiscard]] std::int32_t to_drive(std::int32_t from_zero) const noexcept TANDEM_RT {
+    return static_cast<std::int32_t>(static_cast<std::uint32_t>(from_zero) +
+                                     static_cast<std::uint32_t>(zero_counts));
+  }
   [[nodiscard]] static AxisScale of(const JointConfig& joint);
 };
 

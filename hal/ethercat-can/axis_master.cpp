@@ -19,7 +19,8 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
   feedback_.adopt(sample_);
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
   if (!traits_.tells_velocity && heard_ && elapsed_ns > 0) {
-    const double counts = static_cast<double>(feedback_.position) - last_position;
+    const auto counts = static_cast<std::int32_t>(  // the counter may wrap around
+        static_cast<std::uint32_t>(feedback_.position) - static_cast<std::uint32_t>(last_position));
     feedback_.velocity =
         canopen::clamp_round<std::int32_t>(counts * 1.0e9 / static_cast<double>(elapsed_ns));
   }

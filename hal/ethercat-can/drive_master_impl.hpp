@@ -81,6 +81,7 @@ struct DriveMaster::Impl {
 
   Impl(const RobotConfig& robot_config, PdoLayout layout, std::span<Bus* const> buses);
 
+  // From the layout: drive_master_build.cpp
   void compile_exchanges(Node& node);
   [[nodiscard]] void* variable(Node& node, const PdoPlan& pdo, const MappedField& field);
 

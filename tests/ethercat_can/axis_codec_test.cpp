@@ -62,6 +62,36 @@ TEST_F(Codec, PositionsGoByInterpolationWhereADriveHasNoCsp) {
   EXPECT_EQ(image_mode(7).first, ControlMode::kPosition);
 }
 
+TEST_F(Codec, AZeroAndADirectionHoldAcrossTheCountersEnd) {
+  constexpr auto kLast = std::numeric_limits<std::int32_t>::max();
+  constexpr auto kFirst = std::numeric_limits<std::int32_t>::min();
+  JointConfig joint;
+  joint.encoder_counts_per_rev = 36000.0;
+  joint.motor_encoder_counts_per_rev = 36000.0;
+  joint.rated_torque_Nm = 50.0;
+  joint.reversed = true;
+  joint.zero_counts = kLast - 8;
+  const AxisScale turned = AxisScale::of(joint);
+  command.position_rad()[0] = -10 * 2.0 * std::numbers::pi / 36000.0;
+  command.velocity_rad_s()[0] = 2.0 * std::numbers::pi / 36000.0;
+  command.torque_Nm()[0] = 5.0;
+  encode_command(turned, canopen::Mode::kCsp, command, 0, raw);
+  EXPECT_EQ(raw.target_position, kFirst + 1) << "ten counts up, past the last one";
+  EXPECT_EQ(raw.velocity_offset, -1);
+  EXPECT_EQ(raw.torque_offset, -100);
+  for (const std::int32_t count : {kFirst, kFirst + 1, -1, 0, 1, kLast - 8, kLast}) {
+    EXPECT_EQ(turned.to_drive(turned.from_zero(count)), count);
+  }
+  RawFeedback feedback;
+  feedback.position = kFirst + 1;
+  feedback.velocity = -3;
+  feedback.torque = -100;
+  decode_feedback(turned, feedback, 0, state);
+  EXPECT_DOUBLE_EQ(state.position_rad()[0], command.position_rad()[0]);
+  EXPECT_GT(state.velocity_rad_s()[0], 0.0);
+  EXPECT_DOUBLE_EQ(state.torque_Nm()[0], 5.0);
+}
+
 TEST_F(Codec, IdleKeepsTheModeOfTheDrive) {
   encode_command(scale(), canopen::Mode::kCsp, command, 0, raw);
   command.mode()[0] = static_cast<std::int8_t>(ControlMode::kIdle);

@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
 
 #include "hal/config/capabilities.hpp"
@@ -92,6 +93,24 @@ TEST_F(BoardSheet, IsOverruledByTheRobotsUnits) {
   EXPECT_EQ(joint.encoder_counts_per_rev, 36000.0);
   EXPECT_EQ(joint.rated_torque_Nm, 12.0);
   EXPECT_FALSE(joint.counts_of_sheet || joint.torque_of_sheet);
+}
+
+TEST_F(BoardSheet, LetsAJointHaveADirectionAndAZero) {
+  const std::string turned =
+      with(kArm, "max_torque_Nm = 10.0\n",
+           "max_torque_Nm = 10.0\nreversed = true\nzero_counts = -2147483648\n");
+  const auto robot = read(turned);
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_TRUE(robot->joints[0].reversed);
+  EXPECT_EQ(robot->joints[0].zero_counts, std::numeric_limits<std::int32_t>::min());
+  const auto own = read(with(with(turned, "eds = \"drive.eds\"\n", ""), "reversed = true\n",
+                             "reversed = true\nencoder_counts_per_rev = 36000\n"
+                             "motor_encoder_counts_per_rev = 36000\n"));
+  ASSERT_FALSE(own);
+  ASSERT_EQ(own.error().size(), 2U);
+  EXPECT_NE(own.error()[0].to_string().find("reversed: is for drives of other makers"),
+            std::string::npos)
+      << own.error()[0].to_string();
 }
 
 TEST_F(BoardSheet, WithoutUnitsAsksForThemByName) {

@@ -1,0 +1,125 @@
+// From the layout to what a cycle runs through: ports, nodes, axes, lists of copies.
+#include <algorithm>
+
+#include "hal/ethercat-can/drive_master_impl.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::PdoDirection;
+
+namespace {
+
+/// A sensor has no time-out of its own in the configuration.
+constexpr int kSensorTimeoutCycles = 10;
+/// Of each joint, by what its board's PDOs carry.
+std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& layout) {
+  std::vector<AxisTraits> traits(robot.joints.size());
+  for (const NodePlan& node : layout.nodes) {
+    for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      traits[node.joints[axis]] = {.can = node.abilities[axis],
+                                   .tells_velocity = node.carries(axis, WireField::kVelocity),
+                                   .tells_mode = node.carries(axis, WireField::kModeDisplay),
+                                   .tells_motor = node.carries(axis, WireField::kMotorPosition)};
+    }
+  }
+  return traits;
+}
+
+}  // namespace
+
+DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
+    : plan(std::move(node_plan)),
+      master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps)),
+      timeout_cycles(timeout),
+      frames(plan.pdos.size()),
+      sent(plan.pdos.size()) {
+  tpdos.fill(-1);
+  for (std::size_t p = 0; p < plan.pdos.size(); ++p) {
+    const PdoPlan& pdo = plan.pdos[p];
+    if (pdo.direction == PdoDirection::kTransmit) tpdos[pdo.number - 1] = static_cast<int>(p);
+    frames[p].id = pdo.cob_id;
+    frames[p].length = canopen::frame_length(pdo.bytes);
+    if (frames[p].length > canopen::kClassicFrameBytes) {
+      frames[p].flags = canopen::kFlagFd | canopen::kFlagBrs;
+    }
+    if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
+  }
+  sample.resize(channels.size());
+}
+
+DriveMaster::Impl::Impl(const RobotConfig& robot_config, PdoLayout layout,
+                        std::span<Bus* const> buses)
+    : robot(robot_config),
+      joint_node(robot.joints.size()),
+      joint_fresh(robot.joints.size()),
+      sent_revision(robot.joints.size()) {
+  const std::size_t frames = 16 + layout.nodes.size() * 8;
+  for (Bus* bus : buses) ports.emplace_back(*bus, frames);
+  const std::vector<AxisTraits> traits = traits_of(robot, layout);
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    const GainsConfig& gains = robot.gains_of(robot.joints[j]);
+    axes.emplace_back(AxisScale::of(robot.joints[j]), traits[j], gains.stiffness_Nm_rad,
+                      gains.damping_Nms_rad);
+    for (const PidConfig* loop :
+         {&gains.position, &gains.velocity, &gains.torque, &gains.current}) {
+      file_gains.push_back(loop->gains);
+    }
+  }
+  sent_gains = file_gains;
+  std::size_t channel = 0;
+  for (NodePlan& plan : layout.nodes) {
+    Port& port = ports[plan.bus];
+    const std::int64_t heartbeat_ns = std::int64_t{plan.heartbeat_ms} * 1'000'000;
+    port.heartbeat_ns =
+        port.heartbeat_ns == 0 ? heartbeat_ns : std::min(port.heartbeat_ns, heartbeat_ns);
+    port.nodes[static_cast<std::size_t>(plan.id)] = static_cast<std::int16_t>(nodes.size());
+    for (const std::size_t joint : plan.joints) joint_node[joint] = nodes.size();
+    for (const PdoPlan& pdo : plan.pdos) {
+      const bool sampled = pdo.group == PdoGroup::kFeedback || pdo.group == PdoGroup::kSensor;
+      if (!sampled || pdo.part + 1 != plan.parts) continue;
+      std::uint32_t& last = port.last_tpdo[static_cast<std::size_t>(plan.id)];
+      last = std::max(last, canopen::cob::tpdo(pdo.number, 0));
+    }
+    auto steps = make_configuration(robot, plan);
+    const int timeout =
+        plan.board < 0 ? kSensorTimeoutCycles
+                       : robot.boards[static_cast<std::size_t>(plan.board)].command_timeout_cycles;
+    Node& node = nodes.emplace_back(std::move(plan), std::move(steps), timeout);
+    node.first_channel = channel;
+    channel += node.channels.size();
+  }
+  for (Node& node : nodes) compile_exchanges(node);  // nodes and axes keep their places from now on
+}
+
+/// The variable behind a field of a PDO.
+void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedField& field) {
+  switch (field.field) {
+    case WireField::kSensorChannel: return &node.sample[field.axis];
+    case WireField::kCycleEcho: return &node.echo;
+    case WireField::kCycleCounter: return &counter;
+    default: break;
+  }
+  AxisMaster& axis = axes[node.plan.joints[field.axis]];
+  if (pdo.direction == PdoDirection::kReceive) return axis.command_variable(field.field);
+  return pdo.group == PdoGroup::kSlowFeedback ? axis.slow_variable(field.field)
+                                              : axis.sample_variable(field.field);
+}
+
+void DriveMaster::Impl::compile_exchanges(Node& node) {
+  for (const PdoPlan& pdo : node.plan.pdos) {
+    Exchange& exchange = node.exchanges.emplace_back();
+    for (const MappedField& field : pdo.fields) {
+      exchange.copies.push_back(
+          {.data = variable(node, pdo, field), .offset = field.offset, .size = field.size});
+      exchange.echo |= field.field == WireField::kCycleEcho;
+      if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
+      const std::size_t joint = node.plan.joints[field.axis];
+      if (std::ranges::find(exchange.joints, joint) == exchange.joints.end())
+        exchange.joints.push_back(joint);
+    }
+    // A sample of several parts is that of all axes, and its last part makes it whole.
+    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) exchange.joints = node.plan.joints;
+  }
+}
+
+}  // namespace tandem::hal::can
