@@ -1,5 +1,4 @@
-// Lengths that CAN cannot have and 29-bit frames are refused here, in both directions; remote
-// requests are only received.
+// Lengths that CAN cannot have and 29-bit frames are refused here, in both directions.
 #include "hal/ethercat-can/socket_frame.hpp"
 
 #include <linux/can/error.h>
@@ -22,12 +21,17 @@ bool length_exists(std::size_t length, bool fd) noexcept {
 
 std::size_t to_kernel(const Frame& frame, bool fd, canfd_frame& out) noexcept TANDEM_RT {
   const bool switches = (frame.flags & canopen::kFlagBrs) != 0;
-  if ((frame.flags & ~(canopen::kFlagFd | canopen::kFlagBrs)) != 0) return 0;
+  const bool remote = (frame.flags & canopen::kFlagRtr) != 0;
+  if ((frame.flags & canopen::kFlagError) != 0 || (remote && frame.fd())) return 0;
   if (frame.id > CAN_SFF_MASK || !length_exists(frame.length, frame.fd())) return 0;
   if (frame.fd() ? !fd : switches) return 0;
   out = {};
   out.can_id = frame.id;
   out.len = frame.length;
+  if (remote) {
+    out.can_id |= CAN_RTR_FLAG;
+    return CAN_MTU;
+  }
   if (switches) out.flags = CANFD_BRS;
   std::copy_n(frame.data.begin(), frame.length, out.data);
   return frame.fd() ? CANFD_MTU : CAN_MTU;

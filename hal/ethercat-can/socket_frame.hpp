@@ -18,7 +18,7 @@ namespace tandem::hal::can {
 /// @param fd  the bus carries FD frames
 /// @return the bytes to hand over: CAN_MTU (classic) or CANFD_MTU; 0 when the frame cannot be sent:
 ///         an identifier above 7FF, a length that does not exist in its format, an FD frame on a
-///         classic bus, bit-rate switch without FD, a remote or an error frame.
+///         classic bus, bit-rate switch without FD, a remote request of CAN FD, an error frame.
 [[nodiscard]] std::size_t to_kernel(const canopen::Frame& frame, bool fd,
                                     canfd_frame& out) noexcept TANDEM_RT;
 

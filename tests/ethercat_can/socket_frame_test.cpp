@@ -46,6 +46,16 @@ TEST(SocketFrame, WritesAnFdFrameWithItsRateSwitch) {
   EXPECT_EQ(bytes_of(out), expected);
 }
 
+TEST(SocketFrame, WritesARemoteRequestWithoutData) {
+  canfd_frame out;
+  Frame guard{.id = 0x705, .length = 1, .flags = canopen::kFlagRtr};
+  guard.data[0] = 0xFF;
+  EXPECT_EQ(to_kernel(guard, true, out), CAN_MTU);
+  EXPECT_EQ(out.can_id, 0x705 | CAN_RTR_FLAG);
+  EXPECT_EQ(out.len, 1);
+  EXPECT_EQ(out.data[0], 0) << "a heartbeat of that node it is not";
+}
+
 TEST(SocketFrame, RefusesWhatCannotBeSent) {
   canfd_frame out;
   EXPECT_EQ(to_kernel(Frame{.id = 0x800}, true, out), 0U) << "29-bit identifier";
@@ -55,7 +65,8 @@ TEST(SocketFrame, RefusesWhatCannotBeSent) {
   EXPECT_EQ(to_kernel(Frame{.id = 1, .length = 8, .flags = canopen::kFlagFd}, false, out), 0U)
       << "FD on a classic bus";
   EXPECT_EQ(to_kernel(Frame{.id = 1, .flags = canopen::kFlagBrs}, true, out), 0U);
-  EXPECT_EQ(to_kernel(Frame{.id = 1, .flags = canopen::kFlagRtr}, true, out), 0U);
+  EXPECT_EQ(to_kernel(Frame{.id = 1, .flags = canopen::kFlagRtr | canopen::kFlagFd}, true, out), 0U)
+      << "CAN FD has no remote requests";
   EXPECT_EQ(to_kernel(Frame{.id = 1, .flags = canopen::kFlagError}, true, out), 0U);
 }
 
