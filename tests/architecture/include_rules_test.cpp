@@ -23,6 +23,7 @@ const Rules& rules() {
       {"rt", {"base"}},
       {"model", {"base"}},
       {"canopen", {"base"}},
+      {"ethercat", {"base", "canopen"}},
       {"firmware_emu", {"base", "canopen"}},
       {"hal", {"base", "model/loop_spec.hpp"}},
       {"hal/config", {"base", "canopen", "hal", "model/loop_spec.hpp"}},
@@ -178,7 +179,7 @@ TEST(Architecture, EverySourceOrItsHeaderBeginsWithItsPurpose) {
   const fs::path root = TANDEM_SOURCE_DIR;
   int checked = 0;
   for (const char* folder :
-       {"apps", "base", "bench", "canopen", "controllers", "dds", "examples", "firmware_emu", "hal",
+       {"apps", "base", "bench", "canopen", "controllers", "dds", "ethercat", "examples", "firmware_emu", "hal",
         "log", "model", "report", "rt", "runtime", "scaffold"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       const fs::path& file = entry.path();
