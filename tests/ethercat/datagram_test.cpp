@@ -51,10 +51,10 @@ TEST(Datagram, TwoInAFrameAreJoinedByTheFirstOnesMoreBit) {
   ASSERT_EQ(state.size(), 2u);
   state[0] = 0x11;
   ASSERT_EQ(frame.writer.add(Command::kLrw, 0x02, 0x00010200, 3).size(), 3u);
-  EXPECT_EQ(frame.finish(), padded(hex(kEthernet +
-                                       "1D 10 "
-                                       "05 01 01 10 20 01 02 80 00 00 11 00 00 00 "
-                                       "0C 02 00 02 01 00 03 00 00 00 00 00 00 00 00")));
+  EXPECT_EQ(frame.finish(),
+            padded(hex(kEthernet + "1D 10 "
+                                   "05 01 01 10 20 01 02 80 00 00 11 00 00 00 "
+                                   "0C 02 00 02 01 00 03 00 00 00 00 00 00 00 00")));
 }
 
 TEST(Datagram, EveryCommandIsWrittenAndReadBackAsItsNumber) {
