@@ -25,6 +25,7 @@ const Rules& rules() {
       {"canopen", {"base"}},
       {"ethercat", {"base", "canopen"}},
       {"firmware_emu", {"base", "canopen"}},
+      {"firmware_emu/ethercat", {"base", "canopen", "ethercat"}},
       {"hal", {"base", "model/loop_spec.hpp"}},
       {"hal/config", {"base", "canopen", "hal", "model/loop_spec.hpp"}},
       {"hal/ethercat-can", {"base", "canopen", "hal", "hal/config", "rt/histogram.hpp"}},

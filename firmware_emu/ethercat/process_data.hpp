@@ -1,0 +1,80 @@
+// A slave's process data: objects 1C00, 1C12, 1C13, 16xx and 1Axx, and the copying that they say.
+// Layer: firmware_emu.  Thread: the line's; construction non-RT.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "canopen/object_dictionary.hpp"
+
+namespace tandem::firmware::esc {
+
+inline constexpr std::size_t kMaxPdos = 4;
+inline constexpr std::size_t kMaxPdoEntries = 32;
+/// What the memory of one direction has room for, three buffers of it.
+inline constexpr std::size_t kMaxProcessBytes = 1024;
+
+/// A PDO at power-on: its object, and entries as index << 16 | sub << 8 | bits.
+struct PdoSetup {
+  std::uint16_t index = 0;  ///< 16xx or 1Axx
+  std::vector<std::uint32_t> entries;
+  bool assigned = true;
+};
+
+/// One direction. Its objects change in PREOP only: count to 0, then entries, then count.
+class ProcessData final : public canopen::ObjectOwner {
+ public:
+  enum class Direction : std::uint8_t { kOutputs, kInputs };
+
+  ProcessData(Direction direction, std::span<const PdoSetup> pdos);
+
+  /// Adds its objects to `od`, whose entries it may then map.
+  /// @return false when `od` is full or has one of them
+  bool add_to(canopen::ObjectDictionary& od);
+  /// Whether the objects may be written.
+  void set_open(bool open) noexcept { open_ = open; }
+  /// Bytes that the assigned PDOs have together.
+  [[nodiscard]] std::size_t bytes() const noexcept TANDEM_RT;
+  /// Finds the mapped objects, before copying begins.
+  void compile() noexcept TANDEM_RT;
+  /// Outputs: what came goes into the objects. @pre compile(); image.size() == bytes()
+  void take(std::span<const std::uint8_t> image) const noexcept TANDEM_RT;
+  /// Inputs: what the objects hold goes out. @pre compile(); image.size() == bytes()
+  void give(std::span<std::uint8_t> image) const noexcept TANDEM_RT;
+  void archive(Archive& ar);
+
+  canopen::AbortCode check(const canopen::ObjectEntry& entry,
+                           const std::uint8_t* bytes) noexcept TANDEM_RT override;
+  void written(const canopen::ObjectEntry&) noexcept TANDEM_RT override {}
+
+ private:
+  struct Pdo {
+    std::uint16_t index = 0;
+    std::uint8_t count = 0;
+    std::array<std::uint32_t, kMaxPdoEntries> entries{};
+  };
+  struct Copy {
+    const canopen::ObjectEntry* entry = nullptr;  ///< none: a gap
+    std::uint32_t bytes = 0;
+  };
+
+  [[nodiscard]] const Pdo* find(std::uint16_t index) const noexcept;
+  [[nodiscard]] canopen::AbortCode check_entry(std::uint32_t mapped) const noexcept;
+  [[nodiscard]] static std::size_t bytes_of(const Pdo& pdo) noexcept;
+
+  Direction direction_;
+  bool open_ = false;
+  const canopen::ObjectDictionary* od_ = nullptr;
+  std::vector<Pdo> pdos_;
+  std::uint8_t assigned_count_ = 0;
+  std::array<std::uint16_t, kMaxPdos> assigned_{};
+  std::size_t copies_ = 0;
+  std::array<Copy, kMaxPdos * kMaxPdoEntries> copy_{};
+};
+
+}  // namespace tandem::firmware::esc
