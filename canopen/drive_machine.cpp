@@ -253,6 +253,7 @@ void DriveMachine::compose_statusword(const DriveInputs& inputs,
   if (inputs.standstill && stop_stays(options)) word |= kTargetReached;
   if (state_ == DriveState::kOperationEnabled) {
     if (inputs.follows_command && motion_ == DriveMotion::kFollow) word |= kFollowsCommand;
+    if (inputs.target_reached && motion_ == DriveMotion::kFollow) word |= kTargetReached;
     if (inputs.following_error) word |= statusword::kFollowingError;
   }
   statusword_ = word;

@@ -61,6 +61,7 @@ struct DriveInputs {
   bool internal_limit = false;   ///< statusword bit 11
   bool follows_command = false;  ///< statusword bit 12, shown in Operation Enabled
   bool following_error = false;  ///< statusword bit 13
+  bool target_reached = false;   ///< statusword bit 10, in a mode that has a target
   bool warning = false;          ///< statusword bit 7
   bool has_brake = false;        ///< the motor has a brake
   bool brake_moved = true;       ///< it has had the time that it needs to obey brake_set()
@@ -69,8 +70,8 @@ struct DriveInputs {
 /// The drive's side: transitions 0 to 16, at most one per step. A controlword with bit 7 is no
 /// command, whatever the other bits say: only its rising edge counts, and halt.
 ///
-/// Bit 10 of the statusword, target reached: the modes here are cyclic and have no target that they
-/// reach by themselves. So it is set where a stop that stays enabled has come to rest: halt, and
+/// Bit 10 of the statusword, target reached: cyclic modes have no target that they reach by
+/// themselves. In those it is set where a stop that stays enabled has come to rest: halt, and
 /// quick stop with option 5 or 6.
 ///
 /// A quick stop ramp that ends in an open bridge leads there by the shorted winding, when there is

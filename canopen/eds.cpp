@@ -31,6 +31,8 @@ constexpr std::array kNames{
     ObjectName{0x1008, "Manufacturer device name"},
     ObjectName{0x1009, "Manufacturer hardware version"},
     ObjectName{0x100A, "Manufacturer software version"},
+    ObjectName{0x100C, "Guard time"},
+    ObjectName{0x100D, "Life time factor"},
     ObjectName{0x1014, "COB-ID EMCY"},
     ObjectName{0x1016, "Consumer heartbeat time"},
     ObjectName{0x1017, "Producer heartbeat time"},

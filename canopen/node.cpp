@@ -11,6 +11,7 @@ namespace tandem::canopen {
 namespace {
 
 constexpr std::uint32_t kNoCobId = 0xFFFFFFFF;
+constexpr std::uint8_t kGuardToggle = 0x80;
 
 }  // namespace
 
@@ -30,6 +31,8 @@ void Node::add_objects(ObjectDictionary& od) {
   od.add_value<std::uint32_t>(kSyncId, 0, cob::kSync);
   od.add(kSyncPeriod, 0, sync_period_us_, kReadWrite);
   od.add_string(kDeviceName, 0, config_.name);
+  od.add(kGuardTime, 0, guarding_.time_ms, kReadWrite);
+  od.add(kLifeTimeFactor, 0, guarding_.life_factor, kReadWrite);
   od.add_value<std::uint32_t>(kEmergencyId, 0,
                               cob::kEmergency + static_cast<std::uint32_t>(config_.id));
   od.add_value<std::uint8_t>(kHeartbeatConsumer, 0, kHeartbeatConsumers);
@@ -79,7 +82,8 @@ NodeEvents Node::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT 
     return enter(NmtState::kPreOperational);
   }
   produce_heartbeat(dt_ns, out);
-  const NodeEvents events = watch_heartbeats(dt_ns, out);
+  const auto events =
+      static_cast<NodeEvents>(watch_heartbeats(dt_ns, out) | watch_guarding(dt_ns, out));
   if (state_ != NmtState::kStopped) sdo_.process(dt_ns, out);
   if (state_ == NmtState::kOperational) {
     for (TxPdo& pdo : tpdos_) pdo.process(dt_ns, out);
@@ -92,13 +96,14 @@ void Node::transmit_synchronous(FrameSink& out) noexcept TANDEM_RT {
   for (TxPdo& pdo : tpdos_) pdo.sync(out);
 }
 
-bool Node::answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT {
+bool Node::answer_remote(std::uint32_t id, FrameSink& out) noexcept TANDEM_RT {
+  if (id == cob::kHeartbeat + static_cast<std::uint32_t>(config_.id)) return answer_guard(out);
   if (state_ != NmtState::kOperational) return false;
   return std::ranges::any_of(tpdos_, [&](const TxPdo& pdo) { return pdo.answer_remote(id, out); });
 }
 
 bool Node::heartbeat_lost() const noexcept {
-  return std::ranges::any_of(consumers_, &Consumer::lost);
+  return guarding_.lost || std::ranges::any_of(consumers_, &Consumer::lost);
 }
 
 NodeEvents Node::on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
@@ -148,7 +153,7 @@ NodeEvents Node::on_rpdo(const Frame& frame, FrameSink& out) noexcept {
   return 0;
 }
 
-void Node::find_rpdos() noexcept {
+void Node::find_rpdos() noexcept TANDEM_RT {
   for (std::size_t i = 0; i < rpdos_.size(); ++i)
     rpdo_ids_[i] = rpdos_[i].in_use() ? rpdos_[i].cob_id() : kNoCobId;
 }
@@ -171,10 +176,36 @@ NodeEvents Node::watch_heartbeats(std::int64_t dt_ns, FrameSink& out) noexcept {
     consumer.silent_ns += dt_ns;
     if (consumer.silent_ns < (consumer.object & 0xFFFF) * kNsPerMs) continue;
     consumer.lost = true;
-    raise_error(ErrorCode::kHeartbeatLost, error_register::kCommunication, 0, out);
-    events = static_cast<NodeEvents>(events | kEventHeartbeatLost | communication_error());
+    events = static_cast<NodeEvents>(events | lose_master(out));
   }
   return events;
+}
+
+// CiA 301: a node that produces heartbeats is not guarded as well.
+bool Node::answer_guard(FrameSink& out) noexcept TANDEM_RT {
+  if (state_ == NmtState::kBootUp || producer_ms_ != 0) return false;
+  Frame answer = make_heartbeat(config_.id, state_);
+  answer.data[0] |= guarding_.toggle;
+  out.push(answer);
+  guarding_.toggle ^= kGuardToggle;
+  guarding_.heard = true;
+  guarding_.lost = false;
+  guarding_.silent_ns = 0;
+  return true;
+}
+
+NodeEvents Node::watch_guarding(std::int64_t dt_ns, FrameSink& out) noexcept {
+  const std::int64_t life_ns = std::int64_t{guarding_.time_ms} * guarding_.life_factor * kNsPerMs;
+  if (life_ns == 0 || producer_ms_ != 0 || !guarding_.heard || guarding_.lost) return 0;
+  guarding_.silent_ns += dt_ns;
+  if (guarding_.silent_ns < life_ns) return 0;
+  guarding_.lost = true;
+  return lose_master(out);
+}
+
+NodeEvents Node::lose_master(FrameSink& out) noexcept {
+  raise_error(ErrorCode::kHeartbeatLost, error_register::kCommunication, 0, out);
+  return static_cast<NodeEvents>(kEventHeartbeatLost | communication_error());
 }
 
 NodeEvents Node::communication_error() noexcept {
@@ -208,6 +239,7 @@ void Node::reset_communication() noexcept TANDEM_RT {
   sync_period_us_ = 0;
   since_heartbeat_ns_ = 0;
   consumers_.fill({});
+  guarding_ = {};
   for (RxPdo& pdo : rpdos_) pdo.reset();
   for (TxPdo& pdo : tpdos_) pdo.reset();
   find_rpdos();
@@ -278,6 +310,8 @@ void Node::archive(Archive& ar) {
   ar(state_, applied_rpdos_, error_register_, error_behaviour_, history_count_, producer_ms_,
      sync_period_us_, since_heartbeat_ns_, history_, sdo_);
   for (Consumer& c : consumers_) ar(c.object, c.heard, c.lost, c.silent_ns);
+  ar(guarding_.time_ms, guarding_.life_factor, guarding_.toggle, guarding_.heard, guarding_.lost,
+     guarding_.silent_ns);
   for (RxPdo& pdo : rpdos_) ar(pdo);
   for (TxPdo& pdo : tpdos_) ar(pdo);
   if (ar.reading()) find_rpdos();

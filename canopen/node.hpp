@@ -72,8 +72,9 @@ class Node final : private ObjectOwner {
     const bool to_it = (id & ~kFunctionMask) == static_cast<std::uint32_t>(config_.id);
     return broadcast || to_it || number_of_rpdo(id) >= 0;
   }
-  /// A remote request for identifier `id`. @return whether one of the node's TPDOs answers it.
-  bool answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT;
+  /// A remote request for identifier `id`: a guard request, or one for a TPDO.
+  /// @return whether the node answers it.
+  bool answer_remote(std::uint32_t id, FrameSink& out) noexcept TANDEM_RT;
   /// Advances time: boot-up, heartbeats, SDO time-out, event-driven TPDOs.
   NodeEvents process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT;
   /// Sends the TPDOs that the SYNC just received makes due.
@@ -87,8 +88,11 @@ class Node final : private ObjectOwner {
   /// Every error is gone: the register is cleared and EMCY 0000 is sent (once).
   void clear_errors(FrameSink& out) noexcept TANDEM_RT;
 
+  /// Someone else than a master has written the node's objects in the dictionary.
+  void objects_changed() noexcept TANDEM_RT { find_rpdos(); }
+
   [[nodiscard]] NmtState state() const noexcept { return state_; }
-  /// A monitored heartbeat has stopped and was not heard since.
+  /// A monitored heartbeat, or the master's guarding, has stopped and was not heard since.
   [[nodiscard]] bool heartbeat_lost() const noexcept;
   [[nodiscard]] int id() const noexcept { return config_.id; }
   /// Bit n-1: RPDO n took effect at the last SYNC or since (event-driven ones).
@@ -109,6 +113,16 @@ class Node final : private ObjectOwner {
     }
   };
 
+  /// The master's guarding of this node (100C, 100D), in use until a heartbeat is produced (1017).
+  struct Guarding {
+    std::uint16_t time_ms = 0;
+    std::uint8_t life_factor = 0;
+    std::uint8_t toggle = 0;  ///< bit 7 of the next answer
+    bool heard = false;       ///< monitoring starts with the first request
+    bool lost = false;
+    std::int64_t silent_ns = 0;
+  };
+
   static constexpr std::uint32_t kFunctionMask = 0x780;
 
   void add_objects(ObjectDictionary& od);
@@ -119,13 +133,17 @@ class Node final : private ObjectOwner {
       if (rpdo_ids_[static_cast<std::size_t>(i)] == id) return i;
     return -1;
   }
-  void find_rpdos() noexcept;
+  void find_rpdos() noexcept TANDEM_RT;
   NodeEvents on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
   NodeEvents on_sync() noexcept;
   NodeEvents on_rpdo(const Frame& frame, FrameSink& out) noexcept;
   void on_heartbeat(const Frame& frame) noexcept;
   NodeEvents watch_heartbeats(std::int64_t dt_ns, FrameSink& out) noexcept;
+  NodeEvents watch_guarding(std::int64_t dt_ns, FrameSink& out) noexcept;
+  bool answer_guard(FrameSink& out) noexcept TANDEM_RT;
   NodeEvents enter(NmtState state) noexcept;
+  /// The master is gone: an emergency, and what 1029 says.
+  NodeEvents lose_master(FrameSink& out) noexcept;
   NodeEvents communication_error() noexcept;
   void reset_communication() noexcept TANDEM_RT;
   void produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept;
@@ -144,6 +162,7 @@ class Node final : private ObjectOwner {
   std::int64_t since_heartbeat_ns_ = 0;
   std::array<std::uint32_t, kErrorHistory> history_{};
   std::array<Consumer, kHeartbeatConsumers> consumers_{};
+  Guarding guarding_;
   SdoServer sdo_;
   std::array<std::uint32_t, kPdosPerNode> rpdo_ids_{};  ///< kNoCobId: not in use
   std::array<RxPdo, kPdosPerNode> rpdos_;

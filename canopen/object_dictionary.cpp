@@ -89,6 +89,21 @@ bool ObjectDictionary::insert(const ObjectEntry& entry) {
   return true;
 }
 
+bool ObjectDictionary::set_variable(std::uint16_t index, std::uint8_t sub, DataType type,
+                                    void* data) {
+  const auto at = std::ranges::find_if(
+      entries_, [&](const ObjectEntry& e) { return e.index == index && e.sub == sub; });
+  if (at == entries_.end() || at->type != type) return false;
+  at->data = data;
+  at->owner = nullptr;
+  return true;
+}
+
+void ObjectDictionary::replace(std::vector<ObjectEntry> entries) {
+  entries.resize(std::min(entries.size(), capacity_));
+  entries_ = std::move(entries);
+}
+
 void* ObjectDictionary::store(const void* value, std::size_t size) {
   if (slots_used_ == slots_.size()) return nullptr;
   void* slot = &slots_[slots_used_++];

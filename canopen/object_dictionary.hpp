@@ -151,6 +151,19 @@ class ObjectDictionary {
   /// A constant string. `text` must outlive the dictionary.
   bool add_string(std::uint16_t index, std::uint8_t sub, std::string_view text);
 
+  /// An entry that is there stands for another variable of its type from now on, without an owner.
+  /// @return false when there is none, or it has another type
+  template <class T>
+  bool rebind(std::uint16_t index, std::uint8_t sub, T& variable) {
+    return set_variable(index, sub, detail::data_type<T>(), &variable);
+  }
+  /// Room for a value of up to four bytes that the dictionary holds itself, for replace().
+  /// @return nullptr when the dictionary is full.
+  [[nodiscard]] void* hold(std::uint32_t bits) { return store(&bits, sizeof bits); }
+  /// The dictionary has these entries from now on, and no others.
+  /// @pre sorted by index and sub-index, none twice; at most the capacity
+  void replace(std::vector<ObjectEntry> entries);
+
   /// The entry, or nullptr.
   [[nodiscard]] const ObjectEntry* find(std::uint16_t index,
                                         std::uint8_t sub) const noexcept TANDEM_RT;
@@ -185,6 +198,7 @@ class ObjectDictionary {
 
  private:
   bool insert(const ObjectEntry& entry);
+  bool set_variable(std::uint16_t index, std::uint8_t sub, DataType type, void* data);
   void* store(const void* value, std::size_t size);
 
   std::size_t capacity_;

@@ -166,7 +166,7 @@ void TxPdo::sync(FrameSink& out) noexcept TANDEM_RT {
 }
 
 void TxPdo::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
-  if (!in_use() || synchronous()) return;
+  if (!in_use() || type_ < kEventManufacturer) return;  // 252, 253: when asked for
   since_sent_ns_ += dt_ns;
   if (since_sent_ns_ < inhibit_100us_ * (kNsPerMs / 10)) return;
   const bool timed = event_ms_ != 0 && since_sent_ns_ >= event_ms_ * kNsPerMs;

@@ -16,9 +16,11 @@ constexpr double kRestVelocity_rad_s = 0.05;  // of the motor, reflected to the 
 constexpr double kRestTime_s = 0.02;
 constexpr double kSlower_rad_s = 0.01;  // what counts as having become slower
 
-bool supported(std::int8_t mode) noexcept {
-  return (mode >= -4 && mode <= 0) || (mode >= 8 && mode <= 10);
-}
+constexpr double kSwitch_rad = 0.005;  // homing's switches: before the ends of the range
+
+/// Modes in which a drive makes its own way to a target.
+constexpr std::uint32_t kProfileModes =
+    mode_bit(Mode::kPp) | mode_bit(Mode::kPv) | mode_bit(Mode::kTq) | mode_bit(Mode::kHm);
 
 /// The object's index as it is on axis 0.
 std::uint16_t on_axis_0(std::uint16_t index) noexcept {
@@ -30,17 +32,25 @@ std::uint16_t on_axis_0(std::uint16_t index) noexcept {
 
 Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDictionary& od)
     : period_s_(static_cast<double>(board.control_period_ns) * 1.0e-9),
+      modes_(setup.modes),
+      reversed_(setup.reversed),
+      zero_at_power_on_(setup.zero_counts),
+      zero_counts_(setup.zero_counts),
       power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
       objects_(power_on_),
       torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
                      NoiseGenerator::stream(board.seed, static_cast<std::uint64_t>(index))) {
   objects_.add_to(od, index, *this);
+  if ((modes_ & kProfileModes) != 0) profile_.add_to(od, index);
   apply_settings();
   take_demands();
 }
 
 void Axis::power_on() noexcept TANDEM_RT {
   objects_ = power_on_;
+  zero_counts_ = zero_at_power_on_;
+  profile_.power_on();
+  profiled_ = {};
   machine_.reset();
   protection_ = {};
   mode_ = Mode::kNone;
@@ -107,15 +117,33 @@ void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
   show_actual();
 }
 
+bool Axis::supported(std::int8_t mode) const noexcept {
+  if (mode == 0) return true;
+  const int bit = mode > 0 ? mode - 1 : 15 - mode;  // the manufacturer's from bit 16
+  return bit < 32 && (modes_ >> bit & 1U) != 0;
+}
+
+std::int32_t Axis::to_wire(std::int64_t counts) const noexcept {
+  const auto low = static_cast<std::uint32_t>(reversed_ ? -counts : counts);
+  return static_cast<std::int32_t>(low + static_cast<std::uint32_t>(zero_counts_));
+}
+
+std::int32_t Axis::from_wire(std::int32_t value) const noexcept {
+  const std::uint32_t counts =
+      static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(zero_counts_);
+  return static_cast<std::int32_t>(reversed_ ? 0U - counts : counts);
+}
+
 void Axis::show_actual() noexcept {
   AxisObjects& o = objects_;
-  o.position = static_cast<std::int32_t>(link_encoder_.counts());
-  o.velocity =
-      clamp_round<std::int32_t>(measured_.link_velocity_rad_s * link_encoder_.counts_per_rad());
+  const double sign = reversed_ ? -1.0 : 1.0;
+  o.position = to_wire(link_encoder_.counts());
+  o.velocity = clamp_round<std::int32_t>(sign * measured_.link_velocity_rad_s *
+                                         link_encoder_.counts_per_rad());
   o.motor_position = static_cast<std::int32_t>(motor_encoder_.counts());
   o.motor_velocity =
       clamp_round<std::int32_t>(measured_.motor_velocity_rad_s * motor_encoder_.counts_per_rad());
-  o.torque = clamp_round<std::int16_t>(measured_.torque_Nm * 1.0e3 / o.rated_torque_Nm());
+  o.torque = clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / o.rated_torque_Nm());
   o.current = clamp_round<std::int16_t>(measured_.current_A * 100.0);
   o.temperature = clamp_round<std::int16_t>(temperature_C_ * 10.0);
 }
@@ -142,7 +170,8 @@ void Axis::take_demands() noexcept {
 }
 
 ErrorCode Axis::present_cause(ErrorCode connection) noexcept {
-  const bool follows = machine_.motion() == DriveMotion::kFollow && mode_ == Mode::kCsp;
+  const bool follows =
+      machine_.motion() == DriveMotion::kFollow && ProfileModes::cyclic(mode_) == Mode::kCsp;
   const ErrorCode cause = protection_.update(
       protection_config_,
       {.link_position_rad = measured_.link_position_rad,
@@ -181,19 +210,22 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
   }
   const ErrorCode cause = present_cause(connection);
   watch_stop();
+  const bool profile = ProfileModes::has(mode_);
   const DriveState before = machine_.state();
   const bool brake_was_set = machine_.brake_set();
-  const DriveState now = machine_.step(objects_.controlword,
-                                       {.fault = cause != ErrorCode::kNone,
-                                        .at_rest = stopped(),
-                                        .standstill = resting_s_ >= kRestTime_s,
-                                        .internal_limit = controller_.limited(),
-                                        .follows_command = mode_ != Mode::kNone,
-                                        .following_error = protection_.lagging(),
-                                        .warning = protection_.warning(protection_config_),
-                                        .has_brake = has_brake(),
-                                        .brake_moved = brake_moved()},
-                                       objects_.options);
+  const DriveState now = machine_.step(
+      objects_.controlword,
+      {.fault = cause != ErrorCode::kNone,
+       .at_rest = stopped(),
+       .standstill = resting_s_ >= kRestTime_s,
+       .internal_limit = controller_.limited(),
+       .follows_command = profile ? profiled_.bit_12 : mode_ != Mode::kNone,
+       .following_error = mode_ == Mode::kHm ? profiled_.bit_13 : protection_.lagging(),
+       .target_reached = profile && profiled_.target_reached,
+       .warning = protection_.warning(protection_config_),
+       .has_brake = has_brake(),
+       .brake_moved = brake_moved()},
+      objects_.options);
   objects_.statusword = machine_.statusword();
   watch_brake(brake_was_set);
 
@@ -207,7 +239,34 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
     objects_.error_code = 0;
   }
   if (now == DriveState::kOperationEnabled && before != now) seed_references();
+  if (profile) run_profile();
   return events;
+}
+
+void Axis::run_profile() noexcept {
+  const AxisObjects& o = objects_;
+  const ControllerConfig config = o.controller();
+  const double at_rad = measured_.link_position_rad;
+  const bool at_min = at_rad <= config.min_position_rad + kSwitch_rad;
+  const bool at_max = at_rad >= config.max_position_rad - kSwitch_rad;
+  profiled_ = profile_.step({.mode = mode_,
+                             .controlword = o.controlword,
+                             .follows = machine_.motion() == DriveMotion::kFollow,
+                             .position = o.position,
+                             .target_position = o.target_position,
+                             .target_velocity = o.target_velocity,
+                             .target_torque = o.target_torque,
+                             .torque = o.torque,
+                             .at_low_switch = reversed_ ? at_max : at_min,
+                             .at_high_switch = reversed_ ? at_min : at_max},
+                            period_s_);
+  if (!profiled_.homed) return;
+  const std::int32_t counts = from_wire(o.position);
+  zero_counts_ = 0;
+  zero_counts_ = static_cast<std::int32_t>(static_cast<std::uint32_t>(profile_.home_offset()) -
+                                           static_cast<std::uint32_t>(to_wire(counts)));
+  objects_.position = to_wire(counts);
+  objects_.target_position = objects_.position;
 }
 
 // The axis holds where it is until a command says otherwise.
@@ -279,15 +338,20 @@ bool Axis::can_ramp() const noexcept {
 
 Reference Axis::reference() const noexcept {
   const AxisObjects& o = objects_;
+  const double sign = reversed_ ? -1.0 : 1.0;
   const double rad = link_encoder_.rad_per_count();
   const double Nm = o.rated_torque_Nm() * 1.0e-3;
+  const bool profile = ProfileModes::has(mode_);
   const bool by_velocity = mode_ == Mode::kCsv || mode_ == Mode::kVelocityImpedance;
-  const std::int64_t velocity =
-      std::int64_t{o.velocity_offset} + (by_velocity ? o.target_velocity : 0);
-  const int torque = o.torque_offset + (mode_ == Mode::kCst ? o.target_torque : 0);
-  return {.position_rad = o.target_position * rad,
-          .velocity_rad_s = static_cast<double>(velocity) * rad,
-          .torque_Nm = torque * Nm,
+  const std::int64_t velocity = std::int64_t{o.velocity_offset} + (profile ? profiled_.velocity
+                                                                   : by_velocity ? o.target_velocity
+                                                                                 : 0);
+  const int torque = o.torque_offset + (profile               ? profiled_.torque
+                                        : mode_ == Mode::kCst ? o.target_torque
+                                                              : 0);
+  return {.position_rad = from_wire(profile ? profiled_.position : o.target_position) * rad,
+          .velocity_rad_s = sign * (static_cast<double>(velocity) * rad),
+          .torque_Nm = sign * (torque * Nm),
           .voltage_V = o.target_voltage * 0.01,
           .current_A = o.target_current * 0.01,
           .stiffness_Nm_rad = stiffness_Nm_rad_,
@@ -296,7 +360,8 @@ Reference Axis::reference() const noexcept {
 
 AxisDrive Axis::control() noexcept TANDEM_RT {
   const Action doing = action();
-  const double voltage_V = controller_.update(doing, mode_, reference(), measured_);
+  const double voltage_V =
+      controller_.update(doing, ProfileModes::cyclic(mode_), reference(), measured_);
   show_controller();
   return {.voltage_V = voltage_V,
           .enabled = doing != Action::kOff,
@@ -306,8 +371,8 @@ AxisDrive Axis::control() noexcept TANDEM_RT {
 void Axis::show_controller() noexcept {
   const JointController::Terms& terms = controller_.terms();
   objects_.voltage = clamp_round<std::int16_t>(terms.voltage_V * 100.0);
-  objects_.following_error =
-      clamp_round<std::int32_t>(terms.position_error_rad * link_encoder_.counts_per_rad());
+  objects_.following_error = clamp_round<std::int32_t>(
+      (reversed_ ? -1.0 : 1.0) * terms.position_error_rad * link_encoder_.counts_per_rad());
   objects_.telemetry = {static_cast<float>(terms.torque_reference_Nm),
                         static_cast<float>(terms.transfer_V),
                         static_cast<float>(controller_.position_loop().state.i),
@@ -356,6 +421,9 @@ void Axis::archive(Archive& ar) {
   ar(objects_, changed);
   if (ar.reading()) apply_settings();
   settings_changed_ = changed;
+  profile_.archive(ar);
+  ar(zero_counts_, profiled_.position, profiled_.velocity, profiled_.torque,
+     profiled_.target_reached, profiled_.bit_12, profiled_.bit_13, profiled_.homed);
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
      damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_, brake_periods_, stop_,

@@ -11,6 +11,7 @@
 #include "firmware_emu/axis_objects.hpp"
 #include "firmware_emu/estimator.hpp"
 #include "firmware_emu/joint_controller.hpp"
+#include "firmware_emu/profile_modes.hpp"
 #include "firmware_emu/protection.hpp"
 #include "firmware_emu/setup.hpp"
 
@@ -55,6 +56,12 @@ class Axis final : private canopen::ObjectOwner {
                                                 const std::uint8_t* bytes) const noexcept;
 
   void apply_settings() noexcept TANDEM_RT;
+  [[nodiscard]] bool supported(std::int8_t mode) const noexcept;
+  /// Counts of the joint's encoder as 6064 shows them, and back.
+  [[nodiscard]] std::int32_t to_wire(std::int64_t counts) const noexcept;
+  [[nodiscard]] std::int32_t from_wire(std::int32_t value) const noexcept;
+  /// The modes in which the drive makes its own way: one period of them.
+  void run_profile() noexcept;
   void show_actual() noexcept;
   void show_controller() noexcept;
   void take_demands() noexcept;
@@ -78,10 +85,16 @@ class Axis final : private canopen::ObjectOwner {
   }
 
   double period_s_;
+  std::uint32_t modes_;
+  bool reversed_;
+  std::int32_t zero_at_power_on_;
+  std::int32_t zero_counts_;  ///< homing changes it
   AxisObjects power_on_;
   AxisObjects objects_;
   ProtectionConfig protection_config_;
   JointController controller_;
+  ProfileModes profile_;
+  ProfileOutputs profiled_;  ///< of the last period
   Protection protection_;
   canopen::DriveMachine machine_;
   Encoder link_encoder_;

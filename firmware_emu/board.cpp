@@ -100,6 +100,9 @@ Status check(const BoardSetup& setup) {
     return bad("axes", "a board has 1 to " + std::to_string(kMaxAxes) + " axes");
   }
   if (setup.control_period_ns <= 0) return bad("control_period_ns", "is not positive");
+  if (setup.sheet != nullptr) {
+    if (Status status = check_sheet(*setup.sheet, setup.axes.size()); !status) return status;
+  }
   if (setup.command_timeout_syncs < 0) return bad("command_timeout_syncs", "is negative");
   for (std::size_t i = 0; i < setup.axes.size(); ++i) {
     if (Status status = check_axis(setup.axes[i], "axes[" + std::to_string(i) + "]"); !status) {
@@ -134,9 +137,18 @@ std::vector<std::unique_ptr<Axis>> make_board(const BoardSetup& setup, ObjectDic
 
 }  // namespace
 
+namespace {
+
+std::size_t entries_of(const std::shared_ptr<const DataSheet>& sheet) {
+  return sheet == nullptr ? 0 : sheet->entries.size() + sheet->dummies.size();
+}
+
+}  // namespace
+
 Board::Board(const BoardSetup& setup)
     : setup_(setup),
-      od_(kNodeObjects + kBoardEntries + setup.axes.size() * kAxisEntries),
+      od_(kNodeObjects + kBoardEntries + setup.axes.size() * kAxisEntries +
+          entries_of(setup.sheet)),
       axes_(make_board(setup_, od_, ignored_frames_, sync_timeout_us_, cycle_counter_)),
       node_({.id = setup_.node_id,
              .device_type = kDriveDeviceType,
@@ -149,18 +161,23 @@ Board::Board(const BoardSetup& setup)
             od_),
       sync_period_us_(
           static_cast<const std::uint32_t*>(od_.find(canopen::object::kSyncPeriod, 0)->data)),
+      sheet_(setup.sheet == nullptr
+                 ? SheetDictionary{}
+                 : SheetDictionary{*setup.sheet, setup.node_id, setup.axes.size(), od_}),
       outbox_storage_(kOutboxFrames),
       outbox_(outbox_storage_),
       commands_(setup.axes.size()),
-      drives_(setup.axes.size()) {}
+      drives_(setup.axes.size()) {
+  node_.objects_changed();
+}
 
 void Board::receive(const Frame& frame) noexcept TANDEM_RT {
-  if (!is_data_frame(frame)) {
-    const bool answered = is_remote_request(frame) && node_.answer_remote(frame.id, outbox_);
-    if (!answered) ++ignored_frames_;
-    return;
+  NodeEvents events = 0;
+  if (is_data_frame(frame)) {
+    events = node_.receive(frame, outbox_);
+  } else if (!is_remote_request(frame) || !node_.answer_remote(frame.id, outbox_)) {
+    ++ignored_frames_;
   }
-  const NodeEvents events = node_.receive(frame, outbox_);
   if (heartbeat_lost_ && !node_.heartbeat_lost()) {
     heartbeat_lost_ = false;
     clear_when_well();
@@ -197,6 +214,12 @@ void Board::take(NodeEvents events) noexcept {
     cycle_counter_ = 0;
     sync_timeout_us_ = 0;
     for (const auto& axis : axes_) axis->power_on();
+    sheet_.restore_all();
+    node_.objects_changed();
+  }
+  if ((events & kEventResetCommunication) != 0) {
+    sheet_.restore_communication();
+    node_.objects_changed();
   }
 }
 
@@ -207,7 +230,8 @@ void Board::find_command_rpdos() noexcept {
     std::uint32_t found = 0;
     for (int n = 0; n < kPdosPerNode; ++n) {
       const auto mapping = static_cast<std::uint16_t>(canopen::object::kRpdoMapping + n);
-      const auto count = od_.value<std::uint8_t>(mapping, 0);
+      const bool listed = od_.find(mapping, 0) != nullptr && od_.find(mapping, 1) != nullptr;
+      const std::uint8_t count = listed ? od_.value<std::uint8_t>(mapping, 0) : std::uint8_t{0};
       for (std::uint8_t sub = 1; sub <= count; ++sub) {
         if (od_.value<std::uint32_t>(mapping, sub) >> 16 == index) found |= 1U << n;
       }

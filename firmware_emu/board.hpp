@@ -15,6 +15,7 @@
 #include "canopen/object_dictionary.hpp"
 #include "firmware_emu/axis.hpp"
 #include "firmware_emu/setup.hpp"
+#include "firmware_emu/sheet_dictionary.hpp"
 
 namespace tandem::firmware {
 
@@ -72,8 +73,15 @@ class Board {
   [[nodiscard]] const canopen::ObjectDictionary& dictionary() const noexcept { return od_; }
 
   /// What 1018:`sub` says from now on: the firmware was exchanged, or the whole board.
+  /// A drive whose sheet has no such entry stays as it is.
   void set_identity(canopen::IdentitySub sub, std::uint32_t value) noexcept TANDEM_RT {
-    od_.set_value(canopen::object::kIdentity, static_cast<std::uint8_t>(sub), value);
+    const auto entry = static_cast<std::uint8_t>(sub);
+    if (od_.find(canopen::object::kIdentity, entry) == nullptr) return;
+    od_.set_value(canopen::object::kIdentity, entry, value);
+  }
+  /// What a board that stands in for another maker's drive lacks or takes otherwise.
+  [[nodiscard]] const std::vector<std::string>& remarks() const noexcept {
+    return sheet_.remarks();
   }
 
   /// Everything that changes, frames that wait to be sent included.
@@ -97,6 +105,7 @@ class Board {
   std::vector<std::unique_ptr<Axis>> axes_;
   canopen::Node node_;
   const std::uint32_t* sync_period_us_;  ///< 1006
+  SheetDictionary sheet_;
   std::vector<canopen::Frame> outbox_storage_;
   canopen::FrameSink outbox_;
   std::vector<Commands> commands_;

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "canopen/data_sheet.hpp"
 #include "canopen/objects.hpp"
 #include "firmware_emu/joint_controller.hpp"
 
@@ -32,6 +34,9 @@ struct AxisDrive {
 
 /// Power-on values of one axis: its object dictionary starts with them.
 struct AxisSetup {
+  std::uint32_t modes = canopen::kTandemModes;  ///< it takes these: bits of 6502
+  bool reversed = false;         ///< 6064 counts down, and 6077 too, as the joint's angle grows
+  std::int32_t zero_counts = 0;  ///< 6064 where the joint is at 0; its range may wrap around
   double link_counts_per_rev = 524288.0;   ///< 608F
   double motor_counts_per_rev = 819200.0;  ///< 2033, per revolution of the link
   double rated_torque_Nm = 1.0;            ///< 6076
@@ -75,6 +80,8 @@ struct BoardSetup {
   int command_timeout_syncs = 10;  ///< 2032; 0: never
   std::uint64_t seed = 1;          ///< of the torque sensors' noise
   std::vector<AxisSetup> axes;
+  /// The board stands in for the drive of this sheet, whose dictionary it has; null: one of ours.
+  std::shared_ptr<const canopen::DataSheet> sheet;
 };
 
 /// A sensor node: force/torque, IMU.

@@ -49,6 +49,7 @@ Exit eds_command(const EdsOptions& options) {
     json.push_back({{"file", path}, {"objects", file.objects}, {"nodes", file.nodes}});
   }
   if (errors.empty()) {
+    if (files.empty()) facts.add("nothing written", "every board has its maker's sheet (`eds`)");
     facts.print(human_output(options.json));
     if (const Status written = write_json(options.json, json); !written) {
       errors.push_back(written.error());

@@ -92,6 +92,9 @@ Result<std::vector<EdsFile>> make_eds_files(const hal::RobotConfig& robot) {
   if (!layout) return std::unexpected(layout.error());
   std::vector<EdsFile> files;
   for (const NodePlan& node : layout->nodes) {
+    const bool foreign =
+        node.board >= 0 && !robot.boards[static_cast<std::size_t>(node.board)].eds.empty();
+    if (foreign) continue;
     const bool fd = robot.buses[node.bus].fd;
     const std::string type = type_name(robot, node, fd);
     // Equal but for their identity: the second kind is type_2, and so on.

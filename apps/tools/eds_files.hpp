@@ -19,7 +19,8 @@ struct EdsFile {
 };
 
 /// From the firmware's own object dictionary, with its values after power-on as defaults. Nodes
-/// whose sheets are equal are of one type.
+/// whose sheets are equal are of one type. A drive of another make has a sheet already: it is left
+/// out.
 /// Errors: those of make_pdo_layout().
 [[nodiscard]] Result<std::vector<EdsFile>> make_eds_files(const hal::RobotConfig& robot);
 

@@ -107,6 +107,10 @@ std::pair<ControlMode, InteractionMode> image_mode(std::int8_t mode) noexcept TA
     case Mode::kCst: return {ControlMode::kTorque, kStiff};
     case Mode::kOpenLoop: return {ControlMode::kOpenLoop, kStiff};
     case Mode::kCurrent: return {ControlMode::kCurrent, kStiff};
+    case Mode::kPp:
+    case Mode::kPv:
+    case Mode::kTq:
+    case Mode::kHm:
     case Mode::kNone: break;
   }
   return {ControlMode::kIdle, kStiff};

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "canopen/frame.hpp"
+#include "firmware_emu/sheet_dictionary.hpp"
 #include "hal/sim/actuator.hpp"
 #include "hal/sim/sensors.hpp"
 
@@ -60,6 +61,8 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
     axis.brake_release_ms = static_cast<std::uint16_t>(joint.brake->release_ms);
     axis.brake_engage_ms = static_cast<std::uint16_t>(joint.brake->engage_ms);
   }
+  axis.reversed = joint.reversed;
+  axis.zero_counts = joint.zero_counts;
   axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;
@@ -85,19 +88,36 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   return axis;
 }
 
+/// The board has the drive's dictionary. Such a drive has no time-out of commands: it stops when it
+/// is told to, or when the master is not heard any more.
+void stand_in_for(const hal::BoardConfig& config, firmware::BoardSetup& board) {
+  board.sheet = config.sheet;
+  board.vendor = config.vendor_id.value_or(config.sheet->vendor.value_or(0));
+  board.product = config.product_code.value_or(config.sheet->product.value_or(0));
+  board.revision = config.revision.value_or(config.sheet->revision.value_or(0));
+  board.command_timeout_syncs = 0;
+  board.max_pdo_bytes =
+      std::min(board.max_pdo_bytes, static_cast<std::size_t>(config.sheet->most_pdo_bytes));
+  for (std::size_t a = 0; a < board.axes.size(); ++a) {
+    board.axes[a].modes = firmware::emulated_modes(*config.sheet, static_cast<int>(a));
+  }
+}
+
 }  // namespace
 
 Status check_firmware(const hal::RobotConfig& robot) {
-  const auto foreign = std::ranges::find_if(
-      robot.boards, [](const hal::BoardConfig& board) { return !board.eds.empty(); });
-  if (foreign == robot.boards.end()) return {};
-  return std::unexpected(Error{
-      .message =
-          "is a drive of another make (" + foreign->eds + "), and only our own boards are emulated",
-      .hint = "run with --hal can on its bus, or leave `eds` out to simulate one of our boards",
-      .file = robot.file,
-      .line = foreign->line,
-      .key = "board '" + foreign->name + "'"});
+  for (const hal::BoardConfig& board : robot.boards) {
+    if (board.eds.empty()) continue;
+    const Status good = firmware::check_sheet(*board.sheet, joints_of(robot, board).size());
+    if (good) continue;
+    return std::unexpected(Error{
+        .message = "its drive (" + board.eds + ") cannot be emulated: " + good.error().message,
+        .hint = good.error().hint,
+        .file = robot.file,
+        .line = board.line,
+        .key = "board '" + board.name + "'"});
+  }
+  return {};
 }
 
 model::ModelSpec model_spec(const hal::RobotConfig& robot) {
@@ -185,6 +205,7 @@ firmware::BoardSetup board_setup(const hal::RobotConfig& robot, std::size_t inde
   for (const std::size_t joint : joints_of(robot, config)) {
     board.axes.push_back(axis_setup(robot, robot.joints[joint]));
   }
+  if (!config.eds.empty()) stand_in_for(config, board);
   return board;
 }
 

@@ -13,7 +13,8 @@
 
 namespace tandem::sim {
 
-/// Only our own boards' firmware is emulated. Error: a board that is of another make, by its sheet.
+/// Whether the boards can be emulated: ours, and stand-ins for drives by their sheets.
+/// Error: a drive whose sheet lacks what an emulation needs (firmware::check_sheet()).
 [[nodiscard]] Status check_firmware(const hal::RobotConfig& robot);
 
 /// What the robot's kernels are generated from: its sites, its sensors (an IMU is a site, see

@@ -18,7 +18,7 @@ using canopen::ObjectEntry;
 using canopen::SheetEntry;
 
 constexpr int kNode = 5;
-const std::string kMover = TANDEM_SOURCE_DIR "/tests/data/drives/mover.dcf";
+const std::string kMover = TANDEM_SOURCE_DIR "/config/drives/mover.dcf";
 
 /// As a sheet's reader gives it: integers by their value, reals by their bits.
 std::int64_t number_of(const ObjectEntry& entry) {

@@ -162,6 +162,39 @@ TEST_F(NodeTest, LosesTheMastersHeartbeatAfterItsTimeAndFallsBack) {
   EXPECT_EQ(wait(1000), 0) << "told once";
 }
 
+TEST_F(NodeTest, AnswersGuardRequestsWithAToggleUntilItProducesHeartbeats) {
+  EXPECT_FALSE(node->answer_remote(0x703, out.sink())) << "not on the bus yet";
+  wait(0);
+  (void)out.take();
+  for (const std::uint8_t answer : std::initializer_list<std::uint8_t>{0x7F, 0xFF, 0x7F}) {
+    EXPECT_TRUE(node->answer_remote(0x703, out.sink()));
+    EXPECT_EQ(out.take(), Frames{wire(0x703, {answer})});
+  }
+  EXPECT_FALSE(node->answer_remote(0x704, out.sink())) << "another node's";
+  configure({0x2B, 0x17, 0x10, 0x00, 50, 0, 0, 0});
+  EXPECT_FALSE(node->answer_remote(0x703, out.sink()));
+}
+
+TEST_F(NodeTest, LosesAMasterThatGuardsNoMore) {
+  wait(0);
+  (void)out.take();
+  configure({0x2B, 0x0C, 0x10, 0x00, 50, 0, 0, 0});
+  configure({0x2F, 0x0D, 0x10, 0x00, 3, 0, 0, 0});
+  map_and_start();
+  EXPECT_EQ(wait(1000), 0) << "monitoring starts with the first request";
+  EXPECT_TRUE(node->answer_remote(0x703, out.sink()));
+  EXPECT_EQ(wait(149), 0);
+  EXPECT_TRUE(node->answer_remote(0x703, out.sink()));
+  (void)out.take();
+  EXPECT_EQ(wait(149), 0);
+  EXPECT_EQ(wait(1), kEventHeartbeatLost | kEventLeftOperational);
+  EXPECT_EQ(out.take(), Frames{wire(0x083, {0x30, 0x81, 0x11, 0, 0, 0, 0, 0})});
+  EXPECT_TRUE(node->heartbeat_lost());
+  EXPECT_EQ(wait(1000), 0) << "told once";
+  EXPECT_TRUE(node->answer_remote(0x703, out.sink()));
+  EXPECT_FALSE(node->heartbeat_lost());
+}
+
 TEST_F(NodeTest, StaysOperationalOnALostHeartbeatWhen1029SaysSo) {
   wait(0);
   (void)out.take();

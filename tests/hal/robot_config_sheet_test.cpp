@@ -48,7 +48,7 @@ max_torque_Nm = 10.0
 
 struct BoardSheet : ::testing::Test {
   BoardSheet() {
-    std::ifstream file(std::string(TANDEM_SOURCE_DIR) + "/tests/data/drives/servo.eds");
+    std::ifstream file(std::string(TANDEM_SOURCE_DIR) + "/config/drives/servo.eds");
     sheet = {std::istreambuf_iterator<char>(file), {}};
     EXPECT_GT(sheet.size(), 10000U);
   }

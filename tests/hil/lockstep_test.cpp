@@ -87,6 +87,27 @@ TEST_P(HilLockstep, ASquatOverCanIsTheInProcessRunBitForBit) {
 INSTANTIATE_TEST_SUITE_P(Robots, HilLockstep, testing::Values("coman", "walkman"),
                          [](const auto& robot) { return std::string(robot.param); });
 
+class HilDrives : public Lockstep, public testing::WithParamInterface<const char*> {};
+
+/// Boards that stand in for other makers' drives, by their data sheets.
+TEST_P(HilDrives, ATrajectoryOverCanIsTheInProcessRunBitForBit) {
+  const std::string trajectory = experiment(GetParam()) + "/trajectory.toml";
+  ASSERT_NO_FATAL_FAILURE(run_in_process(trajectory, {"--duration", "1"}));
+  Process robot(emulate_words(trajectory), file("robot.txt"));
+  ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
+  Process master(tandem({"run", trajectory, "--hal", "can", "--lockstep", "--no-socket",
+                         "--duration", "1", "--log", over_can_}),
+                 file("run.txt"));
+  ASSERT_EQ(master.wait(), 0) << master.output();
+  ASSERT_EQ(robot.interrupt(), 0) << robot.output();
+  const std::string name = std::string(GetParam()).substr(0, std::string(GetParam()).rfind('_'));
+  expect_same_bits("/" + name + "-trajectory-001.mcap", 500);
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, HilDrives,
+                         testing::Values("panda_classic", "double_pendulum_interpolated"),
+                         [](const auto& robot) { return std::string(robot.param); });
+
 using HilServe = Lockstep;
 
 /// Three processes: boards and plant, the loop on CAN, and over DDS the controllers.

@@ -136,6 +136,8 @@ TEST_P(Wire, EverySampleComesWholeInItsCycle) {
 
 INSTANTIATE_TEST_SUITE_P(Of, Wire,
                          testing::Values("double_pendulum_classic/trajectory.toml",
+                                         "double_pendulum_interpolated/trajectory.toml",
+                                         "panda_classic/trajectory.toml",
                                          "double_pendulum/trajectory.toml", "coman/squat.toml"),
                          [](const auto& experiment) {
                            const std::string path = experiment.param;

@@ -1,0 +1,334 @@
+// A board that stands in for another maker's drive: the dictionary of its sheet, and the modes in
+// which a drive makes its own way.
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "canopen/data_sheet.hpp"
+#include "firmware_emu/sheet_dictionary.hpp"
+#include "tests/firmware_emu/rig.hpp"
+
+namespace tandem::firmware::testing {
+namespace {
+
+using canopen::DataSheet;
+using canopen::SheetEntry;
+
+constexpr std::uint32_t kNoObject = 0x06020000;
+constexpr std::uint32_t kReadOnly = 0x06010002;
+constexpr std::uint32_t kTooHigh = 0x06090031;
+constexpr int kControlword = 0x6040;
+
+DataSheet sheet_of(const char* name) {
+  auto sheet =
+      canopen::load_data_sheet(std::string(TANDEM_SOURCE_DIR) + "/config/drives/" + name);
+  if (!sheet) throw std::runtime_error(sheet.error().to_string());
+  return std::move(*sheet);
+}
+
+SheetEntry number(std::uint16_t index, std::uint8_t sub, canopen::DataType type,
+                  std::int64_t value) {
+  return {.index = index,
+          .sub = sub,
+          .type = static_cast<std::uint16_t>(type),
+          .access = canopen::kWriteRpdo,
+          .value = canopen::SheetValue{.number = value}};
+}
+
+/// The servo's sheet, with profile modes and homing as well.
+DataSheet servo_with_profiles() {
+  using enum canopen::DataType;
+  DataSheet sheet = sheet_of("servo.eds");
+  const auto modes = std::ranges::find(sheet.entries, 0x6502, &SheetEntry::index);
+  modes->value->number = 0x3AD;
+  for (const SheetEntry& entry :
+       {number(0x6081, 0, kUnsigned32, 400'000), number(0x6083, 0, kUnsigned32, 2'000'000),
+        number(0x6084, 0, kUnsigned32, 2'000'000), number(0x6087, 0, kUnsigned32, 1'000),
+        number(0x607C, 0, kInteger32, -1'000), number(0x6098, 0, kInteger8, 17),
+        number(0x6099, 1, kUnsigned32, 200'000), number(0x6099, 2, kUnsigned32, 20'000),
+        number(0x609A, 0, kUnsigned32, 1'000'000)}) {
+    sheet.entries.push_back(entry);
+  }
+  std::ranges::sort(sheet.entries, {},
+                    [](const SheetEntry& e) { return std::uint32_t{e.index} << 8 | e.sub; });
+  return sheet;
+}
+
+BoardSetup stand_in(DataSheet sheet) {
+  BoardSetup setup = board_setup();
+  setup.sheet = std::make_shared<const DataSheet>(std::move(sheet));
+  setup.vendor = setup.sheet->vendor.value_or(0);
+  setup.product = setup.sheet->product.value_or(0);
+  setup.max_pdo_bytes = 8;
+  setup.command_timeout_syncs = 0;
+  setup.axes[0].modes = emulated_modes(*setup.sheet, 0);
+  return setup;
+}
+
+/// Commands by SDO: what a hand at the bus would send.
+class StandIn : public Rig {
+ public:
+  explicit StandIn(const BoardSetup& setup) : Rig(setup) {
+    send_commands = false;
+    for (TestJoint& joint : joints) joint.link_inertia = 0.2;
+    step();
+    nmt(1);
+  }
+  void word(int value, int periods = 3) {
+    ASSERT_EQ(write(kControlword, 0, static_cast<std::uint16_t>(value)), 0U);
+    cycles(periods);
+  }
+  void enable_by_sdo(int mode) {
+    ASSERT_EQ(write(0x6060, 0, static_cast<std::int8_t>(mode)), 0U);
+    for (const int value : {0x06, 0x07, 0x0F}) word(value);
+    ASSERT_EQ(state(), canopen::DriveState::kOperationEnabled);
+  }
+  [[nodiscard]] bool bit(int n) const { return (statusword() >> n & 1) != 0; }
+  [[nodiscard]] std::int32_t position() const { return object<std::int32_t>(0x6064); }
+};
+
+TEST(SheetBoard, HasTheEntriesOfItsSheetAndNoOthers) {
+  for (const char* name : {"servo.eds", "mover.dcf"}) {
+    const DataSheet sheet = sheet_of(name);
+    const Board board(stand_in(sheet));
+    std::size_t texts = 0;
+    for (const SheetEntry& entry : sheet.entries) {
+      const canopen::ObjectEntry* made = board.dictionary().find(entry.index, entry.sub);
+      texts += made == nullptr || made->type == canopen::DataType::kVisibleString ? 1 : 0;
+      if (made == nullptr || made->type == canopen::DataType::kVisibleString) continue;
+      EXPECT_EQ(made->size, entry.size()) << name << std::hex << ' ' << entry.index;
+      const bool stores = entry.index == 0x1010 || entry.index == 0x1011;
+      EXPECT_EQ(made->access, stores ? std::uint8_t{canopen::kRead} : entry.access)
+          << name << std::hex << ' ' << entry.index;
+    }
+    EXPECT_LE(texts, 3U) << name;
+    for (const canopen::ObjectEntry& made : board.dictionary().entries()) {
+      if (made.index < 0x1000) continue;  // fillers
+      EXPECT_NE(sheet.find(made.index, made.sub), nullptr) << std::hex << made.index;
+    }
+  }
+}
+
+TEST(SheetBoard, AnswersWithTheSheetsRightsLimitsAndValues) {
+  DataSheet sheet = sheet_of("servo.eds");
+  const auto limited = std::ranges::find(sheet.entries, 0x1017, &SheetEntry::index);
+  limited->high = 500;
+  limited->value = canopen::SheetValue{.number = 200};
+  StandIn rig(stand_in(std::move(sheet)));
+  EXPECT_EQ(rig.read<std::uint32_t>(0x1000, 0), 0x00020192U);
+  EXPECT_EQ(rig.read<std::uint32_t>(0x1018, 1), 0xFFF1U);
+  EXPECT_EQ(rig.read<std::uint16_t>(0x1017, 0), 200);
+  EXPECT_EQ(rig.write(0x1000, 0, std::uint32_t{1}), kReadOnly);
+  EXPECT_EQ(rig.write(0x1017, 0, std::uint16_t{501}), kTooHigh);
+  EXPECT_EQ(rig.write(0x2010, 0, 1.0F), kNoObject) << "our own boards' stiffness";
+  EXPECT_EQ(rig.write(0x1017, 0, std::uint16_t{500}), 0U);
+  rig.nmt(0x82);  // reset communication
+  rig.step();
+  EXPECT_EQ(rig.read<std::uint16_t>(0x1017, 0), 200) << "its value at power-on";
+}
+
+TEST(SheetBoard, SendsThePdosThatTheSheetMapsWithoutAnySetting) {
+  DataSheet sheet = sheet_of("servo.eds");
+  const auto set = [&](std::uint16_t index, std::uint8_t sub, std::int64_t value) {
+    std::ranges::find_if(sheet.entries, [&](const SheetEntry& e) {
+      return e.index == index && e.sub == sub;
+    })->value = canopen::SheetValue{.number = value};
+  };
+  set(0x1800, 2, 1);
+  set(0x1A00, 1, 0x60410010);
+  set(0x1A00, 2, 0x60640020);
+  set(0x1A00, 0, 2);
+  StandIn rig(stand_in(sheet));
+  rig.seen.clear();
+  rig.cycles(2);
+  const auto sent = rig.frames_of(0x185);
+  ASSERT_EQ(sent.size(), 2U);
+  EXPECT_EQ(sent[0].length, 6);
+}
+
+TEST(SheetBoard, RefusesTheModesThatTheSheetHasNot) {
+  StandIn rig(stand_in(sheet_of("servo.eds")));
+  EXPECT_EQ(rig.write(0x6060, 0, std::int8_t{5}), 0x06090030U);
+  EXPECT_EQ(rig.write(0x6060, 0, std::int8_t{-1}), 0x06090030U) << "our own boards' impedance";
+  EXPECT_EQ(rig.write(0x6060, 0, std::int8_t{8}), 0U);
+}
+
+TEST(SheetBoard, CountsFromItsZeroInItsOwnDirectionThroughTheCountersEnd) {
+  BoardSetup setup = stand_in(sheet_of("servo.eds"));
+  setup.axes[0].reversed = true;
+  setup.axes[0].zero_counts = std::numeric_limits<std::int32_t>::min() + 10;
+  StandIn rig(setup);
+  rig.joints[0].q = rig.joints[0].th = 0.1;
+  rig.cycles(2);
+  const std::int32_t counts = Rig::counts(0.1);
+  const auto expected = static_cast<std::int32_t>(
+      static_cast<std::uint32_t>(setup.axes[0].zero_counts) - static_cast<std::uint32_t>(counts));
+  EXPECT_GT(expected, 0) << "the counter has wrapped around";
+  EXPECT_NEAR(rig.position(), expected, 1);
+  rig.enable_by_sdo(8);
+  const auto target = static_cast<std::int32_t>(static_cast<std::uint32_t>(expected) - 5'000U);
+  ASSERT_EQ(rig.write(0x607A, 0, target), 0U);
+  rig.cycles(3000);
+  EXPECT_NEAR(rig.joints[0].q, 0.1 + 5'000 * 2.0 * std::numbers::pi / 524288.0, 2e-3)
+      << "fewer counts are a larger angle";
+}
+
+TEST(SheetBoard, InterpolatesOnlyWhileTheMasterEnablesIt) {
+  StandIn rig(stand_in(sheet_of("mover.dcf")));
+  rig.enable_by_sdo(7);
+  EXPECT_FALSE(rig.bit(12));
+  ASSERT_EQ(rig.write(0x60C1, 1, std::int32_t{20'000}), 0U);
+  rig.cycles(500);
+  EXPECT_NEAR(rig.joints[0].q, 0.0, 1e-3) << "bit 4 of the controlword is clear";
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(12));
+  rig.cycles(3000);
+  EXPECT_NEAR(rig.joints[0].q, 20'000 * 2.0 * std::numbers::pi / 524288.0, 2e-3);
+}
+
+TEST(SheetBoard, GoesToASetPointOnItsOwnProfile) {
+  StandIn rig(stand_in(servo_with_profiles()));
+  rig.enable_by_sdo(1);
+  ASSERT_EQ(rig.write(0x607A, 0, std::int32_t{40'000}), 0U);
+  rig.cycles(100);
+  EXPECT_NEAR(rig.joints[0].q, 0.0, 1e-3) << "a target is no set-point yet";
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(12)) << "acknowledged";
+  EXPECT_FALSE(rig.bit(10));
+  // 40,000 counts at 400,000/s with 2,000,000/s^2: v^2/a = 80,000 is more, so a triangle of
+  // 2 sqrt(s / a) = 0.283 s.
+  int periods = 3;
+  while (!rig.bit(10) && periods < 1000) rig.cycles(1), ++periods;
+  EXPECT_NEAR(periods, 283, 4);
+  rig.word(0x0F);
+  EXPECT_FALSE(rig.bit(12));
+  rig.cycles(2000);
+  EXPECT_NEAR(rig.joints[0].q, 40'000 * 2.0 * std::numbers::pi / 524288.0, 2e-3);
+  rig.word(0x5F);  // relative: 40,000 more
+  rig.word(0x4F, 3000);
+  EXPECT_NEAR(rig.joints[0].q, 80'000 * 2.0 * std::numbers::pi / 524288.0, 4e-3);
+}
+
+TEST(SheetBoard, ANewSetPointWaitsUntilTheOneBeforeIsReached) {
+  StandIn rig(stand_in(servo_with_profiles()));
+  rig.enable_by_sdo(1);
+  ASSERT_EQ(rig.write(0x607A, 0, std::int32_t{40'000}), 0U);
+  rig.word(0x1F);
+  rig.word(0x0F);
+  ASSERT_EQ(rig.write(0x607A, 0, std::int32_t{0}), 0U);
+  rig.word(0x1F);
+  rig.word(0x0F);
+  EXPECT_TRUE(rig.bit(12)) << "it waits";
+  rig.cycles(200);
+  EXPECT_GT(rig.position(), 25'000) << "on the way to the first";
+  rig.cycles(3000);
+  EXPECT_FALSE(rig.bit(12));
+  EXPECT_TRUE(rig.bit(10));
+  EXPECT_NEAR(rig.joints[0].q, 0.0, 4e-3);
+}
+
+TEST(SheetBoard, ReachesAProfileVelocityByItsAcceleration) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  StandIn rig(setup);
+  rig.enable_by_sdo(3);
+  EXPECT_TRUE(rig.bit(12)) << "speed 0";
+  ASSERT_EQ(rig.write(0x60FF, 0, std::int32_t{100'000}), 0U);
+  int periods = 2;
+  rig.cycles(2);
+  while (!rig.bit(10) && periods < 1000) rig.cycles(1), ++periods;
+  EXPECT_NEAR(periods, 50, 3);  // 100,000 / 2,000,000 s
+  EXPECT_FALSE(rig.bit(12));
+}
+
+TEST(SheetBoard, RampsAProfileTorqueByItsSlope) {
+  StandIn rig(stand_in(servo_with_profiles()));
+  rig.enable_by_sdo(4);
+  ASSERT_EQ(rig.write(0x6071, 0, std::int16_t{100}), 0U);
+  rig.cycles(50);
+  EXPECT_FALSE(rig.bit(10));
+  rig.cycles(60);
+  EXPECT_TRUE(rig.bit(10));
+}
+
+TEST(SheetBoard, HomesAtTheEndOfItsRange) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].controller.min_position_rad = -0.3;
+  StandIn rig(setup);
+  rig.enable_by_sdo(6);
+  EXPECT_FALSE(rig.bit(12));
+  rig.word(0x1F);
+  int periods = 0;
+  while (!rig.bit(10) && periods < 3000) rig.cycles(1), ++periods;
+  EXPECT_TRUE(rig.bit(12)) << "homing attained";
+  EXPECT_FALSE(rig.bit(13));
+  EXPECT_NEAR(rig.joints[0].q, -0.3, 0.03);
+  rig.cycles(500);
+  EXPECT_NEAR(rig.position(), -1'000, 2'000) << "the home offset";
+  EXPECT_EQ(rig.error(), 0);
+}
+
+TEST(SheetBoard, AHomingMethodThatItHasNotIsAHomingError) {
+  StandIn rig(stand_in(servo_with_profiles()));
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{3}), 0U);
+  rig.enable_by_sdo(6);
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(13));
+  EXPECT_FALSE(rig.bit(12));
+  rig.word(0x0F);
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{35}), 0U);
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(12)) << "here is home";
+  EXPECT_FALSE(rig.bit(13));
+  EXPECT_NEAR(rig.position(), -1'000, 2);
+}
+
+TEST(SheetBoard, NeedsTheObjectsOfADrive) {
+  DataSheet sheet = sheet_of("servo.eds");
+  ASSERT_TRUE(check_sheet(sheet, 1));
+  EXPECT_FALSE(check_sheet(sheet, 2)) << "it has one axis";
+  std::erase_if(sheet.entries, [](const SheetEntry& e) { return e.index == kControlword; });
+  const Status without = check_sheet(sheet, 1);
+  ASSERT_FALSE(without);
+  EXPECT_NE(without.error().message.find("6040"), std::string::npos);
+}
+
+TEST(SheetBoard, AMappingOfWhatItLacksStartsEmptyAndIsTold) {
+  DataSheet sheet = sheet_of("servo.eds");
+  const auto mapped = std::ranges::find_if(
+      sheet.entries, [](const SheetEntry& e) { return e.index == 0x1A00 && e.sub == 1; });
+  mapped->value = canopen::SheetValue{.number = 0x5FFF0020};
+  std::prev(mapped)->value = canopen::SheetValue{.number = 1};  // how many
+  const Board board(stand_in(std::move(sheet)));
+  EXPECT_EQ(board.dictionary().value<std::uint8_t>(0x1A00, 0), 0);
+  ASSERT_FALSE(board.remarks().empty());
+  EXPECT_NE(board.remarks().back().find("1A00"), std::string::npos);
+}
+
+TEST(SheetBoard, ASnapshotInTheMiddleOfAMoveGoesOnTheSame) {
+  const BoardSetup setup = stand_in(servo_with_profiles());
+  StandIn rig(setup);
+  rig.enable_by_sdo(1);
+  ASSERT_EQ(rig.write(0x607A, 0, std::int32_t{40'000}), 0U);
+  rig.word(0x1F, 50);
+  Archive writing;
+  rig.board.archive(writing);
+  const std::vector<std::byte> saved(writing.bytes().begin(), writing.bytes().end());
+  StandIn other(setup);
+  other.joints = rig.joints;
+  Archive reading(saved);
+  other.board.archive(reading);
+  ASSERT_TRUE(reading.ok());
+  EXPECT_TRUE(reading.at_end());
+  for (int k = 0; k < 300; ++k) {
+    rig.cycles(1);
+    other.cycles(1);
+    ASSERT_EQ(rig.position(), other.position()) << k;
+    ASSERT_EQ(rig.statusword(), other.statusword()) << k;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::firmware::testing
