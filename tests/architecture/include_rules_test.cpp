@@ -29,6 +29,7 @@ const Rules& rules() {
       {"hal", {"base", "model/loop_spec.hpp"}},
       {"hal/config", {"base", "canopen", "hal", "model/loop_spec.hpp"}},
       {"hal/ethercat-can", {"base", "canopen", "hal", "hal/config", "rt/histogram.hpp"}},
+      {"hal/ethercat-can/ethercat", {"base", "canopen", "ethercat"}},
       {"hal/sim",
        {"base", "model", "canopen", "firmware_emu", "hal", "hal/config", "hal/ethercat-can"}},
       {"hal/sim/engines", {"base", "model/tree.hpp", "hal/sim/engine.hpp"}},
