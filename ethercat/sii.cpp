@@ -160,7 +160,8 @@ std::vector<std::uint8_t> build(const Content& content) {
 }
 
 Error parse(Bytes bytes, Content& content) {
-  content = {};
+  content.name.clear();  // and not the whole, which would free what a caller has reserved
+  content.managers.clear();
   if (bytes.size() < 2 * kFixedWords) return Error::kTooShort;
   if (bytes[14] != check_sum(bytes)) return Error::kCheckSum;
   const auto word = [&](std::size_t at) { return canopen::get<std::uint16_t>(&bytes[2 * at]); };

@@ -87,7 +87,8 @@ enum class Error : std::uint8_t {
 
 /// The bytes of an SII with this content; FMMUs for outputs, inputs and the mailbox's state.
 [[nodiscard]] std::vector<std::uint8_t> build(const Content& content);
-/// Reads `bytes`; `content` is only complete after kNone.
+/// Reads `bytes`; `content` is only complete after kNone. Allocates nothing when `content.name` has
+/// room for 255 characters and `content.managers` for kMaxSyncManagers.
 [[nodiscard]] Error parse(std::span<const std::uint8_t> bytes, Content& content);
 
 }  // namespace tandem::ethercat::sii

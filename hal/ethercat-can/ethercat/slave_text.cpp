@@ -1,0 +1,66 @@
+// Why a slave is down, in words.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "hal/ethercat-can/ethercat/slave_master.hpp"
+
+namespace tandem::hal::ecat {
+
+namespace {
+
+std::string identity_text(const ethercat::sii::Identity& identity) {
+  return fmt::format("vendor {:08X}, product {:08X}, revision {:08X}, serial number {}",
+                     identity.vendor, identity.product, identity.revision, identity.serial);
+}
+
+std::string code_text(ethercat::AlCode code) {
+  return fmt::format("{} (AL status code {:04X})", to_string(code), std::to_underlying(code));
+}
+
+std::string step_text(const CoeStep& step, const CoeClient& coe) {
+  const auto object = fmt::format("object {:04X}:{:02X}", step.index, step.sub);
+  if (coe.status() == CoeClient::Status::kDone) {
+    return object + " has another value than it should have";
+  }
+  return fmt::format("{} was refused: {} (abort code {:08X})", object, to_string(coe.abort_code()),
+                     std::to_underlying(coe.abort_code()));
+}
+
+}  // namespace
+
+std::string SlaveMaster::text() const {
+  if (stage_ != SlaveStage::kDown) return {};
+  const auto say = [this](const std::string& what) {
+    return fmt::format("slave {} ({}): {}", position_, plan_.name, what);
+  };
+  switch (error_) {
+    case SlaveError::kNone: break;
+    case SlaveError::kNoAnswer: return say("does not answer under its address");
+    case SlaveError::kSii:
+      return say(sii_error_ == ethercat::sii::Error::kNone ? "its SII cannot be read"
+                                                           : to_string(sii_error_));
+    case SlaveError::kWrongIdentity:
+      return say("is another device: " + identity_text(content_.identity) + "; expected " +
+                 identity_text(plan_.identity));
+    case SlaveError::kNoMailbox: return say("has no CoE mailbox, and is to be set up by SDO");
+    case SlaveError::kSdo: return say(step_text(steps_[step_], coe_));
+    case SlaveError::kNoMemory: return say("its SII names no memory for the process data");
+    case SlaveError::kRefused:
+      return say(fmt::format("refused {}: {}", to_string(wanted_), code_text(al_code_)));
+    case SlaveError::kStateTimeout:
+      return say(fmt::format("did not enter {} in time", to_string(wanted_)));
+    case SlaveError::kClock:
+      return say(fmt::format("its clock is {} ns off the reference", difference_ns_));
+    case SlaveError::kLeftState:
+      return say(fmt::format("is in {}: {}", to_string(al_state_), code_text(al_code_)));
+    case SlaveError::kMappingLost: return say("its FMMUs were changed, by a second master perhaps");
+    case SlaveError::kGone:
+      return say(position_ == 0 ? "is gone: its cable from the master is cut, or it has no power"
+                                : fmt::format("is gone: a cable before it is cut, or there is no "
+                                              "power; see the line"));
+  }
+  return {};
+}
+
+}  // namespace tandem::hal::ecat
