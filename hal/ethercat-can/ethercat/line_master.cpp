@@ -114,7 +114,7 @@ bool LineMaster::take_own(const ethercat::Datagram& datagram) noexcept {
   if (datagram.index() != index_) return false;
   if (datagram.command() == Command::kLrw) return image_.take(datagram);
   if (datagram.command() == Command::kFrmw && datagram.data().size() == 8) {
-    if (datagram.working_counter() == 0) return true;
+    if (datagram.working_counter() == 0 || !reference_.set) return true;
     reference_.time_ns = canopen::get<std::uint64_t>(datagram.data().data());
     return true;
   }
@@ -171,7 +171,7 @@ void LineMaster::send(std::int64_t now_ns) noexcept TANDEM_RT {
   watch_back_ = false;
   image_.begin(index_, slaves_);
   batch_.begin(link_->address());
-  if (reference_.time_ns != 0 || reference_.offset_ns != 0) {  // its clock has been set
+  if (reference_.set) {
     (void)batch_.add(Command::kFrmw, index_, register_address(reference_.station, reg::kSystemTime),
                      8);
   }

@@ -36,7 +36,8 @@ SlaveMaster::SlaveMaster(const SlavePlan& plan, std::size_t position, const Slav
 
 void SlaveMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = SlaveError::kNone;
-  look_wanted_ = difference_wanted_ = false;
+  look_wanted_ = difference_wanted_ = is_reference_ = false;
+  difference_ns_ = 0;
   enter(SlaveStage::kReset, now_ns);
   wanted_ = AlState::kInit;
 }
@@ -246,13 +247,15 @@ void SlaveMaster::take_clock(Data data, std::int64_t now_ns, ClockReference& ref
     case 1: reference_times_ = latched(reference.station != station_ || behind_); break;
     case 2: {
       const Latched own = latched(behind_);
-      if (reference.station == station_) {  // its system time is the loop's
+      is_reference_ = reference.station == station_;
+      if (is_reference_) {  // its system time is the loop's
         reference.offset_ns = static_cast<std::uint64_t>(now_ns) - own.local_ns;
       }
       delay_ns_ = ecat::delay_ns(reference_times_, own);
       offset_ns_ = ecat::offset_ns(reference_times_, reference.offset_ns, own);
       break;
     }
+    case 3: reference.set |= is_reference_; break;
     case 6:
       sync0_start_ns_ = ecat::sync0_start_ns(get<std::uint64_t>(data.data()), kSync0LeadNs,
                                              static_cast<std::uint64_t>(plan_.sync0_cycle_ns));
@@ -265,6 +268,7 @@ void SlaveMaster::take_clock(Data data, std::int64_t now_ns, ClockReference& ref
 }
 
 void SlaveMaster::take_difference(Data data) noexcept {
+  if (is_reference_) return;  // the register has what an earlier reference left there
   const auto raw = get<std::uint32_t>(data.data());
   const auto size = static_cast<std::int32_t>(raw & ~ethercat::kDifferenceSign);
   difference_ns_ = (raw & ethercat::kDifferenceSign) != 0 ? -size : size;

@@ -62,6 +62,7 @@ struct SlaveMapping {
 /// The reference clock, for those that follow it.
 struct ClockReference {
   std::uint16_t station = 0;  ///< 0: there is none
+  bool set = false;           ///< whether its offset has been written
   std::uint64_t offset_ns = 0;
   std::uint64_t time_ns = 0;  ///< its system time in the last cycle
 };
@@ -158,6 +159,7 @@ class SlaveMaster {
   std::int64_t since_ns_ = 0;  ///< when the stage began
   std::int64_t trouble_ns_ = 0;
   bool has_clock_ = false;
+  bool is_reference_ = false;
   bool state_written_ = false;
   bool look_wanted_ = false;
   bool difference_wanted_ = false;
