@@ -30,6 +30,7 @@ class Tamper final : public ethercat::Medium {
  public:
   explicit Tamper(ethercat::Medium& medium) : medium_(&medium) {}
   bool pass(std::span<std::uint8_t> frame, std::int64_t now_ns) noexcept override {
+    if (record) frames.emplace_back(frame.begin(), frame.end());
     const bool back = medium_->pass(frame, now_ns);
     if (shorten > 0) --shorten, take_one(frame);
     if (record) frames.emplace_back(frame.begin(), frame.end());
@@ -37,7 +38,7 @@ class Tamper final : public ethercat::Medium {
   }
 
   int shorten = 0;      ///< so many frames lose one of their process data's working counter
-  bool record = false;  ///< keeps the frames that come back
+  bool record = false;  ///< keeps the frames, as they go out and as they come back
   std::vector<Bytes> frames;
 
  private:
