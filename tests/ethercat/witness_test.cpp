@@ -63,12 +63,14 @@ TEST(EtherCatWitness, TsharkReadsEveryFrameOfAStartAndSomeCycles) {
   }
   MasterRig rig(3);
   rig.tamper.record = true;
+  rig.tamper.reserve(10'000);
   ASSERT_TRUE(rig.to_op()) << rig.master->text();
   rig.cycles(20);
   rig.master->slave(1).sdo().upload(0x1008, 0);  // in segments
   rig.cycles(20);
   rig.master->slave(2).sdo().upload(0x3000, 0);  // an abort
   rig.cycles(20);
+  rig.tamper.frames.resize(rig.tamper.kept);
   ScratchFolder folder;
   write_capture(folder / "ecat.pcap", rig.tamper.frames);
   const auto lines = tshark(folder / "ecat.pcap",

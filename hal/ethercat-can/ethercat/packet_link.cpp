@@ -3,7 +3,9 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <linux/ethtool.h>
 #include <linux/if_packet.h>
+#include <linux/sockios.h>
 #include <net/if.h>
 #include <net/if_arp.h>
 #include <sys/ioctl.h>
@@ -53,6 +55,15 @@ Result<int> make_packet_socket(const std::string& interface) {
                           {});
 }
 
+/// Whether something answers at the other end of the cable. The driver knows it at once,
+/// IFF_RUNNING follows some time later.
+bool has_link(ifreq request, int socket) {
+  const bool running = (request.ifr_flags & IFF_RUNNING) != 0;
+  ethtool_value link{.cmd = ETHTOOL_GLINK, .data = 0};
+  request.ifr_data = reinterpret_cast<char*>(&link);
+  return ::ioctl(socket, SIOCETHTOOL, &request) == 0 ? link.data != 0 : running;
+}
+
 /// The interface's index and address, after it was looked at.
 struct Found {
   int index = 0;
@@ -79,7 +90,7 @@ Result<Found> find_interface(const std::string& interface, int socket) {
   if (::ioctl(socket, SIOCGIFFLAGS, &request) != 0 || (request.ifr_flags & IFF_UP) == 0) {
     return refuse_interface(interface, "is down", fmt::format("sudo ip link set {} up", interface));
   }
-  if ((request.ifr_flags & IFF_RUNNING) == 0) {
+  if (!has_link(request, socket)) {
     return refuse_interface(interface, "has no link: nothing answers at the other end of its cable",
                             "plug the cable of the first slave in, and switch the slave on");
   }
