@@ -164,7 +164,8 @@ void Esc::written_managers(std::size_t address, std::size_t size) noexcept {
 
 void Esc::refresh(std::size_t address, std::size_t size, const Passage& passage) noexcept {
   if (!has_dc_ || !overlaps(address, size, reg::kSystemTime, 8)) return;
-  set(reg::kSystemTime, clock_.stamp(passage.arrived_ns) + at<std::int64_t>(reg::kTimeOffset));
+  set(reg::kSystemTime, static_cast<std::uint64_t>(clock_.stamp(passage.arrived_ns)) +
+                            at<std::uint64_t>(reg::kTimeOffset));
 }
 
 void Esc::latch(const Passage& passage) noexcept {
@@ -239,7 +240,8 @@ bool Esc::sync0_active() const noexcept {
 void Esc::run_sync0(std::int64_t now_ns) noexcept {
   const auto cycle_ns = at<std::uint32_t>(reg::kSync0Cycle);
   if (!sync0_active() || sync0_missed_ || cycle_ns == 0) return;
-  const std::int64_t since = system_time_ns(now_ns) - at<std::int64_t>(reg::kSyncStart);
+  const auto since = static_cast<std::int64_t>(static_cast<std::uint64_t>(system_time_ns(now_ns)) -
+                                               at<std::uint64_t>(reg::kSyncStart));
   if (since >= 0) pulses_ = static_cast<std::uint64_t>(since) / cycle_ns + 1;
 }
 

@@ -47,6 +47,28 @@ TEST(MasterClock, MeasuresTheWayAndHoldsTheClocksTogether) {
   }
 }
 
+TEST(MasterClock, IsHandedRoundOnlyAfterTheReferenceHasItsOffset) {
+  MasterRig rig(2);
+  rig.tamper.record = true;
+  rig.tamper.reserve(2000);
+  ASSERT_TRUE(rig.to_op()) << rig.master->text();
+  bool offset = false;
+  int rounds = 0;
+  for (std::size_t i = 0; i < rig.tamper.kept; ++i) {
+    ethercat::FrameReader reader(rig.tamper.frames[i]);
+    ethercat::Datagram datagram;
+    while (reader.next(datagram)) {
+      const bool writes = datagram.command() == ethercat::Command::kFpwr;
+      offset |= writes && datagram.offset() == ethercat::reg::kTimeOffset &&
+                datagram.slave() == rig.master->slave(0).station();
+      if (datagram.command() != ethercat::Command::kFrmw) continue;
+      ++rounds;
+      ASSERT_TRUE(offset) << "frame " << i;
+    }
+  }
+  EXPECT_GT(rounds, 100);
+}
+
 TEST(MasterStart, SlavesWithoutClocksNeedNone) {
   auto setups = MasterRig::setups(3);
   setups[0].has_dc = setups[2].has_dc = false;
