@@ -23,8 +23,7 @@ constexpr std::uint32_t kTooHigh = 0x06090031;
 constexpr int kControlword = 0x6040;
 
 DataSheet sheet_of(const char* name) {
-  auto sheet =
-      canopen::load_data_sheet(std::string(TANDEM_SOURCE_DIR) + "/config/drives/" + name);
+  auto sheet = canopen::load_data_sheet(std::string(TANDEM_SOURCE_DIR) + "/config/drives/" + name);
   if (!sheet) throw std::runtime_error(sheet.error().to_string());
   return std::move(*sheet);
 }
