@@ -3,12 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <memory>
+
 #include "apps/text/console.hpp"
 #include "apps/tools/sheet_facts.hpp"
 #include "base/counted.hpp"
 #include "canopen/data_sheet.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
+#include "firmware_emu/board.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
 
 namespace tandem::apps {
@@ -164,11 +168,43 @@ void print_use(std::FILE* out, const Result<hal::can::DriveUse>& use) {
   for (const std::string& text : use->misses) fmt::print(out, "  {}\n", text);
 }
 
+/// The drive in simulation and in `tandem emulate`.
+struct StandIn {
+  std::vector<int> modes{};            ///< 6060, of the first axis
+  std::vector<std::string> remarks{};  ///< what it lacks, or takes otherwise than the sheet says
+};
+
+Result<StandIn> stand_in_of(const DataSheet& sheet, const SheetFacts& facts) {
+  firmware::BoardSetup setup;
+  setup.axes.resize(static_cast<std::size_t>(std::clamp(facts.axes, 1, canopen::kMaxAxes)));
+  if (Status good = firmware::check_sheet(sheet, setup.axes.size()); !good) {
+    return std::unexpected(good.error());
+  }
+  setup.sheet = std::make_shared<const DataSheet>(sheet);
+  const std::uint32_t modes = firmware::emulated_modes(sheet, 0);
+  StandIn made{.remarks = firmware::Board(setup).remarks()};
+  for (int bit = 0; bit < 16; ++bit) {
+    if ((modes >> bit & 1U) != 0) made.modes.push_back(bit + 1);
+  }
+  return made;
+}
+
+void print_stand_in(std::FILE* out, const Result<StandIn>& simulated) {
+  if (!simulated) {
+    fmt::print(out, "\nIt cannot be simulated: {}\n", simulated.error().message);
+    return;
+  }
+  fmt::print(out, "\nIn simulation it has the modes {}.{}\n", fmt::join(simulated->modes, ", "),
+             simulated->remarks.empty() ? "" : " Otherwise than the sheet says:");
+  for (const std::string& text : simulated->remarks) fmt::print(out, "  {}\n", text);
+}
+
 void print_sheet(std::FILE* out, const DataSheet& sheet, const SheetFacts& facts,
-                 const Result<hal::can::DriveUse>& use) {
+                 const Result<hal::can::DriveUse>& use, const Result<StandIn>& simulated) {
   print_facts(out, sheet, facts);
   print_modes(out, facts);
   print_use(out, use);
+  print_stand_in(out, simulated);
   print_pdos(out, facts);
   print_list(out, "Into RPDOs:", facts.into_rpdo);
   print_list(out, "Into TPDOs:", facts.into_tpdo);
@@ -232,8 +268,17 @@ Json use_json(const Result<hal::can::DriveUse>& use) {
   return {{"refused", nullptr}, {"does", does}, {"misses", use->misses}};
 }
 
+Json stand_in_json(const Result<StandIn>& simulated) {
+  if (!simulated) {
+    return {{"refused", simulated.error().message},
+            {"modes", Json::array()},
+            {"remarks", Json::array()}};
+  }
+  return {{"refused", nullptr}, {"modes", simulated->modes}, {"remarks", simulated->remarks}};
+}
+
 Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
-                const Result<hal::can::DriveUse>& use) {
+                const Result<hal::can::DriveUse>& use, const Result<StandIn>& simulated) {
   Json json{{"file", sheet.file},
             {"vendor_name", sheet.vendor_name},
             {"product_name", sheet.product_name},
@@ -255,6 +300,7 @@ Json sheet_json(const DataSheet& sheet, const SheetFacts& facts,
   json["modes"] = modes_json(facts);
   json["own_modes"] = facts.own_modes;
   json["master"] = use_json(use);
+  json["simulation"] = stand_in_json(simulated);
   json["lacks"] = facts.lacks;
   json["pdos"] = pdos_json(facts);
   json["into_rpdo"] = objects_json(facts.into_rpdo);
@@ -271,8 +317,9 @@ Exit eds_show(const EdsOptions& options) {
   if (!sheet) return refuse(sheet.error());
   const SheetFacts facts = sheet_facts(*sheet);
   const auto use = hal::can::use_of(*sheet);
-  print_sheet(human_output(options.json), *sheet, facts, use);
-  const Status written = write_json(options.json, sheet_json(*sheet, facts, use));
+  const auto simulated = stand_in_of(*sheet, facts);
+  print_sheet(human_output(options.json), *sheet, facts, use, simulated);
+  const Status written = write_json(options.json, sheet_json(*sheet, facts, use, simulated));
   return written ? Exit::kDone : refuse(written.error());
 }
 

@@ -82,7 +82,8 @@ void PdoPacker::append(PdoPlan& pdo, MappedField field) {
 }
 
 bool PdoPacker::open() {
-  while (next_ < slots_.size() && !slots_[next_].mappable) ++next_;
+  const auto serves = [](const PdoSlot& slot) { return slot.mappable && slot.timely; };
+  while (next_ < slots_.size() && !serves(slots_[next_])) ++next_;
   if (next_ >= slots_.size()) return false;
   start(slots_[next_++]);
   return true;
@@ -143,7 +144,7 @@ void BoardPacker::use_fixed(PdoGroup group) {
     const PdoSlot* best = nullptr;
     std::size_t most = 0;
     for (const PdoSlot& slot : packer_.slots()) {
-      if (slot.mappable || packer_.used(slot) || !fills(slot, group)) continue;
+      if (slot.mappable || !slot.timely || packer_.used(slot) || !fills(slot, group)) continue;
       const std::size_t takes = taken_by(slot);
       if (takes > most) best = &slot;
       most = std::max(most, takes);
@@ -155,7 +156,8 @@ void BoardPacker::use_fixed(PdoGroup group) {
 }
 
 bool BoardPacker::has_mappable() const {
-  return std::ranges::any_of(packer_.slots(), &PdoSlot::mappable);
+  return std::ranges::any_of(packer_.slots(),
+                             [](const PdoSlot& slot) { return slot.mappable && slot.timely; });
 }
 
 /// Whether the master can send or take every byte of the PDO.

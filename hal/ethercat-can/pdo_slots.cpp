@@ -118,6 +118,7 @@ std::vector<PdoSlot> pdo_slots(const DataSheet& sheet, PdoDirection direction, i
                      sheet.value(parameter, 2, node_id).value_or(kEventProfile)),
                  .most_entries = entries_of(sheet, mapping),
                  .mapping = default_mapping(sheet, mapping)};
+    slot.timely = receive || slot.type_writable || slot.type == kEverySync;
     const bool ours = slot.on && (from_power_on & cob::kIdMask) == own;
     if (!slot.id_writable && !ours) continue;
     if (slot.mappable ? slot.most_entries == 0 : slot.mapping.empty()) continue;

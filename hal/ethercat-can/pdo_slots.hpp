@@ -21,12 +21,13 @@ struct PdoSlot {
   bool id_writable = true;  ///< it can be switched on and off
   bool type_writable = true;
   std::uint8_t type = canopen::kEventProfile;  ///< transmission type from power-on
+  bool timely = true;  ///< of a TPDO: it is sent at every SYNC, or can be told so
   std::uint8_t most_entries = 0;
   std::vector<std::uint32_t> mapping{};  ///< from power-on, as mapping_entry() makes them
 };
 
 /// The PDOs that a master can use: one that is off and cannot be switched on is left out, so is one
-/// whose identifier is another and cannot be written.
+/// whose identifier is another and cannot be written. One that is not timely is only switched off.
 [[nodiscard]] std::vector<PdoSlot> pdo_slots(const canopen::DataSheet& sheet,
                                              canopen::PdoDirection direction, int node_id);
 

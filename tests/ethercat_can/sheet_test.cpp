@@ -219,6 +219,26 @@ TEST(Sheet, PdosThatAreNotUsedAreSwitchedOff) {
   EXPECT_FALSE(rig.too_long);
 }
 
+TEST(Sheet, ATpdoThatIsSentByEventsForEverIsSwitchedOff) {
+  Sheet s = servo();
+  s.add(0x1800, 2, kUnsigned8, canopen::kRead, 255);
+  SheetRig rig(s);
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_EQ(rig.drive.value(0x1800, 1) & 0x80000000, 0x80000000);
+  EXPECT_EQ(rig.drive.value(0x1801, 2), 1) << "the next one carries what it would have";
+  rig.command.position_rad()[0] = 100 * kRadPerCount;
+  rig.steps(5);
+  EXPECT_NEAR(rig.state.position_rad()[0], 100 * kRadPerCount, 1e-12);
+}
+
+TEST(Sheet, ADriveWhoseTpdosAreAllSentByEventsIsRefused) {
+  Sheet s = servo();
+  for (int n = 0; n < 4; ++n) s.add(0x1800 + n, 2, kUnsigned8, canopen::kRead, 255);
+  SheetRig rig(s);
+  EXPECT_EQ(rig.master, nullptr);
+  EXPECT_NE(rig.error.find("PDO"), std::string::npos) << rig.error;
+}
+
 TEST(Sheet, ADriveWithoutCspInterpolates) {
   SheetRig rig(interpolating());
   ASSERT_TRUE(rig.bring_up());
