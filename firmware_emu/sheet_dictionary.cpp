@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "base/counted.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
@@ -233,8 +234,8 @@ SheetDictionary::SheetDictionary(const DataSheet& sheet, int node_id, std::size_
   for (const MadeEntry& one : made) entries.push_back(one.entry);
   od.replace(std::move(entries));
   if (const std::size_t all = sheet.entries.size() + sheet.dummies.size(); made.size() < all) {
-    remarks_.push_back(std::to_string(all - made.size()) +
-                       " entries are left out: texts, domains, numbers of 24 or more than 32 bit");
+    remarks_.push_back(counted(all - made.size(), "entry is", "entries are") +
+                       " left out: texts, domains, numbers of 24 or more than 32 bit");
   }
   for (const MadeEntry& one : made) {
     const auto value = sheet.value(one.entry.index, one.entry.sub, node_id);

@@ -17,17 +17,7 @@
 #include <cstring>
 #include <utility>
 
-#if defined(__has_feature)
-#if __has_feature(realtime_sanitizer)
-#include <sanitizer/rtsan_interface.h>
-#define TANDEM_OWN_SYSTEM_CALL const __rtsan::ScopedDisabler own_call
-#endif
-#endif
-#ifndef TANDEM_OWN_SYSTEM_CALL
-/// The next call, on a socket that never waits, is the cycle's own: clang's sanitizer takes every
-/// system call for a fault.
-#define TANDEM_OWN_SYSTEM_CALL static_cast<void>(0)
-#endif
+#include "base/own_system_call.hpp"
 
 namespace tandem::hal::ecat {
 
