@@ -230,9 +230,11 @@ void Board::find_command_rpdos() noexcept {
     std::uint32_t found = 0;
     for (int n = 0; n < kPdosPerNode; ++n) {
       const auto mapping = static_cast<std::uint16_t>(canopen::object::kRpdoMapping + n);
-      const bool listed = od_.find(mapping, 0) != nullptr && od_.find(mapping, 1) != nullptr;
-      const std::uint8_t count = listed ? od_.value<std::uint8_t>(mapping, 0) : std::uint8_t{0};
-      for (std::uint8_t sub = 1; sub <= count; ++sub) {
+      const ObjectEntry* count = od_.find(mapping, 0);  // a sheet may lack it, or some entries
+      for (std::uint8_t sub = 1; count != nullptr && sub <= od_.value<std::uint8_t>(mapping, 0);
+           ++sub) {
+        const ObjectEntry* entry = od_.find(mapping, sub);
+        if (entry == nullptr) break;
         if (od_.value<std::uint32_t>(mapping, sub) >> 16 == index) found |= 1U << n;
       }
     }

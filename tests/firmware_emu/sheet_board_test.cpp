@@ -306,6 +306,19 @@ TEST(SheetBoard, AMappingOfWhatItLacksStartsEmptyAndIsTold) {
   EXPECT_NE(board.remarks().back().find("1A00"), std::string::npos);
 }
 
+// The fuzzer's: the start looked for the controlword in entries that the sheet had not.
+TEST(SheetBoard, AMappingWithFewerEntriesThanItsNumberSaysIsNoCrash) {
+  DataSheet sheet = sheet_of("servo.eds");
+  std::erase_if(sheet.entries, [](const SheetEntry& e) { return e.index == 0x1600 && e.sub > 1; });
+  StandIn rig(stand_in(std::move(sheet)));
+  ASSERT_EQ(rig.write(0x1400, 1, 0x80000205U), 0U);
+  (void)rig.write(0x1600, 1, 0x60400010U);
+  (void)rig.write(0x1600, 0, std::uint8_t{4});
+  rig.nmt(0x80);
+  rig.nmt(1);
+  EXPECT_EQ(rig.board.nmt_state(), canopen::NmtState::kOperational);
+}
+
 TEST(SheetBoard, ASnapshotInTheMiddleOfAMoveGoesOnTheSame) {
   const BoardSetup setup = stand_in(servo_with_profiles());
   StandIn rig(setup);
