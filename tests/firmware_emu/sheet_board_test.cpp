@@ -310,10 +310,10 @@ TEST(SheetBoard, AMappingOfWhatItLacksStartsEmptyAndIsTold) {
 TEST(SheetBoard, AMappingWithFewerEntriesThanItsNumberSaysIsNoCrash) {
   DataSheet sheet = sheet_of("servo.eds");
   std::erase_if(sheet.entries, [](const SheetEntry& e) { return e.index == 0x1600 && e.sub > 1; });
+  std::ranges::find(sheet.entries, 0x1600, &SheetEntry::index)->type =
+      static_cast<std::uint16_t>(canopen::DataType::kUnsigned32);  // so it is no mapping's number
   StandIn rig(stand_in(std::move(sheet)));
-  ASSERT_EQ(rig.write(0x1400, 1, 0x80000205U), 0U);
-  (void)rig.write(0x1600, 1, 0x60400010U);
-  (void)rig.write(0x1600, 0, std::uint8_t{4});
+  ASSERT_EQ(rig.write(0x1600, 0, std::uint32_t{4}), 0U);
   rig.nmt(0x80);
   rig.nmt(1);
   EXPECT_EQ(rig.board.nmt_state(), canopen::NmtState::kOperational);
