@@ -223,6 +223,7 @@ NodeEvents Node::enter(NmtState state) noexcept {
   if (state == NmtState::kOperational) {
     for (RxPdo& pdo : rpdos_) pdo.restart();
     for (TxPdo& pdo : tpdos_) pdo.restart();
+    find_rpdos();  // another wire than CAN may have written their identifiers
     return kEventOperational;
   }
   if (state != NmtState::kPreOperational) sdo_.reset();

@@ -66,11 +66,14 @@ class Board {
   [[nodiscard]] std::uint64_t dropped() const noexcept { return outbox_.dropped(); }
 
   [[nodiscard]] int node_id() const noexcept { return setup_.node_id; }
+  [[nodiscard]] const std::string& name() const noexcept { return setup_.name; }
   [[nodiscard]] std::size_t axes() const noexcept { return axes_.size(); }
   [[nodiscard]] const Axis& axis(std::size_t index) const noexcept { return *axes_[index]; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return node_.state(); }
   [[nodiscard]] std::int64_t control_period_ns() const noexcept { return setup_.control_period_ns; }
   [[nodiscard]] const canopen::ObjectDictionary& dictionary() const noexcept { return od_; }
+  /// For a wire that reaches the objects without frames; no entry may be added.
+  [[nodiscard]] canopen::ObjectDictionary& dictionary() noexcept { return od_; }
 
   /// What 1018:`sub` says from now on: the firmware was exchanged, or the whole board.
   /// A drive whose sheet has no such entry stays as it is.

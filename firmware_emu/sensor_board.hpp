@@ -44,10 +44,13 @@ class SensorBoard {
   [[nodiscard]] std::uint64_t dropped() const noexcept { return outbox_.dropped(); }
 
   [[nodiscard]] int node_id() const noexcept { return setup_.node_id; }
+  [[nodiscard]] const std::string& name() const noexcept { return setup_.name; }
   /// What was last measured, in the truth's order.
   [[nodiscard]] std::span<const float> channels() const noexcept { return values_; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return node_.state(); }
   [[nodiscard]] const canopen::ObjectDictionary& dictionary() const noexcept { return od_; }
+  /// For a wire that reaches the objects without frames; no entry may be added.
+  [[nodiscard]] canopen::ObjectDictionary& dictionary() noexcept { return od_; }
 
   void archive(Archive& ar);
 

@@ -34,9 +34,12 @@ void check_reference(TomlTable& table, const char* key, const std::string& name,
 /// @param sim  says how long the hoist needs, which is the default of settle_s
 HalOptions read_hal(TomlTable table, const SimOptions& sim) {
   HalOptions hal;
-  const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "dds"});
+  const std::string backend = table.choice_or("backend", "sim", {"sim", "can", "ethercat", "dds"});
   if (backend == "dds") hal.backend = BackendKind::kDds;
-  if (backend == "can") hal.backend = BackendKind::kCan;
+  if (backend == "can" || backend == "ethercat") {
+    hal.backend = BackendKind::kWire;
+    hal.wire = backend;
+  }
   hal.lockstep = table.boolean_or("lockstep", hal.lockstep);
   hal.delay_cycles = static_cast<std::uint32_t>(table.integer_or("delay_cycles", 0, 0, 1000));
   hal.answer_window = table.number_or("answer_window", hal.answer_window, {0.05, 0.95});

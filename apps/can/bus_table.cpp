@@ -23,9 +23,10 @@ const char* kind_name(BusLoadRow::Kind kind) {
 
 std::string rates(const BusLoad& load) {
   const double nominal = static_cast<double>(load.rates.nominal) / kMega;
-  return load.fd ? fmt::format("CAN FD, {:g} and {:g} Mbit/s", nominal,
-                               static_cast<double>(load.rates.data) / kMega)
-                 : fmt::format("classic CAN, {:g} Mbit/s", nominal);
+  const bool two = load.kind == hal::BusKind::kCan && load.fd;
+  const std::string data =
+      two ? fmt::format(" and {:g}", static_cast<double>(load.rates.data) / kMega) : "";
+  return fmt::format("{}, {:g}{} Mbit/s", hal::can::wire_name(load.kind, load.fd), nominal, data);
 }
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
@@ -59,7 +60,8 @@ Json to_json(const BusLoad& load) {
                     {"load", row.time_us / load.period_us()}});
   }
   return {{"bus", load.bus},
-          {"fd", load.fd},
+          {"kind", load.kind == hal::BusKind::kCan ? "can" : "ethercat"},
+          {"fd", load.kind == hal::BusKind::kCan && load.fd},
           {"bitrate", load.rates.nominal},
           {"data_bitrate", load.rates.data},
           {"period_us", load.period_us()},

@@ -5,33 +5,32 @@
 namespace tandem::apps {
 
 using hal::can::BusStatistics;
-using hal::can::SocketCanBus;
 
-BusWatch::BusWatch(std::span<SocketCanBus* const> buses, std::FILE* out)
+BusWatch::BusWatch(std::span<const OpenBus> buses, std::FILE* out)
     : buses_(buses), out_(out), told_(buses.size()) {}
 
 void BusWatch::look() {
   for (std::size_t b = 0; b < buses_.size(); ++b) {
     Told& told = told_[b];
-    std::string text = buses_[b]->status_text();
+    std::string text = buses_[b].end->status_text();
     if (text == told.text) continue;
     const Clock::time_point now = Clock::now();
     if (now < told.next) continue;
     const char* clear = is_terminal(out_) ? "\r\x1b[K" : "";  // a progress bar
     fmt::print(out_, "{}note: {}\n", clear,
-               text.empty() ? fmt::format("CAN interface {} is well again", buses_[b]->interface())
+               text.empty() ? fmt::format("interface {} is well again", buses_[b].interface)
                             : text);
     told = {.text = std::move(text), .next = now + std::chrono::seconds(1)};
   }
 }
 
-Json buses_json(std::span<SocketCanBus* const> buses) {
+Json buses_json(std::span<const OpenBus> buses) {
   Json all = Json::array();
-  for (const SocketCanBus* bus : buses) {
-    const BusStatistics s = bus->statistics();
+  for (const OpenBus& bus : buses) {
+    const BusStatistics s = bus.end->statistics();
     Json json;
-    json["interface"] = bus->interface();
-    json["status"] = bus->status_text();
+    json["interface"] = bus.interface;
+    json["status"] = bus.end->status_text();
     json["sent"] = s.sent;
     json["received"] = s.received;
     json["send_refused"] = s.send_refused;
@@ -45,17 +44,17 @@ Json buses_json(std::span<SocketCanBus* const> buses) {
   return all;
 }
 
-void add_bus_facts(std::span<SocketCanBus* const> buses, Facts& facts) {
-  for (const SocketCanBus* bus : buses) {
-    const BusStatistics s = bus->statistics();
-    const std::string status = bus->status_text();
+void add_bus_facts(std::span<const OpenBus> buses, Facts& facts) {
+  for (const OpenBus& bus : buses) {
+    const BusStatistics s = bus.end->statistics();
+    const std::string status = bus.end->status_text();
     if (s.send_refused + s.receive_lost + s.error_frames + s.recoveries > 0) {
-      facts.add(bus->interface(),
+      facts.add(bus.interface,
                 fmt::format("{} frames not sent, {} lost on the way in, {} error frames, {} "
                             "recoveries",
                             s.send_refused, s.receive_lost, s.error_frames, s.recoveries));
     }
-    if (!status.empty()) facts.add(bus->interface(), status);
+    if (!status.empty()) facts.add(bus.interface, status);
   }
 }
 

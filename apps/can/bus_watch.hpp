@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/text/console.hpp"
-#include "hal/ethercat-can/socket_can_bus.hpp"
+#include "apps/can/can_sockets.hpp"
 
 namespace tandem::apps {
 
@@ -18,7 +18,7 @@ class BusWatch {
  public:
   using Clock = std::chrono::steady_clock;
 
-  BusWatch(std::span<hal::can::SocketCanBus* const> buses, std::FILE* out);
+  BusWatch(std::span<const OpenBus> buses, std::FILE* out);
   /// Prints what has changed. No system call while nothing has.
   void look();
 
@@ -27,14 +27,14 @@ class BusWatch {
     std::string text;  ///< empty: well
     Clock::time_point next{};
   };
-  std::span<hal::can::SocketCanBus* const> buses_;
+  std::span<const OpenBus> buses_;
   std::FILE* out_;
   std::vector<Told> told_;
 };
 
 /// docs/json.md. For when the buses' thread has ended, as bus_facts().
-[[nodiscard]] Json buses_json(std::span<hal::can::SocketCanBus* const> buses);
+[[nodiscard]] Json buses_json(std::span<const OpenBus> buses);
 /// A line for every bus that lost frames or was not well.
-void add_bus_facts(std::span<hal::can::SocketCanBus* const> buses, Facts& facts);
+void add_bus_facts(std::span<const OpenBus> buses, Facts& facts);
 
 }  // namespace tandem::apps

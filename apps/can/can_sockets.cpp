@@ -1,6 +1,7 @@
 #include "apps/can/can_sockets.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <set>
 #include <thread>
@@ -24,11 +25,13 @@ Error of_bus(const hal::BusConfig& bus, Error error) {
 }  // namespace
 
 std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
-    const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps) {
+    const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps,
+    const MakeLine& make_line) {
   std::unique_ptr<CanSockets> all(new CanSockets);
   Diagnostics errors;
   std::set<std::string> locked;
-  for (const hal::BusConfig& bus : robot.buses) {
+  for (std::size_t b = 0; b < robot.buses.size(); ++b) {
+    const hal::BusConfig& bus = robot.buses[b];
     if (locked.insert(bus.interface).second) {
       auto lock = InterfaceLock::take(bus.interface, side);
       if (!lock) {
@@ -37,24 +40,44 @@ std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
       }
       all->locks_.push_back(std::move(*lock));
     }
-    auto opened = SocketCanBus::open(
-        {.interface = bus.interface, .fd = bus.fd, .side = side, .stamps = stamps});
-    if (!opened) {
-      errors.push_back(of_bus(bus, opened.error()));
-      continue;
-    }
-    all->waited_.push_back(opened->get());
-    all->ends_.push_back(opened->get());
-    all->sockets_.push_back(std::move(*opened));
+    const Status opened = bus.kind == hal::BusKind::kEthercat
+                              ? all->open_line(bus, b, make_line)
+                              : all->open_can(bus, side, stamps);
+    if (!opened) errors.push_back(of_bus(bus, opened.error()));
   }
   if (!errors.empty()) return std::unexpected(std::move(errors));
   return all;
 }
 
+Status CanSockets::open_can(const hal::BusConfig& bus, hal::can::SocketSide side, bool stamps) {
+  auto opened = SocketCanBus::open(
+      {.interface = bus.interface, .fd = bus.fd, .side = side, .stamps = stamps});
+  if (!opened) return std::unexpected(opened.error());
+  open_.push_back({.interface = bus.interface, .end = opened->get(), .can = opened->get()});
+  ends_.push_back(opened->get());
+  owned_.push_back(std::move(*opened));
+  return {};
+}
+
+Status CanSockets::open_line(const hal::BusConfig& bus, std::size_t index,
+                             const MakeLine& make_line) {
+  auto link = hal::ecat::PacketLink::open(bus.interface);
+  if (!link) return std::unexpected(link.error());
+  auto end = make_line(index, **link, *this);
+  if (!end) return std::unexpected(end.error());
+  open_.push_back({.interface = bus.interface, .end = end->get(), .link = link->get()});
+  ends_.push_back(end->get());
+  links_.push_back(std::move(*link));
+  owned_.push_back(std::move(*end));
+  return {};
+}
+
 Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t period_ns) {
   Diagnostics errors;
   std::vector<std::unique_ptr<SocketCanBus>> ears;
+  std::vector<const hal::BusConfig*> heard;
   for (const hal::BusConfig& bus : robot.buses) {
+    if (bus.kind != hal::BusKind::kCan) continue;  // a line's master sees another one's frames
     auto opened = SocketCanBus::open({.interface = bus.interface,
                                       .fd = bus.fd,
                                       .side = hal::can::SocketSide::kWitness,
@@ -64,25 +87,35 @@ Diagnostics listen_for_masters(const hal::RobotConfig& robot, std::int64_t perio
       continue;
     }
     ears.push_back(std::move(*opened));
+    heard.push_back(&bus);
   }
   if (!errors.empty()) return errors;
+  if (ears.empty()) return errors;
   const std::int64_t until_ns = rt::WallClock{}.now_ns() + hal::can::listening_ns(robot, period_ns);
   while (rt::WallClock{}.now_ns() < until_ns && !rt::stop_requested()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   for (std::size_t b = 0; b < ears.size(); ++b) {
     const Status alone = hal::can::expect_no_master(*ears[b], ears[b]->interface());
-    if (!alone) errors.push_back(of_bus(robot.buses[b], alone.error()));
+    if (!alone) errors.push_back(of_bus(*heard[b], alone.error()));
   }
   return errors;
 }
 
 std::int64_t CanSockets::now_ns() noexcept { return rt::WallClock{}.now_ns(); }
 
+int CanSockets::descriptor(std::size_t bus) const noexcept {
+  const OpenBus& open = open_[bus];
+  return open.can != nullptr ? hal::can::waiting_socket(*open.can) : open.link->descriptor();
+}
+
 void CanSockets::wait(std::int64_t at_most_ns, int bus) noexcept {
-  const std::span<SocketCanBus* const> all(waited_);
-  const auto chosen = bus == kAnyBus ? all : all.subspan(static_cast<std::size_t>(bus), 1);
-  (void)hal::can::wait_for_frames(chosen, at_most_ns);
+  std::array<int, hal::can::kMaxBuses> sockets;
+  std::size_t count = 0;
+  for (std::size_t b = 0; b < open_.size() && count < sockets.size(); ++b) {
+    if (bus == kAnyBus || bus == static_cast<int>(b)) sockets[count++] = descriptor(b);
+  }
+  (void)hal::can::wait_for_frames(std::span<const int>(sockets).first(count), at_most_ns);
 }
 
 bool CanSockets::stopping() const noexcept { return rt::stop_requested(); }

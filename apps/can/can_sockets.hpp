@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -11,24 +12,37 @@
 #include "apps/can/interface_lock.hpp"
 #include "base/result.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/ethercat-can/ethercat/packet_link.hpp"
 #include "hal/ethercat-can/frame_wait.hpp"
 #include "hal/ethercat-can/socket_can_bus.hpp"
 
 namespace tandem::apps {
+
+/// A bus that is open: one of the two is null.
+struct OpenBus {
+  std::string interface;
+  hal::can::Bus* end = nullptr;
+  const hal::can::SocketCanBus* can = nullptr;
+  const hal::ecat::PacketLink* link = nullptr;
+};
+
+/// Makes this side's end of the line of [[bus]] `index`.
+using MakeLine = std::function<Result<std::unique_ptr<hal::can::Bus>>(
+    std::size_t index, hal::ecat::Link& link, hal::can::FrameWait& wait)>;
 
 /// One socket per [[bus]], in robot.toml's order, and the wait for all of them.
 class CanSockets final : public hal::can::FrameWait {
  public:
   /// Locks the interface of every bus for this side, and opens it.
   /// @param stamps  take the times of frames: nobody asks for them in lockstep
+  /// @param make_line  for EtherCAT
   /// Errors: all of them, each with its bus.
   [[nodiscard]] static std::expected<std::unique_ptr<CanSockets>, Diagnostics> open(
-      const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps);
+      const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps,
+      const MakeLine& make_line);
 
   [[nodiscard]] std::span<hal::can::Bus* const> buses() const noexcept { return ends_; }
-  [[nodiscard]] std::span<hal::can::SocketCanBus* const> sockets() const noexcept {
-    return waited_;
-  }
+  [[nodiscard]] std::span<const OpenBus> open_buses() const noexcept { return open_; }
 
   [[nodiscard]] std::int64_t now_ns() noexcept override;
   void wait(std::int64_t at_most_ns, int bus) noexcept override;
@@ -37,10 +51,14 @@ class CanSockets final : public hal::can::FrameWait {
 
  private:
   CanSockets() = default;
+  Status open_can(const hal::BusConfig& bus, hal::can::SocketSide side, bool stamps);
+  Status open_line(const hal::BusConfig& bus, std::size_t index, const MakeLine& make_line);
+  [[nodiscard]] int descriptor(std::size_t bus) const noexcept;
 
   std::vector<InterfaceLock> locks_;  // of distinct interfaces
-  std::vector<std::unique_ptr<hal::can::SocketCanBus>> sockets_;
-  std::vector<hal::can::SocketCanBus*> waited_;
+  std::vector<std::unique_ptr<hal::ecat::PacketLink>> links_;
+  std::vector<std::unique_ptr<hal::can::Bus>> owned_;
+  std::vector<OpenBus> open_;
   std::vector<hal::can::Bus*> ends_;
 };
 

@@ -273,7 +273,7 @@ void add_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--duration", o.duration_s, "Seconds to run, instead of the experiment's")
       ->check(a_duration());
   app.add_option("--hal", o.hal, "Backend: where the robot is (default: the experiment's, or sim)")
-      ->check(CLI::IsMember({"sim", "can", "dds"}));
+      ->check(CLI::IsMember({"sim", "can", "ethercat", "dds"}));
   app.add_flag(
       "--lockstep", o.lockstep,
       "CAN, DDS: wait for `tandem emulate --lockstep` or `serve --lockstep`, at any speed");
@@ -300,7 +300,7 @@ void add_flags(CLI::App& app, ServeOptions& o) {
   add_loop_flags(app, o.run);
   app.add_option("--hal", o.run.hal,
                  "Backend: where the robot is (default: the experiment's, or sim)")
-      ->check(CLI::IsMember({"sim", "can"}));
+      ->check(CLI::IsMember({"sim", "can", "ethercat"}));
   app.add_flag("--lockstep", o.run.lockstep, "Each cycle waits for its owner's command");
   app.add_flag("--once", o.run.once, "End when an owner gives the robot back");
   app.footer(kServeExamples);

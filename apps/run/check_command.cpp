@@ -22,8 +22,8 @@ namespace {
 const char* backend_text(runtime::BackendKind backend) {
   switch (backend) {
     case runtime::BackendKind::kSim: break;
-    case runtime::BackendKind::kCan:
-      return "can: drive master here, boards on SocketCAN interfaces";
+    case runtime::BackendKind::kWire:
+      return "wire: drive master here, boards on their CAN and EtherCAT interfaces";
     case runtime::BackendKind::kDds: return "dds: the robot of another process (tandem serve)";
   }
   return "sim: drive master, frames, boards' firmware and plant in this process";
@@ -41,7 +41,7 @@ void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
     for (const hal::BoardConfig& board : robot.boards) nodes += board.bus == bus.name ? 1 : 0;
     for (const hal::SensorConfig& sensor : robot.sensors) nodes += sensor.bus == bus.name ? 1 : 0;
     facts.add("bus " + bus.name,
-              fmt::format("{}, {}", counted(nodes, "node"), bus.fd ? "CAN FD" : "CAN"));
+              fmt::format("{}, {}", counted(nodes, "node"), hal::can::wire_name(bus.kind, bus.fd)));
   }
 }
 

@@ -13,6 +13,7 @@
 #include "apps/robot/start_torque.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
+#include "hal/ethercat-can/line_bus.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
@@ -116,7 +117,7 @@ std::optional<Error> no_retreat(const Composition& c) {
 std::vector<double> start_of(const runtime::Experiment& e) {
   if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
   if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
-  if (e.hal.backend == runtime::BackendKind::kCan) return {};
+  if (e.hal.backend == runtime::BackendKind::kWire) return {};
   return std::vector<double>(e.robot.joints.size(), 0.0);
 }
 
@@ -189,9 +190,19 @@ void add_owner(Composition& c, Collector& errors) {
 
 }  // namespace
 
-std::string hal_name(const runtime::HalOptions& hal) {
+std::string wire_name(const hal::RobotConfig& robot) {
+  const bool line = !robot.buses.empty() &&
+                    std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
+                      return bus.kind == hal::BusKind::kEthercat;
+                    });
+  return line ? "EtherCAT" : "CAN";
+}
+
+std::string hal_name(const runtime::Experiment& e) {
+  const runtime::HalOptions& hal = e.hal;
   if (hal.backend == runtime::BackendKind::kSim) return "sim";
-  const std::string name = hal.backend == runtime::BackendKind::kCan ? "can" : "dds";
+  const std::string wire = wire_name(e.robot) == "CAN" ? "can" : "ethercat";
+  const std::string name = hal.backend == runtime::BackendKind::kWire ? wire : "dds";
   return hal.lockstep ? name + " lockstep" : name;
 }
 
@@ -210,6 +221,7 @@ void override_experiment(runtime::Experiment& e, const Overrides& overrides) {
   e.duration_s = overrides.duration_s.value_or(e.duration_s);
   if (!overrides.kernel_variant.empty()) e.kernel_variant = overrides.kernel_variant;
   e.hal.backend = overrides.backend.value_or(e.hal.backend);
+  if (overrides.backend) e.hal.wire = overrides.wire;
   e.hal.lockstep = e.hal.lockstep || overrides.lockstep;
   e.dds.enabled = overrides.dds.value_or(e.dds.enabled);
   e.dds.domain = overrides.domain.value_or(e.dds.domain);
@@ -224,6 +236,20 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
                                  static_cast<double>(e.loop.period_ns) * 1e-9),
              .file = e.file,
              .key = "duration_s"}};
+  }
+  const auto has = [&](hal::BusKind kind) {
+    return std::ranges::find(e.robot.buses, kind, &hal::BusConfig::kind) != e.robot.buses.end();
+  };
+  const hal::BusKind asked =
+      e.hal.wire == "ethercat" ? hal::BusKind::kEthercat : hal::BusKind::kCan;
+  if (e.hal.backend == runtime::BackendKind::kWire && !has(asked)) {
+    const std::string wire = e.hal.wire == "ethercat" ? "EtherCAT" : "CAN";
+    const char* other = e.hal.wire == "ethercat" ? "can" : "ethercat";
+    return {{.message = "the robot has no " + wire + " bus",
+             .hint = fmt::format("add --hal {}, or write the kind of its [[bus]] in {}", other,
+                                 e.robot.file),
+             .file = e.file,
+             .key = "hal.backend"}};
   }
   const bool is_remote = e.hal.backend == runtime::BackendKind::kDds;
   if (overrides.serves && is_remote) {
@@ -367,13 +393,21 @@ Diagnostics connect(Composition& c, const std::string& record_frames) {
   if (e.hal.backend == runtime::BackendKind::kDds && record_frames.empty()) {
     return connect_remote(c);
   }
-  if (e.hal.backend != runtime::BackendKind::kCan) {
+  if (e.hal.backend != runtime::BackendKind::kWire) {
     if (record_frames.empty()) return {};
     return {fail("--record-frames: a robot in this process has no bus to record",
                  "add --hal can, and start tandem emulate")
                 .error()};
   }
-  auto sockets = CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep);
+  const auto make_line = [&e](std::size_t bus, hal::ecat::Link& link, hal::can::FrameWait&)
+      -> Result<std::unique_ptr<hal::can::Bus>> {
+    auto made = hal::can::LineBus::create(
+        e.robot, bus, link, {.period_ns = e.loop.period_ns, .lockstep = e.hal.lockstep});
+    if (!made) return std::unexpected(made.error());
+    return std::move(*made);
+  };
+  auto sockets =
+      CanSockets::open(e.robot, hal::can::SocketSide::kMaster, !e.hal.lockstep, make_line);
   if (!sockets) return sockets.error();
   if (Diagnostics others = listen_for_masters(e.robot, e.loop.period_ns); !others.empty()) {
     return others;

@@ -34,6 +34,7 @@ struct Overrides {
   std::string kernel_variant = {};
   MissingKernels missing_kernels = MissingKernels::kRefuse;
   std::optional<runtime::BackendKind> backend = std::nullopt;
+  std::string wire = {};  ///< with kWire: "can", "ethercat"
   bool lockstep = false;                     ///< true: whatever the experiment says
   std::vector<std::string> interfaces = {};  ///< "can0=vcan0"
   std::string scenario = {};                 ///< faults to inject into the simulation
@@ -70,14 +71,17 @@ struct Composition {
   Diagnostics warnings;
 
   /// Empty without a CAN backend.
-  [[nodiscard]] std::span<hal::can::SocketCanBus* const> can_buses() const {
+  [[nodiscard]] std::span<const OpenBus> open_buses() const {
     if (sockets == nullptr) return {};
-    return sockets->sockets();
+    return sockets->open_buses();
   }
 };
 
-/// "sim", "can", "can lockstep", "dds", "dds lockstep", for logs and summaries.
-[[nodiscard]] std::string hal_name(const runtime::HalOptions& hal);
+/// "EtherCAT" when the robot has no other bus, else "CAN".
+[[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);
+
+/// "sim", "can", "can lockstep", "ethercat", "dds", "dds lockstep", for logs and summaries.
+[[nodiscard]] std::string hal_name(const runtime::Experiment& e);
 
 /// The keys `engine` and `engine_version` of JSON; null where no plant is in this process.
 void add_engine_json(const runtime::Experiment& e, Json& json);

@@ -35,7 +35,7 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
       **participant, {.robot = e.robot,
                       .tree = c.tree,
                       .urdf = text_of(e.robot.model.urdf),
-                      .hal = hal_name(e.hal),
+                      .hal = hal_name(e),
                       .version = TANDEM_VERSION,
                       .description_hash = c.kernels->description_hash,
                       .period_ns = e.loop.period_ns,

@@ -16,6 +16,7 @@
 #include "base/counted.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/sim/emulator.hpp"
+#include "hal/sim/line_boards.hpp"
 #include "hal/sim/scenario.hpp"
 #include "hal/sim/setup.hpp"
 #include "rt/stop_signal.hpp"
@@ -115,7 +116,14 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
   if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
   e->robot = std::move(*emulated);
-  auto sockets = CanSockets::open(robot, hal::can::SocketSide::kBoards, false);
+  const auto make_line = [&](std::size_t bus, hal::ecat::Link& link, hal::can::FrameWait& wait)
+      -> Result<std::unique_ptr<hal::can::Bus>> {
+    const sim::LineBoards::Config config{.period_ns = period_ns,
+                                         .seed = e->subject.sim.seed,
+                                         .clock = options.lockstep ? nullptr : &wait};
+    return std::make_unique<sim::LineBoards>(*e->robot, bus, link, config);
+  };
+  auto sockets = CanSockets::open(robot, hal::can::SocketSide::kBoards, false, make_line);
   if (!sockets) return std::unexpected(sockets.error());
   e->sockets = std::move(*sockets);
   e->emulator = std::make_unique<sim::Emulator>(
@@ -162,7 +170,7 @@ Json summary_json(const Emulation& e, bool lockstep) {
   json["frames_in"] = s.frames_in;
   json["frames_out"] = s.frames_out;
   json["frames_lost"] = s.frames_lost;
-  json["buses"] = buses_json(e.sockets->sockets());
+  json["buses"] = buses_json(e.sockets->open_buses());
   json["all_enabled"] = e.robot->all_enabled();
   json["diverged"] = e.robot->plant().diverged();
   return json;
@@ -176,7 +184,7 @@ void print_summary(const Emulation& e, std::FILE* out) {
                                      s.steps_without_sync, s.slipped));
   facts.add("frames",
             fmt::format("{} in, {} out, {} lost", s.frames_in, s.frames_out, s.frames_lost));
-  add_bus_facts(e.sockets->sockets(), facts);
+  add_bus_facts(e.sockets->open_buses(), facts);
   if (e.robot->plant().diverged()) {
     facts.add("the simulation diverged", e.robot->plant().diverged_text());
   }
@@ -217,7 +225,7 @@ void tell_injected(Emulation& e, std::FILE* out, bool quiet) {
 void emulate(Emulation& e, TaskQueue& tasks, std::FILE* out, bool quiet) {
   constexpr std::int64_t kPatienceNs = 100'000'000;
   StatusLine line(out);
-  BusWatch buses(e.sockets->sockets(), stderr);
+  BusWatch buses(e.sockets->open_buses(), stderr);
   while (!rt::stop_requested()) {
     if (e.emulator->poll(kPatienceNs) == Code::kDiverged) return;
     tasks.run_waiting();

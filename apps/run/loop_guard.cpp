@@ -36,8 +36,9 @@ void say(const std::string& line) {
 Result<std::unique_ptr<LoopGuard>> LoopGuard::open(const Composition& composition,
                                                    runtime::RobotCycle& cycle) {
   std::unique_ptr<LoopGuard> guard(new LoopGuard(composition, cycle));
-  for (const SocketCanBus* bus : composition.can_buses()) {
-    auto sender = SocketCanBus::open({.interface = bus->interface(),
+  for (const OpenBus& bus : composition.open_buses()) {
+    if (bus.can == nullptr) continue;  // without frames a slave's watchdog stops it
+    auto sender = SocketCanBus::open({.interface = bus.interface,
                                       .fd = false,
                                       .side = hal::can::SocketSide::kSender,
                                       .receive_queue = 1,

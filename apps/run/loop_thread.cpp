@@ -98,7 +98,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
   const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
   const runtime::Progress& progress = cycle.progress();
   ProgressBar bar(out, static_cast<double>(e.cycles()) * period_s);
-  BusWatch buses(c.can_buses(), stderr);
+  BusWatch buses(c.open_buses(), stderr);
   FaultNotes faults;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {

@@ -77,7 +77,9 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
 
 std::string pace_text(const Composition& c) {
   const runtime::HalOptions& hal = c.experiment.hal;
-  std::string where = hal.backend == runtime::BackendKind::kCan ? "over CAN, " : "";
+  std::string where = hal.backend == runtime::BackendKind::kWire
+                          ? "over " + wire_name(c.experiment.robot) + ", "
+                          : "";
   if (hal.backend == runtime::BackendKind::kDds) where = "over DDS, ";
   if (c.backend->pace() == hal::Pace::kBus) return where + "at the server's pace";
   if (c.backend->pace() == hal::Pace::kWallClock) return where + "in real time";
@@ -231,7 +233,7 @@ class Session {
         return injected(c_.sim->post(fault) ? Code::kOk : Code::kQueueFull);
       });
     }
-    const bool on_robot = e.hal.backend == runtime::BackendKind::kCan && !e.hal.lockstep;
+    const bool on_robot = e.hal.backend == runtime::BackendKind::kWire && !e.hal.lockstep;
     auto socket = serve(commands_, {.path = options_.socket,
                                     .kind = "run",
                                     .wanted = !options_.no_socket,
@@ -361,7 +363,9 @@ Exit run_command(const RunOptions& options) {
                       .serves = options.serves,
                       .dds = options.dds,
                       .domain = options.domain};
-  if (options.hal == "can") overrides.backend = runtime::BackendKind::kCan;
+  const bool wire = options.hal == "can" || options.hal == "ethercat";
+  if (wire) overrides.backend = runtime::BackendKind::kWire;
+  if (wire) overrides.wire = options.hal;
   if (options.hal == "sim") overrides.backend = runtime::BackendKind::kSim;
   if (options.hal == "dds") overrides.backend = runtime::BackendKind::kDds;
   const auto composition = compose(options.experiment, overrides);

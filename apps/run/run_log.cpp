@@ -22,7 +22,7 @@ log::RunInfo info_of(const Composition& c) {
   log::RunInfo info;
   info.version = TANDEM_VERSION;
   info.robot = e.robot.name;
-  info.hal = hal_name(e.hal);
+  info.hal = hal_name(e);
   for (const hal::JointConfig& joint : e.robot.joints) info.joints.push_back(joint.name);
   for (const hal::BoardConfig& board : e.robot.boards) info.boards.push_back(board.name);
   for (const hal::BusConfig& bus : e.robot.buses) info.buses.push_back(bus.name);

@@ -227,7 +227,7 @@ Json RunSummary::json() const {
   const rt::LoopStatistics& loop = cycle.loop();
   Json json;
   json["robot"] = e.robot.name;
-  json["hal"] = hal_name(e.hal);
+  json["hal"] = hal_name(e);
   json["seed"] = e.seed;
   json["cycles"] = cycle.running_cycles();
   json["period_ns"] = e.loop.period_ns;
@@ -245,7 +245,7 @@ Json RunSummary::json() const {
   json["log"] = log_json(log);
   json["frames"] = frames_json(frames);
   json["dds"] = dds_json(dds);
-  json["buses"] = buses_json(composition.can_buses());
+  json["buses"] = buses_json(composition.open_buses());
   json["joints"] = Json::object();
   const auto tracking = cycle.statistics().tracking();
   const auto limited = cycle.statistics().limited_cycles();
@@ -287,7 +287,7 @@ void RunSummary::print(std::FILE* out) const {
   const std::string engine = sim::engine_text(composition.experiment.sim.engine);
   if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);
   add_output_facts(*this, facts);
-  add_bus_facts(composition.can_buses(), facts);
+  add_bus_facts(composition.open_buses(), facts);
   add_frame_facts(*this, facts);
   facts.print(out);
 }

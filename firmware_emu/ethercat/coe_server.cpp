@@ -48,10 +48,10 @@ std::size_t CoeServer::download(Bytes message, Out out) noexcept {
   AbortCode code = AbortCode::kNone;
   if ((command & sdo_command::kExpedited) != 0) {
     const std::size_t size = sdo_command::expedited_bytes(command);
-    code = od_->write(index_, sub_, message.subspan(kSdoAt + 4, size));
+    code = dictionary().write(index_, sub_, message.subspan(kSdoAt + 4, size));
   } else {
-    const canopen::ObjectEntry* entry = od_->find(index_, sub_);
-    if (entry == nullptr) return abort(od_->exists(index_, sub_), out);
+    const canopen::ObjectEntry* entry = dictionary().find(index_, sub_);
+    if (entry == nullptr) return abort(dictionary().exists(index_, sub_), out);
     if ((entry->access & canopen::kWrite) == 0) return abort(AbortCode::kReadOnly, out);
     expected_ = get<std::uint32_t>(&message[kSdoAt + 4]);
     const Bytes data = message.subspan(kSdoDataAt);
@@ -62,7 +62,7 @@ std::size_t CoeServer::download(Bytes message, Out out) noexcept {
       transfer_ = Transfer::kDownload;
       toggle_ = false;
     } else {
-      code = od_->write(index_, sub_, {buffer_.data(), length_});
+      code = dictionary().write(index_, sub_, {buffer_.data(), length_});
     }
   }
   if (code != AbortCode::kNone) return abort(code, out);
@@ -81,7 +81,7 @@ std::size_t CoeServer::download_segment(Bytes message, Out out) noexcept {
   length_ += data.size();
   if ((command & sdo_command::kLast) != 0) {
     if (length_ != expected_) return abort(AbortCode::kLength, out);
-    const AbortCode code = od_->write(index_, sub_, {buffer_.data(), length_});
+    const AbortCode code = dictionary().write(index_, sub_, {buffer_.data(), length_});
     if (code != AbortCode::kNone) return abort(code, out);
     transfer_ = Transfer::kNone;
   }
@@ -93,7 +93,7 @@ std::size_t CoeServer::download_segment(Bytes message, Out out) noexcept {
 }
 
 std::size_t CoeServer::upload(Out out) noexcept {
-  const AbortCode code = od_->read(index_, sub_, buffer_, length_);
+  const AbortCode code = dictionary().read(index_, sub_, buffer_, length_);
   if (code != AbortCode::kNone) return abort(code, out);
   if (length_ >= 1 && length_ <= sdo_command::kExpeditedBytes) {
     const auto command =

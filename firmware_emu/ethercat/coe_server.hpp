@@ -20,9 +20,13 @@ inline constexpr std::size_t kMaxCoeBytes = 1024;
 /// One transfer at a time: expedited, normal, or in segments when it does not fit the mailbox.
 class CoeServer {
  public:
+  /// @param application   answers for objects that are not in `od`
   /// @param answer_bytes  size of the mailbox to the master, kMinMailboxBytes to kMaxMailboxBytes
+  CoeServer(canopen::ObjectDictionary& od, canopen::ObjectDictionary& application,
+            std::size_t answer_bytes) noexcept
+      : own_(&od), application_(&application), answer_bytes_(answer_bytes) {}
   CoeServer(canopen::ObjectDictionary& od, std::size_t answer_bytes) noexcept
-      : od_(&od), answer_bytes_(answer_bytes) {}
+      : CoeServer(od, od, answer_bytes) {}
 
   /// Answers a message of the master.
   /// @param request  the mailbox's bytes, what follows the message included
@@ -49,7 +53,13 @@ class CoeServer {
   std::size_t refuse(ethercat::MailboxError error, Out out) noexcept;
   std::size_t refuse_information(Out out) noexcept;
 
-  canopen::ObjectDictionary* od_;
+  [[nodiscard]] canopen::ObjectDictionary& dictionary() const noexcept {
+    const bool own = own_->exists(index_, sub_) != canopen::AbortCode::kNoObject;
+    return own ? *own_ : *application_;
+  }
+
+  canopen::ObjectDictionary* own_;
+  canopen::ObjectDictionary* application_;
   std::size_t answer_bytes_;
   Transfer transfer_ = Transfer::kNone;
   bool toggle_ = false;

@@ -10,13 +10,6 @@ namespace tandem::firmware::esc {
 using canopen::AbortCode;
 using canopen::ObjectEntry;
 
-namespace {
-
-constexpr std::uint16_t kAssignOutputs = 0x1C12;
-constexpr std::uint16_t kAssignInputs = 0x1C13;
-
-}  // namespace
-
 ProcessData::ProcessData(Direction direction, std::span<const PdoSetup> pdos)
     : direction_(direction) {
   for (const PdoSetup& setup : pdos.first(std::min(pdos.size(), kMaxPdos))) {
@@ -30,8 +23,7 @@ ProcessData::ProcessData(Direction direction, std::span<const PdoSetup> pdos)
 
 bool ProcessData::add_to(canopen::ObjectDictionary& od) {
   od_ = &od;
-  const bool outputs = direction_ == Direction::kOutputs;
-  const std::uint16_t assign = outputs ? kAssignOutputs : kAssignInputs;
+  const std::uint16_t assign = assignment_object(direction_);
   const auto most = [](std::size_t count) {
     return canopen::ObjectRange{.min = 0, .max = static_cast<double>(count)};
   };
@@ -87,7 +79,7 @@ AbortCode ProcessData::check_entry(std::uint32_t mapped) const noexcept {
 AbortCode ProcessData::check(const ObjectEntry& entry,
                              const std::uint8_t* bytes) noexcept TANDEM_RT {
   if (!open_) return AbortCode::kDeviceState;
-  const bool assignment = entry.index == kAssignOutputs || entry.index == kAssignInputs;
+  const bool assignment = entry.index == assignment_object(direction_);
   const Pdo* pdo = assignment ? nullptr : find(entry.index);
   const std::uint8_t count = assignment ? assigned_count_ : pdo->count;
   if (entry.sub != 0) return count == 0 ? AbortCode::kNone : AbortCode::kUnsupportedAccess;
@@ -122,7 +114,7 @@ void ProcessData::compile() noexcept TANDEM_RT {
   }
 }
 
-void ProcessData::take(std::span<const std::uint8_t> image) const noexcept TANDEM_RT {
+void ProcessData::take(std::span<const std::uint8_t> image) noexcept TANDEM_RT {
   for (std::size_t i = 0, at = 0; i < copies_; at += copy_[i++].bytes) {
     if (copy_[i].entry != nullptr) copy_[i].entry->decode(&image[at]);
   }

@@ -11,13 +11,11 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "canopen/object_dictionary.hpp"
+#include "firmware_emu/ethercat/process_objects.hpp"
 
 namespace tandem::firmware::esc {
 
-inline constexpr std::size_t kMaxPdos = 4;
 inline constexpr std::size_t kMaxPdoEntries = 32;
-/// What the memory of one direction has room for, three buffers of it.
-inline constexpr std::size_t kMaxProcessBytes = 1024;
 
 /// A PDO at power-on: its object, and entries as index << 16 | sub << 8 | bits.
 struct PdoSetup {
@@ -27,26 +25,21 @@ struct PdoSetup {
 };
 
 /// One direction. Its objects change in PREOP only: count to 0, then entries, then count.
-class ProcessData final : public canopen::ObjectOwner {
+class ProcessData final : public ProcessObjects, public canopen::ObjectOwner {
  public:
-  enum class Direction : std::uint8_t { kOutputs, kInputs };
-
   ProcessData(Direction direction, std::span<const PdoSetup> pdos);
 
-  /// Adds its objects to `od`, whose entries it may then map.
-  /// @return false when `od` is full or has one of them
-  bool add_to(canopen::ObjectDictionary& od);
-  /// Whether the objects may be written.
-  void set_open(bool open) noexcept { open_ = open; }
-  /// Bytes that the assigned PDOs have together.
-  [[nodiscard]] std::size_t bytes() const noexcept TANDEM_RT;
+  /// The objects that it then maps are in `od` too.
+  bool add_to(canopen::ObjectDictionary& od) override;
+  void set_open(bool open) noexcept TANDEM_RT override { open_ = open; }
+  [[nodiscard]] std::size_t bytes() const noexcept TANDEM_RT override;
   /// Finds the mapped objects, before copying begins.
-  void compile() noexcept TANDEM_RT;
-  /// Outputs: what came goes into the objects. @pre compile(); image.size() == bytes()
-  void take(std::span<const std::uint8_t> image) const noexcept TANDEM_RT;
-  /// Inputs: what the objects hold goes out. @pre compile(); image.size() == bytes()
-  void give(std::span<std::uint8_t> image) const noexcept TANDEM_RT;
-  void archive(Archive& ar);
+  void compile() noexcept TANDEM_RT override;
+  /// Into the objects.
+  void take(std::span<const std::uint8_t> image) noexcept TANDEM_RT override;
+  /// What the objects hold.
+  void give(std::span<std::uint8_t> image) const noexcept TANDEM_RT override;
+  void archive(Archive& ar) override;
 
   canopen::AbortCode check(const canopen::ObjectEntry& entry,
                            const std::uint8_t* bytes) noexcept TANDEM_RT override;

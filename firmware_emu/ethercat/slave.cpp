@@ -76,17 +76,22 @@ sii::Content sii_content(const SlaveSetup& setup) {
 }
 
 Slave::Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od)
+    : Slave(setup, od, od, std::make_unique<ProcessData>(Direction::kOutputs, setup.outputs),
+            std::make_unique<ProcessData>(Direction::kInputs, setup.inputs)) {}
+
+Slave::Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od,
+             canopen::ObjectDictionary& application, std::unique_ptr<ProcessObjects> outputs,
+             std::unique_ptr<ProcessObjects> inputs)
     : state_delay_ns_(setup.state_delay_ns),
       mailbox_bytes_(setup.mailbox_bytes),
-      od_(&od),
-      outputs_(ProcessData::Direction::kOutputs, setup.outputs),
-      inputs_(ProcessData::Direction::kInputs, setup.inputs),
-      coe_(od, setup.mailbox_bytes),
+      outputs_(std::move(outputs)),
+      inputs_(std::move(inputs)),
+      coe_(od, application, setup.mailbox_bytes),
       esc_(sii::build(sii_content(setup)), setup.has_dc, setup.clock) {
   od.add_value(0x1C00, 0, std::uint8_t{4});
   for (std::uint8_t number = 1; number <= 4; ++number) od.add_value(0x1C00, number, number);
-  outputs_.add_to(od);
-  inputs_.add_to(od);
+  outputs_->add_to(od);
+  inputs_->add_to(od);
 }
 
 void Slave::reset(std::int64_t now_ns) noexcept TANDEM_RT {
@@ -100,7 +105,7 @@ void Slave::reset(std::int64_t now_ns) noexcept TANDEM_RT {
 void Slave::process(std::int64_t now_ns) noexcept TANDEM_RT {
   esc_.process(now_ns);
   take_state_request(now_ns);
-  if (state_ == AlState::kOp && outputs_.bytes() != 0 && esc_.watchdog_expired()) {
+  if (state_ == AlState::kOp && outputs_->bytes() != 0 && esc_.watchdog_expired()) {
     fail(AlState::kSafeOp, AlCode::kWatchdog);
   }
   run_mailbox();
@@ -145,11 +150,11 @@ AlCode Slave::try_enter(AlState wanted) const noexcept {
       return one.active && !one.mailbox() && one.written() == writes && one.length == bytes &&
              one.start >= ethercat::reg::kRam && one.start + bytes <= kMemoryBytes;
     };
-    if (!fits(esc_.manager(2), outputs_.bytes(), true)) return AlCode::kOutputs;
-    if (!fits(esc_.manager(3), inputs_.bytes(), false)) return AlCode::kInputs;
+    if (!fits(esc_.manager(2), outputs_->bytes(), true)) return AlCode::kOutputs;
+    if (!fits(esc_.manager(3), inputs_->bytes(), false)) return AlCode::kInputs;
     return AlCode::kNone;
   }
-  if (outputs_.bytes() != 0 && !heard_outputs_) return AlCode::kNoOutputs;
+  if (outputs_->bytes() != 0 && !heard_outputs_) return AlCode::kNoOutputs;
   if (esc_.sync0_active() && esc_.sync0_pulses() == 0) return AlCode::kNoSync;
   return AlCode::kNone;
 }
@@ -172,13 +177,13 @@ void Slave::enter(AlState state, std::int64_t now_ns) noexcept {
     answer_bytes_ = 0;
   }
   if (state == AlState::kSafeOp && state_ == AlState::kPreOp) {
-    outputs_.compile();
-    inputs_.compile();
+    outputs_->compile();
+    inputs_->compile();
     heard_outputs_ = false;
   }
   if (state == AlState::kOp) esc_.arm_watchdog(now_ns);
-  outputs_.set_open(state == AlState::kPreOp);
-  inputs_.set_open(state == AlState::kPreOp);
+  outputs_->set_open(state == AlState::kPreOp);
+  inputs_->set_open(state == AlState::kPreOp);
   state_ = state;
 }
 
@@ -211,8 +216,8 @@ void Slave::take_process_data() noexcept {
   if (state_ != AlState::kOp) return;
   const SyncManager manager = esc_.manager(2);
   const std::span<const std::uint8_t> image = esc_.memory(manager.start, manager.length);
-  if (image.size() != outputs_.bytes() || image.empty()) return;
-  outputs_.take(image);
+  if (image.size() != outputs_->bytes() || image.empty()) return;
+  outputs_->take(image);
   ++taken_;
 }
 
@@ -220,12 +225,14 @@ void Slave::publish() noexcept TANDEM_RT {
   if (state_ != AlState::kSafeOp && state_ != AlState::kOp) return;
   const SyncManager manager = esc_.manager(3);
   const std::span<std::uint8_t> image = esc_.memory(manager.start, manager.length);
-  if (image.size() == inputs_.bytes() && !image.empty()) inputs_.give(image);
+  if (image.size() == inputs_->bytes() && !image.empty()) inputs_->give(image);
 }
 
 void Slave::archive(Archive& ar) {
-  ar(outputs_, inputs_, coe_, esc_, state_, code_, error_, requested_, heard_outputs_, request_,
-     last_counter_, requested_ns_, taken_, answer_bytes_, answer_);
+  outputs_->archive(ar);
+  inputs_->archive(ar);
+  ar(coe_, esc_, state_, code_, error_, requested_, heard_outputs_, request_, last_counter_,
+     requested_ns_, taken_, answer_bytes_, answer_);
 }
 
 }  // namespace tandem::firmware::esc

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,8 +31,8 @@ struct SlaveSetup {
   ethercat::sii::Identity identity{.vendor = kNobodysVendor};
   std::string name;
   std::uint16_t mailbox_bytes = 128;  ///< each way, kMinMailboxBytes to 1024
-  std::vector<PdoSetup> outputs;      ///< 16xx, at most kMaxPdos
-  std::vector<PdoSetup> inputs;       ///< 1Axx, at most kMaxPdos
+  std::vector<PdoSetup> outputs{};    ///< 16xx, at most kMaxPdos
+  std::vector<PdoSetup> inputs{};     ///< 1Axx, at most kMaxPdos
   bool has_dc = true;
   ClockSetup clock;
   std::int64_t state_delay_ns = 0;  ///< how long the application takes to change its state
@@ -50,6 +51,11 @@ class Slave {
   /// Adds 1C00, 1C12, 1C13 and the PDOs' objects to `od`, which has the rest already and outlives
   /// the slave. @pre check(setup)
   Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od);
+  /// A slave whose process data is another's; of setup its PDOs are not used.
+  /// @param application  answers for what is not in `od`
+  Slave(const SlaveSetup& setup, canopen::ObjectDictionary& od,
+        canopen::ObjectDictionary& application, std::unique_ptr<ProcessObjects> outputs,
+        std::unique_ptr<ProcessObjects> inputs);
   Slave(const Slave&) = delete;
   Slave& operator=(const Slave&) = delete;
 
@@ -82,9 +88,8 @@ class Slave {
 
   std::int64_t state_delay_ns_;
   std::uint16_t mailbox_bytes_;
-  canopen::ObjectDictionary* od_;
-  ProcessData outputs_;
-  ProcessData inputs_;
+  std::unique_ptr<ProcessObjects> outputs_;
+  std::unique_ptr<ProcessObjects> inputs_;
   CoeServer coe_;
   Esc esc_;
   ethercat::AlState state_ = ethercat::AlState::kInit;

@@ -175,9 +175,16 @@ struct LoopConfig : model::LoopSpec {
 };
 
 /// [[bus]]
+/// What a [[bus]] is made of.
+enum class BusKind : std::uint8_t {
+  kCan,
+  kEthercat,  ///< a line of slaves; a node's id is its place in the line, from 1 at the master
+};
+
 struct BusConfig {
   std::string name;
-  std::string interface;  ///< "can0": the SocketCAN name; unused in process
+  std::string interface;  ///< "can0", "eth1": unused in process
+  BusKind kind = BusKind::kCan;
   bool fd = true;
   std::int64_t bitrate = 1'000'000;
   std::int64_t data_bitrate = 8'000'000;

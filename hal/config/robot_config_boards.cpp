@@ -14,6 +14,8 @@ constexpr double kSheetBoot_s = 6.0;  // drives that need five are known
 
 BusConfig read_bus(TomlTable& table) {
   BusConfig bus;
+  const bool ethercat = table.choice_or("kind", "can", {"can", "ethercat"}) == "ethercat";
+  bus.kind = ethercat ? BusKind::kEthercat : BusKind::kCan;
   bus.fd = table.boolean_or("fd", true);
   bus.bitrate = table.integer_or("bitrate", bus.bitrate, 10'000, 1'000'000);
   bus.data_bitrate = table.integer_or("data_bitrate", bus.data_bitrate, 10'000, 12'000'000);

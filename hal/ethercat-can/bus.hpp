@@ -50,6 +50,10 @@ class Bus {
   /// @return how many; less than frames.size() means that nothing more is there.
   virtual std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT = 0;
   [[nodiscard]] virtual BusState state() const noexcept TANDEM_RT = 0;
+  /// Asks once more for what the cycle has not brought, where the wire can.
+  virtual void ask_again() noexcept TANDEM_RT {}
+  /// All that the nodes of this end say in a step has been sent.
+  virtual void end_step() noexcept TANDEM_RT {}
 
   /// When the frames of the last receive() reached this machine [ns, the clock of sent_ns()], in
   /// their order; empty when the bus does not know.

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "canopen/frame.hpp"
@@ -20,6 +21,12 @@ constexpr double kSdoEveryNs = 100e6;
 using Kind = BusLoadRow::Kind;
 using Nodes = std::vector<const NodePlan*>;
 
+constexpr std::int64_t kEthernetRate = 100'000'000;
+/// Of an Ethernet frame: preamble, addresses, type, header, a datagram's 12, check sum, gap.
+constexpr double kFrameOverhead = 8 + 14 + 2 + 12 + 4 + 12;
+constexpr double kDataPerFrame = 1400.0;  ///< of process data
+constexpr double kLeastData = 32.0;       ///< the shortest frame has 64 bytes
+
 FrameBits worst_of(std::size_t bytes) {
   const int length = canopen::frame_length(bytes);
   return worst_frame_bits(length, bytes > canopen::kClassicFrameBytes);
@@ -30,8 +37,10 @@ class Sum {
  public:
   Sum(const BusConfig& bus, std::int64_t period_ns) {
     load_.bus = bus.name;
+    load_.kind = bus.kind;
     load_.fd = bus.fd;
     load_.rates = {.nominal = bus.bitrate, .data = bus.data_bitrate};
+    if (bus.kind == BusKind::kEthercat) load_.rates = {kEthernetRate, kEthernetRate};
     load_.period_ns = period_ns;
     load_.max_load = bus.max_load;
   }
@@ -41,6 +50,14 @@ class Sum {
     row_.frames += per_cycle;
     row_.bits += per_cycle * (bits.nominal + bits.data);
     row_.time_us += per_cycle * static_cast<double>(duration_ns(bits, load_.rates)) * 1e-3;
+  }
+  /// Bytes in datagrams of EtherCAT frames.
+  void ethernet(std::size_t bytes, double per_cycle) {
+    const double frames = std::ceil(static_cast<double>(bytes) / kDataPerFrame);
+    const double all = std::max(static_cast<double>(bytes), kLeastData) + frames * kFrameOverhead;
+    row_.frames += per_cycle * frames;
+    row_.bits += per_cycle * 8.0 * all;
+    row_.time_us += per_cycle * 8.0 * all * 1e6 / kEthernetRate;
   }
   void row(std::string what, Kind kind) {
     row_.what = std::move(what);
@@ -67,7 +84,30 @@ class Sum {
   BusLoadRow row_;
 };
 
+/// A cycle's process data both ways, then the outputs by themselves.
+BusLoad load_of_line(const BusConfig& bus, const Nodes& nodes, std::int64_t period_ns) {
+  std::size_t outputs = 0;
+  std::size_t inputs = 0;
+  for (const NodePlan* node : nodes) {
+    for (const PdoPlan& pdo : node->pdos) {
+      const bool receive = pdo.direction == canopen::PdoDirection::kReceive;
+      (receive ? outputs : inputs) += pdo.bytes;
+    }
+  }
+  constexpr std::size_t kStateAndClock = 12 + 2 + 12 + 8;
+  constexpr std::size_t kMessage = 128 + 12;
+  Sum sum(bus, period_ns);
+  sum.ethernet(outputs + inputs + kStateAndClock, 1.0);
+  sum.row("process data", Kind::kUrgent);
+  sum.ethernet(outputs, 1.0);
+  sum.row("outputs", Kind::kUrgent);
+  sum.ethernet(nodes.size() * kMessage, static_cast<double>(period_ns) / kSdoEveryNs);
+  sum.row("messages, reserved", Kind::kMean);
+  return sum.load();
+}
+
 BusLoad load_of(const BusConfig& bus, const Nodes& nodes, std::int64_t period_ns) {
+  if (bus.kind == BusKind::kEthercat) return load_of_line(bus, nodes, period_ns);
   Sum sum(bus, period_ns);
   sum.frame(0, 1.0);
   sum.row("SYNC", Kind::kUrgent);
@@ -114,7 +154,7 @@ std::optional<std::int64_t> feasible_period(const BusConfig& bus, const Nodes& n
 std::optional<std::int64_t> feasible_data_rate(BusConfig bus, const Nodes& nodes,
                                                std::int64_t period_ns) {
   for (const std::int64_t rate : {2'000'000, 4'000'000, 5'000'000, 8'000'000}) {
-    if (!bus.fd || rate <= bus.data_bitrate) continue;
+    if (bus.kind != BusKind::kCan || !bus.fd || rate <= bus.data_bitrate) continue;
     bus.data_bitrate = rate;
     if (load_of(bus, nodes, period_ns).fits()) return rate;
   }
@@ -123,7 +163,7 @@ std::optional<std::int64_t> feasible_data_rate(BusConfig bus, const Nodes& nodes
 
 /// Whether the same nodes would do on CAN FD: their PDOs are laid out anew.
 bool feasible_as_fd(const RobotConfig& robot, std::size_t index, std::int64_t period_ns) {
-  if (robot.buses[index].fd) return false;
+  if (robot.buses[index].fd || robot.buses[index].kind != BusKind::kCan) return false;
   RobotConfig other = robot;
   other.buses[index].fd = true;
   const auto layout = make_pdo_layout(other);
@@ -184,8 +224,9 @@ std::string remedy_of(const RobotConfig& robot, std::size_t index, const Nodes& 
 std::string rates_text(const BusLoad& load) {
   const double nominal = static_cast<double>(load.rates.nominal) * 1e-6;
   const double data = static_cast<double>(load.rates.data) * 1e-6;
-  return load.fd ? fmt::format("CAN FD {:g}/{:g} Mbit/s", nominal, data)
-                 : fmt::format("classic CAN {:g} Mbit/s", nominal);
+  const bool two = load.kind == BusKind::kCan && load.fd;
+  return fmt::format("{} {:g}{} Mbit/s", wire_name(load.kind, load.fd), nominal,
+                     two ? fmt::format("/{:g}", data) : "");
 }
 
 /// "SYNC 55 + commands 540 + … = 1130 us of 1000 us".
@@ -201,6 +242,11 @@ std::string arithmetic(const BusLoad& load, bool urgent_only) {
 }
 
 }  // namespace
+
+std::string wire_name(BusKind kind, bool fd) {
+  if (kind == BusKind::kEthercat) return "EtherCAT";
+  return fd ? "CAN FD" : "classic CAN";
+}
 
 Result<std::vector<BusLoad>> bus_loads(const RobotConfig& robot, std::int64_t period_ns) {
   const auto layout = make_pdo_layout(robot);

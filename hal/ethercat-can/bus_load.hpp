@@ -29,6 +29,7 @@ struct BusLoadRow {
 /// One bus at one period.
 struct BusLoad {
   std::string bus;
+  BusKind kind = BusKind::kCan;
   bool fd = true;
   BitRates rates;
   std::int64_t period_ns = 0;
@@ -43,6 +44,9 @@ struct BusLoad {
   /// Whether a real bus carries it: what is urgent within the period, and the mean load.
   [[nodiscard]] bool fits() const { return urgent_us <= period_us() && load <= max_load; }
 };
+
+/// "CAN FD", "classic CAN", "EtherCAT".
+[[nodiscard]] std::string wire_name(BusKind kind, bool fd);
 
 /// Every [[bus]], in the configuration's order. docs/wire.md says what is counted.
 /// Errors: those of make_pdo_layout().

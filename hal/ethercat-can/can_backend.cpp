@@ -123,13 +123,19 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
       wait_->now_ns() + (config_.lockstep ? config_.lockstep_timeout_ns : window_ns);
   master_->cycle_begin(time);
   // One bus after the other, the last first: its answers come last, and the others' with them.
+  bool asked_again = false;  // of the bus that is waited for
   for (std::size_t waiting = buses_.size(); waiting > 0;) {
     buses_[waiting - 1]->collect(*master_);
     if (answered(waiting - 1)) {
       --waiting;
+      asked_again = false;
       continue;
     }
     const std::int64_t now_ns = wait_->now_ns();
+    if (!config_.lockstep && !asked_again && now_ns >= deadline_ns - window_ns / 2) {
+      buses_[waiting - 1]->bus().ask_again();
+      asked_again = true;
+    }
     if (now_ns >= deadline_ns) {
       silent_ = config_.lockstep;
       if (silent_) return;
@@ -139,7 +145,8 @@ void CanBackend::exchange(const CycleTime& time) noexcept {
     if (config_.lockstep && wait_->stopping()) {
       deadline_ns = std::min(deadline_ns, now_ns + kPatienceNs);
     }
-    wait_->wait(deadline_ns - now_ns, static_cast<int>(waiting - 1));
+    const bool half = !config_.lockstep && !asked_again;
+    wait_->wait(deadline_ns - now_ns - (half ? window_ns / 2 : 0), static_cast<int>(waiting - 1));
   }
 }
 

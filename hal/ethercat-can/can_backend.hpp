@@ -74,6 +74,7 @@ class CanBackend final : public Backend {
     [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
     [[nodiscard]] const DriveMaster::NodeSet& sampled() const noexcept { return sampled_; }
     void begin_cycle() noexcept;
+    [[nodiscard]] Bus& bus() noexcept { return *bus_; }
 
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
       return bus_->send(frames);

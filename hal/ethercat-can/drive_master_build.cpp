@@ -29,7 +29,8 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
 
 DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout)
     : plan(std::move(node_plan)),
-      master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps)),
+      master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps),
+             plan.start_time_ns),
       timeout_cycles(timeout),
       frames(plan.pdos.size()),
       sent(plan.pdos.size()) {
@@ -101,8 +102,9 @@ void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedFi
   }
   AxisMaster& axis = axes[node.plan.joints[field.axis]];
   if (pdo.direction == PdoDirection::kReceive) return axis.command_variable(field.field);
-  return pdo.group == PdoGroup::kSlowFeedback ? axis.slow_variable(field.field)
-                                              : axis.sample_variable(field.field);
+  return pdo.group == PdoGroup::kSlowFeedback || !is_sampled(field.field)
+             ? axis.slow_variable(field.field)
+             : axis.sample_variable(field.field);
 }
 
 void DriveMaster::Impl::compile_exchanges(Node& node) {

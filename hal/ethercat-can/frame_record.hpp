@@ -66,6 +66,8 @@ class FrameRecord {
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
     [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_.state(); }
+    void ask_again() noexcept TANDEM_RT override { bus_.ask_again(); }
+    void end_step() noexcept TANDEM_RT override { bus_.end_step(); }
     [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
       return bus_.received_ns();
     }

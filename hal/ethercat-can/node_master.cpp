@@ -36,10 +36,11 @@ bool is_interpolation_period(std::uint16_t index) noexcept {
 }  // namespace
 
 NodeMaster::NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, NodeWatch watch,
-                       std::vector<SdoStep> steps)
+                       std::vector<SdoStep> steps, std::int64_t start_time_ns)
     : id_(id),
       heartbeat_timeout_ns_(std::int64_t{kHeartbeatPeriods} * heartbeat_ms * 1'000'000),
       boot_time_ns_(boot_time_ns),
+      start_time_ns_(start_time_ns),
       watch_(watch),
       steps_(std::move(steps)),
       sdo_(id) {}
@@ -83,6 +84,8 @@ void NodeMaster::on_heartbeat(NmtState state, std::int64_t now_ns) noexcept TAND
   }
   if (stage_ == NodeStage::kStarting && state == NmtState::kOperational) {
     enter(NodeStage::kRunning, now_ns);
+  } else if (stage_ == NodeStage::kStarting && state == NmtState::kStopped) {
+    fail(NodeError::kNotOperational, now_ns);
   } else if (stage_ == NodeStage::kRunning && state != NmtState::kOperational) {
     fail(NodeError::kLeftOperational, now_ns);
   }
@@ -107,7 +110,7 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
       if (watch_ == NodeWatch::kNothing) return enter(NodeStage::kRunning, now_ns);
       guard(now_ns, out);
       watch_heartbeat(now_ns);
-      if (stage_ == NodeStage::kStarting && now_ns - since_ns_ >= kStartTimeoutNs) {
+      if (stage_ == NodeStage::kStarting && now_ns - since_ns_ >= start_time_ns_) {
         fail(NodeError::kNotOperational, now_ns);
       }
       return;

@@ -41,13 +41,13 @@ class NodeMaster {
  public:
   static constexpr std::int64_t kSdoAnswerNs = 500'000'000;
   static constexpr int kSdoTries = 3;
-  static constexpr std::int64_t kStartTimeoutNs = 1'000'000'000;
   static constexpr int kReboots = 3;
 
   /// @param boot_time_ns  from a reset to the node's boot-up at most; after it the node is reset
   ///                      once more, after twice the time it is given up
+  /// @param start_time_ns  from NMT start to operational at most
   NodeMaster(int id, int heartbeat_ms, std::int64_t boot_time_ns, NodeWatch watch,
-             std::vector<SdoStep> steps);
+             std::vector<SdoStep> steps, std::int64_t start_time_ns = 1'000'000'000);
 
   /// The values for the objects 60C2 (the period) and 2052 (the time-out; 0: none). Before the
   /// first restart().
@@ -90,6 +90,7 @@ class NodeMaster {
   int id_;
   std::int64_t heartbeat_timeout_ns_;
   std::int64_t boot_time_ns_;
+  std::int64_t start_time_ns_;
   NodeWatch watch_;
   std::vector<SdoStep> steps_;
 

@@ -17,6 +17,9 @@ namespace {
 namespace object = canopen::object;
 using canopen::PdoDirection;
 
+/// How long a slave's clock may take to come near the reference, and its way to OP.
+constexpr std::int64_t kSlaveStartNs = 15'000'000'000;
+
 // In the order in which they are packed.
 constexpr std::array kCommandBlock{WireField::kControlword, WireField::kMode,
                                    WireField::kTargetPosition, WireField::kVelocityOffset,
@@ -31,6 +34,15 @@ constexpr std::array kShortCommands{WireField::kControlword, WireField::kTargetP
 constexpr std::array kShortFeedback{WireField::kStatusword, WireField::kPosition,
                                     WireField::kTorque, WireField::kVelocity,
                                     WireField::kMotorPosition};
+// The same in one PDO of an axis.
+constexpr std::array kAllCommands{
+    WireField::kControlword,    WireField::kMode,         WireField::kTargetPosition,
+    WireField::kVelocityOffset, WireField::kTorqueOffset, WireField::kTargetVoltage,
+    WireField::kTargetCurrent,  WireField::kStiffness,    WireField::kDamping};
+constexpr std::array kAllFeedback{
+    WireField::kStatusword,    WireField::kPosition,      WireField::kVelocity, WireField::kTorque,
+    WireField::kMotorPosition, WireField::kMotorVelocity, WireField::kCurrent,  WireField::kVoltage,
+    WireField::kTemperature,   WireField::kModeDisplay,   WireField::kErrorCode};
 constexpr std::array kSlowCommands{WireField::kTargetVoltage, WireField::kTargetCurrent,
                                    WireField::kStiffness, WireField::kDamping};
 constexpr std::array kSlowFeedback{WireField::kMotorVelocity, WireField::kCurrent,
@@ -74,6 +86,8 @@ Result<const BusConfig*> attach(const RobotConfig& robot, const std::string& nam
                                       "name one of the [[bus]] tables"));
   }
   node.bus = static_cast<std::size_t>(bus - robot.buses.data());
+  node.ethercat = bus->kind == BusKind::kEthercat;
+  if (node.ethercat) node.start_time_ns = kSlaveStartNs;
   return bus;
 }
 
@@ -146,29 +160,46 @@ Status too_narrow(const RobotConfig& robot, const NodePlan& node, bool fd) {
           ")"));
 }
 
+/// Errors: a direction's PDOs that can be mapped do not take all that has to be in them.
+Status pack(const RobotConfig& robot, const BoardConfig& board, BoardPacker::Spread spread,
+            NodePlan& node) {
+  using enum BoardPacker::Spread;
+  const canopen::DataSheet& sheet = *board.sheet;
+  const bool fill = spread == kFill;
+  const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
+  BoardPacker receive(node, sheet, PdoDirection::kReceive, spread);
+  receive.add(PdoGroup::kCommand, canopen::kEverySync,
+              fill              ? std::span<const WireField>(kShortCommands)
+              : spread == kEach ? std::span<const WireField>(kAllCommands)
+                                : std::span<const WireField>(kCommandBlock));
+  if (spread != kEach) receive.add(PdoGroup::kSlowCommand, canopen::kEverySync, kSlowCommands);
+  if (receive.has_mappable() && !receive.left().empty()) return too_narrow(robot, node, !fill);
+  receive.use_fixed(PdoGroup::kCommand);
+  BoardPacker transmit(node, sheet, PdoDirection::kTransmit, spread);
+  transmit.add(PdoGroup::kFeedback, canopen::kEverySync,
+               fill              ? std::span<const WireField>(kShortFeedback)
+               : spread == kEach ? std::span<const WireField>(kAllFeedback)
+                                 : std::span<const WireField>(kFeedbackBlock));
+  if (transmit.has_mappable() && !transmit.left().empty()) return too_narrow(robot, node, !fill);
+  if (spread != kEach) transmit.add(PdoGroup::kSlowFeedback, slow, kSlowFeedback);
+  transmit.use_fixed(PdoGroup::kFeedback);
+  return {};
+}
+
 Status pack_board(const RobotConfig& robot, const BoardConfig& board, bool fd, NodePlan& node) {
   using enum canopen::Access;
+  using enum BoardPacker::Spread;
   const canopen::DataSheet& sheet = *board.sheet;
-  const auto slow = static_cast<std::uint8_t>(std::clamp(board.slow_pdo_every, 1, 240));
-  BoardPacker receive(node, sheet, PdoDirection::kReceive, fd);
-  receive.add(PdoGroup::kCommand, canopen::kEverySync,
-              fd ? std::span(kCommandBlock) : std::span(kShortCommands));
-  receive.add(PdoGroup::kSlowCommand, canopen::kEverySync, kSlowCommands);
-  if (receive.has_mappable() && !receive.left().empty()) return too_narrow(robot, node, fd);
-  receive.use_fixed(PdoGroup::kCommand);
-  BoardPacker transmit(node, sheet, PdoDirection::kTransmit, fd);
-  transmit.add(PdoGroup::kFeedback, canopen::kEverySync,
-               fd ? std::span(kFeedbackBlock) : std::span(kShortFeedback));
-  if (transmit.has_mappable() && !transmit.left().empty()) return too_narrow(robot, node, fd);
-  transmit.add(PdoGroup::kSlowFeedback, slow, kSlowFeedback);
-  transmit.use_fixed(PdoGroup::kFeedback);
+  const BoardPacker::Spread spread = !fd ? kFill : node.ethercat ? kEach : kTogether;
+  if (Status packed = pack(robot, board, spread, node); !packed) return packed;
   if (!fd) number_parts(node);
   const auto type = canopen::DataType::kUnsigned8;
   if (canopen::mappable(sheet, object::kCycleCounter, 0, type, kMapRpdo)) {
     add_counter(node, PdoGroup::kCommand, WireField::kCycleCounter, fd);
-    add_counter(node, PdoGroup::kSlowFeedback, WireField::kCycleEcho, fd);
+    add_counter(node, spread == kEach ? PdoGroup::kFeedback : PdoGroup::kSlowFeedback,
+                WireField::kCycleEcho, fd);
   }
-  node.watch = watch_of(sheet);
+  node.watch = node.ethercat ? NodeWatch::kHeartbeat : watch_of(sheet);
   node.boot_time_ns = board.boot_time_ns;
   return check_drive(robot, node, sheet);
 }
@@ -239,6 +270,12 @@ Result<NodePlan> plan_sensor(const RobotConfig& robot, std::size_t index) {
 }
 
 }  // namespace
+
+std::uint16_t mapping_object(const PdoPlan& pdo) noexcept {
+  const bool receive = pdo.direction == PdoDirection::kReceive;
+  return static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) +
+                                    pdo.number - 1);
+}
 
 bool NodePlan::carries(std::size_t axis, WireField field) const {
   return std::ranges::any_of(pdos, [&](const PdoPlan& pdo) {

@@ -46,6 +46,11 @@ enum class WireField : std::uint8_t {
   kSensorChannel,
 };
 
+/// Whether the field is a part of a sample; one that is not counts when it comes.
+[[nodiscard]] constexpr bool is_sampled(WireField field) noexcept {
+  return field <= WireField::kMotorPosition || field == WireField::kSensorChannel;
+}
+
 /// When a PDO is sent.
 enum class PdoGroup : std::uint8_t { kCommand, kSlowCommand, kFeedback, kSlowFeedback, kSensor };
 
@@ -81,10 +86,14 @@ struct PdoPlan {
   std::vector<MappedField> fields;
 };
 
+/// The object that a PDO's mapping is: 1600, 1A00 and on.
+[[nodiscard]] std::uint16_t mapping_object(const PdoPlan& pdo) noexcept;
+
 /// One node: a board with its axes, or a sensor.
 struct NodePlan {
-  std::string name;     ///< of the board or the sensor
-  std::size_t bus = 0;  ///< index in RobotConfig::buses
+  std::string name;       ///< of the board or the sensor
+  std::size_t bus = 0;    ///< index in RobotConfig::buses
+  bool ethercat = false;  ///< its bus is a line of slaves
   int id = 0;
   int heartbeat_ms = 50;
   int board = -1;                     ///< index in RobotConfig::boards; -1: a sensor
@@ -95,7 +104,8 @@ struct NodePlan {
   std::vector<PdoPlan> unused{};  ///< in use from power-on: bring-up switches them off
   /// By axis: what its sheet offers.
   std::vector<canopen::DriveAbilities> abilities{};
-  std::int64_t boot_time_ns = 1'500'000'000;  ///< from a reset to its boot-up, at most
+  std::int64_t boot_time_ns = 1'500'000'000;   ///< from a reset to its boot-up, at most
+  std::int64_t start_time_ns = 1'000'000'000;  ///< from NMT start to operational, at most
   NodeWatch watch = NodeWatch::kHeartbeat;
 
   /// Whether a PDO has this field of an axis.
@@ -111,7 +121,8 @@ struct PdoLayout {
 /// board's fields are those that its sheet has objects for, in the PDOs that the sheet offers.
 ///
 /// On CAN FD an axis' block stays whole, and blocks follow one another in frames of at most 64
-/// bytes. In frames of eight bytes the fields fill one PDO after the other; one axis of our own
+/// bytes. On EtherCAT an axis has one PDO each way, with all of its fields in it. In frames of
+/// eight bytes the fields fill one PDO after the other; one axis of our own
 /// boards takes all eight PDOs, two of them for each sample. Where a PDO's mapping cannot be
 /// written, it is used as it is.
 /// Errors: axes of a board with gaps, more axes or channels than a node's PDOs can carry on its

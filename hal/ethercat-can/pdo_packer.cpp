@@ -109,11 +109,12 @@ PdoPlan PdoPacker::plan(const PdoSlot& slot) const {
 }
 
 BoardPacker::BoardPacker(NodePlan& node, const canopen::DataSheet& sheet, PdoDirection direction,
-                         bool fd)
+                         Spread spread)
     : node_(node),
       sheet_(sheet),
-      blocks_(fd),
-      packer_(node, direction, most_bytes(fd), pdo_slots(sheet, direction, node.id)) {}
+      spread_(spread),
+      packer_(node, direction, most_bytes(spread != Spread::kFill),
+              pdo_slots(sheet, direction, node.id)) {}
 
 void BoardPacker::add(PdoGroup group, std::uint8_t transmission,
                       std::span<const WireField> fields) {
@@ -126,11 +127,12 @@ void BoardPacker::add(PdoGroup group, std::uint8_t transmission,
       block.push_back(*found);
       known_.push_back(*found);
     }
-    if (blocks_) {
-      pack(block);
-    } else {
+    if (spread_ == Spread::kFill) {
       for (const MappedField& field : block) pack({&field, 1});
+      continue;
     }
+    if (spread_ == Spread::kEach) packer_.begin(group, transmission);
+    pack(block);
   }
 }
 

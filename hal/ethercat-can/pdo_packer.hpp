@@ -57,9 +57,14 @@ class PdoPacker {
 /// Packs the fields of a board's axes in one direction, as far as its sheet has objects for them.
 class BoardPacker {
  public:
-  /// @param fd  an axis' fields stay together in one PDO; else they fill one after the other
+  /// How an axis' fields are spread over PDOs.
+  enum class Spread : std::uint8_t {
+    kFill,      ///< one PDO of eight bytes after the other
+    kTogether,  ///< they stay together, and PDOs of up to 64 bytes take several axes
+    kEach,      ///< each axis has a PDO of its own
+  };
   BoardPacker(NodePlan& node, const canopen::DataSheet& sheet, canopen::PdoDirection direction,
-              bool fd);
+              Spread spread);
 
   void add(PdoGroup group, std::uint8_t transmission, std::span<const WireField> fields);
   /// PDOs whose mapping stays as it is take what found no place, first the one that takes the most.
@@ -79,7 +84,7 @@ class BoardPacker {
 
   NodePlan& node_;
   const canopen::DataSheet& sheet_;
-  bool blocks_;
+  Spread spread_;
   PdoPacker packer_;
   std::vector<MappedField> known_;  ///< all that the drive has objects for
   std::vector<MappedField> left_;   ///< of them, what is in no PDO yet

@@ -47,7 +47,37 @@ void add_sensor_identity(Steps& steps) {
   add_check(steps, object::kIdentity, kProduct, kSensorProduct);
 }
 
-/// CiA 301's procedure: out of use, no entries, the entries, their number, in use.
+/// No entries, the entries, their number.
+void add_mapping(Steps& steps, const PdoPlan& pdo) {
+  if (!pdo.mapping_written) return;
+  const std::uint16_t mapping = mapping_object(pdo);
+  steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
+  std::uint8_t count = 0;
+  for (const MappedField& field : pdo.fields) {
+    steps.push_back(
+        write_step(mapping, ++count, mapping_entry(field.index, field.sub, field.size)));
+  }
+  steps.push_back(write_step(mapping, 0, count));
+}
+
+/// EtherCAT: mappings, then which PDOs are the process data, in their order.
+void add_process_data(Steps& steps, const NodePlan& node) {
+  constexpr std::uint16_t kAssignOutputs = 0x1C12;
+  constexpr std::uint16_t kAssignInputs = 0x1C13;
+  for (const PdoDirection direction : {PdoDirection::kReceive, PdoDirection::kTransmit}) {
+    const auto assignment = direction == PdoDirection::kReceive ? kAssignOutputs : kAssignInputs;
+    steps.push_back(write_step(assignment, 0, std::uint8_t{0}));
+    std::uint8_t count = 0;
+    for (const PdoPlan& pdo : node.pdos) {
+      if (pdo.direction != direction) continue;
+      add_mapping(steps, pdo);
+      steps.push_back(write_step(assignment, ++count, mapping_object(pdo)));
+    }
+    steps.push_back(write_step(assignment, 0, count));
+  }
+}
+
+/// CiA 301's procedure: out of use, the mapping, in use.
 ///
 /// @param sheet  of the board, or null: a sensor of ours
 void add_pdo(Steps& steps, const PdoPlan& pdo, const DataSheet* sheet) {
@@ -55,20 +85,10 @@ void add_pdo(Steps& steps, const PdoPlan& pdo, const DataSheet* sheet) {
   const auto offset = static_cast<std::uint16_t>(pdo.number - 1);
   const auto parameter = static_cast<std::uint16_t>(
       (receive ? object::kRpdoParameter : object::kTpdoParameter) + offset);
-  const auto mapping =
-      static_cast<std::uint16_t>((receive ? object::kRpdoMapping : object::kTpdoMapping) + offset);
   // Nobody asks for a TPDO by a remote request: it would come beside the cycle.
   const std::uint32_t cob_id = receive ? pdo.cob_id : pdo.cob_id | cob::kNoRtr;
   if (pdo.id_written) steps.push_back(write_step(parameter, kPdoCobId, cob_id | cob::kInvalid));
-  if (pdo.mapping_written) {
-    steps.push_back(write_step(mapping, 0, std::uint8_t{0}));
-    std::uint8_t count = 0;
-    for (const MappedField& field : pdo.fields) {
-      steps.push_back(
-          write_step(mapping, ++count, mapping_entry(field.index, field.sub, field.size)));
-    }
-    steps.push_back(write_step(mapping, 0, count));
-  }
+  add_mapping(steps, pdo);
   if (pdo.type_written) steps.push_back(write_step(parameter, kPdoType, pdo.transmission));
   // An inhibit time or an event timer from power-on would hold answers to SYNC back or add others.
   for (const PdoParameterSub sub : {kPdoInhibit, kPdoEvent}) {
@@ -254,8 +274,12 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   } else {
     add_sensor_identity(steps);
   }
-  for (const PdoPlan& pdo : node.unused) switch_off(steps, pdo);
-  for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo, sheet);
+  if (node.ethercat) {
+    add_process_data(steps, node);
+  } else {
+    for (const PdoPlan& pdo : node.unused) switch_off(steps, pdo);
+    for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo, sheet);
+  }
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
   const auto takes = [&](std::uint16_t index, std::uint8_t sub) {
     return sheet == nullptr || writable(*sheet, index, sub);
@@ -263,6 +287,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   if (sheet != nullptr && offered(*sheet, object::kSyncTimeout, 0, DataType::kUnsigned32)) {
     steps.push_back(write_step(object::kSyncTimeout, 0, std::uint32_t{0}));
   }
+  if (node.ethercat) return steps;  // its state is watched, and its process data's watchdog
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
   if (node.watch == NodeWatch::kGuarding) {
     steps.push_back(

@@ -265,13 +265,24 @@ void SocketCanBus::discard_waiting() noexcept {
 
 // ---- Waiting
 
+int waiting_socket(const SocketCanBus& bus) noexcept {
+  const BusState state = bus.state();
+  const bool away = state == BusState::kDown || state == BusState::kGone;
+  return away ? -1 : bus.descriptor();
+}
+
 bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t at_most_ns) noexcept {
-  std::array<pollfd, kMaxBuses> waits;
+  std::array<int, kMaxBuses> sockets;
   const std::size_t count = std::min(buses.size(), kMaxBuses);
+  for (std::size_t i = 0; i < count; ++i) sockets[i] = waiting_socket(*buses[i]);
+  return wait_for_frames(std::span<const int>(sockets).first(count), at_most_ns);
+}
+
+bool wait_for_frames(std::span<const int> sockets, std::int64_t at_most_ns) noexcept {
+  std::array<pollfd, kMaxBuses> waits;
+  const std::size_t count = std::min(sockets.size(), kMaxBuses);
   for (std::size_t i = 0; i < count; ++i) {
-    const BusState state = buses[i]->state();
-    const bool away = state == BusState::kDown || state == BusState::kGone;
-    waits[i] = {.fd = away ? -1 : buses[i]->descriptor(), .events = POLLIN, .revents = 0};
+    waits[i] = {.fd = sockets[i], .events = POLLIN, .revents = 0};
   }
   const std::int64_t rest_ns = std::max<std::int64_t>(0, at_most_ns);
   const timespec rest{.tv_sec = rest_ns / kSecondNs, .tv_nsec = rest_ns % kSecondNs};

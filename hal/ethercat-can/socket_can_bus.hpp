@@ -145,5 +145,9 @@ inline constexpr std::size_t kMaxBuses = 32;
 /// @pre buses.size() <= kMaxBuses
 /// @rt blocks; no allocation; one system call
 bool wait_for_frames(std::span<SocketCanBus* const> buses, std::int64_t at_most_ns) noexcept;
+/// The same on sockets; -1: one that is not waited for.
+bool wait_for_frames(std::span<const int> sockets, std::int64_t at_most_ns) noexcept;
+/// What to wait on for a bus: -1 while its interface is away, or frames can never come.
+[[nodiscard]] int waiting_socket(const SocketCanBus& bus) noexcept;
 
 }  // namespace tandem::hal::can

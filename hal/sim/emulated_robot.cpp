@@ -229,6 +229,19 @@ Code EmulatedRobot::step(std::int64_t time_ns) noexcept TANDEM_RT {
   return Code::kOk;
 }
 
+std::vector<EmulatedRobot::Node> EmulatedRobot::nodes(std::size_t bus) {
+  std::vector<Node> all;
+  for (const std::size_t b : attached_[bus].boards) {
+    firmware::Board& board = *boards_[b].board;
+    all.push_back({board.name(), board.node_id(), &board.dictionary(), &boards_[b].powered});
+  }
+  for (const std::size_t s : attached_[bus].sensors) {
+    firmware::SensorBoard& board = *sensor_nodes_[s].board;
+    all.push_back({board.name(), board.node_id(), &board.dictionary(), &sensor_nodes_[s].powered});
+  }
+  return all;
+}
+
 bool EmulatedRobot::all_enabled() const noexcept {
   return std::ranges::all_of(boards_, [](const BoardNode& node) {
     for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {

@@ -111,6 +111,17 @@ class EmulatedRobot {
   /// True when every axis of every board is in Operation Enabled.
   [[nodiscard]] bool all_enabled() const noexcept;
 
+  /// A board or sensor, for who emulates another wire before its firmware. In place while the robot
+  /// lives.
+  struct Node {
+    std::string name;
+    int id = 0;
+    canopen::ObjectDictionary* dictionary = nullptr;
+    const std::uint8_t* powered = nullptr;
+  };
+  /// Those of a bus.
+  [[nodiscard]] std::vector<Node> nodes(std::size_t bus);
+
   [[nodiscard]] std::size_t boards() const noexcept { return boards_.size(); }
   /// The bus that a board is on.
   [[nodiscard]] std::size_t bus_of(std::size_t board) const noexcept { return boards_[board].bus; }

@@ -141,6 +141,7 @@ void Emulator::answer() noexcept {
       statistics_.frames_lost += all - sent;
       if (count < room) break;
     } while (true);
+    out.end_step();
   }
 }
 

@@ -14,18 +14,40 @@ Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot
   auto emulated = EmulatedRobot::create(robot, kernels, config);
   if (!emulated) return std::unexpected(emulated.error());
   std::vector<hal::can::Bus*> ends;
+  std::vector<Line> lines;
   for (std::size_t b = 0; b < (*emulated)->buses(); ++b) {
-    ends.push_back(&(*emulated)->bus(b).master());
+    if (robot.buses[b].kind != hal::BusKind::kEthercat) {
+      ends.push_back(&(*emulated)->bus(b).master());
+      continue;
+    }
+    auto line = make_line(robot, **emulated, b, config);
+    if (!line) return std::unexpected(line.error());
+    ends.push_back(line->master.get());
+    lines.push_back(std::move(*line));
   }
   auto master = hal::can::DriveMaster::create(robot, ends);
   if (!master) return std::unexpected(master.error());
   return std::unique_ptr<SimRobot>(
-      new SimRobot(std::move(*emulated), std::move(*master), config.truth));
+      new SimRobot(std::move(*emulated), std::move(lines), std::move(*master), config.truth));
 }
 
-SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
+Result<SimRobot::Line> SimRobot::make_line(const hal::RobotConfig& robot, EmulatedRobot& emulated,
+                                           std::size_t bus, const SimRobotConfig& config) {
+  Line line{.bus = bus, .cable = std::make_unique<hal::ecat::LoopbackLink>()};
+  auto master = hal::can::LineBus::create(robot, bus, line.cable->master(),
+                                          {.period_ns = config.period_ns, .lockstep = true});
+  if (!master) return std::unexpected(master.error());
+  line.master = std::move(*master);
+  line.boards = std::make_unique<LineBoards>(
+      emulated, bus, line.cable->slaves(),
+      LineBoards::Config{.period_ns = config.period_ns, .seed = config.seed});
+  return line;
+}
+
+SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot, std::vector<Line> lines,
                    std::unique_ptr<hal::can::DriveMaster> master, bool keep_truth)
     : robot_(std::move(robot)),
+      lines_(std::move(lines)),
       master_(std::move(master)),
       truth_filler_(robot_->plant()),
       truth_(robot_->plant().joints(), robot_->plant().contact().feet(),
@@ -50,7 +72,9 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   }
   master_->cycle_begin(time);
   hook_(SimStage::kMasterSync);
+  to_boards();
   if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
+  to_master();
   const Code code = master_->receive(state);
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
@@ -58,6 +82,29 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
   hook_(SimStage::kTruth);
   return code;
+}
+
+/// What a line's slaves have heard.
+void SimRobot::to_boards() noexcept {
+  for (Line& line : lines_) {
+    hal::can::Bus& bus = robot_->bus(line.bus).master();
+    for (std::size_t count = passing_.size(); count == passing_.size();) {
+      count = line.boards->receive(passing_);
+      (void)bus.send(std::span(passing_).first(count));
+    }
+  }
+}
+
+/// What the boards of a line have to say.
+void SimRobot::to_master() noexcept {
+  for (Line& line : lines_) {
+    hal::can::Bus& bus = robot_->bus(line.bus).master();
+    for (std::size_t count = passing_.size(); count == passing_.size();) {
+      count = bus.receive(passing_);
+      (void)line.boards->send(std::span(passing_).first(count));
+    }
+    line.boards->end_step();
+  }
 }
 
 Code SimRobot::write(const hal::CommandImage& command,
@@ -79,6 +126,7 @@ hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
 }
 
 bool SimRobot::archive(Archive& ar) {
+  if (!lines_.empty()) return false;  // what a line's master knows is not archived
   ar(*robot_, truth_, *master_);
   return true;
 }

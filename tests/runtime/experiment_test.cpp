@@ -166,7 +166,7 @@ foot = "wrist_ft")"),
   EXPECT_EQ(e->seed, 7u);
   EXPECT_EQ(e->cycles(), 1250u);
   EXPECT_EQ(e->kernel_variant, "baseline");
-  EXPECT_EQ(e->hal.backend, BackendKind::kCan);
+  EXPECT_EQ(e->hal.backend, BackendKind::kWire);
   EXPECT_TRUE(e->hal.lockstep);
   EXPECT_EQ(e->hal.answer_window, 0.7);
   EXPECT_EQ(e->settle_cycles(), 2u);

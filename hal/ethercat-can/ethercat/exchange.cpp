@@ -97,4 +97,9 @@ void Exchange::collect(FrameBatch& batch, std::int64_t now_ns) noexcept TANDEM_R
   }
 }
 
+bool Exchange::under_way() const noexcept TANDEM_RT {
+  return std::ranges::any_of(
+      requests_, [](const Request& request) { return request.state == Request::State::kSent; });
+}
+
 }  // namespace tandem::hal::ecat

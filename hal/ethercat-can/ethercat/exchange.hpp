@@ -99,6 +99,8 @@ class Exchange {
   void age(std::int64_t now_ns) noexcept TANDEM_RT;
   /// Adds what is wanted, as far as it fits.
   void collect(FrameBatch& batch, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Whether a datagram was sent that has neither come back nor been given up.
+  [[nodiscard]] bool under_way() const noexcept TANDEM_RT;
   /// Datagrams that were sent again.
   [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }
 

@@ -112,6 +112,10 @@ void LineMaster::take_frame(FrameBuffer& frame) noexcept {
 
 bool LineMaster::take_own(const ethercat::Datagram& datagram) noexcept {
   if (datagram.index() != index_) return false;
+  if (datagram.command() == Command::kLwr && writes_ > 0) {
+    --writes_;
+    return true;
+  }
   if (datagram.command() == Command::kLrw) return image_.take(datagram);
   if (datagram.command() == Command::kFrmw && datagram.data().size() == 8) {
     if (datagram.working_counter() == 0 || !reference_.set) return true;
@@ -169,6 +173,7 @@ void LineMaster::send(std::int64_t now_ns) noexcept TANDEM_RT {
   }
   index_ = static_cast<std::uint8_t>(kFirstCyclicIndex + (index_ + 1) % Exchange::kIndices);
   watch_back_ = false;
+  writes_ = 0;
   image_.begin(index_, slaves_);
   batch_.begin(link_->address());
   if (reference_.set) {
@@ -180,6 +185,29 @@ void LineMaster::send(std::int64_t now_ns) noexcept TANDEM_RT {
   exchange_.collect(batch_, now_ns);
   (void)link_->send(batch_.finish());
   sent_ = true;
+}
+
+void LineMaster::write() noexcept TANDEM_RT {
+  if (!sent_ || writes_ != 0) return;
+  batch_.begin(link_->address());
+  writes_ = image_.write(batch_);
+  (void)link_->send(batch_.finish());
+}
+
+void LineMaster::stop() noexcept TANDEM_RT {
+  constexpr std::array<std::uint8_t, 2> kInit{
+      std::uint8_t{std::to_underlying(ethercat::AlState::kInit) | ethercat::kAlError}, 0};
+  if (!sent_) return;
+  batch_.begin(link_->address());
+  const auto data =
+      batch_.add(Command::kBwr, index_, register_address(0, reg::kAlControl), kInit.size());
+  std::ranges::copy(kInit, data.begin());
+  (void)link_->send(batch_.finish());
+  scan_ = Scan::kIdle;
+}
+
+bool LineMaster::settled() const noexcept {
+  return watch_back_ && image_.complete() && writes_ == 0 && !exchange_.under_way();
 }
 
 void LineMaster::scan(std::int64_t now_ns) noexcept {
@@ -243,6 +271,7 @@ void LineMaster::run_clocks(std::int64_t now_ns) noexcept {
   if (latching_) return;
   bool waits = false;
   for (const SlaveMaster& slave : slaves_) {
+    if (slave.waiting()) continue;
     if (slave.stage() < SlaveStage::kWaitClock || slave.stage() == SlaveStage::kClock) return;
     waits |= slave.stage() == SlaveStage::kWaitClock;
   }

@@ -48,6 +48,9 @@ struct LineStatistics {
 
 /// One cycle: receive(t); inputs are read and outputs written; send(t). Never blocks. Process data
 /// is exchanged from the scan on, long before OP is asked for.
+///
+/// Where the slaves' SYNC0 comes just before send(), outputs would wait for the SYNC0 after the
+/// next. write() sends them within the cycle that computed them.
 class LineMaster {
  public:
   static constexpr std::int64_t kScanTimeNs = 5'000'000'000;
@@ -74,6 +77,13 @@ class LineMaster {
   std::size_t resend() noexcept TANDEM_RT;
   /// Sends the next cycle, and what the slaves' start and transfers want.
   void send(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Sends the outputs by themselves, at most once after each send(). A lost one is made up for by
+  /// the next cycle.
+  void write() noexcept TANDEM_RT;
+  /// Asks every slave to go to INIT, with its outputs off. Once, at the end.
+  void stop() noexcept TANDEM_RT;
+  /// Whether nothing that was sent is under way any more.
+  [[nodiscard]] bool settled() const noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return slaves_.size(); }
   [[nodiscard]] SlaveMaster& slave(std::size_t position) noexcept { return slaves_[position]; }
@@ -131,6 +141,7 @@ class LineMaster {
 
   std::uint8_t index_ = 0;
   bool sent_ = false;
+  std::size_t writes_ = 0;  ///< of outputs by themselves, under way
   bool watch_back_ = false;
   std::uint8_t states_ = 0;  ///< of all slaves, ORed
   CycleReport cycle_;

@@ -29,6 +29,7 @@ ProcessImage::ProcessImage(const std::vector<SlavePlan>& plans) {
       mappings_[i].outputs_at = static_cast<std::uint32_t>(at);
       at += mappings_[i].outputs;
     }
+    group.outputs = at - group.begin;
     for (std::size_t i = group.first; i < group.last; ++i) {
       mappings_[i].inputs_at = static_cast<std::uint32_t>(at);
       at += mappings_[i].inputs;
@@ -71,6 +72,20 @@ void ProcessImage::send(FrameBatch& batch) noexcept TANDEM_RT {
     if (data.empty()) return;
     std::copy_n(out_.begin() + static_cast<std::ptrdiff_t>(group.begin), group.bytes, data.begin());
   }
+}
+
+std::size_t ProcessImage::write(FrameBatch& batch) noexcept TANDEM_RT {
+  std::size_t datagrams = 0;
+  for (const Group& group : groups_) {
+    if (group.outputs == 0) continue;
+    const std::span<std::uint8_t> data = batch.add(
+        ethercat::Command::kLwr, index_, static_cast<std::uint32_t>(group.begin), group.outputs);
+    if (data.empty()) break;
+    std::copy_n(out_.begin() + static_cast<std::ptrdiff_t>(group.begin), group.outputs,
+                data.begin());
+    ++datagrams;
+  }
+  return datagrams;
 }
 
 bool ProcessImage::take(const ethercat::Datagram& datagram) noexcept TANDEM_RT {

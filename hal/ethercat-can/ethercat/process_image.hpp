@@ -31,6 +31,8 @@ class ProcessImage {
   void begin(std::uint8_t index, std::span<const SlaveMaster> slaves) noexcept TANDEM_RT;
   /// Adds the datagrams of this cycle that have not come back.
   void send(FrameBatch& batch) noexcept TANDEM_RT;
+  /// Adds the outputs of every group by themselves. @return datagrams
+  [[nodiscard]] std::size_t write(FrameBatch& batch) noexcept TANDEM_RT;
   /// Takes a datagram of this cycle.
   /// @return false when it is none, or has come already
   bool take(const ethercat::Datagram& datagram) noexcept TANDEM_RT;
@@ -46,6 +48,7 @@ class ProcessImage {
     std::size_t first = 0, last = 0;  ///< slaves [first, last)
     std::size_t begin = 0;            ///< bytes of the image
     std::size_t bytes = 0;
+    std::size_t outputs = 0;  ///< of them; they come first
     std::uint16_t counter = 0;
     std::uint16_t expected = 0;
     bool back = false;

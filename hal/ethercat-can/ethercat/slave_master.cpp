@@ -36,7 +36,7 @@ SlaveMaster::SlaveMaster(const SlavePlan& plan, std::size_t position, const Slav
 
 void SlaveMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   error_ = SlaveError::kNone;
-  look_wanted_ = difference_wanted_ = is_reference_ = false;
+  look_wanted_ = difference_wanted_ = is_reference_ = goes_on_ = false;
   difference_ns_ = 0;
   enter(SlaveStage::kReset, now_ns);
   wanted_ = AlState::kInit;
@@ -184,7 +184,8 @@ void SlaveMaster::read_sii_end(std::int64_t now_ns) noexcept {
   };
   const bool coe = (content_.protocols & sii::kProtocolCoe) != 0 && usable(box.out_bytes) &&
                    usable(box.in_bytes);
-  if (!coe && !steps_.empty()) return fail(SlaveError::kNoMailbox, now_ns);
+  const bool asked = plan_.waits_in_preop || !steps_.empty();
+  if (!coe && asked) return fail(SlaveError::kNoMailbox, now_ns);
   if (!find_memory()) return fail(SlaveError::kNoMemory, now_ns);
   coe_.reset(station_, box);
   enter_state(SlaveStage::kPreOp, AlState::kPreOp, now_ns);
@@ -214,6 +215,7 @@ void SlaveMaster::take_state(Data data, std::int64_t now_ns, SlaveStage next) no
 }
 
 void SlaveMaster::configure(std::int64_t now_ns, Exchange& exchange) noexcept {
+  if (waiting()) return coe_.process(now_ns, exchange, position_);
   const bool at_start = stage_ == SlaveStage::kConfigure;
   if (at_start && step_ == steps_.size()) return enter(SlaveStage::kProcessData, now_ns);
   if (at_start && !started_step_) {

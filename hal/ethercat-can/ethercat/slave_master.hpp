@@ -87,6 +87,12 @@ class SlaveMaster {
                ClockReference& reference) noexcept TANDEM_RT;
   /// The frame whose time stamps it waited for has passed. @pre stage() == kWaitClock
   void clocks_latched(std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Whether it is in PREOP as its plan says, for transfers by sdo().
+  [[nodiscard]] bool waiting() const noexcept {
+    return stage_ == SlaveStage::kConfigure && plan_.waits_in_preop && !goes_on_;
+  }
+  /// Its PDOs are mapped: it may leave PREOP. @pre waiting()
+  void go_on() noexcept TANDEM_RT { goes_on_ = true; }
   /// Lets it go to OP. @pre stage() == kReady, and its process data is exchanged every cycle
   void start(std::int64_t now_ns) noexcept TANDEM_RT;
   void fail(SlaveError error, std::int64_t now_ns) noexcept TANDEM_RT;
@@ -95,7 +101,7 @@ class SlaveMaster {
   /// Reads how far its clock is off, when it has nothing else to do.
   void ask_difference() noexcept TANDEM_RT { difference_wanted_ = has_clock_; }
 
-  /// For transfers at run time. @pre stage() == kReady or kRunning
+  /// For transfers of others. @pre waiting(), or stage() == kReady or kRunning
   [[nodiscard]] CoeClient& sdo() noexcept { return coe_; }
   [[nodiscard]] SlaveStage stage() const noexcept { return stage_; }
   [[nodiscard]] bool running() const noexcept { return stage_ == SlaveStage::kRunning; }
@@ -164,6 +170,7 @@ class SlaveMaster {
   bool look_wanted_ = false;
   bool difference_wanted_ = false;
   bool started_step_ = false;
+  bool goes_on_ = false;
   ethercat::AlState wanted_ = ethercat::AlState::kInit;
   ethercat::AlState al_state_ = ethercat::AlState::kNone;
   ethercat::AlCode al_code_ = ethercat::AlCode::kNone;

@@ -66,6 +66,7 @@ Status check(const std::vector<SlavePlan>& plans) {
 }
 
 std::vector<CoeStep> make_steps(const SlavePlan& plan) {
+  if (plan.waits_in_preop) return {};
   std::vector<CoeStep> steps = plan.steps;
   if (!plan.outputs.empty()) add_assignment(steps, kAssignOutputs, plan.outputs);
   if (!plan.inputs.empty()) add_assignment(steps, kAssignInputs, plan.inputs);
@@ -74,10 +75,12 @@ std::vector<CoeStep> make_steps(const SlavePlan& plan) {
 
 bool matches(const SlavePlan& plan, const ethercat::sii::Identity& found) noexcept {
   const ethercat::sii::Identity& wanted = plan.identity;
-  return found.vendor == wanted.vendor && found.product == wanted.product &&
-         found.revision >> 16 == wanted.revision >> 16 &&
-         (found.revision & 0xFFFF) >= (wanted.revision & 0xFFFF) &&
-         (wanted.serial == 0 || found.serial == wanted.serial);
+  const auto same = [](std::uint32_t want, std::uint32_t is) { return want == 0 || want == is; };
+  const bool revision =
+      wanted.revision == 0 || (found.revision >> 16 == wanted.revision >> 16 &&
+                               (found.revision & 0xFFFF) >= (wanted.revision & 0xFFFF));
+  return same(wanted.vendor, found.vendor) && same(wanted.product, found.product) && revision &&
+         same(wanted.serial, found.serial);
 }
 
 }  // namespace tandem::hal::ecat

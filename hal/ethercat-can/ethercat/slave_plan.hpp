@@ -37,16 +37,17 @@ template <class T>
 /// A PDO: its object, and entries as index << 16 | sub << 8 | bits.
 struct PdoPlan {
   std::uint16_t index = 0;  ///< 16xx or 1Axx
-  std::vector<std::uint32_t> entries;
+  std::vector<std::uint32_t> entries{};
   bool fixed = false;  ///< the slave has these entries and does not let them be written
 };
 
 struct SlavePlan {
-  std::string name;                  ///< for messages
-  ethercat::sii::Identity identity;  ///< serial 0: any; of the revision a later minor is right too
-  std::vector<PdoPlan> outputs;      ///< to the slave
-  std::vector<PdoPlan> inputs;
-  std::vector<CoeStep> steps;       ///< before the PDOs
+  std::string name;                    ///< for messages
+  ethercat::sii::Identity identity{};  ///< 0: any; of the revision a later minor is right too
+  std::vector<PdoPlan> outputs{};      ///< to the slave
+  std::vector<PdoPlan> inputs{};
+  std::vector<CoeStep> steps{};     ///< before the PDOs
+  bool waits_in_preop = false;      ///< steps, mapping and assignment are another's; see go_on()
   std::int64_t sync0_cycle_ns = 0;  ///< 0: no SYNC0
   /// How long a change of state may take.
   std::int64_t state_time_ns = 5'000'000'000;
@@ -56,7 +57,8 @@ struct SlavePlan {
 [[nodiscard]] std::size_t bytes_of(const std::vector<PdoPlan>& pdos);
 /// Whether a master can be built for these slaves; the error names the slave.
 [[nodiscard]] Status check(const std::vector<SlavePlan>& plans);
-/// plan.steps, then mapping and assignment of the PDOs in the order that slaves ask for.
+/// plan.steps, then mapping and assignment of the PDOs in the order that slaves ask for. None for a
+/// plan that waits in PREOP.
 [[nodiscard]] std::vector<CoeStep> make_steps(const SlavePlan& plan);
 /// Whether `found` is what `plan` expects.
 [[nodiscard]] bool matches(const SlavePlan& plan, const ethercat::sii::Identity& found) noexcept;

@@ -1,0 +1,299 @@
+// Frames of the drive master to the line, and the line's news back as frames.
+#include "hal/ethercat-can/line_bus.hpp"
+
+#include <algorithm>
+
+#include "canopen/bytes.hpp"
+#include "canopen/sdo_bytes.hpp"
+#include "hal/ethercat-can/sdo_sequence.hpp"
+
+namespace tandem::hal::can {
+
+using canopen::AbortCode;
+using canopen::Frame;
+using canopen::NmtState;
+using canopen::PdoDirection;
+using ecat::CoeClient;
+using ecat::SlaveError;
+using ecat::SlaveMaster;
+using ecat::SlaveStage;
+
+namespace {
+
+/// A slave tells in a cycle: state, an answer, and its TPDOs.
+constexpr std::size_t kFramesPerSlave = 4 + canopen::kPdosPerNode;
+
+/// The plan of each node of the bus, by its place in the line.
+Result<std::vector<const NodePlan*>> in_order(const RobotConfig& robot, const PdoLayout& layout,
+                                              std::size_t bus) {
+  std::vector<const NodePlan*> nodes;
+  for (const NodePlan& node : layout.nodes) {
+    if (node.bus == bus) nodes.push_back(&node);
+  }
+  std::ranges::sort(nodes, {}, &NodePlan::id);
+  for (std::size_t place = 0; place < nodes.size(); ++place) {
+    if (nodes[place]->id == static_cast<int>(place) + 1) continue;
+    return std::unexpected(
+        Error{.message = "has no node in place " + std::to_string(place + 1) + " of its line",
+              .hint = "number its boards and sensors from 1 at the master, without a gap",
+              .file = robot.file,
+              .line = robot.buses[bus].line,
+              .key = "bus '" + robot.buses[bus].name + "'"});
+  }
+  return nodes;
+}
+
+ecat::SlavePlan plan_of(const NodePlan& node, std::int64_t period_ns) {
+  ecat::SlavePlan plan{.name = node.name, .waits_in_preop = true, .sync0_cycle_ns = period_ns};
+  for (const PdoPlan& pdo : node.pdos) {
+    ecat::PdoPlan one{.index = mapping_object(pdo), .fixed = true};
+    for (const MappedField& field : pdo.fields) {
+      one.entries.push_back(canopen::mapping_entry(field.index, field.sub, field.size));
+    }
+    (pdo.direction == PdoDirection::kReceive ? plan.outputs : plan.inputs)
+        .push_back(std::move(one));
+  }
+  return plan;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::size_t bus,
+                                                 ecat::Link& link, const Config& config) {
+  const auto layout = make_pdo_layout(robot);
+  if (!layout) return std::unexpected(layout.error());
+  const auto nodes = in_order(robot, *layout, bus);
+  if (!nodes) return std::unexpected(nodes.error());
+  std::vector<ecat::SlavePlan> plans;
+  std::vector<Slave> slaves;
+  for (const NodePlan* node : *nodes) {
+    plans.push_back(plan_of(*node, config.period_ns));
+    Slave& slave = slaves.emplace_back();
+    slave.id = node->id;
+    slave.heartbeat_ns = std::int64_t{node->heartbeat_ms} * 1'000'000;
+    std::uint8_t outputs = 0;
+    std::uint8_t inputs = 0;
+    for (const PdoPlan& pdo : node->pdos) {
+      const bool receive = pdo.direction == PdoDirection::kReceive;
+      std::uint8_t& at = receive ? outputs : inputs;
+      (receive ? slave.outputs : slave.inputs)
+          .push_back({.cob_id = pdo.cob_id, .offset = at, .bytes = pdo.bytes});
+      at = static_cast<std::uint8_t>(at + pdo.bytes);
+    }
+  }
+  auto line = ecat::LineMaster::create(link, std::move(plans));
+  if (!line) return std::unexpected(line.error());
+  return std::unique_ptr<LineBus>(new LineBus(std::move(*line), std::move(slaves), config));
+}
+
+LineBus::LineBus(std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
+                 const Config& config)
+    : line_(std::move(line)),
+      slaves_(std::move(slaves)),
+      config_(config),
+      storage_(2 * slaves_.size() * kFramesPerSlave + 2),
+      inbox_(storage_) {}
+
+std::size_t LineBus::send(std::span<const Frame> frames) noexcept TANDEM_RT {
+  namespace cob = canopen::cob;
+  bool outputs = false;
+  for (const Frame& frame : frames) {
+    const std::size_t slave = (frame.id & 0x7F) - 1;  // 0 wraps: none has it
+    if (frame.id == cob::kNmt) {
+      command(frame);
+    } else if (frame.id == cob::kSync) {
+      begin_cycle();
+    } else if (slave < slaves_.size() && (frame.id & 0x780) == cob::kSdoRequest) {
+      request(slave, frame);
+    } else if (slave < slaves_.size()) {
+      outputs = output(slave, frame) || outputs;
+    }
+  }
+  if (outputs) line_->write();
+  return frames.size();
+}
+
+void LineBus::command(const Frame& frame) noexcept {
+  const std::uint8_t node = frame.data[1];
+  for (std::size_t i = 0; i < slaves_.size(); ++i) {
+    if (node == 0 || node == slaves_[i].id) command(i, frame.data[0]);
+  }
+  const bool over = std::ranges::all_of(slaves_, &Slave::left);
+  if (over) line_->stop();
+}
+
+void LineBus::command(std::size_t i, std::uint8_t nmt) noexcept {
+  using canopen::NmtCommand;
+  Slave& slave = slaves_[i];
+  SlaveMaster& master = line_->slave(i);
+  slave.op_wanted = false;
+  slave.left = false;
+  switch (static_cast<NmtCommand>(nmt)) {
+    case NmtCommand::kStart:
+      slave.op_wanted = true;
+      if (master.waiting()) master.go_on();
+      return;
+    case NmtCommand::kStop: std::ranges::fill(line_->outputs(i), std::uint8_t{0}); return;
+    case NmtCommand::kEnterPreOperational: slave.left = true; return;
+    default: slave.reset_wanted = true; return;
+  }
+}
+
+/// What the drive master asks for has one to four bytes.
+void LineBus::request(std::size_t i, const Frame& frame) noexcept {
+  Slave& slave = slaves_[i];
+  SlaveMaster& master = line_->slave(i);
+  const bool hears = master.waiting() || master.running() || master.stage() == SlaveStage::kReady;
+  const std::uint8_t command = frame.data[0];
+  const int specifier = command >> 5;
+  if (!hears || (specifier != 1 && specifier != 2)) return;
+  slave.index = canopen::get<std::uint16_t>(&frame.data[1]);
+  slave.sub = frame.data[3];
+  slave.sdo_reads = specifier == 2;
+  slave.sdo_waits = true;
+  if (slave.sdo_reads) return master.sdo().upload(slave.index, slave.sub);
+  const std::size_t unused = (command & canopen::kSizeGiven) != 0 ? (command >> 2) & 3U : 0U;
+  master.sdo().download(slave.index, slave.sub, std::span(frame.data).subspan(4, 4 - unused));
+}
+
+bool LineBus::output(std::size_t i, const Frame& frame) noexcept {
+  for (const Pdo& pdo : slaves_[i].outputs) {
+    if (pdo.cob_id != frame.id || frame.length < pdo.bytes) continue;
+    std::copy_n(frame.data.begin(), pdo.bytes, line_->outputs(i).begin() + pdo.offset);
+    return true;
+  }
+  return false;
+}
+
+void LineBus::begin_cycle() noexcept {
+  if (!taken_) {  // it has not come back whole, and will not any more
+    (void)line_->collect();
+    take_cycle();
+  }
+  if (now_ns_ == 0) line_->restart(0);  // frames go round from the first cycle on
+  now_ns_ += config_.period_ns;
+  restart();
+  for (std::size_t i = 0; i < slaves_.size(); ++i) {
+    SlaveMaster& slave = line_->slave(i);
+    if (slaves_[i].op_wanted && slave.stage() == SlaveStage::kReady) slave.start(now_ns_);
+  }
+  line_->send(now_ns_);
+  taken_ = false;
+}
+
+/// All at once when nobody was started yet; else each by itself, while the others run.
+void LineBus::restart() noexcept {
+  const auto wanted = std::ranges::count(slaves_, true, &Slave::reset_wanted);
+  if (wanted == 0) return;
+  const bool all = wanted == static_cast<std::ptrdiff_t>(slaves_.size());
+  if (all) line_->restart(now_ns_);
+  for (std::size_t i = 0; i < slaves_.size(); ++i) {
+    Slave& slave = slaves_[i];
+    if (!slave.reset_wanted) continue;
+    if (!all) line_->restart(i, now_ns_);
+    slave.reset_wanted = slave.booted = slave.sdo_waits = false;
+    slave.told = NmtState::kBootUp;
+    std::ranges::fill(line_->outputs(i), std::uint8_t{0});
+  }
+}
+
+std::size_t LineBus::receive(std::span<Frame> frames) noexcept TANDEM_RT {
+  if (!taken_) {
+    const bool complete = line_->collect();
+    if (config_.lockstep ? line_->settled() : complete) take_cycle();
+  }
+  const std::span<const Frame> waiting = inbox_.frames().subspan(given_);
+  const std::size_t count = std::min(waiting.size(), frames.size());
+  std::copy_n(waiting.begin(), count, frames.begin());
+  given_ += count;
+  if (given_ == inbox_.frames().size()) {
+    inbox_.clear();
+    given_ = 0;
+  }
+  return count;
+}
+
+void LineBus::take_cycle() noexcept {
+  taken_ = true;
+  const bool valid = line_->receive(now_ns_).valid;
+  for (std::size_t i = 0; i < slaves_.size(); ++i) {
+    tell_state(i);
+    tell_sdo(i);
+    if (valid && line_->slave(i).running()) tell_inputs(i);
+  }
+  if (config_.lockstep && line_->settled()) inbox_.push(canopen::make_time(now_ns_));
+}
+
+void LineBus::tell_state(std::size_t i) noexcept {
+  Slave& slave = slaves_[i];
+  const SlaveMaster& master = line_->slave(i);
+  const bool there =
+      !(master.stage() == SlaveStage::kDown &&
+        (master.error() == SlaveError::kGone || master.error() == SlaveError::kNoAnswer));
+  if (!slave.booted) {
+    if (!master.waiting()) return;
+    slave.booted = true;
+    inbox_.push(canopen::make_heartbeat(slave.id, NmtState::kBootUp));
+  }
+  if (!there) return;
+  const NmtState state = master.running()                      ? NmtState::kOperational
+                         : master.stage() == SlaveStage::kDown ? NmtState::kStopped
+                                                               : NmtState::kPreOperational;
+  if (state == slave.told && now_ns_ - slave.told_ns < slave.heartbeat_ns) return;
+  slave.told = state;
+  slave.told_ns = now_ns_;
+  inbox_.push(canopen::make_heartbeat(slave.id, state));
+}
+
+void LineBus::tell_sdo(std::size_t i) noexcept {
+  Slave& slave = slaves_[i];
+  CoeClient& sdo = line_->slave(i).sdo();
+  if (!slave.sdo_waits || sdo.busy()) return;
+  slave.sdo_waits = false;
+  AbortCode code = sdo.status() == CoeClient::Status::kDone ? AbortCode::kNone : sdo.abort_code();
+  const std::span<const std::uint8_t> value = sdo.value();
+  const bool fits = !slave.sdo_reads || (!value.empty() && value.size() <= 4);
+  if (code == AbortCode::kNone && !fits) code = AbortCode::kOutOfMemory;
+  const auto answer = [&](int specifier, std::uint8_t bits) {
+    return canopen::sdo_frame(canopen::cob::kSdoResponse, slave.id,
+                              static_cast<std::uint8_t>(specifier << 5 | bits), slave.index,
+                              slave.sub);
+  };
+  Frame frame;
+  if (code != AbortCode::kNone) {
+    frame = answer(canopen::kAbort, 0);
+    canopen::put(&frame.data[4], static_cast<std::uint32_t>(code));
+  } else if (slave.sdo_reads) {
+    const auto unused = static_cast<std::uint8_t>((4 - value.size()) << 2);
+    frame = answer(2, unused | canopen::kExpedited | canopen::kSizeGiven);
+    std::ranges::copy(value, &frame.data[4]);
+  } else {
+    frame = answer(3, 0);
+  }
+  inbox_.push(frame);
+}
+
+void LineBus::tell_inputs(std::size_t i) noexcept {
+  const std::span<const std::uint8_t> inputs = line_->inputs(i);
+  for (const Pdo& pdo : slaves_[i].inputs) {
+    Frame frame;
+    frame.id = pdo.cob_id;
+    frame.length = canopen::frame_length(pdo.bytes);
+    if (frame.length > canopen::kClassicFrameBytes) {
+      frame.flags = canopen::kFlagFd | canopen::kFlagBrs;
+    }
+    std::copy_n(inputs.begin() + pdo.offset, pdo.bytes, frame.data.begin());
+    inbox_.push(frame);
+  }
+}
+
+BusStatistics LineBus::statistics() const noexcept {
+  const ecat::LineStatistics line = line_->statistics();
+  return {.sent = line.cycles,
+          .received = line.cycles - line.lost,
+          .receive_lost = line.lost,
+          .ignored = line.malformed + line.strangers,
+          .recoveries = line_->mended()};
+}
+
+}  // namespace tandem::hal::can

@@ -1,0 +1,180 @@
+// Ethernet frames pass through the slaves in order; the boards hear of it once a cycle.
+#include "hal/sim/line_boards.hpp"
+
+#include <algorithm>
+
+#include "base/split_mix.hpp"
+#include "canopen/messages.hpp"
+#include "ethercat/datagram.hpp"
+
+namespace tandem::sim {
+
+using canopen::Frame;
+using ethercat::AlState;
+using firmware::esc::BoardData;
+
+namespace {
+
+constexpr std::size_t kFramesAtOnce = 64;
+constexpr std::size_t kOwnObjects = 16;
+constexpr double kWorstDrift_ppm = 20.0;
+constexpr std::int64_t kJitterNs = 10;
+
+}  // namespace
+
+LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& link,
+                       const Config& config)
+    : link_(&link),
+      config_(config),
+      came_(kFramesAtOnce),
+      back_(kFramesAtOnce),
+      storage_(),
+      inbox_(storage_) {
+  std::vector<EmulatedRobot::Node> nodes = robot.nodes(bus);
+  std::ranges::sort(nodes, {}, &EmulatedRobot::Node::id);
+  for (const EmulatedRobot::Node& node : nodes) add_seat(node, config);
+  std::vector<firmware::esc::Slave*> slaves;
+  for (const Seat& seat : seats_) slaves.push_back(seat.slave.get());
+  line_ = std::make_unique<firmware::esc::SlaveLine>(std::move(slaves));
+  storage_.resize(seats_.size() * (2 + canopen::kPdosPerNode) + 1);
+  inbox_ = canopen::FrameSink(storage_);
+}
+
+void LineBoards::add_seat(const EmulatedRobot::Node& node, const Config& config) {
+  Seat& seat = seats_.emplace_back();
+  seat.node = node;
+  seat.objects = std::make_unique<canopen::ObjectDictionary>(kOwnObjects);
+  using Way = firmware::esc::Direction;
+  auto outputs = std::make_unique<BoardData>(Way::kOutputs, *node.dictionary, node.id);
+  auto inputs = std::make_unique<BoardData>(Way::kInputs, *node.dictionary, node.id);
+  seat.outputs = outputs.get();
+  seat.inputs = inputs.get();
+  std::uint64_t random = config.seed + static_cast<std::uint64_t>(node.id);
+  const double unit = static_cast<double>(split_mix(random) >> 11) * 0x1p-53;
+  const firmware::esc::SlaveSetup setup{
+      .name = node.name,
+      .clock = {.drift_ppm = kWorstDrift_ppm * (2.0 * unit - 1.0),
+                .jitter_ns = kJitterNs,
+                .started_ns = static_cast<std::int64_t>(split_mix(random) >> 34),
+                .seed = split_mix(random)}};
+  seat.slave = std::make_unique<firmware::esc::Slave>(setup, *seat.objects, *node.dictionary,
+                                                      std::move(outputs), std::move(inputs));
+}
+
+std::size_t LineBoards::receive(std::span<Frame> frames) noexcept TANDEM_RT {
+  if (!in_cycle_) fetch();
+  const std::span<const Frame> waiting = inbox_.frames().subspan(given_);
+  const std::size_t count = std::min(frames.size(), waiting.size());
+  std::copy_n(waiting.begin(), count, frames.begin());
+  given_ += count;
+  if (given_ == inbox_.frames().size()) {
+    inbox_.clear();
+    given_ = 0;
+  }
+  return count;
+}
+
+/// Takes frames, and lets them pass up to one that begins a cycle.
+void LineBoards::fetch() noexcept {
+  if (first_ == count_) {
+    first_ = 0;
+    count_ = link_->receive(came_);
+  }
+  pass();
+  if (first_ == count_) return;
+  in_cycle_ = true;
+  begin_cycle();
+}
+
+/// A cycle's frames have one index, and logical addresses that go up. A frame that is sent again
+/// has the same.
+bool LineBoards::begins_cycle(hal::ecat::FrameBuffer& frame) noexcept {
+  ethercat::FrameReader reader(frame.frame());
+  ethercat::Datagram datagram;
+  while (reader.next(datagram)) {
+    const bool reads = datagram.command() == ethercat::Command::kLrw ||
+                       datagram.command() == ethercat::Command::kLrd;
+    if (!reads) continue;
+    const bool fresh = datagram.index() != cycle_index_;
+    cycle_index_ = datagram.index();
+    return fresh;
+  }
+  return false;
+}
+
+/// Up to the next cycle's frame; what comes back is sent.
+void LineBoards::pass() noexcept {
+  std::size_t back = 0;
+  for (; first_ < count_; ++first_) {
+    hal::ecat::FrameBuffer& frame = came_[first_];
+    if (!in_cycle_ && begins_cycle(frame)) break;
+    in_cycle_ = false;
+    if (!line_->pass(frame.frame(), now_ns_)) continue;
+    back_[back].size = frame.size;
+    std::copy_n(frame.bytes.begin(), frame.size, back_[back++].bytes.begin());
+  }
+  if (back > 0) (void)link_->send(std::span(back_).first(back));
+}
+
+void LineBoards::begin_cycle() noexcept {
+  now_ns_ = config_.clock != nullptr ? config_.clock->now_ns() : now_ns_ + config_.period_ns;
+  for (std::size_t place = 0; place < seats_.size(); ++place) run(seats_[place], place);
+  inbox_.push(canopen::make_sync());
+}
+
+void LineBoards::run(Seat& seat, std::size_t place) noexcept {
+  line_->set_power(place, *seat.node.powered != 0, now_ns_);
+  if (*seat.node.powered == 0) return;
+  seat.slave->process(now_ns_);
+  tell_state(seat);
+  if (!seat.outputs->fresh() || seat.slave->state() != AlState::kOp) return;
+  for (const BoardData::Part& part : seat.outputs->parts()) {
+    inbox_.push(canopen::make_frame(part.cob_id, seat.outputs->bytes_of(part)));
+  }
+}
+
+void LineBoards::tell_state(Seat& seat) noexcept {
+  using canopen::NmtCommand;
+  const AlState before = std::exchange(seat.state, seat.slave->state());
+  if (before == seat.state) return;
+  const auto tell = [&](NmtCommand command) {
+    inbox_.push(canopen::make_nmt(command, seat.node.id));
+  };
+  if (seat.state == AlState::kInit) {
+    tell(NmtCommand::kResetNode);
+  } else if (seat.state == AlState::kOp) {
+    tell(NmtCommand::kStart);
+  } else if (before == AlState::kOp) {
+    tell(NmtCommand::kEnterPreOperational);
+  }
+}
+
+std::size_t LineBoards::send(std::span<const Frame> frames) noexcept TANDEM_RT {
+  for (const Frame& frame : frames) {
+    const std::size_t place = (frame.id & 0x7F) - 1;
+    if (place >= seats_.size()) continue;
+    for (const BoardData::Part& part : seats_[place].inputs->parts()) {
+      if (part.cob_id != frame.id || frame.length < part.bytes) continue;
+      std::copy_n(frame.data.begin(), part.bytes, seats_[place].inputs->bytes_of(part).begin());
+    }
+  }
+  return frames.size();
+}
+
+void LineBoards::end_step() noexcept TANDEM_RT {
+  if (!in_cycle_) return;
+  for (Seat& seat : seats_) {
+    if (*seat.node.powered != 0) seat.slave->publish();
+  }
+  pass();
+  for (Seat& seat : seats_) {  // what the cycle's messages ask for
+    if (*seat.node.powered != 0) seat.slave->process(now_ns_);
+  }
+}
+
+hal::can::BusStatistics LineBoards::statistics() const noexcept {
+  const hal::ecat::LinkStatistics link = link_->statistics();
+  return {.sent = link.sent, .received = link.received, .send_refused = link.refused};
+}
+
+}  // namespace tandem::sim
