@@ -34,7 +34,7 @@ enum class BackendKind : std::uint8_t {
 /// [hal]: what stands for the robot, and how the loop and it go together.
 struct HalOptions {
   BackendKind backend = BackendKind::kSim;
-  std::string wire = {};  ///< kWire: "can" or "ethercat", as it was asked for
+  std::string wire = {};           ///< kWire: "can" or "ethercat", as it was asked for
   bool lockstep = false;           ///< "can": wait for an emulated robot's answers, at any speed
   double answer_window = 0.5;      ///< "can" in real time: share of the period to wait for answers
   std::uint32_t delay_cycles = 0;  ///< between the controllers and the limits

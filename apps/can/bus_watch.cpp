@@ -17,9 +17,9 @@ void BusWatch::look() {
     const Clock::time_point now = Clock::now();
     if (now < told.next) continue;
     const char* clear = is_terminal(out_) ? "\r\x1b[K" : "";  // a progress bar
-    fmt::print(out_, "{}note: {}\n", clear,
-               text.empty() ? fmt::format("interface {} is well again", buses_[b].interface)
-                            : text);
+    fmt::print(
+        out_, "{}note: {}\n", clear,
+        text.empty() ? fmt::format("interface {} is well again", buses_[b].interface) : text);
     told = {.text = std::move(text), .next = now + std::chrono::seconds(1)};
   }
 }

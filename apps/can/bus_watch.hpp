@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/text/console.hpp"
 #include "apps/can/can_sockets.hpp"
+#include "apps/text/console.hpp"
 
 namespace tandem::apps {
 

@@ -40,9 +40,8 @@ std::expected<std::unique_ptr<CanSockets>, Diagnostics> CanSockets::open(
       }
       all->locks_.push_back(std::move(*lock));
     }
-    const Status opened = bus.kind == hal::BusKind::kEthercat
-                              ? all->open_line(bus, b, make_line)
-                              : all->open_can(bus, side, stamps);
+    const Status opened = bus.kind == hal::BusKind::kEthercat ? all->open_line(bus, b, make_line)
+                                                              : all->open_can(bus, side, stamps);
     if (!opened) errors.push_back(of_bus(bus, opened.error()));
   }
   if (!errors.empty()) return std::unexpected(std::move(errors));

@@ -13,10 +13,10 @@
 #include "apps/robot/start_torque.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
-#include "hal/ethercat-can/line_bus.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
 #include "hal/ethercat-can/can_backend.hpp"
 #include "hal/ethercat-can/drive_use.hpp"
+#include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/engine_loader.hpp"
 #include "hal/sim/scenario.hpp"
 #include "hal/sim/setup.hpp"
@@ -191,10 +191,10 @@ void add_owner(Composition& c, Collector& errors) {
 }  // namespace
 
 std::string wire_name(const hal::RobotConfig& robot) {
-  const bool line = !robot.buses.empty() &&
-                    std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
-                      return bus.kind == hal::BusKind::kEthercat;
-                    });
+  const bool line =
+      !robot.buses.empty() && std::ranges::all_of(robot.buses, [](const hal::BusConfig& bus) {
+        return bus.kind == hal::BusKind::kEthercat;
+      });
   return line ? "EtherCAT" : "CAN";
 }
 
@@ -399,8 +399,8 @@ Diagnostics connect(Composition& c, const std::string& record_frames) {
                  "add --hal can, and start tandem emulate")
                 .error()};
   }
-  const auto make_line = [&e](std::size_t bus, hal::ecat::Link& link, hal::can::FrameWait&)
-      -> Result<std::unique_ptr<hal::can::Bus>> {
+  const auto make_line = [&e](std::size_t bus, hal::ecat::Link& link,
+                              hal::can::FrameWait&) -> Result<std::unique_ptr<hal::can::Bus>> {
     auto made = hal::can::LineBus::create(
         e.robot, bus, link, {.period_ns = e.loop.period_ns, .lockstep = e.hal.lockstep});
     if (!made) return std::unexpected(made.error());

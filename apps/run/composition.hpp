@@ -34,7 +34,7 @@ struct Overrides {
   std::string kernel_variant = {};
   MissingKernels missing_kernels = MissingKernels::kRefuse;
   std::optional<runtime::BackendKind> backend = std::nullopt;
-  std::string wire = {};  ///< with kWire: "can", "ethercat"
+  std::string wire = {};                     ///< with kWire: "can", "ethercat"
   bool lockstep = false;                     ///< true: whatever the experiment says
   std::vector<std::string> interfaces = {};  ///< "can0=vcan0"
   std::string scenario = {};                 ///< faults to inject into the simulation

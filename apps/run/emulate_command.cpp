@@ -116,8 +116,8 @@ std::expected<std::unique_ptr<Emulation>, Diagnostics> compose_emulation(
   auto emulated = sim::EmulatedRobot::create(robot, e->kernels.get(), e->subject.sim);
   if (!emulated) return std::unexpected(in_file(emulated.error(), robot.file));
   e->robot = std::move(*emulated);
-  const auto make_line = [&](std::size_t bus, hal::ecat::Link& link, hal::can::FrameWait& wait)
-      -> Result<std::unique_ptr<hal::can::Bus>> {
+  const auto make_line = [&](std::size_t bus, hal::ecat::Link& link,
+                             hal::can::FrameWait& wait) -> Result<std::unique_ptr<hal::can::Bus>> {
     const sim::LineBoards::Config config{.period_ns = period_ns,
                                          .seed = e->subject.sim.seed,
                                          .clock = options.lockstep ? nullptr : &wait};

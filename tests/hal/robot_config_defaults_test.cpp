@@ -199,7 +199,7 @@ TEST(RobotConfigDefaults, AreCheckedWhenNobodyUsesThem) {
       "[bus_defaults]\nmax_load = 7\nname = 'x'\n",
       "robots/leg.toml:6: bus_defaults.max_load: 7 is out of range "
       "(must be at least 0.01 and at most 1)\n"
-      "robots/leg.toml:7: bus_defaults.name: unknown key (known: bitrate, data_bitrate, fd, "
+      "robots/leg.toml:7: bus_defaults.name: unknown key (known: bitrate, data_bitrate, fd, kind, "
       "max_load)");
 }
 
