@@ -1,0 +1,117 @@
+// Robots on EtherCAT: in process, and master and boards in two processes on a cable of a network of
+// the test's own.
+#include "tests/apps/program.hpp"
+#include "tests/ethercat/own_network.hpp"
+#include "tests/hil/process.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using test::in_own_network;
+using test::kNoNetwork;
+using test::Process;
+
+class LineRun : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    const std::string fd = "fd = true\nbitrate = 1_000_000\ndata_bitrate = 8_000_000\n";
+    edit("robot.toml", fd, "kind = \"ethercat\"\n");
+    edit("robot.toml", "interface = \"can0\"", "interface = \"eth1\"");
+  }
+  [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
+
+  /// Master and boards at both ends of a cable. @return the child's exit status
+  int run_over_cable(const std::string& experiment, const std::vector<std::string>& more,
+                     bool lockstep) {
+    return in_own_network([&] {
+      std::vector<std::string> emulate = {
+          "emulate",   experiment, "--interface",      "eth1=" + std::string(test::kSlaveEnd),
+          "--no-socket", "--json", file("boards.json")};
+      std::vector<std::string> run = {
+          "run",         experiment,   "--hal",         "ethercat",
+          "--interface", "eth1=" + std::string(test::kMasterEnd),
+          "--no-socket", "--json",     file("run.json")};
+      run.insert(run.end(), more.begin(), more.end());
+      for (auto* words : {&emulate, &run}) {
+        if (lockstep) words->push_back("--lockstep");
+      }
+      Process boards(test::tandem(emulate), file("boards.txt"));
+      EXPECT_TRUE(boards.says("Ctrl-C")) << boards.output();
+      Process master(test::tandem(run), file("run.txt"));
+      EXPECT_EQ(master.wait(), 0) << master.output();
+      EXPECT_EQ(boards.interrupt(), 0) << boards.output();
+    });
+  }
+};
+
+TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
+  const std::string squat = TANDEM_SOURCE_DIR "/config/coman/squat_ethercat.toml";
+  const Outcome alone =
+      tandem("run '" + squat + "' --duration 1 --no-socket -q --log '" + file("in_process") +
+             "' --json in.json");
+  ASSERT_EQ(alone.status, 0) << alone.err;
+  EXPECT_EQ(json("in.json")["faults"].size(), 0U);
+  const int status =
+      run_over_cable(squat, {"--duration", "1", "-q", "--log", file("over_cable")}, true);
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  ASSERT_EQ(status, 0);
+  const std::string log = "/coman-squat_ethercat-001.mcap";
+  const Outcome diff = tandem("log diff in_process" + log + " over_cable" + log + " --json -");
+  EXPECT_EQ(diff.status, 0) << diff.out;
+  EXPECT_EQ(json("run.json")["hal"], "ethercat lockstep");
+  const auto cycles = nlohmann::json::parse(diff.out)["topics"]["/tandem/state"]["messages"][0];
+  EXPECT_GT(cycles, 1500) << "from power-on to the end";
+  EXPECT_EQ(json("boards.json")["steps"], cycles);
+}
+
+/// At 500 Hz, patient enough for a machine that does other things as well.
+TEST_F(LineRun, InRealTimeTheRobotMovesWithoutAFault) {
+  edit("robot.toml", "slow_pdo_every = 4", "heartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
+  edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 2_000_000");
+  const int status = run_over_cable(
+      file("hold.toml"), {"--duration", "0.3", "--no-log", "--on-fault", "end"}, false);
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  ASSERT_EQ(status, 0);
+  EXPECT_EQ(json("run.json")["faults"].size(), 0U);
+  EXPECT_GT(json("run.json")["cycles"], 100);
+}
+
+TEST_F(LineRun, AWireThatTheRobotHasNotIsRefused) {
+  const Outcome can = tandem("run hold.toml --hal can");
+  EXPECT_EQ(can.status, 2);
+  EXPECT_NE(can.err.find("the robot has no CAN bus (add --hal ethercat"), std::string::npos)
+      << can.err;
+  edit("robot.toml", "kind = \"ethercat\"\n", "");
+  const Outcome line = tandem("run hold.toml --hal ethercat");
+  EXPECT_EQ(line.status, 2);
+  EXPECT_NE(line.err.find("the robot has no EtherCAT bus (add --hal can"), std::string::npos)
+      << line.err;
+}
+
+TEST_F(LineRun, NodesThatAreNotOneBehindTheOtherAreRefused) {
+  edit("robot.toml", "bus = \"arm\"\n", "bus = \"arm\"\nnode_id = 3\n");
+  const Outcome outcome = tandem("run hold.toml --no-log");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("has no node in place 1 of its line"), std::string::npos)
+      << outcome.err;
+}
+
+/// The joints and everything about them are robot.toml's.
+TEST_F(LineRun, ComansLineCarriesTheSameRobot) {
+  const auto can = read_text(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  const auto line = read_text(TANDEM_SOURCE_DIR "/config/coman/robot_ethercat.toml");
+  const auto joints = [](const std::string& text) {
+    const std::size_t from = text.find("# --- joints");
+    return text.substr(from, text.find("# --- sensors") - from);
+  };
+  const auto head = [](const std::string& text) {
+    const std::size_t from = text.find("name = \"coman\"");
+    return text.substr(from, text.find("# ---", text.find("[gains.soft_arm]")) - from);
+  };
+  EXPECT_EQ(joints(can), joints(line));
+  EXPECT_EQ(head(can), head(line));
+}
+
+}  // namespace
+}  // namespace tandem::apps
