@@ -112,8 +112,8 @@ void BoardData::give(std::span<std::uint8_t> image) const noexcept TANDEM_RT {
 }
 
 void BoardData::archive(Archive& ar) {
-  ar(open_, fresh_, assigned_count_, assigned_, image_);
-  if (ar.reading() && !open_) compile();
+  ar(open_, fresh_, assigned_count_, assigned_, image_, count_);
+  for (Part& part : parts_) ar(part.cob_id, part.offset, part.bytes);
 }
 
 }  // namespace tandem::firmware::esc

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/archive.hpp"
 #include "canopen/bytes.hpp"
 #include "canopen/sdo_bytes.hpp"
 #include "hal/ethercat-can/sdo_sequence.hpp"
@@ -285,6 +286,17 @@ void LineBus::tell_inputs(std::size_t i) noexcept {
     std::copy_n(inputs.begin() + pdo.offset, pdo.bytes, frame.data.begin());
     inbox_.push(frame);
   }
+}
+
+void LineBus::archive(Archive& ar) {
+  ar(*line_, now_ns_, taken_);
+  for (Slave& s : slaves_) {
+    ar(s.reset_wanted, s.op_wanted, s.booted, s.left, s.sdo_waits, s.sdo_reads, s.index, s.sub,
+       s.told, s.told_ns);
+  }
+  if (!ar.reading()) return;
+  inbox_.clear();
+  given_ = 0;
 }
 
 BusStatistics LineBus::statistics() const noexcept {

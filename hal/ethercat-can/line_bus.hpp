@@ -16,6 +16,10 @@
 #include "hal/ethercat-can/ethercat/line_master.hpp"
 #include "hal/ethercat-can/pdo_layout.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::can {
 
 /// What a node of the drive master is on the line.
@@ -53,6 +57,9 @@ class LineBus final : public Bus {
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
   [[nodiscard]] BusStatistics statistics() const noexcept override;
   [[nodiscard]] std::string status_text() const override { return line_->text(); }
+
+  /// Between two cycles, when every frame was taken.
+  void archive(Archive& ar);
 
   [[nodiscard]] const ecat::LineMaster& line() const noexcept { return *line_; }
 

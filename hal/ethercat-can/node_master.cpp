@@ -204,6 +204,7 @@ void NodeMaster::enter(NodeStage stage, std::int64_t now_ns) noexcept {
 void NodeMaster::archive(Archive& ar) {
   ar(stage_, error_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
      next_guard_ns_, heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
+  for (SdoStep& step : steps_) ar(step.bytes);  // set_times() has been there
 }
 
 }  // namespace tandem::hal::can

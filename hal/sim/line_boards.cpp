@@ -172,6 +172,14 @@ void LineBoards::end_step() noexcept TANDEM_RT {
   }
 }
 
+void LineBoards::archive(Archive& ar) {
+  ar(*line_, in_cycle_, cycle_index_, now_ns_);
+  for (Seat& seat : seats_) ar(seat.state);
+  if (!ar.reading()) return;
+  first_ = count_ = given_ = 0;
+  inbox_.clear();
+}
+
 hal::can::BusStatistics LineBoards::statistics() const noexcept {
   const hal::ecat::LinkStatistics link = link_->statistics();
   return {.sent = link.sent, .received = link.received, .send_refused = link.refused};

@@ -49,6 +49,9 @@ class LineBoards final : public hal::can::Bus {
   }
   [[nodiscard]] hal::can::BusStatistics statistics() const noexcept override;
 
+  /// Between two steps.
+  void archive(Archive& ar);
+
   [[nodiscard]] firmware::esc::SlaveLine& line() noexcept { return *line_; }
 
  private:

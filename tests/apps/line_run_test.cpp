@@ -26,12 +26,12 @@ class LineRun : public Program {
                      bool lockstep) {
     return in_own_network([&] {
       std::vector<std::string> emulate = {
-          "emulate",   experiment, "--interface",      "eth1=" + std::string(test::kSlaveEnd),
-          "--no-socket", "--json", file("boards.json")};
+          "emulate",     experiment, "--interface",      "eth1=" + std::string(test::kSlaveEnd),
+          "--no-socket", "--json",   file("boards.json")};
       std::vector<std::string> run = {
-          "run",         experiment,   "--hal",         "ethercat",
-          "--interface", "eth1=" + std::string(test::kMasterEnd),
-          "--no-socket", "--json",     file("run.json")};
+          "run",         experiment,    "--hal",
+          "ethercat",    "--interface", "eth1=" + std::string(test::kMasterEnd),
+          "--no-socket", "--json",      file("run.json")};
       run.insert(run.end(), more.begin(), more.end());
       for (auto* words : {&emulate, &run}) {
         if (lockstep) words->push_back("--lockstep");
@@ -47,9 +47,8 @@ class LineRun : public Program {
 
 TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   const std::string squat = TANDEM_SOURCE_DIR "/config/coman/squat_ethercat.toml";
-  const Outcome alone =
-      tandem("run '" + squat + "' --duration 1 --no-socket -q --log '" + file("in_process") +
-             "' --json in.json");
+  const Outcome alone = tandem("run '" + squat + "' --duration 1 --no-socket -q --log '" +
+                               file("in_process") + "' --json in.json");
   ASSERT_EQ(alone.status, 0) << alone.err;
   EXPECT_EQ(json("in.json")["faults"].size(), 0U);
   const int status =
@@ -69,8 +68,8 @@ TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
 TEST_F(LineRun, InRealTimeTheRobotMovesWithoutAFault) {
   edit("robot.toml", "slow_pdo_every = 4", "heartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
   edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 2_000_000");
-  const int status = run_over_cable(
-      file("hold.toml"), {"--duration", "0.3", "--no-log", "--on-fault", "end"}, false);
+  const int status = run_over_cable(file("hold.toml"),
+                                    {"--duration", "0.3", "--no-log", "--on-fault", "end"}, false);
   if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
   ASSERT_EQ(status, 0);
   EXPECT_EQ(json("run.json")["faults"].size(), 0U);

@@ -28,12 +28,15 @@ ConformanceRobot make_swing() {
 
 ConformanceRobot make_classic() { return make(tandem::test::classic_swing_robot(), 2); }
 
+ConformanceRobot make_line() { return make(tandem::test::line_swing_robot(), 2); }
+
 INSTANTIATE_TEST_SUITE_P(SimRobot, BackendConformance,
                          testing::Values(ConformanceCase{"rigid", make_swing<0>},
                                          ConformanceCase{"electrical", make_swing<1>},
                                          ConformanceCase{"elastic", make_swing<2>},
                                          ConformanceCase{"both", make_swing<3>},
-                                         ConformanceCase{"classic", make_classic}),
+                                         ConformanceCase{"classic", make_classic},
+                                         ConformanceCase{"line", make_line}),
                          [](const auto& made) { return made.param.name; });
 
 }  // namespace

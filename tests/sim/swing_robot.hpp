@@ -105,6 +105,15 @@ inline hal::RobotConfig classic_swing_robot() {
   return robot;
 }
 
+/// The same on EtherCAT: board and sensors in one line.
+inline hal::RobotConfig line_swing_robot(const std::string& control_period = "1_000_000") {
+  hal::RobotConfig robot = swing_robot(2, control_period);
+  robot.buses[0].kind = hal::BusKind::kEthercat;
+  robot.sensors[0].node_id = 2;
+  robot.sensors[1].node_id = 3;
+  return robot;
+}
+
 inline const tandem_kernels* swing_kernels(int order) {
   return order < 2 ? pendulum_kernels<139>() : pendulum_kernels<0>();
 }

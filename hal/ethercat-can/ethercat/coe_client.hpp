@@ -13,6 +13,10 @@
 #include "ethercat/sii.hpp"
 #include "hal/ethercat-can/ethercat/exchange.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// The longest value that can be read or written.
@@ -49,6 +53,7 @@ class CoeClient {
   [[nodiscard]] std::span<const std::uint8_t> value() const noexcept {
     return {buffer_.data(), length_};
   }
+  void archive(Archive& ar);
   /// Error code of the last emergency message that was in the mailbox; 0: none.
   [[nodiscard]] std::uint16_t emergency() const noexcept { return emergency_; }
 

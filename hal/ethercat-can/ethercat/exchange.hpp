@@ -13,6 +13,10 @@
 #include "ethercat/mailbox.hpp"
 #include "hal/ethercat-can/ethercat/link.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// Frames of one cycle, filled one after another.
@@ -99,6 +103,7 @@ class Exchange {
   void age(std::int64_t now_ns) noexcept TANDEM_RT;
   /// Adds what is wanted, as far as it fits.
   void collect(FrameBatch& batch, std::int64_t now_ns) noexcept TANDEM_RT;
+  void archive(Archive& ar);
   /// Whether a datagram was sent that has neither come back nor been given up.
   [[nodiscard]] bool under_way() const noexcept TANDEM_RT;
   /// Datagrams that were sent again.

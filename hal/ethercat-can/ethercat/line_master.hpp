@@ -12,6 +12,10 @@
 #include "hal/ethercat-can/ethercat/link.hpp"
 #include "hal/ethercat-can/ethercat/process_image.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// What is wrong with the line as a whole.
@@ -105,6 +109,8 @@ class LineMaster {
   /// Times that a broken line was whole again.
   [[nodiscard]] std::uint64_t mended() const noexcept { return mended_; }
   [[nodiscard]] LineStatistics statistics() const noexcept;
+  /// Between two cycles.
+  void archive(Archive& ar);
   /// What is wrong, line and slaves, a sentence each. Not RT.
   [[nodiscard]] std::string text() const;
 

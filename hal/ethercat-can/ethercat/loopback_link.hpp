@@ -8,6 +8,10 @@
 
 #include "hal/ethercat-can/ethercat/link.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// Two first-in-first-out queues of fixed capacity; what does not fit is lost and counted.
@@ -19,6 +23,8 @@ class LoopbackLink {
 
   [[nodiscard]] Link& master() noexcept { return master_; }
   [[nodiscard]] Link& slaves() noexcept { return slaves_; }
+  /// The frames that wait.
+  void archive(Archive& ar);
 
  private:
   static constexpr std::size_t kWaiting = 64;
@@ -27,6 +33,7 @@ class LoopbackLink {
     std::vector<FrameBuffer> frames{kWaiting};
     std::size_t first = 0;
     std::size_t count = 0;
+    void archive(Archive& ar);
   };
   class End final : public Link {
    public:

@@ -11,6 +11,10 @@
 #include "hal/ethercat-can/ethercat/exchange.hpp"
 #include "hal/ethercat-can/ethercat/slave_master.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// One LRW per group of slaves; a group's outputs are before its inputs, so that what comes back
@@ -37,6 +41,7 @@ class ProcessImage {
   /// @return false when it is none, or has come already
   bool take(const ethercat::Datagram& datagram) noexcept TANDEM_RT;
 
+  void archive(Archive& ar);
   /// Whether every datagram of the cycle has come back.
   [[nodiscard]] bool complete() const noexcept;
   /// Sums over the groups.

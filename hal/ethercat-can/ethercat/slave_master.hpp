@@ -13,6 +13,10 @@
 #include "hal/ethercat-can/ethercat/exchange.hpp"
 #include "hal/ethercat-can/ethercat/slave_plan.hpp"
 
+namespace tandem {
+class Archive;
+}
+
 namespace tandem::hal::ecat {
 
 /// Why a slave is not, or no longer, in OP.
@@ -125,6 +129,7 @@ class SlaveMaster {
   [[nodiscard]] std::uint16_t station() const noexcept { return station_; }
   [[nodiscard]] std::size_t position() const noexcept { return position_; }
   [[nodiscard]] const SlavePlan& plan() const noexcept { return plan_; }
+  void archive(Archive& ar);
   /// Why it is down, in a sentence; empty when it is not. Not RT.
   [[nodiscard]] std::string text() const;
 
