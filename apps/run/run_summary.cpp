@@ -165,7 +165,18 @@ void add_stopped(const LoopTimes& times, Facts& facts) {
 }
 
 /// How long cycles took, and whether they were in time.
+Json start_json(const hal::can::DriveMaster* master) {
+  if (master == nullptr || master->start_up().duration_ns == 0) return nullptr;
+  const hal::can::StartUp& start = master->start_up();
+  return {{"axes", start.axes},
+          {"seconds", static_cast<double>(start.duration_ns) * 1e-9},
+          {"frames_sent", start.sent},
+          {"frames_received", start.received}};
+}
+
 void add_timing_facts(const RunSummary& summary, Facts& facts) {
+  const std::string start = start_text(summary.composition.master);
+  if (!start.empty()) facts.add("start", start);
   const rt::LoopStatistics& loop = summary.cycle.loop();
   const bool wall_clock = summary.composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
@@ -213,6 +224,14 @@ void add_frame_facts(const RunSummary& summary, Facts& facts) {
 
 }  // namespace
 
+std::string start_text(const hal::can::DriveMaster* master) {
+  if (master == nullptr || master->start_up().duration_ns == 0) return "";
+  const hal::can::StartUp& start = master->start_up();
+  return fmt::format("{} enabled after {:.3f} s, {} frames sent and {} received",
+                     counted(start.axes, "axis", "axes"),
+                     static_cast<double>(start.duration_ns) * 1e-9, start.sent, start.received);
+}
+
 double RunSummary::sim_s() const {
   const auto cycles = static_cast<std::int64_t>(cycle.running_cycles());
   return static_cast<double>(cycles * composition.experiment.loop.period_ns) / 1e9;
@@ -259,6 +278,7 @@ Json RunSummary::json() const {
   json["base"] = base_json(cycle.statistics().base());
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
+  json["start"] = start_json(master);
   json["remote"] = remote_json(server, composition.remote);
   json["faults"] = faults;
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();

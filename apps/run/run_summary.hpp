@@ -17,6 +17,9 @@
 
 namespace tandem::apps {
 
+/// "29 axes enabled after 0.211 s, …"; empty without a master, or before that.
+[[nodiscard]] std::string start_text(const hal::can::DriveMaster* master);
+
 struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;

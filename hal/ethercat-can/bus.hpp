@@ -63,7 +63,7 @@ class Bus {
   /// When the last send() handed its frames over; 0 when the bus does not know.
   [[nodiscard]] virtual std::int64_t sent_ns() const noexcept TANDEM_RT { return 0; }
 
-  [[nodiscard]] virtual BusStatistics statistics() const noexcept { return {}; }
+  [[nodiscard]] virtual BusStatistics statistics() const noexcept TANDEM_RT { return {}; }
   /// Why state() is not kActive, with what to do about it; empty while it is. Not RT.
   [[nodiscard]] virtual std::string status_text() const { return {}; }
 };

@@ -31,6 +31,7 @@ void DriveMaster::Impl::begin(const CycleTime& time) noexcept TANDEM_RT {
       node.master.restart(now_ns);
     }
     for (Port& port : ports) port.next_heartbeat_ns = now_ns;
+    started_ns = now_ns;
     begun = true;
   }
   ++counter;
@@ -333,6 +334,8 @@ std::string DriveMaster::status_text() const { return impl_->status(); }
 std::string DriveMaster::parameter_error() const { return impl_->refused_text(); }
 
 std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
+
+const StartUp& DriveMaster::start_up() const noexcept { return impl_->start_up; }
 
 std::vector<RoundTrip> DriveMaster::round_trips() const {
   std::vector<RoundTrip> trips;

@@ -41,6 +41,14 @@ struct RoundTrip {
   rt::Histogram time;
 };
 
+/// What the first start took, from the first cycle to the one in which every axis was enabled.
+struct StartUp {
+  std::int64_t duration_ns = 0;  ///< 0: not every axis was enabled yet
+  std::size_t axes = 0;
+  std::uint64_t sent = 0;      ///< frames, on all buses
+  std::uint64_t received = 0;  ///< the same
+};
+
 /// Brings all nodes to operation at once, then exchanges the process image with them.
 ///
 /// One cycle, in this order, from the first cycle to the last:
@@ -125,6 +133,8 @@ class DriveMaster {
   /// measurement, no state: not in a snapshot. Not RT.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
+  /// A measurement, no state: not in a snapshot.
+  [[nodiscard]] const StartUp& start_up() const noexcept;
   /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.
   /// Not RT.
   [[nodiscard]] std::vector<RoundTrip> round_trips() const;

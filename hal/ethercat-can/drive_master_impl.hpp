@@ -114,6 +114,7 @@ struct DriveMaster::Impl {
   void reset_joint(std::size_t joint) noexcept TANDEM_RT;
   void take_resets(const CommandImage& command) noexcept TANDEM_RT;
   void enable_again() noexcept TANDEM_RT;
+  void measure_start() noexcept TANDEM_RT;
   void watch_reset() noexcept TANDEM_RT;
   void set_targets(AxisMaster::TargetState target) noexcept TANDEM_RT;
   void fail() noexcept TANDEM_RT;
@@ -165,7 +166,9 @@ struct DriveMaster::Impl {
   std::int32_t refused_node = -1;
   SdoStep refused_step;
   canopen::AbortCode refused_code = canopen::AbortCode::kNone;
-  std::uint64_t unsent = 0;  ///< cycles whose commands a bus did not take whole; no state
+  StartUp start_up;             ///< no state
+  std::int64_t started_ns = 0;  ///< time of the first cycle; no state
+  std::uint64_t unsent = 0;     ///< cycles whose commands a bus did not take whole; no state
 };
 
 }  // namespace tandem::hal::can

@@ -56,6 +56,7 @@ void DriveMaster::Impl::advance() noexcept TANDEM_RT {
       } else if (all_enabled()) {
         set_targets(TargetState::kFollow);
         stage = MasterStage::kRunning;
+        measure_start();
       }
       break;
     case MasterStage::kRunning:
@@ -70,6 +71,15 @@ void DriveMaster::Impl::advance() noexcept TANDEM_RT {
     case MasterStage::kFailed: break;
   }
   if (resetting) watch_reset();
+}
+
+void DriveMaster::Impl::measure_start() noexcept TANDEM_RT {
+  start_up = {.duration_ns = now_ns - started_ns, .axes = axes.size()};
+  for (const Port& port : ports) {
+    const BusStatistics passed = port.bus->statistics();
+    start_up.sent += passed.sent;
+    start_up.received += passed.received;
+  }
 }
 
 /// Once every fault is reset: all axes again, where they are.

@@ -74,7 +74,9 @@ class FrameRecord {
     [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override {
       return bus_.sent_ns();
     }
-    [[nodiscard]] BusStatistics statistics() const noexcept override { return bus_.statistics(); }
+    [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
+      return bus_.statistics();
+    }
     [[nodiscard]] std::string status_text() const override { return bus_.status_text(); }
 
    private:

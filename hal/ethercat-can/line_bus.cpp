@@ -84,12 +84,13 @@ Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::
   }
   auto line = ecat::LineMaster::create(link, std::move(plans));
   if (!line) return std::unexpected(line.error());
-  return std::unique_ptr<LineBus>(new LineBus(std::move(*line), std::move(slaves), config));
+  return std::unique_ptr<LineBus>(new LineBus(link, std::move(*line), std::move(slaves), config));
 }
 
-LineBus::LineBus(std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
-                 const Config& config)
-    : line_(std::move(line)),
+LineBus::LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line,
+                 std::vector<Slave> slaves, const Config& config)
+    : link_(&link),
+      line_(std::move(line)),
       slaves_(std::move(slaves)),
       config_(config),
       storage_(2 * slaves_.size() * kFramesPerSlave + 2),
@@ -299,10 +300,12 @@ void LineBus::archive(Archive& ar) {
   given_ = 0;
 }
 
-BusStatistics LineBus::statistics() const noexcept {
+BusStatistics LineBus::statistics() const noexcept TANDEM_RT {
   const ecat::LineStatistics line = line_->statistics();
-  return {.sent = line.cycles,
-          .received = line.cycles - line.lost,
+  const ecat::LinkStatistics wire = link_->statistics();
+  return {.sent = wire.sent,
+          .received = wire.received,
+          .send_refused = wire.refused,
           .receive_lost = line.lost,
           .ignored = line.malformed + line.strangers,
           .recoveries = line_->mended()};

@@ -55,7 +55,7 @@ class LineBus final : public Bus {
   std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
   [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return BusState::kActive; }
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
-  [[nodiscard]] BusStatistics statistics() const noexcept override;
+  [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override { return line_->text(); }
 
   /// Between two cycles, when every frame was taken.
@@ -86,7 +86,8 @@ class LineBus final : public Bus {
     std::int64_t told_ns = 0;
   };
 
-  LineBus(std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves, const Config& config);
+  LineBus(ecat::Link& link, std::unique_ptr<ecat::LineMaster> line, std::vector<Slave> slaves,
+          const Config& config);
   void command(const canopen::Frame& frame) noexcept;
   void command(std::size_t slave, std::uint8_t nmt) noexcept;
   void request(std::size_t slave, const canopen::Frame& frame) noexcept;
@@ -98,6 +99,7 @@ class LineBus final : public Bus {
   void tell_sdo(std::size_t slave) noexcept;
   void tell_inputs(std::size_t slave) noexcept;
 
+  ecat::Link* link_;
   std::unique_ptr<ecat::LineMaster> line_;
   std::vector<Slave> slaves_;  ///< by their place in the line
   Config config_;

@@ -78,6 +78,9 @@ class LoopbackBus {
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
     std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
     [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return BusState::kActive; }
+    [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override {
+      return {.sent = out_.passed, .received = in_.passed};
+    }
 
    private:
     LoopbackBus& bus_;

@@ -73,7 +73,7 @@ class SocketCanBus final : public Bus {
   }
   /// CLOCK_MONOTONIC, just before the frames were handed over.
   [[nodiscard]] std::int64_t sent_ns() const noexcept TANDEM_RT override { return sent_ns_; }
-  [[nodiscard]] BusStatistics statistics() const noexcept override { return statistics_; }
+  [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override { return statistics_; }
   /// As after the last send() or receive(); any thread may ask.
   [[nodiscard]] std::string status_text() const override;
 

@@ -180,7 +180,7 @@ void LineBoards::archive(Archive& ar) {
   inbox_.clear();
 }
 
-hal::can::BusStatistics LineBoards::statistics() const noexcept {
+hal::can::BusStatistics LineBoards::statistics() const noexcept TANDEM_RT {
   const hal::ecat::LinkStatistics link = link_->statistics();
   return {.sent = link.sent, .received = link.received, .send_refused = link.refused};
 }

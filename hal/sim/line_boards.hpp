@@ -47,7 +47,7 @@ class LineBoards final : public hal::can::Bus {
   [[nodiscard]] hal::can::BusState state() const noexcept TANDEM_RT override {
     return hal::can::BusState::kActive;
   }
-  [[nodiscard]] hal::can::BusStatistics statistics() const noexcept override;
+  [[nodiscard]] hal::can::BusStatistics statistics() const noexcept TANDEM_RT override;
 
   /// Between two steps.
   void archive(Archive& ar);

@@ -36,7 +36,9 @@ class InProcessLink final : public Link {
   [[nodiscard]] ethercat::MacAddress address() const noexcept override {
     return {0x00, 0x00, 0x00, 0x00, 0x00, 0x01};
   }
-  [[nodiscard]] LinkStatistics statistics() const noexcept override { return statistics_; }
+  [[nodiscard]] LinkStatistics statistics() const noexcept TANDEM_RT override {
+    return statistics_;
+  }
   /// Frames under way included.
   void archive(Archive& ar);
 

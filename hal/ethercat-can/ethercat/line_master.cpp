@@ -323,7 +323,7 @@ void LineMaster::judge_slaves() noexcept {
   }
 }
 
-LineStatistics LineMaster::statistics() const noexcept {
+LineStatistics LineMaster::statistics() const noexcept TANDEM_RT {
   LineStatistics all = statistics_;
   all.repeated = exchange_.repeated();
   return all;

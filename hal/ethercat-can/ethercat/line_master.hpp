@@ -108,7 +108,7 @@ class LineMaster {
   [[nodiscard]] std::size_t broken_cable() const noexcept { return broken_cable_; }
   /// Times that a broken line was whole again.
   [[nodiscard]] std::uint64_t mended() const noexcept { return mended_; }
-  [[nodiscard]] LineStatistics statistics() const noexcept;
+  [[nodiscard]] LineStatistics statistics() const noexcept TANDEM_RT;
   /// Between two cycles.
   void archive(Archive& ar);
   /// What is wrong, line and slaves, a sentence each. Not RT.

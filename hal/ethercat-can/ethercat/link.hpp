@@ -43,7 +43,7 @@ class Link {
   virtual std::size_t receive(std::span<FrameBuffer> frames) noexcept TANDEM_RT = 0;
   /// The source address of the frames to be sent, without the mark of a slave.
   [[nodiscard]] virtual ethercat::MacAddress address() const noexcept = 0;
-  [[nodiscard]] virtual LinkStatistics statistics() const noexcept = 0;
+  [[nodiscard]] virtual LinkStatistics statistics() const noexcept TANDEM_RT = 0;
 };
 
 }  // namespace tandem::hal::ecat

@@ -43,7 +43,9 @@ class LoopbackLink {
     [[nodiscard]] ethercat::MacAddress address() const noexcept override {
       return {0x00, 0x00, 0x00, 0x00, 0x00, 0x01};
     }
-    [[nodiscard]] LinkStatistics statistics() const noexcept override { return statistics_; }
+    [[nodiscard]] LinkStatistics statistics() const noexcept TANDEM_RT override {
+      return statistics_;
+    }
 
    private:
     Queue* out_;

@@ -25,7 +25,9 @@ class PacketLink final : public Link {
   std::size_t send(std::span<const FrameBuffer> frames) noexcept TANDEM_RT override;
   std::size_t receive(std::span<FrameBuffer> frames) noexcept TANDEM_RT override;
   [[nodiscard]] ethercat::MacAddress address() const noexcept override { return address_; }
-  [[nodiscard]] LinkStatistics statistics() const noexcept override { return statistics_; }
+  [[nodiscard]] LinkStatistics statistics() const noexcept TANDEM_RT override {
+    return statistics_;
+  }
   /// For poll().
   [[nodiscard]] int descriptor() const noexcept { return socket_; }
 
