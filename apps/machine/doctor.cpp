@@ -239,7 +239,7 @@ Finding swap(const Machine& m) {
 }
 
 Finding can_support(const Machine& m) {
-  const std::string name = "kernel's CAN";
+  const std::string name = kCanSupport;
   if (m.has("/proc/net/can/rcvlist_all")) return ok(name, "loaded");
   const std::string release = m.text("/proc/sys/kernel/osrelease").value_or("");
   const std::string folder = "/lib/modules/" + release;

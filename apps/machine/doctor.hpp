@@ -18,6 +18,9 @@ enum class Health : std::uint8_t {
 };
 [[nodiscard]] const char* to_string(Health health);
 
+/// The name of the finding about CAN in the kernel.
+inline constexpr char kCanSupport[] = "kernel's CAN";
+
 struct Finding {
   std::string name;  ///< "kernel"
   Health health = Health::kOk;

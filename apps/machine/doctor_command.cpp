@@ -55,6 +55,10 @@ Exit doctor_command(const DoctorOptions& options) {
   if (!options.robot.empty()) {
     const auto robot = read_robot(options.robot);
     if (!robot) return refuse(robot.error());
+    const auto is_can = [](const hal::BusConfig& bus) { return bus.kind == hal::BusKind::kCan; };
+    if (std::ranges::none_of(robot->config.buses, is_can)) {
+      std::erase_if(findings, [](const Finding& one) { return one.name == kCanSupport; });
+    }
     const std::vector<Finding> more = examine_interfaces(machine, robot->config);
     findings.insert(findings.end(), more.begin(), more.end());
   }

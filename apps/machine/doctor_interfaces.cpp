@@ -1,4 +1,4 @@
-// The doctor's look at the CAN interfaces of a robot.
+// The doctor's look at the CAN and EtherCAT interfaces of a robot.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -149,6 +149,41 @@ void examine(const Bus& bus, std::vector<Finding>& out) {
   examine_restart(bus, out);
 }
 
+/// A network interface that carries the frames of a line, and nothing else.
+void examine_line(const Machine& machine, const Bus& bus, std::vector<Finding>& out) {
+  const std::string& interface = bus.config.interface;
+  const std::string type = bus.link.value("link_type", std::string("?"));
+  if (type != "ether") {
+    out.push_back({bus.name("type"), Health::kMissing, type, "it is no Ethernet interface",
+                   "give bus '" + bus.config.name + "' another interface in robot.toml"});
+    return;
+  }
+  out.push_back({bus.name("type"), Health::kOk, "Ethernet", {}, {}});
+  const std::string state = bus.link.value("operstate", std::string("?"));
+  Finding link{bus.name("link"), Health::kOk, state == "UP" ? "up" : state, {}, {}};
+  if (!bus.up()) {
+    link = {link.name, Health::kMissing, "down", "no frame can be sent",
+            fmt::format("ip link set {} up", interface)};
+  } else if (state != "UP" && state != "UNKNOWN") {
+    link.health = Health::kMissing;
+    link.why = "no slave is at the other end of the cable, or it has no power";
+    link.mend = "look at the cable to the first slave";
+  }
+  out.push_back(std::move(link));
+  constexpr int kEthernetMtu = 1500;
+  const int mtu = bus.link.value("mtu", 0);
+  if (mtu < kEthernetMtu) {
+    out.push_back({bus.name("frames"), Health::kMissing, fmt::format("{} bytes", mtu),
+                   "a frame of process data may have 1500",
+                   fmt::format("ip link set {} mtu {}", interface, kEthernetMtu)});
+  }
+  constexpr unsigned kCapNetRaw = 13;
+  if (!machine.has_capability(kCapNetRaw)) {
+    out.push_back({bus.name("permission"), Health::kMissing, "none", "raw frames need CAP_NET_RAW",
+                   "setcap cap_net_raw+ep $(command -v tandem), or run as root"});
+  }
+}
+
 std::size_t nodes_of(const hal::RobotConfig& robot, const std::string& bus) {
   const auto on_bus = [&bus](const auto& node) { return node.bus == bus; };
   return static_cast<std::size_t>(std::ranges::count_if(robot.boards, on_bus) +
@@ -169,6 +204,14 @@ std::vector<Finding> examine_interfaces(const Machine& machine, const hal::Robot
       return one.value("ifname", std::string()) == config.interface;
     });
     if (link == links.end()) {
+      const bool line = config.kind == hal::BusKind::kEthercat;
+      if (line) {
+        findings.push_back({config.interface, Health::kMissing, "no such interface",
+                            fmt::format("bus {} of robot.toml names it", config.name),
+                            "name the machine's, which `ip link` lists, in robot.toml or by "
+                            "--interface"});
+        continue;
+      }
       findings.push_back(
           {config.interface, Health::kMissing, "no such interface",
            fmt::format("bus {} of robot.toml names it", config.name),
@@ -177,7 +220,12 @@ std::vector<Finding> examine_interfaces(const Machine& machine, const hal::Robot
                        config.interface, type_words(config))});
       continue;
     }
-    examine({config, nodes_of(robot, config.name), *link}, findings);
+    const Bus bus{config, nodes_of(robot, config.name), *link};
+    if (config.kind == hal::BusKind::kEthercat) {
+      examine_line(machine, bus, findings);
+    } else {
+      examine(bus, findings);
+    }
   }
   return findings;
 }

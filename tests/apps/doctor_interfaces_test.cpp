@@ -123,5 +123,25 @@ TEST_F(DoctorInterfaces, SaysWhenIpTellsNothing) {
   expect(findings, "CAN interfaces", Health::kWarning, "unknown", "apt-get install iproute2");
 }
 
+/// The interface of an EtherCAT line.
+TEST_F(DoctorInterfaces, WantsALinkForALine) {
+  robot_.buses = {{.name = "leg", .interface = "eth1", .kind = hal::BusKind::kEthercat}};
+  const std::string good = R"([{"ifname": "eth1", "flags": ["UP"], "mtu": 1500,
+                                "operstate": "UP", "link_type": "ether"}])";
+  const auto look = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    write("/ip.json", text.replace(text.find(from), from.size(), to));
+    return examine_interfaces(machine(), robot_);
+  };
+  expect(look("UP", "UP"), "eth1 link", Health::kOk, "up", "");
+  expect(look(R"("UP"])", R"("BROADCAST"])"), "eth1 link", Health::kMissing, "down",
+         "ip link set eth1 up");
+  expect(look(R"("operstate": "UP")", R"("operstate": "DOWN")"), "eth1 link", Health::kMissing,
+         "DOWN", "the first slave");
+  expect(look("ether", "can"), "eth1 type", Health::kMissing, "can", "another interface");
+  expect(look("1500", "576"), "eth1 frames", Health::kMissing, "576", "mtu 1500");
+  expect(look("eth1", "eth2"), "eth1", Health::kMissing, "no such interface", "--interface");
+}
+
 }  // namespace
 }  // namespace tandem::apps
