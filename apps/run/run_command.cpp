@@ -295,8 +295,7 @@ class Session {
     if (dds_ != nullptr) summary.dds = dds_->finish();
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
-      const std::string start = start_text(c_.master);
-      summary.log = start.empty() ? recorder_->close() : recorder_->close({{"start", start}});
+      summary.log = recorder_->close(result_of(c_.master));
     }
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     summary.faults = fault_texts(*cycle_, summary.log);

@@ -177,6 +177,11 @@ Json start_json(const hal::can::DriveMaster* master) {
 void add_timing_facts(const RunSummary& summary, Facts& facts) {
   const std::string start = start_text(summary.composition.master);
   if (!start.empty()) facts.add("start", start);
+  if (summary.composition.master != nullptr) {
+    for (const std::string& text : summary.composition.master->wire_texts()) {
+      facts.add("wire", text);
+    }
+  }
   const rt::LoopStatistics& loop = summary.cycle.loop();
   const bool wall_clock = summary.composition.experiment.loop.pacing != rt::Pacing::kSimulated;
   if (wall_clock) {
@@ -223,6 +228,15 @@ void add_frame_facts(const RunSummary& summary, Facts& facts) {
 }
 
 }  // namespace
+
+log::StringMap result_of(const hal::can::DriveMaster* master) {
+  log::StringMap result;
+  const std::string start = start_text(master);
+  if (!start.empty()) result.emplace_back("start", start);
+  if (master == nullptr) return result;
+  for (const std::string& text : master->wire_texts()) result.emplace_back("wire", text);
+  return result;
+}
 
 std::string start_text(const hal::can::DriveMaster* master) {
   if (master == nullptr || master->start_up().duration_ns == 0) return "";
@@ -279,6 +293,7 @@ Json RunSummary::json() const {
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
   json["start"] = start_json(master);
+  json["wire"] = master == nullptr ? std::vector<std::string>() : master->wire_texts();
   json["remote"] = remote_json(server, composition.remote);
   json["faults"] = faults;
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();

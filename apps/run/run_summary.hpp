@@ -20,6 +20,9 @@ namespace tandem::apps {
 /// "29 axes enabled after 0.211 s, …"; empty without a master, or before that.
 [[nodiscard]] std::string start_text(const hal::can::DriveMaster* master);
 
+/// What the log's record "result" tells of the master.
+[[nodiscard]] log::StringMap result_of(const hal::can::DriveMaster* master);
+
 struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;

@@ -64,6 +64,9 @@ class Bus {
   [[nodiscard]] virtual std::int64_t sent_ns() const noexcept TANDEM_RT { return 0; }
 
   [[nodiscard]] virtual BusStatistics statistics() const noexcept TANDEM_RT { return {}; }
+  /// What this kind of wire alone can tell of the run so far, in a sentence; empty: nothing. Not
+  /// RT.
+  [[nodiscard]] virtual std::string measured_text() const { return {}; }
   /// Why state() is not kActive, with what to do about it; empty while it is. Not RT.
   [[nodiscard]] virtual std::string status_text() const { return {}; }
 };

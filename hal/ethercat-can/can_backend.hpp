@@ -91,6 +91,7 @@ class CanBackend final : public Backend {
       return bus_->statistics();
     }
     [[nodiscard]] std::string status_text() const override { return bus_->status_text(); }
+    [[nodiscard]] std::string measured_text() const override { return bus_->measured_text(); }
 
    private:
     Bus* bus_;

@@ -335,6 +335,15 @@ std::string DriveMaster::parameter_error() const { return impl_->refused_text();
 
 std::vector<std::string> DriveMaster::warnings() const { return impl_->warnings(); }
 
+std::vector<std::string> DriveMaster::wire_texts() const {
+  std::vector<std::string> texts;
+  for (std::size_t b = 0; b < impl_->ports.size(); ++b) {
+    const std::string text = impl_->ports[b].bus->measured_text();
+    if (!text.empty()) texts.push_back("bus " + impl_->robot.buses[b].name + ": " + text);
+  }
+  return texts;
+}
+
 const StartUp& DriveMaster::start_up() const noexcept { return impl_->start_up; }
 
 std::vector<RoundTrip> DriveMaster::round_trips() const {

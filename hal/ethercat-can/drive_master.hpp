@@ -133,6 +133,8 @@ class DriveMaster {
   /// measurement, no state: not in a snapshot. Not RT.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
+  /// "bus line: …" of every bus that has something to tell of its wire. Not RT.
+  [[nodiscard]] std::vector<std::string> wire_texts() const;
   /// A measurement, no state: not in a snapshot.
   [[nodiscard]] const StartUp& start_up() const noexcept;
   /// Of every board, in the configuration's order. A measurement, no state: not in a snapshot.

@@ -78,6 +78,7 @@ class FrameRecord {
       return bus_.statistics();
     }
     [[nodiscard]] std::string status_text() const override { return bus_.status_text(); }
+    [[nodiscard]] std::string measured_text() const override { return bus_.measured_text(); }
 
    private:
     FrameRecord& record_;

@@ -1,6 +1,8 @@
 // Frames of the drive master to the line, and the line's news back as frames.
 #include "hal/ethercat-can/line_bus.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "base/archive.hpp"
@@ -298,6 +300,26 @@ void LineBus::archive(Archive& ar) {
   if (!ar.reading()) return;
   inbox_.clear();
   given_ = 0;
+}
+
+std::string LineBus::measured_text() const {
+  const ecat::LineStatistics line = line_->statistics();
+  std::string text = fmt::format("{} of {} cycles lost, {} frames sent again", line.lost,
+                                 line.cycles, line.resent);
+  const SlaveMaster* worst = nullptr;
+  std::int32_t most_ns = -1;
+  for (std::size_t i = 0; i < slaves_.size(); ++i) {
+    const SlaveMaster& slave = line_->slave(i);
+    const std::int32_t off_ns = std::max(-slave.clock().least, slave.clock().most);
+    if (slave.clock().count == 0 || off_ns <= most_ns) continue;
+    worst = &slave;
+    most_ns = off_ns;
+  }
+  if (worst == nullptr) return text;
+  return text + fmt::format(
+                    "; the clocks follow the first slave's within {} ns, worst {} with {} "
+                    "to {} ns",
+                    most_ns, worst->plan().name, worst->clock().least, worst->clock().most);
 }
 
 BusStatistics LineBus::statistics() const noexcept TANDEM_RT {

@@ -57,6 +57,8 @@ class LineBus final : public Bus {
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override { return line_->text(); }
+  /// Of clocks and cycles.
+  [[nodiscard]] std::string measured_text() const override;
 
   /// Between two cycles, when every frame was taken.
   void archive(Archive& ar);

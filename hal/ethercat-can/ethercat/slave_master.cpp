@@ -274,6 +274,10 @@ void SlaveMaster::take_difference(Data data) noexcept {
   const auto raw = get<std::uint32_t>(data.data());
   const auto size = static_cast<std::int32_t>(raw & ~ethercat::kDifferenceSign);
   difference_ns_ = (raw & ethercat::kDifferenceSign) != 0 ? -size : size;
+  if (stage_ != SlaveStage::kRunning) return;
+  clock_.least = clock_.count == 0 ? difference_ns_ : std::min(clock_.least, difference_ns_);
+  clock_.most = clock_.count == 0 ? difference_ns_ : std::max(clock_.most, difference_ns_);
+  ++clock_.count;
 }
 
 void SlaveMaster::take_running(Data data, std::int64_t now_ns) noexcept {

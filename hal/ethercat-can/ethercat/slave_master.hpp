@@ -71,6 +71,13 @@ struct ClockReference {
   std::uint64_t time_ns = 0;  ///< its system time in the last cycle
 };
 
+/// How far a slave's clock was ahead of the reference in OP [ns]. A measurement, no state.
+struct ClockFigures {
+  std::int32_t least = 0;
+  std::int32_t most = 0;
+  std::uint64_t count = 0;
+};
+
 /// Non-blocking: one request at a time, on the channel that is its position.
 class SlaveMaster {
  public:
@@ -126,6 +133,7 @@ class SlaveMaster {
   [[nodiscard]] std::uint32_t delay_ns() const noexcept { return delay_ns_; }
   /// By how much its clock was ahead of the reference when it was last asked.
   [[nodiscard]] std::int32_t difference_ns() const noexcept { return difference_ns_; }
+  [[nodiscard]] const ClockFigures& clock() const noexcept { return clock_; }
   [[nodiscard]] std::uint16_t station() const noexcept { return station_; }
   [[nodiscard]] std::size_t position() const noexcept { return position_; }
   [[nodiscard]] const SlavePlan& plan() const noexcept { return plan_; }
@@ -192,6 +200,7 @@ class SlaveMaster {
   std::uint64_t offset_ns_ = 0;
   std::uint64_t sync0_start_ns_ = 0;
   std::int32_t difference_ns_ = 0;
+  ClockFigures clock_;
   CoeClient coe_;
 };
 
