@@ -66,11 +66,13 @@ void BoardData::set_open(bool open) noexcept TANDEM_RT {
   if (open && !open_) {
     for (int number = 1; number <= canopen::kPdosPerNode; ++number) switch_pdo(number, false);
     image_.fill(0);
+    count_ = 0;
   }
   open_ = open;
 }
 
 std::size_t BoardData::bytes() const noexcept TANDEM_RT {
+  if (!open_ && count_ > 0) return parts_[count_ - 1].offset + parts_[count_ - 1].bytes;
   std::size_t sum = 0;
   for (std::size_t i = 0; i < assigned_count_; ++i) sum += mapped_bytes(assigned_[i]);
   return sum;

@@ -126,6 +126,11 @@ bool Esc::map_bits(const Fmmu& fmmu, std::uint32_t address, std::span<std::uint8
   const auto from = static_cast<std::size_t>(physical / 8);
   const auto size = static_cast<std::size_t>((physical + end - begin + 7) / 8) - from;
   if (size > scratch_.size() || from + size > kMemoryBytes) return false;
+  if (((begin - origin) | (end - origin) | physical) % 8 == 0) {  // whole bytes, as nearly always
+    const auto at = static_cast<std::size_t>((begin - origin) / 8);
+    const std::span<std::uint8_t> here = data.subspan(at, size);
+    return write_data ? write(from, here, passage) : read(from, here, false, passage);
+  }
   const std::span<std::uint8_t> bytes(scratch_.data(), size);
   if (write_data) {
     std::copy_n(&memory_[from], size, bytes.begin());

@@ -54,7 +54,8 @@ void SlaveLine::set_cable(std::size_t number, bool whole) noexcept TANDEM_RT {
 }
 
 void SlaveLine::set_power(std::size_t position, bool on, std::int64_t now_ns) noexcept TANDEM_RT {
-  if (on && powered_[position] == 0) slaves_[position]->reset(now_ns);
+  if (on == (powered_[position] != 0)) return;
+  if (on) slaves_[position]->reset(now_ns);
   powered_[position] = on ? 1 : 0;
   update_links();
 }
