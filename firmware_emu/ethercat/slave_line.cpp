@@ -49,6 +49,7 @@ void SlaveLine::process(std::int64_t now_ns) noexcept TANDEM_RT {
 }
 
 void SlaveLine::set_cable(std::size_t number, bool whole) noexcept TANDEM_RT {
+  if (whole == (cable_whole_[number] != 0)) return;
   cable_whole_[number] = whole ? 1 : 0;
   update_links();
 }

@@ -167,6 +167,9 @@ EmulatedRobot::EmulatedRobot(const hal::RobotConfig& robot, const SimRobotConfig
     buses_.push_back(std::make_unique<LoopbackBus>());
   }
   attached_.resize(buses_.size());
+  for (std::size_t b = 0; b < buses_.size(); ++b) {
+    attached_[b].line = robot.buses[b].kind == hal::BusKind::kEthercat;
+  }
   for (const hal::JointConfig& joint : robot.joints) {
     supply_V_.push_back(robot.actuator_of(joint).voltage_limit_V);
   }
@@ -233,11 +236,13 @@ std::vector<EmulatedRobot::Node> EmulatedRobot::nodes(std::size_t bus) {
   std::vector<Node> all;
   for (const std::size_t b : attached_[bus].boards) {
     firmware::Board& board = *boards_[b].board;
-    all.push_back({board.name(), board.node_id(), &board.dictionary(), &boards_[b].powered});
+    all.push_back({board.name(), board.node_id(), static_cast<int>(b), &board.dictionary(),
+                   &boards_[b].powered});
   }
   for (const std::size_t s : attached_[bus].sensors) {
     firmware::SensorBoard& board = *sensor_nodes_[s].board;
-    all.push_back({board.name(), board.node_id(), &board.dictionary(), &sensor_nodes_[s].powered});
+    all.push_back(
+        {board.name(), board.node_id(), -1, &board.dictionary(), &sensor_nodes_[s].powered});
   }
   return all;
 }
@@ -329,7 +334,7 @@ void EmulatedRobot::deliver(bool at_sync) noexcept {
 }
 
 void EmulatedRobot::pass_to_boards(std::size_t bus, const canopen::Frame& frame) noexcept {
-  if (!faults_.any()) return receive(bus, frame);
+  if (!faults_.any() || attached_[bus].line) return receive(bus, frame);
   canopen::FrameSink out(passed_);
   faults_.pass(Direction::kToBoards, bus, frame, out);
   for (const canopen::Frame& one : out.frames()) receive(bus, one);
@@ -384,7 +389,7 @@ void EmulatedRobot::run_boards() noexcept {
 
 void EmulatedRobot::answer(std::size_t bus, std::size_t sender,
                            std::span<const canopen::Frame> frames) noexcept {
-  if (!faults_.any()) return put_out(bus, sender, frames);
+  if (!faults_.any() || attached_[bus].line) return put_out(bus, sender, frames);
   for (const canopen::Frame& frame : frames) {
     canopen::FrameSink out(passed_);
     faults_.pass(Direction::kToMaster, bus, frame, out);

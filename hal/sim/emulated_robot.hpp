@@ -116,6 +116,7 @@ class EmulatedRobot {
   struct Node {
     std::string name;
     int id = 0;
+    int board = -1;  ///< index in the configuration; -1: a sensor
     canopen::ObjectDictionary* dictionary = nullptr;
     const std::uint8_t* powered = nullptr;
   };
@@ -142,6 +143,8 @@ class EmulatedRobot {
   [[nodiscard]] const Fault* next_begun_fault() noexcept TANDEM_RT { return faults_.next_begun(); }
   /// Every fault injected so far, and what it has done.
   [[nodiscard]] std::span<const FaultSlot> faults() const noexcept { return faults_.slots(); }
+  /// For who emulates another wire: whose frames are struck there.
+  [[nodiscard]] FaultInjection& injection() noexcept { return faults_; }
   [[nodiscard]] const firmware::Board& board(std::size_t index) const noexcept {
     return *boards_[index].board;
   }
@@ -229,6 +232,7 @@ class EmulatedRobot {
   /// Who is on a bus: indices in boards_ and sensor_nodes_.
   struct Attached {
     std::vector<std::size_t> boards, sensors;
+    bool line = false;  // an EtherCAT bus: faults strike its frames elsewhere
   };
   std::vector<Attached> attached_;  // per bus
   std::vector<double> supply_V_;    // per joint

@@ -118,6 +118,18 @@ void FaultInjection::pass(Direction direction, std::size_t bus, const Frame& in,
   if (follows) out.push(behind);
 }
 
+hal::FaultKind FaultInjection::fate(Direction direction, std::size_t bus) noexcept TANDEM_RT {
+  for (FaultSlot& slot : std::span(slots_).first(count_)) {
+    const bool wire = slot.fault.kind == FaultKind::kFrameDrop ||
+                      slot.fault.kind == FaultKind::kFrameDelay ||
+                      slot.fault.kind == FaultKind::kFrameDuplicate;
+    if (slot.active == 0 || !wire || !goes(slot.fault.direction, direction)) continue;
+    if (slot.fault.bus >= 0 && static_cast<std::size_t>(slot.fault.bus) != bus) continue;
+    if (strikes(slot)) return slot.fault.kind;
+  }
+  return FaultKind::kNone;
+}
+
 bool FaultInjection::next_due(Direction direction, std::size_t bus,
                               Frame& frame) noexcept TANDEM_RT {
   for (std::size_t i = 0; i < held_count_; ++i) {

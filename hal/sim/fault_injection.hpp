@@ -117,6 +117,9 @@ class FaultInjection {
   /// What becomes of one frame, in `out`: at most kMostFramesOut.
   void pass(Direction direction, std::size_t bus, const canopen::Frame& frame,
             canopen::FrameSink& out) noexcept TANDEM_RT;
+  /// What happens to an Ethernet frame of an EtherCAT bus: kFrameDrop, kFrameDelay (it comes with
+  /// the next cycle's), kFrameDuplicate, or kNone.
+  [[nodiscard]] hal::FaultKind fate(Direction direction, std::size_t bus) noexcept TANDEM_RT;
   /// The next delayed frame whose step has come.
   [[nodiscard]] bool next_due(Direction direction, std::size_t bus,
                               canopen::Frame& frame) noexcept TANDEM_RT;

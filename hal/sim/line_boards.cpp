@@ -24,7 +24,9 @@ constexpr std::int64_t kJitterNs = 10;
 
 LineBoards::LineBoards(EmulatedRobot& robot, std::size_t bus, hal::ecat::Link& link,
                        const Config& config)
-    : link_(&link),
+    : robot_(&robot),
+      bus_(bus),
+      link_(&link),
       config_(config),
       came_(kFramesAtOnce),
       back_(kFramesAtOnce),
@@ -104,20 +106,60 @@ bool LineBoards::begins_cycle(hal::ecat::FrameBuffer& frame) noexcept {
 
 /// Up to the next cycle's frame; what comes back is sent.
 void LineBoards::pass() noexcept {
-  std::size_t back = 0;
-  for (; first_ < count_; ++first_) {
-    hal::ecat::FrameBuffer& frame = came_[first_];
-    if (!in_cycle_ && begins_cycle(frame)) break;
-    in_cycle_ = false;
-    if (!line_->pass(frame.frame(), now_ns_)) continue;
-    back_[back].size = frame.size;
-    std::copy_n(frame.bytes.begin(), frame.size, back_[back++].bytes.begin());
+  back_count_ = 0;
+  if (in_cycle_ && late_.size != 0) {
+    put_back(late_);
+    late_.size = 0;
   }
-  if (back > 0) (void)link_->send(std::span(back_).first(back));
+  for (; first_ < count_; ++first_) {
+    if (!in_cycle_ && begins_cycle(came_[first_])) break;
+    in_cycle_ = false;
+    pass(came_[first_]);
+  }
+  if (back_count_ > 0) (void)link_->send(std::span(back_).first(back_count_));
+}
+
+void LineBoards::pass(hal::ecat::FrameBuffer& frame) noexcept {
+  using hal::FaultKind;
+  FaultInjection& faults = robot_->injection();
+  const auto fate = [&](Direction direction) {
+    return faults.any() ? faults.fate(direction, bus_) : FaultKind::kNone;
+  };
+  const FaultKind out = fate(Direction::kToBoards);
+  if (out == FaultKind::kFrameDrop || !line_->pass(frame.frame(), now_ns_)) return;
+  if (out == FaultKind::kFrameDuplicate) put_back(frame);
+  const FaultKind back = fate(Direction::kToMaster);
+  if (back == FaultKind::kFrameDrop) return;
+  if (back == FaultKind::kFrameDuplicate) put_back(frame);
+  if (out == FaultKind::kFrameDelay || back == FaultKind::kFrameDelay) {
+    late_ = frame;
+    return;
+  }
+  put_back(frame);
+}
+
+void LineBoards::put_back(const hal::ecat::FrameBuffer& frame) noexcept {
+  if (back_count_ == back_.size()) return;
+  back_[back_count_].size = frame.size;
+  std::copy_n(frame.bytes.begin(), frame.size, back_[back_count_++].bytes.begin());
+}
+
+/// A cable leads to the board that a fault names, or to the first slave.
+void LineBoards::set_cables() noexcept {
+  for (std::size_t place = 0; place < seats_.size(); ++place) {
+    const bool cut = std::ranges::any_of(robot_->injection().slots(), [&](const FaultSlot& slot) {
+      const bool here = slot.active != 0 && slot.fault.kind == hal::FaultKind::kBusDown &&
+                        static_cast<std::size_t>(slot.fault.bus) == bus_;
+      const bool first = slot.fault.board < 0;
+      return here && (first ? place == 0 : seats_[place].node.board == slot.fault.board);
+    });
+    line_->set_cable(place, !cut);
+  }
 }
 
 void LineBoards::begin_cycle() noexcept {
   now_ns_ = config_.clock != nullptr ? config_.clock->now_ns() : now_ns_ + config_.period_ns;
+  if (robot_->injection().any()) set_cables();
   for (std::size_t place = 0; place < seats_.size(); ++place) run(seats_[place], place);
   inbox_.push(canopen::make_sync());
 }
@@ -153,12 +195,22 @@ std::size_t LineBoards::send(std::span<const Frame> frames) noexcept TANDEM_RT {
   for (const Frame& frame : frames) {
     const std::size_t place = (frame.id & 0x7F) - 1;
     if (place >= seats_.size()) continue;
+    if ((frame.id & 0x780) == canopen::cob::kHeartbeat) watch_boot_up(seats_[place], frame);
     for (const BoardData::Part& part : seats_[place].inputs->parts()) {
       if (part.cob_id != frame.id || frame.length < part.bytes) continue;
       std::copy_n(frame.data.begin(), part.bytes, seats_[place].inputs->bytes_of(part).begin());
     }
   }
   return frames.size();
+}
+
+/// A board that booted by itself takes its slave along.
+void LineBoards::watch_boot_up(Seat& seat, const Frame& frame) noexcept {
+  const auto message = canopen::parse_heartbeat(frame);
+  const bool boots = message && message->state == canopen::NmtState::kBootUp;
+  if (!boots || seat.slave->state() < AlState::kSafeOp) return;
+  seat.slave->fail(AlState::kInit, ethercat::AlCode::kUnspecified);
+  seat.state = AlState::kInit;
 }
 
 void LineBoards::end_step() noexcept TANDEM_RT {
@@ -173,7 +225,9 @@ void LineBoards::end_step() noexcept TANDEM_RT {
 }
 
 void LineBoards::archive(Archive& ar) {
-  ar(*line_, in_cycle_, cycle_index_, now_ns_);
+  ar(*line_, in_cycle_, cycle_index_, now_ns_, late_.size);
+  late_.size = std::min(late_.size, late_.bytes.size());
+  ar.raw(late_.bytes.data(), late_.size);
   for (Seat& seat : seats_) ar(seat.state);
   if (!ar.reading()) return;
   first_ = count_ = given_ = 0;

@@ -70,14 +70,22 @@ class LineBoards final : public hal::can::Bus {
   void pass() noexcept;
   void begin_cycle() noexcept;
   void run(Seat& seat, std::size_t place) noexcept;
+  void set_cables() noexcept;
+  void pass(hal::ecat::FrameBuffer& frame) noexcept;
+  void put_back(const hal::ecat::FrameBuffer& frame) noexcept;
   void tell_state(Seat& seat) noexcept;
+  void watch_boot_up(Seat& seat, const canopen::Frame& frame) noexcept;
 
+  EmulatedRobot* robot_;
+  std::size_t bus_;
   hal::ecat::Link* link_;
   Config config_;
   std::vector<Seat> seats_;  ///< by place
   std::unique_ptr<firmware::esc::SlaveLine> line_;
   std::vector<hal::ecat::FrameBuffer> came_;  ///< what waits to pass is [first_, count_)
   std::vector<hal::ecat::FrameBuffer> back_;
+  std::size_t back_count_ = 0;
+  hal::ecat::FrameBuffer late_;  ///< a fault's: it comes back with the next cycle; size 0: none
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   bool in_cycle_ = false;  ///< a cycle's frame waits for the step

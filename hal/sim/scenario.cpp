@@ -77,6 +77,33 @@ void read_node(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   }
 }
 
+/// Which way, how often: of frames on any wire.
+void read_share(TomlTable& table, Fault& fault) {
+  const std::string way = table.choice_or("direction", "both", {"to_boards", "to_master", "both"});
+  if (way == "to_boards") fault.direction = Direction::kToBoards;
+  if (way == "to_master") fault.direction = Direction::kToMaster;
+  fault.probability = table.number_or("probability", 1.0, {0.0, 1.0, true});
+  fault.count = static_cast<std::uint32_t>(table.integer_or("count", 0, 0, kAnyU32));
+  fault.seed = static_cast<std::uint64_t>(
+      table.integer_or("seed", 0, 0, std::numeric_limits<std::int64_t>::max()));
+}
+
+/// On an EtherCAT bus a frame goes through every slave.
+void read_line_frames(TomlTable& table, Fault& fault) {
+  if (fault.node_id != 0) {
+    table.error(fault.board >= 0 ? "board" : "sensor", "an Ethernet frame is of no single node",
+                "name the bus; for one slave there is board_kill, board_reset and bus_down");
+  }
+  if (fault.kind == FaultKind::kFrameCorrupt || fault.kind == FaultKind::kFrameReorder) {
+    table.error("kind", "Ethernet drops frames that are damaged, and a line keeps their order",
+                "use frame_drop, frame_delay or frame_duplicate");
+  }
+  if (fault.kind == FaultKind::kFrameDelay) {
+    fault.steps = static_cast<std::uint32_t>(table.integer_or("steps", 1, 1, 1));
+  }
+  read_share(table, fault);
+}
+
 void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   if (table.has("bus")) fault.bus = index_of(table, "bus", robot.buses);
   if (table.has("board") || table.has("sensor")) {  // the node's frames, on its bus
@@ -89,23 +116,34 @@ void read_frames(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
     if (fault.board >= 0) of(robot.boards[static_cast<std::size_t>(fault.board)]);
     if (fault.sensor >= 0) of(robot.sensors[static_cast<std::size_t>(fault.sensor)]);
   }
+  const bool line = fault.bus >= 0 && robot.buses[static_cast<std::size_t>(fault.bus)].kind ==
+                                          hal::BusKind::kEthercat;
+  if (line) return read_line_frames(table, fault);
   if (table.has("cob_id")) {
     fault.cob_id = static_cast<std::uint32_t>(table.integer("cob_id", 0, 0x7FF));
     fault.cob_mask = static_cast<std::uint32_t>(table.integer_or("cob_mask", 0x7FF, 1, 0x7FF));
   }
-  const std::string way = table.choice_or("direction", "both", {"to_boards", "to_master", "both"});
-  if (way == "to_boards") fault.direction = Direction::kToBoards;
-  if (way == "to_master") fault.direction = Direction::kToMaster;
-  fault.probability = table.number_or("probability", 1.0, {0.0, 1.0, true});
-  fault.count = static_cast<std::uint32_t>(table.integer_or("count", 0, 0, kAnyU32));
-  fault.seed = static_cast<std::uint64_t>(
-      table.integer_or("seed", 0, 0, std::numeric_limits<std::int64_t>::max()));
+  read_share(table, fault);
   if (fault.kind == FaultKind::kFrameDelay) {
     fault.steps = static_cast<std::uint32_t>(table.integer("steps", 1, 1'000'000));
   }
   if (fault.kind == FaultKind::kFrameCorrupt) {
     fault.length = static_cast<std::int32_t>(table.integer_or("length", -1, 0, 64));
     fault.bits = static_cast<std::uint32_t>(table.integer_or("bits", 1, 1, 512));
+  }
+}
+
+/// Of an EtherCAT bus the cable that leads to a board can be cut; else that to the first slave.
+void read_cable(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+  fault.bus = index_of(table, "bus", robot.buses);
+  if (fault.bus < 0 || !table.has("board")) return;
+  const hal::BusConfig& bus = robot.buses[static_cast<std::size_t>(fault.bus)];
+  fault.board = index_of(table, "board", robot.boards);
+  if (bus.kind != hal::BusKind::kEthercat) {
+    table.error("board", "a CAN bus is down for all of its nodes", "leave the board out");
+  } else if (fault.board >= 0 &&
+             robot.boards[static_cast<std::size_t>(fault.board)].bus != bus.name) {
+    table.error("board", "it is on another bus", "name a board of bus '" + bus.name + "'");
   }
 }
 
@@ -156,7 +194,7 @@ void read_target(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
     case FaultKind::kEncoderUnplug:
     case FaultKind::kMotorOverheat:
     case FaultKind::kSpringBreak: return read_joint(table, robot, fault);
-    case FaultKind::kBusDown: fault.bus = index_of(table, "bus", robot.buses); return;
+    case FaultKind::kBusDown: return read_cable(table, robot, fault);
   }
 }
 

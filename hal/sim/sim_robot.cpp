@@ -14,15 +14,15 @@ Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot
   auto emulated = EmulatedRobot::create(robot, kernels, config);
   if (!emulated) return std::unexpected(emulated.error());
   std::vector<hal::can::Bus*> ends;
-  std::vector<Line> lines;
+  std::vector<std::unique_ptr<InProcessLine>> lines;
   for (std::size_t b = 0; b < (*emulated)->buses(); ++b) {
     if (robot.buses[b].kind != hal::BusKind::kEthercat) {
       ends.push_back(&(*emulated)->bus(b).master());
       continue;
     }
-    auto line = make_line(robot, **emulated, b, config);
+    auto line = InProcessLine::create(robot, **emulated, b, config);
     if (!line) return std::unexpected(line.error());
-    ends.push_back(line->master.get());
+    ends.push_back(&(*line)->master());
     lines.push_back(std::move(*line));
   }
   auto master = hal::can::DriveMaster::create(robot, ends);
@@ -31,20 +31,8 @@ Result<std::unique_ptr<SimRobot>> SimRobot::create(const hal::RobotConfig& robot
       new SimRobot(std::move(*emulated), std::move(lines), std::move(*master), config.truth));
 }
 
-Result<SimRobot::Line> SimRobot::make_line(const hal::RobotConfig& robot, EmulatedRobot& emulated,
-                                           std::size_t bus, const SimRobotConfig& config) {
-  Line line{.bus = bus, .cable = std::make_unique<hal::ecat::LoopbackLink>()};
-  auto master = hal::can::LineBus::create(robot, bus, line.cable->master(),
-                                          {.period_ns = config.period_ns, .lockstep = true});
-  if (!master) return std::unexpected(master.error());
-  line.master = std::move(*master);
-  line.boards = std::make_unique<LineBoards>(
-      emulated, bus, line.cable->slaves(),
-      LineBoards::Config{.period_ns = config.period_ns, .seed = config.seed});
-  return line;
-}
-
-SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot, std::vector<Line> lines,
+SimRobot::SimRobot(std::unique_ptr<EmulatedRobot> robot,
+                   std::vector<std::unique_ptr<InProcessLine>> lines,
                    std::unique_ptr<hal::can::DriveMaster> master, bool keep_truth)
     : robot_(std::move(robot)),
       lines_(std::move(lines)),
@@ -60,7 +48,12 @@ hal::Phase SimRobot::phase() const noexcept {
 
 std::string SimRobot::status_text() const {
   if (plant().diverged()) return "the simulation diverged: " + plant().diverged_text();
-  return master_->status_text();
+  std::string text = master_->status_text();
+  for (const auto& line : lines_) {
+    const std::string why = line->master().status_text();
+    if (!why.empty()) text += (text.empty() ? "" : "; ") + why;
+  }
+  return text;
 }
 
 Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
@@ -72,9 +65,9 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   }
   master_->cycle_begin(time);
   hook_(SimStage::kMasterSync);
-  to_boards();
+  for (const auto& line : lines_) line->to_boards();
   if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
-  to_master();
+  for (const auto& line : lines_) line->to_master();
   const Code code = master_->receive(state);
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
@@ -82,29 +75,6 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   if (keep_truth_) truth_filler_.fill(plant(), time, truth_);
   hook_(SimStage::kTruth);
   return code;
-}
-
-/// What a line's slaves have heard.
-void SimRobot::to_boards() noexcept {
-  for (Line& line : lines_) {
-    hal::can::Bus& bus = robot_->bus(line.bus).master();
-    for (std::size_t count = passing_.size(); count == passing_.size();) {
-      count = line.boards->receive(passing_);
-      (void)bus.send(std::span(passing_).first(count));
-    }
-  }
-}
-
-/// What the boards of a line have to say.
-void SimRobot::to_master() noexcept {
-  for (Line& line : lines_) {
-    hal::can::Bus& bus = robot_->bus(line.bus).master();
-    for (std::size_t count = passing_.size(); count == passing_.size();) {
-      count = bus.receive(passing_);
-      (void)line.boards->send(std::span(passing_).first(count));
-    }
-    line.boards->end_step();
-  }
 }
 
 Code SimRobot::write(const hal::CommandImage& command,
@@ -127,7 +97,7 @@ hal::InjectedFault SimRobot::next_injected() noexcept TANDEM_RT {
 
 bool SimRobot::archive(Archive& ar) {
   ar(*robot_, truth_, *master_);
-  for (Line& line : lines_) ar(*line.cable, *line.boards, *line.master);
+  for (const auto& line : lines_) ar(*line);
   return true;
 }
 

@@ -9,10 +9,8 @@
 #include "base/spsc_ring.hpp"
 #include "hal/backend.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
-#include "hal/ethercat-can/ethercat/loopback_link.hpp"
-#include "hal/ethercat-can/line_bus.hpp"
 #include "hal/sim/emulated_robot.hpp"
-#include "hal/sim/line_boards.hpp"
+#include "hal/sim/in_process_line.hpp"
 #include "hal/sim/truth.hpp"
 
 namespace tandem::sim {
@@ -61,24 +59,11 @@ class SimRobot final : public hal::Backend {
   }
 
  private:
-  /// An EtherCAT bus: both ends of its line, and the cable between them.
-  struct Line {
-    std::size_t bus = 0;
-    std::unique_ptr<hal::ecat::LoopbackLink> cable;
-    std::unique_ptr<LineBoards> boards{};
-    std::unique_ptr<hal::can::LineBus> master{};
-  };
-
-  SimRobot(std::unique_ptr<EmulatedRobot> robot, std::vector<Line> lines,
+  SimRobot(std::unique_ptr<EmulatedRobot> robot, std::vector<std::unique_ptr<InProcessLine>> lines,
            std::unique_ptr<hal::can::DriveMaster> master, bool keep_truth);
-  static Result<Line> make_line(const hal::RobotConfig& robot, EmulatedRobot& emulated,
-                                std::size_t bus, const SimRobotConfig& config);
-  void to_boards() noexcept;
-  void to_master() noexcept;
 
   std::unique_ptr<EmulatedRobot> robot_;
-  std::vector<Line> lines_;
-  std::array<canopen::Frame, 64> passing_{};  ///< no state
+  std::vector<std::unique_ptr<InProcessLine>> lines_;  ///< EtherCAT
   std::unique_ptr<hal::can::DriveMaster> master_;
   TruthFiller truth_filler_;
   hal::TruthImage truth_;

@@ -86,6 +86,9 @@ TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
                              "TEST(?:_P)?\\(FaultRow, (\\w+)\\)");
   EXPECT_GT(tests.size(), 20U);
   EXPECT_EQ(named, tests);
+  EXPECT_EQ(
+      matches(text_of(kRoot / "docs/faults.md"), "`LineRow\\.(\\w+)`"),
+      matches(text_of(kRoot / "tests/runtime/line_rows_test.cpp"), "TEST_F\\(LineRow, (\\w+)\\)"));
 }
 
 TEST(Documentation, LinksLeadToFilesThatExist) {

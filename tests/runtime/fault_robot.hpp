@@ -11,6 +11,7 @@
 
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/sim/emulated_robot.hpp"
+#include "hal/sim/in_process_line.hpp"
 #include "rt/clock.hpp"
 #include "runtime/robot_cycle.hpp"
 #include "tests/runtime/test_controllers.hpp"
@@ -52,7 +53,14 @@ class FaultRobot final : public hal::Backend {
     emulated = std::move(*made);
     std::vector<hal::can::Bus*> ends;
     for (std::size_t b = 0; b < robot.buses.size(); ++b) {
-      buses.push_back(std::make_unique<FailingBus>(emulated->bus(b).master()));
+      hal::can::Bus* end = &emulated->bus(b).master();
+      if (robot.buses[b].kind == hal::BusKind::kEthercat) {
+        auto line = sim::InProcessLine::create(robot, *emulated, b, config);
+        EXPECT_TRUE(line.has_value()) << line.error().to_string();
+        end = &(*line)->master();
+        lines.push_back(std::move(*line));
+      }
+      buses.push_back(std::make_unique<FailingBus>(*end));
       ends.push_back(buses.back().get());
     }
     auto drives = hal::can::DriveMaster::create(robot, ends);
@@ -62,14 +70,20 @@ class FaultRobot final : public hal::Backend {
 
   [[nodiscard]] hal::Pace pace() const noexcept override { return hal::Pace::kSimulatedClock; }
   [[nodiscard]] hal::Phase phase() const noexcept override { return master->phase(); }
-  [[nodiscard]] std::string status_text() const override { return master->status_text(); }
+  [[nodiscard]] std::string status_text() const override {
+    std::string text = master->status_text();
+    for (const auto& line : lines) text += "\n" + line->master().status_text();
+    return text;
+  }
   [[nodiscard]] Code read(const hal::CycleTime& time,
                           hal::StateImage& state) noexcept TANDEM_RT override {
     for (const auto& bus : buses) bus->room = bus->queue;
     hal::CycleTime late = time;
     late.time_ns += slept_ns_;
     master->cycle_begin(late);
+    for (const auto& line : lines) line->to_boards();
     const Code code = emulated->step(late.time_ns);
+    for (const auto& line : lines) line->to_master();
     return code == Code::kOk ? master->receive(state) : code;
   }
   [[nodiscard]] Code write(const hal::CommandImage& command,
@@ -95,6 +109,7 @@ class FaultRobot final : public hal::Backend {
   }
 
   std::unique_ptr<sim::EmulatedRobot> emulated;
+  std::vector<std::unique_ptr<sim::InProcessLine>> lines;  ///< EtherCAT buses
   std::vector<std::unique_ptr<FailingBus>> buses;
   std::unique_ptr<hal::can::DriveMaster> master;
 

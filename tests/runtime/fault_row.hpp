@@ -18,8 +18,11 @@ using sim::Fault;
 /// The page's line of the running test, cell by cell: fault | detected by | reaction | detected |
 /// safe | test.
 inline std::vector<std::string> row_of_this_test() {
-  const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
-  const std::string name = "`FaultRow." + test.substr(0, test.find('/')) + "`";
+  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+  const std::string test = info->name();
+  const bool on_line = std::string(info->test_suite_name()) == "LineRow";
+  const std::string name =
+      std::string(on_line ? "`LineRow." : "`FaultRow.") + test.substr(0, test.find('/')) + "`";
   std::ifstream page(std::filesystem::path(TANDEM_SOURCE_DIR) / "docs/faults.md");
   for (std::string line; std::getline(page, line);) {
     if (line.find(name) == std::string::npos) continue;

@@ -51,6 +51,7 @@ LineMaster::LineMaster(Link& link, std::vector<SlavePlan> plans)
 
 void LineMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   scan_ = Scan::kCount;
+  stopped_ = scan_is_slow_ = false;
   scan_ns_ = now_ns;
   part_ = 0;
   error_ = LineError::kNone;
@@ -165,7 +166,7 @@ void LineMaster::add_watch() noexcept {
 }
 
 void LineMaster::send(std::int64_t now_ns) noexcept TANDEM_RT {
-  if (scan_ == Scan::kIdle) return;
+  if (scan_ == Scan::kIdle || stopped_) return;
   if (scan_ != Scan::kDone) scan(now_ns);
   if (scan_ == Scan::kDone) {
     run_clocks(now_ns);
@@ -188,7 +189,7 @@ void LineMaster::send(std::int64_t now_ns) noexcept TANDEM_RT {
 }
 
 void LineMaster::write() noexcept TANDEM_RT {
-  if (!sent_ || writes_ != 0) return;
+  if (!sent_ || stopped_ || writes_ != 0) return;
   batch_.begin(link_->address());
   writes_ = image_.write(batch_);
   (void)link_->send(batch_.finish());
@@ -203,7 +204,7 @@ void LineMaster::stop() noexcept TANDEM_RT {
       batch_.add(Command::kBwr, index_, register_address(0, reg::kAlControl), kInit.size());
   std::ranges::copy(kInit, data.begin());
   (void)link_->send(batch_.finish());
-  scan_ = Scan::kIdle;
+  stopped_ = true;
 }
 
 bool LineMaster::settled() const noexcept {
@@ -218,9 +219,11 @@ void LineMaster::scan(std::int64_t now_ns) noexcept {
   part_ = right ? part_ + 1 : 0;
   if (part_ >= 2) {
     scan_ = Scan::kClear;
+    scan_is_slow_ = false;
     part_ = 0;
     return clear(now_ns);
   }
+  scan_is_slow_ = now_ns - scan_ns_ >= kSlowScanNs;
   if (now_ns - scan_ns_ < kScanTimeNs) return;
   found_ = watch_back_ ? cycle_.reached : 0;
   error_ = found_ == 0 ? LineError::kSilent
@@ -334,7 +337,13 @@ std::string LineMaster::text() const {
   const auto say = [&](const std::string& line) { all += line + "\n"; };
   const std::string expected = std::to_string(size());
   switch (error_) {
-    case LineError::kNone: break;
+    case LineError::kNone:
+      if (scan_is_slow_ && cycle_.reached < size()) {
+        say(std::to_string(cycle_.reached) + " of " + expected + " slaves answer: look at slave " +
+            std::to_string(cycle_.reached) + " (" + slaves_[cycle_.reached].plan().name +
+            ") and the cable to it");
+      }
+      break;
     case LineError::kSilent:
       say("no frame comes back: the cable from the master to slave 0 (" + slaves_[0].plan().name +
           ") is cut, or the slave has no power");

@@ -58,6 +58,7 @@ struct LineStatistics {
 class LineMaster {
  public:
   static constexpr std::int64_t kScanTimeNs = 5'000'000'000;
+  static constexpr std::int64_t kSlowScanNs = 500'000'000;
   static constexpr unsigned kCertain = 3;  ///< cycles in a row until a break is believed
   static constexpr unsigned kSilentCycles = 20;
 
@@ -147,7 +148,9 @@ class LineMaster {
 
   std::uint8_t index_ = 0;
   bool sent_ = false;
-  std::size_t writes_ = 0;  ///< of outputs by themselves, under way
+  bool stopped_ = false;
+  bool scan_is_slow_ = false;  ///< text() tells whom it waits for
+  std::size_t writes_ = 0;     ///< of outputs by themselves, under way
   bool watch_back_ = false;
   std::uint8_t states_ = 0;  ///< of all slaves, ORed
   CycleReport cycle_;

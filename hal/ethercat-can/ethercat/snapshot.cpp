@@ -42,8 +42,8 @@ void SlaveMaster::archive(Archive& ar) {
 
 void LineMaster::archive(Archive& ar) {
   ar(image_, slaves_, exchange_, scan_, part_, scan_ns_, error_, broken_cable_, found_,
-     short_reach_, full_reach_, mended_, index_, sent_, writes_, watch_back_, states_, latching_,
-     turn_);
+     short_reach_, full_reach_, mended_, index_, sent_, stopped_, scan_is_slow_, writes_,
+     watch_back_, states_, latching_, turn_);
   ar(cycle_.complete, cycle_.valid, cycle_.counter, cycle_.expected, cycle_.reached,
      cycle_.lost_in_row, cycle_.short_in_row, cycle_.reference_ns);
   ar(statistics_, reference_.station, reference_.set, reference_.offset_ns, reference_.time_ns);

@@ -1,0 +1,186 @@
+// The rows of docs/faults.md about an EtherCAT line.
+#include "tests/runtime/fault_row.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using namespace test;
+using sim::Fault;
+
+class LineRow : public testing::Test {};
+
+/// UR5e with its three boards in one line.
+struct LineRig : private LoadedRobot, FaultRig {
+  explicit LineRig(std::vector<Fault> scenario = {})
+      : LoadedRobot("ur5e"),
+        FaultRig(line(loaded.robot), loaded.kernels.get(), "ready", std::move(scenario),
+                 RowRig::kHanging_ns) {}
+  static hal::RobotConfig line(hal::RobotConfig config) {
+    config.buses[0].kind = hal::BusKind::kEthercat;
+    int place = static_cast<int>(config.boards.size());
+    for (hal::SensorConfig& sensor : config.sensors) sensor.node_id = ++place;
+    return RowRig::with(std::move(config), hal::StopCategory::kCategory1);
+  }
+  /// Cycles of the robot alone, every joint held.
+  void drive(int cycles) {
+    for (int i = 0; i < cycles; ++i) {
+      (void)backend->read(next(), state);
+      (void)backend->write(hold, parameters);
+    }
+  }
+  /// With this fault, and 0.5 s after its end: nothing has moved by itself, and after a reset the
+  /// robot moves again.
+  void expect_recovery(const Fault& fault) {
+    run();
+    inject(fault);
+    drive(1000);
+    EXPECT_EQ(backend->phase(), hal::Phase::kFault) << causes();
+    backend->reset();
+    for (int i = 0; i < 8 && backend->phase() != hal::Phase::kOperational; ++i) drive(500);
+    EXPECT_EQ(backend->phase(), hal::Phase::kOperational) << causes();
+    EXPECT_EQ(backend->status_text().find("slave"), std::string::npos) << causes();
+  }
+  hal::CycleTime next() {
+    if (time.cycle == 0) time.time_ns = cycle->state().time_ns()[0];
+    ++time.cycle;
+    time.time_ns += 1'000'000;
+    time.period_ns = 1'000'000;
+    return time;
+  }
+  hal::CycleTime time;
+  hal::StateImage state{robot.shape()};
+  hal::CommandImage hold{robot.shape()};
+  hal::ParameterImage parameters = hal::initial_parameters(robot);
+};
+
+Fault frames(FaultKind kind, std::uint32_t count, sim::Direction direction) {
+  Fault fault = of(kind);
+  fault.count = count;
+  fault.direction = direction;
+  return fault;
+}
+
+Fault cable_to(std::int32_t board, std::int64_t duration_ns = -1) {
+  Fault fault = of(FaultKind::kBusDown);
+  fault.board = board;
+  fault.duration_ns = duration_ns;
+  return fault;
+}
+
+/// A cycle's frames are two: process data, and the outputs before them.
+TEST_F(LineRow, FramesOfACycleLost) {
+  LineRig rig;
+  rig.run();
+  rig.inject(frames(FaultKind::kFrameDrop, 2, sim::Direction::kToMaster));
+  std::uint32_t oldest = 0;
+  for (int i = 0; i < 200; ++i) {
+    rig.step();
+    oldest = std::max(oldest, rig.cycle->state().age_cycles()[0]);
+  }
+  expect_struck(rig, 2);
+  EXPECT_EQ(oldest, 1U);
+  EXPECT_EQ(rig.cycle->state().age_cycles()[0], 0U);
+  expect_running(rig);
+  expect_row({});
+}
+
+TEST_F(LineRow, FramesLostForEver) {
+  LineRig rig;
+  rig.run();
+  rig.inject(frames(FaultKind::kFrameDrop, 0, sim::Direction::kBoth));
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("no frame comes back"), std::string::npos) << rig.causes();
+}
+
+TEST_F(LineRow, FramesLate) {
+  LineRig rig;
+  rig.run();
+  rig.inject(frames(FaultKind::kFrameDelay, 1, sim::Direction::kToMaster));
+  for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 1);
+  expect_running(rig);
+  expect_row({});
+}
+
+TEST_F(LineRow, FramesTwice) {
+  LineRig rig;
+  rig.run();
+  rig.inject(frames(FaultKind::kFrameDuplicate, 40, sim::Direction::kToMaster));
+  for (int i = 0; i < 200; ++i) rig.step();
+  expect_struck(rig, 40);
+  expect_running(rig);
+  expect_row({});
+}
+
+TEST_F(LineRow, CableCutBetweenSlaves) {
+  LineRig rig;
+  rig.run();
+  rig.inject(cable_to(1, 500'000'000));
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the cable from slave 0 (board_1) to slave 1 (board_2) is cut"),
+            std::string::npos)
+      << rig.causes();
+  LineRig().expect_recovery(cable_to(1, 500'000'000));
+}
+
+TEST_F(LineRow, CableToTheFirstSlaveCut) {
+  LineRig rig;
+  rig.run();
+  rig.inject(cable_to(-1, 500'000'000));
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("the cable from the master to slave 0"), std::string::npos)
+      << rig.causes();
+  LineRig().expect_recovery(cable_to(-1, 500'000'000));
+}
+
+TEST_F(LineRow, SlaveWithoutPower) {
+  LineRig rig;
+  rig.run();
+  Fault fault = of(FaultKind::kBoardKill);
+  fault.board = 2;  // the last one: the others are still reached
+  fault.duration_ns = 500'000'000;
+  rig.inject(fault);
+  expect_row(rig.watch());
+  LineRig().expect_recovery(fault);
+}
+
+TEST_F(LineRow, BoardResets) {
+  LineRig rig;
+  rig.run();
+  Fault fault = of(FaultKind::kBoardReset);
+  fault.board = 1;
+  fault.duration_ns = 0;
+  rig.inject(fault);
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("board_2"), std::string::npos) << rig.causes();
+  LineRig().expect_recovery(fault);
+}
+
+TEST_F(LineRow, WrongIdentity) {
+  Fault fault = of(FaultKind::kBoardIdentity);
+  fault.board = 1;
+  fault.number = 7;
+  LineRig rig({fault});
+  for (int i = 0; i < 4000 && !rig.noticed(); ++i) rig.step();
+  EXPECT_TRUE(rig.noticed());
+  EXPECT_NE(rig.causes().find("board_2"), std::string::npos) << rig.causes();
+  for (std::size_t b = 0; b < rig.robot.boards.size(); ++b) {
+    EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kNone) << "nothing was enabled";
+  }
+  expect_row({});
+}
+
+TEST_F(LineRow, SlaveMissingAtTheStart) {
+  Fault fault = of(FaultKind::kBoardKill);
+  fault.board = 2;
+  LineRig rig({fault});
+  for (int i = 0; i < 8000 && !rig.noticed(); ++i) rig.step();
+  EXPECT_TRUE(rig.noticed());
+  EXPECT_NE(rig.causes().find("2 of 4 slaves answer: look at slave 2 (board_3)"),
+            std::string::npos)
+      << rig.causes();
+  expect_row({});
+}
+
+}  // namespace
+}  // namespace tandem::runtime
