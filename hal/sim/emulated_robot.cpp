@@ -136,6 +136,12 @@ Result<std::unique_ptr<EmulatedRobot>> EmulatedRobot::create(const hal::RobotCon
                                                              const tandem_kernels* kernels,
                                                              const SimRobotConfig& config) {
   if (config.period_ns <= 0) return fail("the loop's period has to be above 0 ns");
+  const bool line = std::ranges::find(robot.buses, hal::BusKind::kEthercat,
+                                      &hal::BusConfig::kind) != robot.buses.end();
+  if (config.bus_timing && line) {
+    return fail_at("sim.bus_timing", "a robot on EtherCAT has no CAN frames whose time could count",
+                   "leave it out");
+  }
   Result<PlantConfig> plant = plant_config(robot, kernels, config);
   if (!plant) return std::unexpected(plant.error());
   Result<Plant> body = Plant::create(*plant);

@@ -10,8 +10,8 @@ Result<std::unique_ptr<InProcessLine>> InProcessLine::create(const hal::RobotCon
                                                              std::size_t bus,
                                                              const SimRobotConfig& config) {
   std::unique_ptr<InProcessLine> line(new InProcessLine);
-  auto master = hal::can::LineBus::create(robot, bus, line->cable_.master(),
-                                          {.period_ns = config.period_ns});
+  auto master =
+      hal::can::LineBus::create(robot, bus, line->cable_.master(), {.period_ns = config.period_ns});
   if (!master) return std::unexpected(master.error());
   line->master_ = std::move(*master);
   line->boards_ = std::make_unique<LineBoards>(

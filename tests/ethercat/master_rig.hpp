@@ -115,7 +115,9 @@ class MasterRig {
   bool until(hal::ecat::SlaveStage stage, int most = 20'000) {
     for (int i = 0; i < most && !master->all(stage); ++i) {
       cycle();
-      if (!master->text().empty()) return false;
+      const bool slow_scan = master->error() == hal::ecat::LineError::kNone &&
+                             master->slave(0).stage() == hal::ecat::SlaveStage::kWait;
+      if (!slow_scan && !master->text().empty()) return false;
     }
     return master->all(stage);
   }

@@ -176,8 +176,7 @@ TEST_F(LineRow, SlaveMissingAtTheStart) {
   LineRig rig({fault});
   for (int i = 0; i < 8000 && !rig.noticed(); ++i) rig.step();
   EXPECT_TRUE(rig.noticed());
-  EXPECT_NE(rig.causes().find("2 of 4 slaves answer: look at slave 2 (board_3)"),
-            std::string::npos)
+  EXPECT_NE(rig.causes().find("2 of 4 slaves answer: look at slave 2 (board_3)"), std::string::npos)
       << rig.causes();
   expect_row({});
 }

@@ -76,5 +76,14 @@ TEST(Line, MovesAsTheSameBoardDoesOnCan) {
   EXPECT_EQ(line.state.age_cycles()[0], 0U);
 }
 
+TEST(Line, HasNoBusTiming) {
+  SimRobotConfig config{.posture = "up"};
+  config.bus_timing = true;
+  const auto made = SimRobot::create(line_swing_robot(), tandem::test::swing_kernels(2), config);
+  ASSERT_FALSE(made.has_value());
+  EXPECT_NE(made.error().to_string().find("sim.bus_timing: a robot on EtherCAT"), std::string::npos)
+      << made.error().to_string();
+}
+
 }  // namespace
 }  // namespace tandem::sim

@@ -102,6 +102,31 @@ TEST(Scenario, SaysWhatIsWrongAndWhere) {
             std::string::npos);
 }
 
+TEST(Scenario, OfAnEthercatLineStrikesWholeFramesAndCables) {
+  const auto read = [](const std::string& text) {
+    return parse_scenario(text, "faults.toml", test::line_swing_robot(), 1'000'000);
+  };
+  const auto good = read(
+      "[[fault]]\nkind = 'bus_down'\nbus = 'line'\nboard = 'board'\n"
+      "[[fault]]\nkind = 'frame_drop'\nbus = 'line'\ncount = 2\ndirection = 'to_master'\n");
+  ASSERT_TRUE(good.has_value()) << good.error()[0].to_string();
+  EXPECT_EQ((*good)[0].board, 0);
+  EXPECT_EQ((*good)[1].count, 2U);
+  const auto error = [&](const std::string& text) {
+    const auto faults = read("[[fault]]\n" + text);
+    return faults ? std::string() : faults.error()[0].to_string();
+  };
+  EXPECT_NE(error("kind = 'frame_corrupt'\nbus = 'line'").find("Ethernet drops frames"),
+            std::string::npos);
+  EXPECT_NE(error("kind = 'frame_drop'\nboard = 'board'").find("is of no single node"),
+            std::string::npos);
+  EXPECT_NE(error("kind = 'frame_drop'\nbus = 'line'\ncob_id = 1").find("cob_id: unknown key"),
+            std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = 'bus_down'\nbus = 'line'\nboard = 'board'")
+                .find("a CAN bus is down for all of its nodes"),
+            std::string::npos);
+}
+
 TEST(Scenario, TakesTheWordsOfACommandLine) {
   const std::vector<std::string> words{"kind=encoder_jump", "joint=swing", "rad=-0.5"};
   const auto faults = parse(scenario_of_words(words));
