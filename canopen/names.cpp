@@ -62,7 +62,7 @@ const char* to_string(ErrorCode code) noexcept {
     case ErrorCode::kEmergencyInput: return "emergency stop input active";
     case ErrorCode::kOscillation: return "the joint oscillates";
   }
-  return "error";
+  return "";
 }
 
 }  // namespace tandem::canopen

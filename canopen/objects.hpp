@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 namespace tandem::canopen {
 
@@ -306,8 +307,11 @@ enum class ErrorCode : std::uint16_t {
   kPositionLimit = 0x8612,  ///< reference or position limit
 };
 
-/// In words ("following error"), for messages; "error" for an unknown code.
+/// In words ("following error"), for messages; empty for one that our boards do not have.
 [[nodiscard]] const char* to_string(ErrorCode code) noexcept;
+
+/// What a code that CiA 301 or CiA 402 define says; of one that they do not, what its class says.
+[[nodiscard]] std::string_view error_words(std::uint16_t code) noexcept;
 
 /// Bits of the error register (1001).
 namespace error_register {

@@ -39,8 +39,9 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 }  // namespace
 
 std::string DriveMaster::error_text(std::uint32_t code) {
-  return fmt::format("{} (error code 0x{:04X})",
-                     canopen::to_string(static_cast<canopen::ErrorCode>(code)), code);
+  std::string_view words = canopen::to_string(static_cast<canopen::ErrorCode>(code));
+  if (words.empty()) words = canopen::error_words(static_cast<std::uint16_t>(code));
+  return fmt::format("{} (error code 0x{:04X})", words, code);
 }
 
 std::string DriveMaster::Impl::joint_name(std::size_t joint) const {

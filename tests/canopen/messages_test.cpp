@@ -71,5 +71,14 @@ TEST(Emergency, IsNotASync) {
   EXPECT_FALSE(parse_emergency(wire(0x081, {0, 0, 0})));
 }
 
+TEST(ErrorWords, TellACodeOrItsClass) {
+  EXPECT_EQ(error_words(0x8611), "following error");
+  EXPECT_EQ(error_words(0x3210), "DC link over-voltage");
+  EXPECT_EQ(error_words(0x2213), "current inside the device") << "one that is not listed";
+  EXPECT_EQ(error_words(0x7306), "sensor");
+  EXPECT_EQ(error_words(0xFF37), "the maker's own error: its manual tells");
+  EXPECT_EQ(error_words(0x0001), "unknown error");
+}
+
 }  // namespace
 }  // namespace tandem::canopen

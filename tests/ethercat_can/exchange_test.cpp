@@ -191,8 +191,8 @@ TEST(Exchange, AnEmergencyThatNamesNoAxisIsTold) {
                 "frames were lost (error code 0x8110), register 0x11, then 02 00 00 00 09",
                 "joint Joint5 (board board_2, node 12, axis 1): an emergency without a fault: "
                 "PDO too short (error code 0x8210)",
-                "foot (node 40 on bus arms): emergencies that name no axis: 1; the last: error "
-                "(error code 0x5000), register 0x81, then A0 01 02 03 04"}));
+                "foot (node 40 on bus arms): emergencies that name no axis: 1; the last: device "
+                "hardware (error code 0x5000), register 0x81, then A0 01 02 03 04"}));
 }
 
 TEST(Exchange, AFaultIsNamedByAnEmergencyThatNamesNoAxis) {
@@ -207,8 +207,10 @@ TEST(Exchange, AFaultIsNamedByAnEmergencyThatNamesNoAxis) {
   (void)rig.legs.boards().send(frames);
   rig.step();
   const std::string text = rig.master->status_text();
-  for (const char* joint : {"Joint2 (board board_1, node 11, axis 0): error (error code 0x2331)",
-                            "Joint3 (board board_1, node 11, axis 1): error (error code 0x2331)"}) {
+  for (const char* joint :
+       {"Joint2 (board board_1, node 11, axis 0): earth leakage of the motor (error code 0x2331)",
+        "Joint3 (board board_1, node 11, axis 1): earth leakage of the motor (error code "
+        "0x2331)"}) {
     EXPECT_NE(text.find(joint), std::string::npos) << text;
   }
 }
