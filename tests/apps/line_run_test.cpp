@@ -22,9 +22,17 @@ class LineRun : public Program {
   [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
 
   /// Master and boards at both ends of a cable. @return the child's exit status
+  /// @param capture  a file for all that tshark sees on the cable; empty: none
   int run_over_cable(const std::string& experiment, const std::vector<std::string>& more,
-                     bool lockstep) {
+                     bool lockstep, const std::string& capture = {}) {
     return in_own_network([&] {
+      std::unique_ptr<Process> witness;
+      if (!capture.empty()) {
+        witness = std::make_unique<Process>(
+            std::vector<std::string>{"tshark", "-i", test::kMasterEnd, "-w", capture},
+            file("tshark.txt"));
+        EXPECT_TRUE(witness->says("Capturing")) << witness->output();
+      }
       std::vector<std::string> emulate = {
           "emulate",     experiment, "--interface",      "eth1=" + std::string(test::kSlaveEnd),
           "--no-socket", "--json",   file("boards.json")};
@@ -41,6 +49,9 @@ class LineRun : public Program {
       Process master(test::tandem(run), file("run.txt"));
       EXPECT_EQ(master.wait(), 0) << master.output();
       EXPECT_EQ(boards.interrupt(), 0) << boards.output();
+      if (witness != nullptr) {
+        EXPECT_EQ(witness->interrupt(), 0) << witness->output();
+      }
     });
   }
 };
@@ -62,6 +73,31 @@ TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   const auto cycles = nlohmann::json::parse(diff.out)["topics"]["/tandem/state"]["messages"][0];
   EXPECT_GT(cycles, 1500) << "from power-on to the end";
   EXPECT_EQ(json("boards.json")["steps"], cycles);
+}
+
+/// Of a whole start and run of 21 slaves, power-on to INIT, every frame is one that a stranger's
+/// program reads.
+TEST_F(LineRun, TsharkReadsEveryFrameOfAStartAndARun) {
+  if (std::system("command -v tshark > /dev/null") != 0) {
+    GTEST_SKIP() << "tshark is not installed (scripts/packages.txt, section hil)";
+  }
+  const std::string squat = TANDEM_SOURCE_DIR "/config/coman/squat_ethercat.toml";
+  const int status =
+      run_over_cable(squat, {"--duration", "0.1", "-q", "--no-log"}, true, file("cable.pcapng"));
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  ASSERT_EQ(status, 0);
+  const auto count = [&](const std::string& filter) {
+    const std::string command = "tshark -r '" + file("cable.pcapng") + "' -Y '" + filter +
+                                "' -T fields -e frame.number 2>/dev/null | wc -l > '" +
+                                file("count") + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return std::stoi(read_text(file("count")));
+  };
+  const int steps = json("boards.json")["steps"];
+  EXPECT_GT(count("ecat"), 3 * steps) << "a cycle's frames and outputs, there and back";
+  EXPECT_EQ(count("eth.type == 0x88a4 && !ecat"), 0);
+  EXPECT_EQ(count("_ws.malformed"), 0);
+  EXPECT_GT(count("ecat_mailbox.coe"), 100) << "SDO in the mailboxes";
 }
 
 /// At 500 Hz, patient enough for a machine that does other things as well.
