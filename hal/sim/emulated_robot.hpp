@@ -51,7 +51,8 @@ enum class SimStage : std::uint8_t {
   kMasterSync,    ///< the master sends SYNC k
   kPlant,         ///< physics, in sub-steps of the plant, up to the time of cycle k
   kSense,         ///< accelerations, forces and sensors' truth at cycle k
-  kBoards,        ///< frames to the boards; firmware and controllers; their answers
+  kBoards,        ///< frames to the boards, emulated slaves before them included; firmware and
+                  ///< controllers; their answers
   kMasterDecode,  ///< the master fills the state image
   kTruth,         ///< the true state is copied for the log
 };

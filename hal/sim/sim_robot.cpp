@@ -66,8 +66,10 @@ Code SimRobot::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   master_->cycle_begin(time);
   hook_(SimStage::kMasterSync);
   for (const auto& line : lines_) line->to_boards();
+  if (!lines_.empty()) hook_(SimStage::kBoards);
   if (const Code code = robot_->step(time.time_ns); code != Code::kOk) return code;
   for (const auto& line : lines_) line->to_master();
+  if (!lines_.empty()) hook_(SimStage::kBoards);
   const Code code = master_->receive(state);
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
