@@ -100,6 +100,9 @@ class Backend {
 
   /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
   /// that is not in this process reports nothing.
+  /// By how much the next cycle should begin later [ns], so that the loop keeps its place in the
+  /// time of a wire that has a clock. On the wall clock only.
+  [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend

@@ -145,6 +145,12 @@ std::int64_t CyclicLoop::finish() noexcept TANDEM_RT {
   return now_ns;
 }
 
+void CyclicLoop::shift(std::int64_t ns) noexcept TANDEM_RT {
+  if (config_.pacing != Pacing::kWallClock || !started_) return;
+  const std::int64_t most_ns = config_.period_ns / 100;
+  grid_ns_ += std::clamp(ns, -most_ns, most_ns);
+}
+
 void CyclicLoop::skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT {
   ++statistics_.overruns;
   statistics_.skipped += cycles;

@@ -94,6 +94,10 @@ class CyclicLoop {
   /// gets its number and time by that. Counted as an overrun's are.
   void skip(Tick& tick, std::uint64_t cycles) noexcept TANDEM_RT;
 
+  /// Moves the grid, and all that comes after, by `ns`: the wire has a clock of its own. At most a
+  /// hundredth of the period a call; without effect where no clock paces the loop.
+  void shift(std::int64_t ns) noexcept TANDEM_RT;
+
   /// The overruns so far count no more towards OverrunPolicy::kStop.
   void forget_late() noexcept TANDEM_RT { late_mask_ = 0; }
   /// The cycle counter, which is all that simulated time is. The grid restarts at the next

@@ -76,6 +76,7 @@ void RobotCycle::exchange(rt::Tick& tick) noexcept {
 
 void RobotCycle::read() noexcept TANDEM_RT {
   read_code_ = backend_->read(time_, state_);
+  loop_.shift(backend_->clock_shift_ns());
   state_.cycle()[0] = time_.cycle;
   state_.time_ns()[0] = time_.time_ns;
   if (!started_) event(EventKind::kStarted);

@@ -60,6 +60,7 @@ Status CanSockets::open_can(const hal::BusConfig& bus, hal::can::SocketSide side
 
 Status CanSockets::open_line(const hal::BusConfig& bus, std::size_t index,
                              const MakeLine& make_line) {
+  if (!make_line) return fail("is EtherCAT, which is not open to this command");
   auto link = hal::ecat::PacketLink::open(bus.interface);
   if (!link) return std::unexpected(link.error());
   auto end = make_line(index, **link, *this);

@@ -35,11 +35,11 @@ class CanSockets final : public hal::can::FrameWait {
  public:
   /// Locks the interface of every bus for this side, and opens it.
   /// @param stamps  take the times of frames: nobody asks for them in lockstep
-  /// @param make_line  for EtherCAT
+  /// @param make_line  for EtherCAT; without it there is none
   /// Errors: all of them, each with its bus.
   [[nodiscard]] static std::expected<std::unique_ptr<CanSockets>, Diagnostics> open(
       const hal::RobotConfig& robot, hal::can::SocketSide side, bool stamps,
-      const MakeLine& make_line);
+      const MakeLine& make_line = {});
 
   [[nodiscard]] std::span<hal::can::Bus* const> buses() const noexcept { return ends_; }
   [[nodiscard]] std::span<const OpenBus> open_buses() const noexcept { return open_; }

@@ -52,6 +52,8 @@ class Bus {
   [[nodiscard]] virtual BusState state() const noexcept TANDEM_RT = 0;
   /// Asks once more for what the cycle has not brought, where the wire can.
   virtual void ask_again() noexcept TANDEM_RT {}
+  /// As Backend::clock_shift_ns(); 0: the wire has no clock.
+  [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
   /// All that the nodes of this end say in a step has been sent.
   virtual void end_step() noexcept TANDEM_RT {}
 

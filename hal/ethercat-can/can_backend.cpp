@@ -163,6 +163,13 @@ Code CanBackend::write(const CommandImage& command,
   return silent_ ? Code::kFault : master_->send(command, parameters);
 }
 
+std::int64_t CanBackend::clock_shift_ns() const noexcept TANDEM_RT {
+  for (const auto& bus : buses_) {
+    if (const std::int64_t shift_ns = bus->bus().clock_shift_ns(); shift_ns != 0) return shift_ns;
+  }
+  return 0;
+}
+
 /// Nobody is there to be shut down when the emulated robot is gone.
 bool CanBackend::shut_down() noexcept TANDEM_RT { return silent_ || master_->shut_down(); }
 

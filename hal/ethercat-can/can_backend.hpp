@@ -55,6 +55,8 @@ class CanBackend final : public Backend {
     return cause == FaultCause::kDrive ? DriveMaster::error_text(code)
                                        : Backend::fault_text(cause, code);
   }
+  /// The first EtherCAT bus'.
+  [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
@@ -74,7 +76,7 @@ class CanBackend final : public Backend {
     [[nodiscard]] bool answered() const noexcept { return times_ > 0; }
     [[nodiscard]] const DriveMaster::NodeSet& sampled() const noexcept { return sampled_; }
     void begin_cycle() noexcept;
-    [[nodiscard]] Bus& bus() noexcept { return *bus_; }
+    [[nodiscard]] Bus& bus() const noexcept { return *bus_; }
 
     std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override {
       return bus_->send(frames);

@@ -68,6 +68,9 @@ class FrameRecord {
     [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return bus_.state(); }
     void ask_again() noexcept TANDEM_RT override { bus_.ask_again(); }
     void end_step() noexcept TANDEM_RT override { bus_.end_step(); }
+    [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {
+      return bus_.clock_shift_ns();
+    }
     [[nodiscard]] std::span<const std::int64_t> received_ns() const noexcept TANDEM_RT override {
       return bus_.received_ns();
     }

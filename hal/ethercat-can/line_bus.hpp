@@ -54,6 +54,10 @@ class LineBus final : public Bus {
   std::size_t send(std::span<const canopen::Frame> frames) noexcept TANDEM_RT override;
   std::size_t receive(std::span<canopen::Frame> frames) noexcept TANDEM_RT override;
   [[nodiscard]] BusState state() const noexcept TANDEM_RT override { return BusState::kActive; }
+  /// The frames pass the first slave kAfterSync0 of a period after its SYNC0: the boards have had
+  /// time to sample, and outputs come long before the next.
+  static constexpr double kAfterSync0 = 0.3;
+  [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
   [[nodiscard]] std::string status_text() const override { return line_->text(); }
@@ -97,6 +101,7 @@ class LineBus final : public Bus {
   void begin_cycle() noexcept;
   void restart() noexcept;
   void take_cycle() noexcept;
+  void follow_clock(const ecat::CycleReport& cycle) noexcept;
   void tell_state(std::size_t slave) noexcept;
   void tell_sdo(std::size_t slave) noexcept;
   void tell_inputs(std::size_t slave) noexcept;
@@ -105,8 +110,9 @@ class LineBus final : public Bus {
   std::unique_ptr<ecat::LineMaster> line_;
   std::vector<Slave> slaves_;  ///< by their place in the line
   Config config_;
-  std::int64_t now_ns_ = 0;  ///< cycles so far
-  bool taken_ = true;        ///< what the last cycle brought
+  std::int64_t now_ns_ = 0;    ///< cycles so far
+  std::int64_t shift_ns_ = 0;  ///< of the last cycle; no state
+  bool taken_ = true;          ///< what the last cycle brought
   std::vector<canopen::Frame> storage_;
   canopen::FrameSink inbox_;  ///< for the drive master
   std::size_t given_ = 0;     ///< of it

@@ -35,6 +35,25 @@ TEST(CyclicLoop, StartsEachCycleAtAnAbsoluteGridPoint) {
   EXPECT_EQ(loop.statistics().overruns, 0U);
 }
 
+TEST(CyclicLoop, ShiftsItsGridALittleAtATime) {
+  FakeClock clock;
+  CyclicLoop loop(wall(), clock);
+  loop.shift(5000);  // before the grid has begun
+  cycle(loop, clock, 200'000);
+  loop.shift(3000);
+  cycle(loop, clock, 200'000);
+  loop.shift(-1'000'000);
+  cycle(loop, clock, 200'000);
+  cycle(loop, clock, 200'000);
+  EXPECT_EQ(clock.sleeps,
+            (std::vector<std::int64_t>{kStart + kMs_ns + 3000, kStart + 2 * kMs_ns + 3000 - 10'000,
+                                       kStart + 3 * kMs_ns + 3000 - 10'000}));
+  CyclicLoop free({.period_ns = kMs_ns, .pacing = Pacing::kSimulated}, clock);
+  cycle(free, clock, 200'000);
+  free.shift(5000);
+  EXPECT_EQ(cycle(free, clock, 0).time_ns, kMs_ns);
+}
+
 TEST(CyclicLoop, SkipsToTheNextGridPointAfterAnOverrunAndKeepsItsPhase) {
   FakeClock clock;
   CyclicLoop loop(wall(), clock);

@@ -1,5 +1,6 @@
 // The swing with its board and sensors on an EtherCAT line, in process.
 #include "base/archive.hpp"
+#include "hal/ethercat-can/ethercat/loopback_link.hpp"
 #include "tests/sim/swing_loop.hpp"
 #include "tests/sim/swing_robot.hpp"
 
@@ -74,6 +75,53 @@ TEST(Line, MovesAsTheSameBoardDoesOnCan) {
   }
   EXPECT_LT(worst, 1e-4) << "a cycle later it would be 1e-3";
   EXPECT_EQ(line.state.age_cycles()[0], 0U);
+}
+
+/// The wall clock of a test; the slaves' clocks drift from it.
+class TestClock final : public hal::can::FrameWait {
+ public:
+  [[nodiscard]] std::int64_t now_ns() noexcept override { return now; }
+  void wait(std::int64_t, int) noexcept override {}
+  std::int64_t now = 1'000'000;
+};
+
+/// Where in a period the frames pass the first slave, after so many cycles.
+std::int64_t phase_ns(bool follows, int cycles) {
+  constexpr std::int64_t kPeriod = 1'000'000;
+  const hal::RobotConfig robot = line_swing_robot();
+  auto emulated = EmulatedRobot::create(robot, tandem::test::swing_kernels(2), {.posture = "up"});
+  EXPECT_TRUE(emulated.has_value());
+  hal::ecat::LoopbackLink cable;
+  TestClock clock;
+  LineBoards boards(**emulated, 0, cable.slaves(), {.period_ns = kPeriod, .clock = &clock});
+  auto line = hal::can::LineBus::create(robot, 0, cable.master(), {.period_ns = kPeriod});
+  EXPECT_TRUE(line.has_value());
+  const std::array<hal::can::Bus*, 1> ends{line->get()};
+  auto master = hal::can::DriveMaster::create(robot, ends);
+  EXPECT_TRUE(master.has_value());
+  hal::StateImage state(robot.shape());
+  std::array<canopen::Frame, 64> frames;
+  for (int i = 0; i < cycles; ++i) {
+    (*master)->cycle_begin(
+        {.cycle = static_cast<std::uint64_t>(i), .time_ns = i * kPeriod, .period_ns = kPeriod});
+    hal::can::Bus& bus = (*emulated)->bus(0).master();
+    (void)bus.send(std::span(frames).first(boards.receive(frames)));
+    EXPECT_EQ((*emulated)->step(i * kPeriod), Code::kOk);
+    (void)boards.send(std::span(frames).first(bus.receive(frames)));
+    boards.end_step();
+    (void)(*master)->receive(state);
+    clock.now += kPeriod + (follows ? (*line)->clock_shift_ns() : 0);
+  }
+  EXPECT_EQ((*master)->phase(), hal::Phase::kOperational) << (*master)->status_text();
+  return static_cast<std::int64_t>((*line)->line().cycle().reference_ns %
+                                   static_cast<std::uint64_t>(kPeriod));
+}
+
+TEST(Line, TheLoopKeepsItsPlaceBetweenTwoPulsesOfSync0) {
+  const auto wanted = static_cast<std::int64_t>(hal::can::LineBus::kAfterSync0 * 1e6);
+  EXPECT_LT(std::abs(phase_ns(true, 1500) - wanted), 500);
+  EXPECT_LT(std::abs(phase_ns(true, 4000) - wanted), 500);
+  EXPECT_GT(std::abs(phase_ns(false, 4000) - wanted), 5'000) << "else it proves nothing";
 }
 
 TEST(Line, HasNoBusTiming) {
