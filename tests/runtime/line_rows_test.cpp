@@ -156,6 +156,27 @@ TEST_F(LineRow, BoardResets) {
   LineRig().expect_recovery(fault);
 }
 
+/// The clock of the first slave is the reference: all of them start anew, and are reset once more.
+TEST_F(LineRow, FirstBoardResets) {
+  LineRig rig;
+  rig.run();
+  Fault fault = of(FaultKind::kBoardReset);
+  fault.duration_ns = 0;
+  rig.inject(fault);
+  expect_row(rig.watch());
+  LineRig again;
+  again.run();
+  again.inject(fault);
+  again.drive(100);
+  int resets = 0;
+  for (; resets < 3 && again.backend->phase() != hal::Phase::kOperational; ++resets) {
+    again.backend->reset();
+    again.drive(3000);
+  }
+  EXPECT_EQ(again.backend->phase(), hal::Phase::kOperational) << again.causes();
+  EXPECT_LE(resets, 2);
+}
+
 TEST_F(LineRow, WrongIdentity) {
   Fault fault = of(FaultKind::kBoardIdentity);
   fault.board = 1;
