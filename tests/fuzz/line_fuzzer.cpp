@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 
+#include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "hal/ethercat-can/ethercat/loopback_link.hpp"
 #include "hal/ethercat-can/line_bus.hpp"
@@ -72,8 +73,8 @@ struct Robot {
     auto made = sim::EmulatedRobot::create(config, test::swing_kernels(2), {.posture = "up"});
     require(made.has_value());
     emulated = std::move(*made);
-    boards = std::make_unique<sim::LineBoards>(*emulated, 0, cable.slaves(),
-                                               sim::LineBoards::Config{});
+    boards =
+        std::make_unique<sim::LineBoards>(*emulated, 0, cable.slaves(), sim::LineBoards::Config{});
     auto bus = hal::can::LineBus::create(config, 0, wire, {});
     require(bus.has_value());
     line = std::move(*bus);
