@@ -320,6 +320,12 @@ void LineBus::archive(Archive& ar) {
   given_ = 0;
 }
 
+std::string LineBus::status_text() const {
+  std::string text;
+  for (const char letter : line_->text()) text += letter == '\n' ? "; " : std::string(1, letter);
+  return text.substr(0, text.size() - std::min<std::size_t>(text.size(), 2));
+}
+
 std::string LineBus::measured_text() const {
   const ecat::LineStatistics line = line_->statistics();
   std::string text = fmt::format("{} of {} cycles lost, {} frames sent again", line.lost,

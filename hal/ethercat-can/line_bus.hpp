@@ -60,7 +60,7 @@ class LineBus final : public Bus {
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void ask_again() noexcept TANDEM_RT override { (void)line_->resend(); }
   [[nodiscard]] BusStatistics statistics() const noexcept TANDEM_RT override;
-  [[nodiscard]] std::string status_text() const override { return line_->text(); }
+  [[nodiscard]] std::string status_text() const override;
   /// Of clocks and cycles.
   [[nodiscard]] std::string measured_text() const override;
 

@@ -51,7 +51,7 @@ LineMaster::LineMaster(Link& link, std::vector<SlavePlan> plans)
 
 void LineMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
   scan_ = Scan::kCount;
-  stopped_ = scan_is_slow_ = false;
+  stopped_ = false;
   scan_ns_ = now_ns;
   part_ = 0;
   error_ = LineError::kNone;
