@@ -29,6 +29,8 @@ KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
       return {"sensor_wrenches",
               {q, v, vdot, wrench},
               {{"out", 6 * static_cast<int>(m.sensors.size())}}};
+    case Kernel::kGeneralisedMomentum:
+      return {"generalised_momentum", {q, v, wrench}, {{"p", nv}, {"b", nv}}};
     case Kernel::kInverseDynamicsDerivatives:
       return {"inverse_dynamics_derivatives",
               {q, v, vdot, wrench},

@@ -24,11 +24,12 @@ enum class Kernel : std::uint8_t {
   kSiteMotion,
   kSiteJacobians,
   kSensorWrenches,
+  kGeneralisedMomentum,
   kInverseDynamicsDerivatives,
   kForwardDynamicsDerivatives,
 };
-inline constexpr int kKernels = 10;     ///< in every library
-inline constexpr int kAllKernels = 12;  ///< where ModelSpec::derivatives asks for them
+inline constexpr int kKernels = 11;     ///< in every library
+inline constexpr int kAllKernels = 13;  ///< where ModelSpec::derivatives asks for them
 
 /// One array argument of a kernel.
 struct KernelArray {
@@ -62,6 +63,8 @@ void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::v
     case Kernel::kSiteMotion: return site_motion<S>(m, i(0), i(1), i(2), o(0), o(1), o(2));
     case Kernel::kSiteJacobians: return site_jacobians<S>(m, i(0), o(0));
     case Kernel::kSensorWrenches: return SensorWrenches<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
+    case Kernel::kGeneralisedMomentum:
+      return GeneralisedMomentum<S>(m, i(0), i(1), i(2), o(0), o(1)).run();
     case Kernel::kInverseDynamicsDerivatives:
       return RneaDerivatives<S>(m, i(0), i(1), i(2), i(3), o(0), o(1), o(2)).run();
     case Kernel::kForwardDynamicsDerivatives: return;
@@ -83,7 +86,11 @@ class FollowerKernels {
       case Kernel::kForwardDynamics: return forward_dynamics(in, out[0]);
       case Kernel::kMassMatrix: return mass_matrix(in, out[0]);
       case Kernel::kInverseDynamics:
-      case Kernel::kBias: out[0] = gather_forces<S>(m_, on_tree(kernel, in)[0]); return;
+      case Kernel::kBias:
+      case Kernel::kGeneralisedMomentum:
+        out = on_tree(kernel, in);
+        for (std::vector<S>& forces : out) forces = gather_forces<S>(m_, forces);
+        return;
       case Kernel::kSiteJacobians: out[0] = gather_columns<S>(m_, on_tree(kernel, in)[0]); return;
       case Kernel::kCenterOfMass:
         out = on_tree(kernel, in);
@@ -125,6 +132,7 @@ class FollowerKernels {
     if (kernel == Kernel::kMassMatrix) sizes[0] = nv * nv;
     if (kernel == Kernel::kInverseDynamicsDerivatives) sizes.assign(3, nv * nv);
     if (kernel == Kernel::kInverseDynamics || kernel == Kernel::kBias) sizes[0] = nv;
+    if (kernel == Kernel::kGeneralisedMomentum) sizes.assign(2, nv);
     if (kernel == Kernel::kSiteJacobians) sizes[0] = 6 * static_cast<int>(m_.sites.size()) * nv;
     if (kernel == Kernel::kCenterOfMass) sizes[2] = 3 * nv;
     return sizes;

@@ -73,6 +73,9 @@ class InterpretedKernels {
     kernels_.bias = [](In a, In b, double* r) {
       Rnea<double>(m(), q(a), v(b), {}, {}, out(r, nv())).run();
     };
+    kernels_.generalised_momentum = [](In a, In b, In c, double* p, double* r) {
+      GeneralisedMomentum<double>(m(), q(a), v(b), f(c), out(p, nv()), out(r, nv())).run();
+    };
     kernels_.center_of_mass = [](In a, In b, double* c, double* cdot, double* J) {
       CenterOfMass<double>(m(), q(a), v(b), out(c, 3), out(cdot, 3), out(J, 3 * nv())).run();
     };

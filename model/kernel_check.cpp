@@ -73,6 +73,9 @@ Arrays call_kernel(const tandem_kernels& k, Kernel kernel, const Mechanism& m, c
     case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
     case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
     case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
+    case Kernel::kGeneralisedMomentum:
+      k.generalised_momentum(i(0), i(1), i(2), o(0), o(1));
+      break;
     case Kernel::kInverseDynamicsDerivatives:
       k.inverse_dynamics_derivatives(i(0), i(1), i(2), i(3), o(0), o(1), o(2));
       break;
@@ -131,6 +134,7 @@ Arrays SeededState::of(Kernel kernel) const {
     case Kernel::kSensorWrenches: return {q, v, vdot, wrench};
     case Kernel::kMassMatrix:
     case Kernel::kSiteJacobians: return {q};
+    case Kernel::kGeneralisedMomentum: return {q, v, wrench};
     case Kernel::kSiteMotion: return {q, v, vdot};
     case Kernel::kBias:
     case Kernel::kCenterOfMass:
@@ -149,6 +153,7 @@ double kernel_error(Kernel kernel, double mass_kg, const std::vector<double>& ac
     case Kernel::kBias:
     case Kernel::kEnergy:
     case Kernel::kSensorWrenches:
+    case Kernel::kGeneralisedMomentum:
     case Kernel::kInverseDynamicsDerivatives: scale = 0.1 * mass_kg; break;
     case Kernel::kMassMatrix:
     case Kernel::kCentroidalMomentum: scale = 0.01 * mass_kg; break;

@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define TANDEM_KERNELS_ABI 4u
+#define TANDEM_KERNELS_ABI 5u
 
 /* Operations of one kernel as emitted (before the compiler). */
 typedef struct tandem_kernel_count {
@@ -75,6 +75,12 @@ typedef struct tandem_kernels {
    * sensor's frame. In the foot of a standing robot the force points up: + weight / 2. */
   void (*sensor_wrenches)(const double* q, const double* v, const double* vdot,
                           const double* wrench, double* out);
+
+  /* p(nv) = M v, the generalised momentum, and b(nv) = C^T v - g + sum J^T f, with which
+   * dp/dt = tau + b; C is any factorisation of the Coriolis forces with dM/dt = C + C^T. No
+   * acceleration enters: what a momentum observer needs. */
+  void (*generalised_momentum)(const double* q, const double* v, const double* wrench, double* p,
+                               double* b);
 
   /* Several states in a call, for sweeps, predictions and differences: element i of state s stands
    * at [i * states + s] of every array. `states` is a multiple of four, and what exceeds one is

@@ -137,6 +137,20 @@ class CenterOfMass {
   std::span<S> c_, cdot_, J_;
 };
 
+/// The momentum of masses that turn with w about an origin that moves with v, about it.
+template <class S>
+[[nodiscard]] Force<S> momentum_of(const Moments<double>& x, const Vec3<S>& w, const Vec3<S>& v) {
+  Force<S> p;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const int k = (i + 2) % 3;
+    p.f[i] = v[i] * x.m + w[j] * x.h[k] - w[k] * x.h[j];
+    p.n[i] = w[i] * (x.J(j, j) + x.J(k, k)) - w[j] * x.J(i, j) - w[k] * x.J(i, k) + v[k] * x.h[j] -
+             v[j] * x.h[k];
+  }
+  return p;
+}
+
 /// The momentum of everything and the moments of the masses, about the base's origin, in the
 /// base's frame; and what the joints' motion adds to twice the kinetic energy.
 template <class S>
@@ -162,18 +176,6 @@ class Momentum {
     Force<S> momentum;
     Moments<S> moments;
   };
-
-  static Force<S> momentum_of(const Moments<double>& x, const Vec3<S>& w, const Vec3<S>& v) {
-    Force<S> p;
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3;
-      const int k = (i + 2) % 3;
-      p.f[i] = v[i] * x.m + w[j] * x.h[k] - w[k] * x.h[j];
-      p.n[i] = w[i] * (x.J(j, j) + x.J(k, k)) - w[j] * x.J(i, j) - w[k] * x.J(i, k) +
-               v[k] * x.h[j] - v[j] * x.h[k];
-    }
-    return p;
-  }
 
   Total visit(int body, const Vec3<S>& angular, const Vec3<S>& linear) {
     Total total{momentum_of(m_.moments[body], angular, linear), {}};
@@ -202,6 +204,87 @@ class Momentum {
   Force<S> momentum_;
   Moments<S> moments_;
   S energy2_ = 0.0;
+};
+
+/// p = M v and b with dp/dt = tau + b (A. De Luca et al., "Collision detection and safe reaction with
+/// the DLR-III lightweight manipulator arm", 2006). An entry of p is S . H of a joint's axis S and
+/// the momentum H of all that it moves, as spatial vectors. H changes by the forces on these masses,
+/// of which S . F is tau; S turns with the body's velocity V. So b = (V x S) . H + S . (gravity and
+/// wrenches), by one pass over the tree, and no mass matrix is differentiated.
+template <class S>
+class GeneralisedMomentum {
+ public:
+  GeneralisedMomentum(const Mechanism& m, std::span<const S> q, std::span<const S> v,
+                      std::span<const S> wrench, std::span<S> p, std::span<S> b)
+      : m_(m), q_(q), v_(v), wrench_(wrench), p_(p), b_(b) {}
+
+  void run() {
+    Motion base{.gravity = multiply_transposed(base_pose(m_, q_).R, vec<S>(m_.gravity))};
+    if (m_.floating_base) {
+      base.linear = {v_[0], v_[1], v_[2]};
+      base.angular = {v_[3], v_[4], v_[5]};
+    }
+    const Total total = visit(0, base);
+    if (!m_.floating_base) return;
+    const Force<S> change = rate(total, base);
+    for (int i = 0; i < 3; ++i) {
+      p_[i] = total.momentum.f[i];
+      p_[i + 3] = total.momentum.n[i];
+      b_[i] = change.f[i];
+      b_[i + 3] = change.n[i];
+    }
+  }
+
+ private:
+  // Of a body's origin, and gravity, in its frame.
+  struct Motion {
+    Vec3<S> angular{S(0.0), S(0.0), S(0.0)};
+    Vec3<S> linear{S(0.0), S(0.0), S(0.0)};
+    Vec3<S> gravity;
+  };
+  // Of a body and all behind it, about its origin, in its frame.
+  struct Total {
+    Force<S> momentum;
+    Moments<S> moments;
+    Force<S> external;
+  };
+
+  // What the body's motion, gravity and wrenches change of the momentum's components in its frame.
+  static Force<S> rate(const Total& t, const Motion& body) {
+    Force<S> g;
+    for (int i = 0; i < 3; ++i) g.f[i] = t.moments.m * body.gravity[i];
+    g.n = cross(t.moments.h, body.gravity);
+    const Force<S> turned{cross(t.momentum.f, body.angular),
+                          cross(t.momentum.n, body.angular) + cross(t.momentum.f, body.linear)};
+    return turned + g + t.external;
+  }
+
+  Total visit(int body, const Motion& motion) {
+    Total total{momentum_of(m_.moments[body], motion.angular, motion.linear), {}, {}};
+    total.moments.m = m_.moments[body].m;
+    total.moments.h = vec<S>(m_.moments[body].h);
+    total.external = external_force(m_, body, wrench_);
+    for (const int j : m_.children[body]) {
+      const int i = m_.v_index(j);
+      const bool slides = m_.joints[j].prismatic;
+      const JointTransform<S> t = joint_transform(m_.joints[j], q_[m_.q_index(j)]);
+      Motion child{.gravity = to_child(t, motion.gravity)};
+      carry_down(t, motion.angular, motion.linear, child.angular, child.linear);
+      (slides ? child.linear : child.angular)[2] += v_[i];
+      const Total behind = visit(j + 1, child);
+      const Force<S> change = rate(behind, child);
+      p_[i] = (slides ? behind.momentum.f : behind.momentum.n)[2] + m_.joints[j].armature * v_[i];
+      b_[i] = (slides ? change.f : change.n)[2];
+      total.momentum = total.momentum + to_parent(t, behind.momentum);
+      total.external = total.external + to_parent(t, behind.external);
+      add_to(total.moments, to_parent(t, behind.moments));
+    }
+    return total;
+  }
+
+  const Mechanism& m_;
+  std::span<const S> q_, v_, wrench_;
+  std::span<S> p_, b_;
 };
 
 /// Linear, then angular about the centre of mass, in the world.

@@ -99,6 +99,61 @@ TEST_P(Identities, InverseDynamicsIsMassMatrixBiasAndTransposedJacobians) {
   EXPECT_LE(relative_error(tau, expected), 1e-12);
 }
 
+// dp/dt = tau + b along any motion, with dp/dt from differences: no Coriolis matrix is needed.
+TEST_P(Identities, GeneralisedMomentumChangesByItsTorquesAndItsBias) {
+  const Mechanism m = with_armature(GetParam());
+  const RandomState s(m, 8);
+  const double h = 1e-5;
+  const auto momentum_at = [&](double time) {
+    Array v = s.v, middle = s.v;  // half way: second order in time
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] += s.vdot[i] * time;
+    for (std::size_t i = 0; i < v.size(); ++i) middle[i] += s.vdot[i] * time / 2;
+    return evaluate_kernel(Kernel::kGeneralisedMomentum, m,
+                           {moved(m, s.q, middle, time), v, s.wrench})[0];
+  };
+  const Array before = momentum_at(-h), after = momentum_at(h);
+  const Array tau = evaluate_kernel(Kernel::kInverseDynamics, m, {s.q, s.v, s.vdot, s.wrench})[0];
+  const Arrays now = evaluate_kernel(Kernel::kGeneralisedMomentum, m, {s.q, s.v, s.wrench});
+  Array difference(tau.size()), expected(tau.size());
+  for (std::size_t i = 0; i < tau.size(); ++i) {
+    difference[i] = (after[i] - before[i]) / (2 * h);
+    expected[i] = tau[i] + now[1][i];
+  }
+  EXPECT_LE(relative_error(difference, expected), 1e-7);
+}
+
+// p = M v; of dM/dt = C + C^T and C v + g = h follow C^T v - g = dM/dt v - h, and the energy:
+// v^T C^T v = v^T C v. At rest b is minus gravity.
+TEST_P(Identities, GeneralisedMomentumIsThatOfMassMatrixAndCoriolisMatrix) {
+  const Mechanism m = with_armature(GetParam());
+  const RandomState s(m, 9);
+  const Array none(s.wrench.size(), 0.0), rest(s.v.size(), 0.0);
+  const auto mass_times_v = [&](const Array& q) {
+    return times(evaluate_kernel(Kernel::kMassMatrix, m, {q})[0], s.v);
+  };
+  const Arrays now = evaluate_kernel(Kernel::kGeneralisedMomentum, m, {s.q, s.v, none});
+  EXPECT_LE(relative_error(now[0], mass_times_v(s.q)), 1e-12);
+  const Array bias = evaluate_kernel(Kernel::kBias, m, {s.q, s.v})[0];
+  const Array gravity = evaluate_kernel(Kernel::kBias, m, {s.q, rest})[0];
+  const double h = 1e-5;
+  const Array before = mass_times_v(moved(m, s.q, s.v, -h));
+  const Array after = mass_times_v(moved(m, s.q, s.v, h));
+  Array transposed(s.v.size()), expected(s.v.size());
+  double power = 0.0, power_of_C = 0.0, scale = 0.0;
+  for (std::size_t i = 0; i < s.v.size(); ++i) {
+    transposed[i] = now[1][i] + gravity[i];
+    expected[i] = (after[i] - before[i]) / (2 * h) - (bias[i] - gravity[i]);
+    power += s.v[i] * transposed[i];
+    power_of_C += s.v[i] * (bias[i] - gravity[i]);
+    scale += std::abs(s.v[i] * transposed[i]) + 0.01 * std::abs(s.v[i] * bias[i]);  // it cancels
+  }
+  EXPECT_LE(relative_error(transposed, expected), 1e-7);
+  EXPECT_NEAR(power, power_of_C, 1e-11 * scale);
+  Array at_rest = evaluate_kernel(Kernel::kGeneralisedMomentum, m, {s.q, rest, none})[1];
+  for (double& force : at_rest) force = -force;
+  EXPECT_LE(relative_error(at_rest, gravity), 1e-12);
+}
+
 TEST_P(Identities, JacobiansAreTheDifferencesOfPoses) {
   const Mechanism m = reference_mechanism(GetParam());
   const RandomState s(m, 5);

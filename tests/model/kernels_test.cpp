@@ -76,6 +76,7 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
                           {q, v, a},
                           {q},
                           {q, v, a, wrench},
+                          {q, v, wrench},
                           {q, v, a, wrench},
                           {q, v, flat(state["tau"]), wrench}};
     for (int k = 0; k < static_cast<int>(library->kernel_count); ++k) {

@@ -158,6 +158,10 @@ TEST_P(Followers, HaveTheTreesOwnMassMatrixForcesAndJacobiansWithTheConstraintAp
         relative_error(ours(Kernel::kInverseDynamics, {s.q, s.v, s.vdot, s.wrench})[0],
                        robot.forces(tree(Kernel::kInverseDynamics, {q, v, vdot, s.wrench})[0])),
         1e-14);
+    const Arrays momentum = ours(Kernel::kGeneralisedMomentum, {s.q, s.v, s.wrench});
+    const Arrays of_tree = tree(Kernel::kGeneralisedMomentum, {q, v, s.wrench});
+    for (std::size_t k = 0; k < 2; ++k)
+      EXPECT_LE(relative_error(momentum[k], robot.forces(of_tree[k])), 1e-14);
     EXPECT_LE(relative_error(ours(Kernel::kSiteJacobians, {s.q})[0],
                              robot.columns(tree(Kernel::kSiteJacobians, {q})[0])),
               1e-14);

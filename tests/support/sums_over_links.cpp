@@ -196,6 +196,32 @@ RealVector SumsOverLinks::external(std::span<const double> wrench) const {
   return sum;
 }
 
+// M v, and with Mdot v = sum Jdot^T (m c', I w) + sum J^T d/dt (m c', I w at v = const) what is left
+// of it less the bias: the time derivatives of the bodies' momenta cancel.
+std::vector<std::vector<double>> SumsOverLinks::generalised_momentum(
+    std::span<const double> wrench) const {
+  RealVector b = external(wrench);
+  for (const Mass& mass : masses_) {
+    const Vector3 velocity = velocity_of(mass.body, mass.com);
+    const Vector3 linear = mass.kg * velocity;
+    const Vector3 angular = mass.inertia * angular_[static_cast<std::size_t>(mass.body)];
+    b += mass.J.topRows<3>().transpose() * (mass.kg * gravity_);
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const Column& c = columns_[k];
+      if (!moves(mass.body, c)) continue;
+      Real& entry = b[static_cast<int>(k)];
+      if (c.slides) {
+        entry += c.axis_rate.dot(linear);
+      } else {
+        entry += (c.axis_rate.cross(mass.com - c.point) + c.axis.cross(velocity - c.point_rate))
+                     .dot(linear) +
+                 c.axis_rate.dot(angular);
+      }
+    }
+  }
+  return {flat_rows(mass_matrix() * v_), flat_rows(b)};
+}
+
 RealVector SumsOverLinks::inverse_dynamics(std::span<const double> vdot,
                                            std::span<const double> wrench) const {
   return mass_matrix() * real(vdot) + bias() - external(wrench);
@@ -325,6 +351,7 @@ std::vector<std::vector<double>> SumsOverLinks::outputs(
     case Kernel::kSiteMotion: return site_motion(in[2]);
     case Kernel::kSiteJacobians: return {site_jacobians()};
     case Kernel::kSensorWrenches: return {sensors(in[2], in[3])};
+    case Kernel::kGeneralisedMomentum: return generalised_momentum(in[2]);
     case Kernel::kInverseDynamicsDerivatives:
     case Kernel::kForwardDynamicsDerivatives: break;  // tests take differences
   }

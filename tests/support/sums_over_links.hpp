@@ -73,6 +73,8 @@ class SumsOverLinks {
                                                                 const Vector3& point) const;
   [[nodiscard]] RealVector external(std::span<const double> wrench) const;
   [[nodiscard]] std::vector<std::vector<double>> center_of_mass() const;
+  [[nodiscard]] std::vector<std::vector<double>> generalised_momentum(
+      std::span<const double> wrench) const;
   [[nodiscard]] std::vector<double> momentum() const;
   [[nodiscard]] std::vector<double> energy() const;
   [[nodiscard]] std::vector<std::vector<double>> site_motion(std::span<const double> vdot) const;
