@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "bench/sim_rig.hpp"
+#include "estimation/estimator.hpp"
+#include "hal/config/capabilities.hpp"
 
 namespace tandem::bench {
 namespace {
@@ -128,6 +130,49 @@ int trace_cost(const std::string& file, const std::string& library) {
   return 0;
 }
 
+/// What estimation costs: beside a squat, each part takes every cycle's image right after the
+/// cycle, when the caches hold the cycle's things and not its own.
+int estimation_cost(const std::string& file, const std::string& library) {
+  auto rig = make_sim_rig(file, library);
+  if (!rig) return fail_with(rig.error());
+  const runtime::Experiment& e = (*rig)->run->experiment;
+  const hal::Robot robot = hal::robot_of(e.robot);
+  const bool floats = robot.floating_base;
+  const auto make = [&](bool observer) {
+    estimation::EstimationConfig config;
+    if (floats) config.base.emplace();
+    if (observer) config.observer.emplace();
+    return estimation::Estimator::make(robot, (*rig)->run->kernels.get(), config, e.loop.period_ns);
+  };
+  auto base = floats ? make(false) : make(true);
+  auto both = make(true);
+  if (!base || !both) {
+    fmt::print("\nestimation none: {}\n", (base ? both : base).error().to_string());
+    return 0;
+  }
+  const auto cycle = (*rig)->cycle(0, nullptr);
+  rt::WallClock clock;
+  std::vector<double> base_us, both_us;
+  for (int i = 0; cycle->step() && i < 12'000; ++i) {
+    const auto time = [&](estimation::Estimator& one, std::vector<double>& times) {
+      const std::int64_t begin_ns = clock.now_ns();
+      one.update(cycle->state());
+      if (i > 4000) times.push_back(us(clock.now_ns() - begin_ns));
+    };
+    if (i % 2 == 0) time(**base, base_us);
+    time(**both, both_us);
+    if (i % 2 != 0) time(**base, base_us);
+  }
+  const double one = median(base_us), all = median(both_us);
+  if (floats) {
+    fmt::print("\nestimation median {:.2f} us base, {:.2f} us observer, {:.2f} us both\n", one,
+               all - one, all);
+  } else {
+    fmt::print("\nestimation median {:.2f} us observer\n", all);
+  }
+  return 0;
+}
+
 }  // namespace
 }  // namespace tandem::bench
 
@@ -139,5 +184,6 @@ int main(int count, char** arguments) {
     const int status = tandem::bench::run(file, library, logged);
     if (status != 0) return status;
   }
-  return tandem::bench::trace_cost(file, library);
+  const int status = tandem::bench::estimation_cost(file, library);
+  return status != 0 ? status : tandem::bench::trace_cost(file, library);
 }

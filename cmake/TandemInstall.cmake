@@ -14,6 +14,8 @@ set(TANDEM_PLUGIN_HEADERS
   hal/command_fields.inc
   hal/cycle_time.hpp
   hal/devices.hpp
+  hal/estimate.hpp
+  hal/estimate_fields.inc
   hal/image.hpp
   hal/joint_capabilities.hpp
   hal/joint_devices.hpp

@@ -20,6 +20,7 @@
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
 #include "hal/cycle_time.hpp"
+#include "hal/estimate.hpp"
 #include "hal/image.hpp"
 #include "hal/robot.hpp"
 #include "model/kernels.h"
@@ -31,13 +32,15 @@ class ControllerSetup {
  public:
   ControllerSetup(const hal::Robot& robot_in, hal::ParameterImage& gains_in,
                   const tandem_kernels* kernels_in, std::int64_t period_ns_in,
-                  TomlTable parameters_in, std::span<const double> start_position_rad_in = {})
+                  TomlTable parameters_in, std::span<const double> start_position_rad_in = {},
+                  const hal::EstimateImage* estimate_in = nullptr)
       : robot(robot_in),
         gains(gains_in),
         kernels(kernels_in),
         period_ns(period_ns_in),
         parameters(std::move(parameters_in)),
-        start_position_rad(start_position_rad_in) {}
+        start_position_rad(start_position_rad_in),
+        estimate(estimate_in) {}
 
   const hal::Robot& robot;  ///< joints and their limits, sensors, sites, feet, postures
   /// Gains of the drives' loops, for hal::Devices; set those of claimed joints only, in start()
@@ -49,6 +52,9 @@ class ControllerSetup {
   /// Where the joints stand when the controller starts, in the image's order, as the experiment
   /// says; empty: not known, as while a run goes on. Valid during configure().
   std::span<const double> start_position_rad;
+  /// What is estimated of the robot, of this cycle in start() and update(): the base's state,
+  /// contacts, external torques. Null without [estimation]; outlives the controller.
+  const hal::EstimateImage* estimate;
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller
@@ -113,7 +119,7 @@ class Controller {
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 6;
+inline constexpr std::uint32_t kControllerInterface = 7;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
@@ -129,8 +135,9 @@ inline constexpr std::uint32_t kControllerAbi =
     hash_of({sizeof(ControllerSetup), sizeof(ControllerSetup::Claim), sizeof(hal::Robot),
              sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
              sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
-             sizeof(hal::StateImage), sizeof(hal::CommandImage), sizeof(hal::ParameterImage),
-             sizeof(hal::CycleTime), sizeof(TomlTable), sizeof(tandem_kernels)});
+             sizeof(hal::StateImage), sizeof(hal::EstimateImage), sizeof(hal::CommandImage),
+             sizeof(hal::ParameterImage), sizeof(hal::CycleTime), sizeof(TomlTable),
+             sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

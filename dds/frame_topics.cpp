@@ -1,4 +1,5 @@
-// Transforms from the joints' measured positions; the base's from the simulation's truth.
+// Transforms from the joints' measured positions; the base's from the run's estimate, or without
+// one from the simulation's truth.
 #include "dds/frame_topics.hpp"
 
 #include <Eigen/Geometry>
@@ -10,6 +11,26 @@ namespace {
 
 model::Placement inverse(const model::Placement& a_b) {
   return {a_b.R.transpose(), -(a_b.R.transpose() * a_b.p)};
+}
+
+/// Position, quaternion, velocity.
+struct Base {
+  std::span<const double> p, q, v;
+};
+
+template <class I>
+std::optional<Base> finite_base(const I& image) {
+  const Base base{image.base_position_m(), image.base_quaternion(), image.base_velocity()};
+  if (!finite(base.p) || !finite(base.q) || !finite(base.v)) return std::nullopt;
+  return base;
+}
+
+/// The estimate where there is one, as on a robot that nobody simulates. Nothing until it starts.
+std::optional<Base> base_of(const CycleSample& sample) {
+  if (sample.estimate != nullptr && sample.estimate->estimates_base()) {
+    return sample.estimate->has_base() ? finite_base(*sample.estimate) : std::nullopt;
+  }
+  return sample.truth == nullptr ? std::nullopt : finite_base(*sample.truth);
 }
 
 geometry_msgs_msg_dds__Transform_ transform(const model::Placement& at) {
@@ -56,7 +77,9 @@ FrameTopics::FrameTopics(OutputMaker& maker, const RunDescription& run)
       urdf_(run.urdf),
       odom_("odom"),
       base_(run.tree.links.front().name),
-      base_known_(run.tree.floating_base && run.truth != nullptr),
+      base_known_(
+          run.tree.floating_base &&
+          (run.truth != nullptr || (run.estimate != nullptr && run.estimate->estimates_base()))),
       tf_(maker.periodic<tf2_msgs::TFMessage>(Topic::kTf, "tf")),
       tf_static_(maker.latched<tf2_msgs::TFMessage>("tf_static")),
       description_(maker.latched<std_msgs::String>("robot_description")) {
@@ -84,13 +107,10 @@ void FrameTopics::publish(const CycleSample& sample) {
 void FrameTopics::publish_moving(const CycleSample& sample) {
   const Time stamp = ros_time(sample.stamp_ns);
   transforms_.clear();
-  if (base_known_ && sample.truth != nullptr) {
-    const auto p = sample.truth->base_position_m();
-    const auto q = sample.truth->base_quaternion();
-    if (finite(p) && finite(q)) {
-      transforms_.push_back(
-          {{stamp, refer(odom_)}, refer(base_), {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}}});
-    }
+  if (const auto base = base_of(sample); base_known_ && base) {
+    const auto& [p, q, v] = *base;
+    transforms_.push_back(
+        {{stamp, refer(odom_)}, refer(base_), {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}}});
   }
   const auto positions = sample.state.position_rad();
   for (const FrameEdge& edge : frames_.moving) {
@@ -105,11 +125,9 @@ void FrameTopics::publish_moving(const CycleSample& sample) {
 }
 
 void FrameTopics::publish_odometry(const CycleSample& sample) {
-  if (sample.truth == nullptr) return;
-  const auto p = sample.truth->base_position_m();
-  const auto q = sample.truth->base_quaternion();
-  const auto v = sample.truth->base_velocity();
-  if (!finite(p) || !finite(q) || !finite(v)) return;
+  const auto base = base_of(sample);
+  if (!base) return;
+  const auto& [p, q, v] = *base;
   nav_msgs::Odometry message{};
   message.header = {ros_time(sample.stamp_ns), refer(odom_)};
   message.child_frame_id = refer(base_);

@@ -74,15 +74,18 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
       state_(run.robot.shape()),
       command_(run.robot.shape()),
       truth_(run.truth == nullptr ? std::nullopt : std::optional(*run.truth)),
+      estimate_(run.estimate == nullptr ? std::nullopt : std::optional(*run.estimate)),
       state_at_(aligned(sizeof(Head))),
       command_at_(state_at_ + aligned(state_.bytes().size())),
       truth_at_(command_at_ + aligned(command_.bytes().size())),
+      estimate_at_(truth_at_ + (truth_ ? aligned(truth_->bytes().size()) : 0)),
       times_ring_(aligned(sizeof(Times)), kTimesSlots),
       image_ring_(slot_bytes(), kImageSlots) {
   OutputMaker maker(participant, run.period_ns, counts_);
   for (std::size_t t = 0; t < kTopics; ++t) every_[t] = maker.every(static_cast<Topic>(t));
   if (!run.simulated_time) every_[static_cast<std::size_t>(Topic::kClock)] = 0;
-  if (run.truth == nullptr) every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
+  if (run.truth == nullptr && (!estimate_ || !estimate_->estimates_base()))
+    every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
   groups_.push_back(std::make_unique<JointTopics>(maker, run));
   groups_.push_back(std::make_unique<SensorTopics>(maker, run));
@@ -95,7 +98,7 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
 Publisher::~Publisher() { stop(); }
 
 std::size_t Publisher::slot_bytes() const {
-  return truth_at_ + (truth_ ? aligned(truth_->bytes().size()) : 0);
+  return estimate_at_ + (estimate_ ? aligned(estimate_->bytes().size()) : 0);
 }
 
 void Publisher::take(const hal::CycleView& view) noexcept TANDEM_RT {
@@ -120,8 +123,10 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   if (slot.empty()) return;
   const std::int64_t wakeup_ns = std::max<std::int64_t>(0, view.times.wakeup_ns);
   const bool truth = truth_ && view.truth != nullptr && (due & kNeedsTruth) != 0;
-  const Head head{number,         view.time, view.times.begin_ns - wakeup_ns, due, view.phase,
-                  view.read_code, truth};
+  const bool estimate = estimate_ && view.estimate != nullptr && (due & kNeedsTruth) != 0;
+  const Head head{number, view.time,  view.times.begin_ns - wakeup_ns,
+                  due,    view.phase, view.read_code,
+                  truth,  estimate};
   std::memcpy(slot.data(), &head, sizeof(head));
   const auto copy = [&](std::size_t at, std::span<const std::byte> bytes) {
     std::memcpy(slot.data() + at, bytes.data(), bytes.size());
@@ -129,6 +134,7 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   if ((due & kNeedsState) != 0) copy(state_at_, view.state.bytes());
   if ((due & kNeedsCommand) != 0) copy(command_at_, view.command.bytes());
   if (truth) copy(truth_at_, view.truth->bytes());
+  if (estimate) copy(estimate_at_, view.estimate->bytes());
   image_ring_.end_push();
 }
 
@@ -202,6 +208,7 @@ void Publisher::publish(std::span<const std::byte> slot) {
   if ((head.due & kNeedsState) != 0) copy(state_.bytes(), state_at_);
   if ((head.due & kNeedsCommand) != 0) copy(command_.bytes(), command_at_);
   if (head.truth) copy(truth_->bytes(), truth_at_);
+  if (head.estimate) copy(estimate_->bytes(), estimate_at_);
   count_times(head.number);
   loop_.dropped = image_ring_.dropped();
   clock_ns_ = head.time.time_ns;
@@ -213,6 +220,7 @@ void Publisher::publish(std::span<const std::byte> slot) {
                            .state = state_,
                            .command = command_,
                            .truth = head.truth ? &*truth_ : nullptr,
+                           .estimate = head.estimate ? &*estimate_ : nullptr,
                            .loop = loop_,
                            .faults = faults_};
   if (sample.is_due(Topic::kClock)) publish_clock();  // before what is stamped with it

@@ -59,7 +59,7 @@ class Publisher final : public hal::CycleObserver {
     std::uint32_t due;
     hal::RunPhase phase;
     Code read_code;
-    bool truth;
+    bool truth, estimate;
   };
 
   Publisher(Participant& participant, const RunDescription& run);
@@ -85,7 +85,8 @@ class Publisher final : public hal::CycleObserver {
   hal::StateImage state_;
   hal::CommandImage command_;
   std::optional<hal::TruthImage> truth_;
-  std::size_t state_at_, command_at_, truth_at_;  // in a slot
+  std::optional<hal::EstimateImage> estimate_;
+  std::size_t state_at_, command_at_, truth_at_, estimate_at_;  // in a slot
   SpscRing times_ring_, image_ring_;
   std::uint64_t taken_ = 0;  // the loop's
 

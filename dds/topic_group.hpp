@@ -40,8 +40,9 @@ struct RunDescription {
   std::string description_hash{};
   std::int64_t period_ns = 1'000'000;
   bool simulated_time = false;  ///< stamps are time_ns and `clock` publishes them; else wall clock
-  const hal::TruthImage* truth = nullptr;  ///< the cycles'; null: they bring none
-  std::uint64_t run = 0;                   ///< drawn at its start
+  const hal::TruthImage* truth = nullptr;        ///< the cycles'; null: they bring none
+  const hal::EstimateImage* estimate = nullptr;  ///< the same
+  std::uint64_t run = 0;                         ///< drawn at its start
 };
 
 /// The loop's times, of every cycle so far.
@@ -62,7 +63,8 @@ struct CycleSample {
   std::uint32_t due;             ///< bit i: Topic i
   const hal::StateImage& state;  ///< good when a topic is due that needs it, as are
   const hal::CommandImage& command;
-  const hal::TruthImage* truth;  ///< null: none
+  const hal::TruthImage* truth;        ///< null: none
+  const hal::EstimateImage* estimate;  ///< null: none
   const LoopRecord& loop;
   const std::vector<FaultEntry>& faults;
 

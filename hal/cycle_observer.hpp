@@ -7,6 +7,7 @@
 #include "base/realtime.hpp"
 #include "base/result.hpp"
 #include "hal/backend.hpp"
+#include "hal/estimate.hpp"
 #include "hal/image.hpp"
 #include "hal/run_phase.hpp"
 #include "hal/truth.hpp"
@@ -29,8 +30,9 @@ struct CycleView {
   RunPhase phase;
   Code read_code;  ///< of the backend's read()
   const StateImage& state;
-  const CommandImage& command;  ///< as it went to the drives
-  const TruthImage* truth;      ///< null without a simulation
+  const CommandImage& command;    ///< as it went to the drives
+  const TruthImage* truth;        ///< null without a simulation
+  const EstimateImage* estimate;  ///< null where nothing is estimated
   CycleTimes times;
 };
 

@@ -33,13 +33,15 @@ enum class FaultKind : std::uint8_t {
   kSpringBreak,
   // buses
   kBusDown,  ///< a cut cable, or a switched-off interface
+  // the body
+  kPush,  ///< a force on a link, from outside
 };
-inline constexpr std::array<std::string_view, 19> kFaultNames = {
+inline constexpr std::array<std::string_view, 20> kFaultNames = {
     "none",           "frame_drop",     "frame_delay",     "frame_duplicate",
     "frame_corrupt",  "frame_reorder",  "board_kill",      "board_reset",
     "board_identity", "board_revision", "board_duplicate", "emergency_stop",
     "supply_sag",     "encoder_freeze", "encoder_jump",    "encoder_unplug",
-    "motor_overheat", "spring_break",   "bus_down"};
+    "motor_overheat", "spring_break",   "bus_down",        "push"};
 
 /// What a fault strikes.
 enum class FaultTarget : std::uint8_t { kNone = 0, kJoint, kBoard, kSensor, kBus };

@@ -39,12 +39,14 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kMotionRequested: return "motion requested";
     case EventKind::kMotionStopped: return "motion stopped";
     case EventKind::kRecoveryRequested: return "recovery requested";
+    case EventKind::kCollision: return "fault: collision";
   }
   return "?";
 }
 
 bool is_fault(EventKind kind) noexcept {
   return kind == EventKind::kFault || kind == EventKind::kEmergencyStop ||
+         kind == EventKind::kCollision ||
          (kind >= EventKind::kFeedbackLost && kind <= EventKind::kFell);
 }
 
@@ -91,6 +93,11 @@ std::string text_of(const Event& event, bool has_joint) {
     case EventKind::kBringUpFailed:
     case EventKind::kTooLate:
     case EventKind::kOwnerLost: return "";
+    case EventKind::kCollision: {
+      char torque[48];
+      std::snprintf(torque, sizeof torque, ": an external torque of %.1f Nm", 1e-3 * event.code);
+      return torque;
+    }
     case EventKind::kFell: {
       constexpr const char* kHow[] = {"",
                                       ": its base is tilted",

@@ -41,6 +41,7 @@ enum class EventKind : std::uint8_t {
   kMotionRequested,      ///< on request: of a joint to `value`; `code`: 0 in rad, 1 in m
   kMotionStopped,        ///< on request: a joint brakes
   kRecoveryRequested,    ///< on request: a joint goes back to its limits
+  kCollision,            ///< a fault: something pushes a joint; `code`: its torque [mNm or mN]
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.

@@ -57,6 +57,11 @@ void RobotView::take_channel(std::uint16_t channel, std::string_view topic,
   } else if (topic == "/tandem/truth" && !robot_.base_link.empty()) {
     truth_.channel = channel;
     truth_layout_ = layout;
+  } else if (topic == "/tandem/estimate" && !robot_.base_link.empty() && truth_.channel < 0) {
+    const hal::Field* base = layout.find("base_position_m");
+    if (base == nullptr || base->count != 3) return;  // of an observer alone
+    truth_.channel = channel;
+    truth_layout_ = layout;
   }
 }
 
@@ -105,6 +110,10 @@ bool RobotView::write_joint_states(std::int64_t time_ns, std::span<const std::by
 }
 
 bool RobotView::write_base(std::int64_t time_ns, std::span<const std::byte> truth) {
+  if (truth_layout_.find("base_valid") != nullptr) {  // an estimate that has not started
+    read_field(truth_layout_, "base_valid", truth, values_);
+    if (values_.front() == 0.0) return false;
+  }
   CdrWriter out(body_);
   out.number(std::uint32_t{1});  // of the list of transforms
   write_header(out, time_ns, kWorld);

@@ -32,7 +32,8 @@ class RobotView {
   /// @param joints  names in the images' order
   RobotView(ViewedRobot robot, std::vector<std::string> joints);
 
-  /// A channel of the log: it looks for /tandem/state and /tandem/truth.
+  /// A channel of the log: it looks for /tandem/state and /tandem/truth or, where there is none
+  /// before it, /tandem/estimate.
   void take_channel(std::uint16_t channel, std::string_view topic, const hal::Layout& layout);
   /// Once all channels are known: makes those that it can fill.
   void add_channels(McapWriter& writer);

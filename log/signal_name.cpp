@@ -17,6 +17,7 @@ struct Row {
 constexpr Row kRows[] = {
 #define TANDEM_FIELD(type, name, count, doc) {#name, #count},
 #include "hal/command_fields.inc"
+#include "hal/estimate_fields.inc"
 #include "hal/state_fields.inc"
 #include "hal/truth_fields.inc"
 #undef TANDEM_FIELD

@@ -99,7 +99,8 @@ void add_row(const RunData& run, std::size_t row, const tandem_kernels& kernels,
 Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels& kernels) {
   const Result<std::vector<std::size_t>> order = model_order(run, kernels);
   if (!order) return std::unexpected(order.error());
-  if (kernels.floating_base != 0 && !run.truth()) return fail("the log lacks the base's motion");
+  if (kernels.floating_base != 0 && !run.motion_known())
+    return fail("the log lacks the base's motion");
   Result<model::ClosedLoops> loops = loops_of(run, kernels);
   if (!loops) return std::unexpected(loops.error());
   const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
@@ -107,7 +108,7 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
   motion.step_s = run.step_s * static_cast<double>(stride);
   Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
   const std::vector<int> feet = feet_of_wrenches(run, kernels);
-  const bool ground_known = run.truth() || run.robot.contact.feet.empty();
+  const bool ground_known = run.motion_known() || run.robot.contact.feet.empty();
   for (std::size_t row = 0; row < run.rows_before_fault(); row += stride) {
     add_row(run, row, kernels, *order, *loops, motion);
     if (ground_known) motion.wrenches.push_back(ground_wrenches(run, feet, row));

@@ -184,7 +184,7 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
         "no inverse dynamics: there is no kernel library that fits this log; run: "
         "tandem model build " +
         run->robot.file);
-  } else if (kernels->floating_base != 0 && !run->truth()) {
+  } else if (kernels->floating_base != 0 && !run->motion_known()) {
     files.remarks.push_back(
         "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
   }

@@ -15,6 +15,7 @@ namespace {
 const char kState[] = "/tandem/state";
 const char kCommand[] = "/tandem/command";
 const char kTruth[] = "/tandem/truth";
+const char kEstimate[] = "/tandem/estimate";
 
 std::unexpected<Error> log_error(const RunData& run, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
@@ -213,6 +214,26 @@ Status read_command(const log::LogFile& file, RunData& run) {
   return {};
 }
 
+/// Rows that the run and a table of another topic have alike: the log of a killed run may end
+/// between a state and its truth. 0: they do not fit.
+std::size_t shared_rows(const RunData& run, const log::Table& table) {
+  const std::size_t rows = std::min(run.rows(), table.time_s.size());
+  const bool same =
+      std::equal(run.time_s.begin(), run.time_s.begin() + static_cast<std::ptrdiff_t>(rows),
+                 table.time_s.begin());
+  return rows >= 2 && same ? rows : 0;
+}
+
+void resize_rows(RunData& run, std::size_t rows) {
+  run.time_s.resize(rows);
+  for (Columns* columns :
+       {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
+        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm, &run.loop_error,
+        &run.passive_rad}) {
+    for (std::vector<double>& column : *columns) column.resize(rows);
+  }
+}
+
 Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
@@ -230,25 +251,39 @@ Status read_truth(const log::LogFile& file, const Window& window, RunData& run) 
                              {"passive_position_rad", passive}});
   if (!table) return std::unexpected(table.error());
   crop(*table, window.begin_s, window.end_s);
-  // The log of a killed run may end between a state and its truth.
-  const std::size_t rows = std::min(run.rows(), table->time_s.size());
-  if (rows < 2 ||
-      !std::equal(run.time_s.begin(), run.time_s.begin() + rows, table->time_s.begin())) {
-    return {};
-  }
+  const std::size_t rows = shared_rows(run, *table);
+  if (rows == 0) return {};
   run.base = take(*table, 0, 13);
   run.foot_position_m = take(*table, 13, feet);
   run.foot_force_N = take(*table, 13 + feet, feet);
   run.foot_moment_Nm = take(*table, 13 + 2 * feet, feet);
   run.loop_error = take(*table, 13 + 3 * feet, 2 * loops);
   run.passive_rad = take(*table, 13 + 3 * feet + 2 * loops, passive);
-  run.time_s.resize(rows);
-  for (Columns* columns :
-       {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad, &run.sensor,
-        &run.base, &run.foot_position_m, &run.foot_force_N, &run.foot_moment_Nm, &run.loop_error,
-        &run.passive_rad}) {
-    for (std::vector<double>& column : *columns) column.resize(rows);
-  }
+  resize_rows(run, rows);
+  return {};
+}
+
+/// The run's own estimate, where nobody simulated it. It has to have started before the first row.
+Status read_estimate(const log::LogFile& file, const Window& window, RunData& run) {
+  const auto* topic = file.find(kEstimate);
+  if (run.motion_known() || topic == nullptr || !run.robot.model.floating_base) return {};
+  const std::size_t feet = 3 * run.robot.contact.feet.size();
+  auto table = read_columns(file, kEstimate,
+                            {{"base_position_m", 3},
+                             {"base_quaternion", 4},
+                             {"base_velocity", 6},
+                             {"foot_force_n", feet},
+                             {"foot_moment_nm", feet},
+                             {"base_valid", 1}});
+  if (!table) return {};  // an observer alone: no base
+  crop(*table, window.begin_s, window.end_s);
+  const std::size_t rows = shared_rows(run, *table);
+  if (rows == 0 || table->columns.back().front() != 1.0) return {};
+  run.base = take(*table, 0, 13);
+  run.foot_force_N = take(*table, 13, feet);
+  run.foot_moment_Nm = take(*table, 13 + feet, feet);
+  run.estimated = true;
+  resize_rows(run, rows);
   return {};
 }
 
@@ -268,7 +303,7 @@ std::size_t RunData::first_channel(std::size_t index) const {
 }
 
 model::Placement RunData::base_placement(std::size_t row) const {
-  if (!truth() || !robot.model.floating_base) return {};
+  if (!motion_known() || !robot.model.floating_base) return {};
   const Eigen::Quaterniond rotation(base[6][row], base[3][row], base[4][row], base[5][row]);
   return {rotation.normalized().toRotationMatrix(),
           Eigen::Vector3d(base[0][row], base[1][row], base[2][row])};
@@ -348,6 +383,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
   if (const Status s = read_truth(*file, window, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_estimate(*file, window, run); !s) return std::unexpected(s.error());
   run.step_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.rows() - 1);
   return run;
 }

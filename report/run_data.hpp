@@ -66,7 +66,8 @@ struct RunData {
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another
   Columns base;             ///< [13][row]: position, quaternion xyzw, velocity of the base
-                            ///< in its frame; empty when the log has no truth
+                            ///< in its frame; by the truth or, without it, by the run's
+                            ///< estimate; empty without either
   Columns foot_position_m;  ///< [3 feet][row]: origin of each foot's site in W; empty as base
   Columns foot_force_N;     ///< [3 feet][row]: of the ground on each foot, W axes; empty as base
   Columns foot_moment_Nm;   ///< [3 feet][row]: about the site's origin, W axes; empty as base
@@ -79,14 +80,18 @@ struct RunData {
   [[nodiscard]] std::size_t rows_before_fault() const;
   /// First channel of sensor `index` in `sensor`.
   [[nodiscard]] std::size_t first_channel(std::size_t index) const;
-  /// The root link in W; upright at the origin when the log has no truth.
+  /// The root link in W; upright at the origin when nobody knows.
   [[nodiscard]] model::Placement base_placement(std::size_t row) const;
   /// Every joint's position at a row, in the image's order, then the passive ones'.
   [[nodiscard]] std::vector<double> positions(std::size_t row) const;
   /// Whether a joint (image) is prismatic: its columns are m, m/s and N then.
   [[nodiscard]] bool slides(std::size_t joint) const;
+  bool estimated = false;  ///< base, foot forces and moments are the run's estimate
+
   /// Whether the log has where the base was and what the ground did.
-  [[nodiscard]] bool truth() const { return !base.empty(); }
+  [[nodiscard]] bool motion_known() const { return !base.empty(); }
+  /// The same, by the simulation's truth.
+  [[nodiscard]] bool truth() const { return motion_known() && !estimated; }
   /// Joints that were under position control, the worst first.
   [[nodiscard]] std::vector<Tracking> tracking() const;
   /// One per foot; none when the log has no truth.

@@ -77,6 +77,8 @@ class ControllerHost {
   /// Where the joints will stand when the run starts, in the image's order, for those who are added
   /// active from now on; empty: not known.
   void start_from(std::vector<double> position_rad) { start_rad_ = std::move(position_rad); }
+  /// What is estimated, for those who are configured from now on; null: nothing.
+  void show_estimate(const hal::EstimateImage* estimate) { estimate_ = estimate; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
@@ -253,6 +255,7 @@ class ControllerHost {
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
   std::vector<double> start_rad_;  // of start_from()
+  const hal::EstimateImage* estimate_ = nullptr;
   std::vector<hal::JointCapabilities> capabilities_;
 
   // The loop's.

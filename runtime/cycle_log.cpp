@@ -4,13 +4,18 @@
 namespace tandem::runtime {
 
 CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
-                   const hal::CommandImage& command, const hal::TruthImage* truth)
+                   const hal::CommandImage& command, const hal::TruthImage* truth,
+                   const hal::EstimateImage* estimate)
     : recorder_(recorder) {
   if (recorder_ == nullptr) return;
   state_ = recorder_->add_channel("/tandem/state", "tandem/msg/State", state.layout());
   command_ = recorder_->add_channel("/tandem/command", "tandem/msg/Command", command.layout());
   if (truth != nullptr) {
     truth_ = recorder_->add_channel("/tandem/truth", "tandem/msg/Truth", truth->layout());
+  }
+  if (estimate != nullptr) {
+    estimate_ =
+        recorder_->add_channel("/tandem/estimate", "tandem/msg/Estimate", estimate->layout());
   }
   recorder_->start();
 }
@@ -40,12 +45,13 @@ void CycleLog::event(const hal::CycleTime& time,
 }
 
 void CycleLog::images(const hal::CycleTime& time, const hal::StateImage& state,
-                      const hal::CommandImage& command,
-                      const hal::TruthImage* truth) noexcept TANDEM_RT {
+                      const hal::CommandImage& command, const hal::TruthImage* truth,
+                      const hal::EstimateImage* estimate) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
   recorder_->push(state_, time.time_ns, state.bytes());
   recorder_->push(command_, time.time_ns, command.bytes());
   if (truth != nullptr) recorder_->push(truth_, time.time_ns, truth->bytes());
+  if (estimate != nullptr) recorder_->push(estimate_, time.time_ns, estimate->bytes());
 }
 
 }  // namespace tandem::runtime

@@ -4,6 +4,7 @@
 
 #include "base/realtime.hpp"
 #include "hal/cycle_time.hpp"
+#include "hal/estimate.hpp"
 #include "hal/fault_kind.hpp"
 #include "hal/image.hpp"
 #include "hal/truth.hpp"
@@ -11,14 +12,15 @@
 
 namespace tandem::runtime {
 
-/// The channels of state, command and truth, and the events. Without a recorder it does nothing.
+/// The channels of state, command, truth and estimate, and the events. Without a recorder it does
+/// nothing.
 class CycleLog {
  public:
   /// Adds its channels and starts the recorder. The layouts are those of the images shown.
   /// @param recorder  null: nothing is logged. Outlives it.
-  /// @param truth     null: there is none
+  /// @param truth, estimate  null: there is none
   CycleLog(log::Recorder* recorder, const hal::StateImage& state, const hal::CommandImage& command,
-           const hal::TruthImage* truth);
+           const hal::TruthImage* truth, const hal::EstimateImage* estimate);
 
   /// For simulated time, which can wait: blocks until so many messages have room.
   void wait_for_space(std::size_t messages) {
@@ -30,7 +32,8 @@ class CycleLog {
              std::uint32_t code = 0, float value = 0.0F) noexcept TANDEM_RT;
   void event(const hal::CycleTime& time, const hal::InjectedFault& fault) noexcept TANDEM_RT;
   void images(const hal::CycleTime& time, const hal::StateImage& state,
-              const hal::CommandImage& command, const hal::TruthImage* truth) noexcept TANDEM_RT;
+              const hal::CommandImage& command, const hal::TruthImage* truth,
+              const hal::EstimateImage* estimate) noexcept TANDEM_RT;
   /// Messages that found no room.
   [[nodiscard]] std::uint64_t dropped() const noexcept TANDEM_RT {
     return recorder_ == nullptr ? 0 : recorder_->dropped();
@@ -38,7 +41,7 @@ class CycleLog {
 
  private:
   log::Recorder* recorder_;
-  log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0;
+  log::Recorder::Channel state_ = 0, command_ = 0, truth_ = 0, estimate_ = 0;
 };
 
 }  // namespace tandem::runtime

@@ -8,6 +8,7 @@
 
 #include "base/nearest.hpp"
 #include "rt/clock_control.hpp"
+#include "runtime/estimation_options.hpp"
 #include "runtime/standing_height.hpp"
 
 namespace tandem::runtime {
@@ -191,7 +192,7 @@ ReportOptions read_report(TomlTable table) {
 
 const Names kSections{"robot",  "duration_s", "seed",    "posture", "kernel_variant", "period_ns",
                       "sim",    "hal",        "overrun", "clock",   "realtime",       "faults",
-                      "remote", "log",        "report",  "dds",     "controller"};
+                      "remote", "log",        "report",  "dds",     "estimation",     "controller"};
 
 /// What of the experiment can be read without its robot.
 Experiment read(const TomlDocument& document, TomlTable& root) {
@@ -297,6 +298,7 @@ void combine(Experiment& e, TomlTable& root) {
   check_reference(report, "position_of", e.report.position_of, e.robot.joints, "joint");
   check_reference(report, "torque_of", e.report.torque_of, e.robot.joints, "joint");
   check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
+  if (root.has("estimation")) e.estimation = read_estimation(root.table("estimation"), e.robot);
   apply_order(e, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);
 }

@@ -14,6 +14,7 @@
 #include "base/result.hpp"
 #include "base/toml_reader.hpp"
 #include "dds/config.hpp"
+#include "estimation/config.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/urdf.hpp"
@@ -124,7 +125,8 @@ struct Experiment {
   RemoteOptions remote;
   LogOptions log;
   ReportOptions report;
-  dds::Config dds;  ///< off without the table
+  estimation::EstimationConfig estimation;  ///< nothing without the table
+  dds::Config dds;                          ///< off without the table
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
 

@@ -27,6 +27,7 @@ enum class FaultSource : std::uint8_t {
   kOwner,          ///< the owner in another process; `code` is a hal::OwnerLoss, kNone: it asked
   kStray,          ///< a controller wrote what it had not claimed; `index` joint, `code` controller
   kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
+  kCollision,      ///< something pushes a joint; `code` is its external torque [mNm or mN]
 };
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.

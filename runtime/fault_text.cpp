@@ -1,6 +1,8 @@
 // What users read of a fault: one sentence for each source, with the names of what it struck.
 #include "runtime/fault_text.hpp"
 
+#include <cstdio>
+
 #include "hal/remote_command.hpp"
 
 namespace tandem::runtime {
@@ -26,6 +28,15 @@ std::string owner_text(hal::OwnerLoss loss) {
   return {};
 }
 
+/// "12.3 Nm"
+std::string in_units(const FaultRecord& record, const FaultContext& about) {
+  const auto joint = static_cast<std::size_t>(record.index);
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f %s", 1e-3 * record.code,
+                about.robot.joints[joint].slides ? "N" : "Nm");
+  return text;
+}
+
 std::string text_of(const FaultRecord& record, const FaultContext& about) {
   const std::string count = std::to_string(record.code);
   const char* code = tandem::to_string(static_cast<Code>(record.code));
@@ -46,6 +57,8 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
     case FaultSource::kEmergencyStop:
       return emergency_text(static_cast<EmergencyInput>(record.code));
     case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
+    case FaultSource::kCollision:
+      return "collision: an external torque of " + in_units(record, about);
     case FaultSource::kFall:
       return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
   }
@@ -60,6 +73,7 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
     case FaultSource::kJointLost:
     case FaultSource::kCommand:
     case FaultSource::kStray:
+    case FaultSource::kCollision:
       fault.joint = about.robot.joints[index].name;
       fault.board = about.robot.joints[index].board;
       break;

@@ -2,6 +2,7 @@
 #include "runtime/robot_cycle.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "rt/scoped_realtime.hpp"
@@ -53,8 +54,8 @@ bool RobotCycle::step() noexcept {
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
-  // Three images, and every event that one cycle can bring.
-  const std::size_t most = 3 + 16 + Inbox::kCapacity + 3 * watch_.joints() + watch_.sensors();
+  // Four images, and every event that one cycle can bring.
+  const std::size_t most = 4 + 16 + Inbox::kCapacity + 3 * watch_.joints() + watch_.sensors();
   if (config_.loop.pacing == rt::Pacing::kSimulated) log_.wait_for_space(most);
   const rt::Tick tick = loop_.wait();
   time_ = {tick.cycle, tick.time_ns, config_.loop.period_ns};
@@ -95,6 +96,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (tick.stop && !run_.in(RunPhase::kFaulted) && !run_.in(RunPhase::kShutDown)) {
     fault({.source = FaultSource::kOverrun, .category = StopCategory::kCategory1});
   }
+  if (estimator_ != nullptr) estimator_->update(state_);
   if (!run_.in(RunPhase::kBringUp) && !run_.in(RunPhase::kShutDown)) {
     while (const auto found = watch_.next_joint(state_)) fault(*found);
     while (const auto found = watch_.next_sensor(state_)) fault(*found);
@@ -102,9 +104,26 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   if (run_.controllers_run() && truth_ != nullptr) {
     if (const auto found = watch_.fall(*truth_)) fault(*found);
   }
+  check_collisions();
   check_backend(read_code_);
   advance_phase();
   watch_drive_resets();
+}
+
+/// While controllers run: a robot that lies, or that somebody holds, feels more than itself.
+void RobotCycle::check_collisions() noexcept TANDEM_RT {
+  if (estimator_ == nullptr || !run_.controllers_run()) return;
+  const auto found = estimator_->collision();
+  if (!found) return;
+  const double thousandths = std::clamp(1e3 * std::abs(found->torque_Nm), 0.0, 4e9);
+  fault({.index = static_cast<std::int32_t>(found->joint),
+         .code = static_cast<std::uint32_t>(thousandths),
+         .source = FaultSource::kCollision,
+         .category = estimator_->reaction()});
+}
+
+const hal::EstimateImage* RobotCycle::estimate() const noexcept TANDEM_RT {
+  return estimator_ == nullptr ? nullptr : &estimator_->image();
 }
 
 /// A missed sample shows as age, a lost command as the board's own time-out, and a drive's fault
@@ -299,7 +318,7 @@ void RobotCycle::hand_over() noexcept TANDEM_RT {
   if (run_.in(RunPhase::kRunning)) {
     statistics_.take(state_, command_, truth_, limits_.counters());
   }
-  log_.images(time_, state_, command_, truth_);
+  log_.images(time_, state_, command_, truth_, estimate());
   progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);
   progress_.phase.store(run_.phase(), std::memory_order_relaxed);
   progress_.cycles.store(loop_.statistics().cycles, std::memory_order_relaxed);
@@ -322,6 +341,7 @@ void RobotCycle::show() noexcept TANDEM_RT {
                    .state = state_,
                    .command = command_,
                    .truth = truth_,
+                   .estimate = estimate(),
                    .times = {.begin_ns = begin_ns_,
                              .wakeup_ns = wakeup_ns_,
                              .bus_ns = loop_.last_bus_ns(),

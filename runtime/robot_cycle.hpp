@@ -7,6 +7,7 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
+#include "estimation/estimator.hpp"
 #include "hal/backend.hpp"
 #include "hal/command_limits.hpp"
 #include "hal/config/robot_config.hpp"
@@ -36,10 +37,11 @@ struct CycleParts {
   hal::Backend& backend;
   ControllerHost& controllers;
   rt::Clock& clock;
-  log::Recorder* recorder = nullptr;       ///< null: nothing is logged. Not started yet.
-  const hal::TruthImage* truth = nullptr;  ///< the simulation's, filled by backend.read()
-  hal::CycleObserver* observer = nullptr;  ///< null: nobody watches
-  RemoteCommandParts owner = {};           ///< for one in another process
+  log::Recorder* recorder = nullptr;           ///< null: nothing is logged. Not started yet.
+  const hal::TruthImage* truth = nullptr;      ///< the simulation's, filled by backend.read()
+  hal::CycleObserver* observer = nullptr;      ///< null: nobody watches
+  RemoteCommandParts owner = {};               ///< for one in another process
+  estimation::Estimator* estimator = nullptr;  ///< null: nothing is estimated
 };
 
 /// A run from bring-up to shut-down, cycle by cycle. step() is the cycle; RunMachine says which
@@ -109,6 +111,8 @@ class RobotCycle {
 
   // Their parts.
   void check_backend(Code code) noexcept TANDEM_RT;
+  void check_collisions() noexcept TANDEM_RT;
+  [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT;
   void advance_phase() noexcept TANDEM_RT;
   void run_controllers() noexcept TANDEM_RT;
   void retreat_further() noexcept TANDEM_RT;
@@ -167,6 +171,7 @@ class RobotCycle {
   const hal::TruthImage* truth_;
   hal::CycleObserver* observer_;
   RemoteCommandParts owner_;
+  estimation::Estimator* estimator_;
   CycleConfig config_;
 
   Inbox inbox_;

@@ -29,6 +29,7 @@ EventKind event_of(FaultSource source) noexcept TANDEM_RT {
     case FaultSource::kOwner: return EventKind::kOwnerLost;
     case FaultSource::kStray: return EventKind::kUnclaimed;
     case FaultSource::kFall: return EventKind::kFell;
+    case FaultSource::kCollision: return EventKind::kCollision;
     default: return EventKind::kFault;
   }
 }
@@ -39,7 +40,8 @@ EventKind event_of(FaultSource source) noexcept TANDEM_RT {
 void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint =
       record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
-      record.source == FaultSource::kCommand || record.source == FaultSource::kStray;
+      record.source == FaultSource::kCommand || record.source == FaultSource::kStray ||
+      record.source == FaultSource::kCollision;
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {

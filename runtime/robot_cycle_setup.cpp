@@ -18,6 +18,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       truth_(parts.truth),
       observer_(parts.observer),
       owner_(parts.owner),
+      estimator_(parts.estimator),
       config_(config),
       inbox_(config.loop),
       loop_(config.loop, parts.clock, &inbox_.clock()),
@@ -28,7 +29,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       delay_(parts.robot.shape(), config.delay_cycles),
       limits_(hal::robot_of(parts.robot), config.loop.period_ns),
       watch_(parts.robot, parts.backend, config.lost_after_cycles, config.fall),
-      log_(parts.recorder, state_, command_, parts.truth),
+      log_(parts.recorder, state_, command_, parts.truth, estimate()),
       statistics_(parts.robot.joints.size(), parts.truth == nullptr ? 0 : parts.truth->feet(),
                   parts.truth == nullptr ? 0 : parts.truth->loops()),
       trace_(config.trace_cycles),
@@ -54,6 +55,7 @@ void RobotCycle::archive(Archive& ar) {
   delay_.archive(ar);
   limits_.archive(ar);
   watch_.archive(ar);
+  if (estimator_ != nullptr) estimator_->archive(ar);
   statistics_.archive(ar);
   controllers_->archive(ar);
   ar(time_, started_, controlling_, held_back_, before_retreat_, read_code_, ran_);

@@ -100,6 +100,12 @@ const char kLogDiffExamples[] = R"(Examples:
 
 Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
 
+const char kLogThresholdsExamples[] = R"(Examples:
+  tandem log thresholds runs/coman-squat-001.mcap            [estimation.collision] for one an hour
+  tandem log thresholds runs/panda.mcap --per-hour 0.1 --from 5 >> my_experiment.toml
+The log is of free motion with [estimation.observer], at least 8 s of it. What was not moved there
+is not known: docs/estimation.md.)";
+
 const char kEdsExamples[] = R"(Examples:
   tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
   tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for
@@ -442,6 +448,18 @@ void add_flags(CLI::App& app, LogOptions& o) {
   diff->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   diff->footer(kLogDiffExamples);
   diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
+  CLI::App* thresholds =
+      app.add_subcommand("thresholds", "Collision thresholds from a run that touched nothing");
+  thresholds->add_option("log", o.log, "MCAP file")->required();
+  thresholds
+      ->add_option("--per-hour", o.alarms_per_hour,
+                   "False alarms per hour of all joints together (default: 1)")
+      ->check(CLI::Range(1e-6, 3600.0));
+  thresholds->add_option("--from", o.from_s, "Leave out what was before [s] (default: 0)")
+      ->check(CLI::Range(0.0, 1e6));
+  thresholds->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  thresholds->footer(kLogThresholdsExamples);
+  thresholds->callback([&o] { o.action = LogOptions::Action::kThresholds; });
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {

@@ -182,9 +182,11 @@ struct NewOptions {
   std::string json;
 };
 
-/// tandem log info|csv|diff LOG [LOG_B]
+/// tandem log info|csv|diff|thresholds LOG [LOG_B]
 struct LogOptions {
-  enum class Action : std::uint8_t { kInfo, kCsv, kDiff } action = Action::kInfo;
+  enum class Action : std::uint8_t { kInfo, kCsv, kDiff, kThresholds } action = Action::kInfo;
+  double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
+  double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
   std::string log;
   std::string other;                ///< diff: the log that `log` is compared with
   std::string topic;                ///< csv: empty is the state; info: whose fields are listed

@@ -121,6 +121,17 @@ std::vector<double> start_of(const runtime::Experiment& e) {
   return std::vector<double>(e.robot.joints.size(), 0.0);
 }
 
+/// What the experiment wants estimated, shown to the controllers that are added after it.
+void add_estimator(Composition& c, Collector& errors) {
+  const runtime::Experiment& e = c.experiment;
+  if (!e.estimation.any()) return;
+  auto made = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(), e.estimation,
+                                          e.loop.period_ns);
+  if (!made) return errors.add(made.error(), e.file, 0);
+  c.estimator = std::move(*made);
+  c.controllers->show_estimate(&c.estimator->image());
+}
+
 /// The robot's kernels, and the host of controllers. They are built after all that can be checked
 /// without them, for it takes a while.
 /// @return false: there are errors, and no more to find
@@ -146,6 +157,7 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
   c.controllers =
       std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));
+  add_estimator(c, errors);
   return true;
 }
 

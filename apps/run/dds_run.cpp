@@ -41,6 +41,7 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
                       .period_ns = e.loop.period_ns,
                       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
                       .truth = truth,
+                      .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
                       .run = draw_run()});
   if (!publisher) return std::unexpected(publisher.error());
   return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));

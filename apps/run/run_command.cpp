@@ -207,7 +207,8 @@ class Session {
                                        .recorder = recorder_.get(),
                                        .truth = truth_,
                                        .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
-                                       .owner = {server_.get(), c_.owner.get(), c_.owner_slot}},
+                                       .owner = {server_.get(), c_.owner.get(), c_.owner_slot},
+                                       .estimator = c_.estimator.get()},
                    config);
     if (server_ != nullptr) tell_faults(*server_, *cycle_);
   }

@@ -48,6 +48,7 @@ std::uint64_t bytes_needed(const Composition& c) {
   std::uint64_t cycle_bytes = hal::StateImage(e.robot.shape()).bytes().size() +
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
+  if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
   // Joint states and the base's frame, for viewers: three numbers and a name of each joint.
   const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
   const auto cycles_per_view =

@@ -7,6 +7,7 @@
 
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
+#include "apps/tools/log_thresholds.hpp"
 #include "base/counted.hpp"
 #include "log/compare.hpp"
 #include "log/csv.hpp"
@@ -198,6 +199,8 @@ Exit log_command(const LogOptions& options) {
     const Result<Exit> compared = diff(*file, options);
     if (compared) exit = *compared;
     if (!compared) done = std::unexpected(compared.error());
+  } else if (options.action == LogOptions::Action::kThresholds) {
+    done = print_thresholds(*file, options);
   } else if (!options.topic.empty()) {
     done = print_fields(*file, full_topic(options.topic), human_output(options.json));
     if (done) done = write_json(options.json, info_json(*file));

@@ -14,31 +14,6 @@ constexpr double kTogether = 4.0;                        // points on the ground
 // What the bound on the way leaves out: projections onto closed loops, stages of Runge-Kutta.
 constexpr double kMargin_m = 0.001;
 
-Vec3 vec3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-Mat3 mat3(const Eigen::Matrix3d& R) {
-  return {R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)};
-}
-Vec3 cross(const Vec3& a, const Vec3& b) noexcept {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec3 sum(const Vec3& a, const Vec3& b) noexcept { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-double dot(const Vec3& a, const double* b) noexcept {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-Mat3 product(const Mat3& A, const Mat3& B) noexcept {
-  Mat3 C{};
-  for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t c = 0; c < 3; ++c)
-      C[3 * r + c] = A[3 * r] * B[c] + A[3 * r + 1] * B[3 + c] + A[3 * r + 2] * B[6 + c];
-  return C;
-}
-/// By `angle` about the unit vector `k` (Rodrigues).
-Mat3 turn(const Vec3& k, double angle) noexcept {
-  const double c = std::cos(angle), s = std::sin(angle), t = 1.0 - c;
-  return {t * k[0] * k[0] + c,        t * k[0] * k[1] - s * k[2], t * k[0] * k[2] + s * k[1],
-          t * k[0] * k[1] + s * k[2], t * k[1] * k[1] + c,        t * k[1] * k[2] - s * k[0],
-          t * k[0] * k[2] - s * k[1], t * k[1] * k[2] + s * k[0], t * k[2] * k[2] + c};
-}
 double length_1(const double* v) noexcept {
   return std::abs(v[0]) + std::abs(v[1]) + std::abs(v[2]);
 }
@@ -48,12 +23,14 @@ double length_1(const double* v) noexcept {
 BodyContact::BodyContact(const hal::RobotConfig& robot, const model::Tree& tree,
                          const tandem_kernels& kernels, const double* q,
                          std::span<const Posture> postures, std::int64_t substep_ns)
-    : config_(robot.contact), floating_(tree.floating_base) {
+    : config_(robot.contact) {
   if (!(config_.stiffness_N_m > 0.0)) return;
-  add_joints(tree, kernels);
+  motion_ = TreeMotion(tree, kernels);
+  body_force_.assign(6 * motion_.bodies().size(), 0.0);
+  for (const model::Link& link : tree.links) names_.push_back(link.name);
   generalized_.assign(kernels.nv, 0.0);
   const std::vector<double> rest(kernels.nv, 0.0);
-  place(q, rest.data());
+  motion_.place(q, rest.data());
   add_groups(tree, link_points(robot, tree));
   add_reach(tree);
   add_sensors(robot, tree);
@@ -64,25 +41,6 @@ BodyContact::BodyContact(const hal::RobotConfig& robot, const model::Tree& tree,
   groups_force_.assign(6 * groups_.size(), 0.0);
 }
 
-void BodyContact::add_joints(const model::Tree& tree, const tandem_kernels& kernels) {
-  for (const model::Joint& joint : tree.joints) {
-    const model::Joint& own =
-        joint.follows() ? tree.joints[static_cast<std::size_t>(joint.leader)] : joint;
-    joints_.push_back({.parent = static_cast<std::size_t>(joint.parent),
-                       .coordinate = joint_of(kernels, own.name),
-                       .multiplier = joint.multiplier,
-                       .offset = joint.offset,
-                       .prismatic = joint.type == model::JointType::kPrismatic,
-                       .axis = vec3(joint.axis),
-                       .p = vec3(joint.in_parent.p),
-                       .R = mat3(joint.in_parent.R)});
-  }
-  bodies_.assign(joints_.size() + 1, {});
-  bodies_[0].R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  body_force_.assign(6 * bodies_.size(), 0.0);
-  for (const model::Link& link : tree.links) names_.push_back(link.name);
-}
-
 void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoints>& points) {
   for (const LinkPoints& one : points) {
     const model::Link& link = tree.links[one.link];
@@ -90,8 +48,8 @@ void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoin
     Group group{one.link, body, points_.size(), points_.size(), {}, 0.0};
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& point : one.in_body_m) {
-      const Vec3 at = rotate(bodies_[body].R.data(), vec3(point).data());
-      const double depth = config_.height_m - bodies_[body].p[2] - at[2];
+      const Vec3 at = rotate(motion_.bodies()[body].R.data(), vec3(point).data());
+      const double depth = config_.height_m - motion_.bodies()[body].p[2] - at[2];
       if (depth > 0.0) continue;
       points_.push_back(vec3(point));
       center += point;
@@ -110,14 +68,14 @@ void BodyContact::add_groups(const model::Tree& tree, const std::vector<LinkPoin
 
 /// How far any point of a body, or beyond it, is from the body's origin, in any posture.
 void BodyContact::add_reach(const model::Tree& tree) {
-  std::vector<double> reach(bodies_.size(), 0.0);
+  std::vector<double> reach(motion_.bodies().size(), 0.0);
   for (const Group& group : groups_) {
     const double at = Eigen::Vector3d(group.center.data()).norm() + group.radius;
     reach[group.body] = std::max(reach[group.body], at);
   }
-  reach_m_.assign(generalized_.size() - (floating_ ? 6 : 0), 0.0);
-  for (std::size_t j = joints_.size(); j-- > 0;) {
-    const Joint& joint = joints_[j];
+  reach_m_.assign(generalized_.size() - (motion_.floating() ? 6 : 0), 0.0);
+  for (std::size_t j = motion_.joints().size(); j-- > 0;) {
+    const TreeMotion::Joint& joint = motion_.joints()[j];
     const double beyond = reach[j + 1];
     if (!(beyond > 0.0)) continue;
     const model::Joint& described = tree.joints[j];
@@ -151,32 +109,32 @@ void BodyContact::add_sensors(const hal::RobotConfig& robot, const model::Tree& 
 void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> postures,
                       std::int64_t substep_ns) {
   const double h_s = static_cast<double>(substep_ns) * 1e-9;
-  const std::size_t base = floating_ ? 6 : 0;
+  const std::size_t base = motion_.floating() ? 6 : 0;
   const std::vector<double> rest(kernels.nv, 0.0);
   std::vector<double> mass(points_.size(), std::numeric_limits<double>::infinity());
   for (const Posture& posture : postures) {
-    place(posture.q.data(), rest.data());
+    motion_.place(posture.q.data(), rest.data());
     for (const Group& group : groups_) {
       for (std::size_t i = group.begin; i < group.end; ++i) {
         PointJacobian J = PointJacobian::Zero(kernels.nv, 3);
-        const Vec3 lever = rotate(bodies_[group.body].R.data(), points_[i].data());
-        const Vec3 at = sum(bodies_[group.body].p, lever);
-        const auto to = [&at](const Body& body) -> Vec3 {
+        const Vec3 lever = rotate(motion_.bodies()[group.body].R.data(), points_[i].data());
+        const Vec3 at = sum(motion_.bodies()[group.body].p, lever);
+        const auto to = [&at](const TreeMotion::Body& body) -> Vec3 {
           return {at[0] - body.p[0], at[1] - body.p[1], at[2] - body.p[2]};
         };
-        for (std::size_t body = group.body; body > 0; body = joints_[body - 1].parent) {
-          const Joint& joint = joints_[body - 1];
-          const Vec3& axis = bodies_[body].axis;
-          const Vec3 way = joint.prismatic ? axis : cross(axis, to(bodies_[body]));
+        for (std::size_t body = group.body; body > 0; body = motion_.joints()[body - 1].parent) {
+          const TreeMotion::Joint& joint = motion_.joints()[body - 1];
+          const Vec3& axis = motion_.bodies()[body].axis;
+          const Vec3 way = joint.prismatic ? axis : cross(axis, to(motion_.bodies()[body]));
           J.row(static_cast<Eigen::Index>(base + joint.coordinate)) +=
               joint.multiplier * Eigen::RowVector3d(way.data());
         }
         for (std::size_t axis = 0; axis < base / 2; ++axis) {
-          const Mat3& R = bodies_[0].R;
+          const Mat3& R = motion_.bodies()[0].R;
           const Vec3 along{R[axis], R[3 + axis], R[6 + axis]};
           J.row(static_cast<Eigen::Index>(axis)) = Eigen::RowVector3d(along.data());
           J.row(static_cast<Eigen::Index>(3 + axis)) =
-              Eigen::RowVector3d(cross(along, to(bodies_[0])).data());
+              Eigen::RowVector3d(cross(along, to(motion_.bodies()[0])).data());
         }
         mass[i] = std::min(mass[i], point_mass(posture, J));
       }
@@ -194,47 +152,10 @@ void BodyContact::fit(const tandem_kernels& kernels, std::span<const Posture> po
   }
 }
 
-void BodyContact::place(const double* q, const double* v) noexcept {
-  const double* at = q;
-  const double* rate = v;
-  if (floating_) {
-    Body& base = bodies_[0];
-    base.R = rotation_of(q + 3);
-    base.p = {q[0], q[1], q[2]};
-    base.v = rotate(base.R.data(), v);
-    base.w = rotate(base.R.data(), v + 3);
-    at += 7;
-    rate += 6;
-  }
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Joint& joint = joints_[j];
-    const Body& parent = bodies_[joint.parent];
-    Body& body = bodies_[j + 1];
-    const double position = joint.multiplier * at[joint.coordinate] + joint.offset;
-    const double speed = joint.multiplier * rate[joint.coordinate];
-    const Mat3 before_joint = product(parent.R, joint.R);
-    body.axis = rotate(before_joint.data(), joint.axis.data());
-    body.R = joint.prismatic ? before_joint : product(before_joint, turn(joint.axis, position));
-    Vec3 offset = rotate(parent.R.data(), joint.p.data());
-    body.w = parent.w;
-    Vec3 slide{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (joint.prismatic) {
-        offset[i] += position * body.axis[i];
-        slide[i] = speed * body.axis[i];
-      } else {
-        body.w[i] += speed * body.axis[i];
-      }
-    }
-    body.p = sum(parent.p, offset);
-    body.v = sum(sum(parent.v, cross(parent.w, offset)), slide);
-  }
-}
-
 void BodyContact::moved(const double* v, double h_s) noexcept TANDEM_RT {
   if (groups_.empty()) return;
   double speed = 0.0;
-  if (floating_) {
+  if (motion_.floating()) {
     speed = length_1(v) + base_reach_m_ * length_1(v + 3);
     v += 6;
   }
@@ -246,12 +167,12 @@ void BodyContact::moved(const double* v, double h_s) noexcept TANDEM_RT {
 void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) noexcept TANDEM_RT {
   touching_ = 0;
   if (groups_.empty() || clearance_m_ > kMargin_m + 2.0 * step_m_) return;
-  place(q, v);
+  motion_.place(q, v);
   energy_J_ = 0.0;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const Group& group = groups_[g];
-    const Body& body = bodies_[group.body];
+    const TreeMotion::Body& body = motion_.bodies()[group.body];
     const double clearance = body.p[2] +
                              dot({body.R[6], body.R[7], body.R[8]}, group.center.data()) -
                              group.radius - config_.height_m;
@@ -270,7 +191,7 @@ void BodyContact::evaluate(const double* q, const double* v, bool move_anchors) 
 }
 
 void BodyContact::touch(const Group& group, double* force, bool move_anchors) noexcept {
-  const Body& body = bodies_[group.body];
+  const TreeMotion::Body& body = motion_.bodies()[group.body];
   for (std::size_t i = group.begin; i < group.end; ++i) {
     const Vec3 lever = rotate(body.R.data(), points_[i].data());
     const Vec3 at = sum(body.p, lever);
@@ -287,33 +208,14 @@ void BodyContact::touch(const Group& group, double* force, bool move_anchors) no
   }
 }
 
-/// The groups' forces as generalized ones: from the tips to the base, moments about W's origin.
+/// The groups' forces as generalized ones.
 void BodyContact::generalize() noexcept {
   std::ranges::fill(generalized_, 0.0);
   std::ranges::fill(body_force_, 0.0);
   for (std::size_t g = 0; g < groups_.size(); ++g)
     for (std::size_t i = 0; i < 6; ++i)
       body_force_[6 * groups_[g].body + i] += groups_force_[6 * g + i];
-  const auto about = [](const double* force, const Vec3& p) -> Vec3 {
-    const Vec3 moved = cross(p, {force[0], force[1], force[2]});
-    return {force[3] - moved[0], force[4] - moved[1], force[5] - moved[2]};
-  };
-  double* joint_forces = generalized_.data() + (floating_ ? 6 : 0);
-  for (std::size_t j = joints_.size(); j-- > 0;) {
-    const Joint& joint = joints_[j];
-    const Body& body = bodies_[j + 1];
-    const double* force = body_force_.data() + 6 * (j + 1);
-    const Vec3 moment = about(force, body.p);
-    joint_forces[joint.coordinate] +=
-        joint.multiplier * dot(body.axis, joint.prismatic ? force : moment.data());
-    for (std::size_t i = 0; i < 6; ++i) body_force_[6 * joint.parent + i] += force[i];
-  }
-  if (!floating_) return;
-  const Vec3 force = rotate_back(bodies_[0].R.data(), body_force_.data());
-  const Vec3 moment =
-      rotate_back(bodies_[0].R.data(), about(body_force_.data(), bodies_[0].p).data());
-  std::copy(force.begin(), force.end(), generalized_.begin());
-  std::copy(moment.begin(), moment.end(), generalized_.begin() + 3);
+  motion_.add_generalized(body_force_.data(), generalized_.data());
 }
 
 void BodyContact::add_forces(double* forces) const noexcept TANDEM_RT {
@@ -331,7 +233,7 @@ void BodyContact::add_beyond(std::size_t sensor, double* channels) const noexcep
       moment[i] += groups_force_[6 * g + 3 + i];
     }
   }
-  const Body& body = bodies_[beyond.body];
+  const TreeMotion::Body& body = motion_.bodies()[beyond.body];
   const Mat3 R = product(body.R, beyond.R);
   const Vec3 moved = cross(sum(body.p, rotate(body.R.data(), beyond.p.data())), force);
   for (std::size_t i = 0; i < 3; ++i) moment[i] -= moved[i];

@@ -14,6 +14,7 @@
 #include "hal/sim/ground_law.hpp"
 #include "hal/sim/link_points.hpp"
 #include "hal/sim/rotation.hpp"
+#include "hal/sim/tree_motion.hpp"
 #include "model/kernels.h"
 #include "model/tree.hpp"
 
@@ -63,19 +64,6 @@ class BodyContact {
   }
 
  private:
-  struct Joint {
-    std::size_t parent;      // body; this joint's is its own index + 1
-    std::size_t coordinate;  // of the kernels' joints
-    double multiplier, offset;
-    bool prismatic;
-    Vec3 axis, p;  // in the joint's frame; in the parent's body
-    Mat3 R;
-  };
-  struct Body {
-    Mat3 R;
-    Vec3 p, v, w;  // in W, of its origin
-    Vec3 axis;     // of its joint, in W
-  };
   struct Group {  // one link's points
     std::size_t link, body, begin, end;
     Vec3 center;  // of a ball around them, in the body's frame
@@ -87,21 +75,17 @@ class BodyContact {
     Vec3 p{};                         // its frame in the body
     std::vector<std::uint8_t> group;  // beyond it, or not
   };
-  void add_joints(const model::Tree& tree, const tandem_kernels& kernels);
   void add_groups(const model::Tree& tree, const std::vector<LinkPoints>& points);
   void add_reach(const model::Tree& tree);
   void add_sensors(const hal::RobotConfig& robot, const model::Tree& tree);
   void fit(const tandem_kernels& kernels, std::span<const Posture> postures,
            std::int64_t substep_ns);
-  void place(const double* q, const double* v) noexcept;
   void touch(const Group& group, double* force, bool move_anchors) noexcept;
   void generalize() noexcept;
 
   hal::ContactConfig config_;
-  bool floating_ = false;
+  TreeMotion motion_;
   std::vector<std::string> names_;  // of links
-  std::vector<Joint> joints_;
-  std::vector<Body> bodies_;  // joints + 1
   std::vector<Group> groups_;
   std::vector<Vec3> points_;  // in their bodies' frames
   std::vector<PointGround> ground_;

@@ -67,6 +67,7 @@ void EmulatedRobot::begin_faults(std::int64_t time_ns) noexcept {
       one.frozen[side] = one.unplugged[side] = 0;
     }
   }
+  plant_.pushes().clear();
   for (const FaultSlot& slot : faults_.slots()) {
     if (slot.active != 0 || slot.ended != 0) apply(slot, time_ns - first_ns_);
   }
@@ -140,6 +141,7 @@ void EmulatedRobot::apply_to_joint(const FaultSlot& slot, std::int64_t since_ns)
     case FaultKind::kSpringBreak:
       if (slot.began != 0) plant_.break_spring(j);
       break;
+    case FaultKind::kPush: plant_.pushes().add(j, fault.force_N, fault.point_m); break;
     default: break;
   }
 }

@@ -30,13 +30,15 @@ enum class EncoderSide : std::uint8_t { kLink, kMotor };
 
 /// One fault, its target by index in the robot's configuration. Plain data without padding.
 struct Fault {
-  std::int64_t start_ns = 0;      ///< after `from`
-  std::int64_t duration_ns = -1;  ///< -1: for good
-  std::int64_t ramp_ns = 0;       ///< in which a sag or a temperature is reached
-  double value = 0.0;             ///< jump [rad, or m of a slide], supply [V], winding [degC]
-  double probability = 1.0;       ///< that a selected frame is struck
-  std::uint64_t seed = 0;         ///< of what is random in it
-  std::int32_t bus = -1;          ///< -1: any
+  std::int64_t start_ns = 0;        ///< after `from`
+  std::int64_t duration_ns = -1;    ///< -1: for good
+  std::int64_t ramp_ns = 0;         ///< in which a sag or a temperature is reached
+  double value = 0.0;               ///< jump [rad, or m of a slide], supply [V], winding [degC]
+  double probability = 1.0;         ///< that a selected frame is struck
+  std::uint64_t seed = 0;           ///< of what is random in it
+  std::array<double, 3> force_N{};  ///< in W
+  std::array<double, 3> point_m{};  ///< where it acts, in the joint's frame
+  std::int32_t bus = -1;            ///< -1: any
   std::int32_t board = -1;
   std::int32_t sensor = -1;
   std::int32_t joint = -1;
@@ -54,7 +56,7 @@ struct Fault {
   EncoderSide encoder = EncoderSide::kLink;
   std::uint32_t reserved = 0;
 };
-static_assert(sizeof(Fault) == 104);
+static_assert(sizeof(Fault) == 152);
 
 /// As the loop sees it: what it strikes, the narrowest that it names.
 [[nodiscard]] constexpr hal::InjectedFault injected(const Fault& fault) noexcept {
@@ -82,7 +84,7 @@ struct FaultSlot {
   std::uint8_t told = 0;   ///< next_begun() gave it
   std::array<std::uint8_t, 7> reserved{};
 };
-static_assert(sizeof(FaultSlot) == 128);
+static_assert(sizeof(FaultSlot) == 176);
 
 /// ```
 /// faults.begin_step(time_ns, enabled_ns);

@@ -245,6 +245,9 @@ void Plant::place_surroundings(const PlantConfig& config) {
                        step_stretch(integrator_), substep_ns_);
   if (!described) return;
   bodies_ = BodyContact(*config.robot, *config.tree, *kernels_, q(), postures, substep_ns_);
+  std::vector<std::string> joints;
+  for (const PlantJoint& joint : config.joints) joints.push_back(joint.name);
+  pushes_ = Pushes(*config.tree, *kernels_, joints);
 }
 
 void Plant::hold(const double* q, std::span<const double> load) {
@@ -323,7 +326,7 @@ std::string Plant::diverged_text() const {
 void Plant::archive(Archive& ar) {
   ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
      motor_rate_, pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
-     diverged_rate_, point_forces_W_);
+     diverged_rate_, point_forces_W_, pushes_);
   if (engine_) engine_->archive(ar);
 }
 

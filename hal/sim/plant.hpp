@@ -22,6 +22,7 @@
 #include "hal/sim/hoist.hpp"
 #include "hal/sim/light_joints.hpp"
 #include "hal/sim/loop_forces.hpp"
+#include "hal/sim/push.hpp"
 #include "model/kernels.h"
 
 namespace tandem::sim {
@@ -126,6 +127,9 @@ class Plant {
     actuators_.heat(map_[joint], at_least_C);
   }
 
+  /// Who pushes the robot from outside; empty without the description.
+  [[nodiscard]] Pushes& pushes() noexcept { return pushes_; }
+
   /// 1: the hoist holds the base, 0: it is free.
   [[nodiscard]] double hoist_share() const noexcept { return hoist_.share(); }
 
@@ -207,6 +211,7 @@ class Plant {
   Actuators actuators_;
   Contact contact_;
   BodyContact bodies_;
+  Pushes pushes_;
   EndStops stops_;
   LightJoints light_;
   Hoist hoist_;

@@ -37,13 +37,15 @@ void Plant::rates(const double* x, MotorState motor_rate) noexcept {
   applied_tau_ = forces;
 }
 
-/// tau_ itself, to the bit, while no joint is at an end and only soles touch the ground.
+/// tau_ itself, to the bit, while no joint is at an end, only soles touch the ground and nobody
+/// pushes.
 const std::vector<double>& Plant::with_ends_and_ground(const double* q, const double* v) noexcept {
   const bool ends = stops_.touched(q + base_q_);
-  if (!ends && !bodies_.touching()) return tau_;
+  if (!ends && !bodies_.touching() && !pushes_.any()) return tau_;
   forces_ = tau_;
   if (ends) stops_.add_torques(q + base_q_, v + base_v_, forces_.data() + base_v_);
   if (bodies_.touching()) bodies_.add_forces(forces_.data());
+  if (pushes_.any()) pushes_.add_forces(q, v, forces_.data());
   return forces_;
 }
 

@@ -167,6 +167,16 @@ void read_joint(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   }
 }
 
+/// On the joint's link, at its origin or another point of it.
+void read_push(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
+  fault.joint = index_of(table, "joint", robot.joints);
+  const std::vector<double> force_N = table.numbers("force_N", 3, {-1e5, 1e5});
+  const std::vector<double> point_m =
+      table.numbers_or("point_m", {0.0, 0.0, 0.0}, {-10.0, 10.0}, 3);
+  if (force_N.size() == 3) std::ranges::copy(force_N, fault.force_N.begin());
+  if (point_m.size() == 3) std::ranges::copy(point_m, fault.point_m.begin());
+}
+
 void read_target(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) {
   switch (fault.kind) {
     case FaultKind::kNone: return;
@@ -195,6 +205,7 @@ void read_target(TomlTable& table, const hal::RobotConfig& robot, Fault& fault) 
     case FaultKind::kMotorOverheat:
     case FaultKind::kSpringBreak: return read_joint(table, robot, fault);
     case FaultKind::kBusDown: return read_cable(table, robot, fault);
+    case FaultKind::kPush: return read_push(table, robot, fault);
   }
 }
 

@@ -37,12 +37,13 @@ std::set<std::string> keys_read() {
   for (const char* file :
        {"hal/config/robot_config.cpp", "hal/config/robot_config_drives.cpp",
         "hal/config/robot_config_loops.cpp", "hal/config/robot_config_joints.cpp",
-        "hal/sim/scenario.cpp", "runtime/experiment.cpp", "dds/config.cpp"}) {
+        "hal/sim/scenario.cpp", "runtime/experiment.cpp", "runtime/estimation_options.cpp",
+        "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
-    const auto found = matches(
-        source,
-        "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|tables|vector3|gain)"
-        "(?:_or|_or_empty|_or_default)?\\((?:table, )?\"(\\w+)\"");
+    const auto found = matches(source,
+                               "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|"
+                               "tables|vector3|gain|positive)"
+                               "(?:_or|_or_empty|_or_default)?\\((?:table, )?\"(\\w+)\"");
     EXPECT_GT(found.size(), 5U) << file << " reads no keys: is the pattern right?";
     keys.insert(found.begin(), found.end());
   }
@@ -63,11 +64,12 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   for (const char* file :
        {"apps/run/run_summary.cpp", "apps/run/composition.cpp", "apps/can/bus_table.cpp",
         "apps/run/check_command.cpp", "apps/tools/model_command.cpp", "apps/tools/new_command.cpp",
-        "apps/tools/log_command.cpp", "apps/tools/eds_command.cpp", "apps/tools/eds_show.cpp",
-        "apps/machine/latency_report.cpp", "apps/machine/doctor_command.cpp",
-        "apps/can/round_trips.cpp", "apps/control/controller_control.cpp",
-        "apps/control/joint_control.cpp", "apps/control/sensor_control.cpp",
-        "apps/clients/topic_command.cpp", "apps/clients/topic_rate.cpp"}) {
+        "apps/tools/log_command.cpp", "apps/tools/log_thresholds.cpp", "apps/tools/eds_command.cpp",
+        "apps/tools/eds_show.cpp", "apps/machine/latency_report.cpp",
+        "apps/machine/doctor_command.cpp", "apps/can/round_trips.cpp",
+        "apps/control/controller_control.cpp", "apps/control/joint_control.cpp",
+        "apps/control/sensor_control.cpp", "apps/clients/topic_command.cpp",
+        "apps/clients/topic_rate.cpp"}) {
     const std::string source = text_of(kRoot / file);
     for (const char* pattern : {"json\\[\"(\\w+)\"\\]", "\\{\"(\\w+)\", [^}\"]"}) {
       for (const std::string& key : matches(source, pattern)) {
@@ -81,6 +83,7 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
 TEST(Documentation, OfTheFaultsNamesTheTestsThatThereAre) {
   const auto named = matches(text_of(kRoot / "docs/faults.md"), "`FaultRow\\.(\\w+)`");
   const auto tests = matches(text_of(kRoot / "tests/runtime/fault_rows_test.cpp") +
+                                 text_of(kRoot / "tests/runtime/fault_rows_collision_test.cpp") +
                                  text_of(kRoot / "tests/runtime/fault_rows_coman_test.cpp") +
                                  text_of(kRoot / "tests/runtime/fault_rows_wire_test.cpp"),
                              "TEST(?:_P)?\\(FaultRow, (\\w+)\\)");

@@ -257,6 +257,39 @@ TEST(Experiment, ReadsTheNetworkProxysKeys) {
   EXPECT_EQ(e->remote.on_lost, hal::StopCategory::kCategory1);
 }
 
+TEST(Experiment, ReadsWhatIsEstimated) {
+  const auto plain = parse_experiment(kExperiment, "arm/x.toml", robot());
+  ASSERT_TRUE(plain.has_value());
+  EXPECT_FALSE(plain->estimation.any()) << "nothing without the table";
+  const auto e =
+      parse_experiment(with("[estimation.base]\nimu = 'head'\nfoot_noise_m = 0.002\nrest_s = 0.5\n"
+                            "[estimation.observer]\nbandwidth_Hz = 20\n[estimation.collision]\n"
+                            "reaction = 'retract'\nthreshold_Nm = {elbow = 2.5}\n"),
+                       "arm/x.toml", robot());
+  ASSERT_TRUE(e.has_value()) << e.error().front().to_string();
+  const estimation::EstimationConfig& all = e->estimation;
+  EXPECT_EQ(all.base->imu, "head");
+  EXPECT_EQ(all.base->foot_noise_m, 0.002);
+  EXPECT_EQ(all.base->gyro_noise_rad_s, estimation::BaseConfig{}.gyro_noise_rad_s);
+  EXPECT_EQ(all.observer->bandwidth_Hz, 20.0);
+  EXPECT_EQ(all.collision->reaction, hal::StopCategory::kCategory2);
+  ASSERT_EQ(all.collision->thresholds.size(), 1U);
+  EXPECT_EQ(all.collision->thresholds[0].joint, "elbow");
+  EXPECT_EQ(all.collision->thresholds[0].torque_Nm, 2.5);
+}
+
+TEST(Experiment, RefusesWhatCannotBeEstimated) {
+  const auto has = [](const std::string& text, const char* part) {
+    return errors_of(with(text)).find(part) != std::string::npos;
+  };
+  EXPECT_TRUE(has("[estimation.base]\nfoot_noise = 0.1", "foot_noise_m")) << "the nearest key";
+  EXPECT_TRUE(has("[estimation.observer]\nbandwidth_Hz = 0", "bandwidth_Hz"));
+  EXPECT_TRUE(has("[estimation.collision]\nreaction = 'stop'\nthreshold_Nm = {elbow = 1}", "hold"));
+  EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {knee = 1}", "knee"));
+  EXPECT_TRUE(has("[estimation.collision]\nreaction = 'warn'", "threshold_Nm"));
+  EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbow = -1}", "elbow"));
+}
+
 TEST(Experiment, SuggestsTheNearestPosture) {
   EXPECT_EQ(errors_of(replaced(kExperiment, "ready", "reddy")),
             "arm/x.toml:3: posture: the robot has no posture 'reddy' (did you mean 'ready'?)\n");

@@ -76,6 +76,21 @@ sensor = "tip"
   EXPECT_EQ((*faults)[3].sensor, 0);
 }
 
+TEST(Scenario, ReadsAPush) {
+  const auto faults = parse(
+      "[[fault]]\nkind = 'push'\njoint = 'swing'\nforce_N = [1.0, -2.0, 3.0]\n"
+      "point_m = [0, 0, 0.5]\nat_s = 1.0\nfor_s = 0.2\n");
+  ASSERT_TRUE(faults) << faults.error().front().to_string();
+  EXPECT_EQ((*faults)[0].force_N, (std::array<double, 3>{1.0, -2.0, 3.0}));
+  EXPECT_EQ((*faults)[0].point_m[2], 0.5);
+  EXPECT_EQ((*faults)[0].duration_ns, 200'000'000);
+  EXPECT_NE(errors_of("[[fault]]\nkind = 'push'\njoint = 'swing'\n").find("force_N"),
+            std::string::npos);
+  EXPECT_NE(errors_of("[[fault]]\nkind = 'push'\njoint = 'swing'\nforce_N = [1.0, 2.0]\n")
+                .find("force_N"),
+            std::string::npos);
+}
+
 TEST(Scenario, SaysWhatIsWrongAndWhere) {
   EXPECT_EQ(errors_of("[[fault]]\nkind = \"board_kil\"\n").find("faults.toml:2: "), 0U);
   EXPECT_NE(errors_of("[[fault]]\nkind = \"board_kil\"\n").find("board_kill"), std::string::npos);

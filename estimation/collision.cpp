@@ -1,0 +1,48 @@
+#include "estimation/collision.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace tandem::estimation {
+
+CollisionWatch::CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet)
+    : threshold_Nm_(std::move(threshold_Nm)), quiet_for_(threshold_Nm_.size()), quiet_(quiet) {}
+
+std::optional<CollisionWatch::Found> CollisionWatch::look(
+    std::span<const double> external_torque_Nm,
+    std::span<std::uint8_t> collided) noexcept TANDEM_RT {
+  std::optional<Found> found;
+  double worst = 0.0;
+  for (std::size_t j = 0; j < threshold_Nm_.size(); ++j) {
+    const double torque = std::abs(external_torque_Nm[j]);
+    const bool beyond = torque > threshold_Nm_[j];
+    collided[j] = beyond ? 1 : 0;
+    if (!beyond) {
+      if (quiet_for_[j] > 0) --quiet_for_[j];
+      continue;
+    }
+    if (quiet_for_[j] == 0 && torque / threshold_Nm_[j] > worst) {
+      worst = torque / threshold_Nm_[j];
+      found = Found{j, external_torque_Nm[j]};
+    }
+    quiet_for_[j] = quiet_;
+  }
+  return found;
+}
+
+double learn_threshold(std::span<const double> largest_Nm, double block_s, double alarms_per_hour) {
+  double mean = 0.0, variance = 0.0, most = 0.0;
+  const auto n = static_cast<double>(largest_Nm.size());
+  for (const double one : largest_Nm) {
+    mean += one / n;
+    most = std::max(most, one);
+  }
+  for (const double one : largest_Nm) variance += (one - mean) * (one - mean) / (n - 1.0);
+  const double scale = std::sqrt(6.0 * variance) / std::numbers::pi;
+  const double location = mean - std::numbers::egamma * scale;
+  const double in_block = std::min(0.5, alarms_per_hour * block_s / 3600.0);
+  return std::max(most, location - scale * std::log(-std::log1p(-in_block)));
+}
+
+}  // namespace tandem::estimation

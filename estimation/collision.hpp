@@ -1,0 +1,54 @@
+// Which joints feel more than the robot's own motion explains, and from which torque on.
+// Layer: estimation.  Thread: CollisionWatch made non-RT, the rest RT; learn_threshold() non-RT.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+
+namespace tandem::estimation {
+
+/// Compares external torques with a threshold by joint. A joint is found once: again after its
+/// torque has been below the threshold for `quiet` cycles.
+class CollisionWatch {
+ public:
+  /// @param threshold_Nm  by joint; infinite: not watched
+  CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet);
+
+  struct Found {
+    std::size_t joint = 0;
+    double torque_Nm = 0.0;
+  };
+  /// One cycle: marks the joints that are beyond their thresholds. The first that is new, the one
+  /// furthest beyond its threshold, or nothing.
+  /// @param collided  by joint, written: 1 beyond
+  [[nodiscard]] std::optional<Found> look(std::span<const double> external_torque_Nm,
+                                          std::span<std::uint8_t> collided) noexcept TANDEM_RT;
+  [[nodiscard]] double threshold_Nm(std::size_t joint) const noexcept {
+    return threshold_Nm_[joint];
+  }
+
+  void archive(Archive& ar) { ar(quiet_for_); }
+
+ private:
+  std::vector<double> threshold_Nm_;
+  std::vector<std::uint32_t> quiet_for_;  // cycles that are left until it can be found again
+  std::uint32_t quiet_;
+};
+
+/// The threshold that a joint's torque without a collision exceeds with this rate, from the largest
+/// magnitudes in blocks of equal length: the quantile of the Gumbel distribution of the same mean
+/// and variance, which is what maxima of many samples tend to, and never less than the largest.
+/// Beyond what was recorded it is an extrapolation: a rate of one an hour from a minute of motion
+/// assumes that the hour is like the minute.
+/// @param largest_Nm        of each block; at least 8
+/// @param alarms_per_hour   of this joint; above 0
+[[nodiscard]] double learn_threshold(std::span<const double> largest_Nm, double block_s,
+                                     double alarms_per_hour);
+
+}  // namespace tandem::estimation

@@ -1,0 +1,118 @@
+#include "estimation/estimator.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "base/nearest.hpp"
+
+namespace tandem::estimation {
+namespace {
+
+constexpr double kQuiet_s = 0.2;  // a joint that collides is found again after so long without
+
+std::unexpected<Error> in_table(Error error, const char* key) {
+  if (error.key.empty()) error.key = key;
+  return std::unexpected(std::move(error));
+}
+
+Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionConfig& config) {
+  std::vector<double> all(robot.joints.size(), std::numeric_limits<double>::infinity());
+  std::vector<std::string> names;
+  for (const hal::Joint& joint : robot.joints) names.push_back(joint.name);
+  for (const auto& [joint, torque_Nm] : config.thresholds) {
+    const int at = robot.joint_index(joint);
+    if (at < 0) return fail("the robot has no joint '" + joint + "'", suggest(joint, names));
+    all[static_cast<std::size_t>(at)] = torque_Nm;
+  }
+  return all;
+}
+
+}  // namespace
+
+Estimator::Estimator(const tandem_kernels& kernels, const ModelJoints& joints,
+                     const hal::EstimateShape& shape)
+    : kernels_(&kernels),
+      joints_(joints),
+      image_(shape),
+      q_(kernels.nq),
+      v_(kernels.nv),
+      tau_(kernels.nv),
+      wrench_(6 * kernels.wrenches) {}
+
+Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
+                                                   const tandem_kernels* kernels,
+                                                   const EstimationConfig& config,
+                                                   std::int64_t period_ns) {
+  const auto joints = ModelJoints::make(robot, kernels);
+  if (!joints) return in_table(joints.error(), "estimation");
+  const double step_s = static_cast<double>(period_ns) * 1e-9;
+  std::optional<BaseEstimator> base;
+  if (config.base) {
+    auto made = BaseEstimator::make(robot, *kernels, *joints, *config.base, step_s);
+    if (!made) return in_table(made.error(), "estimation.base");
+    base.emplace(std::move(*made));
+  }
+  if (config.observer && kernels->floating_base != 0 && !base) {
+    return in_table(
+        fail("the observer of a floating base needs the base's motion", "add [estimation.base]")
+            .error(),
+        "estimation.observer");
+  }
+  if (config.collision && !config.observer) {
+    return in_table(
+        fail("collisions are found in the observer's torques", "add [estimation.observer]").error(),
+        "estimation.collision");
+  }
+  const hal::EstimateShape shape{.base = base ? 1U : 0U,
+                                 .feet = base ? base->feet().feet() : 0U,
+                                 .joints = config.observer ? robot.joints.size() : 0U};
+  std::unique_ptr<Estimator> made(new Estimator(*kernels, *joints, shape));
+  made->base_ = std::move(base);
+  if (config.observer) made->observer_.emplace(*kernels, config.observer->bandwidth_Hz, step_s);
+  if (config.collision) {
+    auto limits = thresholds(robot, *config.collision);
+    if (!limits) return in_table(limits.error(), "estimation.collision.threshold_Nm");
+    made->watch_.emplace(std::move(*limits), static_cast<std::uint32_t>(kQuiet_s / step_s));
+    made->reaction_ = config.collision->reaction;
+  }
+  return made;
+}
+
+void Estimator::update(const hal::StateImage& state) noexcept TANDEM_RT {
+  image_.cycle()[0] = state.cycle()[0];
+  image_.time_ns()[0] = state.time_ns()[0];
+  if (base_) base_->update(state, image_);
+  if (observer_ && (!base_ || base_->started())) observe(state);
+}
+
+void Estimator::observe(const hal::StateImage& state) noexcept {
+  const bool floats = kernels_->floating_base != 0;
+  if (floats) {
+    const hal::EstimateImage& now = image_;
+    std::ranges::copy(now.base_position_m(), q_.begin());
+    std::ranges::copy(now.base_quaternion(), q_.begin() + 3);
+    std::ranges::copy(now.base_velocity(), v_.begin());
+    for (std::size_t i = 0; i < base_->feet().feet(); ++i)
+      std::copy_n(base_->ground(i).data(), 6,
+                  wrench_.begin() + static_cast<std::ptrdiff_t>(6 * base_->feet().wrench(i)));
+  }
+  joints_.to_model(state.position_rad(), q_.data() + (floats ? 7 : 0));
+  joints_.to_model(state.velocity_rad_s(), v_.data() + (floats ? 6 : 0));
+  joints_.to_model(state.torque_Nm(), tau_.data() + (floats ? 6 : 0));
+  observer_->update(q_.data(), v_.data(), tau_.data(), wrench_.data());
+  joints_.to_image(observer_->residual().data() + (floats ? 6 : 0), image_.external_torque_Nm());
+}
+
+std::optional<CollisionWatch::Found> Estimator::collision() noexcept TANDEM_RT {
+  if (!watch_) return std::nullopt;
+  return watch_->look(image_.external_torque_Nm(), image_.collided());
+}
+
+void Estimator::archive(Archive& ar) {
+  image_.archive(ar);
+  if (base_) base_->archive(ar);
+  if (observer_) observer_->archive(ar);
+  if (watch_) watch_->archive(ar);
+}
+
+}  // namespace tandem::estimation

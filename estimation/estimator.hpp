@@ -1,0 +1,72 @@
+// All that a run estimates of its robot in a cycle. Start here to read the room.
+// Layer: estimation.  Thread: made non-RT; the rest RT.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/archive.hpp"
+#include "base/realtime.hpp"
+#include "base/result.hpp"
+#include "estimation/base_estimator.hpp"
+#include "estimation/collision.hpp"
+#include "estimation/config.hpp"
+#include "estimation/momentum_observer.hpp"
+#include "estimation/robot_model.hpp"
+#include "hal/estimate.hpp"
+
+namespace tandem::estimation {
+
+/// Base, then external torques, then collisions, from one state image:
+///
+///   estimator.update(state);          // every cycle, after the robot was read
+///   estimator.image();                // what controllers, log, DDS and report see
+///   estimator.collision();            // while controllers run
+///
+/// No clock, no heap after make(); archived. On a floating base the observer takes the base from
+/// the estimate and the ground from the feet's sensors, so that what is left is neither, and runs
+/// from where the estimate starts.
+class Estimator {
+ public:
+  /// @param kernels  outlive it
+  /// Errors, with the key's table and what to do: BaseEstimator::make()'s, ModelJoints::make()'s;
+  /// an observer on a floating base without [estimation.base]; collisions without an observer; a
+  /// joint that the robot lacks.
+  [[nodiscard]] static Result<std::unique_ptr<Estimator>> make(const hal::Robot& robot,
+                                                               const tandem_kernels* kernels,
+                                                               const EstimationConfig& config,
+                                                               std::int64_t period_ns);
+
+  void update(const hal::StateImage& state) noexcept TANDEM_RT;
+  [[nodiscard]] const hal::EstimateImage& image() const noexcept { return image_; }
+
+  /// A joint that has just been found in collision. Call in cycles in which the robot is under
+  /// control: one that lies feels the ground.
+  [[nodiscard]] std::optional<CollisionWatch::Found> collision() noexcept TANDEM_RT;
+  [[nodiscard]] hal::StopCategory reaction() const noexcept { return reaction_; }
+  [[nodiscard]] double threshold_Nm(std::size_t joint) const noexcept {
+    return watch_->threshold_Nm(joint);
+  }
+  /// Null without [estimation.base].
+  [[nodiscard]] const BaseEstimator* base() const noexcept { return base_ ? &*base_ : nullptr; }
+
+  void archive(Archive& ar);
+
+ private:
+  Estimator(const tandem_kernels& kernels, const ModelJoints& joints,
+            const hal::EstimateShape& shape);
+  void observe(const hal::StateImage& state) noexcept;
+
+  const tandem_kernels* kernels_;
+  ModelJoints joints_;
+  hal::EstimateImage image_;
+  std::optional<BaseEstimator> base_;
+  std::optional<MomentumObserver> observer_;
+  std::optional<CollisionWatch> watch_;
+  hal::StopCategory reaction_ = hal::StopCategory::kWarn;
+  std::vector<double> q_, v_, tau_, wrench_;
+};
+
+}  // namespace tandem::estimation

@@ -1,0 +1,69 @@
+#include "runtime/estimation_options.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using estimation::BaseConfig;
+using estimation::CollisionConfig;
+using estimation::ObserverConfig;
+
+BaseConfig read_base(TomlTable table) {
+  BaseConfig base;
+  base.imu = table.text_or("imu", {});
+  const auto positive = [&](const char* key, double& value, double most) {
+    value = table.number_or(key, value, {1e-9, most});
+  };
+  positive("gyro_noise_rad_s", base.gyro_noise_rad_s, 1.0);
+  positive("accelerometer_noise_m_s2", base.accelerometer_noise_m_s2, 10.0);
+  positive("gyro_drift_rad_s2", base.gyro_drift_rad_s2, 1.0);
+  positive("accelerometer_drift_m_s3", base.accelerometer_drift_m_s3, 10.0);
+  positive("gyro_bias_rad_s", base.gyro_bias_rad_s, 1.0);
+  positive("accelerometer_bias_m_s2", base.accelerometer_bias_m_s2, 10.0);
+  positive("foot_noise_m", base.foot_noise_m, 0.1);
+  positive("foot_slip_m_s", base.foot_slip_m_s, 10.0);
+  if (table.has("contact_force_N")) positive("contact_force_N", base.contact_force_N, 1e5);
+  base.rest_s = table.number_or("rest_s", base.rest_s, {0.01, 60.0});
+  table.finish();
+  return base;
+}
+
+ObserverConfig read_observer(TomlTable table) {
+  ObserverConfig observer;
+  observer.bandwidth_Hz = table.number_or("bandwidth_Hz", observer.bandwidth_Hz, {0.1, 1000.0});
+  table.finish();
+  return observer;
+}
+
+CollisionConfig read_collision(TomlTable table, const hal::RobotConfig& robot) {
+  CollisionConfig collision;
+  const std::string reaction =
+      table.choice_or("reaction", "warn", {"warn", "hold", "zero_torque", "retract"});
+  if (reaction == "hold") collision.reaction = hal::StopCategory::kHold;
+  if (reaction == "zero_torque") collision.reaction = hal::StopCategory::kCategory0;
+  if (reaction == "retract") collision.reaction = hal::StopCategory::kCategory2;
+  TomlTable limits = table.table("threshold_Nm");
+  for (const hal::JointConfig& joint : robot.joints) {
+    if (!limits.has(joint.name)) continue;
+    collision.thresholds.push_back({joint.name, limits.number(joint.name, {1e-3, 1e5})});
+  }
+  limits.finish();  // a joint that the robot lacks is an unknown key
+  if (table.has("threshold_Nm") && collision.thresholds.empty()) {
+    table.error("threshold_Nm", "no joint has a threshold, so nothing is watched",
+                "take what `tandem log thresholds` prints of free motion");
+  }
+  table.finish();
+  return collision;
+}
+
+}  // namespace
+
+estimation::EstimationConfig read_estimation(TomlTable table, const hal::RobotConfig& robot) {
+  estimation::EstimationConfig config;
+  if (table.has("base")) config.base = read_base(table.table("base"));
+  if (table.has("observer")) config.observer = read_observer(table.table("observer"));
+  if (table.has("collision")) config.collision = read_collision(table.table("collision"), robot);
+  table.finish();
+  return config;
+}
+
+}  // namespace tandem::runtime

@@ -1,0 +1,17 @@
+// [estimation] of an experiment, read strictly.
+// Layer: runtime.  Thread: non-RT only.
+#pragma once
+
+#include "base/toml_reader.hpp"
+#include "estimation/config.hpp"
+#include "hal/config/robot_config.hpp"
+
+namespace tandem::runtime {
+
+/// Errors go to the table's document: unknown keys, numbers out of range, a joint that the robot
+/// lacks, a collision without a threshold. What the robot has no sensor for, Estimator::make()
+/// says.
+[[nodiscard]] estimation::EstimationConfig read_estimation(TomlTable table,
+                                                           const hal::RobotConfig& robot);
+
+}  // namespace tandem::runtime

@@ -1,0 +1,76 @@
+// The rows of docs/faults.md about collisions: an arm that reaches, and COMAN in its squat.
+#include "tests/runtime/estimated_run.hpp"
+#include "tests/runtime/fault_row.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using namespace test;
+
+/// A push from 3 s after the drives are enabled, and how the run reacts.
+struct PushedRun : EstimatedRun {
+  PushedRun(const char* robot, const char* file, const char* joint, std::array<double, 3> force_N,
+            double for_s, hal::StopCategory reaction)
+      : EstimatedRun(robot, file, options(robot, reaction)) {
+    const auto push = push_on(experiment->robot, joint, force_N, 3.0, for_s);
+    EXPECT_EQ(backend->robot().inject(push), Code::kOk);
+  }
+  static Options options(const std::string& robot, hal::StopCategory reaction) {
+    estimation::EstimationConfig config = for_legs();
+    if (robot != "coman") config.base.reset();
+    config.collision.emplace();
+    config.collision->reaction = reaction;
+    auto loaded = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot +
+                                  (robot == "coman" ? "/squat.toml" : "/trajectory.toml"));
+    for (const hal::JointConfig& one : loaded->robot.joints)
+      config.collision->thresholds.push_back({one.name, 4.0});
+    return {.noise = false, .estimation = config, .cycle = {.after_stop = AfterStop::kWait}};
+  }
+  Outcome watch() {
+    run_to(RunPhase::kRunning);
+    while (backend->robot().faults()[0].active == 0 && cycle->step()) {
+    }
+    EXPECT_TRUE(cycle->faults().empty()) << cycle->faults()[0].text;
+    Outcome found;
+    for (int i = 1; i <= 4000 && found.open < 0; ++i) {
+      if (found.noticed < 0 && !cycle->faults().empty()) found.noticed = i;
+      if (found.safe < 0 && backend->robot().safe()) found.safe = i;
+      if (found.safe >= 0 && backend->robot().powerless()) found.open = i;
+      cycle->step();
+    }
+    return found;
+  }
+};
+
+TEST(FaultRow, CollisionWarns) {
+  PushedRun run("ur5e", "trajectory", "elbow_joint", {0.0, 50.0, -50.0}, 5.0,
+                hal::StopCategory::kWarn);
+  expect_row(run.watch());
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kRunning) << "the robot goes on";
+  EXPECT_NE(run.cycle->faults()[0].text.find("collision: an external torque of"),
+            std::string::npos);
+  EXPECT_FALSE(run.cycle->faults()[0].joint.empty());
+}
+
+TEST(FaultRow, CollisionHolds) {
+  PushedRun run("ur5e", "trajectory", "elbow_joint", {0.0, 50.0, -50.0}, 5.0,
+                hal::StopCategory::kHold);
+  expect_row(run.watch());
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+}
+
+TEST(FaultRow, CollisionTakesTheTorqueAway) {
+  PushedRun run("ur5e", "trajectory", "elbow_joint", {0.0, 50.0, -50.0}, 5.0,
+                hal::StopCategory::kCategory0);
+  expect_row(run.watch());
+}
+
+TEST(FaultRow, CollisionOfComanRetracts) {
+  PushedRun run("coman", "squat", "LElbj", {30.0, 0.0, -40.0}, 0.1, hal::StopCategory::kCategory2);
+  expect_row(run.watch());
+  for (const runtime::Fault& fault : run.cycle->faults())
+    EXPECT_NE(fault.text.find("collision"), std::string::npos) << fault.text << ": it did not fall";
+}
+
+}  // namespace
+}  // namespace tandem::runtime
