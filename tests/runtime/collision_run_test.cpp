@@ -140,8 +140,9 @@ std::vector<int> detect(const Subject& s, std::size_t place, double force_N, std
 }
 
 TEST_P(Collision, IsFoundSoonAndNotWithoutOne) {
-  const Subject& s = subject(GetParam());
+  Subject s = subject(GetParam());
   const char* text = std::getenv("TANDEM_COLLISION_SEEDS");
+  if (text == nullptr) s.free_s = std::min(s.free_s, 9.5);
   const int seeds = text == nullptr ? 1 : std::atoi(text);
   const auto largest = blocks_of(s, 1, kBlock);
   const std::vector<double> rates =
@@ -162,6 +163,10 @@ TEST_P(Collision, IsFoundSoonAndNotWithoutOne) {
       for (int seed = 1; seed <= seeds; ++seed) {
         const auto found = detect(s, place, force, static_cast<std::uint64_t>(seed), thresholds);
         for (std::size_t r = 0; r < rates.size(); ++r) times[r].push_back(found[r]);
+      }
+      if (force >= 50.0) {  // of seeded directions: those of seed 1 do not pass through the axes
+        const int first = times[rates.size() == 1 ? 0 : 1].front();
+        EXPECT_TRUE(first > 0 && first <= 20) << s.places[place].first << ": " << first << " ms";
       }
       std::printf("%-6s %-20s %5.0f N", s.robot, s.places[place].first, force);
       for (std::size_t r = 0; r < rates.size(); ++r) {
