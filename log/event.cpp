@@ -40,6 +40,7 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kMotionStopped: return "motion stopped";
     case EventKind::kRecoveryRequested: return "recovery requested";
     case EventKind::kCollision: return "fault: collision";
+    case EventKind::kGap: return "gap in the recording";
   }
   return "?";
 }
@@ -86,6 +87,7 @@ std::string target_text(const Event& event) {
 std::string text_of(const Event& event, bool has_joint) {
   switch (event.kind) {
     case EventKind::kOverrun: return ": " + std::to_string(event.code) + " cycles skipped";
+    case EventKind::kGap: return ": " + std::to_string(event.code) + " cycles missing";
     case EventKind::kSensorLost:
     case EventKind::kFeedbackLost: return " for " + std::to_string(event.code) + " cycles";
     case EventKind::kInjected:

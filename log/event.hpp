@@ -42,6 +42,7 @@ enum class EventKind : std::uint8_t {
   kMotionStopped,        ///< on request: a joint brakes
   kRecoveryRequested,    ///< on request: a joint goes back to its limits
   kCollision,            ///< a fault: something pushes a joint; `code`: its torque [mNm or mN]
+  kGap,                  ///< of an imported log: `code` cycles are missing before this one
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.

@@ -103,7 +103,12 @@ Status McapReader::read_record() {
   if (!*file_) return damaged("reading failed");
   const auto opcode = static_cast<Opcode>(head[0]);
   if (opcode == Opcode::kChunk) return open_chunk(record_);
-  return take(opcode, record_);
+  if (opcode != Opcode::kMessage) return take(opcode, record_);
+  // A file without chunks: next_in_chunk() finds the message as one of its own.
+  chunk_.assign(head.begin(), head.end());
+  append(chunk_, std::span<const std::byte>(record_));
+  chunk_at_ = 0;
+  return {};
 }
 
 Status McapReader::take(Opcode opcode, std::span<const std::byte> content) {

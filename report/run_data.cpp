@@ -197,10 +197,12 @@ Status read_state(const log::LogFile& file, Window& window, RunData& run) {
 /// References of the joints that the command puts under position control, by the state's times.
 Status read_command(const log::LogFile& file, RunData& run) {
   const std::size_t n = run.robot.joints.size();
-  auto table = read_columns(file, kCommand, {{"position_rad", n}, {"mode", n}});
-  if (!table) return std::unexpected(table.error());
   const double gap = std::numeric_limits<double>::quiet_NaN();
   run.reference_rad.assign(n, std::vector<double>(run.rows(), gap));
+  // A recording of another program may have no references.
+  if (run.info.hal == "import" && file.find(kCommand) == nullptr) return {};
+  auto table = read_columns(file, kCommand, {{"position_rad", n}, {"mode", n}});
+  if (!table) return std::unexpected(table.error());
   constexpr auto kPosition = static_cast<double>(hal::ControlMode::kPosition);
   std::size_t c = 0;
   for (std::size_t row = 0; row < run.rows(); ++row) {

@@ -105,6 +105,13 @@ const char kLogThresholdsExamples[] = R"(Examples:
   tandem log thresholds runs/panda.mcap --per-hour 0.1 --from 5 >> my_experiment.toml
 The log is of free motion with [estimation.observer], at least 8 s of it. What was not moved there
 is not known: docs/estimation.md.)";
+const char kLogImportExamples[] = R"(Examples:
+  tandem log import q.csv --robot config/ur5e/robot.toml --map ur5e_csv.toml
+  tandem log import bag_0.mcap bag_1.mcap --robot my_robot/robot.toml --map bag.toml -o runs/a.mcap
+The map says what columns or topics mean: units, times, joints, gaps (docs/import.md). What it does
+not say is asked for.
+
+Exit status: 0 done; 2 a file, a map or a robot that is wrong; then there is no log.)";
 
 const char kEdsExamples[] = R"(Examples:
   tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
@@ -460,6 +467,17 @@ void add_flags(CLI::App& app, LogOptions& o) {
   thresholds->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   thresholds->footer(kLogThresholdsExamples);
   thresholds->callback([&o] { o.action = LogOptions::Action::kThresholds; });
+  CLI::App* taken =
+      app.add_subcommand("import", "A recording of another program (CSV, ROS 2 bag) as a log");
+  taken->add_option("files", o.files, "CSV tables side by side, or MCAP bags one after another")
+      ->required();
+  taken->add_option("--robot", o.robot, "The robot that was recorded: its TOML")->required();
+  taken->add_option("--map", o.map, "TOML that says what columns or topics mean")->required();
+  taken->add_option("-o,--output", o.output, "Log to write (default: runs/ROBOT-FILE.mcap)")
+      ->check(is_given(kNameAFile));
+  taken->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  taken->footer(kLogImportExamples);
+  taken->callback([&o] { o.action = LogOptions::Action::kImport; });
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {

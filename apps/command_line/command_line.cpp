@@ -164,7 +164,7 @@ Command parse_command_line(int argc, const char* const* argv) {
                                "The robot on the other end of CAN: boards' firmware and plant");
   commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
   commands.add<ReportOptions>("report", "Draw the plots of a log, or of two");
-  commands.add<LogOptions>("log", "Logs: info, csv, diff, thresholds");
+  commands.add<LogOptions>("log", "Logs: info, csv, diff, import, thresholds");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds",

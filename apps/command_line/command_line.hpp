@@ -182,9 +182,10 @@ struct NewOptions {
   std::string json;
 };
 
-/// tandem log info|csv|diff|thresholds LOG [LOG_B]
+/// tandem log info|csv|diff|thresholds LOG [LOG_B], tandem log import FILE...
 struct LogOptions {
-  enum class Action : std::uint8_t { kInfo, kCsv, kDiff, kThresholds } action = Action::kInfo;
+  enum class Action : std::uint8_t { kInfo, kCsv, kDiff, kImport, kThresholds } action =
+      Action::kInfo;
   double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
   double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
   std::string log;
@@ -192,7 +193,10 @@ struct LogOptions {
   std::string topic;                ///< csv: empty is the state; info: whose fields are listed
   std::vector<std::string> fields;  ///< empty: all
   std::size_t every = 1;            ///< n: each n-th message
-  std::string output;               ///< empty: standard output
+  std::string output;               ///< csv: empty is standard output; import: runs/
+  std::vector<std::string> files;   ///< import: tables or bags
+  std::string robot;                ///< import: robot.toml
+  std::string map;                  ///< import: what the columns or topics mean
   std::string json;
 };
 

@@ -188,6 +188,7 @@ Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
 }  // namespace
 
 Exit log_command(const LogOptions& options) {
+  if (options.action == LogOptions::Action::kImport) return log_import_command(options);
   const Result<log::LogFile> file = log::LogFile::open(options.log);
   Status done;
   Exit exit = Exit::kDone;

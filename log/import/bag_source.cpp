@@ -1,0 +1,386 @@
+// Messages of ROS 2, decoded by their published definitions: a series for each joint and sensor.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "base/nearest.hpp"
+#include "dds/cdr.hpp"
+#include "log/import/sources.hpp"
+#include "log/mcap_reader.hpp"
+
+namespace tandem::log {
+namespace {
+
+constexpr char kJointState[] = "sensor_msgs/msg/JointState";
+constexpr char kImu[] = "sensor_msgs/msg/Imu";
+constexpr char kWrench[] = "geometry_msgs/msg/WrenchStamped";
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// The member at "header.stamp.sec". @pre the definition has it
+const dds::Value& member(const dds::Value& message, std::initializer_list<std::string_view> path) {
+  const dds::Value* at = &message;
+  for (const std::string_view name : path) at = dds::find(*at, name);
+  return *at;
+}
+
+double number(const dds::Value& message, std::initializer_list<std::string_view> path) {
+  return std::get<double>(member(message, path).of);
+}
+
+const std::string& text(const dds::Value& message, std::initializer_list<std::string_view> path) {
+  return std::get<std::string>(member(message, path).of);
+}
+
+/// x, y, z of a vector.
+std::array<double, 3> vector3(const dds::Value& message,
+                              std::initializer_list<std::string_view> path) {
+  const dds::Value& at = member(message, path);
+  return {number(at, {"x"}), number(at, {"y"}), number(at, {"z"})};
+}
+
+std::int64_t header_ns(const dds::Value& message) {
+  const dds::Value& stamp = member(message, {"header", "stamp"});
+  const auto seconds = std::get<std::int64_t>(member(stamp, {"sec"}).of);
+  const auto rest = std::get<std::uint64_t>(member(stamp, {"nanosec"}).of);
+  return seconds * 1'000'000'000 + static_cast<std::int64_t>(rest);
+}
+
+class BagSource {
+ public:
+  BagSource(std::span<const std::string> paths, const ImportMap& map, const hal::RobotConfig& robot)
+      : paths_(paths),
+        map_(map),
+        robot_(robot),
+        joints_(robot.joints.size()),
+        sensors_(map.sensors.size()) {}
+
+  Result<Recording> read() {
+    for (const std::string& path : paths_) {
+      path_ = path;
+      if (Status done = read_file(); !done) return std::unexpected(done.error());
+    }
+    if (Status done = check_topics(); !done) return std::unexpected(done.error());
+    if (Status done = check_stamps(); !done) return std::unexpected(done.error());
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      const SensorMap& sensor = map_.sensors[s];
+      if (sensors_[s].rows() == 0) {
+        return std::unexpected(Error{"the recording has no topic '" + sensor.topic + "'",
+                                     suggest(sensor.topic, topics_), map_.file, sensor.line,
+                                     sensor.key + ".topic"});
+      }
+    }
+    if (Status done = check_joints(); !done) return std::unexpected(done.error());
+    for (Series& series : joints_) {
+      if (series.rows() > 0) recording_.series.push_back(std::move(series));
+    }
+    for (Series& series : sensors_) recording_.series.push_back(std::move(series));
+    for (Series& series : recording_.series) {
+      if (Status done = drop_invalid(series); !done) return std::unexpected(done.error());
+    }
+    return std::move(recording_);
+  }
+
+ private:
+  std::unexpected<Error> refuse(std::string message, std::string hint, std::string key = {}) const {
+    return std::unexpected(Error{std::move(message), std::move(hint), path_, 0, std::move(key)});
+  }
+
+  Status read_file() {
+    auto reader = McapReader::open(path_);
+    if (!reader) return std::unexpected(reader.error());
+    for (;;) {
+      auto message = reader->next();
+      if (!message) return std::unexpected(message.error());
+      if (!message->has_value()) break;
+      const ChannelRecord& channel = reader->channels().at((*message)->channel);
+      const auto schema = reader->schemas().find(channel.schema_id);
+      const std::string type = schema == reader->schemas().end() ? "" : schema->second.name;
+      if (Status taken = take(channel, type, **message); !taken) return taken;
+    }
+    if (!reader->truncated()) return {};
+    return refuse("the file is cut after " + std::to_string(reader->bytes()) + " bytes",
+                  "copy it again, or mend it: mcap recover");
+  }
+
+  Status take(const ChannelRecord& channel, const std::string& type, const MessageView& message) {
+    constexpr std::int64_t kLatest_ns = 4'000'000'000'000'000'000;
+    if (message.time_ns < 0 || message.time_ns > kLatest_ns) {
+      return refuse("a message was logged after the year 2096", "the file is damaged");
+    }
+    if (std::ranges::find(topics_, channel.topic) == topics_.end()) {
+      topics_.push_back(channel.topic);
+    }
+    ++number_[channel.topic];
+    for (std::size_t s = 0; s < sensors_.size(); ++s) {
+      if (map_.sensors[s].topic == channel.topic) return take_sensor(s, channel, type, message);
+    }
+    const bool named = channel.topic == map_.joint_topic;
+    if (!named && (!map_.joint_topic.empty() || type != kJointState)) return {};
+    if (joint_topic_.empty()) joint_topic_ = channel.topic;
+    if (joint_topic_ != channel.topic) {
+      return refuse(
+          "has several topics of joint states: '" + joint_topic_ + "' and '" + channel.topic + "'",
+          "name one: [bag] joint_states = \"" + joint_topic_ + "\"", "bag.joint_states");
+    }
+    const auto value = decoded(channel, type, kJointState, message);
+    if (!value) return std::unexpected(value.error());
+    return take_joints(channel.topic, *value, message.time_ns);
+  }
+
+  Result<dds::Value> decoded(const ChannelRecord& channel, const std::string& type,
+                             const char* wanted, const MessageView& message) const {
+    if (type != wanted || channel.message_encoding != "cdr") {
+      return refuse("the topic '" + channel.topic + "' has messages of " +
+                        (type.empty() ? "no type" : type) + ", encoding '" +
+                        channel.message_encoding + "'",
+                    std::string("it must be ") + wanted + " in cdr");
+    }
+    auto value = dds::decode(*dds::find_definition(wanted), message.data);
+    if (value) return value;
+    return refuse(where(channel.topic) + ": " + value.error().message,
+                  "the file is damaged, or its messages are not what its schema says");
+  }
+
+  std::string where(const std::string& topic) const {
+    return "message " + std::to_string(number_.at(topic)) + " of " + topic;
+  }
+
+  std::int64_t time_of(const dds::Value& message, std::int64_t log_ns) {
+    const std::int64_t stamp_ns = header_ns(message);
+    behind_ns_.push_back(log_ns - stamp_ns);
+    stamped_ = stamped_ || stamp_ns != 0;
+    return map_.stamp == "header" ? stamp_ns : log_ns;
+  }
+
+  /// The robot's joint of a name in the recording; none: it is not the robot's.
+  std::optional<std::size_t> joint_of(const std::string& name) const {
+    if (const auto found = map_.names.find(name); found != map_.names.end()) return found->second;
+    const int index = robot_.joint_index(name);
+    const bool taken = std::ranges::any_of(map_.names, [&](const auto& one) {
+      return index >= 0 && one.second == static_cast<std::size_t>(index);
+    });
+    if (index < 0 || taken) return std::nullopt;
+    return static_cast<std::size_t>(index);
+  }
+
+  Status take_joints(const std::string& topic, const dds::Value& value, std::int64_t log_ns) {
+    const std::int64_t time_ns = time_of(value, log_ns);
+    const auto list = [&](std::string_view name) -> const dds::Value::List& {
+      return std::get<dds::Value::List>(member(value, {name}).of);
+    };
+    const auto& names = list("name");
+    for (const char* field : {"position", "velocity", "effort"}) {
+      const std::size_t size = list(field).size();
+      if (size == 0 || size == names.size()) continue;
+      return refuse(where(topic) + " has " + std::to_string(names.size()) + " names and " +
+                        std::to_string(size) + " of " + field,
+                    "its publisher is at fault: leave it out of the recording");
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string& name = std::get<std::string>(names[i].of);
+      const auto joint = joint_of(name);
+      if (!joint) {
+        if (Status known = note_unknown(name); !known) return known;
+        continue;
+      }
+      const auto of = [&](const char* field) {
+        return list(field).empty() ? kNone : std::get<double>(list(field)[i].of);
+      };
+      add_joint(*joint, time_ns, {of("position"), of("velocity"), of("effort")}, topic);
+    }
+    return {};
+  }
+
+  Status note_unknown(const std::string& name) {
+    auto& ignored = recording_.excluded.ignored;
+    if (std::ranges::find(ignored, name) != ignored.end()) return {};
+    const auto listed = [&](const char* one) {
+      return std::ranges::find(map_.ignore, one) != map_.ignore.end();
+    };
+    ignored.push_back(name);
+    if (listed("*") || listed(name.c_str())) return {};
+    std::vector<std::string> known;
+    for (const hal::JointConfig& joint : robot_.joints) known.push_back(joint.name);
+    return refuse("the recording's joint '" + name + "' is none of the robot's",
+                  "say whose it is in [bag.names], or name it in `ignore`; " + suggest(name, known),
+                  name);
+  }
+
+  void add_joint(std::size_t joint, std::int64_t time_ns, std::array<double, 3> values,
+                 const std::string& topic) {
+    Series& series = joints_[joint];
+    if (series.columns.empty()) {
+      const std::string& name = robot_.joints[joint].name;
+      series.name = "joint " + name;
+      series.joints = {joint};
+      for (const SignalMap& signal : map_.signals) {
+        series.columns.push_back(
+            {topic + " " + name + " " + signal.key, path_, {false, signal.field, joint}, {}});
+      }
+    }
+    const auto place = std::ranges::find(map_.joints, joint) - map_.joints.begin();
+    series.time_ns.push_back(time_ns);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const SignalMap& signal = map_.signals[i];  // position, velocity, torque
+      const auto p = static_cast<std::size_t>(place);
+      const bool mapped = p < signal.scale.size();
+      series.columns[i].values.push_back(mapped ? signal.scale[p] * values[i] + signal.offset[p]
+                                                : values[i]);
+    }
+  }
+
+  Status take_sensor(std::size_t index, const ChannelRecord& channel, const std::string& type,
+                     const MessageView& message) {
+    const SensorMap& sensor = map_.sensors[index];
+    const hal::SensorConfig& config = robot_.sensors[sensor.sensor];
+    const bool imu = config.type == hal::SensorType::kImu;
+    const auto value = decoded(channel, type, imu ? kImu : kWrench, message);
+    if (!value) return std::unexpected(value.error());
+    const std::string& frame = text(*value, {"header", "frame_id"});
+    if (!frame.empty() && frame != config.link && frame != sensor.frame) {
+      return std::unexpected(
+          Error{"the messages of " + channel.topic + " are in the frame '" + frame +
+                    "', the robot's sensor is in that of '" + config.link + "'",
+                "say frame = \"" + frame + "\" when the two have the same origin and axes",
+                map_.file, sensor.line, sensor.key + ".frame"});
+    }
+    Series& series = sensors_[index];
+    if (series.columns.empty()) start_sensor(series, sensor, channel.topic);
+    series.time_ns.push_back(time_of(*value, message.time_ns));
+    const std::vector<double> channels = imu ? imu_channels(*value) : wrench_channels(*value);
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      series.columns[c].values.push_back(sensor.scale[c] * channels[c]);
+    }
+    return {};
+  }
+
+  void start_sensor(Series& series, const SensorMap& sensor, const std::string& topic) const {
+    const hal::SensorConfig& config = robot_.sensors[sensor.sensor];
+    std::size_t first = 0;
+    for (std::size_t s = 0; s < sensor.sensor; ++s) first += robot_.sensors[s].channels();
+    series.name = "sensor " + config.name;
+    series.sensors = {sensor.sensor};
+    if (config.type == hal::SensorType::kImu) series.quaternions = {0};
+    for (std::size_t c = 0; c < config.channels(); ++c) {
+      series.columns.push_back(
+          {topic + " channel " + std::to_string(c), path_, {false, "sensor", first + c}, {}});
+    }
+  }
+
+  static std::vector<double> imu_channels(const dds::Value& value) {
+    const auto rate = vector3(value, {"angular_velocity"});
+    const auto force = vector3(value, {"linear_acceleration"});
+    std::array<double, 4> q{};
+    const auto& covariance =
+        std::get<dds::Value::List>(member(value, {"orientation_covariance"}).of);
+    if (std::get<double>(covariance[0].of) != -1.0) {
+      const dds::Value& o = member(value, {"orientation"});
+      q = {number(o, {"x"}), number(o, {"y"}), number(o, {"z"}), number(o, {"w"})};
+    }
+    return {q[0], q[1], q[2], q[3], rate[0], rate[1], rate[2], force[0], force[1], force[2]};
+  }
+
+  static std::vector<double> wrench_channels(const dds::Value& value) {
+    const auto force = vector3(value, {"wrench", "force"});
+    const auto moment = vector3(value, {"wrench", "torque"});
+    return {force[0], force[1], force[2], moment[0], moment[1], moment[2]};
+  }
+
+  Status check_topics() {
+    const bool any = std::ranges::any_of(joints_, [](const Series& s) { return s.rows() > 0; });
+    if (any) return {};
+    if (!map_.joint_topic.empty()) {
+      return refuse("has no topic '" + map_.joint_topic + "', or none of the robot's joints in it",
+                    suggest(map_.joint_topic, topics_), "bag.joint_states");
+    }
+    return refuse("has no joint states of this robot",
+                  "record a topic of sensor_msgs/JointState, such as /joint_states");
+  }
+
+  Status check_stamps() {
+    std::ranges::sort(behind_ns_);
+    const auto ms = [&](double share) {
+      const auto at = static_cast<std::size_t>(share * static_cast<double>(behind_ns_.size() - 1));
+      return std::to_string(static_cast<double>(behind_ns_[at]) * 1e-6) + " ms";
+    };
+    if (map_.stamp.empty()) {
+      return std::unexpected(Error{
+          "which time is a sample's: its header's stamp, or when it was logged? It was logged " +
+              ms(0.0) + " to " + ms(1.0) + " after its stamp, " + ms(0.5) + " on the median",
+          "say [bag] stamp = \"header\" or \"log\"", map_.file, 0, "bag.stamp"});
+    }
+    if (map_.stamp == "header" && !stamped_) {
+      return refuse("the headers' stamps are all 0", "say [bag] stamp = \"log\"", "bag.stamp");
+    }
+    return {};
+  }
+
+  Status check_joints() {
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      const std::string& name = robot_.joints[j].name;
+      const bool missing = map_.missing.contains(j);
+      if (missing == (joints_[j].rows() == 0)) continue;
+      if (missing) {
+        return std::unexpected(Error{"the recording has the joint '" + name + "'",
+                                     "remove it there", map_.file, 0, "missing_joints"});
+      }
+      return refuse("lacks the robot's joint '" + name + "'",
+                    "say which of the recording's it is in [bag.names], or where it is: "
+                    "[missing_joints] " +
+                        name + " = 0.0",
+                    name);
+    }
+    return {};
+  }
+
+  /// Columns without any number are absent (an interface that the robot does not have); rows with a
+  /// hole in the others are errors, or left out.
+  Status drop_invalid(Series& series) {
+    std::erase_if(series.columns, [](const ImportedColumn& column) {
+      return column.target.field != "sensor" && column.target.field != "position_rad" &&
+             std::ranges::all_of(column.values, [](double one) { return std::isnan(one); });
+    });
+    std::vector<std::size_t> kept;
+    for (std::size_t row = 0; row < series.rows(); ++row) {
+      const auto hole = std::ranges::find_if(series.columns, [row](const ImportedColumn& column) {
+        return !std::isfinite(column.values[row]);
+      });
+      if (hole == series.columns.end()) {
+        kept.push_back(row);
+        continue;
+      }
+      if (!map_.excludes(Trouble::kInvalid)) {
+        return refuse("sample " + std::to_string(row + 1) + " of " + hole->name + " is not finite",
+                      "leave such samples out by exclude = [\"invalid\"]", series.name);
+      }
+      ++recording_.excluded.invalid;
+    }
+    keep_rows(series, kept);
+    return {};
+  }
+
+  std::span<const std::string> paths_;
+  const ImportMap& map_;
+  const hal::RobotConfig& robot_;
+  std::string path_;  // being read
+  std::vector<Series> joints_, sensors_;
+  std::vector<std::string> topics_;
+  std::string joint_topic_;                      // taken so far
+  std::map<std::string, std::uint64_t> number_;  // messages of each topic so far
+  std::vector<std::int64_t> behind_ns_;          // log time minus stamp
+  bool stamped_ = false;
+  Recording recording_;
+};
+
+}  // namespace
+
+Result<Recording> read_bag_recording(std::span<const std::string> paths, const ImportMap& map,
+                                     const hal::RobotConfig& robot) {
+  return BagSource(paths, map, robot).read();
+}
+
+}  // namespace tandem::log

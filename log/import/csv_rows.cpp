@@ -1,0 +1,135 @@
+#include "log/import/csv_rows.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace tandem::log {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r";
+
+std::string_view bare(std::string_view cell) {
+  const auto begin = cell.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  cell = cell.substr(begin, cell.find_last_not_of(kBlanks) - begin + 1);
+  const bool quoted = cell.size() >= 2 && cell.front() == '"' && cell.back() == '"';
+  return quoted ? cell.substr(1, cell.size() - 2) : cell;
+}
+
+/// The whole text as a number, whatever the locale is.
+template <class T>
+std::optional<T> whole_number(std::string_view digits) {
+  if (digits.starts_with('+')) digits.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error == std::errc::result_out_of_range) return std::numeric_limits<T>::quiet_NaN();
+  if (error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+Result<CsvRows> CsvRows::open(std::string_view text, const std::string& file,
+                              const CsvFormat& format) {
+  CsvRows rows;
+  rows.format_ = format;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  rows.rest_ = text;
+  const auto refuse = [&](std::string message, std::string hint) {
+    return std::unexpected(Error{std::move(message), std::move(hint), file, rows.line_, {}});
+  };
+  for (int i = 0; i < format.skip_lines; ++i) {
+    const auto end = rows.rest_.find('\n');
+    rows.rest_.remove_prefix(
+        std::min(end == std::string_view::npos ? end : end + 1, rows.rest_.size()));
+    ++rows.line_;
+  }
+  if (!rows.next_line()) return refuse("has no rows", "is this the whole file?");
+  rows.split(rows.text_line_);
+  if (!rows.cells_.empty() && rows.cells_.back().empty()) rows.cells_.pop_back();
+  for (std::size_t i = 0; i < rows.cells_.size(); ++i) {
+    std::string name = format.header ? std::string(rows.cells_[i]) : "c" + std::to_string(i + 1);
+    if (name.empty()) {
+      return refuse("column " + std::to_string(i + 1) + " of the header has no name",
+                    "say [csv] header = false when the file has none, or skip_lines");
+    }
+    if (std::ranges::find(rows.names_, name) != rows.names_.end()) {
+      return refuse("the header has two columns '" + name + "'",
+                    "say [csv] header = false when the file has none, or rename one");
+    }
+    rows.names_.push_back(std::move(name));
+  }
+  rows.pending_ = !format.header;
+  return rows;
+}
+
+bool CsvRows::next_line() {
+  while (!rest_.empty()) {
+    const auto end = std::min(rest_.find('\n'), rest_.size());
+    text_line_ = rest_.substr(0, end);
+    rest_.remove_prefix(std::min(end + 1, rest_.size()));
+    ++line_;
+    const auto first = text_line_.find_first_not_of(kBlanks);
+    if (first == std::string_view::npos) continue;
+    if (format_.comment != '\0' && text_line_[first] == format_.comment) continue;
+    return true;
+  }
+  return false;
+}
+
+void CsvRows::split(std::string_view line) {
+  cells_.clear();
+  if (format_.delimiter == ' ') {
+    for (auto at = line.find_first_not_of(kBlanks); at != std::string_view::npos;
+         at = line.find_first_not_of(kBlanks, at)) {
+      const auto end = std::min(line.find_first_of(kBlanks, at), line.size());
+      cells_.push_back(bare(line.substr(at, end - at)));
+      at = end;
+    }
+    return;
+  }
+  bool quoted = false;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') quoted = !quoted;
+    if (line[i] != format_.delimiter || quoted) continue;
+    cells_.push_back(bare(line.substr(begin, i - begin)));
+    begin = i + 1;
+  }
+  cells_.push_back(bare(line.substr(begin)));
+}
+
+bool CsvRows::next() {
+  if (std::exchange(pending_, false)) return true;
+  if (!next_line()) return false;
+  split(text_line_);
+  if (cells_.size() == names_.size() + 1 && cells_.back().empty()) cells_.pop_back();
+  return true;
+}
+
+std::string CsvRows::digits_of(std::size_t column) const {
+  std::string digits(cells_[column]);
+  if (format_.decimal_comma) std::ranges::replace(digits, ',', '.');
+  return digits;
+}
+
+std::optional<double> CsvRows::number(std::size_t column) const {
+  if (cells_[column].empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto value = whole_number<double>(digits_of(column));
+  if (value && !std::isfinite(*value)) return std::numeric_limits<double>::quiet_NaN();
+  return value;
+}
+
+std::optional<std::int64_t> CsvRows::time_ns(std::size_t column, std::int64_t unit_ns) const {
+  const auto value = whole_number<long double>(digits_of(column));
+  constexpr long double kMost = 9.2e18L;
+  if (!value) return std::nullopt;
+  const long double ns = *value * static_cast<long double>(unit_ns);
+  if (!(std::abs(ns) < kMost)) return std::nullopt;
+  return std::llround(ns);
+}
+
+}  // namespace tandem::log

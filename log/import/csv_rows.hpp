@@ -1,0 +1,53 @@
+// A table of text, row by row: comma-separated values and their relatives.
+// Layer: log/import.  Thread: one at a time, non-RT.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.hpp"
+#include "log/import/import_map.hpp"
+
+namespace tandem::log {
+
+/// Reads the lines of a text in order. A byte order mark, CRLF and quotes about a cell are
+/// tolerated; a delimiter at the end of every line as well.
+class CsvRows {
+ public:
+  /// Reads up to the first row. The text outlives this.
+  /// @param file  names it in errors
+  /// Errors: no row at all; a column without a name, or two of one name.
+  [[nodiscard]] static Result<CsvRows> open(std::string_view text, const std::string& file,
+                                            const CsvFormat& format);
+
+  /// Of the columns: the header's, or c1, c2, …
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+  /// The next row's cells, without blanks and quotes; false at the end.
+  [[nodiscard]] bool next();
+  /// As many as there are names, unless the row is ragged.
+  [[nodiscard]] std::span<const std::string_view> cells() const { return cells_; }
+  /// Of the row in the file, from 1.
+  [[nodiscard]] int line() const { return line_; }
+  /// A cell's number; NaN for an empty cell, nan and inf; none: it is no number.
+  [[nodiscard]] std::optional<double> number(std::size_t column) const;
+  /// A time in units of `unit_ns`, rounded to a nanosecond; none: no number, or beyond 292 years.
+  [[nodiscard]] std::optional<std::int64_t> time_ns(std::size_t column, std::int64_t unit_ns) const;
+
+ private:
+  [[nodiscard]] bool next_line();
+  void split(std::string_view line);
+  [[nodiscard]] std::string digits_of(std::size_t column) const;
+
+  CsvFormat format_;
+  std::string_view rest_, text_line_;
+  std::vector<std::string> names_;
+  std::vector<std::string_view> cells_;
+  int line_ = 0;
+  bool pending_ = false;  // the first row has been read with the header
+};
+
+}  // namespace tandem::log

@@ -1,0 +1,204 @@
+#include "log/import/import_log.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "base/sha256.hpp"
+#include "log/import/sources.hpp"
+#include "log/mcap_format.hpp"
+#include "log/recorder.hpp"
+
+namespace tandem::log {
+namespace {
+
+constexpr std::size_t kMagicBytes = 8;
+
+Result<std::string> whole_text(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    return std::unexpected(
+        Error{"is a folder", "name the .mcap files in it, in their order", path, 0, {}});
+  }
+  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad() || !in.is_open()) {
+    return std::unexpected(
+        Error{"cannot read this file", "check the path and its permissions", path, 0, {}});
+  }
+  return text;
+}
+
+bool begins(std::string_view text, std::string_view magic) { return text.starts_with(magic); }
+
+/// What a file is by its first bytes. Errors: a kind that is known and not read.
+Result<bool> is_bag(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::array<char, 16> head{};
+  in.read(head.data(), head.size());
+  const std::string_view first(head.data(), static_cast<std::size_t>(in.gcount()));
+  const auto refuse = [&](std::string message, std::string hint) {
+    return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
+  };
+  if (begins(first, "SQLite format 3")) {
+    return refuse("is a bag in SQLite", "convert it: ros2 bag convert, storage_id: mcap");
+  }
+  if (begins(first, "#ROSBAG V")) {
+    return refuse("is a bag of ROS 1", "convert it: mcap convert");
+  }
+  if (begins(first, "\x28\xB5\x2F\xFD")) return refuse("is compressed", "decompress it: zstd -d");
+  if (begins(first, "\x1F\x8B")) return refuse("is compressed", "decompress it: gunzip");
+  const auto magic = std::as_bytes(std::span(head)).first(kMagicBytes);
+  return first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic);
+}
+
+/// "position_rad", "command torque_nm": what the recording fills, each once.
+std::vector<std::string> filled_fields(const Recording& recording) {
+  std::vector<std::string> fields;
+  for (const Series& series : recording.series) {
+    for (const ImportedColumn& column : series.columns) {
+      const std::string name = (column.target.command ? "command " : "") + column.target.field;
+      if (std::ranges::find(fields, name) == fields.end()) fields.push_back(name);
+    }
+  }
+  return fields;
+}
+
+bool has_command(const ImportMap& map) {
+  return std::ranges::any_of(map.signals, &SignalMap::command);
+}
+
+StringMap counts_of(const ImportRequest& request, const Imported& imported,
+                    const ImportSummary& summary) {
+  const Exclusions& out = summary.excluded;
+  const auto listed = [](const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+    return text;
+  };
+  return {{"imported_from", listed(request.files)},
+          {"source_sha256", imported.sha256},
+          {"source_begin_ns", std::to_string(summary.begin_ns)},
+          {"excluded_invalid", std::to_string(out.invalid)},
+          {"excluded_ragged", std::to_string(out.ragged)},
+          {"excluded_duplicates", std::to_string(out.duplicates)},
+          {"excluded_backwards", std::to_string(out.backwards)},
+          {"excluded_gaps", std::to_string(out.gaps)},
+          {"excluded_gap_cycles", std::to_string(out.gap_cycles)},
+          {"excluded_frozen", listed(out.frozen)},
+          {"ignored", listed(out.ignored)},
+          {"missing_joints", listed(summary.missing)}};
+}
+
+/// Every cycle into the log.
+void write_cycles(Sampler& sampler, const hal::RobotConfig& robot, bool command, Recorder& recorder,
+                  ImportSummary& summary) {
+  hal::StateImage state(robot.shape());
+  hal::CommandImage sent(robot.shape());
+  const Recorder::Channel states =
+      recorder.add_channel("/tandem/state", "tandem/msg/State", state.layout());
+  const Recorder::Channel commands =
+      command ? recorder.add_channel("/tandem/command", "tandem/msg/Command", sent.layout())
+              : states;
+  recorder.start();
+  std::uint64_t missing = 0;  // cycles of the gap that is going on
+  for (std::uint64_t cycle = 0; cycle < sampler.cycles(); ++cycle) {
+    if (!sampler.fill(cycle, state, sent)) {
+      ++missing;
+      continue;
+    }
+    recorder.wait_for_space(3);
+    if (missing > 0) {
+      summary.excluded.gap_cycles += missing;
+      recorder.push(Event{.cycle = cycle,
+                          .time_ns = state.time_ns()[0],
+                          .code = static_cast<std::uint32_t>(std::min<std::uint64_t>(missing, ~0U)),
+                          .kind = EventKind::kGap});
+      missing = 0;
+    }
+    recorder.push(states, state.time_ns()[0], state.bytes());
+    if (command) recorder.push(commands, state.time_ns()[0], sent.bytes());
+    ++summary.cycles;
+  }
+}
+
+}  // namespace
+
+std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request,
+                                                    const hal::RobotConfig& robot) {
+  const auto refuse = [](Error error) { return std::unexpected(Diagnostics{std::move(error)}); };
+  Imported imported;
+  std::vector<ImportFile> files;
+  Sha256 hash;
+  for (const std::string& path : request.files) {
+    auto text = whole_text(path);
+    if (!text) return refuse(text.error());
+    const Result<bool> bag = is_bag(path);
+    if (!bag) return refuse(bag.error());
+    if (!files.empty() && *bag != imported.bag) {
+      return refuse({"is a bag beside a table, or the other way round",
+                     "import them one at a time",
+                     path,
+                     0,
+                     {}});
+    }
+    imported.bag = *bag;
+    hash.update(std::as_bytes(std::span(*text)));
+    if (*bag) text->clear();
+    files.push_back({path, std::move(*text)});
+  }
+  imported.sha256 = hash.finish();
+  auto map_text = whole_text(request.map);
+  if (!map_text) return refuse(map_text.error());
+  imported.map_text = std::move(*map_text);
+  auto map = parse_import_map(imported.map_text, request.map, robot, imported.bag);
+  if (!map) return std::unexpected(map.error());
+  imported.map = std::move(*map);
+  auto recording = imported.bag ? read_bag_recording(request.files, imported.map, robot)
+                                : read_csv_recording(files, imported.map, robot);
+  if (!recording) return refuse(recording.error());
+  imported.recording = std::move(*recording);
+  if (Status s = clean(imported.recording, imported.map); !s) return refuse(s.error());
+  return imported;
+}
+
+std::expected<ImportSummary, Diagnostics> import_log(const ImportRequest& request,
+                                                     const hal::RobotConfig& robot, RunInfo info,
+                                                     const std::string& urdf) {
+  const auto refuse = [](Error error) { return std::unexpected(Diagnostics{std::move(error)}); };
+  auto imported = read_recording(request, robot);
+  if (!imported) return std::unexpected(imported.error());
+  auto sampler = Sampler::create(imported->recording, imported->map, robot);
+  if (!sampler) return refuse(sampler.error());
+  ImportSummary summary{.bag = imported->bag,
+                        .cycles = 0,
+                        .period_ns = imported->map.period_ns,
+                        .begin_ns = sampler->begin_ns(),
+                        .series = spacings(imported->recording),
+                        .excluded = imported->recording.excluded,
+                        .fields = filled_fields(imported->recording),
+                        .missing = {},
+                        .log = {}};
+  for (const auto& [joint, place] : imported->map.missing) {
+    summary.missing.push_back(robot.joints[joint].name);
+  }
+  info.period_ns = summary.period_ns;
+  info.configuration.emplace_back(request.map, imported->map_text);
+  RecorderOptions options;
+  options.writer.compression = Compression::kLz4;
+  options.viewed.urdf = urdf;
+  auto recorder = Recorder::open(request.output, info, options);
+  if (!recorder) return refuse(recorder.error());
+  write_cycles(*sampler, robot, has_command(imported->map), **recorder, summary);
+  summary.log = (*recorder)->close(counts_of(request, *imported, summary));
+  if (!summary.log.error.empty()) {
+    return refuse(
+        {summary.log.error, "free some space, or choose another folder", request.output, 0, {}});
+  }
+  return summary;
+}
+
+}  // namespace tandem::log

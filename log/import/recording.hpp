@@ -1,0 +1,64 @@
+// A recording of another program in memory, before it is put on the cycles of a log.
+// Layer: log/import.  Thread: any, non-RT.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+
+namespace tandem::log {
+
+/// Which number of an image a column becomes.
+struct Target {
+  bool command = false;   ///< of the command image; else of the state image
+  std::string field;      ///< on the wire: "position_rad", "sensor"
+  std::size_t index = 0;  ///< element: the joint's, or the channel's
+};
+
+/// One number over time. SI, link side, in the image's signs.
+struct ImportedColumn {
+  std::string name;  ///< for messages: "q1", "/joint_states elbow position"
+  std::string file;  ///< for messages
+  Target target;
+  std::vector<double> values;
+};
+
+/// Columns that were measured at the same times: those of a CSV, or of one joint or sensor in a
+/// bag.
+struct Series {
+  std::string name;                      ///< for messages: "joint elbow"
+  std::vector<std::size_t> joints;       ///< whose state they are
+  std::vector<std::size_t> sensors;      ///< the same
+  std::vector<std::int64_t> time_ns;     ///< of each row, on the recording's clock
+  std::vector<int> line;                 ///< of each row in its file; empty: rows have none
+  std::vector<ImportedColumn> columns;   ///< as long as time_ns
+  std::vector<std::size_t> quaternions;  ///< the first of four columns that are one
+
+  [[nodiscard]] std::size_t rows() const { return time_ns.size(); }
+};
+
+/// What was left out, because the map says so. Counted for the summary and the log.
+struct Exclusions {
+  std::uint64_t invalid = 0;         ///< rows with a cell that is empty or not finite
+  std::uint64_t ragged = 0;          ///< rows with too few or too many cells
+  std::uint64_t duplicates = 0;      ///< rows whose time is the row's before
+  std::uint64_t backwards = 0;       ///< rows whose time is before that of an earlier row
+  std::uint64_t gaps = 0;            ///< pauses longer than max_gap_s
+  std::uint64_t gap_cycles = 0;      ///< cycles in them, which the log lacks
+  std::vector<std::string> frozen;   ///< columns that never change
+  std::vector<std::string> ignored;  ///< columns, joints or topics that are not used
+};
+
+/// Drops all rows but these, which are in rising order.
+void keep_rows(Series& series, const std::vector<std::size_t>& rows);
+
+/// A whole recording.
+struct Recording {
+  std::vector<Series> series;
+  Exclusions excluded;
+};
+
+}  // namespace tandem::log

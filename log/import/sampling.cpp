@@ -1,0 +1,337 @@
+#include "log/import/sampling.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+namespace tandem::log {
+namespace {
+
+constexpr std::size_t kFewRows = 10;  // fewer that are equal say nothing
+constexpr std::int64_t kGapSteps = 3;
+constexpr std::uint64_t kMostCycles = 1'000'000'000;
+
+std::string in_seconds(std::int64_t ns) {
+  std::string text = std::to_string(static_cast<double>(ns) * 1e-9);
+  return text + " s";
+}
+
+/// What is wrong with a row, with its place.
+Error row_error(const Series& series, std::size_t row, std::string message, std::string hint) {
+  Error error{std::move(message), std::move(hint), series.columns.front().file, 0, series.name};
+  if (row < series.line.size()) {
+    error.line = series.line[row];
+  } else {
+    error.message = "sample " + std::to_string(row + 1) + ": " + error.message;
+  }
+  return error;
+}
+
+/// Rows whose time is after that of every row before them.
+Status check_order(Series& series, const ImportMap& map, Exclusions& excluded) {
+  std::vector<std::size_t> kept;
+  for (std::size_t row = 0; row < series.rows(); ++row) {
+    const std::int64_t time = series.time_ns[row];
+    const std::int64_t last = kept.empty() ? time - 1 : series.time_ns[kept.back()];
+    if (time > last) {
+      kept.push_back(row);
+      continue;
+    }
+    const bool twice = time == last;
+    if (!map.excludes(twice ? Trouble::kDuplicates : Trouble::kBackwards)) {
+      return std::unexpected(row_error(
+          series, row,
+          twice ? "this time was there before" : "time goes back by " + in_seconds(last - time),
+          twice ? "leave such rows out by exclude = [\"duplicates\"]"
+                : "is it the right time column? exclude = [\"backwards\"] leaves such rows out"));
+    }
+    ++(twice ? excluded.duplicates : excluded.backwards);
+  }
+  keep_rows(series, kept);
+  return {};
+}
+
+std::vector<std::int64_t> sorted_steps(const Series& series) {
+  std::vector<std::int64_t> steps;
+  for (std::size_t row = 1; row < series.rows(); ++row) {
+    steps.push_back(series.time_ns[row] - series.time_ns[row - 1]);
+  }
+  std::ranges::sort(steps);
+  return steps;
+}
+
+void crop(Recording& recording, const ImportMap& map) {
+  std::int64_t start = std::numeric_limits<std::int64_t>::max();
+  for (const Series& series : recording.series) {
+    if (series.rows() > 0) start = std::min(start, series.time_ns.front());
+  }
+  for (Series& series : recording.series) {
+    std::vector<std::size_t> kept;
+    for (std::size_t row = 0; row < series.rows(); ++row) {
+      const std::int64_t since = series.time_ns[row] - start;
+      if (since >= map.begin_ns && (map.end_ns == 0 || since <= map.end_ns)) kept.push_back(row);
+    }
+    keep_rows(series, kept);
+  }
+}
+
+std::int64_t max_gap_of(const Series& series, const ImportMap& map) {
+  if (map.max_gap_ns != 0) return map.max_gap_ns;
+  const std::vector<std::int64_t> steps = sorted_steps(series);
+  return kGapSteps * std::max(steps[steps.size() / 2], map.period_ns);
+}
+
+Status check_gaps(const Series& series, const ImportMap& map, Exclusions& excluded) {
+  const std::int64_t most = max_gap_of(series, map);
+  for (std::size_t row = 1; row < series.rows(); ++row) {
+    const std::int64_t step = series.time_ns[row] - series.time_ns[row - 1];
+    if (step <= most) continue;
+    if (!map.excludes(Trouble::kGaps)) {
+      return std::unexpected(row_error(
+          series, row,
+          "nothing was recorded for " + in_seconds(step) + ", more than " + in_seconds(most),
+          "say exclude = [\"gaps\"] and the log lacks these cycles, or raise [time] max_gap_s"));
+    }
+    ++excluded.gaps;
+  }
+  return {};
+}
+
+Status check_frozen(Series& series, const ImportMap& map, Exclusions& excluded) {
+  if (map.allow_frozen || series.rows() < kFewRows) return {};
+  for (std::size_t c = 0; c < series.columns.size();) {
+    const ImportedColumn& column = series.columns[c];
+    const bool orientation = std::ranges::any_of(
+        series.quaternions, [c](std::size_t first) { return c >= first && c < first + 4; });
+    const bool moves = std::ranges::any_of(
+        column.values, [&](double one) { return one != column.values.front(); });
+    if (moves || column.target.command || orientation) {
+      ++c;
+      continue;
+    }
+    const bool may_go = column.target.field != "position_rad" && column.target.field != "sensor";
+    if (!map.excludes(Trouble::kFrozen) || !may_go) {
+      return std::unexpected(
+          Error{"never changes in " + std::to_string(series.rows()) + " samples",
+                std::string("is it recorded at all? allow_frozen = true takes it as it is") +
+                    (may_go ? ", exclude = [\"frozen\"] leaves it out" : ""),
+                column.file, 0, column.name});
+    }
+    excluded.frozen.push_back(column.name);
+    for (std::size_t& first : series.quaternions) first -= first > c ? 1 : 0;
+    series.columns.erase(series.columns.begin() + static_cast<std::ptrdiff_t>(c));
+  }
+  return {};
+}
+
+/// A quaternion and its negative are one rotation: neighbours get the signs that are near.
+void unwrap(Series& series) {
+  for (const std::size_t first : series.quaternions) {
+    for (std::size_t row = 1; row < series.rows(); ++row) {
+      double product = 0.0;
+      for (std::size_t i = first; i < first + 4; ++i) {
+        product += series.columns[i].values[row] * series.columns[i].values[row - 1];
+      }
+      if (product >= 0.0) continue;
+      for (std::size_t i = first; i < first + 4; ++i) series.columns[i].values[row] *= -1.0;
+    }
+  }
+}
+
+void store_number(hal::Image& image, std::size_t offset, double value) {
+  std::memcpy(image.bytes().data() + offset, &value, sizeof value);
+}
+
+double load_number(const hal::Image& image, std::size_t offset) {
+  double value = 0.0;
+  std::memcpy(&value, image.bytes().data() + offset, sizeof value);
+  return value;
+}
+
+/// Every real number is NaN, every integer 0.
+void blank(hal::Image& image) {
+  std::ranges::fill(image.bytes(), std::byte{0});
+  for (const hal::Field& field : image.layout().fields()) {
+    if (field.type != hal::FieldType::kF64) continue;
+    for (std::size_t i = 0; i < field.count; ++i) {
+      store_number(image, field.offset + i * sizeof(double),
+                   std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+}
+
+}  // namespace
+
+void keep_rows(Series& series, const std::vector<std::size_t>& rows) {
+  if (rows.size() == series.rows()) return;
+  const auto keep = [&rows](auto& values) {
+    if (values.empty()) return;
+    for (std::size_t i = 0; i < rows.size(); ++i) values[i] = values[rows[i]];
+    values.resize(rows.size());
+  };
+  keep(series.time_ns);
+  keep(series.line);
+  for (ImportedColumn& column : series.columns) keep(column.values);
+}
+
+Status clean(Recording& recording, const ImportMap& map) {
+  for (Series& series : recording.series) {
+    if (Status s = check_order(series, map, recording.excluded); !s) return s;
+  }
+  crop(recording, map);
+  for (Series& series : recording.series) {
+    if (series.rows() >= 2) continue;
+    return std::unexpected(
+        Error{"has less than two samples that can be used", "is [time] begin_s before its end?",
+              series.columns.empty() ? "" : series.columns.front().file, 0, series.name});
+  }
+  if (map.period_ns == 0) {
+    const Spacing first = spacings(recording).front();
+    return std::unexpected(
+        Error{"is missing: how long is a cycle of the log? The recording has a sample every " +
+                  in_seconds(first.median_ns) + " (" + in_seconds(first.least_ns) + " to " +
+                  in_seconds(first.most_ns) + ")",
+              "say [time] period_s", map.file, 0, "time.period_s"});
+  }
+  for (Series& series : recording.series) {
+    if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
+    if (Status s = check_frozen(series, map, recording.excluded); !s) return s;
+    unwrap(series);
+  }
+  return {};
+}
+
+std::vector<Spacing> spacings(const Recording& recording) {
+  std::vector<Spacing> all;
+  for (const Series& series : recording.series) {
+    const std::vector<std::int64_t> steps = sorted_steps(series);
+    all.push_back(
+        {series.name, series.rows(), steps[steps.size() / 2], steps.front(), steps.back()});
+  }
+  return all;
+}
+
+Sampler::Sampler(const Recording& recording, const ImportMap& map, const hal::RobotConfig& robot)
+    : recording_(recording),
+      map_(map),
+      blank_state_(robot.shape()),
+      blank_command_(robot.shape()),
+      row_(recording.series.size(), 0) {
+  blank(blank_state_);
+  blank(blank_command_);
+  std::ranges::fill(blank_command_.mode(), map_.command_mode);
+  for (const auto& [joint, position_rad] : map_.missing) {
+    blank_state_.position_rad()[joint] = position_rad;
+    blank_state_.velocity_rad_s()[joint] = 0.0;
+  }
+  // An IMU that does not know where it is says 0 0 0 0.
+  for (const SensorMap& sensor : map_.sensors) {
+    if (!sensor.no_orientation) continue;
+    std::ranges::fill(blank_state_.sensor_values(sensor.sensor).first(4), 0.0);
+  }
+  for (const Series& series : recording.series) {
+    max_gap_ns_.push_back(max_gap_of(series, map));
+    std::vector<std::size_t>& offsets = offsets_.emplace_back();
+    for (const ImportedColumn& column : series.columns) {
+      const hal::Image& image =
+          column.target.command ? static_cast<const hal::Image&>(blank_command_) : blank_state_;
+      offsets.push_back(image.layout().find(column.target.field)->offset +
+                        column.target.index * sizeof(double));
+    }
+  }
+}
+
+Result<Sampler> Sampler::create(const Recording& recording, const ImportMap& map,
+                                const hal::RobotConfig& robot) {
+  Sampler made(recording, map, robot);
+  std::int64_t begin = std::numeric_limits<std::int64_t>::min();
+  std::int64_t end = std::numeric_limits<std::int64_t>::max();
+  for (const Series& series : recording.series) {
+    if (series.joints.empty()) continue;
+    begin = std::max(begin, series.time_ns.front());
+    end = std::min(end, series.time_ns.back());
+  }
+  if (begin > end) {
+    return fail("the joints' samples have no time in common",
+                "record them together, or import some of them only");
+  }
+  made.begin_ns_ = begin;
+  made.cycles_ = static_cast<std::uint64_t>((end - begin) / map.period_ns) + 1;
+  if (made.cycles_ < 2 || made.cycles_ > kMostCycles) {
+    return fail("the recording has " + std::to_string(made.cycles_) + " cycles of " +
+                    in_seconds(map.period_ns),
+                "check [time] unit and period_s in " + map.file);
+  }
+  return made;
+}
+
+double Sampler::value_of(const ImportedColumn& column, std::size_t row, double share) const {
+  const double here = column.values[row];
+  if (row + 1 == column.values.size() || share == 0.0) return here;
+  const double next = column.values[row + 1];
+  switch (map_.sampling) {
+    case Sampling::kLinear: return here + share * (next - here);
+    case Sampling::kNearest: return share > 0.5 ? next : here;
+    case Sampling::kPrevious: break;
+  }
+  return here;
+}
+
+/// Numbers and ages of one series. @return false: it has a hole here
+bool Sampler::fill_series(std::size_t index, std::int64_t now_ns, hal::StateImage& state,
+                          hal::CommandImage& command) {
+  const Series& series = recording_.series[index];
+  std::size_t& row = row_[index];
+  while (row + 1 < series.rows() && series.time_ns[row + 1] <= now_ns) ++row;
+  const std::int64_t since_ns = now_ns - series.time_ns[row];
+  if (since_ns < 0) return false;
+  const bool last = row + 1 == series.rows();
+  const std::int64_t most_ns = max_gap_ns_[index];
+  const std::int64_t step_ns = last ? most_ns : series.time_ns[row + 1] - series.time_ns[row];
+  const bool hole = since_ns > 0 && (step_ns > most_ns || since_ns > step_ns);
+  const double share = hole ? 0.0 : static_cast<double>(since_ns) / static_cast<double>(step_ns);
+  for (std::size_t c = 0; c < series.columns.size(); ++c) {
+    const ImportedColumn& column = series.columns[c];
+    hal::Image& image = column.target.command ? static_cast<hal::Image&>(command) : state;
+    store_number(image, offsets_[index][c], value_of(column, row, share));
+  }
+  const bool held = hole || map_.sampling == Sampling::kPrevious;
+  const auto age = static_cast<std::uint32_t>(held ? since_ns / map_.period_ns : 0);
+  for (const std::size_t joint : series.joints) state.age_cycles()[joint] = age;
+  for (const std::size_t sensor : series.sensors) state.sensor_age_cycles()[sensor] = age;
+  if (share > 0.0) normalise(index, state);
+  return !hole;
+}
+
+/// What lies between two unit quaternions is shorter than one.
+void Sampler::normalise(std::size_t index, hal::StateImage& state) const {
+  for (const std::size_t first : recording_.series[index].quaternions) {
+    const auto* offsets = &offsets_[index][first];
+    double norm = 0.0;
+    for (std::size_t i = 0; i < 4; ++i) norm = std::hypot(norm, load_number(state, offsets[i]));
+    for (std::size_t i = 0; norm > 0.5 && i < 4; ++i) {
+      store_number(state, offsets[i], load_number(state, offsets[i]) / norm);
+    }
+  }
+}
+
+bool Sampler::fill(std::uint64_t cycle, hal::StateImage& state, hal::CommandImage& command) {
+  const std::int64_t since_ns = static_cast<std::int64_t>(cycle) * map_.period_ns;
+  state.assign(blank_state_);
+  command.assign(blank_command_);
+  state.cycle()[0] = command.cycle()[0] = cycle;
+  state.time_ns()[0] = command.time_ns()[0] = since_ns;
+  const auto never = static_cast<std::uint32_t>(std::min<std::uint64_t>(cycle + 1, ~0U));
+  std::ranges::fill(state.sensor_age_cycles(), never);
+  bool whole = true;
+  for (std::size_t s = 0; s < recording_.series.size(); ++s) {
+    const bool there = fill_series(s, begin_ns_ + since_ns, state, command);
+    if (!there && !recording_.series[s].joints.empty()) whole = false;
+  }
+  return whole;
+}
+
+}  // namespace tandem::log
