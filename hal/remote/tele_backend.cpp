@@ -1,0 +1,222 @@
+#include "hal/remote/tele_backend.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace tandem::remote {
+namespace {
+
+constexpr std::int64_t kMargin_ns = 1'000'000'000;  // of the past, beyond the delays
+constexpr double kJitters = 8.0;
+
+std::uint64_t cycles(std::int64_t ns, std::int64_t period_ns) {
+  return static_cast<std::uint64_t>((ns + period_ns - 1) / period_ns);
+}
+
+/// From a command to the state that shows it, at most; later states correct nothing.
+std::uint64_t round_trip_cycles(const TeleConfig& config, std::int64_t period_ns) {
+  const double down_s = config.down.delay_s + kJitters * config.down.jitter_s;
+  return cycles(config.playout_ns + static_cast<std::int64_t>(1e9 * down_s) + kMargin_ns,
+                period_ns);
+}
+
+}  // namespace
+
+TeleBackend::TeleBackend(const hal::Robot& description, std::unique_ptr<hal::Backend> robot,
+                         std::unique_ptr<hal::Backend> twin, const TeleConfig& config,
+                         std::int64_t period_ns)
+    : robot_(std::move(robot)),
+      twin_(std::move(twin)),
+      config_(config),
+      period_ns_(period_ns),
+      joints_(description.joints.size()),
+      up_(config.up, config.seed,
+          sizeof(Head) + hal::CommandImage(description.shape()).bytes().size()),
+      down_(config.down, config.seed + 1,
+            sizeof(Head) + hal::StateImage(description.shape()).bytes().size()),
+      playout_(description, cycles(config.playout_ns, period_ns),
+               cycles(config.brake_ns, period_ns), period_ns),
+      limits_(description, period_ns),
+      robot_state_(description.shape()),
+      twin_state_(description.shape()),
+      arrived_(description.shape()),
+      robot_command_(description.shape()),
+      received_(description.shape()),
+      packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), received_.bytes().size())),
+      past_cycles_(round_trip_cycles(config, period_ns)),
+      past_(past_cycles_ * 3 * joints_),
+      correction_(3 * joints_) {}
+
+hal::Phase TeleBackend::phase() const noexcept {
+  const hal::Phase phase = robot_->phase();
+  const bool waits = !linked_ && twin_ && twin_->phase() == hal::Phase::kBringUp;
+  return phase == hal::Phase::kOperational && waits ? hal::Phase::kBringUp : phase;
+}
+
+/// From now on the network lies between the two.
+void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
+  linked_ = true;
+  linked_ns_ = time.time_ns;
+  linked_cycle_ = arrived_cycle_ = time.cycle;
+  arrived_.assign(robot_state_);
+  playout_.start(time.cycle, robot_command_);
+  limits_.follow(robot_command_);
+  std::ranges::fill(correction_, 0.0);
+}
+
+std::span<const std::byte> TeleBackend::pack(const Head& head,
+                                             std::span<const std::byte> image) noexcept TANDEM_RT {
+  std::memcpy(packed_.data(), &head, sizeof head);
+  std::memcpy(packed_.data() + sizeof head, image.data(), image.size());
+  return {packed_.data(), sizeof head + image.size()};
+}
+
+/// What is known of the robot by a state that arrived, against the twin under the same commands.
+void TeleBackend::correct(const Head& head) noexcept TANDEM_RT {
+  const std::uint64_t same = head.source_cycle + 1;  // the twin read its state after that command
+  const std::uint64_t now = now_.cycle;
+  if (same < linked_cycle_ || same > now || now - same >= past_cycles_) return;
+  const double passed =
+      static_cast<double>(head.cycle - arrived_cycle_) * static_cast<double>(period_ns_);
+  const double share =
+      1.0 -
+      std::exp(-passed / static_cast<double>(std::max<std::int64_t>(1, config_.correction_ns)));
+  const double* past = &past_[this->past(same)];
+  const std::span<const double> values[] = {arrived_.position_rad(), arrived_.velocity_rad_s(),
+                                            arrived_.torque_Nm()};
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t j = 0; j < joints_; ++j) {
+      double& correction = correction_[k * joints_ + j];
+      const double error = values[k][j] - past[k * joints_ + j] - correction;
+      if (k == 0) worst_rad_ = std::max(worst_rad_, std::abs(error));
+      correction += share * error;
+    }
+  }
+}
+
+/// The robot's state of this cycle goes down; what has arrived is taken, the newest last.
+void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
+  const std::int64_t since_ns = time.time_ns - linked_ns_;
+  const bool cut = std::ranges::any_of(config_.outages, [since_ns](const Outage& one) {
+    return since_ns >= one.from_ns && since_ns < one.to_ns;
+  });
+  up_.cut(cut);
+  down_.cut(cut);
+  (void)down_.send(time.time_ns, pack({time.cycle, playout_.source_cycle()}, robot_state_.bytes()));
+  for (;;) {
+    const std::span<const std::byte> message = down_.receive(time.time_ns);
+    if (message.empty()) return;
+    Head head{};
+    std::memcpy(&head, message.data(), sizeof head);
+    if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
+    std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
+    if (twin_) correct(head);
+    arrived_cycle_ = head.cycle;
+  }
+}
+
+void TeleBackend::show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
+  if (!twin_) {
+    state.assign(arrived_);
+  } else {
+    state.assign(twin_state_);
+    for (std::size_t j = 0; j < joints_; ++j) {
+      state.position_rad()[j] += correction_[j];
+      state.velocity_rad_s()[j] += correction_[joints_ + j];
+      state.torque_Nm()[j] += correction_[2 * joints_ + j];
+    }
+    // Faults are the robot's own.
+    std::ranges::copy(arrived_.fault(), state.fault().begin());
+    std::ranges::copy(arrived_.statusword(), state.statusword().begin());
+    std::ranges::copy(arrived_.drive_state(), state.drive_state().begin());
+  }
+  state.cycle()[0] = time.cycle;
+  state.time_ns()[0] = time.time_ns;
+}
+
+Code TeleBackend::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
+  now_ = time;
+  Code code = robot_->read(time, robot_state_);
+  if (twin_) {
+    const Code twin = twin_->read(time, twin_state_);
+    if (code == Code::kOk) code = twin;
+  }
+  const bool begins = !linked_ && phase() == hal::Phase::kOperational;
+  if (begins) begin_link(time);
+  if (!linked_) {
+    state.assign(robot_state_);
+    return code;
+  }
+  if (twin_) {
+    double* past = &past_[this->past(time.cycle)];
+    std::ranges::copy(twin_state_.position_rad(), past);
+    std::ranges::copy(twin_state_.velocity_rad_s(), past + joints_);
+    std::ranges::copy(twin_state_.torque_Nm(), past + 2 * joints_);
+  }
+  carry_state(time);
+  show(time, state);
+  return code;
+}
+
+/// The operator's command goes up; the robot plays what it has.
+void TeleBackend::carry_command(const hal::CommandImage& command) noexcept TANDEM_RT {
+  received_.assign(command);
+  received_.cycle()[0] = now_.cycle;
+  (void)up_.send(now_.time_ns, pack({now_.cycle, 0}, received_.bytes()));
+  for (;;) {
+    const std::span<const std::byte> message = up_.receive(now_.time_ns);
+    if (message.empty()) break;
+    std::ranges::copy(message.subspan(sizeof(Head)), received_.bytes().begin());
+    playout_.take(now_.cycle, received_);
+  }
+  playout_.play(now_.cycle, robot_command_);
+  robot_command_.cycle()[0] = now_.cycle;
+  robot_command_.time_ns()[0] = now_.time_ns;
+  (void)limits_.apply(robot_state_, robot_command_);
+}
+
+Code TeleBackend::write(const hal::CommandImage& command,
+                        const hal::ParameterImage& parameters) noexcept TANDEM_RT {
+  if (linked_) {
+    carry_command(command);
+  } else {
+    robot_command_.assign(command);
+  }
+  if (twin_) (void)twin_->write(command, parameters);
+  return robot_->write(robot_command_, parameters);
+}
+
+void TeleBackend::stop(hal::StopCategory category) noexcept TANDEM_RT {
+  robot_->stop(category);
+  if (twin_) twin_->stop(category);
+}
+
+void TeleBackend::reset() noexcept TANDEM_RT {
+  linked_ = false;
+  robot_->reset();
+  if (twin_) twin_->reset();
+}
+
+bool TeleBackend::shut_down() noexcept TANDEM_RT {
+  const bool robot = robot_->shut_down();
+  const bool twin = twin_ == nullptr || twin_->shut_down();
+  return robot && twin;
+}
+
+bool TeleBackend::archive(Archive& ar) {
+  if (!robot_->archive(ar) || (twin_ && !twin_->archive(ar))) return false;
+  ar(up_, down_, playout_, limits_, robot_state_, twin_state_, arrived_, robot_command_, linked_,
+     now_, linked_ns_, arrived_cycle_, linked_cycle_, past_, correction_, worst_rad_);
+  return true;
+}
+
+TeleFigures TeleBackend::figures() const noexcept {
+  return {.up = up_.counts(),
+          .down = down_.counts(),
+          .starved_cycles = playout_.starved_cycles(),
+          .holds = playout_.holds(),
+          .worst_prediction_rad = worst_rad_};
+}
+
+}  // namespace tandem::remote

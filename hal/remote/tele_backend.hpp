@@ -1,0 +1,142 @@
+// A robot behind a narrow, noisy link: what an operator sees of it, and what the robot does alone.
+// Layer: hal/remote.  Thread: made non-RT; the rest the loop's, as hal::Backend says.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/backend.hpp"
+#include "hal/command_limits.hpp"
+#include "hal/remote/network.hpp"
+#include "hal/remote/playout.hpp"
+#include "hal/robot.hpp"
+
+namespace tandem::remote {
+
+/// When nothing passes, in the loop's time since the link began to work.
+struct Outage {
+  std::int64_t from_ns = 0;
+  std::int64_t to_ns = 0;
+};
+
+struct TeleConfig {
+  NetworkConfig up;    ///< of commands, to the robot
+  NetworkConfig down;  ///< of states, to the operator
+  std::uint64_t seed = 1;
+  bool predict = true;          ///< the operator sees the predicted robot, else the last state
+  std::int64_t playout_ns = 0;  ///< a command takes effect so long after it was given
+  std::int64_t correction_ns = 500'000'000;  ///< time constant of the prediction's correction
+  std::int64_t brake_ns = 250'000'000;       ///< in which the robot stops when commands end
+  std::vector<Outage> outages;
+};
+
+/// What the operator's end knows of the link and of the prediction. For the loop's thread, or when
+/// it has stopped.
+struct TeleFigures {
+  Network::Counts up, down;
+  std::uint64_t starved_cycles = 0;   ///< in which the robot had no command and braked or held
+  std::uint64_t holds = 0;            ///< how often that began
+  double worst_prediction_rad = 0.0;  ///< of a joint: the robot's state against its prediction
+};
+
+/// The loop that uses this backend is the operator's. Each of its cycles is one of the robot's.
+///
+/// From when both are operational:
+/// - A command crosses `up` and waits at the robot until `playout_ns` after it was given, so that
+///   jitter and loss do not reach the drives; between commands that arrived the robot interpolates.
+///   Without a command it brakes within `brake_ns` and holds. When commands come again, it returns
+///   to them without a step, at its joints' speed at most. Range and rate limits apply at the robot
+///   once more.
+/// - States cross `down`. With `predict` the operator's loop sees the twin, a robot of the same
+///   description that follows each command at once. It is corrected by what arrives: the low-passed
+///   difference of a state and of what the twin was when it had been given the same commands.
+/// - Bring-up, stops, resets and shut-down do not cross the network.
+class TeleBackend final : public hal::Backend {
+ public:
+  /// @param twin  null without `predict`; made as `robot`, of the same period
+  TeleBackend(const hal::Robot& description, std::unique_ptr<hal::Backend> robot,
+              std::unique_ptr<hal::Backend> twin, const TeleConfig& config, std::int64_t period_ns);
+
+  [[nodiscard]] hal::Pace pace() const noexcept override { return robot_->pace(); }
+  [[nodiscard]] hal::Phase phase() const noexcept override;
+  [[nodiscard]] std::string status_text() const override { return robot_->status_text(); }
+  [[nodiscard]] bool waits_for_bus() const noexcept override { return robot_->waits_for_bus(); }
+  void exchange(const hal::CycleTime& time) noexcept override { robot_->exchange(time); }
+  [[nodiscard]] Code read(const hal::CycleTime& time,
+                          hal::StateImage& state) noexcept TANDEM_RT override;
+  [[nodiscard]] Code write(const hal::CommandImage& command,
+                           const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
+  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
+    return robot_->fault_cause(joint);
+  }
+  [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
+    return robot_->fault_text(cause, code);
+  }
+  void stop(hal::StopCategory category) noexcept TANDEM_RT override;
+  void reset() noexcept TANDEM_RT override;
+  [[nodiscard]] bool resets_one_joint() const noexcept TANDEM_RT override { return false; }
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
+  void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override {
+    robot_->last_command(command);
+  }
+  [[nodiscard]] bool command_in_force(
+      hal::CommandImage& command) const noexcept TANDEM_RT override {
+    return robot_->command_in_force(command);
+  }
+  [[nodiscard]] std::uint64_t missed() const noexcept TANDEM_RT override {
+    return robot_->missed();
+  }
+  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
+    return robot_->next_injected();
+  }
+  [[nodiscard]] bool archive(Archive& ar) override;
+
+  [[nodiscard]] TeleFigures figures() const noexcept;
+  /// The robot's own state in this cycle, which the operator has not seen yet.
+  [[nodiscard]] const hal::StateImage& robot_state() const noexcept { return robot_state_; }
+  /// What the robot follows in this cycle.
+  [[nodiscard]] const hal::CommandImage& robot_command() const noexcept { return robot_command_; }
+
+ private:
+  /// Before the bytes of an image.
+  struct Head {
+    std::uint64_t cycle;
+    std::uint64_t source_cycle;  ///< down: the command that the robot follows is of this cycle
+  };
+
+  void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
+  void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
+  void correct(const Head& head) noexcept TANDEM_RT;
+  void show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT;
+  void carry_command(const hal::CommandImage& command) noexcept TANDEM_RT;
+  [[nodiscard]] std::span<const std::byte> pack(
+      const Head& head, std::span<const std::byte> image) noexcept TANDEM_RT;
+  [[nodiscard]] std::size_t past(std::uint64_t cycle) const noexcept {
+    return cycle % past_cycles_ * 3 * joints_;
+  }
+
+  std::unique_ptr<hal::Backend> robot_, twin_;
+  TeleConfig config_;
+  std::int64_t period_ns_;
+  std::size_t joints_;
+  Network up_, down_;
+  Playout playout_;
+  hal::CommandLimits limits_;
+  hal::StateImage robot_state_, twin_state_, arrived_;
+  hal::CommandImage robot_command_, received_;
+  std::vector<std::byte> packed_;
+  bool linked_ = false;
+  hal::CycleTime now_;
+  std::int64_t linked_ns_ = 0;       // when it began
+  std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has
+  std::uint64_t linked_cycle_ = 0;
+  std::size_t past_cycles_;
+  std::vector<double> past_;        // the twin's positions, velocities, torques of past cycles
+  std::vector<double> correction_;  // the same, added to the twin
+  double worst_rad_ = 0.0;
+};
+
+}  // namespace tandem::remote
