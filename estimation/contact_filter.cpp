@@ -1,12 +1,18 @@
 // Blocks of three by three: of the transition matrix only those that are neither zero nor identity
-// are touched, and each foot corrects by three scalars one after another.
+// are touched, and feet correct one after another.
 #include "estimation/contact_filter.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 namespace tandem::estimation {
+namespace {
+
+using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor, ContactFilter::kMost, 3>;
+
+}  // namespace
 
 Mat3 skew(const Vec3& a) noexcept TANDEM_RT {
   Mat3 m;
@@ -62,8 +68,8 @@ void ContactFilter::predict(const Vec3& gyro_rad_s,
   move_covariance();
   add_noise();
   const Vec3 turn = (gyro_rad_s - gyro_bias_) * step_s_;
-  const Vec3 a =
-      R_ * rotation_by(0.5 * turn) * (specific_force_m_s2 - accelerometer_bias_) + gravity_;
+  const Vec3 force = specific_force_m_s2 - accelerometer_bias_;
+  const Vec3 a = R_ * (force + 0.5 * turn.cross(force)) + gravity_;  // half way through the turn
   p_ += (v_ + 0.5 * step_s_ * a) * step_s_;
   v_ += a * step_s_;
   R_ = R_ * rotation_by(turn);
@@ -71,9 +77,12 @@ void ContactFilter::predict(const Vec3& gyro_rad_s,
   R_ = 0.5 * R_ * (3.0 * Mat3::Identity() - R_.transpose() * R_);
 }
 
-/// P <- F P F^T, F = 1 + A h. A's rows: rotation -R bg; velocity g x rotation - v x R bg - R ba;
-/// position velocity - p x R bg; feet -d x R bg.
+/// P <- F P F^T + Q, F = 1 + A h. A's rows: rotation -R bg; velocity g x rotation - v x R bg - R
+/// ba; position velocity - p x R bg; feet -d x R bg. The gyro's noise acts as its bias does, for
+/// one step: it is added to the bias' variance, and taken away again where it has moved to.
 void ContactFilter::move_covariance() noexcept {
+  const double noise = noise_.gyro_rad_s * noise_.gyro_rad_s;
+  P_.diagonal().segment<3>(kGyroBias).array() += noise;
   const Mat3 hR = step_s_ * R_;
   const Mat3 hg = step_s_ * skew(gravity_);
   const Mat3 vR = skew(v_) * hR, pR = skew(p_) * hR;
@@ -97,26 +106,21 @@ void ContactFilter::move_covariance() noexcept {
   for (std::size_t i = 0; i < feet_; ++i)
     columns(foot_at(i)).noalias() -= columns(kGyroBias) * dR[i].transpose();
   columns(kRotation).noalias() -= columns(kGyroBias) * hR.transpose();
+  P_.diagonal().segment<3>(kGyroBias).array() -= noise;
+  const auto uncouple = [&](int at, const Mat3& M) {  // the next step's noise is another one
+    P_.block<3, 3>(at, kGyroBias) += noise * M;
+    P_.block<3, 3>(kGyroBias, at) += noise * M.transpose();
+  };
+  uncouple(kRotation, hR);
+  uncouple(kVelocity, vR);
+  uncouple(kPosition, pR);
+  for (std::size_t i = 0; i < feet_; ++i) uncouple(foot_at(i), dR[i]);
 }
 
-/// The gyro's noise turns v, p and d about W's origin; that of the accelerometer moves v alone.
+/// Of what walks, and of the accelerometer.
 void ContactFilter::add_noise() noexcept {
-  const double gyro = noise_.gyro_rad_s * step_s_;
   const double walk = std::sqrt(step_s_);
   const auto squared = [](double x) { return x * x; };
-  const double q = squared(gyro);
-  std::array<Mat3, 3 + kMostFeet> turned;
-  std::array<int, 3 + kMostFeet> at{kRotation, kVelocity, kPosition};
-  turned[0] = Mat3::Identity();
-  turned[1] = skew(v_);
-  turned[2] = skew(p_);
-  for (std::size_t i = 0; i < feet_; ++i) {
-    turned[3 + i] = skew(d_[i]);
-    at[3 + i] = foot_at(i);
-  }
-  for (std::size_t a = 0; a < 3 + feet_; ++a)
-    for (std::size_t b = 0; b < 3 + feet_; ++b)
-      P_.block<3, 3>(at[a], at[b]).noalias() += q * turned[a] * turned[b].transpose();
   const auto add = [&](int part, double variance) {
     P_.diagonal().segment<3>(part).array() += variance;
   };
@@ -143,19 +147,18 @@ void ContactFilter::correct(std::span<const Vec3> h_m,
   nis_dof_ = 0;
   for (std::size_t i = 0; i < feet_; ++i) {
     if (standing[i] == 0) continue;
-    const Vec3 z = p_ + R_ * h_m[i] - d_[i];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int p = kPosition + axis, d = foot_at(i) + axis;
-      const Vector Ph = P_.row(p).transpose() - P_.row(d).transpose();
-      const double S = Ph[p] - Ph[d] + variance;
-      const double rest = z[axis] - (error[p] - error[d]);
-      error += Ph * (rest / S);
-      nis_ += rest * rest / S;
-      ++nis_dof_;
-      const double weight = 1.0 / S;
-      for (Eigen::Index row = 0; row < P_.rows(); ++row)
-        P_.row(row) -= (weight * Ph[row]) * Ph.transpose();
-    }
+    const int p = kPosition, d = foot_at(i);
+    // What is not yet in the state is in `error`.
+    const Vec3 z = p_ + R_ * h_m[i] - d_[i] - (error.segment<3>(p) - error.segment<3>(d));
+    const Columns PH = P_.middleCols<3>(p) - P_.middleCols<3>(d);
+    Mat3 S = PH.middleRows<3>(p) - PH.middleRows<3>(d);
+    S.diagonal().array() += variance;
+    const Mat3 inverse = S.inverse();
+    const Columns K = PH * inverse;
+    error += K * z;
+    nis_ += z.dot(inverse * z);
+    nis_dof_ += 3;
+    P_.noalias() -= K.lazyProduct(PH.transpose());
   }
   if (nis_dof_ == 0) return;
   P_ = (0.5 * (P_ + P_.transpose())).eval();  // rounding alone makes them differ
