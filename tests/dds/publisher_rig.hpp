@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@ inline runtime::CompleteRobot robot_of(const std::string& name) {
 struct RigOptions {
   std::string robot = "double_pendulum";
   bool simulated_time = true;
+  bool estimated = false;  ///< a base's estimate beside the truth
   Config config = own_config();
 };
 
@@ -37,6 +39,7 @@ struct PublisherRig {
         state(robot.config.shape()),
         command(robot.config.shape()),
         truth(robot.config.joints.size(), robot.config.contact.feet.size()) {
+    if (options.estimated) estimate.emplace(hal::EstimateShape{.base = 1, .feet = 2, .joints = 0});
     for (std::size_t i = 0; i < state.joints(); ++i) {
       const auto x = static_cast<double>(i + 1);
       state.position_rad()[i] = 0.1 * x;
@@ -65,6 +68,7 @@ struct PublisherRig {
                                                  .period_ns = kPeriod_ns,
                                                  .simulated_time = options.simulated_time,
                                                  .truth = &truth,
+                                                 .estimate = shown_estimate(),
                                                  .run = 77});
     EXPECT_TRUE(made) << made.error().to_string();
     publisher = std::move(*made);
@@ -97,7 +101,11 @@ struct PublisherRig {
                      state,
                      command,
                      &truth,
+                     shown_estimate(),
                      {begin_ns + time_ns, 500, -1, 2000, 0, 0}});
+  }
+  [[nodiscard]] const hal::EstimateImage* shown_estimate() const {
+    return estimate ? &*estimate : nullptr;
   }
   /// Not more of them with a topic that is due than the ring holds: 512.
   void show_all(std::uint64_t from, std::uint64_t to) {
@@ -119,6 +127,7 @@ struct PublisherRig {
   hal::StateImage state;
   hal::CommandImage command;
   hal::TruthImage truth;
+  std::optional<hal::EstimateImage> estimate;
   hal::RunPhase phase = hal::RunPhase::kRunning;
   std::int64_t begin_ns = 0;
   std::atomic<std::uint64_t> fault_version{0};

@@ -202,6 +202,21 @@ TEST(Topics, OfOdometryHaveTheTwistInTheChildsFrame) {
   });
 }
 
+TEST(Topics, OfOdometryAreTheEstimateWhereThereIsOne) {
+  PublisherRig rig({.robot = "coman", .estimated = true});
+  set_base(rig.truth);
+  hal::EstimateImage& estimate = *rig.estimate;
+  estimate.base_valid()[0] = 1;
+  estimate.base_position_m()[1] = 7.0;
+  estimate.base_quaternion()[3] = 1.0;
+  estimate.base_velocity()[5] = -0.5;
+  publish_and_take<nav_msgs::Odometry>(rig, "odom", [&](const auto& m) {
+    EXPECT_EQ(m.pose.pose.position.y, 7.0);
+    EXPECT_EQ(m.pose.pose.orientation.w, 1.0);
+    EXPECT_EQ(m.twist.twist.angular.z, -0.5);
+  });
+}
+
 /// Frames as a listener puts them together: each link's placement in the root of its chain.
 class Listener {
  public:
