@@ -69,8 +69,9 @@ Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_
         "declare a [[sensor]] of type \"imu\" in " + robot.file);
   }
   if (imus.size() > 1) {
-    return fail("the robot has several IMUs",
-                "say which: imu = \"" + robot.sensors[imus.front()].name + "\"");
+    std::string names;
+    for (const std::size_t s : imus) names += (names.empty() ? "" : ", ") + robot.sensors[s].name;
+    return fail("the robot has several IMUs", "say which one: imu = \"…\", of " + names);
   }
   const hal::Sensor& imu = robot.sensors[imus.front()];
   const int site = imu_site(robot, imu, kernels);
