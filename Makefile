@@ -5,7 +5,7 @@ TEST_JOBS ?= $(shell echo $$(($(JOBS) + 1)))
 FUZZ_SECONDS ?= 60
 FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
-FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames ethercat line mcap
+FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames ethercat line mcap import
 
 .PHONY: demo test test-all bench unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
 

@@ -190,9 +190,10 @@ ReportOptions read_report(TomlTable table) {
   return report;
 }
 
-const Names kSections{"robot",  "duration_s", "seed",    "posture", "kernel_variant", "period_ns",
-                      "sim",    "hal",        "overrun", "clock",   "realtime",       "faults",
-                      "remote", "log",        "report",  "dds",     "estimation",     "controller"};
+const Names kSections{"robot",     "duration_s", "seed",       "posture",      "kernel_variant",
+                      "period_ns", "sim",        "hal",        "overrun",      "clock",
+                      "realtime",  "faults",     "remote",     "log",          "report",
+                      "dds",       "controller", "estimation", "teleoperation"};
 
 /// What of the experiment can be read without its robot.
 Experiment read(const TomlDocument& document, TomlTable& root) {
@@ -217,6 +218,7 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.thread = read_realtime(root);
   read_faults(root.table_or_empty("faults"), e);
   e.remote = read_remote(root.table_or_empty("remote"));
+  e.teleoperation = read_teleoperation(root);
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
   if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());

@@ -21,7 +21,9 @@
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
+#include "runtime/controller_spec.hpp"
 #include "runtime/fall_watch.hpp"
+#include "runtime/teleoperation.hpp"
 
 namespace tandem::runtime {
 
@@ -93,14 +95,6 @@ struct ReportOptions {
   std::string foot;         ///< force/torque sensor
 };
 
-/// [[controller]]
-struct ControllerSpec {
-  std::string plugin;    ///< "squat", or a path to a shared library
-  std::string name;      ///< unique; default: the plugin's
-  bool active = true;    ///< false: it waits until it is started while the run goes on
-  TomlTable parameters;  ///< for ControllerSetup; its errors go to `document`
-};
-
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
   std::string file;                         ///< the TOML's path
@@ -123,6 +117,7 @@ struct Experiment {
   bool falls_are_faults = true;                           ///< [faults] fall = "stop", or "allow"
   std::optional<double> watchdog_s;  ///< [faults]; empty: 0.5 on the wall clock, else 5
   RemoteOptions remote;
+  std::optional<Teleoperation> teleoperation;  ///< empty: the robot is at hand
   LogOptions log;
   ReportOptions report;
   estimation::EstimationConfig estimation;  ///< nothing without the table

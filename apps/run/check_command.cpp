@@ -86,6 +86,10 @@ void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
                                 counted(e.cycles(), "cycle"), e.duration_s));
   add_simulation_facts(e, facts);
   facts.add("seed", std::to_string(e.seed));
+  if (e.teleoperation) {
+    facts.add("link to the robot", remote::tc_command(e.teleoperation->link.up, "INTERFACE"));
+    facts.add("link back", remote::tc_command(e.teleoperation->link.down, "INTERFACE"));
+  }
   facts.add("log", e.log.folder + "/");
   fmt::print(out, "{} is right. It would run:\n", e.file);
   facts.print(out);

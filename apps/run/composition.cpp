@@ -11,6 +11,7 @@
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
+#include "apps/run/operator_link.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -44,14 +45,6 @@ class Collector {
  private:
   Diagnostics errors_;
 };
-
-/// A plugin's path is relative to the experiment's file; its bare name is looked for.
-std::string plugin_path(const runtime::Experiment& e, const std::string& plugin) {
-  if (!plugin.contains('/')) return plugin;
-  // Absolute, so that "./x.so" beside a file of the working directory does not become a name.
-  const std::filesystem::path folder = std::filesystem::absolute(e.document.folder());
-  return (folder / plugin).lexically_normal().string();
-}
 
 void add_controllers(Composition& c, Collector& errors) {
   const std::vector<std::string> folders = controller_folders();
@@ -270,6 +263,21 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
+  const bool at_any_speed =
+      e.hal.backend == runtime::BackendKind::kSim || (is_remote && e.hal.lockstep);
+  if (e.teleoperation && !at_any_speed) {
+    return {{.message = "the link's model runs in simulated time",
+             .hint = "leave out --hal, or add --hal dds --lockstep; on a real link use tc instead "
+                     "(tandem check prints the command)",
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
+  if (e.teleoperation && overrides.serves) {
+    return {{.message = "the link is at the operator's end",
+             .hint = "serve the robot by an experiment without this table",
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
   if (!overrides.scenario.empty() && e.hal.backend != runtime::BackendKind::kSim) {
     return {{.message = "faults are injected on the other end of the wire",
              .hint = is_remote ? "give --scenario to `tandem serve`"
@@ -337,7 +345,7 @@ Diagnostics add_simulation(Composition& c, const std::string& scenario) {
   c.sim = backend->get();
   c.master = &c.sim->master();
   c.backend = std::move(*backend);
-  return {};
+  return put_link_between(c);
 }
 
 }  // namespace
@@ -395,7 +403,7 @@ Diagnostics connect_remote(Composition& c) {
   if (!backend) return {backend.error()};
   c.remote = backend->get();
   c.backend = std::move(*backend);
-  return {};
+  return put_link_between(c);
 }
 
 }  // namespace

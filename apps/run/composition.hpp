@@ -20,6 +20,7 @@
 #include "estimation/estimator.hpp"
 #include "hal/ethercat-can/frame_record.hpp"
 #include "hal/remote/remote_backend.hpp"
+#include "hal/remote/tele_backend.hpp"
 #include "hal/sim/sim_robot.hpp"
 #include "model/kernel_library.hpp"
 #include "runtime/controller_host.hpp"
@@ -58,12 +59,13 @@ struct Composition {
   model::Tree tree;                     ///< the robot's description
   model::KernelLibrary kernels;         ///< empty with kTolerate: then there is no more than notes
   std::unique_ptr<CanSockets> sockets;  ///< of the CAN backend
-  std::unique_ptr<hal::can::FrameRecord> frames;     ///< of the CAN backend, when it was asked for
-  std::unique_ptr<dds::Participant> participant;     ///< of the DDS backend
-  std::unique_ptr<hal::Backend> backend;             ///< CAN's and DDS' only after connect()
-  sim::SimRobot* sim = nullptr;                      ///< the backend, when it is the simulation
-  const hal::can::DriveMaster* master = nullptr;     ///< the backend's, once that is there
-  remote::RemoteBackend* remote = nullptr;           ///< the backend, when another process has it
+  std::unique_ptr<hal::can::FrameRecord> frames;  ///< of the CAN backend, when it was asked for
+  std::unique_ptr<dds::Participant> participant;  ///< of the DDS backend
+  std::unique_ptr<hal::Backend> backend;          ///< CAN's and DDS' only after connect()
+  sim::SimRobot* sim = nullptr;                   ///< the robot, when it is the simulation
+  const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
+  remote::RemoteBackend* remote = nullptr;        ///< the robot, when another process has it
+  remote::TeleBackend* tele = nullptr;  ///< the backend, when a link lies before the robot
   std::unique_ptr<estimation::Estimator> estimator;  ///< null: nothing is estimated
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar

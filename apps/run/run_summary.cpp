@@ -201,6 +201,39 @@ void add_timing_facts(const RunSummary& summary, Facts& facts) {
   if (wall_clock || woken) facts.add("overruns", std::to_string(loop.overruns));
 }
 
+std::string counts_text(const remote::Network::Counts& counts) {
+  return fmt::format("{} messages, {} lost, {} dropped, {} reordered, {} delivered", counts.sent,
+                     counts.lost, counts.dropped, counts.reordered, counts.delivered);
+}
+
+/// The link to the robot, and what both ends made of it.
+void add_link_facts(const remote::TeleBackend* link, double period_s, Facts& facts) {
+  if (link == nullptr) return;
+  const remote::TeleFigures figures = link->figures();
+  facts.add("commands over the link", counts_text(figures.up));
+  facts.add("states over the link", counts_text(figures.down));
+  facts.add("without commands",
+            fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
+                        counted(figures.holds, "time")));
+}
+
+Json link_json(const remote::TeleBackend* link) {
+  if (link == nullptr) return nullptr;
+  const remote::TeleFigures figures = link->figures();
+  const auto counts = [](const remote::Network::Counts& one) {
+    return Json{{"sent", one.sent},           {"lost", one.lost},
+                {"dropped", one.dropped},     {"duplicated", one.duplicated},
+                {"reordered", one.reordered}, {"delivered", one.delivered}};
+  };
+  Json json;
+  json["up"] = counts(figures.up);
+  json["down"] = counts(figures.down);
+  json["starved_cycles"] = figures.starved_cycles;
+  json["holds"] = figures.holds;
+  json["worst_prediction_rad"] = figures.worst_prediction_rad;
+  return json;
+}
+
 /// What the run wrote and published.
 void add_output_facts(const RunSummary& summary, Facts& facts) {
   if (summary.log) {
@@ -295,6 +328,7 @@ Json RunSummary::json() const {
   json["start"] = start_json(master);
   json["wire"] = master == nullptr ? std::vector<std::string>() : master->wire_texts();
   json["remote"] = remote_json(server, composition.remote);
+  json["teleoperation"] = link_json(composition.tele);
   json["faults"] = faults;
   json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
   json["fault_log"] = faults_json(cycle.faults());
@@ -318,6 +352,8 @@ void RunSummary::print(std::FILE* out) const {
   add_motion_facts(*this, facts);
   add_timing_facts(*this, facts);
   add_remote_facts(server, composition.remote, facts);
+  add_link_facts(composition.tele,
+                 static_cast<double>(composition.experiment.loop.period_ns) * 1e-9, facts);
   facts.add("kernels", composition.kernels->variant);
   const std::string engine = sim::engine_text(composition.experiment.sim.engine);
   if (composition.sim != nullptr && !engine.empty()) facts.add("engine", engine);

@@ -23,11 +23,12 @@ std::uint64_t round_trip_cycles(const TeleConfig& config, std::int64_t period_ns
 
 }  // namespace
 
-TeleBackend::TeleBackend(const hal::Robot& description, std::unique_ptr<hal::Backend> robot,
-                         std::unique_ptr<hal::Backend> twin, const TeleConfig& config,
-                         std::int64_t period_ns)
-    : robot_(std::move(robot)),
-      twin_(std::move(twin)),
+TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
+                         const TeleConfig& config, std::int64_t period_ns)
+    : robot_(std::move(robot.robot)),
+      twin_(std::move(twin.robot)),
+      robot_side_(std::move(robot.side)),
+      twin_side_(std::move(twin.side)),
       config_(config),
       period_ns_(period_ns),
       joints_(description.joints.size()),
@@ -42,6 +43,7 @@ TeleBackend::TeleBackend(const hal::Robot& description, std::unique_ptr<hal::Bac
       twin_state_(description.shape()),
       arrived_(description.shape()),
       robot_command_(description.shape()),
+      twin_command_(description.shape()),
       received_(description.shape()),
       packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), received_.bytes().size())),
       past_cycles_(round_trip_cycles(config, period_ns)),
@@ -63,6 +65,8 @@ void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   playout_.start(time.cycle, robot_command_);
   limits_.follow(robot_command_);
   std::ranges::fill(correction_, 0.0);
+  if (robot_side_) robot_side_->start(time, robot_state_, robot_command_);
+  if (twin_ && twin_side_) twin_side_->start(time, twin_state_, twin_command_);
 }
 
 std::span<const std::byte> TeleBackend::pack(const Head& head,
@@ -111,7 +115,7 @@ void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     std::memcpy(&head, message.data(), sizeof head);
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
-    if (twin_) correct(head);
+    if (twin_ && !ended_) correct(head);
     arrived_cycle_ = head.cycle;
   }
 }
@@ -173,6 +177,9 @@ void TeleBackend::carry_command(const hal::CommandImage& command) noexcept TANDE
   playout_.play(now_.cycle, robot_command_);
   robot_command_.cycle()[0] = now_.cycle;
   robot_command_.time_ns()[0] = now_.time_ns;
+  if (robot_side_ && robot_side_->update(now_, robot_state_, robot_command_) != Code::kOk) {
+    robot_->stop(hal::StopCategory::kCategory1);
+  }
   (void)limits_.apply(robot_state_, robot_command_);
 }
 
@@ -183,22 +190,28 @@ Code TeleBackend::write(const hal::CommandImage& command,
   } else {
     robot_command_.assign(command);
   }
-  if (twin_) (void)twin_->write(command, parameters);
+  if (twin_) {
+    twin_command_.assign(command);
+    if (linked_ && twin_side_) (void)twin_side_->update(now_, twin_state_, twin_command_);
+    (void)twin_->write(twin_command_, parameters);
+  }
   return robot_->write(robot_command_, parameters);
 }
 
 void TeleBackend::stop(hal::StopCategory category) noexcept TANDEM_RT {
+  ended_ = true;
   robot_->stop(category);
   if (twin_) twin_->stop(category);
 }
 
 void TeleBackend::reset() noexcept TANDEM_RT {
-  linked_ = false;
+  linked_ = ended_ = false;
   robot_->reset();
   if (twin_) twin_->reset();
 }
 
 bool TeleBackend::shut_down() noexcept TANDEM_RT {
+  ended_ = true;
   const bool robot = robot_->shut_down();
   const bool twin = twin_ == nullptr || twin_->shut_down();
   return robot && twin;
@@ -206,8 +219,10 @@ bool TeleBackend::shut_down() noexcept TANDEM_RT {
 
 bool TeleBackend::archive(Archive& ar) {
   if (!robot_->archive(ar) || (twin_ && !twin_->archive(ar))) return false;
+  if (robot_side_) robot_side_->archive(ar);
+  if (twin_ && twin_side_) twin_side_->archive(ar);
   ar(up_, down_, playout_, limits_, robot_state_, twin_state_, arrived_, robot_command_, linked_,
-     now_, linked_ns_, arrived_cycle_, linked_cycle_, past_, correction_, worst_rad_);
+     ended_, now_, linked_ns_, arrived_cycle_, linked_cycle_, past_, correction_, worst_rad_);
   return true;
 }
 

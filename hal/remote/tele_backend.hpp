@@ -12,6 +12,7 @@
 #include "hal/command_limits.hpp"
 #include "hal/remote/network.hpp"
 #include "hal/remote/playout.hpp"
+#include "hal/remote/robot_side.hpp"
 #include "hal/robot.hpp"
 
 namespace tandem::remote {
@@ -48,17 +49,22 @@ struct TeleFigures {
 /// - A command crosses `up` and waits at the robot until `playout_ns` after it was given, so that
 ///   jitter and loss do not reach the drives; between commands that arrived the robot interpolates.
 ///   Without a command it brakes within `brake_ns` and holds. When commands come again, it returns
-///   to them without a step, at its joints' speed at most. Range and rate limits apply at the robot
-///   once more.
+///   to them without a step, at its joints' speed at most. Controllers of its own have
+///   their joints by its own state. Range and rate limits apply at the robot once more.
 /// - States cross `down`. With `predict` the operator's loop sees the twin, a robot of the same
 ///   description that follows each command at once. It is corrected by what arrives: the low-passed
 ///   difference of a state and of what the twin was when it had been given the same commands.
 /// - Bring-up, stops, resets and shut-down do not cross the network.
 class TeleBackend final : public hal::Backend {
  public:
-  /// @param twin  null without `predict`; made as `robot`, of the same period
-  TeleBackend(const hal::Robot& description, std::unique_ptr<hal::Backend> robot,
-              std::unique_ptr<hal::Backend> twin, const TeleConfig& config, std::int64_t period_ns);
+  /// A robot, and control of its own; that may be null.
+  struct End {
+    std::unique_ptr<hal::Backend> robot = nullptr;
+    std::unique_ptr<RobotSide> side = nullptr;
+  };
+  /// @param twin  without a robot when config.predict is false; else as `robot`, of the same period
+  TeleBackend(const hal::Robot& description, End robot, End twin, const TeleConfig& config,
+              std::int64_t period_ns);
 
   [[nodiscard]] hal::Pace pace() const noexcept override { return robot_->pace(); }
   [[nodiscard]] hal::Phase phase() const noexcept override;
@@ -119,6 +125,7 @@ class TeleBackend final : public hal::Backend {
   }
 
   std::unique_ptr<hal::Backend> robot_, twin_;
+  std::unique_ptr<RobotSide> robot_side_, twin_side_;
   TeleConfig config_;
   std::int64_t period_ns_;
   std::size_t joints_;
@@ -126,9 +133,10 @@ class TeleBackend final : public hal::Backend {
   Playout playout_;
   hal::CommandLimits limits_;
   hal::StateImage robot_state_, twin_state_, arrived_;
-  hal::CommandImage robot_command_, received_;
+  hal::CommandImage robot_command_, twin_command_, received_;
   std::vector<std::byte> packed_;
   bool linked_ = false;
+  bool ended_ = false;  // the robot follows no command any more: it says nothing of the model
   hal::CycleTime now_;
   std::int64_t linked_ns_ = 0;       // when it began
   std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has

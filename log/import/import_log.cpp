@@ -4,7 +4,6 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <utility>
 
 #include "base/sha256.hpp"
@@ -17,19 +16,24 @@ namespace {
 
 constexpr std::size_t kMagicBytes = 8;
 
-Result<std::string> whole_text(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
+/// A file's bytes into `hash` and, when it is there, `text`: a bag need not fit into memory.
+Status read_bytes(const std::string& path, Sha256& hash, std::string* text) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
     return std::unexpected(
         Error{"is a folder", "name the .mcap files in it, in their order", path, 0, {}});
   }
-  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (in.bad() || !in.is_open()) {
-    return std::unexpected(
-        Error{"cannot read this file", "check the path and its permissions", path, 0, {}});
+  std::ifstream in(path, std::ios::binary);
+  std::string block(std::size_t{1} << 20, '\0');
+  while (in) {
+    in.read(block.data(), static_cast<std::streamsize>(block.size()));
+    const std::string_view got(block.data(), static_cast<std::size_t>(in.gcount()));
+    hash.update(std::as_bytes(std::span(got)));
+    if (text != nullptr) text->append(got);
   }
-  return text;
+  if (!in.bad() && in.is_open()) return {};
+  return std::unexpected(
+      Error{"cannot read this file", "check the path and its permissions", path, 0, {}});
 }
 
 bool begins(std::string_view text, std::string_view magic) { return text.starts_with(magic); }
@@ -134,8 +138,6 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
   std::vector<ImportFile> files;
   Sha256 hash;
   for (const std::string& path : request.files) {
-    auto text = whole_text(path);
-    if (!text) return refuse(text.error());
     const Result<bool> bag = is_bag(path);
     if (!bag) return refuse(bag.error());
     if (!files.empty() && *bag != imported.bag) {
@@ -146,14 +148,16 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
                      {}});
     }
     imported.bag = *bag;
-    hash.update(std::as_bytes(std::span(*text)));
-    if (*bag) text->clear();
-    files.push_back({path, std::move(*text)});
+    files.push_back({path, {}});
+    if (Status read = read_bytes(path, hash, *bag ? nullptr : &files.back().text); !read) {
+      return refuse(read.error());
+    }
   }
   imported.sha256 = hash.finish();
-  auto map_text = whole_text(request.map);
-  if (!map_text) return refuse(map_text.error());
-  imported.map_text = std::move(*map_text);
+  Sha256 ignored;
+  if (Status read = read_bytes(request.map, ignored, &imported.map_text); !read) {
+    return refuse(read.error());
+  }
   auto map = parse_import_map(imported.map_text, request.map, robot, imported.bag);
   if (!map) return std::unexpected(map.error());
   imported.map = std::move(*map);

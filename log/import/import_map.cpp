@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <span>
 #include <string_view>
 #include <utility>
 
@@ -12,63 +10,10 @@
 #include "base/nearest.hpp"
 #include "base/toml_reader.hpp"
 #include "hal/image.hpp"
+#include "log/import/import_units.hpp"
 
 namespace tandem::log {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-enum class Motion : std::uint8_t { kAny, kTurns, kSlides };
-
-struct Unit {
-  std::string_view name;
-  double factor;  ///< to SI; NaN: `scale` says it
-  Motion of = Motion::kAny;
-};
-
-constexpr double kAsked = std::numeric_limits<double>::quiet_NaN();
-constexpr Unit kPositions[] = {{"rad", 1.0, Motion::kTurns},
-                               {"deg", kDegree, Motion::kTurns},
-                               {"turn", 360.0 * kDegree, Motion::kTurns},
-                               {"m", 1.0, Motion::kSlides},
-                               {"mm", 1e-3, Motion::kSlides},
-                               {"raw", kAsked}};
-constexpr Unit kVelocities[] = {
-    {"rad/s", 1.0, Motion::kTurns},         {"deg/s", kDegree, Motion::kTurns},
-    {"rpm", 6.0 * kDegree, Motion::kTurns}, {"m/s", 1.0, Motion::kSlides},
-    {"mm/s", 1e-3, Motion::kSlides},        {"raw", kAsked}};
-constexpr Unit kAccelerations[] = {{"rad/s2", 1.0, Motion::kTurns},
-                                   {"deg/s2", kDegree, Motion::kTurns},
-                                   {"m/s2", 1.0, Motion::kSlides},
-                                   {"raw", kAsked}};
-constexpr Unit kTorques[] = {{"Nm", 1.0, Motion::kTurns},
-                             {"mNm", 1e-3, Motion::kTurns},
-                             {"N", 1.0, Motion::kSlides},
-                             {"raw", kAsked}};
-constexpr Unit kCurrents[] = {{"A", 1.0}, {"mA", 1e-3}, {"raw", kAsked}};
-constexpr Unit kVoltages[] = {{"V", 1.0}, {"mV", 1e-3}, {"raw", kAsked}};
-constexpr Unit kTemperatures[] = {{"C", 1.0}, {"raw", kAsked}};
-
-struct Signal {
-  std::string_view key;
-  const char* field;
-  std::span<const Unit> units;
-  bool in_bag = false;
-};
-constexpr Signal kState[] = {{"position", "position_rad", kPositions, true},
-                             {"velocity", "velocity_rad_s", kVelocities, true},
-                             {"acceleration", "acceleration_rad_s2", kAccelerations},
-                             {"torque", "torque_nm", kTorques, true},
-                             {"motor_position", "motor_position_rad", kPositions},
-                             {"motor_velocity", "motor_velocity_rad_s", kVelocities},
-                             {"current", "current_a", kCurrents},
-                             {"voltage", "voltage_v", kVoltages},
-                             {"temperature", "temperature_c", kTemperatures}};
-constexpr Signal kCommand[] = {{"position", "position_rad", kPositions},
-                               {"velocity", "velocity_rad_s", kVelocities},
-                               {"torque", "torque_nm", kTorques},
-                               {"current", "current_a", kCurrents},
-                               {"voltage", "voltage_v", kVoltages}};
 
 class Reader {
  public:

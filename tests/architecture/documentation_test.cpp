@@ -38,7 +38,7 @@ std::set<std::string> keys_read() {
        {"hal/config/robot_config.cpp", "hal/config/robot_config_drives.cpp",
         "hal/config/robot_config_loops.cpp", "hal/config/robot_config_joints.cpp",
         "hal/sim/scenario.cpp", "runtime/experiment.cpp", "runtime/estimation_options.cpp",
-        "dds/config.cpp"}) {
+        "runtime/teleoperation.cpp", "dds/config.cpp"}) {
     const std::string source = text_of(kRoot / file);
     const auto found = matches(source,
                                "(?:number|integer|text|choice|boolean|numbers|texts|rows|table|"
@@ -64,8 +64,8 @@ TEST(Documentation, OfTheJsonHasEveryKeyThatIsWritten) {
   for (const char* file :
        {"apps/run/run_summary.cpp", "apps/run/composition.cpp", "apps/can/bus_table.cpp",
         "apps/run/check_command.cpp", "apps/tools/model_command.cpp", "apps/tools/new_command.cpp",
-        "apps/tools/log_command.cpp", "apps/tools/log_thresholds.cpp", "apps/tools/eds_command.cpp",
-        "apps/tools/eds_show.cpp", "apps/machine/latency_report.cpp",
+        "apps/tools/log_command.cpp", "apps/tools/log_import.cpp", "apps/tools/log_thresholds.cpp",
+        "apps/tools/eds_command.cpp", "apps/tools/eds_show.cpp", "apps/machine/latency_report.cpp",
         "apps/machine/doctor_command.cpp", "apps/can/round_trips.cpp",
         "apps/control/controller_control.cpp", "apps/control/joint_control.cpp",
         "apps/control/sensor_control.cpp", "apps/clients/topic_command.cpp",

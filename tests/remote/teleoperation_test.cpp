@@ -1,0 +1,312 @@
+// An operator's loop, a link and a robot, as `tandem run` puts them together: what the operator
+// sees, what the robot does, and what happens when the link is gone.
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controllers/plugin_loader.hpp"
+#include "hal/config/capabilities.hpp"
+#include "hal/remote/tele_backend.hpp"
+#include "model/kernel_library.hpp"
+#include "rt/clock.hpp"
+#include "runtime/experiment.hpp"
+#include "runtime/local_controllers.hpp"
+#include "runtime/robot_cycle.hpp"
+
+namespace tandem::remote {
+namespace {
+
+using runtime::RobotCycle;
+
+/// One cycle in which controllers ran.
+struct Row {
+  std::vector<double> hand, seen, robot, robot_velocity, reference;
+  double tilt = 0.0, height_m = 0.0;
+};
+
+/// A bundled robot's teleoperation.toml with a link of one's own.
+class Operated {
+ public:
+  Operated(const std::string& robot, double one_way_s, double loss, bool predict,
+           double seconds = 8.0, std::vector<Outage> outages = {}, double robot_gain = 1.0)
+      : kernels_(*model::load_kernels(TANDEM_BINARY_DIR "/lib/models/" + robot + "_kernels.so")) {
+    auto read =
+        runtime::read_experiment(TANDEM_SOURCE_DIR "/config/" + robot + "/teleoperation.toml");
+    EXPECT_TRUE(read) << read.error().front().to_string();
+    experiment_ = std::make_unique<runtime::Experiment>(std::move(*read));
+    runtime::Experiment& e = *experiment_;
+    TeleConfig config = e.teleoperation->link;
+    config.up = config.down = NetworkConfig{.delay_s = one_way_s, .loss = loss, .limit = 10'000};
+    config.playout_ns = std::llround(1e9 * (one_way_s + 0.02));
+    config.predict = predict;
+    config.outages = std::move(outages);
+    host_ = std::make_unique<runtime::ControllerHost>(e.robot, kernels_.get(), e.loop.period_ns);
+    for (const runtime::ControllerSpec& spec : e.controllers) {
+      auto plugin = load_controller(spec.plugin, {TANDEM_BINARY_DIR "/lib/controllers"});
+      EXPECT_TRUE(plugin) << plugin.error().to_string();
+      EXPECT_TRUE(host_->add(spec.name, std::move(*plugin), spec.parameters));
+    }
+    hal::RobotConfig real = e.robot;  // which the twin need not be like
+    for (hal::GainsConfig& gains : real.gains) gains.position.gains.kp *= robot_gain;
+    auto far = sim::SimRobot::create(real, kernels_.get(), e.sim_robot_config());
+    far_ = far->get();
+    TeleBackend::End robot_end{std::move(*far), side()};
+    TeleBackend::End twin;
+    if (predict) {
+      auto sim = e.sim_robot_config();
+      sim.seed = e.seed + 1;
+      twin = {std::move(*sim::SimRobot::create(e.robot, kernels_.get(), sim)), side()};
+    }
+    link = std::make_unique<TeleBackend>(hal::robot_of(e.robot), std::move(robot_end),
+                                         std::move(twin), config, e.loop.period_ns);
+    runtime::CycleConfig wanted;
+    wanted.loop = e.loop;
+    wanted.running_cycles =
+        static_cast<std::uint64_t>(seconds * 1e9) / static_cast<std::uint64_t>(e.loop.period_ns);
+    wanted.settle_cycles = e.settle_cycles();
+    cycle = std::make_unique<RobotCycle>(
+        runtime::CycleParts{e.robot, *link, *host_, clock_, nullptr, &far_->truth()}, wanted);
+  }
+
+  std::unique_ptr<RobotSide> side() const {
+    const runtime::Experiment& e = *experiment_;
+    auto made =
+        std::make_unique<runtime::LocalControllers>(e.robot, kernels_.get(), e.loop.period_ns);
+    for (const runtime::ControllerSpec& spec : e.teleoperation->robot_controllers) {
+      auto plugin = load_controller(spec.plugin, {TANDEM_BINARY_DIR "/lib/controllers"});
+      EXPECT_TRUE(made->add(spec.name, std::move(*plugin), spec.parameters));
+    }
+    return made;
+  }
+
+  void run() {
+    while (cycle->step()) {
+      if (cycle->phase() != runtime::RunPhase::kRunning) continue;
+      Row row;
+      const auto copy = [](std::span<const double> values) {
+        return std::vector<double>(values.begin(), values.end());
+      };
+      row.hand = copy(cycle->command().position_rad());
+      row.seen = copy(cycle->state().position_rad());
+      row.robot = copy(far_->truth().position_rad());
+      row.robot_velocity = copy(far_->truth().velocity_rad_s());
+      row.reference = copy(link->robot_command().position_rad());
+      const auto q = far_->truth().base_quaternion();
+      row.tilt = 2.0 * std::asin(std::min(1.0, std::hypot(q[0], q[1])));
+      row.height_m = far_->truth().base_position_m()[2];
+      rows.push_back(std::move(row));
+    }
+    EXPECT_TRUE(cycle->faults().empty());
+  }
+
+  /// RMS over time and the joints that the hand moves, from the link's first round trip on [rad].
+  double error(std::vector<double> Row::*what, std::size_t later = 0) const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    const std::vector<std::size_t> joints = moved();
+    for (std::size_t i = 1200; i + later < rows.size(); ++i) {
+      for (const std::size_t j : joints) {
+        const double one = (rows[i + later].*what)[j] - rows[i].hand[j];
+        sum += one * one;
+        ++count;
+      }
+    }
+    return std::sqrt(sum / static_cast<double>(count));
+  }
+  /// RMS distance of the first site from where the hand led it, of an arm on a fixed base [m].
+  double tool_error(std::vector<double> Row::*what, std::size_t later = 0) const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (std::size_t i = 1200; i + later < rows.size(); i += 10, ++count) {
+      const auto a = tool(rows[i + later].*what), b = tool(rows[i].hand);
+      for (std::size_t k = 0; k < 3; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+    }
+    return std::sqrt(sum / static_cast<double>(count));
+  }
+  std::vector<std::size_t> moved() const {
+    std::vector<std::size_t> joints;
+    for (std::size_t j = 0; j < rows.front().hand.size(); ++j) {
+      double most = 0.0;
+      for (const Row& row : rows) most = std::max(most, std::abs(row.hand[j] - rows[0].hand[j]));
+      if (most > 0.01) joints.push_back(j);
+    }
+    return joints;
+  }
+
+  std::unique_ptr<TeleBackend> link;
+  std::unique_ptr<RobotCycle> cycle;
+  std::vector<Row> rows;
+
+ private:
+  std::array<double, 3> tool(const std::vector<double>& image) const {
+    const tandem_kernels& k = *kernels_.get();
+    std::vector<double> q(k.nq), zero(k.nv), pose(12 * k.sites), twist(6 * k.sites),
+        acc(6 * k.sites);
+    for (std::size_t j = 0; j < k.joints; ++j) {
+      const int index = experiment_->robot.joint_index(k.joint_names[j]);
+      q[j] = image[static_cast<std::size_t>(index)];
+    }
+    k.site_motion(q.data(), zero.data(), zero.data(), pose.data(), twist.data(), acc.data());
+    return {pose[9], pose[10], pose[11]};
+  }
+
+  model::KernelLibrary kernels_;
+  std::unique_ptr<runtime::Experiment> experiment_;
+  std::unique_ptr<runtime::ControllerHost> host_;
+  sim::SimRobot* far_ = nullptr;
+  rt::WallClock clock_;
+};
+
+std::size_t cycles_of(double seconds) {
+  return static_cast<std::size_t>(std::llround(seconds * 1e3));
+}
+
+class Teleoperation : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Robots, Teleoperation, testing::Values("panda", "coman"),
+                         [](const auto& one) { return std::string(one.param); });
+
+TEST_P(Teleoperation, PredictionShowsTheHandAtAQuarterOfASecond) {
+  Operated predicted(GetParam(), 0.25, 0.1, true), plain(GetParam(), 0.25, 0.1, false);
+  predicted.run();
+  plain.run();
+  const double with = predicted.error(&Row::seen), without = plain.error(&Row::seen);
+  fmt::print(
+      "{}: the operator sees {:.2f} mrad of error with prediction, {:.1f} without: {:.1f} x\n",
+      GetParam(), 1e3 * with, 1e3 * without, without / with);
+  EXPECT_GT(without, 5.0 * with);
+  EXPECT_GT(without, 0.02) << "the hand moves";
+  // The robot does what the hand did, later by the time of play-out, whatever is lost.
+  const std::size_t later = cycles_of(0.27);
+  EXPECT_LT(predicted.error(&Row::robot, later), 1.5 * with + 1e-3);
+  EXPECT_EQ(predicted.link->figures().starved_cycles, plain.link->figures().starved_cycles);
+  EXPECT_GT(predicted.link->figures().up.lost, 700U);
+}
+
+TEST_P(Teleoperation, PredictionIsCorrectedWhereTheRobotIsNotItsModel) {
+  // The robot's position loops have two thirds of the stiffness that the twin's have.
+  Operated predicted(GetParam(), 0.25, 0.1, true, 8.0, {}, 0.66);
+  Operated plain(GetParam(), 0.25, 0.1, false, 8.0, {}, 0.66);
+  predicted.run();
+  plain.run();
+  const double with = predicted.error(&Row::seen), without = plain.error(&Row::seen);
+  fmt::print(
+      "{}, softer than its model: {:.2f} mrad with prediction, {:.1f} without: {:.1f} x; a "
+      "state differs from its prediction by {:.1f} mrad at most\n",
+      GetParam(), 1e3 * with, 1e3 * without, without / with,
+      1e3 * predicted.link->figures().worst_prediction_rad);
+  EXPECT_GT(without, 5.0 * with);
+  // What the operator sees is what the robot does a moment later.
+  const std::size_t later = cycles_of(0.27);
+  double sum = 0.0;
+  std::size_t count = 0;
+  const auto joints = predicted.moved();
+  for (std::size_t i = 1200; i + later < predicted.rows.size(); ++i) {
+    for (const std::size_t j : joints) {
+      const double one = predicted.rows[i].seen[j] - predicted.rows[i + later].robot[j];
+      sum += one * one;
+      ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(count)), without / 5.0);
+}
+
+/// The worst of a run.
+struct Worst {
+  double speed = 0.0, step = 0.0, tilt = 0.0, sink = 0.0;
+  std::size_t held = 0;  ///< cycles in which no reference moved and no joint was faster than 0.15
+                         ///< rad/s: springs ring
+};
+
+Worst worst_of(const Operated& operated) {
+  Worst worst;
+  const auto joints = operated.moved();
+  const auto& rows = operated.rows;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    double speed = 0.0, step = 0.0;
+    for (const std::size_t j : joints) {
+      speed = std::max(speed, std::abs(rows[i].robot_velocity[j]));
+      step = std::max(step, std::abs(rows[i].reference[j] - rows[i - 1].reference[j]));
+    }
+    worst.speed = std::max(worst.speed, speed);
+    worst.step = std::max(worst.step, step);
+    worst.tilt = std::max(worst.tilt, rows[i].tilt);
+    worst.sink = std::max(worst.sink, std::abs(rows[i].height_m - rows[0].height_m));
+    worst.held += step == 0.0 && speed < 0.15 ? 1 : 0;
+  }
+  return worst;
+}
+
+TEST_P(Teleoperation, HoldsWhenTheLinkIsGoneAndReturnsWithoutAStep) {
+  Operated operated(GetParam(), 0.1, 0.1, true, 8.0, {{4'500'000'000, 6'500'000'000}});
+  Operated whole(GetParam(), 0.1, 0.1, true, 8.0);
+  operated.run();
+  whole.run();
+  const TeleFigures figures = operated.link->figures();
+  EXPECT_EQ(figures.holds, 1U);
+  EXPECT_NEAR(static_cast<double>(figures.starved_cycles), 2000.0, 60.0);
+  const Worst cut = worst_of(operated), uncut = worst_of(whole);
+  for (const auto& [name, one] : {std::pair{"cut", cut}, std::pair{"whole", uncut}}) {
+    fmt::print(
+        "{}, {}: holds {} ms; at most {:.2f} rad/s, {:.2f} mrad a cycle, {:.4f} rad tilted\n",
+        GetParam(), name, one.held, one.speed, 1e3 * one.step, one.tilt);
+  }
+  EXPECT_GT(cut.held, uncut.held + 1300U) << "2 s less braking and ringing";
+  EXPECT_LT(cut.step, 1.1 * uncut.step) << "no step of the robot's references";
+  EXPECT_LT(cut.speed, 1.2 * uncut.speed);
+  EXPECT_LT(cut.tilt, 1.2 * uncut.tilt + 1e-3);
+  EXPECT_LT(cut.sink, uncut.sink + 0.005);
+  const std::size_t first = operated.moved().front();
+  EXPECT_LT(std::abs(operated.rows.back().robot[first] -
+                     operated.rows[operated.rows.size() - 121].hand[first]),
+            0.02)
+      << "it follows again";
+}
+
+TEST(TeleoperationLink, IsAFunctionOfItsSeed) {
+  Operated a("panda", 0.05, 0.2, true, 2.0), b("panda", 0.05, 0.2, true, 2.0);
+  a.run();
+  b.run();
+  ASSERT_EQ(a.rows.size(), b.rows.size());
+  for (std::size_t i = 0; i < a.rows.size(); ++i) {
+    ASSERT_EQ(a.rows[i].seen, b.rows[i].seen) << i;
+    ASSERT_EQ(a.rows[i].robot, b.rows[i].robot) << i;
+  }
+}
+
+/// The table and the figure of docs/teleoperation.md. TANDEM_TELEOPERATION: a file for the table.
+TEST(TeleoperationTable, OfDelaysAndLosses) {
+  const char* file = std::getenv("TANDEM_TELEOPERATION");
+  if (file == nullptr) GTEST_SKIP() << "TANDEM_TELEOPERATION names no file for the table";
+  std::ofstream out(file);
+  out << "robot delay_ms loss predicted_mrad plain_mrad robot_mrad starved_ms predicted_tool_mm "
+         "plain_tool_mm\n";
+  for (const char* robot : {"panda", "coman"}) {
+    for (const double delay_s : {0.0, 0.1, 0.25, 0.5}) {
+      for (const double loss : {0.0, 0.05, 0.2}) {
+        Operated predicted(robot, delay_s, loss, true, 12.0),
+            plain(robot, delay_s, loss, false, 12.0);
+        predicted.run();
+        plain.run();
+        const bool arm = std::string(robot) == "panda";
+        out << fmt::format("{} {:.0f} {:.2f} {:.3f} {:.3f} {:.3f} {} {:.3f} {:.3f}\n", robot,
+                           1e3 * delay_s, loss, 1e3 * predicted.error(&Row::seen),
+                           1e3 * plain.error(&Row::seen),
+                           1e3 * predicted.error(&Row::robot, cycles_of(delay_s + 0.02)),
+                           predicted.link->figures().starved_cycles,
+                           arm ? 1e3 * predicted.tool_error(&Row::seen) : 0.0,
+                           arm ? 1e3 * plain.tool_error(&Row::seen) : 0.0);
+        out.flush();
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::remote
