@@ -63,6 +63,11 @@ constexpr std::array kOfAxis{
     Item{object::kAbortConnectionOption, 0, kInteger16, kReadWrite},
     Item{object::kQuickStopOption, 0, kInteger16, kReadWrite},
     Item{object::kMotorResolution, 0, kUnsigned32, kReadWrite},
+    Item{object::kHomeOffset, 0, kInteger32, kReadWrite},
+    Item{object::kHomingMethod, 0, kInteger8, kReadWrite},
+    Item{object::kHomingSpeeds, 1, kUnsigned32, kReadWrite},
+    Item{object::kHomingSpeeds, 2, kUnsigned32, kReadWrite},
+    Item{object::kHomingAcceleration, 0, kUnsigned32, kReadWrite},
 };
 
 void add(DataSheet& sheet, std::uint16_t index, std::uint8_t sub, DataType type,

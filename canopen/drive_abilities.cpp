@@ -1,6 +1,8 @@
 // Modes from 6502, or from the objects that each needs.
 #include "canopen/drive_abilities.hpp"
 
+#include <cmath>
+
 #include "canopen/eds.hpp"
 
 namespace tandem::canopen {
@@ -87,6 +89,7 @@ DriveAbilities abilities_of(const DataSheet& sheet, int axis) {
   can.impedance = by_rpdo(object::kStiffness, 0, kReal32) && by_rpdo(object::kDamping, 0, kReal32);
   can.open_loop = by_rpdo(object::kTargetVoltage, 0, kInteger16);
   can.current = by_rpdo(object::kTargetCurrent, 0, kInteger16);
+  can.homing = has(Mode::kHm) && !can.one_mode && writable(sheet, at(object::kHomingMethod), 0);
   can.settings = offered(sheet, at(object::kMotorResolution), 0, kUnsigned32) != nullptr;
   return can;
 }
@@ -106,6 +109,26 @@ std::optional<double> ratio(const DataSheet& sheet, std::uint16_t index,
 
 }  // namespace
 
+namespace {
+
+// 60A9, CiA 303-2: prefix (a power of ten), numerator, denominator, reserved.
+constexpr std::uint32_t kUnit = 0x00FFFF00;
+constexpr std::uint32_t kRevolutionsPerMinute = 0x00B44700;
+constexpr std::uint32_t kRevolutionsPerSecond = 0x00B40300;
+constexpr std::uint32_t kIncrementsPerSecond = 0x00B50300;
+
+/// What one such unit is in revolutions of the motor per second.
+std::optional<double> revolutions_per_s(std::uint32_t unit) {
+  const double power = std::pow(10.0, static_cast<std::int8_t>(unit >> 24));
+  if ((unit & kUnit) == kRevolutionsPerMinute) return power / 60.0;
+  if ((unit & kUnit) == kRevolutionsPerSecond) return power;
+  return {};
+}
+
+bool is_increments_per_s(std::uint32_t unit) { return unit == kIncrementsPerSecond; }
+
+}  // namespace
+
 DriveUnits units_of(const DataSheet& sheet, int axis) {
   const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
   DriveUnits units;
@@ -118,6 +141,15 @@ DriveUnits units_of(const DataSheet& sheet, int axis) {
       *units.counts_per_rev *= gear;
       units.position.insert(units.position.end(), of_gear.begin(), of_gear.end());
     }
+  }
+  const auto unit =
+      static_cast<std::uint32_t>(sheet.value(at(object::kVelocityUnit), 0, 0).value_or(0));
+  if (const auto per_s = revolutions_per_s(unit); per_s && !of_gear.empty()) {
+    units.velocity_per_rev = gear / *per_s;
+    units.velocity = of_gear;
+    units.velocity.push_back({at(object::kVelocityUnit), 0, unit});
+  } else if (unit != 0 && !is_increments_per_s(unit)) {
+    units.unknown_velocity = unit;
   }
   const auto rated_mNm = sheet.value(at(object::kRatedTorque), 0, 0).value_or(0);
   if (rated_mNm > 0) {

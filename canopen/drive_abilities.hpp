@@ -34,6 +34,8 @@ struct DriveAbilities {
   bool open_loop = false;
   bool current = false;
   bool settings = false;  ///< it takes a robot.toml's scales, gains and protections
+  /// Mode 6: its method (6098) can be set, and its mode be changed in a PDO.
+  bool homing = false;
   /// 6060 cannot be in a PDO: the mode is set at start-up and stays.
   bool one_mode = false;
 };
@@ -62,6 +64,12 @@ struct DriveUnits {
   std::optional<double> rated_torque_Nm;
   std::vector<UnitObject> position;  ///< what counts_per_rev was computed from
   std::vector<UnitObject> torque;    ///< what rated_torque_Nm was computed from
+  /// Velocity units (606C, 60FF, 60B1) at one revolution of the driven shaft per second, by 60A9
+  /// and the gear 6091; empty: position units per second.
+  std::optional<double> velocity_per_rev;
+  std::vector<UnitObject> velocity;  ///< what velocity_per_rev was computed from
+  /// A value of 60A9 that does not tell what a velocity is, or not without the gear 6091; else 0.
+  std::uint32_t unknown_velocity = 0;
 };
 
 /// @param axis  from 0

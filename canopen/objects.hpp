@@ -52,22 +52,24 @@ inline constexpr std::uint8_t kEventProfile = 255;
 /// are axis 0's: see of_axis().
 namespace object {
 // CiA 301: communication
-inline constexpr std::uint16_t kDeviceType = 0x1000;         // u32
-inline constexpr std::uint16_t kErrorRegister = 0x1001;      // u8
-inline constexpr std::uint16_t kErrorHistory = 0x1003;       // u8 count, u32[8]
-inline constexpr std::uint16_t kSyncId = 0x1005;             // u32
-inline constexpr std::uint16_t kSyncPeriod = 0x1006;         // u32 [us]
-inline constexpr std::uint16_t kDeviceName = 0x1008;         // string
-inline constexpr std::uint16_t kHardwareVersion = 0x1009;    // string
-inline constexpr std::uint16_t kSoftwareVersion = 0x100A;    // string
-inline constexpr std::uint16_t kGuardTime = 0x100C;          // u16 [ms]
-inline constexpr std::uint16_t kLifeTimeFactor = 0x100D;     // u8: guard times without a request
-inline constexpr std::uint16_t kEmergencyId = 0x1014;        // u32
-inline constexpr std::uint16_t kHeartbeatConsumer = 0x1016;  // u32[]: node << 16 | time [ms]
-inline constexpr std::uint16_t kHeartbeatProducer = 0x1017;  // u16 [ms]
-inline constexpr std::uint16_t kIdentity = 0x1018;           // u32: IdentitySub
-inline constexpr std::uint16_t kErrorBehaviour = 0x1029;     // u8[1]: on a communication error
-inline constexpr std::uint16_t kRpdoParameter = 0x1400;      // + number - 1
+inline constexpr std::uint16_t kDeviceType = 0x1000;           // u32
+inline constexpr std::uint16_t kErrorRegister = 0x1001;        // u8
+inline constexpr std::uint16_t kErrorHistory = 0x1003;         // u8 count, u32[8]
+inline constexpr std::uint16_t kSyncId = 0x1005;               // u32
+inline constexpr std::uint16_t kSyncPeriod = 0x1006;           // u32 [us]
+inline constexpr std::uint16_t kDeviceName = 0x1008;           // string
+inline constexpr std::uint16_t kHardwareVersion = 0x1009;      // string
+inline constexpr std::uint16_t kSoftwareVersion = 0x100A;      // string
+inline constexpr std::uint16_t kGuardTime = 0x100C;            // u16 [ms]
+inline constexpr std::uint16_t kLifeTimeFactor = 0x100D;       // u8: guard times without a request
+inline constexpr std::uint16_t kStoreParameters = 0x1010;      // u32: 1 all of them
+inline constexpr std::uint16_t kEmergencyId = 0x1014;          // u32
+inline constexpr std::uint16_t kHeartbeatConsumer = 0x1016;    // u32[]: node << 16 | time [ms]
+inline constexpr std::uint16_t kHeartbeatProducer = 0x1017;    // u16 [ms]
+inline constexpr std::uint16_t kIdentity = 0x1018;             // u32: IdentitySub
+inline constexpr std::uint16_t kVerifyConfiguration = 0x1020;  // u32: 1 date, 2 time of it
+inline constexpr std::uint16_t kErrorBehaviour = 0x1029;       // u8[1]: on a communication error
+inline constexpr std::uint16_t kRpdoParameter = 0x1400;        // + number - 1
 inline constexpr std::uint16_t kRpdoMapping = 0x1600;
 inline constexpr std::uint16_t kTpdoParameter = 0x1800;
 inline constexpr std::uint16_t kTpdoMapping = 0x1A00;
@@ -106,6 +108,7 @@ inline constexpr std::uint16_t kFeedConstant = 0x6092;         // u32: 1 feed, 2
 inline constexpr std::uint16_t kHomingMethod = 0x6098;         // i8
 inline constexpr std::uint16_t kHomingSpeeds = 0x6099;         // u32: 1 to the switch, 2 to zero
 inline constexpr std::uint16_t kHomingAcceleration = 0x609A;   // u32 [link counts/s^2]
+inline constexpr std::uint16_t kVelocityUnit = 0x60A9;         // u32: SI unit of velocities
 inline constexpr std::uint16_t kVelocityOffset = 0x60B1;       // i32 [link counts/s]
 inline constexpr std::uint16_t kTorqueOffset = 0x60B2;         // i16 [per mille of rated]
 inline constexpr std::uint16_t kInterpolationData = 0x60C1;    // i32: 1 the position
@@ -232,8 +235,9 @@ enum class Mode : std::int8_t {
 [[nodiscard]] constexpr std::uint32_t mode_bit(Mode mode) noexcept {
   return 1u << (static_cast<int>(mode) - 1);
 }
-/// 6502 of our boards: CSP, CSV and CST; bits 16 to 19 are the manufacturer's modes -1 to -4.
-inline constexpr std::uint32_t kTandemModes = 0x7U << 7 | 0xFU << 16;
+/// 6502 of our boards: homing, CSP, CSV and CST; bits 16 to 19 are the manufacturer's modes -1 to
+/// -4.
+inline constexpr std::uint32_t kTandemModes = 1U << 5 | 0x7U << 7 | 0xFU << 16;
 
 /// Bits of the controlword (6040).
 namespace controlword {
@@ -242,6 +246,7 @@ inline constexpr std::uint16_t kEnableVoltage = 1u << 1;
 inline constexpr std::uint16_t kQuickStop = 1u << 2;  ///< active low
 inline constexpr std::uint16_t kEnableOperation = 1u << 3;
 inline constexpr std::uint16_t kEnableInterpolation = 1u << 4;  ///< mode 7: follow 60C1
+inline constexpr std::uint16_t kStartHoming = 1u << 4;          ///< mode 6: rising edge; 0: no more
 inline constexpr std::uint16_t kFaultReset = 1u << 7;           ///< rising edge
 inline constexpr std::uint16_t kHalt = 1u << 8;
 
@@ -269,6 +274,8 @@ inline constexpr std::uint16_t kTargetReached = 1u << 10;
 inline constexpr std::uint16_t kInternalLimit = 1u << 11;
 inline constexpr std::uint16_t kFollowsCommand = 1u << 12;  ///< CSP, CSV, CST and ours
 inline constexpr std::uint16_t kFollowingError = 1u << 13;  ///< CSP
+inline constexpr std::uint16_t kHomingAttained = 1u << 12;  ///< homing; with bit 10: it is over
+inline constexpr std::uint16_t kHomingError = 1u << 13;     ///< homing
 }  // namespace statusword
 
 /// Bits of the digital inputs (60FD).

@@ -34,14 +34,19 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
     : period_s_(static_cast<double>(board.control_period_ns) * 1.0e-9),
       modes_(setup.modes),
       reversed_(setup.reversed),
+      velocity_units_(setup.velocity_units_per_rev > 0.0
+                          ? setup.velocity_units_per_rev / setup.link_counts_per_rev
+                          : 1.0),
       zero_at_power_on_(setup.zero_counts),
       zero_counts_(setup.zero_counts),
+      counts_from_power_on_(setup.counts_from_power_on),
+      at_power_on_(setup.counts_from_power_on),
       power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
       objects_(power_on_),
       torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
                      NoiseGenerator::stream(board.seed, static_cast<std::uint64_t>(index))) {
   objects_.add_to(od, index, *this);
-  if ((modes_ & kProfileModes) != 0) profile_.add_to(od, index);
+  if ((modes_ & kProfileModes) != 0) profile_.add_to(od, index, modes_);
   apply_settings();
   take_demands();
 }
@@ -49,6 +54,7 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
 void Axis::power_on() noexcept TANDEM_RT {
   objects_ = power_on_;
   zero_counts_ = zero_at_power_on_;
+  at_power_on_ = counts_from_power_on_;
   profile_.power_on();
   profiled_ = {};
   machine_.reset();
@@ -105,6 +111,13 @@ void Axis::sample(const AxisSense& sense) noexcept TANDEM_RT {
                    link_valid && motor_valid;
   if (!sensors_valid_) return;  // the last good values stay, and a fault follows
   const double velocity_before = measured_.link_velocity_rad_s;
+  if (at_power_on_) {
+    zero_counts_ = 0;
+    zero_counts_ =
+        static_cast<std::int32_t>(static_cast<std::uint32_t>(zero_at_power_on_) -
+                                  static_cast<std::uint32_t>(to_wire(link_encoder_.counts())));
+    at_power_on_ = false;
+  }
   measured_.link_position_rad = link_encoder_.position_rad();
   measured_.link_velocity_rad_s = link_velocity_.update(measured_.link_position_rad);
   measured_.link_acceleration_rad_s2 =
@@ -134,13 +147,21 @@ std::int32_t Axis::from_wire(std::int32_t value) const noexcept {
   return static_cast<std::int32_t>(reversed_ ? 0U - counts : counts);
 }
 
+double Axis::shown_shift_rad() const noexcept {
+  const auto counts = static_cast<std::int32_t>(static_cast<std::uint32_t>(zero_counts_) -
+                                                static_cast<std::uint32_t>(zero_at_power_on_));
+  return (reversed_ ? -counts : counts) * link_encoder_.rad_per_count();
+}
+
 void Axis::show_actual() noexcept {
   AxisObjects& o = objects_;
   const double sign = reversed_ ? -1.0 : 1.0;
   o.position = to_wire(link_encoder_.counts());
   o.velocity = clamp_round<std::int32_t>(sign * measured_.link_velocity_rad_s *
-                                         link_encoder_.counts_per_rad());
-  o.motor_position = static_cast<std::int32_t>(motor_encoder_.counts());
+                                         link_encoder_.counts_per_rad() * velocity_units_);
+  o.motor_position = static_cast<std::int32_t>(
+      motor_encoder_.counts() +
+      clamp_round<std::int32_t>(shown_shift_rad() * motor_encoder_.counts_per_rad()));
   o.motor_velocity =
       clamp_round<std::int32_t>(measured_.motor_velocity_rad_s * motor_encoder_.counts_per_rad());
   o.torque = clamp_round<std::int16_t>(sign * measured_.torque_Nm * 1.0e3 / o.rated_torque_Nm());
@@ -255,6 +276,7 @@ void Axis::run_profile() noexcept {
                              .position = o.position,
                              .target_position = o.target_position,
                              .target_velocity = o.target_velocity,
+                             .velocity_units = velocity_units_,
                              .target_torque = o.target_torque,
                              .torque = o.torque,
                              .at_low_switch = reversed_ ? at_max : at_min,
@@ -343,14 +365,15 @@ Reference Axis::reference() const noexcept {
   const double Nm = o.rated_torque_Nm() * 1.0e-3;
   const bool profile = ProfileModes::has(mode_);
   const bool by_velocity = mode_ == Mode::kCsv || mode_ == Mode::kVelocityImpedance;
-  const std::int64_t velocity = std::int64_t{o.velocity_offset} + (profile ? profiled_.velocity
-                                                                   : by_velocity ? o.target_velocity
-                                                                                 : 0);
+  const std::int64_t asked =
+      std::int64_t{o.velocity_offset} + (by_velocity ? o.target_velocity : 0);
+  const double velocity =
+      static_cast<double>(asked) / velocity_units_ + (profile ? profiled_.velocity : 0);
   const int torque = o.torque_offset + (profile               ? profiled_.torque
                                         : mode_ == Mode::kCst ? o.target_torque
                                                               : 0);
   return {.position_rad = from_wire(profile ? profiled_.position : o.target_position) * rad,
-          .velocity_rad_s = sign * (static_cast<double>(velocity) * rad),
+          .velocity_rad_s = sign * (velocity * rad),
           .torque_Nm = sign * (torque * Nm),
           .voltage_V = o.target_voltage * 0.01,
           .current_A = o.target_current * 0.01,
@@ -422,7 +445,7 @@ void Axis::archive(Archive& ar) {
   if (ar.reading()) apply_settings();
   settings_changed_ = changed;
   profile_.archive(ar);
-  ar(zero_counts_, profiled_.position, profiled_.velocity, profiled_.torque,
+  ar(zero_counts_, at_power_on_, profiled_.position, profiled_.velocity, profiled_.torque,
      profiled_.target_reached, profiled_.bit_12, profiled_.bit_13, profiled_.homed);
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,

@@ -60,6 +60,8 @@ class Axis final : private canopen::ObjectOwner {
   /// Counts of the joint's encoder as 6064 shows them, and back.
   [[nodiscard]] std::int32_t to_wire(std::int64_t counts) const noexcept;
   [[nodiscard]] std::int32_t from_wire(std::int32_t value) const noexcept;
+  /// By what 6064 is off until homing has found the joint's place: shown minus true [rad].
+  [[nodiscard]] double shown_shift_rad() const noexcept;
   /// The modes in which the drive makes its own way: one period of them.
   void run_profile() noexcept;
   void show_actual() noexcept;
@@ -87,8 +89,11 @@ class Axis final : private canopen::ObjectOwner {
   double period_s_;
   std::uint32_t modes_;
   bool reversed_;
+  double velocity_units_;  ///< in a count per second
   std::int32_t zero_at_power_on_;
   std::int32_t zero_counts_;  ///< homing changes it
+  bool counts_from_power_on_;
+  bool at_power_on_;  ///< no sample yet, from which it counts
   AxisObjects power_on_;
   AxisObjects objects_;
   ProtectionConfig protection_config_;

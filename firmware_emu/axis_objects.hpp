@@ -50,7 +50,7 @@ enum TelemetrySub : std::uint8_t {
 inline constexpr std::size_t kTelemetryValues = 8;
 
 /// Entries that an axis adds, for the dictionary's capacity.
-inline constexpr std::size_t kAxisEntries = 126;
+inline constexpr std::size_t kAxisEntries = 132;
 
 /// 6087: the torque reference may change as it likes.
 inline constexpr std::uint32_t kNoTorqueSlope = std::numeric_limits<std::uint32_t>::max();

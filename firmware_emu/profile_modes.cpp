@@ -74,14 +74,17 @@ Mode ProfileModes::cyclic(Mode mode) noexcept TANDEM_RT {
   }
 }
 
-bool ProfileModes::add_to(ObjectDictionary& od, int axis) {
+bool ProfileModes::add_to(ObjectDictionary& od, int axis, std::uint32_t modes) {
   const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
-  return od.rebind(at(co::kTorqueSlope), 0, torque_slope_) &&
-         od.add(at(co::kProfileVelocity), 0, speed_, kWriteRpdo) &&
-         od.add(at(co::kProfileAcceleration), 0, acceleration_, kWriteRpdo) &&
-         od.add(at(co::kProfileDeceleration), 0, deceleration_, kWriteRpdo) &&
-         od.add(at(co::kHomeOffset), 0, home_offset_, kReadWrite) &&
+  const std::uint32_t profiles = mode_bit(Mode::kPp) | mode_bit(Mode::kPv) | mode_bit(Mode::kTq);
+  const bool profile = (modes & profiles) == 0 ||
+                       (od.rebind(at(co::kTorqueSlope), 0, torque_slope_) &&
+                        od.add(at(co::kProfileVelocity), 0, speed_, kWriteRpdo) &&
+                        od.add(at(co::kProfileAcceleration), 0, acceleration_, kWriteRpdo) &&
+                        od.add(at(co::kProfileDeceleration), 0, deceleration_, kWriteRpdo));
+  return profile && od.add(at(co::kHomeOffset), 0, home_offset_, kReadWrite) &&
          od.add(at(co::kHomingMethod), 0, homing_method_, kReadWrite) &&
+         od.add_value<std::uint8_t>(at(co::kHomingSpeeds), 0, 2) &&
          od.add(at(co::kHomingSpeeds), 1, homing_speeds_[0], kReadWrite) &&
          od.add(at(co::kHomingSpeeds), 2, homing_speeds_[1], kReadWrite) &&
          od.add(at(co::kHomingAcceleration), 0, homing_acceleration_, kReadWrite);
@@ -144,15 +147,18 @@ void ProfileModes::take_set_point(const ProfileInputs& in) noexcept {
 
 void ProfileModes::position_mode(const ProfileInputs& in, double dt_s) noexcept {
   take_set_point(in);
-  out_.target_reached = motion_.move(motion_.position + way(out_.position, target_), speed_,
-                                     acceleration_, deceleration_, dt_s) &&
+  const double unit = 1.0 / in.velocity_units;
+  out_.target_reached = motion_.move(motion_.position + way(out_.position, target_), speed_ * unit,
+                                     acceleration_ * unit, deceleration_ * unit, dt_s) &&
                         !waiting_;
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
 }
 
 void ProfileModes::velocity_mode(const ProfileInputs& in, double dt_s) noexcept {
-  out_.target_reached = motion_.run(in.target_velocity, acceleration_, deceleration_, dt_s);
+  const double unit = 1.0 / in.velocity_units;
+  out_.target_reached =
+      motion_.run(in.target_velocity * unit, acceleration_ * unit, deceleration_ * unit, dt_s);
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
   out_.position = in.position;
   out_.bit_12 = out_.velocity == 0;
@@ -217,8 +223,9 @@ void ProfileModes::homing_mode(const ProfileInputs& in, double dt_s) noexcept {
     end_homing(Homing::kDone);
     return;
   }
-  const double speed = homing_speeds_[0];
-  motion_.run(low ? -speed : speed, homing_acceleration_, homing_acceleration_, dt_s);
+  const double speed = homing_speeds_[0] / in.velocity_units;
+  const double acceleration = homing_acceleration_ / in.velocity_units;
+  motion_.run(low ? -speed : speed, acceleration, acceleration, dt_s);
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
 }

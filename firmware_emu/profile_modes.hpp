@@ -35,7 +35,8 @@ struct ProfileInputs {
   bool follows = false;  ///< the drive follows its mode's reference now
   std::int32_t position = 0;
   std::int32_t target_position = 0;  ///< 607A, and 60C1:1
-  std::int32_t target_velocity = 0;  ///< 60FF [counts/s]
+  std::int32_t target_velocity = 0;  ///< 60FF
+  double velocity_units = 1.0;       ///< in a count per second: of 60FF, 6081, 6083, …
   std::int16_t target_torque = 0;    ///< 6071
   std::int16_t torque = 0;           ///< 6077
   bool at_low_switch = false;        ///< homing's: the axis is at the end of its range
@@ -59,10 +60,11 @@ struct ProfileOutputs {
 /// has a switch); every other one ends at once with a homing error.
 class ProfileModes {
  public:
-  /// Adds 6081, 6083, 6084, 6098, 6099, 609A and 607C of the axis; 6087 is of profile
-  /// torque alone from now on.
+  /// Adds 6098, 6099, 609A and 607C of the axis, and for a drive with profile modes also 6081, 6083
+  /// and 6084; 6087 is of profile torque alone then.
+  /// @param modes  the axis', bits of 6502
   /// @return false when `od` is full.
-  bool add_to(canopen::ObjectDictionary& od, int axis);
+  bool add_to(canopen::ObjectDictionary& od, int axis, std::uint32_t modes);
 
   /// Is it one of these modes?
   [[nodiscard]] static bool has(canopen::Mode mode) noexcept TANDEM_RT;
@@ -88,8 +90,8 @@ class ProfileModes {
   void end_homing(Homing how) noexcept;
 
   // Objects
-  std::uint32_t speed_ = 0;         ///< 6081 [counts/s]
-  std::uint32_t acceleration_ = 0;  ///< 6083 [counts/s^2]
+  std::uint32_t speed_ = 0;         ///< 6081 [velocity units]
+  std::uint32_t acceleration_ = 0;  ///< 6083 [velocity units / s]
   std::uint32_t deceleration_ = 0;  ///< 6084
   std::uint32_t torque_slope_ = 0;  ///< 6087 [per mille/s]; 0: as steep as it likes
   std::array<std::uint32_t, 2> homing_speeds_{};

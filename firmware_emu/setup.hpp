@@ -37,7 +37,13 @@ struct AxisSetup {
   std::uint32_t modes = canopen::kTandemModes;  ///< it takes these: bits of 6502
   bool reversed = false;         ///< 6064 counts down, and 6077 too, as the joint's angle grows
   std::int32_t zero_counts = 0;  ///< 6064 where the joint is at 0; its range may wrap around
-  double link_counts_per_rev = 524288.0;   ///< 608F
+  /// The encoder counts from where it stands at power-on, which 6064 shows as `zero_counts` until
+  /// homing finds the joint's place.
+  bool counts_from_power_on = false;
+  double link_counts_per_rev = 524288.0;  ///< 608F
+  /// Velocity units (606C, 60FF, 60B1, 6081, 6099; accelerations in them per second) at one
+  /// revolution of the link per second; 0: counts per second.
+  double velocity_units_per_rev = 0.0;
   double motor_counts_per_rev = 819200.0;  ///< 2033, per revolution of the link
   double rated_torque_Nm = 1.0;            ///< 6076
   /// Gains, motor data, limits. Position limits (607D) may be infinite: no limit.

@@ -11,6 +11,7 @@
 #include "base/result.hpp"
 #include "hal/cycle_time.hpp"
 #include "hal/fault_kind.hpp"
+#include "hal/homing.hpp"
 #include "hal/image.hpp"
 #include "hal/stop_category.hpp"
 
@@ -83,6 +84,16 @@ class Backend {
   /// Whether CommandImage::fault_reset clears the fault of that joint alone.
   [[nodiscard]] virtual bool resets_one_joint() const noexcept TANDEM_RT { return true; }
 
+  /// Begins the homing of `joint`, whose command is idle from now on until it has ended. Then it is
+  /// held where it stands until its command is another one. A fault and a stop end it.
+  /// @return false: the joint has no homing, is not enabled, or is another process' to home
+  virtual bool home(std::size_t /*joint*/) noexcept TANDEM_RT { return false; }
+  /// Halts it where it is; the joint is not homed then.
+  virtual void stop_homing(std::size_t /*joint*/) noexcept TANDEM_RT {}
+  /// What is known of the joint's place. A reset of faults changes nothing about it; a board that
+  /// has lost its power does.
+  [[nodiscard]] virtual Homing homing(std::size_t /*joint*/) const noexcept TANDEM_RT { return {}; }
+
   /// Asks the drives to stop and disable, category 1 (0 when that is latched): called each cycle
   /// until it answers true.
   [[nodiscard]] virtual bool shut_down() noexcept TANDEM_RT = 0;
@@ -98,11 +109,11 @@ class Backend {
   /// Cycles of the robot's time that have gone by unseen just before this exchange().
   [[nodiscard]] virtual std::uint64_t missed() const noexcept TANDEM_RT { return 0; }
 
-  /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
-  /// that is not in this process reports nothing.
   /// By how much the next cycle should begin later [ns], so that the loop keeps its place in the
   /// time of a wire that has a clock. On the wall clock only.
   [[nodiscard]] virtual std::int64_t clock_shift_ns() const noexcept TANDEM_RT { return 0; }
+  /// The next fault that was injected and has begun since, for the log; kNone: no more. A robot
+  /// that is not in this process reports nothing.
   [[nodiscard]] virtual InjectedFault next_injected() noexcept TANDEM_RT { return {}; }
 
   /// Writes or reads everything that the next read() depends on. Simulation only: a backend

@@ -15,7 +15,7 @@ enum class RunPhase : std::uint8_t {
   kResetting,  ///< faults are cleared, and every joint enabled where it is
   kShutDown,   ///< the drives stop and are disabled
   kDone,
-  kHeld,        ///< after a reset: every joint is held until controllers are started
+  kHeld,        ///< after a reset, or until joints are homed: controllers wait to start
   kRetreating,  ///< a stop of category 2: controllers bring the robot to a safe posture
 };
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/realtime.hpp"
+#include "hal/homing.hpp"
 #include "log/cdr_writer.hpp"
 
 namespace tandem::log {
@@ -41,6 +42,9 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kRecoveryRequested: return "recovery requested";
     case EventKind::kCollision: return "fault: collision";
     case EventKind::kGap: return "gap in the recording";
+    case EventKind::kHomingRequested: return "homing requested";
+    case EventKind::kHomed: return "homed";
+    case EventKind::kHomingFailed: return "homing failed";
   }
   return "?";
 }
@@ -100,6 +104,8 @@ std::string text_of(const Event& event, bool has_joint) {
       std::snprintf(torque, sizeof torque, ": an external torque of %.1f Nm", 1e-3 * event.code);
       return torque;
     }
+    case EventKind::kHomingFailed:
+      return std::string(": ") + hal::to_string(static_cast<hal::HomingError>(event.code));
     case EventKind::kFell: {
       constexpr const char* kHow[] = {"",
                                       ": its base is tilted",

@@ -43,6 +43,9 @@ enum class EventKind : std::uint8_t {
   kRecoveryRequested,    ///< on request: a joint goes back to its limits
   kCollision,            ///< a fault: something pushes a joint; `code`: its torque [mNm or mN]
   kGap,                  ///< of an imported log: `code` cycles are missing before this one
+  kHomingRequested,      ///< on request: a drive looks for its joint's place
+  kHomed,                ///< it has found it
+  kHomingFailed,         ///< `code`: its hal::HomingError
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.

@@ -54,6 +54,9 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
       return std::to_string(about.config.loop.stop_late) + " of the last " +
              std::to_string(about.config.loop.stop_window) + " cycles were late";
     case FaultSource::kBringUp: return "the drives were not enabled in time";
+    case FaultSource::kNotHomed:
+      return "it was not homed, for which the controllers waited: tandem joint home, or "
+             "homing.at_start = true";
     case FaultSource::kEmergencyStop:
       return emergency_text(static_cast<EmergencyInput>(record.code));
     case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
@@ -74,6 +77,7 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
     case FaultSource::kCommand:
     case FaultSource::kStray:
     case FaultSource::kCollision:
+    case FaultSource::kNotHomed:
       fault.joint = about.robot.joints[index].name;
       fault.board = about.robot.joints[index].board;
       break;

@@ -44,6 +44,7 @@ struct LoopRequest {
     kRecover,  ///< `joint`, back to its limits
     kMove,     ///< `joint`, as `move` says
     kReset,    ///< the drive of `joint`
+    kHome,     ///< `joint`, as its configuration says
   };
   std::uint64_t number = 0;  ///< its answer's
   Kind kind = Kind::kSwitch;
@@ -79,6 +80,10 @@ enum class RejectReason : std::uint32_t {
   kBoardLost,   ///< not the drive of `joint`, its board has to come back, with all its joints
   kServed,      ///< another process resets the drives
   kDriveFault,  ///< the drive of `joint` is in fault, or its board is lost
+  kNotHomed,    ///< `joint` has to be homed first
+  kHoming,      ///< `joint` is being homed
+  kHomedThere,  ///< another process homes the drives
+  kDisabled,    ///< the drive of `joint` is not enabled
 };
 
 struct LoopAnswer {

@@ -108,6 +108,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   check_backend(read_code_);
   advance_phase();
   watch_drive_resets();
+  watch_homing();
 }
 
 /// While controllers run: a robot that lies, or that somebody holds, feels more than itself.
@@ -152,7 +153,8 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
     case RunPhase::kBringUp:
       if (backend_->phase() == hal::Phase::kOperational) {
         event(EventKind::kBringUpDone);
-        on(RunEvent::kEnabled);
+        wait_for_homing();
+        on(RunEvent::kEnabled, held_back_ != 0);
       } else if (over) {
         fault({.source = FaultSource::kBringUp, .category = StopCategory::kCategory1});
       }
@@ -165,6 +167,7 @@ void RobotCycle::advance_phase() noexcept TANDEM_RT {
     case RunPhase::kFaulted:
     case RunPhase::kHeld:
       if (!over) break;
+      if (ends_unhomed()) break;
       event(EventKind::kControllersDone);
       on(RunEvent::kFinished);
       break;
@@ -190,6 +193,7 @@ void RobotCycle::update(const rt::Tick& tick) noexcept TANDEM_RT {
       controllers_->move_on(state_, command_);
       controllers_->lead_back(command_);
       hold_drives_in_reset(command_);
+      hold_unhomed(command_);
       break;
     case RunPhase::kRunning:
       if (!tick.hold) run_controllers();  // else the last command goes out once more
@@ -218,6 +222,7 @@ void RobotCycle::run_controllers() noexcept TANDEM_RT {
   const Code code = controllers_->update(time_, state_, controlled());
   controllers_->lead_back(controlled());
   hold_drives_in_reset(controlled());
+  hold_unhomed(controlled());
   if (delay_.on()) delay_.pass(wanted_, command_);
   controllers_answered(code);
   if (const auto stray = controllers_->take_stray()) {
@@ -389,6 +394,7 @@ void RobotCycle::show_joints() noexcept TANDEM_RT {
     joint.drive_state = drive_state[j];
     joint.moving = controllers_->leads(j) ? std::uint8_t{1} : std::uint8_t{0};
     joint.resetting = resets_[j] != 0 ? std::uint8_t{1} : std::uint8_t{0};
+    joint.homing = homings_[j];
   }
   services_.show(joints_);
 }

@@ -162,6 +162,16 @@ class RobotCycle {
   void hold_drives_in_reset(hal::CommandImage& command) noexcept TANDEM_RT;
   void drive_is_well(std::size_t joint) noexcept TANDEM_RT;
 
+  // Joints whose position has to be found first: robot_cycle_homing.cpp.
+  [[nodiscard]] LoopAnswer home_joint(std::size_t joint) noexcept TANDEM_RT;
+  void watch_homing() noexcept TANDEM_RT;
+  void home_at_start() noexcept TANDEM_RT;
+  void hold_unhomed(hal::CommandImage& command) noexcept TANDEM_RT;
+  void wait_for_homing() noexcept TANDEM_RT;
+  [[nodiscard]] bool ends_unhomed() noexcept TANDEM_RT;
+  [[nodiscard]] bool has_to_be_homed(std::size_t joint) const noexcept TANDEM_RT;
+  [[nodiscard]] bool claims_unhomed(ControllerSet controllers) const noexcept TANDEM_RT;
+
   void archive(Archive& ar);
 
   const hal::RobotConfig* robot_;
@@ -208,6 +218,9 @@ class RobotCycle {
   std::vector<std::uint8_t> causes_;         // for the owner
   std::uint64_t reset_cycles_;               // that the reset of one drive may take
   std::vector<std::uint64_t> resets_;        // by joint: cycles that are left of it
+  std::vector<std::size_t> homes_;           // the joints that have a homing
+  std::vector<hal::Homing> homings_;         // by joint: as the backend said last
+  bool homes_at_start_ = false;              // joints whose homing nobody has to ask for
 };
 
 }  // namespace tandem::runtime

@@ -41,7 +41,8 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint =
       record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
       record.source == FaultSource::kCommand || record.source == FaultSource::kStray ||
-      record.source == FaultSource::kCollision;
+      record.source == FaultSource::kCollision ||
+      record.source == FaultSource::kNotHomed;
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
@@ -119,7 +120,8 @@ void RobotCycle::reset_done() noexcept TANDEM_RT {
 void RobotCycle::hold_back() noexcept TANDEM_RT {
   const ControllerSet now = controllers_->shown().active;
   const ControllerSet active = now | std::exchange(before_retreat_, ControllerSet{0});
-  if (config_.after_reset == AfterReset::kContinue) {  // those, too, that a retreat has stopped
+  if (config_.after_reset == AfterReset::kContinue &&
+      !claims_unhomed(active)) {  // those, too, that a retreat has stopped
     if (active != now) {
       (void)controllers_->switch_over(0, active & ~now, false, time_, state_, controlled());
     }

@@ -88,6 +88,11 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
     }
     case Kind::kRecover:
     case Kind::kMove: {
+      const bool homes = homings_[request.joint].state == hal::HomingState::kHoming;
+      if (homes && stops_motion(request)) {
+        backend_->stop_homing(request.joint);
+        return {};
+      }
       if (!run_.in(RunPhase::kHeld) && !run_.in(RunPhase::kRunning)) return not_enabled;
       const bool recovers = request.kind == Kind::kRecover;
       const LoopAnswer no =
@@ -97,6 +102,7 @@ LoopAnswer RobotCycle::carry_out(const LoopRequest& request) noexcept TANDEM_RT 
       return controllers_->move(request.joint, request.move, controlling_, state_, controlled());
     }
     case Kind::kReset: return reset_drive(request.joint);
+    case Kind::kHome: return home_joint(request.joint);
     case Kind::kGains: break;
   }
   controllers_->gains().set_gains(request.joint, request.loop, request.gains);
@@ -110,6 +116,10 @@ LoopAnswer RobotCycle::may_lead(std::size_t joint, bool drives) const noexcept T
     answer.reason = RejectReason::kResetting;
   } else if (drives && watch_.is_ill(state_, joint)) {
     answer.reason = RejectReason::kDriveFault;
+  } else if (homings_[joint].state == hal::HomingState::kHoming) {
+    if (drives) answer.reason = RejectReason::kHoming;
+  } else if (drives && has_to_be_homed(joint)) {
+    answer.reason = RejectReason::kNotHomed;
   }
   return answer;
 }
@@ -118,6 +128,13 @@ LoopAnswer RobotCycle::may_start(ControllerSet start) const noexcept TANDEM_RT {
   for (std::size_t j = 0; j < resets_.size(); ++j) {
     if (resets_[j] == 0 || !controllers_->is_claimed(j, start)) continue;
     return {.reason = RejectReason::kResetting, .joint = static_cast<std::int32_t>(j)};
+  }
+  for (const std::size_t j : homes_) {
+    if (!controllers_->is_claimed(j, start)) continue;
+    LoopAnswer no{.joint = static_cast<std::int32_t>(j)};
+    if (homings_[j].state == hal::HomingState::kHoming) no.reason = RejectReason::kHoming;
+    if (has_to_be_homed(j)) no.reason = RejectReason::kNotHomed;
+    if (no.reason != RejectReason::kNone) return no;
   }
   return controllers_->may_start(start);
 }
@@ -156,6 +173,7 @@ void RobotCycle::log_request(const LoopRequest& request) noexcept TANDEM_RT {
     event(EventKind::kControllersSwitched);
   }
   if (request.kind == Kind::kJoint) event(EventKind::kJointSet, joint);
+  if (request.kind == Kind::kHome) event(EventKind::kHomingRequested, joint);
   if (request.kind == Kind::kRecover) event(EventKind::kRecoveryRequested, joint);
   if (request.kind == Kind::kGains) event(EventKind::kGainsSet, joint);
   if (request.kind != Kind::kMove) return;

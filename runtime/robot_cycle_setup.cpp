@@ -39,7 +39,13 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       joint_limited_(parts.robot.joints.size()),
       causes_(parts.robot.joints.size()),
       reset_cycles_(static_cast<std::uint64_t>(kDriveReset_ns / config.loop.period_ns)),
-      resets_(parts.robot.joints.size()) {
+      resets_(parts.robot.joints.size()),
+      homings_(parts.robot.joints.size()) {
+  for (std::size_t j = 0; j < parts.robot.joints.size(); ++j) {
+    if (!parts.robot.joints[j].homing) continue;
+    homes_.push_back(j);
+    homings_[j] = parts.backend.homing(j);
+  }
   progress_.total_cycles = config.running_cycles;
   if (owner_.port != nullptr) owner_.port->on_news([this] { inbox_.bell().ring(); });
 }
@@ -59,7 +65,7 @@ void RobotCycle::archive(Archive& ar) {
   statistics_.archive(ar);
   controllers_->archive(ar);
   ar(time_, started_, controlling_, held_back_, before_retreat_, read_code_, ran_);
-  ar(joint_limited_, faults_, resets_);
+  ar(joint_limited_, faults_, resets_, homings_, homes_at_start_);
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {

@@ -8,9 +8,8 @@ RunPhase next_phase(RunPhase phase, RunEvent event, RunGuards guards) noexcept T
   const RunPhase controlled = guards.settles ? kSettling : kRunning;
   switch (event) {
     case RunEvent::kEnabled:
-      if (phase == kBringUp) return controlled;
-      if (phase == kResetting) return guards.holds_back ? kHeld : controlled;
-      return phase;
+      if (phase != kBringUp && phase != kResetting) return phase;
+      return guards.holds_back ? kHeld : controlled;
     case RunEvent::kSettled: return phase == kSettling ? kRunning : phase;
     case RunEvent::kFinished:
       if (phase == kRunning) return kShutDown;

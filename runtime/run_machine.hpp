@@ -36,9 +36,11 @@ inline constexpr RunEvent kRunEvents[] = {
 
 /// What an event's outcome depends on besides the phase.
 struct RunGuards {
-  bool settles = false;     ///< the robot has to settle before controllers run
-  bool waits = false;       ///< after a stop the run waits: for a reset, or to be ended
-  bool holds_back = false;  ///< controllers that were active before the reset wait to be started
+  bool settles = false;  ///< the robot has to settle before controllers run
+  bool waits = false;    ///< after a stop the run waits: for a reset, or to be ended
+  /// Controllers that were active before a reset, or whose joints are to be homed, wait to be
+  /// started.
+  bool holds_back = false;
 };
 
 /// The phase after `event`; `phase` itself where the event has no meaning there.

@@ -121,6 +121,15 @@ Words words_of(RejectReason reason, RunPhase phase, const std::string& joint,
     case RejectReason::kServed:
       return {"its drive is reset by the process that serves the robot",
               "ask that one, or reset every drive: tandem fault reset"};
+    case RejectReason::kHomedThere:
+      return {"is homed by the process that serves the robot", "ask that one"};
+    case RejectReason::kNotHomed:
+      return {"has to be homed first: its position is not known", "tandem joint home " + joint};
+    case RejectReason::kHoming:
+      return {"is being homed", "ask again when that is over: tandem joint show " + joint +
+                                    "; tandem joint stop " + joint + " ends it"};
+    case RejectReason::kDisabled:
+      return {"its drive is not enabled", "tandem joint set " + joint + " --mode position"};
     case RejectReason::kIncapable:
       return {"cannot be put into this mode", "its [gains] table lacks the loop"};
   }

@@ -60,7 +60,8 @@ struct JointStatus {
   std::uint8_t drive_state = 0;  ///< hal::DriveState
   std::uint8_t moving = 0;       ///< by move_joint() or recover()
   std::uint8_t resetting = 0;    ///< by reset_joint()
-  std::uint8_t padding[6] = {};
+  hal::Homing homing;            ///< what is known of its place
+  std::uint8_t padding[4] = {};
 };
 
 /// The same with what is known of it besides.
@@ -145,7 +146,8 @@ class RunServices {
   [[nodiscard]] std::vector<JointInfo> joints();
   /// Every sensor, in the image's order.
   [[nodiscard]] std::vector<SensorInfo> sensors() const;
-  /// Mode and interaction of a joint that no active controller claims, impedance of any.
+  /// Mode and interaction of a joint that no active controller claims, impedance of any. A joint
+  /// that has to be homed, or is being homed, is refused, here and by what follows.
   /// Errors: unknown joint; claimed (the controller is named); not while controllers run; a mode
   /// that the joint lacks; a value beyond its limit (which is named).
   [[nodiscard]] Result<RequestResult> set_joint(const std::string& joint, const JointRequest& wish,
@@ -169,6 +171,13 @@ class RunServices {
   /// another process'; another phase than faulted, held, settling, running.
   [[nodiscard]] Result<RequestResult> reset_joint(const std::string& joint,
                                                   Patience patience = kPatience);
+  /// Lets the drive of a joint find the joint's place, as its `homing` in robot.toml says.
+  /// Meanwhile nothing else moves the joint; stop it by move_joint() without a target. How it ends,
+  /// joints() tells. Errors: unknown joint; it has no homing; claimed, while controllers run; its
+  /// drive is in fault or not enabled; another process drives the robot; not in the phases held and
+  /// running.
+  [[nodiscard]] Result<RequestResult> home_joint(const std::string& joint,
+                                                 Patience patience = kPatience);
   /// Gains of one of its drive's loops; they travel by SDO, within some ten cycles.
   /// Errors: unknown joint; a loop that it lacks; a gain that is negative, or no 32-bit number.
   [[nodiscard]] Result<RequestResult> set_gains(const std::string& joint, hal::PidLoop loop,

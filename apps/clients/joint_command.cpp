@@ -101,6 +101,7 @@ Result<Json> question_of(const JointOptions& o) {
     case JointOptions::Action::kSet: question["do"] = "joint.set"; break;
     case JointOptions::Action::kMove: question["do"] = "joint.move"; break;
     case JointOptions::Action::kStop: question["do"] = "joint.stop"; break;
+    case JointOptions::Action::kHome: question["do"] = "joint.home"; break;
     case JointOptions::Action::kRecover: question["do"] = "joint.recover"; break;
     case JointOptions::Action::kReset: question["do"] = "joint.reset"; break;
     case JointOptions::Action::kGains: question["do"] = "joint.gains"; break;
@@ -166,6 +167,10 @@ void print_answer(const JointOptions& options, const Json& answer, const Json& q
                  place_of(answer, question["target_rad"], in_degrees(options)), options.joint);
       break;
     case Action::kStop: fmt::print("{} {}\n", options.joint, outcome_of_stop(done, answer)); break;
+    case Action::kHome:
+      fmt::print("{}: its drive {} for its place: tandem joint show {}\n", options.joint,
+                 done ? "looks" : "will look", options.joint);
+      break;
     case Action::kRecover:
       fmt::print("{} comes back from {} {} to its limit: tandem joint list {}\n", options.joint,
                  number_of(answer, "position_rad"), unit_of(answer), options.joint);
@@ -220,6 +225,15 @@ Result<Json> wait_for_reset(ControlClient& run, const std::string& name) {
   for (;;) {
     Result<Json> now = look(run, name);
     if (!now || !now->value("resetting", false)) return now;
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+/// The joint once its homing has ended; after Ctrl-C at once.
+Result<Json> wait_for_homing(ControlClient& run, const std::string& name) {
+  for (;;) {
+    Result<Json> now = look(run, name);
+    if (!now || now->value("homing", "") != "under way" || rt::stop_requested()) return now;
     std::this_thread::sleep_for(kLook);
   }
 }
@@ -296,6 +310,28 @@ Exit tell_reset(const JointOptions& options, const Json& joint) {
   return Exit::kDone;
 }
 
+/// What came of a homing.
+Exit tell_homing(const JointOptions& options, const Json& joint) {
+  const std::string state = joint.value("homing", "");
+  if (state == "homed") {
+    if (options.json == "-") return Exit::kDone;
+    fmt::print("{} is homed: it is at {}\n", options.joint,
+               place_of(joint, joint["position_rad"], !slides(joint)));
+    return Exit::kDone;
+  }
+  if (state == "under way") {  // Ctrl-C
+    fmt::print(stderr, "{0} is still being homed: `tandem joint stop {0}` ends that\n",
+               options.joint);
+    return Exit::kFault;
+  }
+  print_errors({{.message = "the homing failed: " + joint.value("homing_error", ""),
+                 .hint = "see its drive: tandem joint show " + options.joint +
+                         "; then tandem joint home " + options.joint + " again",
+                 .file = {},
+                 .key = options.joint}});
+  return Exit::kFault;
+}
+
 /// list and show: those joints that are named.
 Exit show(const JointOptions& options, Json answer) {
   const bool one = options.action == JointOptions::Action::kShow;
@@ -318,7 +354,8 @@ Exit joint_command(const JointOptions& options) {
   const auto run = ControlClient::open(options.target, "run");
   if (!run) return refuse(run.error());
   const bool moves = options.action == Action::kMove && options.wait;
-  if (moves) rt::install_stop_signals();
+  const bool homes = options.action == Action::kHome;
+  if (moves || homes) rt::install_stop_signals();
   const Result<Json> asked = (*run)->ask(*question);
   if (!asked) return refuse(asked.error());
   Json answer = *asked;
@@ -328,11 +365,12 @@ Exit joint_command(const JointOptions& options) {
   const bool resets = options.action == Action::kReset && answer.value("latched", false) &&
                       answer.value("done", false);
   bool begun = answer.value("done", false);
-  if (moves || resets) {
+  if (moves || resets || (homes && begun)) {
     std::fflush(stdout);  // before the waiting
     const Result<Json> joint =
-        moves ? wait_for_motion(**run, options.joint, (*question)["target_rad"], begun)
-              : wait_for_reset(**run, options.joint);
+        moves   ? wait_for_motion(**run, options.joint, (*question)["target_rad"], begun)
+        : homes ? wait_for_homing(**run, options.joint)
+                : wait_for_reset(**run, options.joint);
     if (!joint) {
       print_errors({joint.error()});
       return Exit::kFault;
@@ -340,8 +378,9 @@ Exit joint_command(const JointOptions& options) {
     for (const auto& [key, value] : joint->items()) {
       if (key != "cycle") answer[key] = value;  // that of the request stays
     }
-    exit = moves ? tell_motion(options, *joint, (*question)["target_rad"], begun)
-                 : tell_reset(options, *joint);
+    exit = moves   ? tell_motion(options, *joint, (*question)["target_rad"], begun)
+           : homes ? tell_homing(options, *joint)
+                   : tell_reset(options, *joint);
   }
   if (Status written = write_json(options.json, answer); !written) return refuse(written.error());
   return exit;

@@ -48,7 +48,11 @@ std::string drive_of(const Json& joint) {
   const auto fault = joint.value("fault", 0U);
   const std::string state = joint.value("drive_state", "");
   const char* sensor = feedback == "sensor_fault" ? ", sensor" : "";
-  return fault == 0 ? state : fmt::format("{} (0x{:04X}){}", state, fault, sensor);
+  if (fault != 0) return fmt::format("{} (0x{:04X}){}", state, fault, sensor);
+  const std::string homing = joint.value("homing", "");
+  return homing == "not homed"   ? state + ", not homed"
+         : homing == "under way" ? state + ", is being homed"
+                                 : state;
 }
 
 /// What the figures of a joint are worth.
@@ -155,6 +159,10 @@ void print_joint(const Json& joint) {
   facts.add("position", with("position_rad", unit) + ", commanded " +
                             with("commanded_position_rad", unit) +
                             (joint.value("moving", false) ? ", moving" : ""));
+  if (const std::string homing = joint.value("homing", "none"); homing != "none") {
+    const std::string why = joint.value("homing_error", "");
+    facts.add("homing", homing + (why.empty() ? "" : ": " + why));
+  }
   facts.add("limits", limits_of(joint));
   facts.add("velocity", with("velocity_rad_s", unit + "/s"));
   facts.add("torque", with("torque_Nm", torque));

@@ -91,6 +91,7 @@ struct JointOptions {
     kSet,
     kMove,
     kStop,
+    kHome,
     kRecover,
     kReset,
     kGains

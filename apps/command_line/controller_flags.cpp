@@ -25,6 +25,7 @@ const char kJointExamples[] = R"(Examples:
   tandem joint move LElbj --to -30deg --speed 20deg/s
                                                      a free joint to a place, and `joint stop LElbj`
   tandem joint move LElbj --to 0 --wait              until it is there; Ctrl-C ends only the waiting
+  tandem joint home LElbj                            let its drive find the joint's place
   tandem joint reset LElbj                           clear the fault of its drive alone
   tandem joint recover LElbj                         outside its limits: slowly back inside
   tandem joint gains LElbj position --kp 150         to its drive, by SDO
@@ -135,7 +136,13 @@ void add_flags(CLI::App& app, JointOptions& o) {
       "--wait", o.wait,
       "Until it has arrived: status 0; 1 when the motion ended elsewhere. Ctrl-C ends the "
       "waiting, not the motion: tandem joint stop");
-  add("stop", "Brake a joint that `joint move` leads", Action::kStop)
+  add("stop", "Brake a joint that `joint move` or `joint home` leads", Action::kStop)
+      ->add_option("joint", o.joint, "Its name")
+      ->required();
+  add("home",
+      "Let a joint's drive find the joint's place, as its `homing` in robot.toml says; until it is "
+      "done: status 0, or 1 when it failed. Ctrl-C ends the waiting alone",
+      Action::kHome)
       ->add_option("joint", o.joint, "Its name")
       ->required();
   add("recover", "Lead a free joint back inside its limits, slowly", Action::kRecover)

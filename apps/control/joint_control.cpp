@@ -94,6 +94,8 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"fault", look.fault},
           {"fault_text", run.cycle.drive_fault(index, look.fault)},
           {"resetting", look.resetting != 0},
+          {"homing", hal::to_string(look.homing.state)},
+          {"homing_error", hal::to_string(look.homing.error)},
           {"age_cycles", look.age_cycles},
           {"feedback", feedback_of(look)},
           {"gains", std::move(gains)}};
@@ -237,11 +239,19 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
         .doc = "else it reaches the speed in half a second"},
        {.name = "unit", .doc = "angle, length: what the joint has to be"}},
       [run](const Json& request) { return move(*run, request); });
-  registry.add("joint.stop", ControlEffect::kChanges, "brakes a joint that joint.move leads",
-               {joint}, [run](const Json& request) {
+  registry.add("joint.stop", ControlEffect::kChanges,
+               "brakes a joint that joint.move or joint.home leads", {joint},
+               [run](const Json& request) {
                  const auto name = request["joint"].get<std::string>();
                  return tell(*run, name, run->cycle.services().move_joint(name, {}));
                });
+  registry.add(
+      "joint.home", ControlEffect::kChanges,
+      "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says",
+      {joint}, [run](const Json& request) {
+        const auto name = request["joint"].get<std::string>();
+        return tell(*run, name, run->cycle.services().home_joint(name));
+      });
   registry.add("joint.recover", ControlEffect::kChanges,
                "leads a joint that stands outside its limits back, at a twentieth of its velocity",
                {joint}, [run](const Json& request) {

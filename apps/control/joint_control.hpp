@@ -8,8 +8,8 @@
 
 namespace tandem::apps {
 
-/// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.recover", "joint.reset"
-/// and "joint.gains". Cycle and robot outlive the registry.
+/// Adds "joint.list", "joint.set", "joint.move", "joint.stop", "joint.home", "joint.recover",
+/// "joint.reset" and "joint.gains". Cycle and robot outlive the registry.
 void add_joint_commands(ControlRegistry& registry, runtime::RobotCycle& cycle,
                         const hal::RobotConfig& robot);
 

@@ -43,6 +43,9 @@ void add_robot_facts(const hal::RobotConfig& robot, Facts& facts) {
     facts.add("bus " + bus.name,
               fmt::format("{}, {}", counted(nodes, "node"), hal::can::wire_name(bus.kind, bus.fd)));
   }
+  for (const hal::can::DriveFact& fact : hal::can::drive_facts(robot)) {
+    facts.add("drive", fact.what + ": " + fact.how);
+  }
 }
 
 void add_kernel_facts(const model::KernelLibrary& kernels, const std::string& robot, Facts& facts) {

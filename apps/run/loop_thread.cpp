@@ -22,6 +22,29 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
+/// Says once why a run that was just enabled does not start.
+class HomingNote {
+ public:
+  void look(const runtime::RobotCycle& cycle, const hal::RobotConfig& robot) {
+    if (told_ || cycle.progress().phase.load() != runtime::RunPhase::kHeld) return;
+    told_ = true;
+    if (cycle.progress().resets.load() > 0) return;
+    std::string names;
+    for (const hal::JointConfig& joint : robot.joints) {
+      if (!joint.homing || !joint.homing->required || joint.homing->at_start) continue;
+      names += (names.empty() ? "" : ", ") + joint.name;
+    }
+    if (names.empty()) return;
+    fmt::print(stderr,
+               "{}held until these are homed: {} (tandem joint home NAME; then tandem controller "
+               "start)\n",
+               is_terminal(stderr) ? "\r\x1b[K" : "", names);
+  }
+
+ private:
+  bool told_ = false;
+};
+
 /// Prints each fault when it happens, for a run that waits for its reset.
 class FaultNotes {
  public:
@@ -100,6 +123,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
   ProgressBar bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.open_buses(), stderr);
   FaultNotes faults;
+  HomingNote homing;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
     if (logged && recorder->failed()) {
@@ -107,6 +131,7 @@ void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Compo
       warn_of_log(*recorder);
     }
     if (!quiet) buses.look();
+    if (!quiet) homing.look(cycle, e.robot);
     if (waits && !quiet) faults.look(cycle);
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,

@@ -117,6 +117,27 @@ struct BrakeConfig {
   int engage_ms = 0;   ///< from the current's end until it holds
 };
 
+/// A joint's `homing`: how its drive finds the joint's place (CiA 402's homing mode).
+struct HomingConfig {
+  int method = 0;                    ///< 6098: -128 to 127, not 0
+  double speed_rad_s = 0.0;          ///< 6099:1, to the switch or stop
+  double zero_speed_rad_s = 0.0;     ///< 6099:2, to the zero; default a tenth of the above
+  double acceleration_rad_s2 = 0.0;  ///< 609A
+  double position_rad = 0.0;         ///< the joint's angle at the place that is found: 607C
+  double timeout_s = 60.0;
+  bool required = true;   ///< until it is done, nothing else moves the joint
+  bool at_start = false;  ///< it is done once the drives are enabled, without a request
+  int line = 0;           ///< in the TOML, for messages
+};
+
+/// A joint's `stop_options`: 605B to 605E of its drive; what is empty stays as the drive has it.
+struct StopOptions {
+  std::optional<int> shutdown;  ///< 605B
+  std::optional<int> disable;   ///< 605C
+  std::optional<int> halt;      ///< 605D
+  std::optional<int> fault;     ///< 605E
+};
+
 /// [[joint]]
 struct JointConfig {
   std::string name;  ///< URDF joint
@@ -142,11 +163,17 @@ struct JointConfig {
                                      ///< drive gives; 0: not watched
   double oscillation_time_s = 1.0;   ///< of that mean
   std::optional<BrakeConfig> brake = {};
-  bool reversed = false;         ///< the drive counts down as the joint's angle grows
-  std::int32_t zero_counts = 0;  ///< what the drive counts where the joint is at 0
-  bool counts_of_sheet = false;  ///< encoder_counts_per_rev is what the drive's sheet says
-  bool torque_of_sheet = false;  ///< rated_torque_Nm is
-  bool slides = false;           ///< prismatic: m and N; the URDF's, by complete_from_description()
+  std::optional<HomingConfig> homing = {};  ///< none: its encoder is absolute
+  bool reversed = false;                    ///< the drive counts down as the joint's angle grows
+  std::int32_t zero_counts = 0;             ///< what the drive counts where the joint is at 0
+  StopOptions stop_options = {};
+  /// The drive's velocity units at one revolution of the joint per second; 0: its counts per
+  /// second.
+  double velocity_units_per_rev = 0.0;
+  bool velocity_of_sheet = false;  ///< velocity_units_per_rev is what the drive's sheet says
+  bool counts_of_sheet = false;    ///< encoder_counts_per_rev is what the drive's sheet says
+  bool torque_of_sheet = false;    ///< rated_torque_Nm is
+  bool slides = false;  ///< prismatic: m and N; the URDF's, by complete_from_description()
   StopCategory on_fault = StopCategory::kCategory1;  ///< when its board dies or faults
   int on_fault_line = 0;                             ///< in the TOML, for messages
   int line = 0;                                      ///< the same
@@ -205,6 +232,7 @@ struct BoardConfig {
   int command_timeout_cycles = 10;             ///< SYNCs without a command until the safe state
   std::int64_t boot_time_ns = 1'500'000'000;   ///< from a reset to the boot-up message, at most
   int slow_pdo_every = 1;                      ///< motor velocity, current, … every n-th SYNC
+  bool keeps_configuration = false;  ///< it stores (1010) and names (1020) what it was written
   std::string eds;  ///< path of its data sheet, against the TOML's folder; empty: one of our own
   std::shared_ptr<const canopen::DataSheet> sheet = canopen::tandem_board_sheet();
   // 1018, as the board has to identify itself; without a value that of the sheet, or any serial

@@ -3,6 +3,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include "canopen/drive_abilities.hpp"
+#include "canopen/frame.hpp"
+#include "canopen/objects.hpp"
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -50,6 +53,7 @@ BoardConfig read_board(TomlTable& table) {
       static_cast<int>(table.integer_or("command_timeout_cycles", 10, 1, 10'000));
   board.slow_pdo_every = static_cast<int>(table.integer_or("slow_pdo_every", 1, 1, 240));
   board.eds = table.text_or("eds", "");
+  board.keeps_configuration = table.boolean_or("keeps_configuration", false);
   const double usual_s = board.eds.empty() ? kOwnBoot_s : kSheetBoot_s;
   board.boot_time_ns = std::llround(1e9 * table.number_or("boot_time_s", usual_s, {0.1, 60.0}));
   board.vendor_id = read_identity(table, "vendor_id");
@@ -69,7 +73,35 @@ void read_sheet(TomlTable& table, const std::string& robot_file, BoardConfig& bo
     return;
   }
   board.eds = path;
+  if (table.boolean_or("fd", false)) {
+    sheet->most_pdo_bytes = static_cast<int>(canopen::kMaxFrameBytes);
+  }
   board.sheet = std::make_shared<const canopen::DataSheet>(std::move(*sheet));
+}
+
+/// What only a drive of another make may, or can, be told.
+void check_drive_keys(TomlTable& table, const RobotConfig& robot, const BoardConfig& board) {
+  const BusConfig* bus = robot.bus(board.bus);
+  if (table.has("fd") && board.eds.empty()) {
+    (void)table.boolean_or("fd", false);
+    table.error("fd", "is for drives of other makers: our own boards take what their bus has",
+                "remove this key, or set fd of the bus");
+  } else if (table.has("fd") && table.boolean_or("fd", false) && bus != nullptr &&
+             (!bus->fd || bus->kind == BusKind::kEthercat)) {
+    table.error("fd", "its bus '" + bus->name + "' is no CAN FD bus",
+                "remove this key, or set fd = true of the bus");
+  }
+  if (!board.keeps_configuration) return;
+  using canopen::writable;
+  namespace object = canopen::object;
+  const bool names = writable(*board.sheet, object::kVerifyConfiguration, 1) &&
+                     writable(*board.sheet, object::kVerifyConfiguration, 2);
+  const bool stores = writable(*board.sheet, object::kStoreParameters, 1);
+  if (names && stores) return;
+  table.error("keeps_configuration",
+              std::string("its drive cannot: ") + (names ? "1010:1" : "1020") +
+                  " is missing in its sheet, or cannot be written",
+              "remove this key: the configuration is written at every start");
 }
 
 /// The joints that the board lists: each once, and on this board alone.
@@ -105,6 +137,7 @@ void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
   read_sheet(table, robot.file, board);
   board.bus = read_bus_name(table, bus);
   check_reference(table, "bus", board.bus, robot.buses, "bus");
+  check_drive_keys(table, robot, board);
   board.node_id = ids.read(table, board.bus);
   board.serial = read_identity(table, "serial");
   std::vector<std::string> joints = read_list(table, board.name, boards);

@@ -1,5 +1,7 @@
 // [[joint]]: limits, brake, encoders and reaction to faults, for one joint or for a list of them.
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "canopen/drive_abilities.hpp"
@@ -49,6 +51,45 @@ std::optional<BrakeConfig> read_brake(TomlTable& table) {
   return b;
 }
 
+std::optional<HomingConfig> read_homing(TomlTable& table) {
+  if (!table.has("homing")) return {};
+  TomlTable homing = table.table("homing");
+  HomingConfig h;
+  h.line = table.line("homing");
+  h.method = static_cast<int>(homing.integer("method", -128, 127));
+  if (h.method == 0 && !homing.has_errors()) {
+    homing.error("method", "0 is no homing", "give the number of a method that the drive has");
+  }
+  h.speed_rad_s = homing.number("speed_rad_s", kPositive);
+  h.zero_speed_rad_s = homing.number_or("zero_speed_rad_s", 0.1 * h.speed_rad_s, kPositive);
+  h.acceleration_rad_s2 = homing.number("acceleration_rad_s2", kPositive);
+  h.position_rad = homing.number_or("position_rad", 0.0);
+  h.timeout_s = homing.number_or("timeout_s", h.timeout_s, {0.1, 3600.0});
+  h.required = homing.boolean_or("required", true);
+  h.at_start = homing.boolean_or("at_start", false);
+  if (h.at_start && !h.required) {
+    homing.error("at_start", "goes with required = true", "remove one of the two");
+  }
+  homing.finish();
+  return h;
+}
+
+StopOptions read_stop_options(TomlTable& table) {
+  StopOptions options;
+  if (!table.has("stop_options")) return options;
+  TomlTable keys = table.table("stop_options");
+  const auto read = [&](const char* key) -> std::optional<int> {
+    if (!keys.has(key)) return {};
+    return static_cast<int>(keys.integer(key, -32768, 32767));
+  };
+  options = {.shutdown = read("shutdown"),
+             .disable = read("disable"),
+             .halt = read("halt"),
+             .fault = read("fault")};
+  keys.finish();
+  return options;
+}
+
 /// What joints may have in common.
 JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   JointConfig joint;
@@ -72,6 +113,9 @@ JointConfig read_joint(TomlTable& table, const RobotConfig& robot) {
   joint.oscillation_time_s =
       table.number_or("oscillation_time_s", joint.oscillation_time_s, {0.01, 60.0});
   joint.brake = read_brake(table);
+  joint.homing = read_homing(table);
+  joint.stop_options = read_stop_options(table);
+  joint.velocity_units_per_rev = table.number_or("velocity_units_per_rev", 0.0, kPositive);
   joint.on_fault = read_stop_category(table);
   joint.on_fault_line = table.line("on_fault");
   return joint;
@@ -131,11 +175,17 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
   }
 }
 
+std::string hex(std::uint32_t value) {
+  std::array<char, 16> text{};
+  (void)std::snprintf(text.data(), text.size(), "0x%08X", value);
+  return text.data();
+}
+
 /// The units of a drive of another make: the table's, else those of its sheet.
 void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint) {
   const BoardConfig* board = robot.board(joint.board);
   if (board == nullptr || board->eds.empty()) {
-    for (const char* key : {"reversed", "zero_counts"}) {
+    for (const char* key : {"reversed", "zero_counts", "velocity_units_per_rev"}) {
       if (!table.has(key)) continue;
       table.error(key, "is for drives of other makers: our own boards count along the joint",
                   "give its board an `eds`, or remove this key");
@@ -159,6 +209,17 @@ void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joi
                   "set it to the position units per revolution of the joint");
     }
   }
+  if (joint.velocity_units_per_rev <= 0.0) {
+    joint.velocity_of_sheet = units.velocity_per_rev.has_value();
+    joint.velocity_units_per_rev = units.velocity_per_rev.value_or(0.0);
+    if (units.unknown_velocity != 0) {
+      table.error("velocity_units_per_rev",
+                  "the sheet does not say what a velocity of joint '" + joint.name +
+                      "' is: 60A9 is " + hex(units.unknown_velocity) + " in " + board->eds +
+                      ", and no gear (6091) or no unit that is known goes with it",
+                  "set it to the drive's velocity units at one revolution of the joint per second");
+    }
+  }
   if (std::isnan(joint.motor_encoder_counts_per_rev)) {
     joint.motor_encoder_counts_per_rev = joint.encoder_counts_per_rev;
   }
@@ -170,6 +231,49 @@ void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joi
                 "neither this table nor the drive's sheet says what the torques of joint '" +
                     joint.name + "' are per mille of: 6076 has no value in " + board->eds,
                 "set it to the motor's rated torque times the gear ratio");
+  }
+}
+
+/// Whether its drive can do the joint's homing.
+void check_homing(TomlTable& table, const RobotConfig& robot, const JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  if (!joint.homing || board == nullptr) return;
+  const canopen::DataSheet& sheet = *board->sheet;
+  if (!canopen::abilities_of(sheet, joint.axis).homing) {
+    table.error("homing",
+                "the drive of joint '" + joint.name +
+                    "' cannot be homed by a master: " + board->eds +
+                    " has no mode 6, its method (6098) cannot be written, or its "
+                    "mode (6060) is in no PDO",
+                "remove this key, and home the drive by its own program");
+    return;
+  }
+  if (canopen::writable(sheet, canopen::of_axis(canopen::object::kHomeOffset, joint.axis), 0)) {
+    return;
+  }
+  const double counts = joint.homing->position_rad * joint.encoder_counts_per_rev;
+  if (joint.zero_counts == 0 && std::abs(counts) < 1.0) return;
+  table.error("homing",
+              "the drive of joint '" + joint.name +
+                  "' counts from 0 where it is homed: it has no home offset (607C)",
+              "leave position_rad and zero_counts at 0, or home it by its own program");
+}
+
+void check_stop_options(TomlTable& table, const RobotConfig& robot, const JointConfig& joint) {
+  const BoardConfig* board = robot.board(joint.board);
+  if (board == nullptr) return;
+  using namespace canopen::object;
+  const StopOptions& options = joint.stop_options;
+  for (const auto& [key, value, index] : {std::tuple{"shutdown", options.shutdown, kShutdownOption},
+                                          {"disable", options.disable, kDisableOption},
+                                          {"halt", options.halt, kHaltOption},
+                                          {"fault", options.fault, kFaultReactionOption}}) {
+    if (!value) continue;
+    if (canopen::writable(*board->sheet, canopen::of_axis(index, joint.axis), 0)) continue;
+    table.error("stop_options",
+                std::string(key) + ": the drive of joint '" + joint.name +
+                    "' has no such option (" + hex(index).substr(6) + ")",
+                "remove it: the drive stops as it was commissioned");
   }
 }
 
@@ -208,6 +312,8 @@ void add_joints(TomlTable& table, std::span<const AxisAssignment> listed, RobotC
     joint.name = name;
     read_axis(table, listed, robot, joint, loose);
     complete_units(table, robot, joint);
+    check_homing(table, robot, joint);
+    check_stop_options(table, robot, joint);
     check_joint(table, joint, robot);
     robot.joints.push_back(joint);
   }

@@ -37,7 +37,10 @@ AxisScale AxisScale::of(const JointConfig& joint) {
   const auto motor_counts = clamp_round<std::uint32_t>(joint.motor_encoder_counts_per_rev);
   const auto rated_mNm = clamp_round<std::uint32_t>(1000.0 * joint.rated_torque_Nm);
   const double sign = joint.reversed ? -1.0 : 1.0;
+  const double velocities =
+      joint.velocity_units_per_rev > 0.0 ? joint.velocity_units_per_rev : counts;
   return {.counts_per_rad = sign * counts / kRadPerRev,
+          .velocity_per_rad_s = sign * velocities / kRadPerRev,
           .motor_counts_per_rad = motor_counts / kRadPerRev,
           .mille_per_Nm = sign * 1.0e6 / rated_mNm,
           .zero_counts = joint.zero_counts};
@@ -125,7 +128,7 @@ void encode_command(const AxisScale& scale, Mode position, const CommandImage& c
   raw.target_position = scale.to_drive(
       clamp_round<std::int32_t>(command.position_rad()[joint] * scale.counts_per_rad));
   raw.velocity_offset =
-      clamp_round<std::int32_t>(command.velocity_rad_s()[joint] * scale.counts_per_rad);
+      clamp_round<std::int32_t>(command.velocity_rad_s()[joint] * scale.velocity_per_rad_s);
   raw.torque_offset = clamp_round<std::int16_t>(command.torque_Nm()[joint] * scale.mille_per_Nm);
   raw.target_voltage = clamp_round<std::int16_t>(command.voltage_V()[joint] / kVoltPerUnit);
   raw.target_current = clamp_round<std::int16_t>(command.current_A()[joint] / kAmperePerUnit);
@@ -138,7 +141,7 @@ void decode_feedback(const AxisScale& scale, const RawFeedback& raw, std::size_t
   const double rad = 1.0 / scale.counts_per_rad;
   const double motor_rad = 1.0 / scale.motor_counts_per_rad;
   state.position_rad()[joint] = scale.from_zero(raw.position) * rad;
-  state.velocity_rad_s()[joint] = raw.velocity * rad;
+  state.velocity_rad_s()[joint] = raw.velocity * (1.0 / scale.velocity_per_rad_s);
   state.torque_Nm()[joint] = raw.torque / scale.mille_per_Nm;
   state.motor_position_rad()[joint] = raw.motor_position * motor_rad;
   state.motor_velocity_rad_s()[joint] = raw.motor_velocity * motor_rad;

@@ -21,6 +21,7 @@ namespace tandem::hal::can {
 /// Factors of one joint's wire units.
 struct AxisScale {
   double counts_per_rad = 1.0;        ///< link encoder, 608F / 2 pi; negative: it counts down
+  double velocity_per_rad_s = 1.0;    ///< of 606C, 60FF and 60B1; counts/s but for other units
   double motor_counts_per_rad = 1.0;  ///< motor encoder reflected to the link, 2033 / 2 pi
   double mille_per_Nm = 1.0;          ///< 1000 / rated torque (6076); negative with the counts
   std::int32_t zero_counts = 0;       ///< the drive's count at 0 rad

@@ -18,15 +18,18 @@ void AxisMaster::received(bool fresh, std::int64_t now_ns) noexcept TANDEM_RT {
   const std::int32_t last_position = feedback_.position;
   feedback_.adopt(sample_);
   const std::int64_t elapsed_ns = now_ns - sample_ns_;
-  if (!traits_.tells_velocity && heard_ && elapsed_ns > 0) {
+  const bool recounts = homing_.under_way();  // a jump of the counts is no motion
+  if (!traits_.tells_velocity && heard_ && elapsed_ns > 0 && !recounts) {
     const auto counts = static_cast<std::int32_t>(  // the counter may wrap around
         static_cast<std::uint32_t>(feedback_.position) - static_cast<std::uint32_t>(last_position));
-    feedback_.velocity =
-        canopen::clamp_round<std::int32_t>(counts * 1.0e9 / static_cast<double>(elapsed_ns));
+    feedback_.velocity = canopen::clamp_round<std::int32_t>(
+        counts * (scale_.velocity_per_rad_s / scale_.counts_per_rad) * 1.0e9 /
+        static_cast<double>(elapsed_ns));
   }
   if (heard_ && elapsed_ns > 0) {
     const double change = static_cast<double>(feedback_.velocity) - previous_velocity_;
-    acceleration_rad_s2_ = change / scale_.counts_per_rad * 1.0e9 / static_cast<double>(elapsed_ns);
+    acceleration_rad_s2_ =
+        change / scale_.velocity_per_rad_s * 1.0e9 / static_cast<double>(elapsed_ns);
   }
   previous_velocity_ = feedback_.velocity;
   sample_ns_ = now_ns;
@@ -52,8 +55,9 @@ bool AxisMaster::check(std::int64_t now_ns) noexcept TANDEM_RT {
           code != 0 ? code : static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
-  if (was_enabled_ && state != WireState::kOperationEnabled &&
-      (target_ == TargetState::kFollow || target_ == TargetState::kHold)) {
+  const bool stays_enabled = target_ == TargetState::kFollow || target_ == TargetState::kHold ||
+                             target_ == TargetState::kHome;
+  if (was_enabled_ && state != WireState::kOperationEnabled && stays_enabled) {
     latch(AxisError::kLeftEnabled, static_cast<std::uint16_t>(ErrorCode::kGeneric), now_ns);
     return true;
   }
@@ -69,13 +73,16 @@ void AxisMaster::latch(AxisError error, std::uint16_t code,
 
 void AxisMaster::set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT {
   if (target == target_) return;
-  const bool goes_on = (target_ == TargetState::kBringUp || target_ == TargetState::kEnable) &&
-                       target == TargetState::kFollow;
+  homing_.interrupt();
+  const bool was_up = target_ == TargetState::kBringUp || target_ == TargetState::kEnable ||
+                      target_ == TargetState::kHome;
+  const bool goes_on = was_up && target == TargetState::kFollow;
   if (!goes_on) was_enabled_ = false;
   if (target == TargetState::kHold) {
     was_enabled_ = enabled();
     seed();
   }
+  if (target_ == TargetState::kHome && target == TargetState::kEnable) seed();
   if (target == TargetState::kReset || target == TargetState::kBringUp) emergency_code_ = 0;
   target_ = target;
   since_ns_ = now_ns;
@@ -96,6 +103,7 @@ bool AxisMaster::command(const CommandImage* image, std::size_t joint,
     case TargetState::kBringUp: walk_up(true, now_ns); return enable_is_late(now_ns);
     case TargetState::kEnable: walk_up(false, now_ns); return enable_is_late(now_ns);
     case TargetState::kReset: raw_.controlword = reset_controlword(); return reset_is_late(now_ns);
+    case TargetState::kHome: go_home(image, joint, now_ns); return false;
     case TargetState::kFollow:
       if (image != nullptr) follow(*image, joint, now_ns);
       return enable_is_late(now_ns);
@@ -118,6 +126,51 @@ void AxisMaster::follow(const CommandImage& image, std::size_t joint,
     return;
   }
   walk_up(false, now_ns);
+}
+
+bool AxisMaster::home(std::int64_t timeout_ns, std::int64_t now_ns) noexcept TANDEM_RT {
+  const bool follows = target_ == TargetState::kFollow && error_ == AxisError::kNone && enabled();
+  const bool again = target_ == TargetState::kHome && !homing_.under_way();
+  if (!traits_.homes || !(follows || again)) return false;
+  target_ = TargetState::kHome;
+  since_ns_ = now_ns;
+  was_enabled_ = true;
+  was_idle_ = false;
+  held_cycles_ = 0;
+  homing_.begin(now_ns, timeout_ns);
+  return true;
+}
+
+Homing AxisMaster::homing() const noexcept TANDEM_RT {
+  if (!traits_.homes) return {};
+  return {.state = homing_.under_way() ? HomingState::kHoming
+                   : homing_.homed()   ? HomingState::kHomed
+                                       : HomingState::kNotHomed,
+          .error = homing_.error()};
+}
+
+void AxisMaster::go_home(const CommandImage* image, std::size_t joint,
+                         std::int64_t now_ns) noexcept {
+  constexpr auto kMode = static_cast<std::int8_t>(canopen::Mode::kHm);
+  constexpr std::uint32_t kChange = 10;  // cycles that a drive may take to change its mode
+  const bool idle =
+      image != nullptr && static_cast<ControlMode>(image->mode()[joint]) == ControlMode::kIdle;
+  was_idle_ = was_idle_ || idle;
+  if (homing_.under_way()) {
+    const bool shows = !traits_.tells_mode || feedback_.mode_display == kMode;
+    seed();
+    raw_.mode = kMode;
+    raw_.controlword = homing_.step(feedback_.statusword, shows, now_ns);
+    if (homing_.under_way()) return;
+  }
+  if (held_cycles_ < kChange) {
+    ++held_cycles_;
+    seed();
+  }
+  raw_.controlword = enable_operation();
+  if (image == nullptr || !was_idle_ || idle) return;
+  set_target(TargetState::kFollow, now_ns);
+  follow(*image, joint, now_ns);
 }
 
 /// One transition nearer to Operation Enabled, with the measured position as target.
@@ -215,6 +268,7 @@ void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDE
 
 void AxisMaster::forget() noexcept TANDEM_RT {
   feedback_ = {};
+  homing_.forget();
   heard_ = false;
   was_enabled_ = false;
   emergency_code_ = 0;
@@ -222,6 +276,7 @@ void AxisMaster::forget() noexcept TANDEM_RT {
 }
 
 void AxisMaster::archive(Archive& ar) {
+  ar(homing_, was_idle_, held_cycles_);
   ar(feedback_, raw_, target_, error_, heard_, was_enabled_, fault_code_, emergency_code_,
      age_cycles_, reset_cycles_, previous_velocity_, sample_ns_, trouble_ns_, since_ns_,
      acceleration_rad_s2_);

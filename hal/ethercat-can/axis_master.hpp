@@ -9,6 +9,7 @@
 #include "canopen/drive_abilities.hpp"
 #include "canopen/drive_machine.hpp"
 #include "hal/ethercat-can/axis_codec.hpp"
+#include "hal/ethercat-can/homing_sequence.hpp"
 #include "hal/image.hpp"
 
 namespace tandem::hal::can {
@@ -30,6 +31,7 @@ struct AxisTraits {
                               .torque = canopen::Mode::kCst};
   bool tells_velocity = true;  ///< else it is the positions' difference
   bool tells_mode = true;      ///< else an enabled axis is in the mode that was sent
+  bool homes = false;          ///< the joint has a homing, and the drive can be told to begin it
   bool tells_motor = true;     ///< the motor's position by itself; else the link's is taken for it
 };
 
@@ -44,6 +46,7 @@ class AxisMaster {
     kHold,       ///< keep the position that it has
     kQuickStop,  ///< stop category 1
     kReset,      ///< clear the drive's fault; then it waits, disabled
+    kHome,       ///< the drive looks for the joint's place; then it is held, until it follows
   };
 
   static constexpr std::int64_t kEnableTimeoutNs = 2'000'000'000;
@@ -83,6 +86,13 @@ class AxisMaster {
   void latch(AxisError error, std::uint16_t code, std::int64_t now_ns) noexcept TANDEM_RT;
 
   void set_target(TargetState target, std::int64_t now_ns) noexcept TANDEM_RT;
+  /// Homes an axis that follows. Afterwards, however it ends, the axis is held where it stands,
+  /// and follows the image again once that has had the joint idle, and then not any more: what the
+  /// image had before is of other counts.
+  /// @return false: the axis has no homing, is not enabled or does not follow; nothing has changed
+  bool home(std::int64_t timeout_ns, std::int64_t now_ns) noexcept TANDEM_RT;
+  void stop_homing(std::int64_t now_ns) noexcept TANDEM_RT { homing_.stop(now_ns); }
+  [[nodiscard]] Homing homing() const noexcept TANDEM_RT;
   /// Makes the raw command of the target; kFollow takes it from the image.
   /// @return true when a reset or a re-enabling has just failed and was latched.
   bool command(const CommandImage* image, std::size_t joint,
@@ -121,6 +131,7 @@ class AxisMaster {
   void seed() noexcept;
   bool enable_is_late(std::int64_t now_ns) noexcept;
   bool reset_is_late(std::int64_t now_ns) noexcept;
+  void go_home(const CommandImage* image, std::size_t joint, std::int64_t now_ns) noexcept;
 
   AxisScale scale_;
   AxisTraits traits_;
@@ -129,6 +140,8 @@ class AxisMaster {
   RawCommand raw_;
   TargetState target_ = TargetState::kNothing;
   AxisError error_ = AxisError::kNone;
+  HomingSequence homing_;
+  bool was_idle_ = false;  ///< kHome: the image has had the joint idle since
   bool heard_ = false;
   bool was_enabled_ = false;  ///< reached Operation Enabled under the present wish to be
   std::uint16_t fault_code_ = 0;
@@ -136,6 +149,7 @@ class AxisMaster {
   std::uint16_t last_emergency_ = 0;  ///< for a warning; no state
   std::uint32_t age_cycles_ = 0;
   std::uint32_t reset_cycles_ = 0;
+  std::uint32_t held_cycles_ = 0;  ///< kHome: since the homing is over
   std::int32_t previous_velocity_ = 0;
   std::int64_t sample_ns_ = 0;
   std::int64_t trouble_ns_ = 0;

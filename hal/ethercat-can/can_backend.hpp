@@ -59,6 +59,11 @@ class CanBackend final : public Backend {
   [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override;
   void stop(StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
+  bool home(std::size_t joint) noexcept TANDEM_RT override { return master_->home(joint); }
+  void stop_homing(std::size_t joint) noexcept TANDEM_RT override { master_->stop_homing(joint); }
+  [[nodiscard]] Homing homing(std::size_t joint) const noexcept TANDEM_RT override {
+    return master_->homing(joint);
+  }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   /// The robot cannot be rewound: false.
   [[nodiscard]] bool archive(Archive& ar) override;

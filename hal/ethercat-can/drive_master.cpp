@@ -292,6 +292,21 @@ FaultCause DriveMaster::fault_cause(std::size_t joint) const noexcept TANDEM_RT 
   return impl_->cause(joint);
 }
 
+bool DriveMaster::home(std::size_t joint) noexcept TANDEM_RT {
+  Impl& m = *impl_;
+  const auto& homing = m.robot.joints[joint].homing;
+  if (!homing || m.stage != Impl::MasterStage::kRunning || m.shutting_down) return false;
+  return m.axes[joint].home(static_cast<std::int64_t>(homing->timeout_s * 1e9), m.now_ns);
+}
+
+void DriveMaster::stop_homing(std::size_t joint) noexcept TANDEM_RT {
+  impl_->axes[joint].stop_homing(impl_->now_ns);
+}
+
+Homing DriveMaster::homing(std::size_t joint) const noexcept TANDEM_RT {
+  return impl_->axes[joint].homing();
+}
+
 void DriveMaster::stop(StopCategory category) noexcept TANDEM_RT { impl_->stop(category); }
 void DriveMaster::reset() noexcept TANDEM_RT { impl_->reset(); }
 

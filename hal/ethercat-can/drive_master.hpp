@@ -16,6 +16,7 @@
 #include "hal/backend.hpp"
 #include "hal/config/robot_config.hpp"
 #include "hal/ethercat-can/bus.hpp"
+#include "hal/homing.hpp"
 #include "hal/image.hpp"
 #include "rt/histogram.hpp"
 
@@ -104,6 +105,15 @@ class DriveMaster {
   /// Clears every latched fault and stop, and enables every axis again. phase() is kBringUp until
   /// they are, or until one cannot be. Without effect after a bring-up that failed.
   void reset() noexcept TANDEM_RT;
+
+  /// Begins the homing of a joint that follows its command: mode 6, bit 4. Meanwhile, and until the
+  /// command has had the joint idle and then not any more, the joint does not follow it. A fault
+  /// and a stop end it.
+  /// @return false: not in operation, or the joint has no homing, or does not follow
+  bool home(std::size_t joint) noexcept TANDEM_RT;
+  /// Halts it; the joint stays where it comes to rest, and is not homed.
+  void stop_homing(std::size_t joint) noexcept TANDEM_RT;
+  [[nodiscard]] Homing homing(std::size_t joint) const noexcept TANDEM_RT;
 
   /// Category 1: quick stop, then disabled, then NMT pre-operational. Once per cycle instead of
   /// send(), until it answers true.

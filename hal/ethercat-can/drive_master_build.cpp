@@ -16,9 +16,12 @@ std::vector<AxisTraits> traits_of(const RobotConfig& robot, const PdoLayout& lay
   std::vector<AxisTraits> traits(robot.joints.size());
   for (const NodePlan& node : layout.nodes) {
     for (std::size_t axis = 0; axis < node.joints.size(); ++axis) {
+      const bool homes = robot.joints[node.joints[axis]].homing && node.abilities[axis].homing &&
+                         node.carries(axis, WireField::kMode);
       traits[node.joints[axis]] = {.can = node.abilities[axis],
                                    .tells_velocity = node.carries(axis, WireField::kVelocity),
                                    .tells_mode = node.carries(axis, WireField::kModeDisplay),
+                                   .homes = homes,
                                    .tells_motor = node.carries(axis, WireField::kMotorPosition)};
     }
   }

@@ -212,7 +212,11 @@ void DriveMaster::Impl::reset() noexcept TANDEM_RT {
   if (shutting_down || (stage != MasterStage::kFaulted && stage != MasterStage::kRunning)) return;
   latched = StopCategory::kWarn;
   resetting = true;
-  for (std::size_t joint = 0; joint < axes.size(); ++joint) reset_joint(joint);
+  for (std::size_t joint = 0; joint < axes.size(); ++joint) {
+    if (axes[joint].target() == TargetState::kHome)
+      axes[joint].set_target(TargetState::kEnable, now_ns);
+    reset_joint(joint);
+  }
 }
 
 /// Goes on with what reset_joint() began: drives that are reset, nodes that are configured anew.

@@ -197,6 +197,14 @@ std::vector<std::string> DriveMaster::Impl::warnings() const {
                                 node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
                                 node.missed));
   }
+  for (const Node& node : nodes) {
+    if (node.master.store_code() == canopen::AbortCode::kNone) continue;
+    texts.push_back(fmt::format(
+        "{} (node {} on bus {}) does not store its configuration (1010:1): {}; it is written again "
+        "at the next start",
+        node.plan.name, node.plan.id, robot.buses[node.plan.bus].name,
+        canopen::to_string(node.master.store_code())));
+  }
   add_emergencies(texts);
   if (unsent > 0)
     texts.push_back(fmt::format("a bus did not take the commands of {} cycles", unsent));

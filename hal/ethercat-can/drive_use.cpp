@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "base/counted.hpp"
@@ -67,6 +68,27 @@ void tell_pdos(const NodePlan& node, DriveUse& use) {
   }
 }
 
+/// What the drive does by itself when it is stopped: what the master writes, else the sheet's
+/// value.
+std::string stops_text(const DataSheet& sheet, int axis, const StopOptions& chosen) {
+  const auto value = [&](std::uint16_t index) -> std::string {
+    const auto found = sheet.value(canopen::of_axis(index, axis), 0, 0);
+    return found ? fmt::format("{}", static_cast<std::int16_t>(*found)) : "the drive's";
+  };
+  const bool quick = canopen::writable(sheet, canopen::of_axis(object::kQuickStopOption, axis), 0);
+  std::string text =
+      "605A " + (quick ? std::string("is set to 2") : value(object::kQuickStopOption));
+  for (const auto& [index, option] : {std::pair{object::kShutdownOption, chosen.shutdown},
+                                      {object::kDisableOption, chosen.disable},
+                                      {object::kHaltOption, chosen.halt},
+                                      {object::kFaultReactionOption, chosen.fault}}) {
+    if (sheet.find(canopen::of_axis(index, axis)) == nullptr) continue;
+    text += fmt::format(", {:04X} ", index) +
+            (option ? fmt::format("is set to {}", *option) : value(index));
+  }
+  return text;
+}
+
 void tell_feedback(const NodePlan& node, DriveUse& use) {
   const auto miss = [&](WireField field, const char* text) {
     if (!node.carries(0, field)) use.misses.emplace_back(text);
@@ -106,6 +128,9 @@ DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
   use.does.push_back({"watching", node.watch == NodeWatch::kHeartbeat  ? "heartbeats"
                                   : node.watch == NodeWatch::kGuarding ? "node guarding"
                                                                        : "its TPDOs alone"});
+  use.does.push_back({"stops", stops_text(sheet, 0, {})});
+  use.does.push_back({"homing", node.abilities[0].homing ? "mode 6, where a joint has `homing`"
+                                                         : "by the drive's own program alone"});
   tell_feedback(node, use);
   for (std::string& text : unwatched(node, sheet)) use.misses.push_back(std::move(text));
   return use;
@@ -132,6 +157,32 @@ Result<DriveUse> use_of(const DataSheet& sheet) {
     return std::unexpected(std::move(error));
   }
   return use_of(layout->nodes[0], sheet);
+}
+
+std::vector<DriveFact> drive_facts(const RobotConfig& robot) {
+  std::vector<DriveFact> facts;
+  std::vector<std::size_t> others;  // by fact: joints besides the first
+  for (const JointConfig& joint : robot.joints) {
+    const BoardConfig* board = robot.board(joint.board);
+    if (board == nullptr || board->eds.empty()) continue;
+    std::string how = stops_text(*board->sheet, joint.axis, joint.stop_options);
+    if (joint.brake) how += "; its brake is the drive's own";
+    if (joint.homing) {
+      how += fmt::format("; homed by method {}{}", joint.homing->method,
+                         joint.homing->required ? ", before anything else moves it" : "");
+    }
+    const auto same = std::ranges::find(facts, how, &DriveFact::how);
+    if (same != facts.end()) {
+      ++others[static_cast<std::size_t>(same - facts.begin())];
+      continue;
+    }
+    facts.push_back({joint.name, std::move(how)});
+    others.push_back(0);
+  }
+  for (std::size_t i = 0; i < facts.size(); ++i) {
+    if (others[i] > 0) facts[i].what += fmt::format(" and {}", counted(others[i], "other"));
+  }
+  return facts;
 }
 
 Result<Diagnostics> drive_warnings(const RobotConfig& robot) {

@@ -60,6 +60,7 @@ void NodeMaster::set_times(std::int64_t period_ns,
     canopen::put(step.bytes.data(), canopen::clamp_round<std::uint32_t>(
                                         static_cast<double>(sync_timeout_ns) / 1000.0));
   }
+  name_configuration(steps_);
 }
 
 void NodeMaster::restart(std::int64_t now_ns) noexcept TANDEM_RT {
@@ -124,7 +125,8 @@ void NodeMaster::process(std::int64_t now_ns, std::int64_t dt_ns,
 
 void NodeMaster::configure(std::int64_t now_ns, std::int64_t dt_ns, FrameSink& out) noexcept {
   if (!requested_) return request(out);
-  sdo_.process(dt_ns, kSdoAnswerNs, out);
+  const bool stores = steps_[step_].use == SdoUse::kStore;
+  sdo_.process(dt_ns, stores ? kStoreNs : kSdoAnswerNs, out);
   if (sdo_.status() == SdoClient::Status::kBusy) return;
   step_answered(now_ns);
   if (stage_ == NodeStage::kConfigure) request(out);
@@ -132,7 +134,7 @@ void NodeMaster::configure(std::int64_t now_ns, std::int64_t dt_ns, FrameSink& o
 
 void NodeMaster::request(FrameSink& out) noexcept {
   const SdoStep& step = steps_[step_];
-  if (step.use != SdoUse::kWrite) {
+  if (step.use != SdoUse::kWrite && step.use != SdoUse::kStore) {
     sdo_.upload(step.index, step.sub, out);
   } else {
     sdo_.download(step.index, step.sub, step.value(), out);
@@ -140,32 +142,51 @@ void NodeMaster::request(FrameSink& out) noexcept {
   requested_ = true;
 }
 
+/// What a drive has kept is not written again.
+bool NodeMaster::skips(const SdoStep& step) const noexcept {
+  return unchanged_ && step.kept && (step.use == SdoUse::kWrite || step.use == SdoUse::kStore);
+}
+
 void NodeMaster::step_answered(std::int64_t now_ns) noexcept {
-  if (sdo_.status() == SdoClient::Status::kAborted) {
-    abort_code_ = sdo_.abort_code();
-    if (abort_code_ == AbortCode::kTimeout) {
-      // A frame was lost; or the boot-up was that of power-on, and the node is in its reset.
-      if (++tries_ < kSdoTries || now_ns < next_reset_ns_) return;
-    }
-    const bool need_not_exist = steps_[step_].use == SdoUse::kCheckBits;
-    if (!need_not_exist || abort_code_ != AbortCode::kNoObject) {
-      return fail(NodeError::kSdoAbort, now_ns);
-    }
-    abort_code_ = AbortCode::kNone;
-  }
-  const SdoStep& step = steps_[step_];
-  const bool answered = sdo_.status() != SdoClient::Status::kAborted;
-  if (answered && step.use != SdoUse::kWrite && !step.accepts(sdo_.value())) {
-    std::array<std::uint8_t, 4> bytes{};
-    std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()), bytes.begin());
-    read_value_ = canopen::get<std::uint32_t>(bytes.data());
-    return fail(NodeError::kWrongIdentity, now_ns);
-  }
+  if (!step_passed(now_ns)) return;
   tries_ = 0;
-  if (++step_ == steps_.size()) {
+  ++step_;
+  while (step_ < steps_.size() && skips(steps_[step_])) ++step_;
+  if (step_ == steps_.size()) {
     heard_ns_ = now_ns;  // its heartbeat has just been switched on
     enter(NodeStage::kReady, now_ns);
   }
+}
+
+/// @return false: it is asked again, or the node is down
+bool NodeMaster::step_passed(std::int64_t now_ns) noexcept {
+  const SdoStep& step = steps_[step_];
+  if (sdo_.status() == SdoClient::Status::kAborted) {
+    const AbortCode code = sdo_.abort_code();
+    if (code == AbortCode::kTimeout) {
+      // A frame was lost; or the boot-up was that of power-on, and the node is in its reset.
+      if (++tries_ < kSdoTries || now_ns < next_reset_ns_) return false;
+    }
+    if (step.use == SdoUse::kStore) store_code_ = code;
+    if (step.use == SdoUse::kVerify) unchanged_ = false;
+    const bool need_not_exist = step.use == SdoUse::kCheckBits && code == AbortCode::kNoObject;
+    if (need_not_exist || step.use == SdoUse::kStore || step.use == SdoUse::kVerify) return true;
+    abort_code_ = code;
+    fail(NodeError::kSdoAbort, now_ns);
+    return false;
+  }
+  if (step.use == SdoUse::kWrite || step.use == SdoUse::kStore) return true;
+  const bool same = step.accepts(sdo_.value());
+  if (step.use == SdoUse::kVerify) {
+    unchanged_ = same && (step.sub == 1 || unchanged_);
+    return true;
+  }
+  if (same) return true;
+  std::array<std::uint8_t, 4> bytes{};
+  std::copy_n(sdo_.value().begin(), std::min<std::size_t>(4, sdo_.value().size()), bytes.begin());
+  read_value_ = canopen::get<std::uint32_t>(bytes.data());
+  fail(NodeError::kWrongIdentity, now_ns);
+  return false;
 }
 
 void NodeMaster::start(std::int64_t now_ns, FrameSink& out) noexcept TANDEM_RT {
@@ -198,12 +219,15 @@ void NodeMaster::enter(NodeStage stage, std::int64_t now_ns) noexcept {
     step_ = 0;
     tries_ = 0;
     requested_ = false;
+    unchanged_ = false;
+    store_code_ = AbortCode::kNone;
   }
 }
 
 void NodeMaster::archive(Archive& ar) {
-  ar(stage_, error_, nmt_, requested_, tries_, reboots_, step_, since_ns_, next_reset_ns_,
-     next_guard_ns_, heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_, sdo_);
+  ar(stage_, error_, nmt_, requested_, unchanged_, store_code_, tries_, reboots_, step_, since_ns_,
+     next_reset_ns_, next_guard_ns_, heard_ns_, booted_ns_, trouble_ns_, abort_code_, read_value_,
+     sdo_);
   for (SdoStep& step : steps_) ar(step.bytes);  // set_times() has been there
 }
 

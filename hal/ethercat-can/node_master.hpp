@@ -41,6 +41,7 @@ class NodeMaster {
  public:
   static constexpr std::int64_t kSdoAnswerNs = 500'000'000;
   static constexpr int kSdoTries = 3;
+  static constexpr std::int64_t kStoreNs = 5'000'000'000;  ///< until a drive has stored
   static constexpr int kReboots = 3;
 
   /// @param boot_time_ns  from a reset to the node's boot-up at most; after it the node is reset
@@ -72,6 +73,10 @@ class NodeMaster {
   [[nodiscard]] std::int64_t trouble_time_ns() const noexcept { return trouble_ns_; }
   [[nodiscard]] canopen::NmtState nmt_state() const noexcept { return nmt_; }
   [[nodiscard]] canopen::AbortCode abort_code() const noexcept { return abort_code_; }
+  /// Its configuration was there already, and was not written.
+  [[nodiscard]] bool unchanged() const noexcept { return unchanged_; }
+  /// Why it did not store its configuration; kNone: it did, or was not asked to.
+  [[nodiscard]] canopen::AbortCode store_code() const noexcept { return store_code_; }
   /// What the failed check read.
   [[nodiscard]] std::uint32_t read_value() const noexcept { return read_value_; }
   [[nodiscard]] std::size_t step() const noexcept { return step_; }
@@ -82,6 +87,8 @@ class NodeMaster {
  private:
   void configure(std::int64_t now_ns, std::int64_t dt_ns, canopen::FrameSink& out) noexcept;
   void step_answered(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool step_passed(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool skips(const SdoStep& step) const noexcept;
   void request(canopen::FrameSink& out) noexcept;
   void watch_heartbeat(std::int64_t now_ns) noexcept;
   void guard(std::int64_t now_ns, canopen::FrameSink& out) noexcept;
@@ -98,6 +105,8 @@ class NodeMaster {
   NodeError error_ = NodeError::kNone;
   canopen::NmtState nmt_ = canopen::NmtState::kBootUp;
   bool requested_ = false;  ///< the step's request is out
+  bool unchanged_ = false;
+  canopen::AbortCode store_code_ = canopen::AbortCode::kNone;
   int tries_ = 0;
   int reboots_ = 0;
   std::size_t step_ = 0;

@@ -155,6 +155,12 @@ void BoardPacker::use_fixed(PdoGroup group) {
     take_fixed(*best, group);
   }
   packer_.switch_off_the_rest();
+  for (const auto& [number, id] : further_pdos(sheet_, packer_.direction(), node_.id)) {
+    PdoPlan& pdo = node_.unused.emplace_back();
+    pdo.direction = packer_.direction();
+    pdo.number = number;
+    pdo.cob_id = id;
+  }
 }
 
 bool BoardPacker::has_mappable() const {

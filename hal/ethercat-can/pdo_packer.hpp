@@ -33,6 +33,7 @@ class PdoPacker {
   /// What is in use from power-on and carries nothing.
   void switch_off_the_rest();
 
+  [[nodiscard]] canopen::PdoDirection direction() const { return direction_; }
   [[nodiscard]] std::span<const PdoSlot> slots() const { return slots_; }
   [[nodiscard]] bool used(const PdoSlot& slot) const;
 

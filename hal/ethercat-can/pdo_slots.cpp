@@ -127,6 +127,21 @@ std::vector<PdoSlot> pdo_slots(const DataSheet& sheet, PdoDirection direction, i
   return slots;
 }
 
+std::vector<std::pair<int, std::uint32_t>> further_pdos(const DataSheet& sheet,
+                                                        PdoDirection direction, int node_id) {
+  constexpr int kMostPdos = 512;
+  const auto first =
+      direction == PdoDirection::kReceive ? object::kRpdoParameter : object::kTpdoParameter;
+  std::vector<std::pair<int, std::uint32_t>> found;
+  for (const SheetEntry& entry : sheet.entries) {
+    const int number = entry.index - first + 1;
+    if (entry.sub != 1 || number <= kPdosPerNode || number > kMostPdos) continue;
+    const std::uint32_t id = identifier(&entry, cob::kInvalid, node_id);
+    if ((id & cob::kInvalid) == 0 && (entry.access & kWrite) != 0) found.emplace_back(number, id);
+  }
+  return found;
+}
+
 std::optional<MappedField> object_of(const DataSheet& sheet, const DriveAbilities& can,
                                      WireField field, int axis) {
   const Finder find(sheet, axis);

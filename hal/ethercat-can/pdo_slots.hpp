@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "canopen/data_sheet.hpp"
@@ -30,6 +31,11 @@ struct PdoSlot {
 /// whose identifier is another and cannot be written. One that is not timely is only switched off.
 [[nodiscard]] std::vector<PdoSlot> pdo_slots(const canopen::DataSheet& sheet,
                                              canopen::PdoDirection direction, int node_id);
+
+/// PDOs beyond the fourth, which a master does not use, that are on from power-on and can be
+/// switched off: their numbers and identifiers.
+[[nodiscard]] std::vector<std::pair<int, std::uint32_t>> further_pdos(
+    const canopen::DataSheet& sheet, canopen::PdoDirection direction, int node_id);
 
 /// The object that carries `field` of an axis, without its place in a PDO; none: the drive has
 /// none. Velocities and torques travel as offsets (60B1, 60B2) where the drive has them: these are

@@ -195,8 +195,8 @@ void add_settings(AxisSteps& add, const RobotConfig& robot, const NodePlan& node
 }
 
 /// The cyclic modes that the axis is used in must be among those that the drive itself names.
-void add_mode_check(Steps& steps, const DriveAbilities& can, int axis) {
-  std::uint32_t wanted = 0;
+void add_mode_check(Steps& steps, const DriveAbilities& can, bool homes, int axis) {
+  std::uint32_t wanted = homes ? mode_bit(Mode::kHm) : 0;
   for (const Mode mode : {can.position, can.velocity, can.torque}) {
     if (mode != Mode::kNone) wanted |= mode_bit(mode);
   }
@@ -215,6 +215,27 @@ void add_unit_checks(Steps& steps, const DataSheet& sheet, const JointConfig& jo
   };
   if (joint.counts_of_sheet) check(units.position);
   if (joint.torque_of_sheet) check(units.torque);
+  if (joint.velocity_of_sheet) check(units.velocity);
+}
+
+/// A joint that is homed: its method and what the sheet has besides. Positions and speeds in the
+/// drive's counts.
+void add_homing(AxisSteps& add, const DataSheet& sheet, const JointConfig& joint) {
+  const HomingConfig& homing = *joint.homing;
+  const AxisScale scale = AxisScale::of(joint);
+  const double counts = std::abs(scale.velocity_per_rad_s);
+  const auto set = [&](std::uint16_t index, std::uint8_t sub, auto value) {
+    if (writable(sheet, of_axis(index, joint.axis), sub)) add(index, sub, value);
+  };
+  const auto rate = [&](double per_rad) {
+    return std::max(1U, clamp_round<std::uint32_t>(per_rad * counts));
+  };
+  set(object::kHomingMethod, 0, static_cast<std::int8_t>(homing.method));
+  set(object::kHomingSpeeds, 1, rate(homing.speed_rad_s));
+  set(object::kHomingSpeeds, 2, rate(homing.zero_speed_rad_s));
+  set(object::kHomingAcceleration, 0, rate(homing.acceleration_rad_s2));
+  set(object::kHomeOffset, 0,
+      scale.to_drive(clamp_round<std::int32_t>(homing.position_rad * scale.counts_per_rad)));
 }
 
 void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std::size_t axis) {
@@ -228,31 +249,43 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   if (takes(object::kQuickStopOption, 0)) {
     add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
   }
-  if (can.settings) return add_settings(add, robot, node, robot.joints[node.joints[axis]]);
-  add_mode_check(steps, can, static_cast<int>(axis));
-  add_unit_checks(steps, sheet, robot.joints[node.joints[axis]]);
+  const JointConfig& joint = robot.joints[node.joints[axis]];
+  const StopOptions& stop = joint.stop_options;
+  for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},
+                                     {object::kDisableOption, stop.disable},
+                                     {object::kHaltOption, stop.halt},
+                                     {object::kFaultReactionOption, stop.fault}}) {
+    if (value) add(index, 0, static_cast<std::int16_t>(*value));
+  }
+  if (joint.homing) add_homing(add, sheet, joint);
+  if (can.settings) return add_settings(add, robot, node, joint);
+  add_mode_check(steps, can, joint.homing.has_value(), static_cast<int>(axis));
+  add_unit_checks(steps, sheet, joint);
   if (takes(object::kInterpolationPeriod, 1) && takes(object::kInterpolationPeriod, 2)) {
     add(object::kInterpolationPeriod, 1, std::uint8_t{0});
     add(object::kInterpolationPeriod, 2, std::int8_t{0});
   }
   // What moves with an offset alone has no other target.
-  if (takes(object::kTargetVelocity, 0)) add(object::kTargetVelocity, 0, std::int32_t{0});
-  if (takes(object::kTargetTorque, 0)) add(object::kTargetTorque, 0, std::int16_t{0});
+  const auto demand = [&](std::uint16_t index, auto value) {
+    if (!takes(index, 0)) return;
+    add(index, 0, value);
+    steps.back().kept = false;
+  };
+  demand(object::kTargetVelocity, std::int32_t{0});
+  demand(object::kTargetTorque, std::int16_t{0});
   const auto reaction =
       sheet.value(of_axis(object::kAbortConnectionOption, static_cast<int>(axis)), 0, node.id);
   const bool does_nothing = reaction.value_or(0) == 0;
   if (takes(object::kAbortConnectionOption, 0) && does_nothing) {
     add(object::kAbortConnectionOption, 0, std::int16_t{3});  // quick stop
   }
-  if (can.one_mode && takes(object::kMode, 0)) {
-    add(object::kMode, 0, static_cast<std::int8_t>(first_mode(can)));
-  }
+  if (can.one_mode) demand(object::kMode, static_cast<std::int8_t>(first_mode(can)));
 }
 
 }  // namespace
 
 bool SdoStep::accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_RT {
-  if (use == SdoUse::kCheck) return std::ranges::equal(read, value());
+  if (use == SdoUse::kCheck || use == SdoUse::kVerify) return std::ranges::equal(read, value());
   if (read.size() != sizeof(std::uint32_t) || size != sizeof(std::uint32_t)) return false;
   const auto found = get<std::uint32_t>(read.data());
   const auto wanted = get<std::uint32_t>(bytes.data());
@@ -264,6 +297,20 @@ bool SdoStep::accepts(std::span<const std::uint8_t> read) const noexcept TANDEM_
   }
 }
 
+namespace {
+
+/// Date and time of the configuration, which a hash of it stands for.
+void add_names(Steps& steps, SdoUse use) {
+  for (std::uint8_t sub = 1; sub <= 2; ++sub) {
+    steps.push_back(write_step(object::kVerifyConfiguration, sub, std::uint32_t{0}));
+    steps.back().use = use;
+  }
+}
+
+void add_watching(Steps& steps, const NodePlan& node, const DataSheet* sheet);
+
+}  // namespace
+
 std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan& node) {
   Steps steps;
   const BoardConfig* board =
@@ -271,6 +318,7 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
   const DataSheet* sheet = board != nullptr ? board->sheet.get() : nullptr;
   if (board != nullptr) {
     add_identity(steps, *board);
+    if (board->keeps_configuration) add_names(steps, SdoUse::kVerify);
   } else {
     add_sensor_identity(steps);
   }
@@ -281,20 +329,33 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
     for (const PdoPlan& pdo : node.pdos) add_pdo(steps, pdo, sheet);
   }
   for (std::size_t axis = 0; axis < node.joints.size(); ++axis) add_axis(steps, robot, node, axis);
-  const auto takes = [&](std::uint16_t index, std::uint8_t sub) {
-    return sheet == nullptr || writable(*sheet, index, sub);
-  };
   if (sheet != nullptr && offered(*sheet, object::kSyncTimeout, 0, DataType::kUnsigned32)) {
     steps.push_back(write_step(object::kSyncTimeout, 0, std::uint32_t{0}));
   }
-  if (node.ethercat) return steps;  // its state is watched, and its process data's watchdog
+  // On EtherCAT its state is watched, and its process data's watchdog.
+  if (!node.ethercat) add_watching(steps, node, sheet);
+  if (board != nullptr && board->keeps_configuration) {
+    add_names(steps, SdoUse::kWrite);
+    constexpr std::uint32_t kSave = 0x65766173;  // "save"
+    steps.push_back(write_step(object::kStoreParameters, 1, kSave));
+    steps.back().use = SdoUse::kStore;
+  }
+  return steps;
+}
+
+namespace {
+
+void add_watching(Steps& steps, const NodePlan& node, const DataSheet* sheet) {
+  const auto takes = [&](std::uint16_t index, std::uint8_t sub) {
+    return sheet == nullptr || writable(*sheet, index, sub);
+  };
   const int timeout_ms = std::min(kHeartbeatPeriods * node.heartbeat_ms, 0xFFFF);
   if (node.watch == NodeWatch::kGuarding) {
     steps.push_back(
         write_step(object::kGuardTime, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
     steps.push_back(
         write_step(object::kLifeTimeFactor, 0, static_cast<std::uint8_t>(kHeartbeatPeriods)));
-    return steps;
+    return;
   }
   if (takes(object::kHeartbeatConsumer, 1)) {
     steps.push_back(write_step(object::kHeartbeatConsumer, 1,
@@ -304,7 +365,27 @@ std::vector<SdoStep> make_configuration(const RobotConfig& robot, const NodePlan
     steps.push_back(
         write_step(object::kHeartbeatProducer, 0, clamp_round<std::uint16_t>(node.heartbeat_ms)));
   }
-  return steps;
+}
+
+}  // namespace
+
+void name_configuration(std::span<SdoStep> steps) noexcept TANDEM_RT {
+  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
+  const auto mix = [&hash](std::uint32_t value) {
+    for (int byte = 0; byte < 4; ++byte)
+      hash = (hash ^ (value >> 8 * byte & 0xFF)) * 0x100000001b3U;
+  };
+  for (const SdoStep& step : steps) {
+    const bool kept = step.use == SdoUse::kWrite && step.kept;
+    if (!kept || step.index == object::kVerifyConfiguration) continue;
+    mix(std::uint32_t{step.index} << 16 | std::uint32_t{step.sub} << 8 | step.size);
+    mix(get<std::uint32_t>(step.bytes.data()));
+  }
+  for (SdoStep& step : steps) {
+    if (step.index != object::kVerifyConfiguration) continue;
+    const auto half = static_cast<std::uint32_t>(step.sub == 1 ? hash : hash >> 32);
+    put(step.bytes.data(), half | 1U);  // 0 is a drive that was never configured
+  }
 }
 
 std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT {

@@ -20,6 +20,8 @@ enum class SdoUse : std::uint8_t {
   kCheckRevision,  ///< the same, but a later minor (the lower 16 bits) is right too
   kCheckProfile,   ///< the lower 16 bits are compared: the profile's number in 1000
   kCheckBits,      ///< every bit of `bytes` is set; an object that is not there passes
+  kVerify,  ///< upload of 1020: with `bytes` in it, what the drive keeps is not written again
+  kStore,   ///< download to 1010: it keeps what was written; a refusal is tolerated
 };
 
 /// One transfer of 1 to 4 bytes.
@@ -28,6 +30,7 @@ struct SdoStep {
   std::uint8_t sub = 0;
   std::uint16_t index = 0;
   std::int8_t axis = -1;  ///< for messages; -1: the node's own object
+  bool kept = true;       ///< a write that a drive keeps: not a demand, as the mode is
   std::uint8_t size = 0;
   std::array<std::uint8_t, 4> bytes{};
 
@@ -50,10 +53,15 @@ template <class T>
 
 /// The node's identity, PDO mapping, axes and heartbeats, in the order in which they are sent; of
 /// all that a board's sheet lacks there is no step.
+/// Of a board that keeps its configuration, 1020 is left 0 until name_configuration().
 /// A board's SYNC time-out (2052) and interpolation period (60C2) are left 0: the period is known
 /// when the first cycle begins.
 [[nodiscard]] std::vector<SdoStep> make_configuration(const RobotConfig& robot,
                                                       const NodePlan& node);
+
+/// Fills 1020's two numbers in, where they are: a hash of every write that the drive keeps. So they
+/// change with the configuration, and with nothing else.
+void name_configuration(std::span<SdoStep> steps) noexcept TANDEM_RT;
 
 /// The object of a loop's gains on axis 0 (2020 to 2023).
 [[nodiscard]] std::uint16_t gains_object(PidLoop loop) noexcept TANDEM_RT;

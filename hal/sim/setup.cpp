@@ -63,6 +63,8 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   }
   axis.reversed = joint.reversed;
   axis.zero_counts = joint.zero_counts;
+  axis.velocity_units_per_rev = joint.velocity_units_per_rev;
+  axis.counts_from_power_on = joint.homing && joint.homing->required;
   axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
   firmware::ControllerConfig& c = axis.controller;

@@ -39,6 +39,11 @@ class SimRobot final : public hal::Backend {
   }
   void stop(hal::StopCategory category) noexcept TANDEM_RT override { master_->stop(category); }
   void reset() noexcept TANDEM_RT override { master_->reset(); }
+  bool home(std::size_t joint) noexcept TANDEM_RT override { return master_->home(joint); }
+  void stop_homing(std::size_t joint) noexcept TANDEM_RT override { master_->stop_homing(joint); }
+  [[nodiscard]] hal::Homing homing(std::size_t joint) const noexcept TANDEM_RT override {
+    return master_->homing(joint);
+  }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override { return master_->shut_down(); }
   [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;

@@ -335,6 +335,7 @@ TEST_F(DdsCommands, AreAnsweredAsOverTheSocket) {
   expect_same("joint list --gains", "joint2");
   expect_same("joint reset joint1", "joint1: its drive has no fault");
   expect_same("joint reset jiont1", "did you mean 'joint1'?");
+  expect_same("joint home joint1", "joint1: has no homing: its encoder is taken for absolute");
   expect_same("sensor list", "the robot has no sensors");
   EXPECT_NE(over_dds("joint show joint2").out.find("operation enabled"), std::string::npos);
   expect_same("fault reset", "nothing is latched");

@@ -2,6 +2,7 @@
 // own node and firmware, so that the master meets a stranger.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -26,15 +27,20 @@ class SheetDrive {
   int boot_ms = 2;            ///< from a reset to the boot-up message
   bool answers_late = false;  ///< every SDO answer comes a second time, later
   bool emergency_at_boot = false;
+  int homing_ms = 50;                 ///< from bit 4 until it is there; never in a negative time
+  bool homing_fails = false;          ///< then it says so by bit 13
+  bool knows_homing = true;           ///< it goes into mode 6
+  bool stores = true;                 ///< 1010:1 keeps what was written over a reset
+  int writes = 0;                     ///< SDO downloads that it took
   std::vector<std::uint32_t> aborts;  ///< that it answered
 
   [[nodiscard]] std::int64_t& value(int index, int sub = 0) {
     return values_[{static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub)}];
   }
   [[nodiscard]] bool operational() const { return nmt_ == 5; }
-  [[nodiscard]] bool enabled() const { return state_ == 4; }
+  [[nodiscard]] bool enabled(int axis = 0) const { return state_[axis] == 4; }
   [[nodiscard]] int guarded() const { return guarded_; }
-  void fault() { state_ = 5; }
+  void fault() { state_[0] = 5; }
 
   void receive(const Frame& frame) {
     const auto id = static_cast<int>(frame.id);
@@ -71,6 +77,8 @@ class SheetDrive {
     }
   }
 
+  void store_now() { (void)store(0x65766173); }
+
   std::vector<Frame> out;
 
  private:
@@ -83,7 +91,8 @@ class SheetDrive {
     for (const SheetEntry& entry : sheet_.entries) {
       value(entry.index, entry.sub) = entry.value ? entry.value->of(node_) : 0;
     }
-    state_ = 1;
+    for (const auto& [key, number] : stored_) values_[key] = number;
+    state_.fill(1);
     nmt_ = 0;
     boot_in_ms_ = boot_ms;
   }
@@ -143,8 +152,19 @@ class SheetDrive {
       if (entry.sub != 0 && value(entry.index) != 0) return 0x06010000;
     }
     const auto raw = canopen::get<std::uint32_t>(&request.data[4]);
+    ++writes;
+    if (entry.index == 0x1010) return store(raw);
     const std::uint32_t mask = size == 4 ? 0xFFFFFFFF : (1u << 8 * size) - 1;
     value(entry.index, entry.sub) = raw & mask;
+    return 0;
+  }
+  std::uint32_t store(std::uint32_t signature) {
+    if (signature != 0x65766173 || !stores) return 0x08000020;
+    for (const SheetEntry& entry : sheet_.entries) {
+      const bool demand = (entry.access & canopen::kMapRpdo) != 0;
+      if ((entry.access & canopen::kWrite) == 0 || demand) continue;
+      stored_[{entry.index, entry.sub}] = value(entry.index, entry.sub);
+    }
     return 0;
   }
   void take_rpdo(int n, const Frame& frame) {
@@ -166,8 +186,11 @@ class SheetDrive {
   void on_sync() {
     for (const auto& [key, number] : pending_) values_[key] = number;
     pending_.clear();
-    machine();
-    move();
+    for (int axis = 0; axis < 2; ++axis) {
+      if (!has(0x6040 + 0x800 * axis)) continue;
+      machine(axis);
+      move(axis);
+    }
     for (int n = 0; n < 4; ++n) {
       const auto cob = value(0x1800 + n, 1);
       const auto type = value(0x1800 + n, 2);
@@ -186,48 +209,71 @@ class SheetDrive {
     }
   }
   /// CiA 402's states: 1 switch-on disabled, 2 ready, 3 switched on, 4 enabled, 5 fault.
-  void machine() {
-    const auto cw = static_cast<unsigned>(value(0x6040));
-    if (state_ == 5) {
-      if ((cw & 0x80) != 0 && (last_controlword_ & 0x80) == 0) state_ = 1;
+  void machine(int axis) {
+    const int at = 0x800 * axis;
+    int& state = state_[axis];
+    const auto cw = static_cast<unsigned>(value(0x6040 + at));
+    if (state == 5) {
+      if ((cw & 0x80) != 0 && (last_controlword_[axis] & 0x80) == 0) state = 1;
     } else if ((cw & 0x02) == 0 || (cw & 0x04) == 0) {
-      state_ = 1;
-    } else if ((cw & 0x0F) == 0x06 && state_ <= 3) {
-      state_ = 2;
-    } else if ((cw & 0x0F) == 0x07 && state_ >= 2) {
-      state_ = 3;
-    } else if ((cw & 0x0F) == 0x0F && state_ >= 3) {
-      state_ = 4;
+      state = 1;
+    } else if ((cw & 0x0F) == 0x06 && state <= 3) {
+      state = 2;
+    } else if ((cw & 0x0F) == 0x07 && state >= 2) {
+      state = 3;
+    } else if ((cw & 0x0F) == 0x0F && state >= 3) {
+      state = 4;
     }
-    last_controlword_ = cw;
+    last_controlword_[axis] = cw;
     constexpr std::array<int, 6> kStatusword{0, 0x0250, 0x0231, 0x0233, 0x0237, 0x0218};
-    value(0x6041) = kStatusword[static_cast<std::size_t>(state_)];
-    value(0x603F) = state_ == 5 ? 0x8611 : 0;
+    value(0x6041 + at) = kStatusword[static_cast<std::size_t>(state)];
+    if (axis == 0 && state == 4 && value(0x6061) == 6) value(0x6041) |= home(cw);
+    value(0x603F + at) = state == 5 ? 0x8611 : 0;
   }
-  void move() {
-    const auto mode = static_cast<std::int8_t>(value(0x6060));
-    value(0x6061) = mode;
+  /// @return bits 10, 12 and 13 of the statusword. They stay until bit 4 rises again.
+  unsigned home(unsigned cw) {
+    if ((cw & 0x10) == 0) {
+      if (homing_ > 0) homing_ = 0;
+    } else if ((last_homing_ & 0x10) == 0) {
+      homed_bits_ = 0;
+      homing_ = homing_ms;
+    } else if (homing_ > 0 && (cw & 0x100) == 0 && --homing_ == 0) {
+      homed_bits_ = homing_fails ? 0x2000 : 0x1400;
+      if (!homing_fails) value(0x6064) = has(0x607C) ? value(0x607C) : 0;
+    }
+    last_homing_ = cw;
+    const bool rests = homing_ == 0 || (cw & 0x100) != 0;
+    return homed_bits_ | (rests && homed_bits_ == 0 ? 0x400u : 0u);
+  }
+  void move(int axis) {
+    const int at = 0x800 * axis;
+    auto mode = static_cast<std::int8_t>(value(0x6060 + at));
+    if (mode == 6 && !knows_homing) mode = static_cast<std::int8_t>(value(0x6061));
+    value(0x6061 + at) = mode;
     const auto i32 = [&](int index, int sub = 0) {
-      return has(index, sub) ? static_cast<std::int32_t>(value(index, sub)) : 0;
+      return has(index + at, sub) ? static_cast<std::int32_t>(value(index + at, sub)) : 0;
     };
-    if (state_ != 4) return;
-    if (mode == 8) value(0x6064) = i32(0x607A);
-    if (mode == 7 && (last_controlword_ & 0x10) != 0) value(0x6064) = i32(0x60C1, 1);
-    if (mode == 9) value(0x6064) += (i32(0x60FF) + i32(0x60B1)) / 1000;
-    if (mode == 10) value(0x6077) = value(0x6071) + value(0x60B2);
+    if (state_[axis] != 4) return;
+    if (mode == 8) value(0x6064 + at) = i32(0x607A);
+    if (mode == 7 && (last_controlword_[axis] & 0x10) != 0) value(0x6064 + at) = i32(0x60C1, 1);
+    if (mode == 9) value(0x6064 + at) += (i32(0x60FF) + i32(0x60B1)) / 1000;
+    if (mode == 10) value(0x6077 + at) = i32(0x6071) + i32(0x60B2);
   }
 
   DataSheet sheet_;
   int node_;
   int nmt_ = 0;
-  int state_ = 1;
+  std::array<int, 2> state_{1, 1};  ///< by axis
   int boot_in_ms_ = 0;
   int guarded_ = 0;
   int toggle_ = 0x80;
   std::int64_t since_heartbeat_ms_ = 0;
-  unsigned last_controlword_ = 0;
+  std::array<unsigned, 2> last_controlword_{};
+  unsigned last_homing_ = 0;
+  unsigned homed_bits_ = 0;
+  int homing_ = 0;  ///< [ms] that are left
   std::array<int, 4> syncs_{};
-  std::map<std::pair<std::uint16_t, std::uint8_t>, std::int64_t> values_, pending_;
+  std::map<std::pair<std::uint16_t, std::uint8_t>, std::int64_t> values_, pending_, stored_;
   std::vector<Frame> late_;
 };
 

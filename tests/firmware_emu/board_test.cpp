@@ -24,7 +24,7 @@ TEST(Board, SaysBootUpAndAnswersWhoItIs) {
   EXPECT_EQ(rig.read<std::uint32_t>(0x1000, 0), 0x00020192U);
   EXPECT_EQ(rig.read<std::uint32_t>(0x1018, 1), 0x7A4DU);
   EXPECT_EQ(rig.read<std::uint32_t>(0x1018, 4), 0x12345678U);
-  EXPECT_EQ(rig.read<std::uint32_t>(0x6502, 0), 0x000F0380U);
+  EXPECT_EQ(rig.read<std::uint32_t>(0x6502, 0), 0x000F03A0U);
 }
 
 /// The master takes a board without a sheet at this one's word.

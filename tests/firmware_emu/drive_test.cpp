@@ -262,7 +262,7 @@ TEST_F(Drive, ShowsTheModeInForceAndRefusesOthers) {
   rig.commands[0].mode = 10;
   rig.cycles(2);
   EXPECT_EQ(rig.object<std::int8_t>(0x6061), 10);
-  rig.commands[0].mode = 6;  // homing: not ours
+  rig.commands[0].mode = 7;  // interpolated position: not ours
   rig.cycles(2);
   EXPECT_EQ(rig.object<std::int8_t>(0x6061), 10);
   EXPECT_GE(rig.object<std::uint32_t>(0x2041), 1U);

@@ -49,6 +49,9 @@ DataSheet servo_with_profiles() {
         number(0x607C, 0, kInteger32, -1'000), number(0x6098, 0, kInteger8, 17),
         number(0x6099, 1, kUnsigned32, 200'000), number(0x6099, 2, kUnsigned32, 20'000),
         number(0x609A, 0, kUnsigned32, 1'000'000)}) {
+    std::erase_if(sheet.entries, [&](const SheetEntry& e) {
+      return e.index == entry.index && e.sub == entry.sub;
+    });
     sheet.entries.push_back(entry);
   }
   std::ranges::sort(sheet.entries, {},
@@ -282,6 +285,63 @@ TEST(SheetBoard, AHomingMethodThatItHasNotIsAHomingError) {
   EXPECT_TRUE(rig.bit(12)) << "here is home";
   EXPECT_FALSE(rig.bit(13));
   EXPECT_NEAR(rig.position(), -1'000, 2);
+}
+
+/// Nothing of it is in the sheet: a brake is the drive's own affair.
+TEST(SheetBoard, ItsBrakeHoldsUntilItIsEnabledAndBeforeItIsDisabled) {
+  BoardSetup setup = stand_in(sheet_of("servo.eds"));
+  setup.axes[0].brake = true;
+  setup.axes[0].brake_release_ms = 40;
+  setup.axes[0].brake_engage_ms = 30;
+  StandIn rig(setup);
+  ASSERT_EQ(rig.write(0x6060, 0, std::int8_t{8}), 0U);
+  ASSERT_EQ(rig.write(0x605A, 0, std::int16_t{2}), 0U);
+  for (const int value : {0x06, 0x07, 0x0F}) rig.word(value);
+  EXPECT_EQ(rig.state(), canopen::DriveState::kSwitchedOn) << "the brake opens";
+  rig.cycles(45);
+  EXPECT_EQ(rig.state(), canopen::DriveState::kOperationEnabled);
+  EXPECT_TRUE(rig.drives[0].brake_open);
+  rig.word(0x02, 25);  // quick stop: at rest after 20 ms
+  EXPECT_FALSE(rig.drives[0].brake_open);
+  EXPECT_TRUE(rig.drives[0].enabled) << "the bridge holds until the brake does";
+  rig.cycles(35);
+  EXPECT_FALSE(rig.drives[0].enabled);
+}
+
+/// 300 rpm of a motor that turns 50 times as often as its joint: a tenth of a revolution a second.
+TEST(SheetBoard, TellsAndTakesVelocitiesInItsOwnUnits) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].velocity_units_per_rev = 3000.0;
+  StandIn rig(setup);
+  ASSERT_EQ(rig.write(0x6083, 0, std::uint32_t{3'000}), 0U);  // in a tenth of a second
+  rig.enable_by_sdo(3);
+  ASSERT_EQ(rig.write(0x60FF, 0, std::int32_t{300}), 0U);
+  rig.cycles(500);
+  const std::int32_t from = rig.position();
+  rig.cycles(100);
+  const double turned = (rig.position() - from) / setup.axes[0].link_counts_per_rev;
+  EXPECT_NEAR(turned, 0.01, 0.001);
+  EXPECT_NEAR(rig.object<std::int32_t>(0x606C), 300, 30);
+}
+
+/// 6064 is 0 where the joint stands at power-on, and what homing says afterwards.
+TEST(SheetBoard, WithoutAnAbsoluteEncoderItCountsFromPowerOn) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].counts_from_power_on = true;
+  setup.axes[0].reversed = true;
+  StandIn rig(setup);
+  rig.joints[0].q = rig.joints[0].th = 0.7;
+  rig.nmt(129);
+  rig.cycles(3);
+  EXPECT_NEAR(rig.position(), 0, 2);
+  rig.nmt(1);
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{35}), 0U);
+  rig.enable_by_sdo(6);
+  rig.word(0x1F);
+  EXPECT_NEAR(rig.position(), -1'000, 200);
+  rig.nmt(129);
+  rig.cycles(3);
+  EXPECT_NEAR(rig.position(), 0, 200) << "its power was gone";
 }
 
 TEST(SheetBoard, NeedsTheObjectsOfADrive) {

@@ -138,6 +138,103 @@ TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
   EXPECT_NE(folder_of_it.find("is a folder"), std::string::npos) << folder_of_it;
 }
 
+constexpr const char* kLast = "max_torque_Nm = 10.0\n";
+
+/// The arm with more of its joint, or of its board.
+std::string joint_with(const std::string& lines) {
+  std::string text = kArm;
+  return text.replace(text.find(kLast), std::string(kLast).size(), kLast + lines);
+}
+std::string board_with(const std::string& lines) {
+  const std::string last = "joints = [\"elbow\"]\n";
+  std::string text = kArm;
+  return text.replace(text.find(last), last.size(), last + lines);
+}
+
+TEST_F(BoardSheet, LetsAJointBeHomed) {
+  const auto robot =
+      read(joint_with("homing = { method = -3, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0, "
+                      "position_rad = 1.5 }\n"));
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  const auto& homing = robot->joints[0].homing;
+  ASSERT_TRUE(homing.has_value());
+  EXPECT_EQ(homing->method, -3);
+  EXPECT_DOUBLE_EQ(homing->zero_speed_rad_s, 0.05);
+  EXPECT_EQ(homing->timeout_s, 60.0);
+  EXPECT_TRUE(homing->required && !homing->at_start);
+}
+
+TEST_F(BoardSheet, RefusesAHomingThatIsNoneOrThatTheDriveHasNot) {
+  const std::string homing =
+      "homing = { method = 17, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0 }\n";
+  const auto why = [&](const std::string& from, const std::string& to) {
+    return refused(joint_with(with(homing, from, to)));
+  };
+  EXPECT_NE(why("17", "0").find("0 is no homing"), std::string::npos);
+  EXPECT_NE(why("17", "128").find("method"), std::string::npos);
+  EXPECT_NE(why("0.5", "-0.5").find("speed_rad_s"), std::string::npos);
+  EXPECT_NE(why("2.0", "nan").find("acceleration_rad_s2"), std::string::npos);
+  EXPECT_NE(why("17,", "17, required = false, at_start = true,").find("at_start"),
+            std::string::npos);
+  EXPECT_NE(why("method = 17,", "").find("method"), std::string::npos);
+  const std::string whole = sheet;
+  sheet = with(sheet, "0x000003EF", "0x000003CF");  // 6502 without bit 5
+  EXPECT_NE(refused(joint_with(homing)).find("the drive of joint 'elbow' cannot be homed"),
+            std::string::npos);
+  sheet = with(whole, "[607C]", "[607B]");
+  sheet = with(sheet, "=0x607C", "=0x607B");
+  EXPECT_TRUE(read(joint_with(homing))) << "home is at 0";
+  EXPECT_NE(why("2.0 }", "2.0, position_rad = 0.1 }").find("no home offset (607C)"),
+            std::string::npos);
+}
+
+TEST_F(BoardSheet, TakesStopOptionsThatTheDriveHas) {
+  const auto robot = read(joint_with("stop_options = { shutdown = 1, fault = -2 }\n"));
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->joints[0].stop_options.shutdown, 1);
+  EXPECT_EQ(robot->joints[0].stop_options.fault, -2);
+  EXPECT_FALSE(robot->joints[0].stop_options.halt.has_value());
+  sheet = with(sheet, "[605D]", "[605F]");
+  sheet = with(sheet, "=0x605D", "=0x605F");
+  const std::string why = refused(joint_with("stop_options = { halt = 1 }\n"));
+  EXPECT_NE(why.find("halt: the drive of joint 'elbow' has no such option (605D)"),
+            std::string::npos)
+      << why;
+}
+
+TEST_F(BoardSheet, KeepsAConfigurationWhereItCan) {
+  const std::string why = refused(board_with("keeps_configuration = true\n"));
+  EXPECT_NE(why.find("its drive cannot: 1010:1 is missing"), std::string::npos) << why;
+}
+
+TEST_F(BoardSheet, TakesFramesOfCanFdWhereTheBusHasThem) {
+  const std::string why = refused(board_with("fd = true\n"));
+  EXPECT_NE(why.find("its bus 'arm' is no CAN FD bus"), std::string::npos) << why;
+  const auto robot = read(with(board_with("fd = true\n"), "fd = false", "fd = true"));
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->boards[0].sheet->most_pdo_bytes, 64);
+  const std::string ours = with(board_with("fd = true\n"), "eds = \"drive.eds\"\n", "");
+  EXPECT_FALSE(read(ours));
+}
+
+TEST_F(BoardSheet, AsksForAVelocityUnitThatItDoesNotKnow) {
+  sheet = with(sheet, "[60B1]",
+               "[60A9]\nParameterName=SI unit velocity\nObjectType=0x7\n"
+               "DataType=0x0007\nAccessType=ro\nDefaultValue=0x00B44700\n"
+               "PDOMapping=0\n\n[60B1]");
+  const auto rpm = read();
+  ASSERT_TRUE(rpm) << rpm.error()[0].to_string();
+  EXPECT_EQ(rpm->joints[0].velocity_units_per_rev, 3000.0) << "60 times the gear";
+  EXPECT_TRUE(rpm->joints[0].velocity_of_sheet);
+  sheet = with(sheet, "0x00B44700", "0x00010300");
+  const std::string why = refused();
+  EXPECT_NE(why.find("velocity_units_per_rev"), std::string::npos) << why;
+  EXPECT_NE(why.find("60A9 is 0x00010300"), std::string::npos) << why;
+  const auto told = read(joint_with("velocity_units_per_rev = 1000\n"));
+  ASSERT_TRUE(told) << told.error()[0].to_string();
+  EXPECT_FALSE(told->joints[0].velocity_of_sheet);
+}
+
 TEST_F(BoardSheet, LetsAControllerClaimOnlyTheDrivesModes) {
   const auto robot = read();
   ASSERT_TRUE(robot);

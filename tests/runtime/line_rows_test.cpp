@@ -1,4 +1,5 @@
 // The rows of docs/faults.md about an EtherCAT line.
+#include "canopen/bytes.hpp"
 #include "tests/runtime/fault_row.hpp"
 
 namespace tandem::runtime {
@@ -189,6 +190,96 @@ TEST_F(LineRow, WrongIdentity) {
     EXPECT_EQ(rig.axis(b).machine().motion(), DriveMotion::kNone) << "nothing was enabled";
   }
   expect_row({});
+}
+
+TEST_F(LineRow, WrongRevision) {
+  Fault fault = of(FaultKind::kBoardRevision);
+  fault.board = 1;
+  fault.number = 0x00020000;
+  LineRig rig({fault});
+  for (int i = 0; i < 4000 && !rig.noticed(); ++i) rig.step();
+  EXPECT_TRUE(rig.noticed());
+  EXPECT_NE(rig.causes().find("board_2"), std::string::npos) << rig.causes();
+  EXPECT_NE(rig.causes().find("revision"), std::string::npos) << rig.causes();
+  expect_row({});
+}
+
+/// Another's frame, which passes the slaves between two of the master's: one datagram that writes
+/// `data` at register `at`.
+void strangers_write(LineRig& rig, std::uint8_t command, int position, std::uint16_t at,
+                     std::initializer_list<std::uint8_t> data) {
+  std::vector<std::uint8_t> frame(60);
+  std::fill_n(frame.begin(), 6, std::uint8_t{0xFF});
+  frame[6] = 0x10;
+  frame[12] = 0x88;
+  frame[13] = 0xA4;
+  canopen::put(&frame[14], static_cast<std::uint16_t>(0x1000 | (12 + data.size())));
+  frame[16] = command;
+  canopen::put(&frame[18], static_cast<std::uint16_t>(-position));
+  canopen::put(&frame[20], at);
+  canopen::put(&frame[22], static_cast<std::uint16_t>(data.size()));
+  std::ranges::copy(data, frame.begin() + 26);
+  auto& robot = *rig.backend;
+  ASSERT_TRUE(robot.lines[0]->boards().line().pass(frame, robot.emulated->now_ns()));
+}
+constexpr std::uint8_t kWriteOne = 2, kWriteAll = 8;  // APWR, BWR
+constexpr std::uint16_t kAlControl = 0x0120, kInputsFmmuActive = 0x061C;
+
+TEST_F(LineRow, SlaveInAnotherState) {
+  LineRig rig;
+  rig.run();
+  strangers_write(rig, kWriteOne, 1, kAlControl, {4, 0});  // SAFEOP
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("slave 1 (board_2): is in SAFEOP"), std::string::npos)
+      << rig.causes();
+}
+
+TEST_F(LineRow, SecondMaster) {
+  LineRig rig;
+  rig.run();
+  strangers_write(rig, kWriteAll, 0, kAlControl, {1, 0});  // INIT
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("slave"), std::string::npos) << rig.causes();
+}
+
+TEST_F(LineRow, WorkingCounterShortOnce) {
+  LineRig rig;
+  rig.run();
+  strangers_write(rig, kWriteOne, 1, kInputsFmmuActive, {0});
+  rig.step();
+  EXPECT_EQ(rig.cycle->state().age_cycles()[2], 1U);
+  strangers_write(rig, kWriteOne, 1, kInputsFmmuActive, {1});
+  for (int i = 0; i < 200; ++i) {
+    rig.step();
+    EXPECT_EQ(rig.cycle->state().age_cycles()[2], 0U);
+  }
+  expect_running(rig);
+  expect_row({});
+}
+
+TEST_F(LineRow, WorkingCounterShortForEver) {
+  LineRig rig;
+  rig.run();
+  strangers_write(rig, kWriteOne, 1, kInputsFmmuActive, {0});
+  expect_row(rig.watch());
+  EXPECT_NE(rig.causes().find("slave 1 (board_2): its FMMUs were changed"), std::string::npos)
+      << rig.causes();
+}
+
+/// For longer than the watchdog no frame reaches the slaves, and then they do again.
+TEST_F(LineRow, WatchdogOfTheOutputs) {
+  LineRig rig;
+  rig.run();
+  Fault fault = frames(FaultKind::kFrameDrop, 0, sim::Direction::kToBoards);
+  fault.duration_ns = 150'000'000;
+  rig.inject(fault);
+  expect_row(rig.watch());
+  for (int i = 0; i < 300; ++i) rig.step();
+  for (std::size_t i = 0; i < rig.robot.boards.size(); ++i) {
+    const auto& slave = rig.backend->lines[0]->boards().line().slave(i);
+    EXPECT_EQ(slave.state(), ethercat::AlState::kSafeOp);
+    EXPECT_EQ(slave.code(), ethercat::AlCode::kWatchdog);
+  }
 }
 
 TEST_F(LineRow, SlaveMissingAtTheStart) {

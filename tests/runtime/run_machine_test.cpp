@@ -82,8 +82,8 @@ TEST(RunMachine, WaitsAfterAStopButNotDuringBringUp) {
                                  {{kHeld, RunEvent::kFinished}, kHeld}});
 }
 
-TEST(RunMachine, HoldsAfterAResetUntilControllersAreStarted) {
-  expect_table({.settles = true, .holds_back = true}, {{{kBringUp, RunEvent::kEnabled}, kSettling},
+TEST(RunMachine, HoldsUntilControllersAreStarted) {
+  expect_table({.settles = true, .holds_back = true}, {{{kBringUp, RunEvent::kEnabled}, kHeld},
                                                        {{kResetting, RunEvent::kEnabled}, kHeld}});
 }
 

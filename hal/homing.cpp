@@ -1,0 +1,27 @@
+#include "hal/homing.hpp"
+
+namespace tandem::hal {
+
+const char* to_string(HomingState state) noexcept {
+  switch (state) {
+    case HomingState::kNone: return "none";
+    case HomingState::kNotHomed: return "not homed";
+    case HomingState::kHoming: return "under way";
+    case HomingState::kHomed: return "homed";
+  }
+  return "none";
+}
+
+const char* to_string(HomingError error) noexcept {
+  switch (error) {
+    case HomingError::kNone: return "";
+    case HomingError::kDrive: return "the drive reports a homing error (statusword bit 13)";
+    case HomingError::kTimeout: return "it did not end within its timeout_s";
+    case HomingError::kMode: return "the drive did not go into the homing mode (6)";
+    case HomingError::kStopped: return "it was stopped on request";
+    case HomingError::kInterrupted: return "a fault or a stop interrupted it";
+  }
+  return "";
+}
+
+}  // namespace tandem::hal

@@ -1,0 +1,77 @@
+// `tandem joint home` against a running `tandem run`, whose controller waits for it.
+#include "tests/apps/running.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class HomedJoints : public Running {
+ protected:
+  /// joint1 is homed where it stands; joint2's method is one that its drive has not.
+  void SetUp() override {
+    Running::SetUp();
+    const std::string homing =
+        "homing = { method = 35, speed_rad_s = 0.5, acceleration_rad_s2 = 1.0, position_rad = 0.5 "
+        "}\n";
+    const std::string robot = read_text(folder_ / "robot.toml");
+    const std::size_t from = robot.find("[[joint]]"), to = robot.find("[posture.ready]");
+    std::string joint = robot.substr(from, to - from);
+    const std::string both = "names = [\"joint1\", \"joint2\"]\n";
+    joint.replace(joint.find(both), both.size(), "name = \"joint1\"\n" + homing);
+    std::string other = joint;
+    other.replace(other.find("joint1"), 6, "joint2");
+    other.replace(other.find("method = 35"), 11, "method = 1");
+    other.replace(other.find("position_rad = 0.5"), 18, "required = false");
+    write_text(folder_ / "robot.toml", robot.substr(0, from) + joint + other + robot.substr(to));
+  }
+  void expect(const Outcome& outcome, int status, const std::string& part) const {
+    EXPECT_EQ(outcome.status, status) << outcome.out << outcome.err;
+    EXPECT_NE((outcome.out + outcome.err).find(part), std::string::npos)
+        << outcome.out << outcome.err;
+  }
+};
+
+TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
+  start("--rate 20 --duration 2000 --on-fault wait");
+  until(R"("phase": "held")");
+  expect(to_run("joint list joint1"), 0, "operation enabled, not homed");
+  expect(to_run("joint move joint1 --to 0"), 2,
+         "joint1: has to be homed first: its position is not known (tandem joint home joint1)");
+  expect(to_run("controller start"), 2, "tandem joint home joint1");
+  expect(to_run("joint home jiont1"), 2, "did you mean 'joint1'?");
+  expect(to_run("joint home joint2"), 1,
+         "joint2: the homing failed: the drive reports a homing error (statusword bit 13)");
+  expect(to_run("joint show joint2"), 0, "not homed: the drive reports a homing error");
+  expect(to_run("joint home joint1"), 0, "joint1 is homed: it is at 0.");
+  const auto shown = nlohmann::json::parse(to_run("joint show joint1 --json -").out);
+  EXPECT_EQ(shown["homing"], "homed");
+  EXPECT_EQ(shown["homing_error"], "");
+  EXPECT_NEAR(shown["position_rad"].get<double>(), 0.5, 0.02);
+  expect(to_run("controller start"), 0, "hold");
+  until(R"("phase": "running")");
+  expect(to_run("joint home joint1"), 2, "is claimed by the controller 'hold'");
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(HomedJoints, ARunThatDoesNotWaitSaysWhichWasNotHomed) {
+  const Outcome ran = tandem("run hold.toml --duration 1 --no-log");
+  expect(ran, 1, "held until these are homed: joint1 (tandem joint home NAME");
+  expect(ran, 1, "fault: 1.");
+  expect(ran, 1, "joint1: it was not homed, for which the controllers waited");
+}
+
+TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {
+  edit("robot.toml", "position_rad = 0.5 }", "position_rad = 0.5, at_start = true }");
+  const Outcome ran = tandem("run hold.toml --duration 1 --no-log --json run.json");
+  EXPECT_EQ(ran.status, 0) << ran.err;
+  EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+
+TEST_F(HomedJoints, AreCheckedByName) {
+  edit("robot.toml", "method = 35", "method = 0");
+  expect(tandem("check robot.toml"), 2, "0 is no homing");
+  edit("robot.toml", "method = 0", "metohd = 35");
+  expect(tandem("check robot.toml"), 2, "metohd");
+}
+
+}  // namespace
+}  // namespace tandem::apps

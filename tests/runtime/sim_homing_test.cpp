@@ -1,0 +1,300 @@
+// A joint whose encoder does not know where it is: homed through the whole chain, on both wires and
+// by another maker's drive; until then nothing moves it.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+
+#include "canopen/data_sheet.hpp"
+#include "hal/sim/sim_robot.hpp"
+#include "rt/clock.hpp"
+#include "runtime/robot_cycle.hpp"
+#include "tests/runtime/test_controllers.hpp"
+#include "tests/sim/swing_robot.hpp"
+
+namespace tandem::runtime {
+namespace {
+
+using hal::FaultKind;
+using hal::HomingError;
+using hal::HomingState;
+
+constexpr double kLowSwitch_rad = -2.995;
+
+/// Which wire, and whose drive.
+struct Kind {
+  const char* name;
+  hal::RobotConfig (*robot)();
+};
+
+hal::RobotConfig can_robot() { return tandem::test::swing_robot(); }
+hal::RobotConfig line_robot() { return tandem::test::line_swing_robot(); }
+hal::RobotConfig others_robot() {
+  hal::RobotConfig robot = tandem::test::classic_swing_robot();
+  const std::string file = std::string(TANDEM_SOURCE_DIR) + "/config/drives/servo.eds";
+  auto sheet = canopen::load_data_sheet(file);
+  EXPECT_TRUE(sheet.has_value());
+  robot.boards[0].sheet = std::make_shared<const canopen::DataSheet>(std::move(*sheet));
+  robot.boards[0].eds = file;
+  robot.joints[0].reversed = true;
+  robot.joints[0].zero_counts = 5000;
+  return robot;
+}
+
+/// The swing, which hangs from its hoist at 0.5 rad; its low switch is at the end of its range.
+struct HomedSwing : ::testing::TestWithParam<Kind> {
+  /// @param cycles  that the run has; 0: it waits
+  void begin(bool required = true, AfterReset after_reset = AfterReset::kHold,
+             bool at_start = false, std::uint64_t cycles = 0) {
+    robot = GetParam().robot();
+    robot.joints[0].homing = hal::HomingConfig{.method = robot.joints[0].reversed ? 18 : 17,
+                                               .speed_rad_s = 1.5,
+                                               .zero_speed_rad_s = 0.1,
+                                               .acceleration_rad_s2 = 5.0,
+                                               .position_rad = kLowSwitch_rad,
+                                               .timeout_s = 10.0,
+                                               .required = required,
+                                               .at_start = at_start};
+    auto made = sim::SimRobot::create(robot, tandem::test::swing_kernels(2),
+                                      {.posture = "up", .release_ns = 100'000'000});
+    ASSERT_TRUE(made) << made.error().to_string();
+    backend = std::move(*made);
+    host = std::make_unique<ControllerHost>(robot, tandem::test::swing_kernels(2), 1'000'000);
+    ASSERT_TRUE(host->add("sine", std::make_unique<test::Sine>(std::vector<std::size_t>{0}),
+                          test::parameters("amplitude_rad = 0.2")));
+    cycle = std::make_unique<RobotCycle>(
+        CycleParts{robot, *backend, *host, clock},
+        CycleConfig{.running_cycles = cycles,
+                    .settle_cycles = 200,
+                    .after_stop = cycles == 0 ? AfterStop::kWait : AfterStop::kEnd,
+                    .after_reset = after_reset});
+  }
+  void steps(int count) {
+    for (int i = 0; i < count; ++i) ASSERT_TRUE(cycle->step());
+  }
+  void until(RunPhase phase, int most = 6000) {
+    for (int taken = 0; taken < most && cycle->phase() != phase; ++taken) {
+      ASSERT_TRUE(cycle->step());
+    }
+    ASSERT_EQ(cycle->phase(), phase) << backend->status_text();
+  }
+  /// What the loop answers to `ask`, called on another thread; empty: it is done.
+  template <class Ask>
+  [[nodiscard]] std::string refusal(const Ask& ask) {
+    auto asked = std::async(std::launch::async, [&] { return ask(cycle->services()); });
+    while (asked.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready) steps(1);
+    const Result<RequestResult> answer = asked.get();
+    return answer ? std::string() : answer.error().to_string();
+  }
+  [[nodiscard]] std::string home_refused() {
+    return refusal([](RunServices& services) { return services.home_joint("swing"); });
+  }
+  [[nodiscard]] std::string move_refused() {
+    return refusal(
+        [](RunServices& services) { return services.move_joint("swing", {.target_rad = 0.1}); });
+  }
+  [[nodiscard]] std::string start_refused() {
+    return refusal([](RunServices& services) { return services.go_on(); });
+  }
+  [[nodiscard]] hal::Homing homing() { return cycle->services().joints()[0].look.homing; }
+  void until_homed(int most = 8000) {
+    for (int i = 0; i < most && homing().state == HomingState::kHoming; ++i) steps(1);
+  }
+  [[nodiscard]] double off_rad() const {
+    return cycle->state().position_rad()[0] - backend->plant().joint(0).position_rad;
+  }
+  void home() {
+    ASSERT_TRUE(cycle->services().home_joint("swing", RunServices::Patience{0}));
+    steps(1);
+    ASSERT_EQ(homing().state, HomingState::kHoming);
+  }
+
+  hal::RobotConfig robot;
+  std::unique_ptr<sim::SimRobot> backend;
+  std::unique_ptr<ControllerHost> host;
+  rt::WallClock clock;
+  std::unique_ptr<RobotCycle> cycle;
+};
+
+TEST_P(HomedSwing, IsHeldUntilItIsHomedAndThenKnowsWhereItIs) {
+  begin();
+  until(RunPhase::kHeld);
+  const double rest = backend->plant().joint(0).position_rad;
+  EXPECT_NEAR(cycle->state().position_rad()[0], 0.0, 0.1) << "it counts from where it was";
+  steps(500);
+  EXPECT_NEAR(backend->plant().joint(0).position_rad, rest, 0.05);
+  home();
+  double fastest = 0.0;
+  for (int i = 0; i < 8000 && homing().state == HomingState::kHoming; ++i) {
+    steps(1);
+    fastest = std::max(fastest, std::abs(backend->plant().joint(0).velocity_rad_s));
+  }
+  ASSERT_EQ(homing().state, HomingState::kHomed) << hal::to_string(homing().error);
+  EXPECT_LT(fastest, 2.0);
+  const double off = off_rad();
+  EXPECT_NEAR(off, 0.0, 2e-3) << "at 1.5 rad/s a period's way past the switch";
+  const bool ours = robot.boards[0].eds.empty();  // another's drive has no motor encoder to show
+  if (ours) {
+    EXPECT_NEAR(cycle->state().motor_position_rad()[0],
+                backend->plant().joint(0).motor_position_rad + off, 1e-4);
+  }
+  steps(300);
+  EXPECT_NEAR(backend->plant().joint(0).position_rad, kLowSwitch_rad, 0.01)
+      << "held where it was found, without a jump";
+  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  steps(1);
+  EXPECT_EQ(cycle->phase(), RunPhase::kRunning);
+  double worst = 0.0;
+  for (int i = 0; i < 500; ++i) {
+    steps(1);
+    worst = std::max(worst, std::abs(off_rad() - off));
+  }
+  EXPECT_LT(worst, 2e-3);
+}
+
+const char* const kRemedy =
+    "swing: has to be homed first: its position is not known (tandem joint "
+    "home swing)";
+
+TEST_P(HomedSwing, RefusesEverythingElseByName) {
+  begin();
+  until(RunPhase::kHeld);
+  EXPECT_EQ(move_refused(), kRemedy);
+  EXPECT_EQ(start_refused(), kRemedy);
+  EXPECT_EQ(refusal([](RunServices& services) { return services.recover("swing"); }), kRemedy);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  home();
+  steps(200);
+  for (const std::string& why : {move_refused(), start_refused(), home_refused()}) {
+    EXPECT_TRUE(why.starts_with("swing: is being homed")) << why;
+  }
+}
+
+TEST_P(HomedSwing, StopsWhereItIsWhenTheHomingIsStopped) {
+  begin();
+  until(RunPhase::kHeld);
+  home();
+  steps(700);
+  ASSERT_GT(std::abs(backend->plant().joint(0).velocity_rad_s), 0.3);
+  ASSERT_TRUE(cycle->services().move_joint("swing", {}, RunServices::Patience{0}));
+  until_homed();
+  EXPECT_EQ(homing().state, HomingState::kNotHomed);
+  EXPECT_EQ(homing().error, HomingError::kStopped);
+  const double rest = backend->plant().joint(0).position_rad;
+  steps(500);
+  EXPECT_NEAR(backend->plant().joint(0).position_rad, rest, 0.05);
+  EXPECT_EQ(cycle->phase(), RunPhase::kHeld);
+  EXPECT_EQ(move_refused(), kRemedy) << "it is not homed";
+  home();  // and from there again
+  until_homed();
+  EXPECT_EQ(homing().state, HomingState::kHomed);
+}
+
+TEST_P(HomedSwing, AFaultEndsTheHomingAndNothingMovesOn) {
+  begin();
+  until(RunPhase::kHeld);
+  home();
+  steps(500);
+  sim::Fault fault;
+  fault.kind = FaultKind::kEncoderUnplug;
+  fault.joint = 0;
+  fault.duration_ns = 5'000'000;
+  ASSERT_EQ(backend->robot().inject(fault), Code::kOk);
+  until(RunPhase::kFaulted);
+  EXPECT_EQ(homing().state, HomingState::kNotHomed);
+  EXPECT_EQ(homing().error, HomingError::kInterrupted);
+  EXPECT_FALSE(home_refused().empty());
+  steps(15'000);  // it swings out
+  cycle->inbox().reset_faults();
+  until(RunPhase::kHeld);
+  EXPECT_EQ(move_refused(), kRemedy);
+  home();
+  until_homed();
+  EXPECT_EQ(homing().state, HomingState::kHomed);
+}
+
+/// After a fault it is where it was; a board that was without power knows nothing any more, and
+/// controllers that a reset would let continue wait.
+TEST_P(HomedSwing, SurvivesAResetOfFaultsButNotTheBoardsPower) {
+  begin(true, AfterReset::kContinue);
+  until(RunPhase::kHeld);
+  home();
+  until_homed();
+  ASSERT_TRUE(cycle->services().go_on(RunServices::Patience{0}));
+  steps(100);
+  ASSERT_EQ(cycle->phase(), RunPhase::kRunning);
+  const auto fault_of = [&](FaultKind kind) {
+    sim::Fault fault;
+    fault.kind = kind;
+    (kind == FaultKind::kEncoderUnplug ? fault.joint : fault.board) = 0;
+    fault.duration_ns = 5'000'000;
+    ASSERT_EQ(backend->robot().inject(fault), Code::kOk);
+    until(RunPhase::kFaulted);
+    steps(15'000);
+    cycle->inbox().reset_faults();
+  };
+  fault_of(FaultKind::kEncoderUnplug);
+  until(RunPhase::kRunning);
+  EXPECT_EQ(homing().state, HomingState::kHomed);
+  EXPECT_LT(std::abs(off_rad()), 0.03);
+  fault_of(FaultKind::kBoardReset);
+  until(RunPhase::kHeld, 20'000);
+  EXPECT_EQ(homing().state, HomingState::kNotHomed);
+  EXPECT_EQ(start_refused(), kRemedy);
+}
+
+TEST_P(HomedSwing, ThatNeedNotBeHomedRunsAtOnce) {
+  begin(false);
+  until(RunPhase::kRunning);
+  EXPECT_LT(std::abs(off_rad()), 0.01) << "its encoder is absolute";
+  EXPECT_EQ(homing().state, HomingState::kNotHomed);
+  EXPECT_TRUE(home_refused().starts_with("swing: is claimed by the controller 'sine'"));
+}
+
+TEST_P(HomedSwing, IsHomedByTheRunItselfWhereThatIsDeclared) {
+  begin(true, AfterReset::kHold, true);
+  until(RunPhase::kHeld);
+  until(RunPhase::kRunning, 8000);
+  EXPECT_EQ(homing().state, HomingState::kHomed);
+  steps(200);
+  EXPECT_LT(std::abs(off_rad()), 3e-3);
+}
+
+TEST_P(HomedSwing, ARunWhoseTimeEndsBeforeThatEndsInAFaultThatNamesTheJoint) {
+  begin(true, AfterReset::kHold, false, 500);
+  while (cycle->step()) {
+  }
+  const auto faults = cycle->faults();
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_EQ(faults[0].joint, "swing");
+  EXPECT_NE(faults[0].text.find("was not homed"), std::string::npos) << faults[0].text;
+  EXPECT_EQ(cycle->running_cycles(), 0U);
+}
+
+/// Two runs are the same to the last bit, and a snapshot of the middle of a homing goes on.
+TEST_P(HomedSwing, IsAFunctionOfItsStateAlone) {
+  begin();
+  until(RunPhase::kHeld);
+  home();
+  steps(300);
+  const auto middle = cycle->save();
+  ASSERT_TRUE(middle.has_value());
+  until_homed();
+  steps(100);
+  const auto end = cycle->save();
+  const std::int64_t ended = cycle->progress().time_ns.load();
+  ASSERT_TRUE(cycle->restore(*middle));
+  steps(1);
+  ASSERT_EQ(homing().state, HomingState::kHoming);
+  while (cycle->progress().time_ns.load() < ended) steps(1);
+  EXPECT_EQ(homing().state, HomingState::kHomed);
+  EXPECT_TRUE(*cycle->save() == *end);
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, HomedSwing,
+                         ::testing::Values(Kind{"can", can_robot}, Kind{"line", line_robot},
+                                           Kind{"others", others_robot}),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+}  // namespace
+}  // namespace tandem::runtime
