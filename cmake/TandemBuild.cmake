@@ -31,6 +31,8 @@ target_compile_features(tandem_options INTERFACE cxx_std_23)
 target_compile_options(tandem_options INTERFACE -ffp-contract=off
   "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
   "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>>"
+  # Nobody replaces a function of a library here, so that g++ may put one into another with -fPIC.
+  "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>>"
   # g++ collects its garbage at 128 MB, which costs a twentieth of the time; a source here takes 1 GB.
   "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>>")
 target_include_directories(tandem_options INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
