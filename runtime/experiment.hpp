@@ -93,6 +93,12 @@ struct ReportOptions {
   std::string foot;         ///< force/torque sensor
 };
 
+/// [parallel]: a second robot, simulated in this process, that gets what the first one gets.
+struct ParallelOptions {
+  std::string robot_file;  ///< resolved; the experiment's own unless it says another
+  hal::RobotConfig robot;  ///< with [parallel.link.NAME]; to be completed with those
+};
+
 /// [[controller]]
 struct ControllerSpec {
   std::string plugin;    ///< "squat", or a path to a shared library
@@ -126,6 +132,7 @@ struct Experiment {
   LogOptions log;
   ReportOptions report;
   estimation::EstimationConfig estimation;  ///< nothing without the table
+  std::optional<ParallelOptions> parallel;  ///< empty: there is no second robot
   dds::Config dds;                          ///< off without the table
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters
