@@ -12,7 +12,8 @@ namespace tandem::hal {
 /// One cycle of the second robot, and how far the first was from it then.
 struct ParallelView {
   StateImage state;  ///< of the second
-  /// First minus second, by joint; zero until both are operational. [rad, rad/s, Nm; m, m/s, N]
+  /// First minus second, by joint; zero unless both follow their command. [rad, rad/s, Nm; m, m/s,
+  /// N]
   std::vector<double> position_rad, velocity_rad_s, torque_Nm;
   std::uint64_t behind_cycles = 0;  ///< the first was so much further
   std::uint64_t missed = 0;         ///< commands that the second never got, so far

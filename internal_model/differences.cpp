@@ -10,11 +10,14 @@ void Difference::take(double difference) noexcept {
   square_sum += difference * difference;
 }
 
+void Differences::compare(const hal::StateImage& first, const hal::StateImage& second) noexcept {
+  ++compared_;
+  if (std::ranges::equal(first.bytes(), second.bytes())) return;
+  if (unequal_++ == 0) first_unequal_ = static_cast<std::int64_t>(first.cycle()[0]);
+}
+
 void Differences::take(const hal::StateImage& first, const hal::StateImage& second) noexcept {
   ++cycles_;
-  if (!std::ranges::equal(first.bytes(), second.bytes())) {
-    if (unequal_++ == 0) first_unequal_ = static_cast<std::int64_t>(first.cycle()[0]);
-  }
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     joints_[j].position_rad.take(first.position_rad()[j] - second.position_rad()[j]);
     joints_[j].velocity_rad_s.take(first.velocity_rad_s()[j] - second.velocity_rad_s()[j]);

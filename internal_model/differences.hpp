@@ -22,17 +22,22 @@ struct JointDifference {
   Difference position_rad, velocity_rad_s, torque_Nm;
 };
 
-/// Figures of two robots' states. Cycles count in which both are operational.
+/// Figures of two robots' states.
 class Differences {
  public:
   explicit Differences(const hal::ImageShape& shape)
       : joints_(shape.joints), channels_(shape.channels()) {}
 
-  /// One cycle of both. @pre both have this shape
+  /// Whether the two are the same bytes, in every cycle. @pre both have this shape
+  void compare(const hal::StateImage& first, const hal::StateImage& second) noexcept;
+  /// Figures of a cycle in which both follow their command. @pre the same
   void take(const hal::StateImage& first, const hal::StateImage& second) noexcept;
 
+  /// Cycles of compare().
+  [[nodiscard]] std::uint64_t compared() const noexcept { return compared_; }
+  /// Cycles of take().
   [[nodiscard]] std::uint64_t cycles() const noexcept { return cycles_; }
-  /// Cycles in which the two images, every field of them, were not the same bytes.
+  /// Of compare(): cycles in which the two images, every field of them, were not the same bytes.
   [[nodiscard]] std::uint64_t unequal() const noexcept { return unequal_; }
   /// The first of them; -1: there was none.
   [[nodiscard]] std::int64_t first_unequal() const noexcept { return first_unequal_; }
@@ -45,7 +50,7 @@ class Differences {
  private:
   std::vector<JointDifference> joints_;
   std::vector<Difference> channels_;
-  std::uint64_t cycles_ = 0, unequal_ = 0;
+  std::uint64_t compared_ = 0, cycles_ = 0, unequal_ = 0;
   std::int64_t first_unequal_ = -1;
 };
 

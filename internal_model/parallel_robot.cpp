@@ -102,8 +102,8 @@ void ParallelRobot::play(const CommandRecord& record) {
   if (record.shut_down) (void)second_->shut_down();
   const bool asked = record.calls_made > 0 || record.shut_down;
   if (second_->phase() == hal::Phase::kFault && !asked && result_.fault.empty()) note_fault();
-  if (record.phase == hal::Phase::kOperational && second_->phase() == hal::Phase::kOperational)
-    differences_.take(record.state, state_);
+  differences_.compare(record.state, state_);
+  if (both_follow(record)) differences_.take(record.state, state_);
   log(record.time.time_ns);
   show(record);
 }
@@ -129,6 +129,12 @@ void ParallelRobot::call(const BackendCall& call) noexcept {
   }
 }
 
+/// Their command: neither in bring-up, in fault nor shutting down.
+bool ParallelRobot::both_follow(const CommandRecord& record) const {
+  return record.written && record.phase == hal::Phase::kOperational &&
+         second_->phase() == hal::Phase::kOperational;
+}
+
 void ParallelRobot::note_fault() { result_.fault = second_->status_text(); }
 
 void ParallelRobot::log(std::int64_t time_ns) {
@@ -141,8 +147,7 @@ void ParallelRobot::log(std::int64_t time_ns) {
 void ParallelRobot::show(const CommandRecord& record) {
   hal::ParallelView& view = shown_.back();
   view.state.assign(state_);
-  const bool both =
-      record.phase == hal::Phase::kOperational && second_->phase() == hal::Phase::kOperational;
+  const bool both = both_follow(record);
   for (std::size_t j = 0; j < view.position_rad.size(); ++j) {
     const hal::StateImage& one = record.state;
     view.position_rad[j] = both ? one.position_rad()[j] - state_.position_rad()[j] : 0.0;

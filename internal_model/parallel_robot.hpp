@@ -85,6 +85,7 @@ class ParallelRobot final : public hal::ParallelSource {
   void play(const CommandRecord& record);
   void make_up(const CommandRecord& record);
   void call(const BackendCall& call) noexcept;
+  [[nodiscard]] bool both_follow(const CommandRecord& record) const;
   void note_fault();
   void take_snapshot();
   void log(std::int64_t time_ns);

@@ -149,9 +149,10 @@ Archive& PredictionService::archive() noexcept TANDEM_RT {
   return archive;
 }
 
-void PredictionService::taken(std::uint64_t next_cycle) noexcept {
+void PredictionService::taken(std::uint64_t next_cycle, std::int64_t took_ns) noexcept {
   HandOver& to = for_controller_ ? controller_ : tool_;
   to.next_cycle = next_cycle;
+  to.took_ns = took_ns;
   if (parallel_ != nullptr) (void)parallel_->snapshot_now(next_cycle);  // wanted() has looked
   if (for_controller_) {
     snapped_ = controller_ticket_ = asked_;
@@ -209,8 +210,10 @@ void PredictionService::answer_controller() {
 }
 
 Result<Answer> PredictionService::answer_tool(std::int64_t horizon_ns) {
-  if (const Status restored = restore(tool_); !restored) return std::unexpected(restored.error());
   Answer answer;
+  answer.loop_bytes = tool_.archive->bytes().size();
+  answer.loop_ns = tool_.took_ns;
+  if (const Status restored = restore(tool_); !restored) return std::unexpected(restored.error());
   answer.prediction = room_for(fork_->cycle->state().joints(), horizon_ns, period_ns_);
   const std::size_t before = fork_->cycle->fault_log().size();
   run_ahead(answer.prediction, horizon_ns, [this] { return closing(); });

@@ -37,6 +37,8 @@ using MakeFork = std::function<Result<std::unique_ptr<Fork>>()>;
 struct Answer {
   hal::Prediction prediction;
   std::vector<runtime::Fault> faults;  ///< that will come
+  std::size_t loop_bytes = 0;          ///< that the loop wrote down for it
+  std::int64_t loop_ns = 0;            ///< and the time that this took, between two cycles
 };
 
 /// What a copy of a controller gets that is part of a prediction: no answer, ever.
@@ -77,7 +79,7 @@ class PredictionService final : public hal::Predictor, public runtime::SnapshotP
   }
   [[nodiscard]] bool whole() const noexcept TANDEM_RT override { return parallel_ == nullptr; }
   [[nodiscard]] Archive& archive() noexcept TANDEM_RT override;
-  void taken(std::uint64_t next_cycle) noexcept override;
+  void taken(std::uint64_t next_cycle, std::int64_t took_ns) noexcept override;
 
  private:
   /// A snapshot on its way from the loop to the worker.
@@ -90,6 +92,7 @@ class PredictionService final : public hal::Predictor, public runtime::SnapshotP
     std::atomic<Stage> stage{Stage::kIdle};
     std::unique_ptr<Archive> archive;
     std::uint64_t next_cycle = 0;
+    std::int64_t took_ns = 0;
   };
   /// A tool's question.
   struct Question {

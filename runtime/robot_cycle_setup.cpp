@@ -72,13 +72,14 @@ bool RobotCycle::write_down(Archive& ar, bool backend) {
 /// Where a robot's cycle is not simulated, under the traps: this takes no heap.
 void RobotCycle::show_snapshot() noexcept {
   if (snapshots_ == nullptr || !snapshots_->wanted()) return;
+  const std::int64_t begin_ns = clock_->now_ns();
   if (snapshots_->whole()) {
     (void)write_down(snapshots_->archive(), true);
   } else {
     const rt::ScopedRealtime now;
     (void)write_down(snapshots_->archive(), false);
   }
-  snapshots_->taken(loop_.next_cycle());
+  snapshots_->taken(loop_.next_cycle(), clock_->now_ns() - begin_ns);
 }
 
 Result<std::vector<std::byte>> RobotCycle::save() {

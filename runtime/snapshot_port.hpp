@@ -20,8 +20,8 @@ class SnapshotPort {
   [[nodiscard]] virtual bool whole() const noexcept TANDEM_RT = 0;
   /// Empty, with all the memory that it needs.
   [[nodiscard]] virtual Archive& archive() noexcept TANDEM_RT = 0;
-  /// It is written, before cycle `next_cycle`. In simulated time this may block.
-  virtual void taken(std::uint64_t next_cycle) noexcept = 0;
+  /// It is written, before cycle `next_cycle`, in so much time. In simulated time this may block.
+  virtual void taken(std::uint64_t next_cycle, std::int64_t took_ns) noexcept = 0;
 };
 
 }  // namespace tandem::runtime

@@ -61,6 +61,10 @@ void print_prediction(const Json& answer) {
   facts.add("ahead", fmt::format("{:.3f} s, to its {}", ahead_s, answer.value("end", "?")));
   facts.add("computed in", fmt::format("{:.1f} ms of one core: {:.0f} x real time", cpu_s * 1e3,
                                        cpu_s > 0.0 ? ahead_s / cpu_s : 0.0));
+  facts.add("cost the loop",
+            fmt::format("{:.1f} us, {:.1f} kB written down",
+                        static_cast<double>(answer.value("loop_ns", std::int64_t{0})) * 1e-3,
+                        static_cast<double>(answer.value("loop_bytes", std::uint64_t{0})) * 1e-3));
   const Json& base = answer["base"];
   if (base.is_object() && !base["position_m"].empty()) {
     facts.add("base height",

@@ -338,10 +338,10 @@ Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
   e.parallel->robot = robot->config;
   auto kernels = supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels);
   if (!kernels) {
-    Error error = kernels.error();
-    if (error.file.empty()) error.file = e.parallel->robot.file;
-    if (error.key.empty()) error.key = "parallel";
-    return {error};
+    return {{.message = "the parallel robot has no kernels: " + kernels.error().message,
+             .hint = "leave --no-build out: the run builds them",
+             .file = kernels.error().file.empty() ? e.parallel->robot.file : kernels.error().file,
+             .key = "parallel"}};
   }
   c.parallel_kernels = std::move(*kernels);
   if (c.parallel_kernels.get() == nullptr) return {};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numbers>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "base/counted.hpp"
@@ -48,6 +49,23 @@ void print_joints_apart(const hal::RobotConfig& robot, const Differences& all, s
   table.print(out);
 }
 
+std::string channel_name(hal::SensorType type, std::size_t channel) {
+  constexpr const char* kWrench[] = {"force x [N]",   "force y [N]",   "force z [N]",
+                                     "torque x [Nm]", "torque y [Nm]", "torque z [Nm]"};
+  constexpr const char* kImu[] = {"orientation x",
+                                  "orientation y",
+                                  "orientation z",
+                                  "orientation w",
+                                  "angular velocity x [rad/s]",
+                                  "angular velocity y [rad/s]",
+                                  "angular velocity z [rad/s]",
+                                  "specific force x [m/s2]",
+                                  "specific force y [m/s2]",
+                                  "specific force z [m/s2]"};
+  const bool wrench = type == hal::SensorType::kForceTorque;
+  return wrench ? kWrench[channel] : kImu[channel];
+}
+
 /// Each sensor's channel that differs most.
 void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, std::FILE* out) {
   Table table({"sensor", "channel", "rms", "max"});
@@ -58,8 +76,8 @@ void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, 
     first += sensor.channels();
     const auto most = std::ranges::max_element(begin, end, {}, &Difference::square_sum);
     if (most == end || most->max == 0.0) continue;
-    table.add({sensor.name, std::to_string(most - begin), fmt::format("{:.3g}", all.rms(*most)),
-               fmt::format("{:.3g}", most->max)});
+    table.add({sensor.name, channel_name(sensor.type, static_cast<std::size_t>(most - begin)),
+               fmt::format("{:.3g}", all.rms(*most)), fmt::format("{:.3g}", most->max)});
   }
   if (table.rows() == 0) return;
   fmt::print(out, "\n");
@@ -67,12 +85,11 @@ void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, 
 }
 
 std::string sameness(const Differences& all) {
-  if (all.cycles() == 0) return "never operational together with the first";
   if (all.unequal() == 0) {
-    return fmt::format("the same bits in all {}", counted(all.cycles(), "cycle"));
+    return fmt::format("the same bits in all {}", counted(all.compared(), "cycle"));
   }
   return fmt::format("differs in {} of {}, first in cycle {}", all.unequal(),
-                     counted(all.cycles(), "cycle"), all.first_unequal());
+                     counted(all.compared(), "cycle"), all.first_unequal());
 }
 
 }  // namespace
@@ -81,7 +98,8 @@ Json parallel_json(const hal::RobotConfig& second, const ParallelResult& result,
                    const Differences& all) {
   Json json{{"robot", second.file},
             {"cycles", result.cycles},
-            {"compared", all.cycles()},
+            {"compared", all.compared()},
+            {"both_followed", all.cycles()},
             {"unequal", all.unequal()},
             {"first_unequal", all.first_unequal() < 0 ? Json() : Json(all.first_unequal())},
             {"missed", result.missed},

@@ -70,6 +70,8 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
             {"end", hal::to_string(p.end)},
             {"cpu_s", p.cpu_s},
             {"wall_s", p.wall_s},
+            {"loop_bytes", answer.loop_bytes},
+            {"loop_ns", answer.loop_ns},
             {"faults", faults_json(answer.faults)},
             {"joints", Json::object()},
             {"base", nullptr}};

@@ -279,7 +279,7 @@ class Session {
     rt::install_emergency_signal();
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
-    if (dds_ != nullptr) dds_->start(*cycle_);
+    if (dds_ != nullptr) dds_->start(*cycle_, parallel_ ? &*parallel_ : nullptr);
     auto guard = LoopGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
     if (parallel_) parallel_->start();

@@ -50,7 +50,7 @@ TEST_F(Parallel, OfOtherGainsDiffersInTableLogAndReport) {
 
 TEST_F(Parallel, WithAHeavierLinkNeedsKernelsOfItsOwn) {
   add("[parallel.link.link2]\nmass_kg = 3.5\n");
-  expect_refused({"there is no kernel library", "parallel", "robot.toml"},
+  expect_refused({"parallel", "the parallel robot has no kernels", "leave --no-build out"},
                  "run hold.toml --duration 0.05 --no-build");
 }
 
