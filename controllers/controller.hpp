@@ -143,8 +143,8 @@ inline constexpr std::uint32_t kControllerAbi =
              sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
              sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
              sizeof(hal::StateImage), sizeof(hal::EstimateImage), sizeof(hal::CommandImage),
-             sizeof(hal::ParameterImage), sizeof(hal::CycleTime), sizeof(TomlTable),
-             sizeof(tandem_kernels)});
+             sizeof(hal::ParameterImage), sizeof(hal::Prediction), sizeof(hal::CycleTime),
+             sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

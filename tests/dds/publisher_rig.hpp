@@ -28,6 +28,7 @@ inline runtime::CompleteRobot robot_of(const std::string& name) {
 struct RigOptions {
   std::string robot = "double_pendulum";
   bool simulated_time = true;
+  bool parallel = false;  ///< a second robot
   Config config = own_config();
 };
 
@@ -65,19 +66,21 @@ struct PublisherRig {
                                                  .period_ns = kPeriod_ns,
                                                  .simulated_time = options.simulated_time,
                                                  .truth = &truth,
+                                                 .parallel = options.parallel,
                                                  .run = 77});
     EXPECT_TRUE(made) << made.error().to_string();
     publisher = std::move(*made);
   }
 
-  void start() {
+  void start(hal::ParallelSource* parallel = nullptr) {
     publisher->start({.version = [this] { return fault_version.load(); },
                       .faults =
                           [this] {
                             const std::lock_guard lock(faults_mutex);
                             return faults;
                           },
-                      .lost = [] { return std::uint64_t{3}; }});
+                      .lost = [] { return std::uint64_t{3}; }},
+                     parallel);
   }
   /// For the publisher's thread to see.
   void set_faults(std::vector<FaultEntry> now) {
