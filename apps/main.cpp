@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
                      [](const JointOptions& options) { return joint_command(options); },
                      [](const SensorOptions& options) { return sensor_command(options); },
                      [](const ClockOptions& options) { return clock_command(options); },
+                     [](const PredictOptions& options) { return predict_command(options); },
                      [](const InjectOptions& options) { return inject_command(options); },
                      [](const CheckOptions& options) { return check_command(options); },
                      [](const ModelOptions& options) { return model_command(options); },

@@ -20,12 +20,21 @@ class Archive {
  public:
   /// An archive that is written to.
   Archive() = default;
+  /// An archive that is written to and has all its memory from now on: what would need more turns
+  /// ok() false. With it a cycle can write itself down.
+  explicit Archive(std::size_t capacity) : bounded_(true) { bytes_.reserve(capacity); }
   /// An archive that is read from. The bytes are copied.
   explicit Archive(std::span<const std::byte> bytes)
       : bytes_(bytes.begin(), bytes.end()), reading_(true) {}
 
+  /// To be written to once more; its memory stays.
+  void clear() noexcept {
+    bytes_.clear();
+    ok_ = true;
+  }
+
   [[nodiscard]] bool reading() const noexcept { return reading_; }
-  /// False once a read asked for more than there is.
+  /// False once a read asked for more than there is, or a bounded archive is full.
   [[nodiscard]] bool ok() const noexcept { return ok_; }
   /// True when a read consumed every byte.
   [[nodiscard]] bool at_end() const noexcept { return position_ == bytes_.size(); }
@@ -40,6 +49,10 @@ class Archive {
   void raw(void* data, std::size_t size) {
     if (size == 0) return;
     if (!reading_) {
+      if (bounded_ && bytes_.capacity() - bytes_.size() < size) {
+        ok_ = false;
+        return;
+      }
       const auto* begin = static_cast<const std::byte*>(data);
       bytes_.insert(bytes_.end(), begin, begin + size);
       return;
@@ -78,6 +91,7 @@ class Archive {
   std::size_t position_ = 0;
   bool reading_ = false;
   bool ok_ = true;
+  bool bounded_ = false;
 };
 
 }  // namespace tandem

@@ -19,6 +19,7 @@ set(TANDEM_PLUGIN_HEADERS
   hal/image.hpp
   hal/joint_capabilities.hpp
   hal/joint_devices.hpp
+  hal/predictor.hpp
   hal/robot.hpp
   hal/sensor_devices.hpp
   hal/service_devices.hpp

@@ -22,6 +22,7 @@
 #include "hal/cycle_time.hpp"
 #include "hal/estimate.hpp"
 #include "hal/image.hpp"
+#include "hal/predictor.hpp"
 #include "hal/robot.hpp"
 #include "model/kernels.h"
 
@@ -33,14 +34,16 @@ class ControllerSetup {
   ControllerSetup(const hal::Robot& robot_in, hal::ParameterImage& gains_in,
                   const tandem_kernels* kernels_in, std::int64_t period_ns_in,
                   TomlTable parameters_in, std::span<const double> start_position_rad_in = {},
-                  const hal::EstimateImage* estimate_in = nullptr)
+                  const hal::EstimateImage* estimate_in = nullptr,
+                  hal::Predictor* predictor_in = nullptr)
       : robot(robot_in),
         gains(gains_in),
         kernels(kernels_in),
         period_ns(period_ns_in),
         parameters(std::move(parameters_in)),
         start_position_rad(start_position_rad_in),
-        estimate(estimate_in) {}
+        estimate(estimate_in),
+        predictor(predictor_in) {}
 
   const hal::Robot& robot;  ///< joints and their limits, sensors, sites, feet, postures
   /// Gains of the drives' loops, for hal::Devices; set those of claimed joints only, in start()
@@ -55,6 +58,9 @@ class ControllerSetup {
   /// What is estimated of the robot, of this cycle in start() and update(): the base's state,
   /// contacts, external torques. Null without [estimation]; outlives the controller.
   const hal::EstimateImage* estimate;
+  /// Runs the robot ahead of its time; null where the run has no model of it: a real robot without
+  /// [parallel]. It outlives the controller. docs/internal-model.md
+  hal::Predictor* predictor;
 
   /// Claims a joint (index in the image) in a mode. Two controllers that claim one joint are an
   /// error before anything moves; a joint that nobody claims is held by the loop. What a controller
@@ -113,13 +119,14 @@ class Controller {
   /// After the last update.
   virtual void stop() noexcept TANDEM_RT {}
 
-  /// Everything that update() depends on, for snapshots.
+  /// Everything that update() depends on, for snapshots. For a prediction it is called between two
+  /// cycles of a robot: it takes no heap and no lock.
   virtual void archive(Archive&) {}
 };
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 7;
+inline constexpr std::uint32_t kControllerInterface = 8;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {
@@ -136,8 +143,8 @@ inline constexpr std::uint32_t kControllerAbi =
              sizeof(hal::Joint), sizeof(hal::PassiveJoint), sizeof(hal::Sensor), sizeof(hal::Site),
              sizeof(hal::Foot), sizeof(hal::Posture), sizeof(model::LoopSpec),
              sizeof(hal::StateImage), sizeof(hal::EstimateImage), sizeof(hal::CommandImage),
-             sizeof(hal::ParameterImage), sizeof(hal::CycleTime), sizeof(TomlTable),
-             sizeof(tandem_kernels)});
+             sizeof(hal::ParameterImage), sizeof(hal::Prediction), sizeof(hal::CycleTime),
+             sizeof(TomlTable), sizeof(tandem_kernels)});
 
 /// What `tandem_controller_plugin()` of a shared library returns.
 struct ControllerPlugin {

@@ -40,12 +40,13 @@ enum class Topic : std::uint8_t {
   kState,
   kCommand,
   kStatistics,
+  kParallel,  ///< of the robot beside this one, when there is one
 };
 struct TopicRate {
   std::string_view key;     ///< of [dds.every]
   std::int64_t default_ns;  ///< between two samples, unless the key says otherwise; 0: none
 };
-inline constexpr std::array<TopicRate, 11> kTopicRates{{
+inline constexpr std::array<TopicRate, 12> kTopicRates{{
     {"joint_states", 10'000'000},
     {"dynamic_joint_states", 0},
     {"imu", 10'000'000},
@@ -57,6 +58,7 @@ inline constexpr std::array<TopicRate, 11> kTopicRates{{
     {"state", 10'000'000},
     {"command", 10'000'000},
     {"statistics", 1'000'000'000},
+    {"parallel", 10'000'000},
 }};
 
 /// [dds]

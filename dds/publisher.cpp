@@ -86,12 +86,18 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
   if (!run.simulated_time) every_[static_cast<std::size_t>(Topic::kClock)] = 0;
   if (run.truth == nullptr && (!estimate_ || !estimate_->estimates_base()))
     every_[static_cast<std::size_t>(Topic::kOdom)] = 0;
+  if (!run.parallel) every_[static_cast<std::size_t>(Topic::kParallel)] = 0;
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
   groups_.push_back(std::make_unique<JointTopics>(maker, run));
   groups_.push_back(std::make_unique<SensorTopics>(maker, run));
   groups_.push_back(std::make_unique<FrameTopics>(maker, run));
   groups_.push_back(std::make_unique<ImageTopics>(maker, run));
   groups_.push_back(std::make_unique<DiagnosticTopics>(maker, run));
+  if (run.parallel) {
+    auto topics = std::make_unique<ParallelTopics>(maker, run);
+    parallel_ = topics.get();
+    groups_.push_back(std::move(topics));
+  }
   error_ = maker.error();
 }
 
@@ -138,7 +144,8 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   image_ring_.end_push();
 }
 
-void Publisher::start(FaultSource faults) {
+void Publisher::start(FaultSource faults, hal::ParallelSource* parallel) {
+  if (parallel_ != nullptr) parallel_->show(parallel);
   fault_source_ = std::move(faults);
   wall_offset_ns_ = wall_less_monotonic();
   offset_due_ = SteadyClock::now() + kOffsetGood;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/spsc_ring.hpp"
+#include "dds/parallel_topics.hpp"
 #include "dds/topic_group.hpp"
 #include "hal/cycle_observer.hpp"
 
@@ -37,7 +38,8 @@ class Publisher final : public hal::CycleObserver {
   Publisher& operator=(const Publisher&) = delete;
 
   /// Publishes what does not change, and starts the thread.
-  void start(FaultSource faults);
+  /// @param parallel  the second robot of RunDescription::parallel; null: there is none
+  void start(FaultSource faults, hal::ParallelSource* parallel = nullptr);
   /// Publishes what is in the ring, and ends the thread. Once, when no cycle comes any more.
   PublishCounts stop();
 
@@ -78,6 +80,7 @@ class Publisher final : public hal::CycleObserver {
   PublishCounts counts_;
   LoopRecord loop_;
   std::vector<std::unique_ptr<TopicGroup>> groups_;
+  ParallelTopics* parallel_ = nullptr;  // one of them
   Output<rosgraph_msgs::Clock> clock_;
   std::optional<Error> error_;
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "log/schema.hpp"
@@ -59,20 +60,34 @@ Recorder::Channel Recorder::add_channel(const std::string& topic, const std::str
   return channel;
 }
 
+void Recorder::open_side(std::int64_t lag_ns) { side_lag_ns_ = lag_ns; }
+
 void Recorder::start() {
   view_.add_channels(writer_);
-  ring_ = std::make_unique<SpscRing>((sizeof(Slot) + largest_ + 7) / 8 * 8, ring_slots_);
+  const std::size_t slot_bytes = (sizeof(Slot) + largest_ + 7) / 8 * 8;
+  ring_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
+  if (side_lag_ns_ >= 0) side_ = std::make_unique<SpscRing>(slot_bytes, ring_slots_);
   thread_ = std::thread([this] { run(); });
 }
 
 bool Recorder::push(Channel channel, std::int64_t time_ns,
                     std::span<const std::byte> image) noexcept TANDEM_RT {
-  const std::span<std::byte> slot = ring_->begin_push();
+  return push(*ring_, channel, time_ns, image);
+}
+
+bool Recorder::push_side(Channel channel, std::int64_t time_ns,
+                         std::span<const std::byte> image) noexcept {
+  return push(*side_, channel, time_ns, image);
+}
+
+bool Recorder::push(SpscRing& ring, Channel channel, std::int64_t time_ns,
+                    std::span<const std::byte> image) noexcept TANDEM_RT {
+  const std::span<std::byte> slot = ring.begin_push();
   if (slot.empty()) return false;
   const Slot head{time_ns, static_cast<std::uint32_t>(image.size()), channel};
   std::memcpy(slot.data(), &head, sizeof head);
   std::memcpy(slot.data() + sizeof head, image.data(), image.size());
-  ring_->end_push();
+  ring.end_push();
   return true;
 }
 
@@ -80,9 +95,11 @@ bool Recorder::push(const Event& event) noexcept TANDEM_RT {
   return push(kEventChannel, event.time_ns, std::as_bytes(std::span(&event, 1)));
 }
 
-void Recorder::wait_for_space(std::size_t messages) const noexcept {
-  const std::size_t wanted = std::min(messages, ring_->capacity());
-  while (ring_->size() + wanted > ring_->capacity()) {
+void Recorder::wait_for_space(std::size_t messages) const noexcept { wait_for(*ring_, messages); }
+
+void Recorder::wait_for(const SpscRing& ring, std::size_t messages) noexcept {
+  const std::size_t wanted = std::min(messages, ring.capacity());
+  while (ring.size() + wanted > ring.capacity()) {
     std::this_thread::sleep_for(kPoll / 20);
   }
 }
@@ -92,11 +109,26 @@ void Recorder::run() {
     // Read before the ring: what was pushed before closing is then surely seen.
     const bool last = closing_.load(std::memory_order_acquire);
     for (auto slot = ring_->front(); !slot.empty(); slot = ring_->front()) {
+      Slot head{};
+      std::memcpy(&head, slot.data(), sizeof head);
+      write_side(head.time_ns - side_lag_ns_);
       write(slot);
       ring_->pop();
     }
-    if (last) return;
+    if (last) return write_side(std::numeric_limits<std::int64_t>::max());
     std::this_thread::sleep_for(kPoll);
+  }
+}
+
+/// The other thread's messages of up to that time.
+void Recorder::write_side(std::int64_t up_to_ns) {
+  if (side_ == nullptr) return;
+  for (auto slot = side_->front(); !slot.empty(); slot = side_->front()) {
+    Slot head{};
+    std::memcpy(&head, slot.data(), sizeof head);
+    if (head.time_ns > up_to_ns) return;
+    write(slot);
+    side_->pop();
   }
 }
 
@@ -139,7 +171,7 @@ RecordingResult Recorder::close(const StringMap& extra) {
   RecordingResult result;
   result.path = path_;
   result.messages = writer_.messages();
-  result.dropped = ring_->dropped();
+  result.dropped = dropped();
   result.failed = lost_;
   result.data_sha256 = hash_.finish();
   StringMap map{{"data_sha256", result.data_sha256},

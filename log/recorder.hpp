@@ -57,6 +57,10 @@ class Recorder {
   /// "tandem/msg/State". The channel /tandem/event exists always.
   [[nodiscard]] Channel add_channel(const std::string& topic, const std::string& type,
                                     const hal::Layout& layout);
+  /// One other thread will push, too. Its messages follow in the file when the loop's are `lag_ns`
+  /// further, or at the end: with a loop that is never further ahead than that, the file does not
+  /// depend on the threads' pace. Before start().
+  void open_side(std::int64_t lag_ns);
   /// No more channels: allocates the ring and starts the writer's thread.
   void start();
 
@@ -66,11 +70,18 @@ class Recorder {
             std::span<const std::byte> image) noexcept TANDEM_RT;
   bool push(const Event& event) noexcept TANDEM_RT;
 
+  /// The same from that other thread.
+  bool push_side(Channel channel, std::int64_t time_ns, std::span<const std::byte> image) noexcept;
+  /// Blocks that other thread until its `messages` fit.
+  void wait_for_side_space(std::size_t messages) const noexcept { wait_for(*side_, messages); }
+
   /// Blocks until `messages` fit into the ring, or until it is empty. For simulated time only,
   /// where the loop may wait for the disk; never on a robot.
   void wait_for_space(std::size_t messages) const noexcept;
 
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return ring_->dropped(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept {
+    return ring_->dropped() + (side_ == nullptr ? 0 : side_->dropped());
+  }
   /// True once the disk refused data, or the file was deleted. Readable while recording.
   [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
   /// Why. @pre failed()
@@ -84,7 +95,11 @@ class Recorder {
  private:
   struct Slot;  // the head of a ring slot
   Recorder() = default;
+  static bool push(SpscRing& ring, Channel channel, std::int64_t time_ns,
+                   std::span<const std::byte> image) noexcept TANDEM_RT;
+  static void wait_for(const SpscRing& ring, std::size_t messages) noexcept;
   void run();
+  void write_side(std::int64_t up_to_ns);
   void write(std::span<const std::byte> slot);
   void write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body);
   void stop_thread();
@@ -97,6 +112,8 @@ class Recorder {
   std::size_t largest_ = sizeof(Event);
   std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
+  std::unique_ptr<SpscRing> side_;  // null: nobody else pushes
+  std::int64_t side_lag_ns_ = -1;   // -1: the same
   std::thread thread_;
   std::atomic<bool> closing_{false};
   std::atomic<bool> failed_{false};

@@ -26,6 +26,9 @@ struct LinkOverride {
   /// ixx ixy ixz iyy iyz izz about the center of mass, along the axes of the link.
   std::optional<std::array<double, 6>> inertia_kg_m2{};
   int line = 0;  ///< in UrdfOptions::overrides_file, for messages
+  // Where an experiment says it: empty in robot.toml.
+  std::string file{};  ///< of `line`
+  std::string key{};   ///< "parallel.link.torso"
 };
 
 struct UrdfOptions {

@@ -50,9 +50,9 @@ class Checker {
     const double whole = tree_.bodies[static_cast<std::size_t>(link.body)].inertia.mass_kg;
     Error report{found, {}, tree_.file, line_of(link.name), "link " + link.name};
     if (const LinkOverride* given = find_override(options_, link.name)) {
-      report.file = options_.overrides_file;
+      report.file = file_of(options_, *given);
       report.line = given->line;
-      report.key = "model.link." + link.name;
+      report.key = key_of(*given);
     }
     if (link.inertia.mass_kg < 0.0) {
       report.hint = "masses are zero or positive";

@@ -12,6 +12,14 @@ const LinkOverride* find_override(const UrdfOptions& options, const std::string&
   return found == options.links.end() ? nullptr : &*found;
 }
 
+const std::string& file_of(const UrdfOptions& options, const LinkOverride& given) {
+  return given.file.empty() ? options.overrides_file : given.file;
+}
+
+std::string key_of(const LinkOverride& given) {
+  return given.key.empty() ? "model.link." + given.link : given.key;
+}
+
 Inertia overridden(const Inertia& described, const LinkOverride& given) {
   Inertia result = described;
   if (given.mass_kg) result.mass_kg = *given.mass_kg;
@@ -31,8 +39,8 @@ void check_overrides(const UrdfOptions& options, const Outline& outline, Diagnos
   for (const LinkOverride& given : options.links) {
     if (std::ranges::find(known, given.link) != known.end()) continue;
     errors.push_back({"the description has no link '" + given.link + "'",
-                      suggest(given.link, known), options.overrides_file, given.line,
-                      "model.link." + given.link});
+                      suggest(given.link, known), file_of(options, given), given.line,
+                      key_of(given)});
   }
 }
 

@@ -13,6 +13,10 @@ namespace tandem::model {
 [[nodiscard]] const LinkOverride* find_override(const UrdfOptions& options,
                                                 const std::string& link);
 
+/// Its place, for messages.
+[[nodiscard]] const std::string& file_of(const UrdfOptions& options, const LinkOverride& given);
+[[nodiscard]] std::string key_of(const LinkOverride& given);
+
 /// `described` with what the override gives; both in the link's frame.
 [[nodiscard]] Inertia overridden(const Inertia& described, const LinkOverride& given);
 

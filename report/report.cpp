@@ -13,6 +13,7 @@
 #include "report/close_passive.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
+#include "report/parallel_figures.hpp"
 #include "report/run_figures.hpp"
 
 namespace tandem::report {
@@ -135,6 +136,22 @@ Status create(const std::string& folder) {
                                {}});
 }
 
+/// A run with the robot beside it: facts of the run, tables of both, and their differences.
+Page parallel_page(const RunData& run, const RunData& second) {
+  Page page;
+  page.title = fmt::format("{}: {}, in parallel", run.info.robot,
+                           std::filesystem::path(run.path).stem().string());
+  page.lead = fmt::format(
+      "Times count from the run's first SYNC, as in the log. A is the robot, B the one that was "
+      "simulated beside it, {}, and got the same commands.",
+      second.robot.file);
+  add_facts(run, "", page.facts);
+  page.tables.push_back(differences_table(run, second));
+  add_tables(run, " A", page);
+  add_tables(second, " B", page);
+  return page;
+}
+
 Page page_of(const RunData& run, const RunData* other) {
   Page page;
   page.title = other == nullptr ? fmt::format("{}: {}", run.info.robot,
@@ -168,6 +185,10 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
   Result<RunData> second = other.empty() ? Result<RunData>(RunData{}) : read_run(other, error_text);
   if (!second) return std::unexpected(second.error());
   RunData* over = other.empty() ? nullptr : &*second;
+  Result<std::optional<RunData>> beside = std::nullopt;
+  if (over == nullptr) beside = read_parallel(*run);
+  if (!beside) return std::unexpected(beside.error());
+  if (*beside) over = &**beside;
   if (over != nullptr && over->info.joints != run->info.joints) {
     return std::unexpected(Error{"the two logs are of different robots",
                                  "lay runs of one robot over each other",
@@ -196,9 +217,14 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
     }
   }
   if (over != nullptr) over->drawn_later_s = run->time_s.front() - over->time_s.front();
-  const std::vector<Figure> figures = figures_of(*run, over, kernels);
+  std::vector<Figure> figures = figures_of(*run, over, kernels);
+  if (*beside) {
+    for (Figure& figure : difference_figures(*run, *over)) figures.push_back(std::move(figure));
+  }
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
-  if (const Status s = write_page(page_of(*run, over), figures, folder); !s) {
+  if (const Status s =
+          write_page(*beside ? parallel_page(*run, *over) : page_of(*run, over), figures, folder);
+      !s) {
     return std::unexpected(s.error());
   }
   files.page = folder + "/report.html";

@@ -16,6 +16,8 @@ const char kState[] = "/tandem/state";
 const char kCommand[] = "/tandem/command";
 const char kTruth[] = "/tandem/truth";
 const char kEstimate[] = "/tandem/estimate";
+const char kParallelState[] = "/tandem/parallel/state";
+const char kParallelTruth[] = "/tandem/parallel/truth";
 
 std::unexpected<Error> log_error(const RunData& run, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
@@ -31,7 +33,8 @@ double settle_of(TomlTable& experiment) {
   return experiment.table_or_empty("hal").number_or("settle_s", by_hoist_s);
 }
 
-/// The robot's and the experiment's files, from the texts that the log carries.
+/// The robot's and the experiment's files, from the texts that the log carries. The first robot is
+/// the run's.
 Status read_configuration(RunData& run) {
   bool found = false;
   for (const auto& [file, text] : run.info.configuration) {
@@ -40,6 +43,7 @@ Status read_configuration(RunData& run) {
     if (!document) return std::unexpected(document.error());
     TomlTable root = document->root();
     if (root.has("model")) {
+      if (found) continue;
       auto robot = hal::parse_robot_config(text, file);
       if (!robot) return std::unexpected(robot.error().front());
       run.robot = std::move(*robot);
@@ -71,7 +75,8 @@ Status read_description(RunData& run) {
                              .exact_right_angles = m.exact_right_angles,
                              .overrides_file = run.robot.file};
   for (const hal::LinkConfig& link : m.links) {
-    options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});
+    options.links.push_back(
+        {link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line, link.file, link.key});
   }
   auto description = model::parse_urdf(text, m.urdf, options);
   if (!description) return std::unexpected(description.error().front());
@@ -168,13 +173,33 @@ Window window_of(const std::vector<log::EventText>& events, double settle_s) {
   return window;
 }
 
-/// Begins with the bring-up's end when the run ended before its controllers started.
-Status read_state(const log::LogFile& file, Window& window, RunData& run) {
+Result<log::Table> state_columns(const log::LogFile& file, const char* topic, const RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
-  auto table = read_columns(
-      file, kState,
+  return read_columns(
+      file, topic,
       {{"position_rad", n}, {"velocity_rad_s", n}, {"torque_nm", n}, {"sensor", channels}});
+}
+
+/// What was measured in the window.
+Status read_rows(log::Table& table, const Window& window, RunData& run) {
+  const std::size_t n = run.robot.joints.size();
+  const std::size_t channels = run.first_channel(run.robot.sensors.size());
+  crop(table, window.begin_s, window.end_s);
+  if (table.time_s.size() < 2) {
+    return log_error(run, "this log has no cycle after the drives' bring-up", {});
+  }
+  run.time_s = table.time_s;
+  run.position_rad = take(table, 0, n);
+  run.velocity_rad_s = take(table, n, n);
+  run.torque_Nm = take(table, 2 * n, n);
+  run.sensor = take(table, 3 * n, channels);
+  return {};
+}
+
+/// Begins with the bring-up's end when the run ended before its controllers started.
+Status read_state(const log::LogFile& file, Window& window, RunData& run) {
+  auto table = state_columns(file, kState, run);
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
   run.controllers_ran = std::min(end_s, window.fault_s) > window.begin_s;
@@ -182,16 +207,7 @@ Status read_state(const log::LogFile& file, Window& window, RunData& run) {
   const double ran_s = window.fault_s - std::max(window.begin_s, 0.0);
   window.end_s = std::min(window.end_s, window.fault_s + after_fault_s(ran_s));
   window.end_s = std::max(window.end_s, window.begin_s);
-  crop(*table, window.begin_s, window.end_s);
-  if (table->time_s.size() < 2) {
-    return log_error(run, "this log has no cycle after the drives' bring-up", {});
-  }
-  run.time_s = table->time_s;
-  run.position_rad = take(*table, 0, n);
-  run.velocity_rad_s = take(*table, n, n);
-  run.torque_Nm = take(*table, 2 * n, n);
-  run.sensor = take(*table, 3 * n, channels);
-  return {};
+  return read_rows(*table, window, run);
 }
 
 /// References of the joints that the command puts under position control, by the state's times.
@@ -236,12 +252,12 @@ void resize_rows(RunData& run, std::size_t rows) {
   }
 }
 
-Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
-  if (file.find(kTruth) == nullptr) return {};
+Status read_truth(const log::LogFile& file, const char* topic, const Window& window, RunData& run) {
+  if (file.find(topic) == nullptr) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
   const std::size_t loops = run.robot.loops.size();
   const std::size_t passive = run.robot.passive.size();
-  auto table = read_columns(file, kTruth,
+  auto table = read_columns(file, topic,
                             {{"base_position_m", 3},
                              {"base_quaternion", 4},
                              {"base_velocity", 6},
@@ -367,6 +383,37 @@ std::vector<FootFigures> RunData::feet() const {
   return all;
 }
 
+Result<std::optional<RunData>> read_parallel(const RunData& run) {
+  const Result<log::LogFile> file = log::LogFile::open(run.path);
+  if (!file) return std::unexpected(file.error());
+  if (file->find(kParallelState) == nullptr) return std::nullopt;
+  RunData second = run;
+  second.faults.clear();
+  for (Columns* truth : {&second.base, &second.foot_position_m, &second.foot_force_N,
+                         &second.foot_moment_Nm, &second.loop_error, &second.passive_rad}) {
+    truth->clear();
+  }
+  for (const auto& [name, text] : run.info.configuration) {
+    if (!name.ends_with(".toml") || name == run.robot.file) continue;
+    auto other = hal::parse_robot_config(text, name);
+    if (!other) continue;  // the experiment
+    second.robot = std::move(*other);
+    if (const Status s = read_description(second); !s) return std::unexpected(s.error());
+  }
+  constexpr double kHalfNanosecond = 0.5e-9;
+  Window window;
+  window.begin_s = run.time_s.front() - kHalfNanosecond;
+  window.end_s = run.time_s.back() + kHalfNanosecond;
+  auto table = state_columns(*file, kParallelState, second);
+  if (!table) return std::unexpected(table.error());
+  if (const Status s = read_rows(*table, window, second); !s) return std::unexpected(s.error());
+  if (const Status s = read_command(*file, second); !s) return std::unexpected(s.error());
+  if (const Status s = read_truth(*file, kParallelTruth, window, second); !s) {
+    return std::unexpected(s.error());
+  }
+  return second;
+}
+
 Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const Result<log::LogFile> file = log::LogFile::open(path);
   if (!file) return std::unexpected(file.error());
@@ -384,7 +431,8 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   Window window = window_of(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
-  if (const Status s = read_truth(*file, window, run); !s) return std::unexpected(s.error());
+  if (const Status s = read_truth(*file, kTruth, window, run); !s)
+    return std::unexpected(s.error());
   if (const Status s = read_estimate(*file, window, run); !s) return std::unexpected(s.error());
   run.step_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.rows() - 1);
   return run;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -97,6 +98,11 @@ struct RunData {
   /// One per foot; none when the log has no truth.
   [[nodiscard]] std::vector<FootFigures> feet() const;
 };
+
+/// The robot that was simulated beside the run's ([parallel]), over the run's own rows; its command
+/// is the run's. Empty: there was none.
+/// Errors: as read_run(); a log that has less of it than two of those rows.
+[[nodiscard]] Result<std::optional<RunData>> read_parallel(const RunData& run);
 
 /// Errors: as log::LogFile::open; a log without state and command; one without its robot's files.
 /// @param error_text  of drives; empty: faults go by their codes

@@ -80,7 +80,7 @@ Result<std::unique_ptr<HostedController>> ControllerHost::configure(
     const std::string& name, std::shared_ptr<Controller> controller, TomlTable parameters,
     std::span<const double> start_rad) {
   ControllerSetup setup(robot_, gains_, kernels_, period_ns_, std::move(parameters), start_rad,
-                        estimate_);
+                        estimate_, predictor_);
   const Status configured = hosted_call(name, [&] { return controller->configure(setup); });
   // Keys that it did not get to before it failed are not wrong.
   if (!configured) return std::unexpected(configured.error());

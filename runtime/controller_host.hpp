@@ -79,6 +79,8 @@ class ControllerHost {
   void start_from(std::vector<double> position_rad) { start_rad_ = std::move(position_rad); }
   /// What is estimated, for those who are configured from now on; null: nothing.
   void show_estimate(const hal::EstimateImage* estimate) { estimate_ = estimate; }
+  /// What those who are added from now on may ask for what will happen; null: nobody.
+  void predict_by(hal::Predictor* predictor) { predictor_ = predictor; }
   /// Configures a controller and takes its claims.
   /// @param active  false: it is loaded, and waits for its start.
   ///
@@ -254,6 +256,7 @@ class ControllerHost {
   hal::ParameterImage gains_;
   const tandem_kernels* kernels_;
   std::int64_t period_ns_;
+  hal::Predictor* predictor_ = nullptr;
   std::vector<double> start_rad_;  // of start_from()
   const hal::EstimateImage* estimate_ = nullptr;
   std::vector<hal::JointCapabilities> capabilities_;

@@ -9,6 +9,7 @@
 #include "base/nearest.hpp"
 #include "rt/clock_control.hpp"
 #include "runtime/estimation_options.hpp"
+#include "runtime/robot_layout.hpp"
 #include "runtime/standing_height.hpp"
 
 namespace tandem::runtime {
@@ -190,10 +191,28 @@ ReportOptions read_report(TomlTable table) {
   return report;
 }
 
-const Names kSections{"robot",     "duration_s", "seed",       "posture",      "kernel_variant",
-                      "period_ns", "sim",        "hal",        "overrun",      "clock",
-                      "realtime",  "faults",     "remote",     "log",          "report",
-                      "dds",       "controller", "estimation", "teleoperation"};
+/// @param folder  of the experiment
+ParallelOptions read_parallel(TomlTable table, const std::string& file, const std::string& folder,
+                              const std::string& own_robot) {
+  ParallelOptions parallel;
+  const std::filesystem::path robot = table.text_or("robot", {});
+  parallel.robot_file = robot.empty()
+                            ? own_robot
+                            : (std::filesystem::path(folder) / robot).lexically_normal().string();
+  TomlTable links = table.table_or_empty("link");
+  parallel.robot.model.links = hal::read_links(links);
+  for (hal::LinkConfig& link : parallel.robot.model.links) {
+    link.file = file;
+    link.key = links.path() + "." + link.name;
+  }
+  table.finish();
+  return parallel;
+}
+
+const Names kSections{"robot",     "duration_s", "seed",       "posture",       "kernel_variant",
+                      "period_ns", "sim",        "hal",        "overrun",       "clock",
+                      "realtime",  "faults",     "remote",     "log",           "report",
+                      "dds",       "controller", "estimation", "teleoperation", "parallel"};
 
 /// What of the experiment can be read without its robot.
 Experiment read(const TomlDocument& document, TomlTable& root) {
@@ -221,6 +240,9 @@ Experiment read(const TomlDocument& document, TomlTable& root) {
   e.teleoperation = read_teleoperation(root);
   e.log = read_log(root.table_or_empty("log"));
   e.report = read_report(root.table_or_empty("report"));
+  if (root.has("parallel")) {
+    e.parallel = read_parallel(root.table("parallel"), e.file, document.folder(), e.robot_file);
+  }
   if (root.has("dds")) e.dds = dds::read_config(root.table("dds"), document.folder());
   check_remote(e, root.table_or_empty("remote"));
   if (right) read_controllers(root, e.controllers);  // else they may be in a table of another name
@@ -266,16 +288,16 @@ void check_periods(const Experiment& e, TomlTable& root) {
   }
 }
 
-void apply_order(Experiment& e, TomlTable sim) {
+void apply_order(const Experiment& e, hal::RobotConfig& robot, TomlTable sim) {
   if (e.sim.order < 0) return;
-  for (hal::ActuatorConfig& actuator : e.robot.actuators) {
+  for (hal::ActuatorConfig& actuator : robot.actuators) {
     actuator.order = e.sim.order;
     const std::string problem = hal::actuator_problem(actuator);
     if (problem.empty()) continue;
     sim.error("order",
               "the actuator '" + actuator.name + "' cannot be of order " +
                   std::to_string(e.sim.order) + ": " + problem,
-              "complete it in the robot's file, or leave the order to it");
+              "complete it in " + robot.file + ", or leave the order to it");
   }
 }
 
@@ -301,8 +323,37 @@ void combine(Experiment& e, TomlTable& root) {
   check_reference(report, "torque_of", e.report.torque_of, e.robot.joints, "joint");
   check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
   if (root.has("estimation")) e.estimation = read_estimation(root.table("estimation"), e.robot);
-  apply_order(e, root.table_or_empty("sim"));
+  apply_order(e, e.robot, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);
+}
+
+/// The second robot: its files, against the first.
+void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
+  if (!e.parallel) return;
+  ParallelOptions& parallel = *e.parallel;
+  TomlTable table = root.table("parallel");
+  auto read = read_robot(parallel.robot_file);
+  if (!read) {
+    errors.insert(errors.end(), read.error().begin(), read.error().end());
+    return;
+  }
+  std::vector<hal::LinkConfig> links = std::move(parallel.robot.model.links);
+  parallel.robot = std::move(read->config);
+  std::vector<hal::LinkConfig>& described = parallel.robot.model.links;
+  for (hal::LinkConfig& link : links) {
+    std::erase_if(described, [&](const hal::LinkConfig& one) { return one.name == link.name; });
+    described.push_back(std::move(link));
+  }
+  if (const std::string other = layout_difference(e.robot, parallel.robot); !other.empty()) {
+    table.error("robot", "the parallel robot has another layout: " + other,
+                "it gets the commands of the first: give both the same joints, sensors and feet, "
+                "in the same order");
+    return;
+  }
+  check_reference(root, "posture", e.posture, parallel.robot.postures,
+                  "posture in " + parallel.robot_file);
+  apply_order(e, parallel.robot, root.table_or_empty("sim"));
+  if (!e.sim.noise) remove_noise(parallel.robot);
 }
 
 Diagnostics in_order(Diagnostics errors) {
@@ -365,7 +416,8 @@ model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string
                              .lock_lines = model.lock_lines,
                              .overrides_file = file};
   for (const hal::LinkConfig& link : model.links) {
-    options.links.push_back({link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line});
+    options.links.push_back(
+        {link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line, link.file, link.key});
   }
   return options;
 }
@@ -446,6 +498,7 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
       e.warnings = std::move(robot->description.warnings);
       e.tree = std::make_shared<const model::Tree>(std::move(robot->description.tree));
       combine(e, root);
+      add_parallel(e, root, robot_errors);
     } else {
       robot_errors = robot.error();
       Error& first = robot_errors.front();

@@ -95,6 +95,12 @@ struct ReportOptions {
   std::string foot;         ///< force/torque sensor
 };
 
+/// [parallel]: a second robot, simulated in this process, that gets what the first one gets.
+struct ParallelOptions {
+  std::string robot_file;  ///< resolved; the experiment's own unless it says another
+  hal::RobotConfig robot;  ///< with [parallel.link.NAME]; to be completed with those
+};
+
 /// The whole experiment.toml with the robot it names.
 struct Experiment {
   std::string file;                         ///< the TOML's path
@@ -121,6 +127,7 @@ struct Experiment {
   LogOptions log;
   ReportOptions report;
   estimation::EstimationConfig estimation;  ///< nothing without the table
+  std::optional<ParallelOptions> parallel;  ///< empty: there is no second robot
   dds::Config dds;                          ///< off without the table
   std::vector<ControllerSpec> controllers;
   TomlDocument document;  ///< its diagnostics() grow while controllers read parameters

@@ -54,6 +54,7 @@ bool RobotCycle::step() noexcept {
 /// May block, as the backend's exchange() may and nothing else: for the cycle's time and, when time
 /// is simulated, for the log, and while it is paused.
 rt::Tick RobotCycle::wait() noexcept {
+  show_snapshot();
   // Four images, and every event that one cycle can bring.
   const std::size_t most = 4 + 16 + Inbox::kCapacity + 3 * watch_.joints() + watch_.sensors();
   if (config_.loop.pacing == rt::Pacing::kSimulated) log_.wait_for_space(most);

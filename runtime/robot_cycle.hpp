@@ -28,6 +28,7 @@
 #include "runtime/run_machine.hpp"
 #include "runtime/run_services.hpp"
 #include "runtime/run_statistics.hpp"
+#include "runtime/snapshot_port.hpp"
 
 namespace tandem::runtime {
 
@@ -42,6 +43,7 @@ struct CycleParts {
   hal::CycleObserver* observer = nullptr;      ///< null: nobody watches
   RemoteCommandParts owner = {};               ///< for one in another process
   estimation::Estimator* estimator = nullptr;  ///< null: nothing is estimated
+  SnapshotPort* snapshots = nullptr;           ///< null: nobody wants any while it runs
 };
 
 /// A run from bring-up to shut-down, cycle by cycle. step() is the cycle; RunMachine says which
@@ -88,6 +90,7 @@ class RobotCycle {
   [[nodiscard]] const rt::LoopStatistics& loop() const noexcept { return loop_.statistics(); }
   [[nodiscard]] const RunStatistics& statistics() const noexcept { return statistics_; }
   [[nodiscard]] const hal::CommandLimits& limits() const noexcept { return limits_; }
+  [[nodiscard]] const CycleConfig& config() const noexcept { return config_; }
   [[nodiscard]] std::uint64_t running_cycles() const noexcept { return ran_; }
   [[nodiscard]] const CycleTrace& trace() const noexcept { return trace_; }
 
@@ -97,6 +100,9 @@ class RobotCycle {
   /// than those that were loaded then (nothing has changed after that one).
   [[nodiscard]] Result<std::vector<std::byte>> save();
   [[nodiscard]] Status restore(std::span<const std::byte> snapshot);
+  /// What save() answers, into `ar`, which may be bounded; without `backend` all but its part,
+  /// which comes last. Between two steps. @return false: the backend cannot be saved
+  [[nodiscard]] bool write_down(Archive& ar, bool backend);
 
  private:
   // The cycle, in this order: robot_cycle.cpp.
@@ -110,6 +116,7 @@ class RobotCycle {
   void hand_over() noexcept TANDEM_RT;
 
   // Their parts.
+  void show_snapshot() noexcept;
   void check_backend(Code code) noexcept TANDEM_RT;
   void check_collisions() noexcept TANDEM_RT;
   [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT;
@@ -182,6 +189,7 @@ class RobotCycle {
   hal::CycleObserver* observer_;
   RemoteCommandParts owner_;
   estimation::Estimator* estimator_;
+  SnapshotPort* snapshots_;
   CycleConfig config_;
 
   Inbox inbox_;

@@ -1,4 +1,5 @@
 // Construction, snapshots and results of RobotCycle: everything outside of the cycle itself.
+#include "rt/scoped_realtime.hpp"
 #include "runtime/fault_text.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -19,6 +20,7 @@ RobotCycle::RobotCycle(const CycleParts& parts, const CycleConfig& config)
       observer_(parts.observer),
       owner_(parts.owner),
       estimator_(parts.estimator),
+      snapshots_(parts.snapshots),
       config_(config),
       inbox_(config.loop),
       loop_(config.loop, parts.clock, &inbox_.clock()),
@@ -68,10 +70,27 @@ void RobotCycle::archive(Archive& ar) {
   ar(joint_limited_, faults_, resets_, homings_, homes_at_start_);
 }
 
+bool RobotCycle::write_down(Archive& ar, bool backend) {
+  archive(ar);
+  return !backend || backend_->archive(ar);
+}
+
+/// Where a robot's cycle is not simulated, under the traps: this takes no heap.
+void RobotCycle::show_snapshot() noexcept {
+  if (snapshots_ == nullptr || !snapshots_->wanted()) return;
+  const std::int64_t begin_ns = clock_->now_ns();
+  if (snapshots_->whole()) {
+    (void)write_down(snapshots_->archive(), true);
+  } else {
+    const rt::ScopedRealtime now;
+    (void)write_down(snapshots_->archive(), false);
+  }
+  snapshots_->taken(loop_.next_cycle(), clock_->now_ns() - begin_ns);
+}
+
 Result<std::vector<std::byte>> RobotCycle::save() {
   Archive ar;
-  archive(ar);
-  if (!backend_->archive(ar)) {
+  if (!write_down(ar, true)) {
     return fail("this robot cannot be saved", "snapshots need a simulated robot");
   }
   return std::vector<std::byte>(ar.bytes().begin(), ar.bytes().end());

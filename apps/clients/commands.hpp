@@ -19,6 +19,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit sensor_command(const SensorOptions& options);
 /// Pauses and steps until simulated time stands.
 [[nodiscard]] Exit clock_command(const ClockOptions& options);
+/// What a running robot will do, by its model.
+[[nodiscard]] Exit predict_command(const PredictOptions& options);
 /// Asks a running process one thing and prints its answer.
 [[nodiscard]] Exit ask_command(const AskOptions& options);
 /// Asks a running `tandem emulate` or `run` to inject a fault.

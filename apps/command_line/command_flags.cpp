@@ -46,6 +46,12 @@ Exit status: 0 each loop has carried it out (or simulated time is paused, and it
 is not confirmed, or there is no run. `kill -USR1 PID` asks for the same without a socket, and gets
 no answer.)";
 
+const char kPredictExamples[] = R"(Examples:
+  tandem predict                                     one second ahead, of the run that goes on
+  tandem predict --horizon 0.2 --json -              every row, for programs
+  tandem predict --horizon 5 --every 50              a row every 50 cycles
+A simulated robot is predicted by a copy of it, a real one by the robot of [parallel]:
+docs/internal-model.md)";
 const char kClockExamples[] = R"(Examples:
   tandem clock show                                  time, paused or not, rate, measured speed
   tandem clock pause
@@ -337,6 +343,15 @@ void add_flags(CLI::App& app, EstopOptions& o) {
       ->check(CLI::IsMember({0, 1, 2}));
   add_target(app, o.target);
   app.footer(kEstopExamples);
+}
+
+void add_flags(CLI::App& app, PredictOptions& o) {
+  app.add_option("--horizon", o.horizon_s, "Seconds ahead, from one cycle to 10 (default: 1)");
+  app.add_option("--every", o.every_cycles, "Cycles between two rows (default: about 100 rows)")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}));
+  add_target(app, o.target);
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kPredictExamples);
 }
 
 void add_flags(CLI::App& app, ClockOptions& o) {

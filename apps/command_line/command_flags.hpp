@@ -33,6 +33,7 @@ void add_flags(CLI::App& app, ServeOptions& o);
 void add_flags(CLI::App& app, FaultOptions& o);
 void add_flags(CLI::App& app, EstopOptions& o);
 void add_flags(CLI::App& app, ClockOptions& o);
+void add_flags(CLI::App& app, PredictOptions& o);
 void add_flags(CLI::App& app, AskOptions& o);
 void add_flags(CLI::App& app, InjectOptions& o);
 void add_flags(CLI::App& app, ControllerOptions& o);

@@ -177,6 +177,7 @@ Command parse_command_line(int argc, const char* const* argv) {
       "joint", "Joints of a running run: list, show, move, stop, set, gains, reset, recover");
   commands.add<SensorOptions>("sensor", "Sensors of a running run: list");
   commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
+  commands.add<PredictOptions>("predict", "What a running robot will do: runs its model ahead");
   commands.add<TopicOptions>("topic", "Topics of ROS 2 and DDS: list, echo, hz");
   commands.add<InjectOptions>("inject",
                               "Inject a fault into a running emulated or simulated robot");

@@ -126,6 +126,14 @@ struct ClockOptions {
   std::string json;
 };
 
+/// tandem predict
+struct PredictOptions {
+  double horizon_s = 1.0;
+  std::uint64_t every_cycles = 0;  ///< between two rows; 0: about 100 rows
+  ControlTarget target;
+  std::string json;
+};
+
 /// tandem ask QUESTION
 struct AskOptions {
   std::string question;  ///< JSON
@@ -264,11 +272,11 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command =
-    std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
-                 ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
-                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, LatencyOptions,
-                 DoctorOptions, EmulateOptions, TopicOptions, SensorOptions, BenchOptions>;
+using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
+                             ClockOptions, ControllerOptions, JointOptions, InjectOptions,
+                             CheckOptions, ModelOptions, NewOptions, LogOptions, EdsOptions,
+                             ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions,
+                             TopicOptions, SensorOptions, BenchOptions, PredictOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

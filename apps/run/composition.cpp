@@ -47,10 +47,8 @@ class Collector {
 };
 
 void add_controllers(Composition& c, Collector& errors) {
-  const std::vector<std::string> folders = controller_folders();
   for (const runtime::ControllerSpec& spec : c.experiment.controllers) {
-    Result<LoadedController> loaded =
-        load_controller(plugin_path(c.experiment, spec.plugin), folders);
+    Result<LoadedController> loaded = load_plugin(c.experiment, spec);
     const int line = spec.parameters.line();
     const std::string key = "controller." + spec.name;
     if (!loaded) {  // of a library; the line that names it is in the experiment
@@ -106,14 +104,6 @@ std::optional<Error> no_retreat(const Composition& c) {
                .key = keys.front().second};
 }
 
-/// Where the joints stand when the run starts, as far as the experiment says.
-std::vector<double> start_of(const runtime::Experiment& e) {
-  if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
-  if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
-  if (e.hal.backend == runtime::BackendKind::kWire) return {};
-  return std::vector<double>(e.robot.joints.size(), 0.0);
-}
-
 /// What the experiment wants estimated, shown to the controllers that are added after it.
 void add_estimator(Composition& c, Collector& errors) {
   const runtime::Experiment& e = c.experiment;
@@ -151,6 +141,10 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
       std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));
   add_estimator(c, errors);
+  if (e.hal.backend == runtime::BackendKind::kSim || e.parallel) {
+    c.predictor = std::make_unique<internal_model::PredictionService>(e.loop.period_ns);
+  }
+  c.controllers->predict_by(c.predictor.get());
   return true;
 }
 
@@ -194,6 +188,18 @@ void add_owner(Composition& c, Collector& errors) {
 }
 
 }  // namespace
+
+std::vector<double> start_of(const runtime::Experiment& e) {
+  if (e.hal.backend == runtime::BackendKind::kDds) return {};  // wherever its owner left it
+  if (const hal::PostureConfig* posture = e.robot.posture(e.posture)) return posture->position_rad;
+  if (e.hal.backend == runtime::BackendKind::kWire) return {};
+  return std::vector<double>(e.robot.joints.size(), 0.0);
+}
+
+Result<LoadedController> load_plugin(const runtime::Experiment& e,
+                                     const runtime::ControllerSpec& spec) {
+  return load_controller(plugin_path(e, spec.plugin), controller_folders());
+}
 
 std::string wire_name(const hal::RobotConfig& robot) {
   const bool line =
@@ -331,6 +337,36 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
   errors.add(hal::can::check_bus_load(e.robot, e.loop.period_ns));
 }
 
+/// The second robot of [parallel], and its kernels. Scenarios are the first robot's.
+Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
+  runtime::Experiment& e = c.experiment;
+  if (!e.parallel || c.kernels.get() == nullptr) return {};
+  const auto robot = with_description(std::move(e.parallel->robot));
+  if (!robot) return robot.error();
+  e.parallel->robot = robot->config;
+  auto kernels = supply_kernels(*robot, e.kernel_variant, overrides.missing_kernels);
+  if (!kernels) {
+    return {{.message = "the parallel robot has no kernels: " + kernels.error().message,
+             .hint = "leave --no-build out: the run builds them",
+             .file = kernels.error().file.empty() ? e.parallel->robot.file : kernels.error().file,
+             .key = "parallel"}};
+  }
+  c.parallel_kernels = std::move(*kernels);
+  if (c.parallel_kernels.get() == nullptr) return {};
+  sim::SimRobotConfig sim = e.sim_robot_config();
+  sim.tree = std::make_shared<const model::Tree>(robot->tree);
+  sim.truth = true;
+  c.simulation = sim;
+  auto second = sim::SimRobot::create(e.parallel->robot, c.parallel_kernels.get(), sim);
+  if (!second) {
+    Error error = second.error();
+    error.file = e.parallel->robot.file;
+    return {error};
+  }
+  c.parallel = std::move(*second);
+  return {};
+}
+
 /// The robot in simulation. @param scenario  a file of faults; may be empty
 Diagnostics add_simulation(Composition& c, const std::string& scenario) {
   const runtime::Experiment& e = c.experiment;
@@ -342,6 +378,7 @@ Diagnostics add_simulation(Composition& c, const std::string& scenario) {
   }
   auto backend = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
   if (!backend) return {in_its_file(backend.error(), e)};
+  if (!e.parallel) c.simulation = sim;
   c.sim = backend->get();
   c.master = &c.sim->master();
   c.backend = std::move(*backend);
@@ -372,6 +409,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
   if (auto warning = no_retreat(*c)) c->warnings.push_back(std::move(*warning));
+  if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;
   if (auto failed = add_simulation(*c, overrides.scenario); !failed.empty()) {

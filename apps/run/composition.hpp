@@ -15,6 +15,7 @@
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "base/result.hpp"
+#include "controllers/plugin_loader.hpp"
 #include "dds/domain.hpp"
 #include "dds/participant.hpp"
 #include "estimation/estimator.hpp"
@@ -22,6 +23,7 @@
 #include "hal/remote/remote_backend.hpp"
 #include "hal/remote/tele_backend.hpp"
 #include "hal/sim/sim_robot.hpp"
+#include "internal_model/prediction_service.hpp"
 #include "model/kernel_library.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/experiment.hpp"
@@ -64,8 +66,12 @@ struct Composition {
   std::unique_ptr<hal::Backend> backend;          ///< CAN's and DDS' only after connect()
   sim::SimRobot* sim = nullptr;                   ///< the robot, when it is the simulation
   const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
-  remote::RemoteBackend* remote = nullptr;        ///< the robot, when another process has it
-  remote::TeleBackend* tele = nullptr;  ///< the backend, when a link lies before the robot
+  remote::TeleBackend* tele = nullptr;      ///< the backend, when a link lies before the robot
+  model::KernelLibrary parallel_kernels;    ///< of [parallel]; may be those of `kernels`
+  std::unique_ptr<sim::SimRobot> parallel;  ///< null: there is no second robot
+  sim::SimRobotConfig simulation;           ///< of the second or, without one, of the first
+  std::unique_ptr<internal_model::PredictionService> predictor;  ///< null: there is no model
+  remote::RemoteBackend* remote = nullptr;           ///< the robot, when another process has it
   std::unique_ptr<estimation::Estimator> estimator;  ///< null: nothing is estimated
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::shared_ptr<runtime::OwnerController> owner;  ///< null: nobody may own the robot from afar
@@ -80,6 +86,13 @@ struct Composition {
     return sockets->open_buses();
   }
 };
+
+/// Where the joints stand when the run starts, as far as the experiment says.
+[[nodiscard]] std::vector<double> start_of(const runtime::Experiment& e);
+
+/// The plugin of one of the experiment's controllers. Errors: load_controller()'s.
+[[nodiscard]] Result<LoadedController> load_plugin(const runtime::Experiment& e,
+                                                   const runtime::ControllerSpec& spec);
 
 /// "EtherCAT" when the robot has no other bus, else "CAN".
 [[nodiscard]] std::string wire_name(const hal::RobotConfig& robot);

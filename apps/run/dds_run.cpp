@@ -42,19 +42,21 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
                       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
                       .truth = truth,
                       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
+                      .parallel = c.parallel != nullptr,
                       .run = draw_run()});
   if (!publisher) return std::unexpected(publisher.error());
   return std::unique_ptr<DdsRun>(new DdsRun(std::move(*participant), std::move(*publisher)));
 }
 
-void DdsRun::start(const runtime::RobotCycle& cycle) {
+void DdsRun::start(const runtime::RobotCycle& cycle, hal::ParallelSource* parallel) {
   publisher_->start({.version =
                          [&cycle] {
                            const runtime::FaultLog& log = cycle.fault_log();
                            return log.size() + log.lost() + (log.size() - log.latched());
                          },
                      .faults = [&cycle] { return entries(cycle.faults()); },
-                     .lost = [&cycle] { return cycle.fault_log().lost(); }});
+                     .lost = [&cycle] { return cycle.fault_log().lost(); }},
+                    parallel);
 }
 
 DdsResult DdsRun::finish() { return {participant_->config().domain, publisher_->stop()}; }

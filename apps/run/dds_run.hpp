@@ -40,7 +40,8 @@ class DdsRun {
   [[nodiscard]] hal::CycleObserver& tap() { return *publisher_; }
 
   /// From now on cycles are published. Before the first of them; the cycle stays until finish().
-  void start(const runtime::RobotCycle& cycle);
+  /// @param parallel  the second robot; null: there is none
+  void start(const runtime::RobotCycle& cycle, hal::ParallelSource* parallel);
   /// When there are no more of them.
   DdsResult finish();
 

@@ -14,6 +14,7 @@
 #include "apps/run/inject.hpp"
 #include "apps/run/loop_guard.hpp"
 #include "apps/run/loop_thread.hpp"
+#include "apps/run/prediction.hpp"
 #include "apps/run/remote_link.hpp"
 #include "apps/run/run_log.hpp"
 #include "apps/run/run_summary.hpp"
@@ -23,6 +24,7 @@
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
+#include "internal_model/parallel_robot.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
@@ -199,18 +201,35 @@ class Session {
 
   void make_cycle() {
     const runtime::CycleConfig config = cycle_config(c_, options_);
+    if (c_.parallel != nullptr) {
+      parallel_.emplace(
+          internal_model::ParallelParts{
+              *c_.backend, *c_.parallel,
+              experiment().sim.ground_truth ? &c_.parallel->truth() : nullptr, recorder_.get()},
+          experiment().robot.shape(), c_.controllers->gains(), experiment().loop.period_ns);
+    }
     waits_ = config.after_stop == runtime::AfterStop::kWait;
     cycle_.emplace(runtime::CycleParts{.robot = experiment().robot,
-                                       .backend = *c_.backend,
+                                       .backend = loops_backend(),
                                        .controllers = *c_.controllers,
                                        .clock = clock_,
                                        .recorder = recorder_.get(),
                                        .truth = truth_,
                                        .observer = dds_ == nullptr ? nullptr : &dds_->tap(),
                                        .owner = {server_.get(), c_.owner.get(), c_.owner_slot},
-                                       .estimator = c_.estimator.get()},
+                                       .estimator = c_.estimator.get(),
+                                       .snapshots = c_.predictor.get()},
                    config);
+    if (c_.predictor != nullptr) {
+      c_.predictor->attach(*cycle_, parallel_ ? &*parallel_ : nullptr,
+                           [this, config] { return make_fork(c_, config); });
+    }
     if (server_ != nullptr) tell_faults(*server_, *cycle_);
+  }
+
+  /// With a second robot: what passes every call on to the first, and tapes it.
+  hal::Backend& loops_backend() {
+    return parallel_ ? static_cast<hal::Backend&>(parallel_->backend()) : *c_.backend;
   }
 
   void announce() const {
@@ -227,6 +246,7 @@ class Session {
   Status open_inputs() {
     const runtime::Experiment& e = experiment();
     add_run_commands(commands_, *cycle_, e.robot);
+    add_predict(commands_, c_.predictor.get(), e.robot);
     if (dds_ != nullptr) admission_.add_to(commands_);
     if (c_.sim != nullptr) {
       add_inject(commands_, e.robot, e.loop.period_ns, [this](const sim::Fault& fault) -> Status {
@@ -259,13 +279,15 @@ class Session {
     rt::install_emergency_signal();
     std::optional<rt::NoCpuSleep> awake;
     if (e.loop.pacing == rt::Pacing::kWallClock) awake.emplace();
-    if (dds_ != nullptr) dds_->start(*cycle_);
+    if (dds_ != nullptr) dds_->start(*cycle_, parallel_ ? &*parallel_ : nullptr);
     auto guard = LoopGuard::open(c_, *cycle_);
     if (!guard) return std::unexpected(guard.error());
+    if (parallel_) parallel_->start();
     LoopThread thread(*cycle_, e.thread);
     watch(*cycle_, thread, c_, **guard, recorder_.get(), out_, waits_, options_.quiet);
     if ((*guard)->gave_up()) end_without_loop(**guard);
     thread.join();
+    if (c_.predictor != nullptr) c_.predictor->close();
     guard->reset();
     if (server_ != nullptr) server_->close();
     if (!thread.report().complete()) {
@@ -293,6 +315,10 @@ class Session {
   Exit finish(const LoopTimes& times) {
     RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}};
     summary.server = server_.get();
+    if (parallel_) {
+      summary.parallel = parallel_->finish();
+      summary.differences = &parallel_->differences();
+    }
     if (dds_ != nullptr) summary.dds = dds_->finish();
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
@@ -327,6 +353,7 @@ class Session {
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
   rt::WallClock clock_;
+  std::optional<internal_model::ParallelRobot> parallel_;
   std::optional<runtime::RobotCycle> cycle_;
   bool waits_ = false;  // for a reset, after a fault
   ControlRegistry commands_;

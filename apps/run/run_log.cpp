@@ -34,8 +34,15 @@ log::RunInfo info_of(const Composition& c) {
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;
-  for (const std::string& file : {e.file, e.robot.file, e.robot.model.urdf}) {
-    info.configuration.emplace_back(file, text_of(file));
+  std::vector<std::string> files{e.file, e.robot.file, e.robot.model.urdf};
+  if (e.parallel) {
+    files.push_back(e.parallel->robot.file);
+    files.push_back(e.parallel->robot.model.urdf);
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {  // each once
+    const auto before = files.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::find(files.begin(), before, files[i]) != before) continue;
+    info.configuration.emplace_back(files[i], text_of(files[i]));
   }
   return info;
 }
@@ -49,6 +56,10 @@ std::uint64_t bytes_needed(const Composition& c) {
                               hal::CommandImage(e.robot.shape()).bytes().size();
   if (c.sim != nullptr && e.sim.ground_truth) cycle_bytes += c.sim->truth().bytes().size();
   if (c.estimator != nullptr) cycle_bytes += c.estimator->image().bytes().size();
+  if (c.parallel != nullptr) {
+    cycle_bytes += hal::StateImage(e.robot.shape()).bytes().size() + 2 * kMessageOverhead;
+    if (e.sim.ground_truth) cycle_bytes += c.parallel->truth().bytes().size();
+  }
   // Joint states and the base's frame, for viewers: three numbers and a name of each joint.
   const std::uint64_t view_bytes = 4 * kMessageOverhead + 64 * e.robot.joints.size();
   const auto cycles_per_view =

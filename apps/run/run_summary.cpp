@@ -10,6 +10,7 @@
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/can/round_trips.hpp"
+#include "apps/run/parallel_summary.hpp"
 #include "apps/run/remote_link.hpp"
 #include "base/counted.hpp"
 #include "hal/sim/engine_loader.hpp"
@@ -322,6 +323,7 @@ Json RunSummary::json() const {
   }
   json["ground"] = ground_json(cycle.statistics().ground(weight_N(*composition.kernels)));
   json["loops"] = loops_json(e.robot, cycle.statistics().loops());
+  json["parallel"] = parallel ? parallel_json(e.parallel->robot, *parallel, *differences) : Json();
   json["base"] = base_json(cycle.statistics().base());
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
@@ -342,6 +344,8 @@ void RunSummary::print(std::FILE* out) const {
   print_loops(*this, out);
   if (!cycle.faults().empty()) fmt::print(out, "\n");
   print_faults(faults_json(cycle.faults()), out);
+  if (parallel)
+    print_parallel(composition.experiment.parallel->robot, *parallel, *differences, out);
   fmt::print(out, "\n");
   if (composition.master != nullptr && composition.backend->waits_for_bus()) {
     print_slowest_nodes(composition.master->round_trips(), out);

@@ -12,6 +12,7 @@
 #include "apps/run/loop_thread.hpp"
 #include "apps/text/console.hpp"
 #include "hal/remote/server.hpp"
+#include "internal_model/parallel_robot.hpp"
 #include "log/recorder.hpp"
 #include "runtime/robot_cycle.hpp"
 
@@ -27,10 +28,12 @@ struct RunSummary {
   const Composition& composition;
   const runtime::RobotCycle& cycle;
   LoopTimes times;
-  std::optional<log::RecordingResult> log;              ///< empty: nothing was logged
-  std::optional<hal::can::FrameRecord::Result> frames;  ///< empty: none were recorded
-  std::vector<std::string> faults;                      ///< the log's trouble included
-  std::optional<DdsResult> dds;                         ///< empty: it was off
+  std::optional<log::RecordingResult> log;                   ///< empty: nothing was logged
+  std::optional<hal::can::FrameRecord::Result> frames;       ///< empty: none were recorded
+  std::vector<std::string> faults;                           ///< the log's trouble included
+  std::optional<DdsResult> dds;                              ///< empty: it was off
+  std::optional<internal_model::ParallelResult> parallel;    ///< empty: there was no second robot
+  const internal_model::Differences* differences = nullptr;  ///< with it
   const remote::Server* server = nullptr;  ///< null: nobody could own the robot from afar
 
   [[nodiscard]] double sim_s() const;

@@ -67,12 +67,7 @@ ModelConfig read_model(TomlTable& root, const std::string& folder) {
     model.lock_lines.emplace(joint, lock.line(joint));
   }
   lock.finish();
-  TomlTable links = table.table_or_empty("link");
-  if (links.holds_tables()) {
-    for (const std::string& name : links.keys()) {
-      model.links.push_back(read_link(links.table(name), name));
-    }
-  }
+  model.links = read_links(table.table_or_empty("link"));
   table.finish();
   for (TomlTable& site : root.tables("site")) read_site(site, model);
   return model;
@@ -315,6 +310,15 @@ std::expected<RobotConfig, Diagnostics> finish(Result<TomlDocument> document) {
 }
 
 }  // namespace
+
+std::vector<LinkConfig> read_links(TomlTable links) {
+  std::vector<LinkConfig> all;
+  if (!links.holds_tables()) return all;
+  for (const std::string& name : links.keys()) {
+    all.push_back(read_link(links.table(name), name));
+  }
+  return all;
+}
 
 std::expected<RobotConfig, Diagnostics> read_robot_config(const std::string& file) {
   return finish(TomlDocument::load(file));

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/result.hpp"
+#include "base/toml_reader.hpp"
 #include "canopen/board_sheet.hpp"
 #include "canopen/data_sheet.hpp"
 #include "hal/image.hpp"
@@ -37,6 +38,9 @@ struct LinkConfig {
   std::optional<std::array<double, 6>> inertia_kg_m2;  ///< ixx ixy ixz iyy iyz izz about the com,
                                                        ///< along the link's axes
   int line = 0;                                        ///< in the TOML, for messages
+  // Where an experiment says it ([parallel.link.NAME]): empty in robot.toml.
+  std::string file{};  ///< of `line`
+  std::string key{};   ///< dotted
 };
 
 /// [model]
@@ -318,6 +322,9 @@ struct RobotConfig {
   [[nodiscard]] const BusConfig* bus(std::string_view name) const;
   [[nodiscard]] const PostureConfig* posture(std::string_view name) const;
 };
+
+/// Every [TABLE.NAME] of `links`, a table of links: [model.link.NAME], [parallel.link.NAME].
+[[nodiscard]] std::vector<LinkConfig> read_links(TomlTable links);
 
 /// Reads and checks a robot.toml by itself (not against its URDF: model/ and apps/ do that).
 /// Errors, all of them at once: unreadable, no TOML, unknown or missing keys, out of range,

@@ -32,6 +32,27 @@ TEST(Archive, RefusesAShapeThatDiffers) {
   EXPECT_FALSE(in.ok());
 }
 
+TEST(Archive, ThatIsBoundedTakesWhatFitsAndNoMore) {
+  Counter counter{7, {1.0, 2.0, 3.0}};
+  Archive free;
+  free(counter);
+  Archive bounded(free.bytes().size());
+  const std::byte* memory = bounded.bytes().data();
+  for (int again = 0; again < 2; ++again) {
+    bounded.clear();
+    bounded(counter);
+    EXPECT_TRUE(bounded.ok());
+    EXPECT_TRUE(std::ranges::equal(bounded.bytes(), free.bytes()));
+  }
+  EXPECT_EQ(bounded.bytes().data(), memory) << "it has not grown";
+  char more = 'x';
+  bounded(more);
+  EXPECT_FALSE(bounded.ok());
+  EXPECT_EQ(bounded.bytes().size(), free.bytes().size());
+  bounded.clear();
+  EXPECT_TRUE(bounded.ok());
+}
+
 TEST(Archive, RefusesToReadPastTheEnd) {
   Archive in(std::span<const std::byte>{});
   int value = 5;

@@ -30,6 +30,7 @@ struct RigOptions {
   std::string robot = "double_pendulum";
   bool simulated_time = true;
   bool estimated = false;  ///< a base's estimate beside the truth
+  bool parallel = false;  ///< a second robot
   Config config = own_config();
 };
 
@@ -69,19 +70,21 @@ struct PublisherRig {
                                                  .simulated_time = options.simulated_time,
                                                  .truth = &truth,
                                                  .estimate = shown_estimate(),
+                                                 .parallel = options.parallel,
                                                  .run = 77});
     EXPECT_TRUE(made) << made.error().to_string();
     publisher = std::move(*made);
   }
 
-  void start() {
+  void start(hal::ParallelSource* parallel = nullptr) {
     publisher->start({.version = [this] { return fault_version.load(); },
                       .faults =
                           [this] {
                             const std::lock_guard lock(faults_mutex);
                             return faults;
                           },
-                      .lost = [] { return std::uint64_t{3}; }});
+                      .lost = [] { return std::uint64_t{3}; }},
+                     parallel);
   }
   /// For the publisher's thread to see.
   void set_faults(std::vector<FaultEntry> now) {

@@ -38,6 +38,37 @@ TEST_P(EveryRobot, HasJointStatesInTheImagesOrder) {
   });
 }
 
+/// A second robot that is always one cycle behind.
+class OneBehind final : public hal::ParallelSource {
+ public:
+  explicit OneBehind(const hal::StateImage& like) : view{like, {0.1, 0.2}, {0.3, 0.4}, {0.5, 0.6}} {
+    view.state.time_ns()[0] = 19'000'000;
+  }
+  const hal::ParallelView* newest() noexcept override { return &view; }
+  hal::ParallelView view;
+};
+
+TEST(ParallelTopics, HaveTheSecondRobotAndItsDifferenceAtItsOwnTime) {
+  PublisherRig rig({.parallel = true});
+  OneBehind second(rig.state);
+  auto states = rig.reader<sensor_msgs::JointState>("parallel/joint_states");
+  auto differences = rig.reader<sensor_msgs::JointState>("parallel/difference");
+  rig.start(&second);
+  rig.show(20);
+  rig.publisher->stop();
+  EXPECT_EQ(states.take([&](const auto& message, const auto&) {
+    EXPECT_EQ(list(message.position), list_of(second.view.state.position_rad()));
+    EXPECT_EQ(ns(message.header.stamp), 19'000'000);
+  }),
+            1U);
+  EXPECT_EQ(differences.take([&](const auto& message, const auto&) {
+    EXPECT_EQ(list(message.position), second.view.position_rad);
+    EXPECT_EQ(list(message.velocity), second.view.velocity_rad_s);
+    EXPECT_EQ(list(message.effort), second.view.torque_Nm);
+  }),
+            1U);
+}
+
 TEST_P(EveryRobot, HasDynamicJointStatesWhenTheyAreAskedFor) {
   Config config = own_config();
   config.every[static_cast<std::size_t>(Topic::kDynamicJointStates)] = 5;

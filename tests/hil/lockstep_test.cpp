@@ -87,6 +87,24 @@ TEST_P(HilLockstep, ASquatOverCanIsTheInProcessRunBitForBit) {
 INSTANTIATE_TEST_SUITE_P(Robots, HilLockstep, testing::Values("coman", "walkman"),
                          [](const auto& robot) { return std::string(robot.param); });
 
+using HilTwin = Lockstep;
+
+/// Beside a robot on the wire, its exact twin in the master's process.
+TEST_F(HilTwin, OfARobotOnCanIsTheSameToTheLastBit) {
+  const std::string twin = experiment("coman/squat_twin.toml");
+  Process robot(emulate_words(twin), file("robot.txt"));
+  ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
+  Process master(tandem({"run", twin, "--hal", "can", "--lockstep", "--no-socket", "--no-log",
+                         "--duration", "3", "--json", file("run.json")}),
+                 file("run.txt"));
+  ASSERT_EQ(master.wait(), 0) << master.output();
+  ASSERT_EQ(robot.interrupt(), 0) << robot.output();
+  const auto parallel = json("run.json")["parallel"];
+  EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
+  EXPECT_GT(parallel["compared"].get<int>(), 3000);
+  EXPECT_EQ(parallel["missed"], 0);
+}
+
 class HilDrives : public Lockstep, public testing::WithParamInterface<const char*> {};
 
 /// Boards that stand in for other makers' drives, by their data sheets.

@@ -313,7 +313,7 @@ TEST(Experiment, SuggestsTheNearestJointAndSensorOfTheReport) {
 TEST(Experiment, RefusesAnOrderThatTheActuatorsLackDataFor) {
   EXPECT_EQ(errors_of(with("[sim]\norder = 3")),
             "arm/x.toml:5: sim.order: the actuator 'motor' cannot be of order 3: inductance_H must "
-            "be positive (complete it in the robot's file, or leave the order to it)\n");
+            "be positive (complete it in arm/robot.toml, or leave the order to it)\n");
 }
 
 TEST(Experiment, RefusesLocalCommandsOverANetwork) {

@@ -1,0 +1,95 @@
+// tandem predict: what a running robot will do, by its model, as a table.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <numbers>
+#include <vector>
+
+#include "apps/clients/commands.hpp"
+#include "apps/clients/control_client.hpp"
+#include "apps/text/console.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr double kDegreesOfOne = 180.0 / std::numbers::pi;
+constexpr std::size_t kMovedShown = 8;
+
+struct MovedJoint {
+  std::string joint;
+  bool slides = false;
+  double now = 0.0, end = 0.0, low = 0.0, high = 0.0, torque = 0.0;
+};
+
+std::vector<MovedJoint> moved_joints(const Json& joints) {
+  std::vector<MovedJoint> rows;
+  for (const auto& [name, one] : joints.items()) {
+    const auto position = one["position_rad"].get<std::vector<double>>();
+    const auto torque = one["torque_Nm"].get<std::vector<double>>();
+    if (position.empty()) continue;
+    const auto [low, high] = std::ranges::minmax(position);
+    MovedJoint row{name, one.value("slides", false), position.front(), position.back(), low, high,
+                   0.0};
+    for (const double value : torque) row.torque = std::max(row.torque, std::abs(value));
+    rows.push_back(row);
+  }
+  std::ranges::stable_sort(rows, std::ranges::greater{},
+                           [](const MovedJoint& row) { return row.high - row.low; });
+  return rows;
+}
+
+void print_prediction(const Json& answer) {
+  std::vector<MovedJoint> rows = moved_joints(answer["joints"]);
+  const std::size_t all = rows.size();
+  rows.resize(std::min(kMovedShown, all));
+  Table table({"moves most", "now", "then", "lowest", "highest", "largest torque"});
+  for (const MovedJoint& row : rows) {
+    const double factor = row.slides ? 1e3 : kDegreesOfOne;
+    const auto position = [&](double value) {
+      return fmt::format("{:.2f} {}", value * factor, row.slides ? "mm" : "deg");
+    };
+    table.add({row.joint, position(row.now), position(row.end), position(row.low),
+               position(row.high), fmt::format("{:.2f} {}", row.torque, row.slides ? "N" : "Nm")});
+  }
+  table.print(stdout);
+  fmt::print("\n");
+  const double cpu_s = answer.value("cpu_s", 0.0);
+  const auto period_s = static_cast<double>(answer.value("period_ns", std::int64_t{0})) * 1e-9;
+  const double ahead_s = static_cast<double>(answer.value("cycles", std::uint64_t{0})) * period_s;
+  Facts facts;
+  facts.add("from", fmt::format("{:.3f} s", answer.value("from_s", 0.0)));
+  facts.add("ahead", fmt::format("{:.3f} s, to its {}", ahead_s, answer.value("end", "?")));
+  facts.add("computed in", fmt::format("{:.1f} ms of one core: {:.0f} x real time", cpu_s * 1e3,
+                                       cpu_s > 0.0 ? ahead_s / cpu_s : 0.0));
+  facts.add("cost the loop",
+            fmt::format("{:.1f} us, {:.1f} kB written down",
+                        static_cast<double>(answer.value("loop_ns", std::int64_t{0})) * 1e-3,
+                        static_cast<double>(answer.value("loop_bytes", std::uint64_t{0})) * 1e-3));
+  const Json& base = answer["base"];
+  if (base.is_object() && !base["position_m"].empty()) {
+    facts.add("base height",
+              fmt::format("{:.4f} m, then {:.4f} m", base["position_m"].front()[2].get<double>(),
+                          base["position_m"].back()[2].get<double>()));
+  }
+  facts.add("faults to come", std::to_string(answer["faults"].size()));
+  facts.print(stdout);
+  for (const Json& fault : answer["faults"]) {
+    fmt::print("fault: {:.3f} s: {}\n", fault.value("time_s", 0.0), fault.value("text", ""));
+  }
+}
+
+}  // namespace
+
+Exit predict_command(const PredictOptions& options) {
+  const auto run = ControlClient::open(options.target, "run");
+  if (!run) return refuse(run.error());
+  Json question{{"do", "predict"}, {"horizon_s", options.horizon_s}};
+  if (options.every_cycles > 0) question["every_cycles"] = options.every_cycles;
+  const Result<Json> answer = (*run)->ask(question);
+  if (!answer) return refuse(answer.error());
+  if (options.json != "-") print_prediction(*answer);
+  if (Status written = write_json(options.json, *answer); !written) return refuse(written.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,169 @@
+#include "apps/run/prediction.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "apps/control/fault_table.hpp"
+#include "hal/config/capabilities.hpp"
+#include "rt/clock.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr std::size_t kRowsAnswered = 100;  // unless asked otherwise
+
+struct RunFork final : internal_model::Fork {
+  [[nodiscard]] bool diverged() const override { return robot->plant().diverged(); }
+
+  internal_model::NoPredictor nobody;
+  rt::WallClock clock;
+  std::unique_ptr<runtime::ControllerHost> controllers;
+  std::unique_ptr<estimation::Estimator> estimator;  // as the run's, or null
+  std::unique_ptr<sim::SimRobot> robot;
+  std::unique_ptr<runtime::RobotCycle> own;
+};
+
+/// The same controllers in the same order.
+Status add_controllers_again(const Composition& c, runtime::ControllerHost& host) {
+  const runtime::Experiment& e = c.experiment;
+  for (const runtime::ControllerSpec& spec : e.controllers) {
+    auto plugin = load_plugin(e, spec);
+    if (!plugin) return std::unexpected(plugin.error());
+    const Status added = host.add(spec.name, std::move(*plugin), spec.parameters, spec.active);
+    if (!added) return added;
+  }
+  if (c.owner == nullptr) return {};
+  const auto nothing = TomlDocument::parse("", e.file);
+  return host.add(runtime::kOwnerController, std::make_shared<runtime::OwnerController>(),
+                  nothing->root(), false);
+}
+
+/// Every `every`th row of one joint.
+Json column(const hal::Prediction& p, const std::vector<double>& of, std::size_t joint,
+            std::size_t every) {
+  Json values = Json::array();
+  for (std::size_t i = 0; i < p.cycles; i += every) values.push_back(p.row(of, i)[joint]);
+  return values;
+}
+
+Json base_rows(const hal::Prediction& p, std::size_t first, std::size_t count, std::size_t every) {
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < p.cycles; i += every) {
+    const auto begin = p.base.begin() + static_cast<std::ptrdiff_t>(7 * i + first);
+    rows.push_back(std::vector<double>(begin, begin + static_cast<std::ptrdiff_t>(count)));
+  }
+  return rows;
+}
+
+Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& robot,
+                 std::size_t every) {
+  const hal::Prediction& p = answer.prediction;
+  const auto period_s = static_cast<double>(p.period_ns) * 1e-9;
+  Json json{{"first_cycle", p.first_cycle},
+            {"from_s", static_cast<double>(p.first_cycle) * period_s},
+            {"period_ns", p.period_ns},
+            {"cycles", p.cycles},
+            {"every_cycles", every},
+            {"end", hal::to_string(p.end)},
+            {"cpu_s", p.cpu_s},
+            {"wall_s", p.wall_s},
+            {"loop_bytes", answer.loop_bytes},
+            {"loop_ns", answer.loop_ns},
+            {"faults", faults_json(answer.faults)},
+            {"joints", Json::object()},
+            {"base", nullptr}};
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    json["joints"][robot.joints[j].name] = {{"slides", robot.joints[j].slides},
+                                            {"reference_rad", column(p, p.reference_rad, j, every)},
+                                            {"position_rad", column(p, p.position_rad, j, every)},
+                                            {"torque_Nm", column(p, p.torque_Nm, j, every)}};
+  }
+  if (robot.model.floating_base) {
+    json["base"] = {{"position_m", base_rows(p, 0, 3, every)},
+                    {"quaternion", base_rows(p, 3, 4, every)}};
+  }
+  return json;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
+                                                        const runtime::CycleConfig& config) {
+  const runtime::Experiment& e = c.experiment;
+  auto fork = std::make_unique<RunFork>();
+  fork->controllers =
+      std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
+  fork->controllers->start_from(start_of(e));
+  fork->controllers->predict_by(&fork->nobody);
+  if (c.estimator != nullptr) {
+    auto estimator = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(),
+                                                 e.estimation, e.loop.period_ns);
+    if (!estimator) return std::unexpected(estimator.error());
+    fork->estimator = std::move(*estimator);
+    fork->controllers->show_estimate(&fork->estimator->image());
+  }
+  if (const Status added = add_controllers_again(c, *fork->controllers); !added) {
+    return std::unexpected(added.error());
+  }
+  const bool beside = c.parallel != nullptr;
+  sim::SimRobotConfig sim = c.simulation;
+  sim.truth = true;
+  auto robot = sim::SimRobot::create(beside ? e.parallel->robot : e.robot,
+                                     (beside ? c.parallel_kernels : c.kernels).get(), sim);
+  if (!robot) return std::unexpected(robot.error());
+  fork->robot = std::move(*robot);
+  fork->truth = &fork->robot->truth();
+  runtime::CycleConfig ahead = config;
+  ahead.loop.pacing = rt::Pacing::kSimulated;
+  ahead.loop.rate = 0.0;
+  ahead.loop.start_paused = false;
+  ahead.trace_cycles = 0;
+  const bool run_has_truth = c.sim != nullptr && e.sim.ground_truth;
+  fork->own = std::make_unique<runtime::RobotCycle>(
+      runtime::CycleParts{.robot = e.robot,
+                          .backend = *fork->robot,
+                          .controllers = *fork->controllers,
+                          .clock = fork->clock,
+                          .truth = run_has_truth ? fork->truth : nullptr,
+                          .estimator = fork->estimator.get()},
+      ahead);
+  fork->cycle = fork->own.get();
+  return fork;
+}
+
+void add_predict(ControlRegistry& registry, internal_model::PredictionService* service,
+                 const hal::RobotConfig& robot) {
+  registry.add(
+      "predict", ControlEffect::kReads, "what the robot will do, by running its model ahead",
+      {{.name = "horizon_s",
+        .type = ControlKey::Type::kNumber,
+        .doc = "[s] from one cycle to 10; default 1"},
+       {.name = "every_cycles",
+        .type = ControlKey::Type::kInteger,
+        .doc = "cycles between two rows of the answer; default: about 100 rows"}},
+      [service, &robot](const Json& request) -> Result<Json> {
+        if (service == nullptr) {
+          return fail("this run has no model of its robot to predict with",
+                      "add [parallel] to the experiment (docs/internal-model.md)");
+        }
+        const double horizon_s = request.value("horizon_s", 1.0);
+        const auto every = request.value("every_cycles", std::int64_t{0});
+        constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
+        if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
+          return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
+        }
+        if (request.contains("every_cycles") && every < 1) {
+          return fail("predict: \"every_cycles\" is less than 1");
+        }
+        const auto answer = service->predict(std::llround(horizon_s * 1e9));
+        if (!answer) return std::unexpected(answer.error());
+        const std::size_t cycles = answer->prediction.cycles;
+        const std::size_t rows = std::max<std::size_t>(1, cycles / kRowsAnswered);
+        return answer_json(*answer, robot, every > 0 ? static_cast<std::size_t>(every) : rows);
+      });
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,85 @@
+#include "internal_model/duplicating_backend.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace tandem::internal_model {
+
+DuplicatingBackend::DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
+                                       const std::atomic<std::uint64_t>& done)
+    : first_(&first), tape_(&tape), done_(&done), revisions_(joints) {}
+
+void DuplicatingBackend::exchange(const hal::CycleTime& time) noexcept {
+  if (first_->pace() == hal::Pace::kSimulatedClock) {
+    while (cycles_ - done_->load(std::memory_order_acquire) >= kMostBehind) {
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  }
+  first_->exchange(time);
+}
+
+Code DuplicatingBackend::read(const hal::CycleTime& time,
+                              hal::StateImage& state) noexcept TANDEM_RT {
+  const Code code = first_->read(time, state);
+  record_ = tape_->begin_push();
+  ++cycles_;
+  if (record_ == nullptr) return code;
+  CommandRecord& record = *record_;
+  record.number = cycles_;
+  record.time = time;
+  record.phase = first_->phase();
+  record.written = record.shut_down = record.new_gains = false;
+  record.calls_made = record.calls_before = late_calls_;
+  std::copy_n(late_.begin(), late_calls_, record.calls.begin());
+  record.state.assign(state);
+  late_calls_ = 0;
+  return code;
+}
+
+void DuplicatingBackend::stop(hal::StopCategory category) noexcept TANDEM_RT {
+  first_->stop(category);
+  note({.category = category});
+}
+
+void DuplicatingBackend::reset() noexcept TANDEM_RT {
+  first_->reset();
+  note({.reset = true});
+}
+
+/// What is called after write() belongs to the next record.
+void DuplicatingBackend::note(const BackendCall& call) noexcept TANDEM_RT {
+  if (record_ != nullptr) return record_->add(call);
+  if (late_calls_ < late_.size()) late_[late_calls_++] = call;
+}
+
+Code DuplicatingBackend::write(const hal::CommandImage& command,
+                               const hal::ParameterImage& gains) noexcept TANDEM_RT {
+  if (record_ != nullptr) {
+    record_->written = true;
+    record_->command.assign(command);
+    for (std::size_t j = 0; j < revisions_.size(); ++j) {
+      record_->new_gains = record_->new_gains || revisions_[j] != gains.revision(j);
+      revisions_[j] = gains.revision(j);
+    }
+    record_->new_gains = record_->new_gains || !gains_known_;
+    if (record_->new_gains) record_->gains = gains;  // equally large: its memory stays
+    gains_known_ = true;
+  }
+  end_record();
+  return first_->write(command, gains);
+}
+
+bool DuplicatingBackend::shut_down() noexcept TANDEM_RT {
+  if (record_ != nullptr) record_->shut_down = true;
+  end_record();
+  return first_->shut_down();
+}
+
+/// The cycle's last call: the second robot may go on.
+void DuplicatingBackend::end_record() noexcept TANDEM_RT {
+  if (record_ != nullptr) tape_->end_push();
+  record_ = nullptr;
+}
+
+}  // namespace tandem::internal_model

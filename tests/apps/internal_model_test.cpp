@@ -1,0 +1,133 @@
+// [parallel] and `tandem predict` of the binary: figures, and one clear error for each wrong input.
+#include "tests/apps/bad_input.hpp"
+#include "tests/apps/running.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Parallel : public BadInput {
+ protected:
+  /// hold.toml with more tables behind it.
+  void add(const std::string& tables) const {
+    write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") + "\n" + tables);
+  }
+};
+
+TEST_F(Parallel, OfAnExactTwinIsTheSameToTheLastBit) {
+  write_text(folder_ / "trajectory.toml",
+             read_text(folder_ / "trajectory.toml") + "\n[parallel]\n");
+  const Outcome outcome = tandem("run trajectory.toml --duration 0.5 --json run.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto parallel = json("run.json")["parallel"];
+  EXPECT_EQ(parallel["unequal"], 0);
+  EXPECT_TRUE(parallel["first_unequal"].is_null());
+  EXPECT_GT(parallel["compared"].get<int>(), 500);
+  EXPECT_EQ(parallel["missed"], 0);
+  EXPECT_TRUE(parallel["fault"].is_null());
+  EXPECT_EQ(parallel["joints"]["joint2"]["torque_Nm"]["max"], 0.0);
+  EXPECT_NE(outcome.out.find("the same bits in all "), std::string::npos) << outcome.out;
+}
+
+TEST_F(Parallel, OfOtherGainsDiffersInTableLogAndReport) {
+  write_text(folder_ / "other.toml", read_text(folder_ / "robot.toml"));
+  edit("other.toml", "position = { kp = 6.0", "position = { kp = 3.0");
+  write_text(folder_ / "trajectory.toml",
+             read_text(folder_ / "trajectory.toml") + "\n[parallel]\nrobot = \"other.toml\"\n");
+  const Outcome outcome =
+      tandem("run trajectory.toml --duration 0.5 --json run.json --log logs --report");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto parallel = json("run.json")["parallel"];
+  EXPECT_GT(parallel["unequal"].get<int>(), 100);
+  EXPECT_GT(parallel["joints"]["joint1"]["position_rad"]["max"].get<double>(), 0.0);
+  EXPECT_NE(outcome.out.find("parallel: first minus second"), std::string::npos) << outcome.out;
+  for (const char* figure : {"position_difference.png", "torque_difference.png"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "logs/double_pendulum-trajectory-001" / figure))
+        << figure << outcome.err;
+  }
+  const Outcome info = tandem("log info logs/double_pendulum-trajectory-001.mcap");
+  EXPECT_NE(info.out.find("/tandem/parallel/state"), std::string::npos) << info.out;
+}
+
+TEST_F(Parallel, WithAHeavierLinkNeedsKernelsOfItsOwn) {
+  add("[parallel.link.link2]\nmass_kg = 3.5\n");
+  expect_refused({"parallel", "the parallel robot has no kernels", "leave --no-build out"},
+                 "run hold.toml --duration 0.05 --no-build");
+}
+
+TEST_F(Parallel, OfAnotherLayoutIsRefusedByName) {
+  write_text(folder_ / "other.toml", read_text(folder_ / "robot.toml"));
+  std::string text = read_text(folder_ / "other.toml");
+  for (std::size_t at = text.find("joint2"); at != std::string::npos;
+       at = text.find("joint2", at)) {
+    text.replace(at, 6, "jointX");
+  }
+  std::string urdf = read_text(folder_ / "double_pendulum.urdf");
+  for (std::size_t at = urdf.find("joint2"); at != std::string::npos;
+       at = urdf.find("joint2", at)) {
+    urdf.replace(at, 6, "jointX");
+  }
+  write_text(folder_ / "other.urdf", urdf);
+  write_text(folder_ / "other.toml", text);
+  edit("other.toml", "double_pendulum.urdf", "other.urdf");
+  add("[parallel]\nrobot = \"other.toml\"\n");
+  expect_refused({"hold.toml:", "parallel.robot", "another layout", "'joint2'", "'jointX'"});
+}
+
+TEST_F(Parallel, WithWrongKeysIsRefused) {
+  add("[parallel]\nrobt = \"robot.toml\"\n");
+  expect_refused({"hold.toml:", "robt", "robot"});
+}
+
+TEST_F(Parallel, WithALinkThatIsNotThereIsRefusedWhereItIsNamed) {
+  add("[parallel.link.link9]\nmass_kg = 1.0\n");
+  expect_refused({"hold.toml:", "parallel.link.link9", "no link 'link9'"});
+}
+
+TEST_F(Parallel, WithARobotThatIsNotThereIsRefused) {
+  add("[parallel]\nrobot = \"nowhere.toml\"\n");
+  expect_refused({"nowhere.toml"});
+}
+
+class Predict : public Running {};
+
+TEST_F(Predict, SaysWhatTheRunWillDo) {
+  begin("");
+  const Outcome outcome = to_run("predict --horizon 0.5 --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto answer = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(answer["cycles"], 500);
+  EXPECT_EQ(answer["every_cycles"], 5);
+  EXPECT_EQ(answer["end"], "horizon");
+  EXPECT_EQ(answer["joints"]["joint1"]["position_rad"].size(), 100U);
+  EXPECT_TRUE(answer["base"].is_null());
+  EXPECT_TRUE(answer["faults"].empty());
+  const Outcome table = to_run("predict --horizon 0.2 --every 10");
+  EXPECT_EQ(table.status, 0) << table.err;
+  EXPECT_NE(table.out.find("x real time"), std::string::npos) << table.out;
+  for (const char* wrong : {"0", "-1", "11", "1e300", "nan"}) {
+    const Outcome refused = to_run(std::string("predict --horizon ") + wrong);
+    EXPECT_EQ(refused.status, 2) << wrong;
+    EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
+  }
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Predict, OfARunThatIsPausedSaysSo) {
+  begin("");
+  EXPECT_EQ(to_run("clock pause").status, 0);
+  const Outcome refused = to_run("predict");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("tandem clock resume"), std::string::npos) << refused.err;
+  EXPECT_EQ(to_run("clock resume").status, 0);
+  EXPECT_EQ(to_run("predict").status, 0) << "it is not kept from the next one";
+  EXPECT_EQ(end(), 0);
+}
+
+TEST_F(Predict, WithoutARunIsAnError) {
+  const Outcome refused = to_run("predict");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
+}
+
+}  // namespace
+}  // namespace tandem::apps

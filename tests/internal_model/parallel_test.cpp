@@ -1,0 +1,139 @@
+// A robot and one beside it that gets the same: equal to the last bit, or late alone.
+#include <nlohmann/json.hpp>
+
+#include "log/log_file.hpp"
+#include "tests/internal_model/swing_run.hpp"
+#include "tests/log/scratch_folder.hpp"
+#include "tests/runtime/lockstep.hpp"
+
+namespace tandem::internal_model {
+namespace {
+
+using runtime::RunPhase;
+using test::RunOptions;
+using test::SwingRun;
+
+void expect_same(const Differences& differences) {
+  EXPECT_EQ(differences.unequal(), 0U) << "first in cycle " << differences.first_unequal();
+  for (const JointDifference& joint : differences.joints()) {
+    EXPECT_EQ(joint.position_rad.max, 0.0);
+    EXPECT_EQ(joint.velocity_rad_s.max, 0.0);
+    EXPECT_EQ(joint.torque_Nm.max, 0.0);
+  }
+  for (const Difference& channel : differences.channels()) EXPECT_EQ(channel.max, 0.0);
+}
+
+TEST(ParallelRobot, IsItsExactTwinToTheLastBitFromPowerOnToShutDown) {
+  SwingRun run;
+  run.cycle->run();
+  const ParallelResult result = run.beside->finish();
+  EXPECT_EQ(result.cycles, run.cycle->loop().cycles);
+  EXPECT_EQ(result.missed, 0U);
+  EXPECT_LE(result.most_behind, DuplicatingBackend::kMostBehind + 1);
+  EXPECT_EQ(result.fault, "");
+  EXPECT_EQ(run.beside->differences().compared(), result.cycles);
+  EXPECT_GT(run.beside->differences().cycles(), 599U);
+  expect_same(run.beside->differences());
+}
+
+/// Calls that a loop makes before and after write(), and parameters.
+TEST(ParallelRobot, GetsStopsResetsAndGainsAsTheFirstDoes) {
+  SwingRun run;
+  run.run_to(RunPhase::kRunning);
+  run.steps(50);
+  run.cycle->inbox().emergency_stop(hal::StopCategory::kCategory1);
+  run.steps(300);
+  ASSERT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+  run.host.gains().set_gains(0, hal::PidLoop::kPosition, {.kp = 500.0, .ki = 200.0, .kd = 20.0});
+  run.cycle->inbox().reset_faults();
+  run.steps(600);
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kHeld);
+  const std::uint64_t cycles = run.cycle->loop().cycles;
+  EXPECT_EQ(run.beside->finish().cycles, cycles);
+  expect_same(run.beside->differences());
+}
+
+TEST(ParallelRobot, OfOtherGainsDiffersAndTheFirstIsNotChanged) {
+  SwingRun alone({.beside = false});
+  SwingRun run({.kp = 300.0});
+  for (int i = 0; i < 900; ++i) {
+    alone.cycle->step();
+    run.cycle->step();
+    ASSERT_TRUE(std::ranges::equal(alone.cycle->state().bytes(), run.cycle->state().bytes())) << i;
+  }
+  (void)run.beside->finish();
+  const Differences& differences = run.beside->differences();
+  EXPECT_GT(differences.joints()[0].position_rad.max, 1e-4);
+  EXPECT_LT(differences.joints()[0].position_rad.max, 0.5);
+  EXPECT_GE(differences.joints()[0].torque_Nm.max,
+            differences.rms(differences.joints()[0].torque_Nm));
+  EXPECT_GT(differences.unequal(), 100U);
+  EXPECT_GE(differences.first_unequal(), 0);
+}
+
+TEST(ParallelRobot, BesideARobotOnAWireIsTheSameToTheLastBit) {
+  const hal::RobotConfig robot = tandem::test::swing_robot();
+  const sim::SimRobotConfig sim{.posture = "up", .release_ns = 100'000'000};
+  runtime::test::LockstepRobot wire(robot, tandem::test::swing_kernels(2), sim);
+  auto second = sim::SimRobot::create(robot, tandem::test::swing_kernels(2), sim);
+  ASSERT_TRUE(second);
+  runtime::ControllerHost host(robot, tandem::test::swing_kernels(2), test::kPeriod_ns);
+  ASSERT_TRUE(host.add("sine", std::make_unique<runtime::test::Sine>(std::vector<std::size_t>{0}),
+                       runtime::test::parameters("amplitude_rad = 0.1")));
+  ParallelRobot beside({*wire.backend, **second}, robot.shape(), host.gains(), test::kPeriod_ns);
+  beside.start();
+  rt::WallClock clock;
+  runtime::RobotCycle cycle({robot, beside.backend(), host, clock, nullptr, nullptr},
+                            {.loop = {.pacing = rt::Pacing::kSimulated}, .running_cycles = 600});
+  cycle.run();
+  EXPECT_EQ(beside.finish().cycles, cycle.loop().cycles);
+  EXPECT_GT(beside.differences().cycles(), 599U);
+  expect_same(beside.differences());
+}
+
+std::string logged(const std::string& path, std::chrono::microseconds slow) {
+  auto recorder = log::Recorder::open(path, {.joints = {"swing"}}, {});
+  EXPECT_TRUE(recorder);
+  SwingRun run({.cycles = 300, .kp = 300.0, .slow = slow, .recorder = recorder->get()});
+  run.cycle->run();
+  (void)run.beside->finish();
+  const log::RecordingResult result = (*recorder)->close();
+  EXPECT_EQ(result.dropped, 0U);
+  return result.data_sha256;
+}
+
+TEST(ParallelRobot, IsLoggedInAnOrderThatDoesNotDependOnThreads) {
+  const log::ScratchFolder folder;
+  const std::string first = logged(folder / "1.mcap", {});
+  EXPECT_EQ(logged(folder / "2.mcap", {}), first);
+  EXPECT_EQ(logged(folder / "3.mcap", std::chrono::microseconds(300)), first);
+  const auto file = log::LogFile::open(folder / "3.mcap");
+  ASSERT_TRUE(file);
+  const auto one = file->read("/tandem/state", {{"position_rad", 0}});
+  const auto other = file->read("/tandem/parallel/state", {{"position_rad", 0}});
+  const auto truth = file->read("/tandem/parallel/truth", {{"position_rad", 0}});
+  ASSERT_TRUE(one && other && truth);
+  EXPECT_EQ(one->time_s, other->time_s);
+  EXPECT_EQ(one->time_s, truth->time_s);
+  EXPECT_NE(one->columns, other->columns);
+}
+
+/// On a clock, with a second robot that is far too slow: the loop waits for nobody.
+TEST(ParallelRobot, ThatIsLateIsLateAlone) {
+  SwingRun run(
+      {.cycles = 300, .pace = hal::Pace::kWallClock, .slow = std::chrono::milliseconds(1)});
+  run.run_to(RunPhase::kRunning);
+  run.steps(300);
+  const std::uint64_t cycles = run.cycle->loop().cycles;
+  const hal::ParallelView* view = nullptr;
+  while ((view = run.beside->newest()) == nullptr) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ASSERT_NE(view, nullptr);
+  EXPECT_GT(view->behind_cycles, 10U);
+  EXPECT_EQ(run.cycle->faults().size(), 0U);
+  EXPECT_GT(cycles, 300U);
+}
+
+}  // namespace
+}  // namespace tandem::internal_model
