@@ -73,9 +73,7 @@ Arrays call_kernel(const tandem_kernels& k, Kernel kernel, const Mechanism& m, c
     case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
     case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
     case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
-    case Kernel::kGeneralisedMomentum:
-      k.generalised_momentum(i(0), i(1), i(2), o(0), o(1));
-      break;
+    case Kernel::kGeneralisedMomentum: k.generalised_momentum(i(0), i(1), i(2), o(0), o(1)); break;
     case Kernel::kInverseDynamicsDerivatives:
       k.inverse_dynamics_derivatives(i(0), i(1), i(2), i(3), o(0), o(1), o(2));
       break;

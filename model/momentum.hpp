@@ -206,11 +206,11 @@ class Momentum {
   S energy2_ = 0.0;
 };
 
-/// p = M v and b with dp/dt = tau + b (A. De Luca et al., "Collision detection and safe reaction with
-/// the DLR-III lightweight manipulator arm", 2006). An entry of p is S . H of a joint's axis S and
-/// the momentum H of all that it moves, as spatial vectors. H changes by the forces on these masses,
-/// of which S . F is tau; S turns with the body's velocity V. So b = (V x S) . H + S . (gravity and
-/// wrenches), by one pass over the tree, and no mass matrix is differentiated.
+/// p = M v and b with dp/dt = tau + b (A. De Luca et al., "Collision detection and safe reaction
+/// with the DLR-III lightweight manipulator arm", 2006). An entry of p is S . H of a joint's axis S
+/// and the momentum H of all that it moves, as spatial vectors. H changes by the forces on these
+/// masses, of which S . F is tau; S turns with the body's velocity V. So b = (V x S) . H + S .
+/// (gravity and wrenches), by one pass over the tree, and no mass matrix is differentiated.
 template <class S>
 class GeneralisedMomentum {
  public:

@@ -41,8 +41,7 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   const bool of_joint =
       record.source == FaultSource::kDrive || record.source == FaultSource::kJointLost ||
       record.source == FaultSource::kCommand || record.source == FaultSource::kStray ||
-      record.source == FaultSource::kCollision ||
-      record.source == FaultSource::kNotHomed;
+      record.source == FaultSource::kCollision || record.source == FaultSource::kNotHomed;
   record.cycle = time_.cycle;
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {

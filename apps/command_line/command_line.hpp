@@ -193,8 +193,13 @@ struct NewOptions {
 
 /// tandem log info|csv|diff|thresholds LOG [LOG_B], tandem log import FILE...
 struct LogOptions {
-  enum class Action : std::uint8_t { kInfo, kCsv, kDiff, kImport, kThresholds } action =
-      Action::kInfo;
+  enum class Action : std::uint8_t {
+    kInfo,
+    kCsv,
+    kDiff,
+    kImport,
+    kThresholds
+  } action = Action::kInfo;
   double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
   double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
   std::string log;

@@ -30,7 +30,7 @@ struct RigOptions {
   std::string robot = "double_pendulum";
   bool simulated_time = true;
   bool estimated = false;  ///< a base's estimate beside the truth
-  bool parallel = false;  ///< a second robot
+  bool parallel = false;   ///< a second robot
   Config config = own_config();
 };
 

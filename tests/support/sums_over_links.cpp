@@ -196,8 +196,8 @@ RealVector SumsOverLinks::external(std::span<const double> wrench) const {
   return sum;
 }
 
-// M v, and with Mdot v = sum Jdot^T (m c', I w) + sum J^T d/dt (m c', I w at v = const) what is left
-// of it less the bias: the time derivatives of the bodies' momenta cancel.
+// M v, and with Mdot v = sum Jdot^T (m c', I w) + sum J^T d/dt (m c', I w at v = const) what is
+// left of it less the bias: the time derivatives of the bodies' momenta cancel.
 std::vector<std::vector<double>> SumsOverLinks::generalised_momentum(
     std::span<const double> wrench) const {
   RealVector b = external(wrench);
