@@ -295,6 +295,10 @@ TEST(TeleoperationTable, OfDelaysAndLosses) {
         predicted.run();
         plain.run();
         const bool arm = std::string(robot) == "panda";
+        EXPECT_EQ(predicted.link->figures().starved_cycles, 0U) << robot << " " << delay_s;
+        if (delay_s >= 0.25) {
+          EXPECT_GT(plain.error(&Row::seen), 5.0 * predicted.error(&Row::seen));
+        }
         out << fmt::format("{} {:.0f} {:.2f} {:.3f} {:.3f} {:.3f} {} {:.3f} {:.3f}\n", robot,
                            1e3 * delay_s, loss, 1e3 * predicted.error(&Row::seen),
                            1e3 * plain.error(&Row::seen),

@@ -1,0 +1,66 @@
+// An operator's run in one process, and with the robot in another one over DDS in lockstep: what
+// the robot does and what the operator sees are the same, bit for bit.
+#include "tests/apps/program.hpp"
+#include "tests/support/dds_domain.hpp"
+
+namespace tandem::apps {
+namespace {
+
+const char kOperated[] = R"(
+[hal]
+settle_s = 0.0
+[teleoperation.up]
+delay_s = 0.1
+jitter_s = 0.02
+distribution = "paretonormal"
+loss_model = "gilbert_elliott"
+to_bad = 0.02
+to_good = 0.3
+[teleoperation.down]
+delay_s = 0.1
+jitter_s = 0.02
+loss = 0.2
+[[teleoperation.outage]]
+from_s = 1.0
+to_s = 1.5
+)";
+
+class TeleoperationRun : public Program {
+ protected:
+  /// A topic of a log as text, from cycle 0 to where controllers are done.
+  [[nodiscard]] std::string rows(const std::string& log, const std::string& topic) const {
+    const Outcome csv = tandem("log csv '" + log + "' --topic " + topic);
+    EXPECT_EQ(csv.status, 0) << csv.err;
+    std::size_t end = 0;
+    for (int row = 0; row < 2200; ++row) end = csv.out.find('\n', end) + 1;
+    return csv.out.substr(0, end);
+  }
+};
+
+TEST_F(TeleoperationRun, OverDdsInLockstepIsTheRunInOneProcess) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  write_text(folder_ / "operated.toml", plain.substr(0, at) + kOperated + plain.substr(at));
+  write_text(folder_ / "served.toml",
+             plain.substr(0, at) + "[hal]\nsettle_s = 0.0\n" + plain.substr(at));
+  const Outcome alone = tandem("run operated.toml --duration 2 --quiet --json alone.json");
+  ASSERT_EQ(alone.status, 0) << alone.err;
+  const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
+  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
+                           domain + " --lockstep --once --quiet --json served.json 2>serve.err & " +
+                           program + "run operated.toml" + domain +
+                           " --duration 2 --hal dds --lockstep --no-socket --quiet --json "
+                           "owner.json 2>owner.err; wait; } </dev/null >both.txt";
+  ASSERT_EQ(std::system(both.c_str()), 0);
+  const auto here = json("alone.json"), there = json("owner.json"), served = json("served.json");
+  EXPECT_EQ(here["teleoperation"]["holds"], 1);
+  EXPECT_EQ(here["teleoperation"]["holds"], there["teleoperation"]["holds"]);
+  EXPECT_GT(here["teleoperation"]["up"]["lost"].get<int>(), 500);
+  const std::string one = here["log"]["path"], other = there["log"]["path"];
+  EXPECT_EQ(rows(one, "state"), rows(other, "state")) << "what the operator sees";
+  EXPECT_EQ(rows(one, "truth"), rows(served["log"]["path"], "truth")) << "what the robot does";
+}
+
+}  // namespace
+}  // namespace tandem::apps
