@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/toml_reader.hpp"
+#include "log/run_window.hpp"
 #include "model/urdf.hpp"
 
 namespace tandem::report {
@@ -18,16 +19,6 @@ const char kTruth[] = "/tandem/truth";
 
 std::unexpected<Error> log_error(const RunData& run, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
-}
-
-/// How long every joint was held before the controllers started, as the experiment says or by
-/// default (docs/configuration.md, [hal] settle_s).
-double settle_of(TomlTable& experiment) {
-  TomlTable sim = experiment.table_or_empty("sim");
-  TomlTable hoist = sim.table_or_empty("hoist");
-  const double by_hoist_s =
-      hoist.boolean_or("enabled", true) ? hoist.number_or("release_s", 1.0) : 0.0;
-  return experiment.table_or_empty("hal").number_or("settle_s", by_hoist_s);
 }
 
 /// The robot's and the experiment's files, from the texts that the log carries.
@@ -48,7 +39,7 @@ Status read_configuration(RunData& run) {
       run.position_of = report.text_or("position_of", {});
       run.torque_of = report.text_or("torque_of", {});
       run.foot = report.text_or("foot", {});
-      run.settle_s = settle_of(root);
+      run.settle_s = log::settle_time_s(root);
     }
   }
   if (found) return {};
@@ -123,13 +114,6 @@ void crop(log::Table& table, double begin_s, double end_s) {
 /// How long the plots go on after a fault: a quarter of the time before it, but not for ever.
 double after_fault_s(double before_s) { return std::clamp(0.25 * before_s, 0.1, 1.0); }
 
-struct Window {
-  double bring_up_s = -1e300;  ///< its end
-  double begin_s = -1e300;
-  double end_s = 1e300;
-  double fault_s = 1e300;
-};
-
 std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
                                 const std::vector<std::string>& joints,
                                 const ErrorText& error_text) {
@@ -149,26 +133,8 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   return faults;
 }
 
-/// When controllers ran, by the events: after bring-up and `settle_s`.
-Window window_of(const std::vector<log::EventText>& events, double settle_s) {
-  Window window;
-  constexpr double kHalfNanosecond = 0.5e-9;
-  for (const log::EventText& one : events) {
-    const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
-    if (one.event.kind == log::EventKind::kBringUpDone) {
-      window.bring_up_s = time_s - kHalfNanosecond;
-      window.begin_s = window.bring_up_s + settle_s;
-    }
-    const bool end = one.event.kind == log::EventKind::kControllersDone ||
-                     one.event.kind == log::EventKind::kStopRequested;
-    if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
-    if (log::is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
-  }
-  return window;
-}
-
 /// Begins with the bring-up's end when the run ended before its controllers started.
-Status read_state(const log::LogFile& file, Window& window, RunData& run) {
+Status read_state(const log::LogFile& file, log::RunWindow& window, RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
   auto table = read_columns(
@@ -213,7 +179,7 @@ Status read_command(const log::LogFile& file, RunData& run) {
   return {};
 }
 
-Status read_truth(const log::LogFile& file, const Window& window, RunData& run) {
+Status read_truth(const log::LogFile& file, const log::RunWindow& window, RunData& run) {
   if (file.find(kTruth) == nullptr) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
   const std::size_t loops = run.robot.loops.size();
@@ -344,7 +310,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const auto events = file->events();
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
-  Window window = window_of(*events, run.settle_s);
+  log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
   if (const Status s = read_truth(*file, window, run); !s) return std::unexpected(s.error());
