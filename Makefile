@@ -51,6 +51,8 @@ test-all: test
 	@build/release/bin/engines_test --gtest_brief=1
 	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
 	@TANDEM_DERIVATIVES_ALL=1 build/release/bin/model_test --gtest_filter='Derivatives.OfAHumanoid*' --gtest_brief=1
+	@TANDEM_IDENTIFY_SEEDS=100 build/release/bin/identification_test --gtest_filter='Identify.Intervals*'
+	@TANDEM_IDENTIFY_ALL=1 build/release/bin/identify_test --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@TANDEM_HIL_SECONDS=30 tests/hil/run build/release/bin/hil_test --gtest_filter='*HilLockstep*'
 	@scripts/test-anywhere --paths

@@ -13,6 +13,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kFaint = 1e-2;  // weight of the description where the data decide alone
+// Of a channel's mean square: errors of the model and of timing, which no length of a log averages.
+constexpr double kModelError = 3e-6;
 constexpr int kReweightings = 4;
 constexpr double kFreedom = 10.0;  // of a link's distribution: as many as its parameters
 constexpr double kDelay_s = 0.005;
@@ -82,6 +84,14 @@ Prior make_prior(const IdentifiedRobot& robot) {
   return prior;
 }
 
+int lags_of(double n) { return static_cast<int>(std::lround(std::cbrt(n))); }
+
+double quantile95(double n, int lags) {
+  constexpr double kNormal = 1.959964;
+  const double freedom = std::max(4.0, 0.75 * n / std::max(1, lags));
+  return kNormal * (1.0 + (kNormal * kNormal + 1.0) / (4.0 * freedom));  // of Student's t
+}
+
 double long_run_variance(const VectorXd& residual, const std::vector<std::size_t>& instant,
                          int lags) {
   const Index n = residual.size();
@@ -113,8 +123,9 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
     total += n;
     out.noise.push_back(std::max(1e-4 * rows.back().y.squaredNorm() / n, 1e-12));
   }
-  const int lags =
-      static_cast<int>(std::lround(std::cbrt(total / static_cast<double>(rows.size()))));
+  const double mean_rows = total / static_cast<double>(std::max<std::size_t>(1, rows.size()));
+  const int lags = lags_of(mean_rows);
+  out.quantile = quantile95(mean_rows, lags);
   // In units of the prior everything is of the order of one.
   const Eigen::LLT<MatrixXd> unit(prior.metric);
   const auto scaled = [&](const MatrixXd& A) {
@@ -147,8 +158,8 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
       // to lags + 1 times in the long-run variance.
       const double spent = solver.solve(scaled(normals[c].gram)).trace() / out.noise[c];
       const double free = std::max(0.2 * n, n - 0.5 * (lags + 1.0) * spent);
-      const double least = std::max(1e-10 * rows[c].y.squaredNorm() / n, 1e-14);
-      out.noise[c] = std::max(least, long_run_variance(residual, rows[c].instant, lags) * n / free);
+      const double model = kModelError * rows[c].y.squaredNorm() / n + 1e-14;
+      out.noise[c] = model + long_run_variance(residual, rows[c].instant, lags) * n / free;
     }
   }
   const MatrixXd half = unit.matrixU().solve(covariance);

@@ -28,7 +28,9 @@ struct DataEstimate {
   Eigen::MatrixXd information;  ///< sum of X^T X over the channels, each over its noise
   Eigen::VectorXd target;       ///< the same of X^T y
   std::vector<double> noise;    ///< per channel: long-run variance of the residual
-  double condition = 0.0;       ///< of the base parameters' columns, weighted and scaled
+  double quantile = 0.0;   ///< of 95 %, in standard deviations: of Student's t distribution, for
+                           ///< the noise is estimated, too
+  double condition = 0.0;  ///< of the base parameters' columns, weighted and scaled
 };
 
 /// Rows of `equations` of whose instants `used` is true. Each channel is weighted by the inverse of
@@ -44,6 +46,14 @@ struct DataEstimate {
 /// and Levenberg-Marquardt steps keep every body possible.
 [[nodiscard]] Eigen::VectorXd possible_parameters(const DataEstimate& data, const Prior& prior,
                                                   Eigen::Index links);
+
+/// Lags that the long-run variance of `n` residuals takes: their cubic root.
+[[nodiscard]] int lags_of(double n);
+
+/// In how many standard deviations 95 % lie when the long-run variance of `n` residuals is
+/// estimated with these lags: Student's t with as many degrees of freedom as Bartlett's window
+/// leaves, 3 n / 4 lags.
+[[nodiscard]] double quantile95(double n, int lags);
 
 /// Variance of the sum of a correlated sequence over its length: autocovariances up to `lags`,
 /// weighted by Bartlett's window.

@@ -28,7 +28,8 @@ constexpr int kSamples = 160;           // of a period, for limits
 constexpr int kMeasured = 60;           // of them, for the condition
 constexpr double kPositionShare = 0.9;  // of the way from the start to a limit
 constexpr double kFreeTurn_rad = 2.0;   // of a joint without limits
-constexpr double kBalance_m = 0.02;
+constexpr double kBalance_m = 0.04;
+constexpr double kStandingShare = 0.5;  // of the speeds that an arm has: what stands sways
 constexpr double kSlip = 0.25;
 constexpr double kLeastShare = 0.4;  // a foot that carries little may swing on its spring
 constexpr double kStep_s = 1e-3;     // of the base's differences
@@ -36,7 +37,7 @@ constexpr int kLegHarmonics = 3;     // times those of the base
 
 /// How far the base goes at most, before limits: [m] and [rad].
 const BasePose& base_reach() {
-  static const BasePose reach{0.04, 0.05, 0.06, 0.15, 0.15, 0.2};
+  static const BasePose reach{0.02, 0.025, 0.06, 0.08, 0.08, 0.12};
   return reach;
 }
 
@@ -150,10 +151,11 @@ class Search {
 
   /// Makes each coordinate, and the base, as large as positions and speeds allow.
   void scale(Candidate& candidate) {
+    const double speed = standing_ ? kStandingShare * request_.share : request_.share;
     for (Index i = 0; i < candidate.free.start.size(); ++i) {
       const auto [down, up] = reach(free_[static_cast<std::size_t>(i)]);
       scale_column(candidate.free, i, down, up,
-                   request_.share * joint(free_[static_cast<std::size_t>(i)]).max_velocity_rad_s);
+                   speed * joint(free_[static_cast<std::size_t>(i)]).max_velocity_rad_s);
     }
     for (Index i = 0; standing_ && i < 6; ++i) {
       const double most = base_reach()[i];

@@ -73,7 +73,7 @@ Ten physical(const LinkParameters& p) {
 }
 
 void describe_link(const LinkParameters& p, const Eigen::Matrix<double, 10, 10>& covariance,
-                   LinkResult& link) {
+                   double quantile, LinkResult& link) {
   link.changed = true;
   link.identified = inertia_of(p);
   Matrix10 J;
@@ -83,7 +83,7 @@ void describe_link(const LinkParameters& p, const Eigen::Matrix<double, 10, 10>&
     J.col(k) = (physical(p + change) - physical(p - change)) / (2.0 * step);
   }
   const Eigen::Matrix<double, 10, 1> ci =
-      kNormal95 * (J * covariance * J.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+      quantile * (J * covariance * J.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
   const double mass = link.described.mass_kg;
   const double moment = std::max(link.described.about_com_kg_m2.trace() / 2.0, 1e-6 * mass);
   const double radius = std::max(std::sqrt(moment / mass), 0.01);
@@ -149,7 +149,8 @@ class Answer {
       for (std::size_t i = 0; i < robot_.regressor.pieces().size(); ++i) {
         if (robot_.regressor.pieces()[i].link != static_cast<int>(l)) continue;
         const Index at = 10 * static_cast<Index>(i);
-        describe_link(possible_.segment<10>(at), data_.covariance.block<10, 10>(at, at), result);
+        describe_link(possible_.segment<10>(at), data_.covariance.block<10, 10>(at, at),
+                      data_.quantile, result);
       }
       out.links.push_back(std::move(result));
     }
@@ -158,7 +159,7 @@ class Answer {
   /// A column's estimate; not identifiable where the joint does not move.
   [[nodiscard]] Estimate of_column(std::size_t coordinate, JointColumn column, double scale) const {
     const Index at = joint_column(coordinate, column);
-    Estimate one{possible_[at], kNormal95 * std::sqrt(data_.covariance(at, at)), false};
+    Estimate one{possible_[at], data_.quantile * std::sqrt(data_.covariance(at, at)), false};
     const bool moves =
         equations_.travel_rad[coordinate] > kStill_rad || column == JointColumn::kOffset;
     one.identifiable = moves && known(one.value, one.ci95, scale);
@@ -254,7 +255,7 @@ class Answer {
                                         base_.independent[static_cast<std::size_t>(i)]));
       one.described = combination.dot(described_);
       one.estimate.value = combination.dot(data_.mean);
-      one.estimate.ci95 = kNormal95 * deviation(combination, data_.covariance);
+      one.estimate.ci95 = data_.quantile * deviation(combination, data_.covariance);
       one.estimate.identifiable = one.estimate.ci95 <= kIdentifiable * own;
       out.base.push_back(std::move(one));
     }
@@ -268,7 +269,8 @@ class Answer {
       out.identified_mass_kg += link.identified.mass_kg;
     }
     const double described = masses.dot(described_);
-    out.mass_kg = {masses.dot(possible_), kNormal95 * deviation(masses, data_.covariance), false};
+    out.mass_kg = {masses.dot(possible_), data_.quantile * deviation(masses, data_.covariance),
+                   false};
     out.mass_kg.identifiable = out.mass_kg.ci95 <= 0.05 * described;
   }
 

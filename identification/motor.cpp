@@ -37,6 +37,8 @@ MotorEstimate estimate_motor(const std::vector<MotorInstant>& instants, bool rig
   Eigen::VectorXd scale(5);
   scale << scales, 0.005;
   const Eigen::MatrixXd scaled = X * scale.asDiagonal();
+  const int lags = lags_of(static_cast<double>(n));
+  const double quantile = quantile95(static_cast<double>(n), lags);
   double noise = std::max(1e-12, y.squaredNorm() / static_cast<double>(n));
   Eigen::VectorXd z;
   Eigen::MatrixXd covariance;
@@ -46,12 +48,11 @@ MotorEstimate estimate_motor(const std::vector<MotorInstant>& instants, bool rig
     const Eigen::LDLT<Eigen::MatrixXd> solver(A);
     z = solver.solve(scaled.transpose() * y / noise);
     covariance = solver.solve(Eigen::MatrixXd::Identity(5, 5));
-    const int lags = static_cast<int>(std::lround(std::cbrt(static_cast<double>(n))));
     noise = std::max(1e-14, long_run_variance(y - scaled * z, order, lags) *
                                 static_cast<double>(n) / static_cast<double>(n - 5));
   }
   const auto estimate = [&](Eigen::Index k) {
-    Estimate one{z[k] * scale[k], kNormal95 * scale[k] * std::sqrt(covariance(k, k)), false};
+    Estimate one{z[k] * scale[k], quantile * scale[k] * std::sqrt(covariance(k, k)), false};
     one.identifiable = known(one.value, one.ci95, scale[k]);
     return one;
   };

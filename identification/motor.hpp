@@ -23,6 +23,4 @@ struct MotorEstimate {
 /// what would be much.
 [[nodiscard]] bool known(double value, double ci95, double scale);
 
-inline constexpr double kNormal95 = 1.96;  ///< standard deviations
-
 }  // namespace tandem::identification

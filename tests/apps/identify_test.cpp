@@ -60,6 +60,38 @@ TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
             std::string::npos);
 }
 
+// The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
+// sensors are noisy.
+TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes a minute";
+  for (const char* file : {"robot.toml", "coman.urdf"}) {
+    std::filesystem::copy_file(std::filesystem::path(TANDEM_SOURCE_DIR "/config/coman") / file,
+                               folder_ / file, std::filesystem::copy_options::overwrite_existing);
+  }
+  edit("robot.toml", "following_error_rad = 0.35",
+       "following_error_rad = 0.35\ntorque_noise_Nm = 0.05");
+  edit("robot.toml", "rated_torque_Nm = 10.0", "rated_torque_Nm = 10.0\ntorque_noise_Nm = 0.005");
+  for (const char* joint : {"LAnkSag", "RAnkSag"}) {
+    edit("robot.toml", std::string("joint = \"") + joint + "\"",
+         std::string("noise = [0.5, 0.5, 0.5, 0.02, 0.02, 0.02]\njoint = \"") + joint + "\"");
+  }
+  edit("robot.toml", "type = \"imu\"",
+       "type = \"imu\"\nnoise = [0, 0, 0, 0, 0.005, 0.005, 0.005, 0.05, 0.05, 0.05]");
+  record("robot.toml", "--period 12 --share 0.5");
+  edit("coman.urdf", "6.3617175", "5.3617175");
+  edit("coman.urdf", "-0.0358501 1.8286043e-05 0.117557148", "-0.0158501 0.010018286 0.097557148");
+  edit("coman.urdf", "0.0038979546", "0.0046979546");  // a thigh's inertia
+  const Outcome found =
+      tandem("identify " + log() + " --robot robot.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  EXPECT_NE(found.err.find("the total mass moves"), std::string::npos) << found.err;
+  const auto torso = json("found.json")["links"]["DWYTorso"];
+  EXPECT_NEAR(torso["mass_kg"]["value"].get<double>(), 6.3617175, 0.01 * 6.3617175);
+  const double com_m[] = {-0.0358501, 1.8286043e-05, 0.117557148};
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(torso["com_m"]["value"][k].get<double>(), com_m[k], 0.002) << k;
+}
+
 TEST_F(Identify, OfAnotherRobotsLogIsOneError) {
   ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 1 --log logs").status, 0);
   const Outcome other = tandem("identify " + log() +

@@ -93,6 +93,7 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
   std::string name;
   for (const auto& [parameter, times] : inside) {
     const double share = static_cast<double>(times) / seeds;
+    if (share < 0.92 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
     if (share < worst) name = parameter;
     worst = std::min(worst, share);
   }
@@ -102,8 +103,9 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
               inside.size(), 100.0 * share, name.c_str(), 100.0 * worst);
   EXPECT_GT(share, 0.90);
   EXPECT_LT(share, 0.995);  // intervals that are too wide are wrong, too
+  // Of 69 exact intervals one is below 90 of 100 by chance (a binomial's 1.2 %), none below 86.
   if (seeds >= 100) {
-    EXPECT_GE(worst, 0.90) << name;
+    EXPECT_GE(worst, 0.86) << name;
   }
 }
 
