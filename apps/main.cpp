@@ -59,6 +59,8 @@ int main(int argc, char** argv) {
                      [](const LogOptions& options) { return log_command(options); },
                      [](const EdsOptions& options) { return eds_command(options); },
                      [](const ReportOptions& options) { return report_command(options); },
+                     [](const ExciteOptions& options) { return excite_command(options); },
+                     [](const IdentifyOptions& options) { return identify_command(options); },
                      [](const DoctorOptions& options) { return doctor_command(options); },
                      [](const TopicOptions& options) { return topic_command(options); },
                      [](const LatencyOptions& options) { return latency_command(options); },

@@ -1,4 +1,4 @@
-// joint_trajectory: leads joints through way-points at given times.
+// joint_trajectory: leads joints through way-points at given times, or along Fourier series.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -7,6 +7,7 @@
 
 #include "base/counted.hpp"
 #include "controllers/controller.hpp"
+#include "controllers/fourier_series.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/segment.hpp"
 
@@ -16,17 +17,26 @@ namespace {
 constexpr int kSamples = 50;  // of a segment, when its limits are checked
 
 /// Parameters: joints (all), interpolation ("min_jerk": rests at every way-point, "quintic": runs
-/// through them), stop_at_end (false), [[waypoint]] time_s, position_rad (one per joint).
+/// through them), stop_at_end (false), link_damping_Nms_rad (0), [[waypoint]] time_s, position_rad
+/// (one per joint). With interpolation "fourier" instead of way-points: period_s, periods (1),
+/// [[harmonic]] cos_rad, sin_rad (one per joint): x = start + sum_k cos_k (cos k w t - 1) + sin_k
+/// sin k w t.
 class JointTrajectory : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
     TomlTable& parameters = setup.parameters;
-    through_ =
-        parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic"}) == "quintic";
+    const std::string interpolation =
+        parameters.choice_or("interpolation", "min_jerk", {"min_jerk", "quintic", "fourier"});
+    through_ = interpolation == "quintic";
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
+    link_damping_Nms_rad_ = parameters.number_or("link_damping_Nms_rad", 0.0, kNotNegative);
     joints_ = joints_parameter(setup);
     joints_known_ = !setup.parameters.has_errors();
     for (const std::size_t joint : joints_) setup.claim(joint, hal::ControlMode::kPosition);
+    if (interpolation == "fourier") {
+      series_.configure(setup, joints_, joints_known_);
+      return {};
+    }
     std::vector<TomlTable> tables = parameters.tables("waypoint");
     if (tables.empty()) {
       parameters.error("", "there is no way-point",
@@ -51,14 +61,20 @@ class JointTrajectory : public Controller {
              hal::CommandImage&) noexcept TANDEM_RT override {
     start_ns_ = time.time_ns;
     segment_ = 0;
+    if (series_.used()) return series_.start(joints_, state);
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       points_[k].position = state.position_rad()[joints_[k]];
     }
   }
 
-  Code update(const hal::CycleTime& time, const hal::StateImage&,
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const double t_s = static_cast<double>(time.time_ns - start_ns_) * 1e-9;
+    if (series_.used()) {
+      series_.play(t_s, joints_, command);
+      damp_links(state, command);
+      return stop_at_end_ && t_s >= series_.end_s() ? Code::kStopped : Code::kOk;
+    }
     const std::size_t last = times_s_.size() - 1;
     while (segment_ < last && t_s >= times_s_[segment_ + 1]) ++segment_;
     for (std::size_t k = 0; k < joints_.size(); ++k) {
@@ -67,12 +83,23 @@ class JointTrajectory : public Controller {
       command.position_rad()[joints_[k]] = now.position;
       command.velocity_rad_s()[joints_[k]] = now.velocity;
     }
+    damp_links(state, command);
     return segment_ == last && stop_at_end_ ? Code::kStopped : Code::kOk;
   }
 
-  void archive(Archive& ar) override { ar(start_ns_, segment_, points_); }
+  void archive(Archive& ar) override { ar(start_ns_, segment_, points_, series_.start_rad()); }
 
  private:
+  /// On a spring the link may swing, which the motor's own loop hardly damps.
+  void damp_links(const hal::StateImage& state,
+                  hal::CommandImage& command) const noexcept TANDEM_RT {
+    if (link_damping_Nms_rad_ == 0.0) return;
+    for (const std::size_t joint : joints_) {
+      const double swing = state.velocity_rad_s()[joint] - command.velocity_rad_s()[joint];
+      command.torque_Nm()[joint] = -link_damping_Nms_rad_ * swing;
+    }
+  }
+
   /// Mostly wrong with every way-point when it is with one, so only the first is reported.
   class Mistake {
    public:
@@ -222,8 +249,10 @@ class JointTrajectory : public Controller {
     return quintic(point(segment, k), point(segment + 1, k), duration, t_s);
   }
 
+  FourierSeries series_;
   bool through_ = false;
   bool stop_at_end_ = false;
+  double link_damping_Nms_rad_ = 0.0;
   bool joints_known_ = false;  // else their number says nothing of the way-points
   bool incomplete_ = false;    // some way-point is
   // Of all way-points; what is between them follows from these.
@@ -239,4 +268,4 @@ class JointTrajectory : public Controller {
 }  // namespace tandem
 
 TANDEM_CONTROLLER(tandem::JointTrajectory, "joint_trajectory",
-                  "Leads joints through way-points at given times.")
+                  "Leads joints through way-points at given times, or along Fourier series.")

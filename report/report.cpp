@@ -1,4 +1,4 @@
-// Reads one or two logs, aligns the start of their controllers, and writes figures, tables and
+// Reads one to three logs, aligns the start of their controllers, and writes figures, tables and
 // page.
 #include "report/report.hpp"
 
@@ -136,6 +136,8 @@ Status create(const std::string& folder) {
                                {}});
 }
 
+constexpr const char* kSides[] = {" A", " B", " C"};
+
 /// A run with the robot beside it: facts of the run, tables of both, and their differences.
 Page parallel_page(const RunData& run, const RunData& second) {
   Page page;
@@ -152,49 +154,70 @@ Page parallel_page(const RunData& run, const RunData& second) {
   return page;
 }
 
-Page page_of(const RunData& run, const RunData* other) {
+Page page_of(const RunData& run, const OtherRuns& others) {
   Page page;
-  page.title = other == nullptr ? fmt::format("{}: {}", run.info.robot,
-                                              std::filesystem::path(run.path).stem().string())
-                                : fmt::format("{}: two runs", run.info.robot);
+  page.title =
+      others.empty()
+          ? fmt::format("{}: {}", run.info.robot, std::filesystem::path(run.path).stem().string())
+          : fmt::format("{}: {} runs", run.info.robot, others.size() == 1 ? "two" : "three");
   page.lead = "Times count from the run's first SYNC, as in the log.";
   page.lead += run.controllers_ran
                    ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
                    : " The run ended before its controllers started.";
-  add_facts(run, other == nullptr ? "" : " A", page.facts);
-  add_tables(run, other == nullptr ? "" : " A", page);
-  if (other == nullptr) return page;
-  page.lead += " A is " + run.path + ", B is " + other->path + ".";
-  if (std::abs(other->drawn_later_s) > 0.0) {
-    page.lead += fmt::format(" B is drawn {:.3f} s {}, so that both controllers start together.",
-                             std::abs(other->drawn_later_s),
-                             other->drawn_later_s > 0.0 ? "later" : "earlier");
+  add_facts(run, others.empty() ? "" : " A", page.facts);
+  add_tables(run, others.empty() ? "" : " A", page);
+  if (others.empty()) return page;
+  page.lead += " A is " + run.path;
+  for (std::size_t i = 0; i < others.size(); ++i)
+    page.lead += fmt::format(",{} is {}", kSides[i + 1], others[i]->path);
+  page.lead += ".";
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const double later_s = others[i]->drawn_later_s;
+    if (std::abs(later_s) > 0.0) {
+      page.lead +=
+          fmt::format("{} is drawn {:.3f} s {}, so that both controllers start together.",
+                      kSides[i + 1], std::abs(later_s), later_s > 0.0 ? "later" : "earlier");
+    }
+    add_facts(*others[i], kSides[i + 1], page.facts);
+    add_tables(*others[i], kSides[i + 1], page);
   }
-  add_facts(*other, " B", page.facts);
-  add_tables(*other, " B", page);
   return page;
+}
+
+/// The runs that are laid over `run`. Errors: more than fit; one of another robot.
+Result<std::vector<RunData>> read_others(const RunData& run, const std::vector<std::string>& logs,
+                                         const ErrorText& error_text) {
+  if (logs.size() > kMostOthers)
+    return fail("more than three logs", "lay up to three over each other");
+  std::vector<RunData> others;
+  for (const std::string& log : logs) {
+    Result<RunData> other = read_run(log, error_text);
+    if (!other) return std::unexpected(other.error());
+    if (other->info.joints != run.info.joints) {
+      return std::unexpected(Error{
+          "the logs are of different robots", "lay runs of one robot over each other", log, 0, {}});
+    }
+    other->drawn_later_s = run.time_s.front() - other->time_s.front();
+    others.push_back(std::move(*other));
+  }
+  return others;
 }
 
 }  // namespace
 
-Result<ReportFiles> make_report(const std::string& log, const std::string& other,
+Result<ReportFiles> make_report(const std::string& log, const std::vector<std::string>& other_logs,
                                 const std::string& folder, const FindKernels& find_kernels,
                                 const ErrorText& error_text) {
   Result<RunData> run = read_run(log, error_text);
   if (!run) return std::unexpected(run.error());
-  Result<RunData> second = other.empty() ? Result<RunData>(RunData{}) : read_run(other, error_text);
-  if (!second) return std::unexpected(second.error());
-  RunData* over = other.empty() ? nullptr : &*second;
+  Result<std::vector<RunData>> other_runs = read_others(*run, other_logs, error_text);
+  if (!other_runs) return std::unexpected(other_runs.error());
   Result<std::optional<RunData>> beside = std::nullopt;
-  if (over == nullptr) beside = read_parallel(*run);
+  if (other_runs->empty()) beside = read_parallel(*run);
   if (!beside) return std::unexpected(beside.error());
-  if (*beside) over = &**beside;
-  if (over != nullptr && over->info.joints != run->info.joints) {
-    return std::unexpected(Error{"the two logs are of different robots",
-                                 "lay runs of one robot over each other",
-                                 other,
-                                 0,
-                                 {}});
+  if (*beside) {
+    (*beside)->drawn_later_s = run->time_s.front() - (*beside)->time_s.front();
+    other_runs->push_back(std::move(**beside));
   }
   if (const Status s = create(folder); !s) return std::unexpected(s.error());
 
@@ -209,22 +232,23 @@ Result<ReportFiles> make_report(const std::string& log, const std::string& other
     files.remarks.push_back(
         "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
   }
-  for (RunData* one : {&*run, over}) {
-    if (one == nullptr) continue;
+  std::vector<RunData*> all{&*run};
+  for (RunData& one : *other_runs) all.push_back(&one);
+  for (RunData* one : all) {
     if (const Status closed = kernels == nullptr ? Status{} : close_passive(*one, *kernels);
         !closed) {
       files.remarks.push_back("what passive joints move is not drawn: " + closed.error().message);
     }
   }
-  if (over != nullptr) over->drawn_later_s = run->time_s.front() - over->time_s.front();
-  std::vector<Figure> figures = figures_of(*run, over, kernels);
+  const OtherRuns others(all.begin() + 1, all.end());
+  std::vector<Figure> figures = figures_of(*run, others, kernels);
   if (*beside) {
-    for (Figure& figure : difference_figures(*run, *over)) figures.push_back(std::move(figure));
+    for (Figure& figure : difference_figures(*run, *others.front()))
+      figures.push_back(std::move(figure));
   }
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
-  if (const Status s =
-          write_page(*beside ? parallel_page(*run, *over) : page_of(*run, over), figures, folder);
-      !s) {
+  const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others);
+  if (const Status s = write_page(page, figures, folder); !s) {
     return std::unexpected(s.error());
   }
   files.page = folder + "/report.html";

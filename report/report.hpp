@@ -1,4 +1,4 @@
-// The report of a run, or of two laid over each other. Start here.
+// The report of a run, or of two or three laid over each other. Start here.
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
@@ -21,11 +21,13 @@ struct ReportFiles {
   std::vector<std::string> remarks;  ///< what the report lacks, and why
 };
 
-/// Draws the report of `log` (and `other`, when not empty) into `folder`, which is created.
+/// Draws the report of `log`, and of up to two others laid over it, into `folder`, which is
+/// created.
 /// @param error_text  of drives, for the faults; empty: they go by their codes
-/// Errors: a log that cannot be read; two logs of different robots; gnuplot is missing; the
+/// Errors: a log that cannot be read; logs of different robots; gnuplot is missing; the
 /// folder cannot be written.
-[[nodiscard]] Result<ReportFiles> make_report(const std::string& log, const std::string& other,
+[[nodiscard]] Result<ReportFiles> make_report(const std::string& log,
+                                              const std::vector<std::string>& others,
                                               const std::string& folder,
                                               const FindKernels& find_kernels,
                                               const ErrorText& error_text = {});

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/toml_reader.hpp"
+#include "log/run_window.hpp"
 #include "model/urdf.hpp"
 
 namespace tandem::report {
@@ -21,16 +22,6 @@ const char kParallelTruth[] = "/tandem/parallel/truth";
 
 std::unexpected<Error> log_error(const RunData& run, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), run.path, 0, {}});
-}
-
-/// How long every joint was held before the controllers started, as the experiment says or by
-/// default (docs/configuration.md, [hal] settle_s).
-double settle_of(TomlTable& experiment) {
-  TomlTable sim = experiment.table_or_empty("sim");
-  TomlTable hoist = sim.table_or_empty("hoist");
-  const double by_hoist_s =
-      hoist.boolean_or("enabled", true) ? hoist.number_or("release_s", 1.0) : 0.0;
-  return experiment.table_or_empty("hal").number_or("settle_s", by_hoist_s);
 }
 
 /// The robot's and the experiment's files, from the texts that the log carries. The first robot is
@@ -53,7 +44,7 @@ Status read_configuration(RunData& run) {
       run.position_of = report.text_or("position_of", {});
       run.torque_of = report.text_or("torque_of", {});
       run.foot = report.text_or("foot", {});
-      run.settle_s = settle_of(root);
+      run.settle_s = log::settle_time_s(root);
     }
   }
   if (found) return {};
@@ -129,13 +120,6 @@ void crop(log::Table& table, double begin_s, double end_s) {
 /// How long the plots go on after a fault: a quarter of the time before it, but not for ever.
 double after_fault_s(double before_s) { return std::clamp(0.25 * before_s, 0.1, 1.0); }
 
-struct Window {
-  double bring_up_s = -1e300;  ///< its end
-  double begin_s = -1e300;
-  double end_s = 1e300;
-  double fault_s = 1e300;
-};
-
 std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
                                 const std::vector<std::string>& joints,
                                 const ErrorText& error_text) {
@@ -155,24 +139,6 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   return faults;
 }
 
-/// When controllers ran, by the events: after bring-up and `settle_s`.
-Window window_of(const std::vector<log::EventText>& events, double settle_s) {
-  Window window;
-  constexpr double kHalfNanosecond = 0.5e-9;
-  for (const log::EventText& one : events) {
-    const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
-    if (one.event.kind == log::EventKind::kBringUpDone) {
-      window.bring_up_s = time_s - kHalfNanosecond;
-      window.begin_s = window.bring_up_s + settle_s;
-    }
-    const bool end = one.event.kind == log::EventKind::kControllersDone ||
-                     one.event.kind == log::EventKind::kStopRequested;
-    if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
-    if (log::is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
-  }
-  return window;
-}
-
 Result<log::Table> state_columns(const log::LogFile& file, const char* topic, const RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
@@ -182,7 +148,7 @@ Result<log::Table> state_columns(const log::LogFile& file, const char* topic, co
 }
 
 /// What was measured in the window.
-Status read_rows(log::Table& table, const Window& window, RunData& run) {
+Status read_rows(log::Table& table, const log::RunWindow& window, RunData& run) {
   const std::size_t n = run.robot.joints.size();
   const std::size_t channels = run.first_channel(run.robot.sensors.size());
   crop(table, window.begin_s, window.end_s);
@@ -198,7 +164,7 @@ Status read_rows(log::Table& table, const Window& window, RunData& run) {
 }
 
 /// Begins with the bring-up's end when the run ended before its controllers started.
-Status read_state(const log::LogFile& file, Window& window, RunData& run) {
+Status read_state(const log::LogFile& file, log::RunWindow& window, RunData& run) {
   auto table = state_columns(file, kState, run);
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
@@ -252,7 +218,8 @@ void resize_rows(RunData& run, std::size_t rows) {
   }
 }
 
-Status read_truth(const log::LogFile& file, const char* topic, const Window& window, RunData& run) {
+Status read_truth(const log::LogFile& file, const char* topic, const log::RunWindow& window,
+                  RunData& run) {
   if (file.find(topic) == nullptr) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
   const std::size_t loops = run.robot.loops.size();
@@ -282,7 +249,7 @@ Status read_truth(const log::LogFile& file, const char* topic, const Window& win
 }
 
 /// The run's own estimate, where nobody simulated it. It has to have started before the first row.
-Status read_estimate(const log::LogFile& file, const Window& window, RunData& run) {
+Status read_estimate(const log::LogFile& file, const log::RunWindow& window, RunData& run) {
   const auto* topic = file.find(kEstimate);
   if (run.motion_known() || topic == nullptr || !run.robot.model.floating_base) return {};
   const std::size_t feet = 3 * run.robot.contact.feet.size();
@@ -401,7 +368,7 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
     if (const Status s = read_description(second); !s) return std::unexpected(s.error());
   }
   constexpr double kHalfNanosecond = 0.5e-9;
-  Window window;
+  log::RunWindow window;
   window.begin_s = run.time_s.front() - kHalfNanosecond;
   window.end_s = run.time_s.back() + kHalfNanosecond;
   auto table = state_columns(*file, kParallelState, second);
@@ -428,7 +395,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   const auto events = file->events();
   if (!events) return std::unexpected(events.error());
   run.faults = faults_of(*events, run.info.joints, error_text);
-  Window window = window_of(*events, run.settle_s);
+  log::RunWindow window = log::run_window(*events, run.settle_s);
   if (const Status s = read_state(*file, window, run); !s) return std::unexpected(s.error());
   if (const Status s = read_command(*file, run); !s) return std::unexpected(s.error());
   if (const Status s = read_truth(*file, kTruth, window, run); !s)

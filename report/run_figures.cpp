@@ -72,38 +72,47 @@ Curve curve_of(const RunData& run, std::string label, CurveStyle style,
   return curve;
 }
 
+/// ", A" of the first of several runs; nothing when it is alone.
+std::string side_of(std::size_t index, const OtherRuns& others) {
+  return others.empty() ? "" : std::string(", ") + static_cast<char>('A' + index);
+}
+
+/// How the runs after the first look.
+constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
+static_assert(std::size(kOthers) == kMostOthers);
+
 /// What every figure over time has: its axis, and where runs ended in a fault. A fault's spike may
 /// be there before the loop knows of the fault: it does not widen the plots.
-void add_time(const RunData& run, const RunData* other, Figure& figure) {
+void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   constexpr double kSpike_s = 0.02;
   figure.x_label = "time since the first SYNC [s]";
-  for (const RunData* one : {&run, other}) {
-    if (one == nullptr || one->faults.empty()) continue;
-    const double fault_s = one->faults.front().time_s + one->drawn_later_s;
-    const char* side = other == nullptr ? "fault" : (one == &run ? "fault, A" : "fault, B");
-    figure.marks.push_back({side, fault_s});
+  for (std::size_t i = 0; i <= others.size(); ++i) {
+    const RunData& one = i == 0 ? run : *others[i - 1];
+    if (one.faults.empty()) continue;
+    const double fault_s = one.faults.front().time_s + one.drawn_later_s;
+    figure.marks.push_back({"fault" + side_of(i, others), fault_s});
     figure.range_until_x = std::min(figure.range_until_x, fault_s - kSpike_s);
   }
 }
 
-Figure position_figure(const RunData& run, const RunData* other, const Subjects& subjects) {
+Figure position_figure(const RunData& run, const OtherRuns& others, const Subjects& subjects) {
   const std::size_t joint = at(subjects.position_of);
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "joint_position";
   figure.title = name + ": position against its reference";
-  add_time(run, other, figure);
+  add_time(run, others, figure);
   const bool slides = run.slides(joint);
   const double factor = slides ? kMillimetres : kDegrees;
   figure.y_label = slides ? "position [mm]" : "position [deg]";
-  figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
-                                   CurveStyle::kMeasured, run.position_rad[joint], factor));
-  if (other != nullptr) {
-    figure.curves.push_back(
-        curve_of(*other, "measured, B", CurveStyle::kSecond, other->position_rad[joint], factor));
+  figure.curves.push_back(curve_of(run, "measured" + side_of(0, others), CurveStyle::kMeasured,
+                                   run.position_rad[joint], factor));
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    figure.curves.push_back(curve_of(*others[i], "measured" + side_of(i + 1, others), kOthers[i],
+                                     others[i]->position_rad[joint], factor));
   }
-  figure.curves.push_back(curve_of(run, other == nullptr ? "reference" : "reference, A",
-                                   CurveStyle::kReference, run.reference_rad[joint], factor));
+  figure.curves.push_back(curve_of(run, "reference" + side_of(0, others), CurveStyle::kReference,
+                                   run.reference_rad[joint], factor));
   return figure;
 }
 
@@ -176,7 +185,7 @@ std::vector<Force> foot_forces(const RunData& run, const std::vector<int>& senso
   return forces;
 }
 
-Figure force_figure(const RunData& run, const RunData* other, const std::vector<int>& sensors) {
+Figure force_figure(const RunData& run, const OtherRuns& others, const std::vector<int>& sensors) {
   constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond, CurveStyle::kThird,
                                     CurveStyle::kFourth,   CurveStyle::kFifth,  CurveStyle::kSixth};
   const std::vector<Force> forces = foot_forces(run, sensors);
@@ -186,21 +195,20 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   figure.title = sensors.empty() ? "Vertical force of the ground on the feet (simulated)"
                                  : fmt::format("Vertical force in the {}six-axis sensors",
                                                legged(run) ? "legs' " : "");
-  add_time(run, other, figure);
+  add_time(run, others, figure);
   figure.y_label = "force [N]";
   const std::size_t shown =
-      other == nullptr ? std::min(std::size(kStyles), forces.size()) : std::size_t{1};
+      others.empty() ? std::min(std::size(kStyles), forces.size()) : std::size_t{1};
   if (shown < forces.size()) figure.title += fmt::format(", {} of {}", shown, forces.size());
   for (std::size_t i = 0; i < shown; ++i) {
-    figure.curves.push_back(curve_of(run, forces[i].name + (other == nullptr ? "" : ", A"),
-                                     kStyles[i], forces[i].up_N, 1.0));
+    figure.curves.push_back(
+        curve_of(run, forces[i].name + side_of(0, others), kStyles[i], forces[i].up_N, 1.0));
   }
-  if (other != nullptr) {
-    const std::vector<Force> more = foot_forces(*other, sensors);
-    if (!more.empty()) {
-      figure.curves.push_back(
-          curve_of(*other, more.front().name + ", B", CurveStyle::kSecond, more.front().up_N, 1.0));
-    }
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const std::vector<Force> more = foot_forces(*others[i], sensors);
+    if (more.empty()) continue;
+    figure.curves.push_back(curve_of(*others[i], more.front().name + side_of(i + 1, others),
+                                     kOthers[i], more.front().up_N, 1.0));
   }
   if (!run.robot.model.floating_base || feet == 0 || forces.size() != feet) return figure;
   const double share = weight_N(run) / static_cast<double>(feet);
@@ -214,7 +222,7 @@ Figure force_figure(const RunData& run, const RunData* other, const std::vector<
   return figure;
 }
 
-Figure torque_figure(const RunData& run, const RunData* other, const Subjects& subjects,
+Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects& subjects,
                      const tandem_kernels* kernels) {
   const std::size_t joint = at(subjects.torque_of);
   const std::string& name = run.robot.joints[joint].name;
@@ -222,13 +230,13 @@ Figure torque_figure(const RunData& run, const RunData* other, const Subjects& s
   const bool slides = run.slides(joint);
   figure.name = "joint_torque";
   figure.title = name + (slides ? ": force, measured" : ": torque, measured");
-  add_time(run, other, figure);
+  add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
-  figure.curves.push_back(curve_of(run, other == nullptr ? "measured" : "measured, A",
-                                   CurveStyle::kMeasured, run.torque_Nm[joint], 1.0));
-  if (other != nullptr) {
-    figure.curves.push_back(
-        curve_of(*other, "measured, B", CurveStyle::kSecond, other->torque_Nm[joint], 1.0));
+  figure.curves.push_back(curve_of(run, "measured" + side_of(0, others), CurveStyle::kMeasured,
+                                   run.torque_Nm[joint], 1.0));
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    figure.curves.push_back(curve_of(*others[i], "measured" + side_of(i + 1, others), kOthers[i],
+                                     others[i]->torque_Nm[joint], 1.0));
   }
   if (kernels == nullptr) return figure;
   Result<Curve> computed = inverse_dynamics_curve(run, subjects.torque_of, *kernels);
@@ -327,19 +335,20 @@ std::vector<double> vertical_force(const RunData& run, int sensor) {
   return force;
 }
 
-std::vector<Figure> figures_of(const RunData& run, const RunData* other,
+std::vector<Figure> figures_of(const RunData& run, const OtherRuns& others,
                                const tandem_kernels* kernels) {
   const Subjects subjects = subjects_of(run);
   std::vector<Figure> figures;
-  figures.push_back(position_figure(run, other, subjects));
+  figures.push_back(position_figure(run, others, subjects));
   if (!subjects.foot_sensors.empty() || (run.truth() && legged(run))) {
-    figures.push_back(force_figure(run, other, subjects.foot_sensors));
+    figures.push_back(force_figure(run, others, subjects.foot_sensors));
   }
-  figures.push_back(torque_figure(run, other, subjects, kernels));
+  figures.push_back(torque_figure(run, others, subjects, kernels));
   std::vector<PostureSample> samples =
-      moments(run, subjects.position_of, other == nullptr ? "" : " A");
-  if (other != nullptr) {
-    const auto more = moments(*other, subjects.position_of, " B");
+      moments(run, subjects.position_of, others.empty() ? "" : " A");
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const auto more =
+        moments(*others[i], subjects.position_of, std::string(" ") + static_cast<char>('B' + i));
     samples.insert(samples.end(), more.begin(), more.end());
   }
   figures.push_back(posture_figure(run.tree, run.robot, samples));

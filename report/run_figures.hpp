@@ -1,5 +1,5 @@
 // The figures of a run: position of one joint, force in the feet, torque of another joint, posture;
-// of two runs, laid over each other.
+// of two or three runs, laid over each other.
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
@@ -23,9 +23,13 @@ struct Subjects {
 /// two joints that move most.
 [[nodiscard]] Subjects subjects_of(const RunData& run);
 
+/// Runs that are laid over another, of the same robot.
+using OtherRuns = std::vector<const RunData*>;
+inline constexpr std::size_t kMostOthers = 2;
+
 /// @param kernels  of the run's robot, for the torque that inverse dynamics gives; null: without.
-/// @param other    laid over `run`; may be null. Of the same robot.
-[[nodiscard]] std::vector<Figure> figures_of(const RunData& run, const RunData* other,
+/// @param others   laid over `run`; kMostOthers at most
+[[nodiscard]] std::vector<Figure> figures_of(const RunData& run, const OtherRuns& others,
                                              const tandem_kernels* kernels);
 
 /// Upward force [N] that a six-axis sensor measured, turned into the world by the run's posture.

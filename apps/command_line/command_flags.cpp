@@ -130,7 +130,23 @@ const char kEdsShowExamples[] = R"(Examples:
 
 const char kReportExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap                report.html and PNG files beside the log
-  tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first)";
+  tandem report runs/a.mcap runs/b.mcap -o compare   the second log over the first
+  tandem report measured.mcap simulated.mcap identified.mcap  three, such as after `tandem identify`)";
+
+const char kIdentifyExamples[] = R"(Examples:
+  tandem excite config/panda/robot.toml --out excite.toml   the experiment
+  tandem run excite.toml                                    its log: runs/panda-excite-001.mcap
+  tandem identify runs/panda-excite-001.mcap --robot config/panda/robot.toml --out identified
+  tandem identify a.mcap b.mcap --robot robot.toml --out identified --json result.json
+The folder gets report.html, the robot with the identified masses and inertias, and the experiments
+of the logs with that robot. Of every log the last third is held back, and compared with.)";
+
+const char kExciteExamples[] = R"(Examples:
+  tandem excite config/panda/robot.toml --out excite.toml
+  tandem excite config/coman/robot.toml --out excite.toml --period 12   it stands while it moves
+  tandem excite robot.toml --out excite.toml --seed 7 --share 0.4       gently, in another way
+  tandem excite robot.toml --out excite.toml --joints elbow,wrist       the others are held
+The experiment is an ordinary one: `tandem check excite.toml`, `tandem run excite.toml`.)";
 
 const char kLatencyExamples[] = R"(Examples:
   tandem latency                                     ours beside cyclictest, idle, then under load
@@ -514,10 +530,44 @@ void add_flags(CLI::App& app, EdsOptions& o) {
 
 void add_flags(CLI::App& app, ReportOptions& o) {
   app.add_option("log", o.log, "MCAP file")->required();
-  app.add_option("other", o.other, "A second log, laid over the first");
+  app.add_option("others", o.others, "One or two more logs, laid over the first")->expected(0, 2);
   app.add_option("-o,--output", o.output, "Folder to write (default: beside the log)");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kReportExamples);
+}
+
+void add_flags(CLI::App& app, IdentifyOptions& o) {
+  app.add_option("logs", o.logs, "MCAP files of the same robot")->required();
+  app.add_option("--robot", o.robot, "Robot TOML to start from; its joints are the logs'")
+      ->required();
+  app.add_option("--out", o.output, "Folder to write")
+      ->required()
+      ->check(is_given("name a folder"));
+  app.add_option("--cutoff", o.cutoff_Hz, "Cut-off of the low pass over every signal [Hz]")
+      ->check(CLI::Range(0.5, 200.0));
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kIdentifyExamples);
+}
+
+void add_flags(CLI::App& app, ExciteOptions& o) {
+  app.add_option("robot", o.robot, "Robot TOML")->required();
+  app.add_option("--out", o.output, "Experiment to write")->required()->check(is_given(kNameAFile));
+  app.add_option("--posture", o.posture, "Start posture (default: the robot's first, or all at 0)");
+  app.add_option("--joints", o.joints, "Joints that move, by comma (default: all that can)")
+      ->delimiter(',');
+  app.add_option("--period", o.period_s, "Seconds of a period (default: 10)")
+      ->check(CLI::Range(2.0, 120.0));
+  app.add_option("--periods", o.periods, "Periods (default: 3)")->check(CLI::Range(1, 100));
+  app.add_option("--harmonics", o.harmonics, "Harmonics of each series (default: 5)")
+      ->check(CLI::Range(2, 20));
+  app.add_option("--seed", o.seed, "Seed of the search (default: 1)")->check(is_seed());
+  app.add_option("--share", o.share, "Share of the limits of speed and torque (default: 0.7)")
+      ->check(CLI::Range(0.05, 1.0));
+  app.add_option("--tries", o.tries,
+                 "Candidates that are compared (default: 300; of more than 12 joints 60)")
+      ->check(CLI::Range(1, 100'000));
+  app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  app.footer(kExciteExamples);
 }
 
 void add_flags(CLI::App& app, LatencyOptions& o) {

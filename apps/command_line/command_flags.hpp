@@ -46,6 +46,8 @@ void add_flags(CLI::App& app, NewOptions& o);
 void add_flags(CLI::App& app, LogOptions& o);
 void add_flags(CLI::App& app, EdsOptions& o);
 void add_flags(CLI::App& app, ReportOptions& o);
+void add_flags(CLI::App& app, IdentifyOptions& o);
+void add_flags(CLI::App& app, ExciteOptions& o);
 void add_flags(CLI::App& app, LatencyOptions& o);
 void add_flags(CLI::App& app, BenchOptions& o);
 void add_flags(CLI::App& app, DoctorOptions& o);

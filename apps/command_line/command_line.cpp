@@ -20,6 +20,7 @@ const char kExamples[] = R"(Examples:
   tandem serve config/coman/squat.toml               a robot for `tandem run X --hal dds`
   tandem check config/coman/squat.toml               read every file, move nothing
   tandem report runs/coman-squat-001.mcap            draw the plots of a run
+  tandem identify runs/panda-excite-001.mcap --robot config/panda/robot.toml --out identified
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
@@ -163,7 +164,9 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<EmulateOptions>("emulate",
                                "The robot on the other end of CAN: boards' firmware and plant");
   commands.add<CheckOptions>("check", "Validate an experiment's or robot's files");
-  commands.add<ReportOptions>("report", "Draw the plots of a log, or of two");
+  commands.add<ReportOptions>("report", "Draw the plots of a log, or of up to three");
+  commands.add<ExciteOptions>("excite", "An experiment that excites a robot's dynamics");
+  commands.add<IdentifyOptions>("identify", "Masses, inertias and friction from logs");
   commands.add<LogOptions>("log", "Logs: info, csv, diff, import, thresholds");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");

@@ -223,11 +223,35 @@ struct EdsOptions {
   std::string json;
 };
 
-/// tandem report LOG [LOG_B]
+/// tandem report LOG [LOG_B [LOG_C]]
 struct ReportOptions {
   std::string log;
-  std::string other;   ///< laid over `log`; may be empty
-  std::string output;  ///< folder; empty: beside the log
+  std::vector<std::string> others;  ///< up to two, laid over `log`
+  std::string output;               ///< folder; empty: beside the log
+  std::string json;
+};
+
+/// tandem identify LOG…
+struct IdentifyOptions {
+  std::vector<std::string> logs;
+  std::string robot;        ///< robot.toml: the description to start from
+  std::string output;       ///< folder
+  double cutoff_Hz = 10.0;  ///< of the low pass over every signal
+  std::string json;
+};
+
+/// tandem excite ROBOT
+struct ExciteOptions {
+  std::string robot;                ///< robot.toml
+  std::string output;               ///< experiment; "-" for standard output
+  std::string posture;              ///< start; empty: the robot's first, else every joint at 0
+  std::vector<std::string> joints;  ///< that move; empty: all that can
+  double period_s = 10.0;           ///< of the series
+  int periods = 3;
+  int harmonics = 5;
+  std::uint64_t seed = 1;
+  double share = 0.7;  ///< of limits of speed and torque that are used
+  int tries = 0;       ///< candidates; 0: 300, of many joints 60
   std::string json;
 };
 
@@ -277,11 +301,12 @@ struct TopicOptions {
 
 /// What was asked for; an `Exit` when nothing is left to do (help, version, wrong usage).
 // clang-format off: one a line, so that additions meet without conflict
-using Command = std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
-                             ClockOptions, ControllerOptions, JointOptions, InjectOptions,
-                             CheckOptions, ModelOptions, NewOptions, LogOptions, EdsOptions,
-                             ReportOptions, LatencyOptions, DoctorOptions, EmulateOptions,
-                             TopicOptions, SensorOptions, BenchOptions, PredictOptions>;
+using Command =
+    std::variant<Exit, RunOptions, ServeOptions, AskOptions, FaultOptions, EstopOptions,
+                 ClockOptions, ControllerOptions, JointOptions, InjectOptions, CheckOptions,
+                 ModelOptions, NewOptions, LogOptions, EdsOptions, ReportOptions, IdentifyOptions,
+                 ExciteOptions, LatencyOptions, DoctorOptions, EmulateOptions, TopicOptions,
+                 SensorOptions, BenchOptions, PredictOptions>;
 // clang-format on
 
 /// Prints help and version on standard output, usage errors on standard error: with the nearest

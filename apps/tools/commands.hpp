@@ -16,5 +16,9 @@ namespace tandem::apps {
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
+/// An experiment that excites a robot's dynamics.
+[[nodiscard]] Exit excite_command(const ExciteOptions& options);
+/// Masses, inertias and friction from logs; writes a robot with them, and a page.
+[[nodiscard]] Exit identify_command(const IdentifyOptions& options);
 
 }  // namespace tandem::apps

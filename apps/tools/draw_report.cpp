@@ -10,17 +10,20 @@ namespace {
 
 /// "runs/coman-squat-001.mcap" -> "runs/coman-squat-001"; with another log beside it
 /// "runs/coman-squat-001-and-coman-squat-002", so that the report of the first alone stays.
-std::string default_folder(const std::string& log, const std::string& other) {
+std::string default_folder(const std::string& log, const std::vector<std::string>& others) {
   std::filesystem::path folder = log;
   folder.replace_extension();
-  if (!other.empty())
-    return folder.string() + "-and-" + std::filesystem::path(other).stem().string();
+  std::string joined = folder.string();
+  for (const std::string& other : others)
+    joined += "-and-" + std::filesystem::path(other).stem().string();
+  if (!others.empty()) return joined;
   return folder.string() == log ? log + ".report" : folder.string();
 }
 
 }  // namespace
 
-Result<report::ReportFiles> draw_report(const std::string& log, const std::string& other,
+Result<report::ReportFiles> draw_report(const std::string& log,
+                                        const std::vector<std::string>& others,
                                         const std::string& output) {
   model::KernelLibrary kernels;  // lives as long as the drawing needs it
   const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
@@ -29,8 +32,8 @@ Result<report::ReportFiles> draw_report(const std::string& log, const std::strin
     kernels = std::move(*found);
     return kernels.get();
   };
-  const std::string folder = output.empty() ? default_folder(log, other) : output;
-  return report::make_report(log, other, folder, find, hal::can::DriveMaster::error_text);
+  const std::string folder = output.empty() ? default_folder(log, others) : output;
+  return report::make_report(log, others, folder, find, hal::can::DriveMaster::error_text);
 }
 
 }  // namespace tandem::apps

@@ -3,17 +3,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/result.hpp"
 #include "report/report.hpp"
 
 namespace tandem::apps {
 
-/// @param other   a second log, laid over the first; empty: none
+/// @param others  up to two more logs, laid over the first
 /// @param output  folder to write; empty: beside `log`, named after the logs
 /// Errors: report::make_report()'s.
 [[nodiscard]] Result<report::ReportFiles> draw_report(const std::string& log,
-                                                      const std::string& other,
+                                                      const std::vector<std::string>& others,
                                                       const std::string& output);
 
 }  // namespace tandem::apps

@@ -8,7 +8,7 @@
 namespace tandem::apps {
 
 Exit report_command(const ReportOptions& options) {
-  const auto files = draw_report(options.log, options.other, options.output);
+  const auto files = draw_report(options.log, options.others, options.output);
   if (!files) return refuse(files.error());
   std::FILE* out = human_output(options.json);
   for (const std::string& remark : files->remarks) fmt::print(stderr, "note: {}\n", remark);

@@ -1,3 +1,6 @@
+#include <cmath>
+#include <numbers>
+
 #include "controllers/min_jerk.hpp"
 #include "controllers/segment.hpp"
 #include "tests/controllers/harness.hpp"
@@ -168,6 +171,56 @@ TEST(JointTrajectory, GoesOnFromASnapshot) {
   run.run(0.3);
   other.run(0.3);
   EXPECT_EQ(other.command.position_rad()[0], run.command.position_rad()[0]);
+}
+
+// x0 + 0.1 (cos w t - 1) + 0.2 sin w t - 0.1 sin 2 w t, w = pi: from rest to rest.
+const char* const kSeries = R"(joints = ['shoulder']
+interpolation = 'fourier'
+period_s = 2.0
+periods = 2
+[[harmonic]]
+cos_rad = [0.1]
+sin_rad = [0.2]
+[[harmonic]]
+cos_rad = [0.0]
+sin_rad = [-0.1]
+)";
+
+TEST(JointTrajectory, FollowsAFourierSeriesAndRestsAtItsEnd) {
+  test::Harness run(hal::test::fake_robot(), "joint_trajectory", kSeries);
+  ASSERT_EQ(run.problem(), "");
+  run.state.position_rad()[0] = 0.3;
+  run.start();
+  double last = 0.3;
+  for (int i = 0; i < 4500; ++i) {
+    ASSERT_EQ(run.step(), Code::kOk);
+    const double w = std::numbers::pi, t = 1e-3 * i;
+    const double wanted = i >= 4000 ? 0.3
+                                    : 0.3 + 0.1 * (std::cos(w * t) - 1.0) + 0.2 * std::sin(w * t) -
+                                          0.1 * std::sin(2.0 * w * t);
+    ASSERT_NEAR(run.command.position_rad()[0], wanted, 1e-12) << i;
+    if (i > 0 && i < 4000) {
+      ASSERT_NEAR(run.command.velocity_rad_s()[0], (wanted - last) * 1e3, 3e-3) << i;
+    }
+    last = wanted;
+  }
+  EXPECT_EQ(run.command.velocity_rad_s()[0], 0.0);
+}
+
+TEST(JointTrajectory, RefusesASeriesThatStartsInMotionIsTooFastOrLacksNumbers) {
+  const auto problem = [](std::string text, const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+    return test::Harness(hal::test::fake_robot(), "joint_trajectory", text).problem();
+  };
+  EXPECT_NE(problem(kSeries, "sin_rad = [-0.1]", "sin_rad = [0.1]").find("does not start at rest"),
+            std::string::npos);
+  EXPECT_NE(problem(kSeries, "period_s = 2.0", "period_s = 0.02").find("rad/s, its limit is"),
+            std::string::npos);
+  EXPECT_NE(problem(kSeries, "cos_rad = [0.1]", "cos_rad = [0.1, 0.2]").find("has 2 numbers for 1"),
+            std::string::npos);
+  EXPECT_NE(problem(kSeries, "[[harmonic]]\ncos_rad = [0.0]\nsin_rad = [-0.1]\n", "")
+                .find("does not start at rest"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ void check_run(const std::string& path) {
   (void)run->feet();
   (void)run->base_placement(run->rows() - 1);
   require(run->positions(0).size() >= run->robot.joints.size());
-  (void)report::figures_of(*run, nullptr, nullptr);
+  (void)report::figures_of(*run, {}, nullptr);
 }
 
 }  // namespace

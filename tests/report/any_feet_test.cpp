@@ -69,7 +69,7 @@ class AnyFeet : public testing::TestWithParam<int> {
     }
   }
   const Figure& figure(const std::string& name) {
-    figures = figures_of(run, nullptr, one.kernels.get());
+    figures = figures_of(run, {}, one.kernels.get());
     return *std::ranges::find(figures, name, &Figure::name);
   }
 
@@ -170,7 +170,7 @@ TEST(NoFeet, ArmsAreDrawnByTheJointsThatMoveMost) {
   const Subjects subjects = subjects_of(run);
   EXPECT_EQ(subjects.position_of, 1);
   EXPECT_EQ(subjects.torque_of, 2);
-  const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
   ASSERT_EQ(figures.size(), 3U);
   EXPECT_EQ(figures[0].title, run.robot.joints[1].name + ": position against its reference");
   EXPECT_EQ(figures[1].title, run.robot.joints[2].name + ": torque, measured");

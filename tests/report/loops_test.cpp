@@ -109,7 +109,7 @@ TEST_F(TurningLinkage, WithoutTruthSaysWhyThereIsNoInverseDynamics) {
   run.base.clear();
   run.passive_rad.clear();
   run.loop_error.clear();
-  const std::vector<Figure> figures = figures_of(run, nullptr, robot.kernels.get());
+  const std::vector<Figure> figures = figures_of(run, {}, robot.kernels.get());
   EXPECT_EQ(figures[1].title,
             "crank: torque, measured (no inverse dynamics: the log lacks the position of coupler)");
 }
@@ -128,7 +128,7 @@ TEST_F(TurningLinkage, WithoutTruthIsClosedFromTheMeasuredCrank) {
           << i << " at row " << row;
     }
   }
-  const std::vector<Figure> figures = figures_of(run, nullptr, robot.kernels.get());
+  const std::vector<Figure> figures = figures_of(run, {}, robot.kernels.get());
   EXPECT_EQ(figures[1].title, "crank: torque, measured and by inverse dynamics");
 }
 
@@ -136,13 +136,13 @@ TEST_F(TurningLinkage, WithoutTruthAndKernelsIsDrawnAsFarAsItIsKnown) {
   run.base.clear();
   run.passive_rad.clear();
   run.loop_error.clear();
-  const Figure posture = figures_of(run, nullptr, nullptr).back();
+  const Figure posture = figures_of(run, {}, nullptr).back();
   EXPECT_TRUE(posture.title.ends_with(", without what passive joints move")) << posture.title;
   for (const double z : posture.curves.front().y) EXPECT_FALSE(std::abs(z) > kCrank_m);
 }
 
 TEST_F(TurningLinkage, IsDrawnClosedAndAboveItsLabels) {
-  const Figure posture = figures_of(run, nullptr, robot.kernels.get()).back();
+  const Figure posture = figures_of(run, {}, robot.kernels.get()).back();
   ASSERT_EQ(posture.curves.size(), 1U);
   const Curve& bars = posture.curves.front();
   const Angles start = angles(1.0);
@@ -207,7 +207,7 @@ TEST_F(Gripper, MovesBothFingersApart) {
 }
 
 TEST_F(Gripper, IsDrawnInMillimetresAndNewtons) {
-  const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
   EXPECT_EQ(figures[0].y_label, "position [mm]");
   EXPECT_NEAR(figures[0].curves[0].y[1], 30.0, 1e-12);
   EXPECT_EQ(figures[1].y_label, "force [N]");
@@ -227,7 +227,7 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
     EXPECT_EQ(one.max_rad, 0.0);
     EXPECT_EQ(one.max_torque_Nm, 0.0);
   }
-  const std::vector<Figure> figures = figures_of(run, nullptr, nullptr);
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
   for (const Figure& figure : {figures[0], figures[1]}) {
     ASSERT_EQ(figure.marks.size(), 1U);
     EXPECT_EQ(figure.x_label, "time since the first SYNC [s]");

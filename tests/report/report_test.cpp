@@ -20,7 +20,7 @@ std::string page_text(const std::string& file) {
 
 TEST(Report, SaysWhichRunItShows) {
   const log::ScratchFolder folder;
-  const auto files = make_report(TANDEM_SOURCE_DIR "/tests/fuzz/seeds/mcap/plain", "",
+  const auto files = make_report(TANDEM_SOURCE_DIR "/tests/fuzz/seeds/mcap/plain", {},
                                  folder / "report", [](const RunData&) { return nullptr; });
   ASSERT_TRUE(files) << files.error().to_string();
   const std::string page = page_text(files->page);

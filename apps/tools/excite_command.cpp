@@ -1,0 +1,157 @@
+// tandem excite: searches an exciting trajectory and writes it as an experiment.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "apps/robot/robot_files.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "identification/excite.hpp"
+
+namespace tandem::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What of a spring a standing robot's legs are damped by: without it they swing for long.
+constexpr double kDamped_s = 0.03;
+
+/// One controller: these joints along their series.
+std::string controller_text(const std::string& name, const identification::Series& series,
+                            const std::vector<std::string>& all,
+                            const std::vector<std::string>& joints, int periods,
+                            double link_damping_Nms_rad) {
+  std::string names;
+  std::vector<Eigen::Index> columns;
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    if (std::ranges::find(joints, all[j]) == joints.end()) continue;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", all[j]);
+    columns.push_back(static_cast<Eigen::Index>(j));
+  }
+  std::string text = fmt::format(
+      "\n[[controller]]\nplugin = \"joint_trajectory\"\nname = \"{}\"\n[controller.parameters]\n"
+      "interpolation = \"fourier\"\nperiod_s = {:.9g}\nperiods = {}\n{}joints = [{}]\n",
+      name, series.period_s, periods,
+      link_damping_Nms_rad > 0.0
+          ? fmt::format("link_damping_Nms_rad = {:.3g}\n", link_damping_Nms_rad)
+          : "",
+      names);
+  const auto row = [&](const Eigen::MatrixXd& values, Eigen::Index k) {
+    std::string out;
+    for (const Eigen::Index column : columns)
+      out += fmt::format("{}{:.9g}", out.empty() ? "" : ", ", values(k, column));
+    return out;
+  };
+  for (Eigen::Index k = 0; k < series.a.rows(); ++k) {
+    text += fmt::format("[[controller.parameters.harmonic]]\ncos_rad = [{}]\nsin_rad = [{}]\n",
+                        row(series.a, k), row(series.b, k));
+  }
+  return text;
+}
+
+/// By how much the legs' links are damped: a share of their softest spring; 0 without springs.
+double leg_damping(const hal::RobotConfig& robot, const std::vector<std::string>& legs) {
+  double softest = std::numeric_limits<double>::infinity();
+  for (const std::string& name : legs) {
+    const auto& joint = robot.joints[static_cast<std::size_t>(robot.joint_index(name))];
+    const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
+    if (actuator.order >= 2) softest = std::min(softest, actuator.spring_Nm_rad);
+  }
+  return std::isfinite(softest) ? kDamped_s * softest : 0.0;
+}
+
+/// The robot's path as the experiment has to say it: relative to the experiment where it can.
+std::string path_from(const std::string& experiment, const std::string& robot) {
+  const fs::path folder = fs::absolute(experiment).parent_path();
+  const fs::path relative =
+      fs::absolute(robot).lexically_normal().lexically_relative(folder.lexically_normal());
+  return relative.empty() ? fs::absolute(robot).lexically_normal().string() : relative.string();
+}
+
+std::string experiment_text(const identification::Excitation& result, const ExciteOptions& options,
+                            const hal::RobotConfig& robot, const std::string& posture) {
+  std::string text = fmt::format(
+      "# Excites the dynamics for `tandem identify`, written by `tandem excite --seed {}`.\n"
+      "# Condition number {:.1f} of {} base parameters; at most {:.0f} % of a joint's way to its\n"
+      "# limits, {:.0f} % of its speed, {:.0f} % of its torque.\n"
+      "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
+      options.seed, result.condition_number, result.base_parameters, 100.0 * result.position_share,
+      100.0 * result.speed_share, 100.0 * result.torque_share,
+      path_from(options.output, options.robot),
+      posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
+      options.periods * options.period_s + 1.0);
+  std::vector<std::string> others;
+  for (const std::string& joint : result.joints)
+    if (std::ranges::find(result.legs, joint) == result.legs.end()) others.push_back(joint);
+  const auto add = [&](const char* name, const std::vector<std::string>& joints, double damping) {
+    if (joints.empty()) return;
+    text += controller_text(name, result.series, result.joints, joints, options.periods, damping);
+  };
+  add("excite", others, 0.0);
+  add("excite_legs", result.legs, leg_damping(robot, result.legs));
+  return text;
+}
+
+}  // namespace
+
+Exit excite_command(const ExciteOptions& options) {
+  const auto robot = read_robot(options.robot);
+  if (!robot) return refuse(robot.error());
+  std::string posture = options.posture;
+  if (posture.empty() && !robot->config.postures.empty())
+    posture = robot->config.postures.front().name;
+  const int tries =
+      options.tries > 0 ? options.tries : (robot->config.joints.size() > 12 ? 60 : 300);
+  const auto result = identification::excite(robot->config, robot->tree,
+                                             {.posture = posture,
+                                              .joints = options.joints,
+                                              .period_s = options.period_s,
+                                              .harmonics = options.harmonics,
+                                              .seed = options.seed,
+                                              .share = options.share,
+                                              .tries = tries});
+  if (!result) {
+    Error error = result.error();
+    if (error.file.empty()) error.file = options.robot;
+    return refuse(error);
+  }
+  if (const Status s =
+          write_file(options.output, experiment_text(*result, options, robot->config, posture));
+      !s)
+    return refuse(s.error());
+  std::FILE* out = human_output(options.json);
+  Facts facts;
+  facts.add("experiment", options.output);
+  facts.add("condition number", fmt::format("{:.1f} of {} base parameters",
+                                            result->condition_number, result->base_parameters));
+  facts.add("joints",
+            fmt::format("{} move, {} are held", result->joints.size(), result->still.size()));
+  facts.add("way to limits", fmt::format("{:.0f} % at most", 100.0 * result->position_share));
+  facts.add("speed", fmt::format("{:.0f} % of a limit at most", 100.0 * result->speed_share));
+  facts.add("torque", fmt::format("{:.0f} % of a limit at most", 100.0 * result->torque_share));
+  if (std::isfinite(result->room_m))
+    facts.add("self-distance", fmt::format("{:.0f} mm more than required", 1e3 * result->room_m));
+  if (robot->tree.floating_base)
+    facts.add("balance", fmt::format("{:.0f} mm inside the feet", 1e3 * result->margin_m));
+  facts.print(out);
+  const auto number = [](double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+  };
+  const Json json{{"experiment", options.output},
+                  {"condition_number", number(result->condition_number)},
+                  {"base_parameters", result->base_parameters},
+                  {"joints", result->joints},
+                  {"held", result->still},
+                  {"position_share", result->position_share},
+                  {"speed_share", result->speed_share},
+                  {"torque_share", result->torque_share},
+                  {"room_m", number(result->room_m)},
+                  {"margin_m", result->margin_m}};
+  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

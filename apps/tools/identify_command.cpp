@@ -1,0 +1,146 @@
+// tandem identify: logs to parameters, files and a page.
+#include <fmt/core.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "apps/robot/robot_files.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "apps/tools/identified_files.hpp"
+#include "apps/tools/identify_page.hpp"
+#include "identification/identify.hpp"
+
+namespace tandem::apps {
+namespace {
+
+using identification::Estimate;
+using identification::Identification;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+template <class Vector>
+Json numbers(const Vector& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(number(value));
+  return list;
+}
+
+Json links_json(const Identification& result) {
+  Json links = Json::object();
+  for (const identification::LinkResult& link : result.links) {
+    const Eigen::Matrix3d& I = link.identified.about_com_kg_m2;
+    const double moments[] = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
+    links[link.name] = {{"mass_kg",
+                         {{"value", link.identified.mass_kg},
+                          {"ci95", number(link.mass_ci95)},
+                          {"identifiable", link.mass_identifiable}}},
+                        {"com_m",
+                         {{"value", numbers(link.identified.com_m)},
+                          {"ci95", numbers(link.com_ci95)},
+                          {"identifiable", link.com_identifiable}}},
+                        {"inertia_kg_m2",
+                         {{"value", numbers(moments)},
+                          {"ci95", numbers(link.inertia_ci95)},
+                          {"identifiable", link.inertia_identifiable}}}};
+  }
+  return links;
+}
+
+Json joints_json(const Identification& result) {
+  const auto known = [](const Estimate& one) {
+    return one.identifiable ? number(one.value) : Json(nullptr);
+  };
+  Json joints = Json::object();
+  for (const identification::JointResult& joint : result.joints) {
+    joints[joint.name] = {{"viscous_Nms_rad", known(joint.viscous_Nms_rad)},
+                          {"coulomb_Nm", known(joint.coulomb_Nm)},
+                          {"rotor_inertia_kg_m2", known(joint.rotor_inertia_kg_m2)},
+                          {"offset_Nm", known(joint.offset_Nm)},
+                          {"rms_Nm", number(joint.rms_Nm)},
+                          {"relative_error", number(joint.relative_error)}};
+  }
+  return joints;
+}
+
+Json base_json(const Identification& result) {
+  Json base = Json::array();
+  for (const identification::BaseParameter& one : result.base) {
+    Json terms = Json::object();
+    for (const auto& [name, factor] : one.terms) terms[name] = factor;
+    base.push_back({{"name", one.name},
+                    {"terms", terms},
+                    {"value", one.estimate.value},
+                    {"ci95", one.estimate.ci95},
+                    {"identifiable", one.estimate.identifiable},
+                    {"described", one.described}});
+  }
+  return base;
+}
+
+void print_result(std::FILE* out, const Identification& result) {
+  Table table({"joint", "rms [Nm]", "left over [%]", "by description [%]"});
+  for (const identification::JointResult& joint : result.joints) {
+    const auto percent = [](double part) {
+      return std::isfinite(part) ? fmt::format("{:.2f}", 100.0 * part) : "-";
+    };
+    table.add({joint.name, std::isfinite(joint.rms_Nm) ? fmt::format("{:.4f}", joint.rms_Nm) : "-",
+               percent(joint.relative_error), percent(joint.described_relative_error)});
+  }
+  table.print(out);
+  fmt::print(out, "\n");
+  Facts facts;
+  facts.add("used", fmt::format("{:.1f} s, {:.1f} s of them held back", result.usable_s,
+                                result.held_out_s));
+  facts.add("condition number", fmt::format("{:.1f}", result.condition_number));
+  std::size_t known = 0;
+  for (const identification::BaseParameter& one : result.base)
+    known += one.estimate.identifiable ? 1 : 0;
+  facts.add("base parameters",
+            fmt::format("{} of {} known by the data", known, result.base.size()));
+  facts.add("mass", fmt::format("{:.4f} kg, described {:.4f} kg", result.identified_mass_kg,
+                                result.described_mass_kg));
+  facts.print(out);
+}
+
+}  // namespace
+
+Exit identify_command(const IdentifyOptions& options) {
+  const auto robot = read_robot(options.robot);
+  if (!robot) return refuse(robot.error());
+  std::error_code problem;
+  std::filesystem::create_directories(options.output, problem);
+  if (problem) {
+    return refuse(Error{"cannot create the folder: " + problem.message(),
+                        "name a folder that can be written with --out",
+                        options.output,
+                        0,
+                        {}});
+  }
+  const auto result = identification::identify(options.logs, robot->config, robot->tree,
+                                               {.cutoff_Hz = options.cutoff_Hz});
+  if (!result) return refuse(result.error());
+  std::FILE* out = human_output(options.json);
+  print_result(out, *result);
+  for (const std::string& remark : result->remarks) fmt::print(stderr, "note: {}\n", remark);
+  for (const std::string& warning : result->warnings) fmt::print(stderr, "warning: {}\n", warning);
+  const auto written = write_identified(*robot, *result, options.logs, options.output);
+  if (!written) return refuse(written.error());
+  Facts files;
+  for (const std::string& file : *written) files.add("written", file);
+  const auto page = write_identify_page(*result, robot->config.name, options.output);
+  if (page) {
+    files.add("report", *page);
+  } else {
+    fmt::print(stderr, "note: no report: {}\n", page.error().to_string());
+  }
+  files.print(out);
+  const Json json{{"links", links_json(*result)},
+                  {"joints", joints_json(*result)},
+                  {"condition_number", number(result->condition_number)},
+                  {"base_parameters", base_json(*result)}};
+  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

@@ -1,0 +1,99 @@
+// Identification of a robot from logs. Start here.
+// Layer: identification.  Thread: non-RT only.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
+#include "identification/base_parameters.hpp"
+#include "identification/samples.hpp"
+#include "model/tree.hpp"
+
+namespace tandem::identification {
+
+struct IdentifyOptions {
+  double cutoff_Hz = 10.0;  ///< of the low pass over every signal
+};
+
+/// A number with half the width of its 95 % confidence interval, from the data alone. `ci95` is NaN
+/// where the data say nothing.
+struct Estimate {
+  double value = 0.0;
+  double ci95 = 0.0;
+  bool identifiable = false;  ///< the data alone give it, to within a third of its scale
+};
+
+/// A link of the description, in its own frame. What was not identifiable is as described, or what
+/// fits the others best: the dynamics are those of the base parameters either way.
+struct LinkResult {
+  std::string name;
+  model::Inertia described, identified;
+  double mass_ci95 = 0.0;
+  Eigen::Vector3d com_ci95;                  ///< [m]
+  Eigen::Matrix<double, 6, 1> inertia_ci95;  ///< ixx ixy ixz iyy iyz izz about the com [kg m^2]
+  bool mass_identifiable = false, com_identifiable = false, inertia_identifiable = false;
+  bool changed = false;  ///< it is the heaviest of its piece: only such are changed
+};
+
+/// A joint. Friction and offset are the sum of what is lost between the motor's current and the
+/// measured torque, and between that and the motion. Not identifiable: NaN.
+struct JointResult {
+  std::string name;
+  bool slides = false;
+  Estimate viscous_Nms_rad, coulomb_Nm, rotor_inertia_kg_m2, offset_Nm;
+  Estimate link_viscous_Nms_rad, link_coulomb_Nm;  ///< the share behind the torque measurement
+  double delay_s = 0.0;         ///< by which the torque is sampled later than the position
+  double rms_Nm = 0.0;          ///< of the residual, on held-out data
+  double relative_error = 0.0;  ///< over the torque, both as RMS; NaN without held-out data
+  double described_rms_Nm = 0.0, described_relative_error = 0.0;  ///< of the description alone
+  // On the held-out data:
+  std::vector<double> time_s, measured_Nm, described_Nm, identified_Nm;
+};
+
+/// One combination of parameters that the robot's motion shows.
+struct BaseParameter {
+  std::string name;  ///< of the parameter that it stands for: its factor is 1
+  std::vector<std::pair<std::string, double>> terms;  ///< "LINK.hx_kg_m" and its factor
+  Estimate estimate;
+  double described = 0.0;
+};
+
+struct Identification {
+  std::vector<LinkResult> links;    ///< all with mass, in the model's order
+  std::vector<JointResult> joints;  ///< in the image's order
+  std::vector<BaseParameter> base;
+  double condition_number = 0.0;  ///< of the base parameters' columns, weighted, of unit length
+  double usable_s = 0.0;          ///< of the logs, without what was excluded
+  double held_out_s = 0.0;
+  double described_mass_kg = 0.0, identified_mass_kg = 0.0;  ///< of everything that moves
+  Estimate mass_kg;                   ///< the same, as far as the equations reach
+  std::vector<std::string> remarks;   ///< what was excluded, and what was assumed
+  std::vector<std::string> warnings;  ///< what to look at before the result is used
+};
+
+/// Identifies the robot from the first two thirds of every log, and compares on the last.
+///
+/// @param tree  of robot's description; outlives nothing
+/// Errors: as read_recording() and make_identified_robot(); too little usable data.
+[[nodiscard]] Result<Identification> identify(const std::vector<std::string>& logs,
+                                              const hal::RobotConfig& robot,
+                                              const model::Tree& tree,
+                                              const IdentifyOptions& options = {});
+/// The same of recordings at hand.
+[[nodiscard]] Result<Identification> identify(const std::vector<Recording>& recordings,
+                                              const hal::RobotConfig& robot,
+                                              const model::Tree& tree,
+                                              const IdentifyOptions& options = {});
+
+/// Base parameters of all columns of the equations, those of joints but for the delays included.
+[[nodiscard]] BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree);
+
+/// "LINK.mass_kg", "JOINT.viscous_Nms_rad": of a column of the equations.
+[[nodiscard]] std::string column_name(const IdentifiedRobot& robot, const model::Tree& tree,
+                                      Eigen::Index column);
+
+}  // namespace tandem::identification

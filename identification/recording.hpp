@@ -1,0 +1,57 @@
+// A log made ready for identification: signals on one time grid, with NaN where they cannot be
+// used, and a remark for everything that was left out.
+// Layer: identification.  Thread: non-RT only.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
+
+namespace tandem::identification {
+
+using Signal = std::vector<double>;  ///< a sample per grid time
+
+/// Joints and channels in the order of the robot's configuration, whatever the log's is.
+struct Recording {
+  std::string path;
+  double period_s = 0.0;
+  double voltage_hold_s = 0.0;             ///< see read_recording()
+  std::vector<double> time_s;              ///< since the log's time 0
+  std::vector<Signal> position_rad;        ///< per joint, link side
+  std::vector<Signal> torque_Nm;           ///< per joint, on the link
+  std::vector<Signal> motor_position_rad;  ///< per joint; all NaN when the log lacks it
+  std::vector<Signal> current_A;           ///< the same
+  std::vector<Signal> reference_rad;       ///< commanded; the same. For checks only
+  std::vector<Signal> sensor;              ///< per channel of all sensors
+  std::vector<std::string> remarks;        ///< one sentence for everything excluded
+
+  [[nodiscard]] std::size_t rows() const { return time_s.size(); }
+};
+
+/// In a simulated log the voltage of a motor is held for a control period, and its torque is
+/// sampled at the end: where no spring is between, the back-EMF has by then reduced it.
+/// voltage_hold_s is the time by which that torque is late, for a rigid drive's equation; 0 in
+/// other logs.
+///
+/// Reads the part of a log in which controllers ran, puts it on a grid and takes out what lies:
+/// gaps, NaN, samples that are old, signals that stand still while the robot moves, torques that
+/// are cut off. Holes of up to five samples are bridged by straight lines.
+///
+/// Errors: as log::LogFile; joints or sensors of another robot; time that goes backwards or stands
+/// still; hardly any samples; a joint whose position is never valid.
+[[nodiscard]] Result<Recording> read_recording(const std::string& path,
+                                               const hal::RobotConfig& robot);
+
+/// The checks of read_recording() on signals at hand; each answers a remark, or nothing.
+/// @param recording  in: raw; out: NaN where it cannot be used
+void bridge_holes(Recording& recording);
+void exclude_frozen(Recording& recording, const hal::RobotConfig& robot);
+void exclude_clipped(Recording& recording, const hal::RobotConfig& robot);
+/// Values that a slow PDO repeats are replaced by lines between those that are new.
+void undo_holds(Signal& signal);
+
+}  // namespace tandem::identification

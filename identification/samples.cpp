@@ -1,0 +1,270 @@
+// Filters and differences every signal at one instant after the other, and writes the equations.
+#include "identification/samples.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "identification/low_pass.hpp"
+
+namespace tandem::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+
+std::unexpected<Error> cannot(const hal::RobotConfig& robot, std::string message,
+                              std::string hint) {
+  return std::unexpected(Error{std::move(message), std::move(hint), robot.file, 0, {}});
+}
+
+/// Channels of an IMU: quaternion, angular velocity, specific force.
+constexpr std::size_t kGyro = 4, kAccelerometer = 7;
+
+Vector3d filtered(const LowPass& filter, const Recording& r, std::size_t channel, std::size_t at,
+                  bool rate = false) {
+  Vector3d out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Signal& signal = r.sensor[channel + i];
+    out[static_cast<Index>(i)] = rate ? filter.rate(signal, at) : filter.value(signal, at);
+  }
+  return out;
+}
+
+/// sign(v) of a joint at every sample, smooth about 0; from differences over a few samples, for an
+/// encoder's steps must not look like motion.
+Signal directions(const Signal& position, double period_s) {
+  const auto span = static_cast<std::size_t>(std::max(1.0, std::round(0.01 / period_s)));
+  Signal out(position.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = span; i + span < position.size(); ++i) {
+    const double v =
+        (position[i + span] - position[i - span]) / (2.0 * static_cast<double>(span) * period_s);
+    out[i] = std::tanh(v / kStick_rad_s);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<IdentifiedRobot> make_identified_robot(const model::Tree& tree,
+                                              const hal::RobotConfig& robot) {
+  if (!robot.loops.empty() || !robot.passive.empty()) {
+    return cannot(robot,
+                  "closed loops and passive joints cannot be identified: the forces in a loop are "
+                  "not measured",
+                  "identify the robot with its loops opened, if it can run so");
+  }
+  RegressorSpec spec;
+  RobotFacts facts;
+  std::size_t channel = 0;
+  for (const hal::SensorConfig& sensor : robot.sensors) {
+    if (sensor.type == hal::SensorType::kForceTorque) {
+      spec.sensors.push_back({sensor.name, sensor.joint, sensor.link});
+      facts.wrench_channel.push_back(channel);
+    } else if (facts.imu_link < 0) {
+      facts.imu_link = tree.link_index(sensor.link);
+      facts.imu_channel = channel;
+    }
+    channel += sensor.channels();
+  }
+  for (const hal::Foot& foot : robot.contact.feet) {
+    const auto site = std::ranges::find(robot.model.sites, foot.site, &hal::SiteConfig::name);
+    if (site != robot.model.sites.end()) spec.ground_links.push_back(site->link);
+  }
+  auto regressor = Regressor::create(tree, spec);
+  if (!regressor) {
+    Error error = regressor.error();
+    error.file = robot.file;
+    return std::unexpected(std::move(error));
+  }
+  if (tree.floating_base && facts.imu_link < 0) {
+    return cannot(robot, "the base floats, and no IMU says how it moves",
+                  "add a [[sensor]] of type \"imu\", or hold the base (base = \"fixed\")");
+  }
+  for (const std::string& name : regressor->coordinates()) {
+    const int joint = robot.joint_index(name);
+    facts.joint.push_back(joint);
+    const hal::JointConfig& config = robot.joints[static_cast<std::size_t>(joint)];
+    const hal::ActuatorConfig& actuator = robot.actuator_of(config);
+    facts.rigid.push_back(actuator.order < 2);
+    facts.rotor_kg_m2.push_back(actuator.inertia_kg_m2);
+    facts.torque_per_A.push_back(actuator.gear_ratio * actuator.torque_constant_Nm_A);
+    facts.damping_Nms_rad.push_back(actuator.damping_Nms_rad);
+    facts.max_torque_Nm.push_back(config.max_torque_Nm);
+    facts.max_velocity_rad_s.push_back(config.max_velocity_rad_s);
+  }
+  facts.gravity_m_s2 = Vector3d(robot.model.gravity_m_s2.data());
+  return IdentifiedRobot{std::move(*regressor), std::move(facts), tree.floating_base};
+}
+
+namespace {
+
+/// What add_equations() does at one instant after the other.
+class Writer {
+ public:
+  Writer(const Recording& recording, const LowPass& filter, IdentifiedRobot& robot, Equations& all)
+      : r_(recording), filter_(filter), robot_(robot), all_(all) {
+    for (std::size_t c = 0; c < robot.facts.joint.size(); ++c) {
+      const auto j = static_cast<std::size_t>(robot.facts.joint[c]);
+      direction_.push_back(directions(r_.position_rad[j], r_.period_s));
+      motor_direction_.push_back(robot.facts.rigid[c]
+                                     ? direction_.back()
+                                     : directions(r_.motor_position_rad[j], r_.period_s));
+    }
+  }
+
+  void add(std::size_t at) {
+    Instant now;
+    read(at, now);
+    robot_.regressor.evaluate(now, Y_, known_);
+    bool any = false;
+    for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
+      const Channel& channel = robot_.regressor.channels()[c];
+      const auto row = static_cast<Index>(c);
+      double measured = 0.0;
+      Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
+      x.head(Y_.cols()) = Y_.row(row);
+      if (channel.kind == Channel::Kind::kJoint) {
+        measured = filter_.value(r_.torque_Nm[joint(channel.index)], at);
+        const auto k = static_cast<std::size_t>(channel.index);
+        if (robot_.facts.rigid[k])
+          measured += robot_.facts.damping_Nms_rad[k] * r_.voltage_hold_s * now.vdot[channel.index];
+        joint_columns(channel.index, at, now, x);
+      } else if (channel.kind == Channel::Kind::kSensor) {
+        measured = now.wrenches[static_cast<std::size_t>(channel.index)][channel.component];
+      }
+      const double y = measured - known_[row];
+      if (!std::isfinite(y) || !x.allFinite()) continue;
+      all_.channels[c].append(x, y, measured, all_.time_s.size());
+      any = true;
+    }
+    if (!any) return;
+    for (Index c = 0; c < now.q.size(); ++c) add_motor(c, at, now);
+    all_.time_s.push_back(r_.time_s[at]);
+  }
+
+ private:
+  [[nodiscard]] std::size_t joint(int coordinate) const {
+    return static_cast<std::size_t>(robot_.facts.joint[static_cast<std::size_t>(coordinate)]);
+  }
+
+  void read(std::size_t at, Instant& now) const {
+    const RobotFacts& facts = robot_.facts;
+    const auto n = static_cast<Index>(facts.joint.size());
+    now.q.resize(n);
+    now.v.resize(n);
+    now.vdot.resize(n);
+    for (Index c = 0; c < n; ++c) {
+      const Signal& position = r_.position_rad[joint(static_cast<int>(c))];
+      now.q[c] = filter_.value(position, at);
+      now.v[c] = filter_.rate(position, at);
+      now.vdot[c] = filter_.second_rate(position, at);
+    }
+    for (const std::size_t channel : facts.wrench_channel) {
+      Eigen::Matrix<double, 6, 1> wrench;
+      wrench << filtered(filter_, r_, channel, at), filtered(filter_, r_, channel + 3, at);
+      now.wrenches.push_back(wrench);
+    }
+    now.w.setZero();
+    now.al.setZero();
+    now.a = -facts.gravity_m_s2;
+    if (!robot_.floating) return;
+    robot_.regressor.base_from_link(
+        facts.imu_link, filtered(filter_, r_, facts.imu_channel + kGyro, at),
+        filtered(filter_, r_, facts.imu_channel + kGyro, at, true),
+        filtered(filter_, r_, facts.imu_channel + kAccelerometer, at), now);
+  }
+
+  void joint_columns(int coordinate, std::size_t at, const Instant& now, Eigen::VectorXd& x) const {
+    const auto c = static_cast<std::size_t>(coordinate);
+    const Index first = Y_.cols() + kJointColumns * coordinate;
+    x[first] = now.v[coordinate];
+    x[first + 1] = filter_.value(direction_[c], at);
+    x[first + 2] = 1.0;
+    x[first + 3] = robot_.facts.rigid[c] ? now.vdot[coordinate] : 0.0;
+    x[first + 4] = -filter_.rate(r_.torque_Nm[joint(coordinate)], at);
+  }
+
+  void add_motor(Index coordinate, std::size_t at, const Instant& now) {
+    const auto c = static_cast<std::size_t>(coordinate);
+    const std::size_t j = joint(static_cast<int>(coordinate));
+    const double per_A = robot_.facts.torque_per_A[c];
+    const bool rigid = robot_.facts.rigid[c];
+    const Signal& motor = r_.motor_position_rad[j];
+    MotorInstant one;
+    one.drive = per_A * filter_.value(r_.current_A[j], at);
+    one.drive_rate = per_A * filter_.rate(r_.current_A[j], at);
+    one.torque = filter_.value(r_.torque_Nm[j], at);
+    one.velocity = rigid ? now.v[coordinate] : filter_.rate(motor, at);
+    one.acceleration = rigid ? 0.0 : filter_.second_rate(motor, at);
+    one.direction = filter_.value(motor_direction_[c], at);
+    const double sum =
+        one.drive + one.drive_rate + one.torque + one.velocity + one.acceleration + one.direction;
+    if (std::isfinite(sum) && per_A > 0.0) all_.motors[c].push_back(one);
+  }
+
+  const Recording& r_;
+  const LowPass& filter_;
+  IdentifiedRobot& robot_;
+  Equations& all_;
+  std::vector<Signal> direction_, motor_direction_;
+  Eigen::MatrixXd Y_;
+  Eigen::VectorXd known_;
+};
+
+}  // namespace
+
+void ChannelRows::append(const Eigen::VectorXd& x, double value, double whole, std::size_t at) {
+  const Index row = rows();
+  if (row == X.rows()) {
+    const Index more = std::max<Index>(64, 2 * row);
+    X.conservativeResize(more, x.size());
+    y.conservativeResize(more);
+    measured.conservativeResize(more);
+  }
+  X.row(row) = x.transpose();
+  y[row] = value;
+  measured[row] = whole;
+  instant.push_back(at);
+}
+
+Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRobot& robot,
+                     Equations& equations) {
+  if (cutoff_Hz * recording.period_s > 0.2) {
+    return std::unexpected(
+        Error{fmt::format("a cut-off of {} Hz is too high for samples every {:.3g} ms", cutoff_Hz,
+                          1e3 * recording.period_s),
+              fmt::format("give --cutoff {:.3g} or less", 0.2 / recording.period_s),
+              recording.path,
+              0,
+              {}});
+  }
+  const LowPass filter(recording.period_s, cutoff_Hz);
+  const std::size_t coordinates = robot.facts.joint.size();
+  equations.columns = robot.regressor.columns() + kJointColumns * static_cast<Index>(coordinates);
+  equations.channels.resize(robot.regressor.channels().size());
+  equations.motors.resize(coordinates);
+  equations.travel_rad.resize(coordinates, 0.0);
+  equations.first_of_log.push_back(equations.time_s.size());
+  Writer writer(recording, filter, robot, equations);
+  for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();
+       at += filter.stride())
+    writer.add(at);
+  const std::size_t added = equations.time_s.size() - equations.first_of_log.back();
+  equations.usable_s += static_cast<double>(added * filter.stride()) * recording.period_s;
+  for (std::size_t c = 0; c < coordinates; ++c) {
+    const Signal& position = recording.position_rad[static_cast<std::size_t>(robot.facts.joint[c])];
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const double q : position) {
+      if (std::isnan(q)) continue;
+      low = std::min(low, q);
+      high = std::max(high, q);
+    }
+    equations.travel_rad[c] = std::max(equations.travel_rad[c], high - low);
+  }
+  return {};
+}
+
+}  // namespace tandem::identification

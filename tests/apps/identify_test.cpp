@@ -1,0 +1,136 @@
+// tandem excite and tandem identify from the command line: a robot whose description is wrong is
+// simulated, found, and simulated again. TANDEM_IDENTIFY_ALL=1: a humanoid, too.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Identify : public Program {
+ protected:
+  /// Excites and runs `robot`, whose files are in the test's folder.
+  void record(const std::string& robot, const std::string& more = {}) const {
+    const Outcome excited =
+        tandem("excite " + robot + " --out excite.toml --json excite.json " + more);
+    ASSERT_EQ(excited.status, 0) << excited.err;
+    const Outcome run = tandem("run excite.toml --quiet --log logs");
+    ASSERT_EQ(run.status, 0) << run.err;
+  }
+  [[nodiscard]] std::string log(const std::string& folder = "logs") const {
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / folder))
+      if (entry.path().extension() == ".mcap")
+        return folder + "/" + entry.path().filename().string();
+    return {};
+  }
+};
+
+TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
+  record("robot.toml");
+  EXPECT_LT(json("excite.json")["condition_number"].get<double>(), 200.0);
+  // The description to start from has another mass, and a centre of mass that is elsewhere.
+  std::filesystem::copy_file(folder_ / "robot.toml", folder_ / "wrong.toml");
+  std::filesystem::copy_file(folder_ / "double_pendulum.urdf", folder_ / "wrong.urdf");
+  edit("wrong.toml", "urdf = \"double_pendulum.urdf\"", "urdf = \"wrong.urdf\"");
+  edit("wrong.urdf", "value=\"0.33238\"", "value=\"0.43238\"");
+  edit("wrong.urdf", "xyz=\"-0.0050107 1.9371e-10 0.10088\"",
+       "xyz=\"-0.0050107 1.9371e-10 0.12088\"");
+  const Outcome found =
+      tandem("identify " + log() + " --robot wrong.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  const nlohmann::json result = json("found.json");
+  EXPECT_EQ(result["links"].size(), 3U);
+  EXPECT_EQ(result["joints"].size(), 2U);
+  for (const auto& [name, joint] : result["joints"].items()) {
+    EXPECT_LT(joint["relative_error"].get<double>(), 0.05) << name;
+    EXPECT_NEAR(joint["viscous_Nms_rad"].get<double>(), 0.17 - 0.16, 0.01) << name;
+  }
+  // The moment about joint2 is what the torques show, whatever link it is put down to.
+  const auto& link = result["links"]["link2"];
+  const double moment =
+      link["mass_kg"]["value"].get<double>() * link["com_m"]["value"][2].get<double>();
+  EXPECT_NEAR(moment, 0.33238 * 0.10088, 0.02 * 0.0335);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "found/report.html"));
+  const Outcome checked = tandem("check found/excite.toml");
+  EXPECT_EQ(checked.status, 0) << checked.err;
+  EXPECT_NE(read_text(folder_ / "found/robot.toml").find("name = \"double_pendulum_identified\""),
+            std::string::npos);
+}
+
+// The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
+// sensors are noisy.
+TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes a minute";
+  for (const char* file : {"robot.toml", "coman.urdf"}) {
+    std::filesystem::copy_file(std::filesystem::path(TANDEM_SOURCE_DIR "/config/coman") / file,
+                               folder_ / file, std::filesystem::copy_options::overwrite_existing);
+  }
+  edit("robot.toml", "following_error_rad = 0.35",
+       "following_error_rad = 0.35\ntorque_noise_Nm = 0.05");
+  edit("robot.toml", "rated_torque_Nm = 10.0", "rated_torque_Nm = 10.0\ntorque_noise_Nm = 0.005");
+  for (const char* joint : {"LAnkSag", "RAnkSag"}) {
+    edit("robot.toml", std::string("joint = \"") + joint + "\"",
+         std::string("noise = [0.5, 0.5, 0.5, 0.02, 0.02, 0.02]\njoint = \"") + joint + "\"");
+  }
+  edit("robot.toml", "type = \"imu\"",
+       "type = \"imu\"\nnoise = [0, 0, 0, 0, 0.005, 0.005, 0.005, 0.05, 0.05, 0.05]");
+  record("robot.toml", "--period 12 --share 0.5");
+  edit("coman.urdf", "6.3617175", "5.3617175");
+  edit("coman.urdf", "-0.0358501 1.8286043e-05 0.117557148", "-0.0158501 0.010018286 0.097557148");
+  edit("coman.urdf", "0.0038979546", "0.0046979546");  // a thigh's inertia
+  const Outcome found =
+      tandem("identify " + log() + " --robot robot.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  EXPECT_NE(found.err.find("the total mass moves"), std::string::npos) << found.err;
+  const auto torso = json("found.json")["links"]["DWYTorso"];
+  EXPECT_NEAR(torso["mass_kg"]["value"].get<double>(), 6.3617175, 0.01 * 6.3617175);
+  const double com_m[] = {-0.0358501, 1.8286043e-05, 0.117557148};
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(torso["com_m"]["value"][k].get<double>(), com_m[k], 0.002) << k;
+}
+
+TEST_F(Identify, OfAnotherRobotsLogIsOneError) {
+  ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 1 --log logs").status, 0);
+  const Outcome other = tandem("identify " + log() +
+                               " --robot " TANDEM_SOURCE_DIR
+                               "/config/panda/robot.toml --out found --json found.json");
+  EXPECT_EQ(other.status, 2);
+  EXPECT_NE(other.err.find("this log is of another robot: it has no joint 'panda_joint1'"),
+            std::string::npos)
+      << other.err;
+  EXPECT_FALSE(json("found.json")["ok"].get<bool>());
+}
+
+TEST_F(Identify, OfAShortLogIsOneError) {
+  ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 1 --log logs").status, 0);
+  const Outcome result = tandem("identify " + log() + " --robot robot.toml --out found");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.err.find("too short to identify anything"), std::string::npos) << result.err;
+}
+
+TEST_F(Identify, OfARobotThatRestsSaysWhatTheDataDoNotSay) {
+  ASSERT_EQ(tandem("run hold.toml --quiet --duration 12 --log logs").status, 0);
+  const Outcome result =
+      tandem("identify " + log() + " --robot robot.toml --out found --json found.json");
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.err.find("hardly move"), std::string::npos) << result.err;
+  for (const auto& [name, joint] : json("found.json")["joints"].items())
+    EXPECT_TRUE(joint["viscous_Nms_rad"].is_null()) << name;
+  for (const auto& [name, link] : json("found.json")["links"].items())
+    EXPECT_FALSE(link["inertia_kg_m2"]["identifiable"].get<bool>()) << name;
+}
+
+TEST_F(Identify, IsRefusedWhereLoopsAreClosed) {
+  const Outcome result =
+      tandem("excite " TANDEM_SOURCE_DIR "/config/four_bar/robot.toml --out e.toml");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.err.find("closed loops and passive joints cannot be identified"),
+            std::string::npos)
+      << result.err;
+}
+
+}  // namespace
+}  // namespace tandem::apps

@@ -1,0 +1,185 @@
+// Identification of recordings whose truth is known: parameters, and whether the intervals hold
+// what they promise. TANDEM_IDENTIFY_SEEDS=100: the whole proof of the latter.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cstdlib>
+#include <map>
+
+#include "identification/estimate.hpp"
+#include "identification/identify.hpp"
+#include "tests/identification/synthetic.hpp"
+
+namespace tandem::identification {
+namespace {
+
+/// The true value of a base parameter, from the true tree and joints.
+double truth_of(const BaseParameter& base, const model::Tree& tree, const Arm& arm,
+                const Reality& reality) {
+  double sum = 0.0;
+  for (const auto& [name, factor] : base.terms) {
+    const std::string owner = name.substr(0, name.rfind('.'));
+    const std::string what = name.substr(name.rfind('.') + 1);
+    const int link = tree.link_index(owner);
+    const auto known = std::ranges::find(kParameterNames, what);
+    if (link >= 0 && known != kParameterNames.end()) {
+      const LinkParameters p = parameters_of(tree.links[static_cast<std::size_t>(link)].inertia);
+      sum += factor * p[known - kParameterNames.begin()];
+      continue;
+    }
+    const auto joint = static_cast<std::size_t>(arm.robot.joint_index(owner));
+    const std::vector<double>& values = what == "viscous_Nms_rad" ? reality.viscous_Nms_rad
+                                        : what == "coulomb_Nm"    ? reality.coulomb_Nm
+                                        : what == "offset_Nm"     ? reality.offset_Nm
+                                                                  : reality.rotor_kg_m2;
+    sum += values.empty() ? 0.0 : factor * values[joint];
+  }
+  return sum;
+}
+
+Reality panda_reality() {
+  return {.rotor_kg_m2 = {0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1},
+          .viscous_Nms_rad = {1.0, 2.0, 0.5, 0.8, 0.3, 0.2, 0.1},
+          .coulomb_Nm = {0.4, 0.5, 0.3, 0.4, 0.2, 0.1, 0.1},
+          .offset_Nm = {0.1, -0.2, 0.1, 0.0, 0.1, -0.1, 0.0},
+          .torque_noise_Nm = 0.3,
+          .torque_quantum_Nm = 0.087,
+          .position_quantum_rad = 6e-6};
+}
+
+TEST(Identify, FindsEveryBaseParameterOfAnArmWithoutNoise) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = reality.torque_quantum_Nm = reality.position_quantum_rad = 0.0;
+  reality.coulomb_Nm.clear();  // the only one that a filter sees otherwise than the equations
+  const Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  EXPECT_LT(result->condition_number, 1000.0);
+  EXPECT_GT(result->held_out_s, 7.0);
+  for (const BaseParameter& base : result->base) {
+    const double truth = truth_of(base, panda.tree, panda, reality);
+    EXPECT_NEAR(base.estimate.value, truth, 2e-3 * (0.1 + std::abs(truth)))
+        << base.terms.front().first;
+  }
+  for (const JointResult& joint : result->joints) {
+    EXPECT_LT(joint.relative_error, 1e-3) << joint.name;
+    EXPECT_NEAR(joint.delay_s, 0.0, 1e-4);
+  }
+}
+
+TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  const char* text = std::getenv("TANDEM_IDENTIFY_SEEDS");
+  const int seeds = text == nullptr ? 6 : std::atoi(text);
+  const Arm panda = arm("panda");
+  const Reality reality = panda_reality();
+  const Series series = wide_series(panda, 3);
+  std::map<std::string, int> inside;
+  int all = 0, held = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Recording recording =
+        synthetic_recording(panda.tree, series, reality, static_cast<std::uint64_t>(seed));
+    const auto result = identify({recording}, panda.robot, panda.tree);
+    ASSERT_TRUE(result) << result.error().to_string();
+    for (const BaseParameter& base : result->base) {
+      const double off = std::abs(base.estimate.value - truth_of(base, panda.tree, panda, reality));
+      const bool holds = off <= base.estimate.ci95;
+      inside[base.name] += holds ? 1 : 0;
+      held += holds ? 1 : 0;
+      ++all;
+    }
+  }
+  double worst = 1.0;
+  std::string name;
+  for (const auto& [parameter, times] : inside) {
+    const double share = static_cast<double>(times) / seeds;
+    if (share < 0.92 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
+    if (share < worst) name = parameter;
+    worst = std::min(worst, share);
+  }
+  const double share = static_cast<double>(held) / all;
+  RecordProperty("held", std::to_string(share));
+  std::printf("%d seeds, %zu base parameters: inside %.1f %%, the worst (%s) %.0f %%\n", seeds,
+              inside.size(), 100.0 * share, name.c_str(), 100.0 * worst);
+  EXPECT_GT(share, 0.90);
+  EXPECT_LT(share, 0.995);  // intervals that are too wide are wrong, too
+  // Of 69 exact intervals one is below 90 of 100 by chance (a binomial's 1.2 %), none below 86.
+  if (seeds >= 100) {
+    EXPECT_GE(worst, 0.86) << name;
+  }
+}
+
+TEST(Identify, FindsAHeavierLinkAndKeepsEveryBodyPossible) {
+  const Arm panda = arm("panda");
+  model::Tree real = panda.tree;
+  const int link = real.link_index("panda_link4");
+  model::Inertia& inertia = real.links[static_cast<std::size_t>(link)].inertia;
+  inertia.mass_kg *= 1.3;
+  inertia.com_m += Eigen::Vector3d(0.01, -0.02, 0.015);
+  const model::Link& on = real.links[static_cast<std::size_t>(link)];
+  real.bodies[static_cast<std::size_t>(on.body)].inertia = on.in_body * on.inertia;
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = 0.05;
+  const Recording recording = synthetic_recording(real, wide_series(panda, 3), reality, 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  for (const LinkResult& one : result->links) {
+    if (!one.changed) continue;
+    const Eigen::Matrix4d P = pseudo_inertia(parameters_of(one.identified));
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(P).eigenvalues()[0], 0.0) << one.name;
+  }
+  for (const JointResult& joint : result->joints) {
+    EXPECT_LT(joint.relative_error, 0.3);
+    EXPECT_LT(joint.rms_Nm, 0.05) << joint.name;
+  }
+  EXPECT_GT(result->joints[1].described_rms_Nm, 1.0);
+}
+
+TEST(Identify, SaysWhatAMotionlessRobotDoesNotShow) {
+  const Arm panda = arm("panda");
+  Series still = wide_series(panda, 3);
+  still.a.setZero();
+  still.b.setZero();
+  const Recording recording = synthetic_recording(panda.tree, still, panda_reality(), 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  for (const LinkResult& link : result->links) {
+    EXPECT_FALSE(link.mass_identifiable || link.com_identifiable || link.inertia_identifiable)
+        << link.name;
+  }
+  for (const JointResult& joint : result->joints) {
+    EXPECT_FALSE(joint.viscous_Nms_rad.identifiable || joint.coulomb_Nm.identifiable ||
+                 joint.rotor_inertia_kg_m2.identifiable)
+        << joint.name;
+  }
+  ASSERT_FALSE(result->warnings.empty());
+  EXPECT_NE(result->warnings.front().find("hardly move"), std::string::npos);
+}
+
+TEST(Identify, RefusesALogThatIsTooShort) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.duration_s = 4.0;
+  const Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().message.find("too short to identify anything"), std::string::npos);
+}
+
+TEST(LongRunVariance, OfAMovingAverageIsThatOfItsMean) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal;
+  constexpr Eigen::Index kLength = 20'000;
+  Eigen::VectorXd white(kLength + 4), residual(kLength);
+  for (double& one : white) one = normal(random);
+  std::vector<std::size_t> instant;
+  for (Eigen::Index i = 0; i < kLength; ++i) {
+    residual[i] = white.segment<4>(i).sum();
+    instant.push_back(static_cast<std::size_t>(i));
+  }
+  EXPECT_NEAR(long_run_variance(residual, instant, 0), 4.0, 0.3);
+  EXPECT_NEAR(long_run_variance(residual, instant, 60), 16.0, 2.0);
+}
+
+}  // namespace
+}  // namespace tandem::identification

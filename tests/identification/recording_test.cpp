@@ -1,0 +1,106 @@
+// What of a recording is left out, and what of it is not.
+#include "identification/recording.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "identification/identify.hpp"
+#include "tests/identification/synthetic.hpp"
+
+namespace tandem::identification {
+namespace {
+
+const Arm& panda() {
+  static const Arm one = arm("panda");
+  return one;
+}
+
+Recording good() {
+  Reality reality;
+  reality.torque_quantum_Nm = 0.087;
+  reality.position_quantum_rad = 6e-6;
+  reality.duration_s = 20.0;
+  return synthetic_recording(panda().tree, wide_series(panda(), 3), reality, 1);
+}
+
+std::size_t missing(const Signal& signal) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(signal, [](double value) { return std::isnan(value); }));
+}
+
+TEST(Recording, LeavesNothingOutOfAGoodOne) {
+  Recording recording = good();
+  bridge_holes(recording);
+  exclude_frozen(recording, panda().robot);
+  exclude_clipped(recording, panda().robot);
+  EXPECT_TRUE(recording.remarks.empty()) << recording.remarks.front();
+  for (std::size_t j = 0; j < 7; ++j) EXPECT_EQ(missing(recording.torque_Nm[j]), 0U);
+}
+
+TEST(Recording, BridgesShortHolesAndLeavesLongOnes) {
+  Recording recording = good();
+  const Signal before = recording.position_rad[2];
+  for (const std::size_t at : {1000U, 1001U, 1002U, 1003U, 1004U})
+    recording.position_rad[2][at] = NAN;
+  for (std::size_t at = 3000; at < 3100; ++at) recording.position_rad[2][at] = NAN;
+  bridge_holes(recording);
+  EXPECT_EQ(missing(recording.position_rad[2]), 100U);
+  EXPECT_NEAR(recording.position_rad[2][1002], before[1002], 1e-4);
+}
+
+TEST(Recording, LeavesOutAFrozenEncoderAndAFrozenTorque) {
+  Recording recording = good();
+  for (std::size_t at = 2000; at < 3000; ++at) {
+    recording.position_rad[3][at] = recording.position_rad[3][2000];
+    recording.torque_Nm[5][at] = recording.torque_Nm[5][2000];
+  }
+  exclude_frozen(recording, panda().robot);
+  ASSERT_EQ(recording.remarks.size(), 2U);
+  EXPECT_NE(recording.remarks[0].find("joint 'panda_joint4': its position stands still"),
+            std::string::npos);
+  EXPECT_NE(recording.remarks[1].find("joint 'panda_joint6': its torque stands still"),
+            std::string::npos);
+  EXPECT_GE(missing(recording.position_rad[3]), 1000U);
+  EXPECT_GE(missing(recording.torque_Nm[5]), 1000U);
+}
+
+TEST(Recording, LeavesOutATorqueThatIsCutOff) {
+  Recording recording = good();
+  double most = 0.0;
+  for (const double one : recording.torque_Nm[1]) most = std::max(most, one);
+  ASSERT_GT(most, 5.0);
+  for (double& one : recording.torque_Nm[1]) one = std::min(one, 0.6 * most);
+  exclude_clipped(recording, panda().robot);
+  ASSERT_EQ(recording.remarks.size(), 1U);
+  EXPECT_NE(recording.remarks[0].find("joint 'panda_joint2': its torque is cut off"),
+            std::string::npos);
+  EXPECT_EQ(std::ranges::count(recording.torque_Nm[1], 0.6 * most), 0);
+}
+
+TEST(Recording, GivesTheSameResultWithWhatLiesLeftOut) {
+  Recording recording = good();
+  double most = 0.0;
+  for (const double one : recording.torque_Nm[1]) most = std::max(most, one);
+  for (double& one : recording.torque_Nm[1]) one = std::min(one, 0.8 * most);
+  exclude_clipped(recording, panda().robot);
+  const auto result = identify({recording}, panda().robot, panda().tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  EXPECT_LT(result->joints[1].rms_Nm, 0.05);
+  ASSERT_FALSE(result->remarks.empty());
+}
+
+TEST(Recording, UndoesTheHoldsOfASlowPdo) {
+  Signal held, smooth;
+  for (int i = 0; i < 400; ++i) smooth.push_back(std::sin(0.02 * i));
+  for (std::size_t i = 0; i < 400; ++i) held.push_back(smooth[i < 3 ? 0 : 3 + 4 * ((i - 3) / 4)]);
+  undo_holds(held);
+  for (std::size_t i = 10; i < 390; ++i) EXPECT_NEAR(held[i], smooth[i], 2e-3) << i;
+  const Signal copy = smooth;
+  undo_holds(smooth);
+  EXPECT_EQ(smooth, copy);
+}
+
+}  // namespace
+}  // namespace tandem::identification
