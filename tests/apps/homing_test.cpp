@@ -53,7 +53,7 @@ TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
 }
 
 TEST_F(HomedJoints, ARunThatDoesNotWaitSaysWhichWasNotHomed) {
-  const Outcome ran = tandem("run hold.toml --duration 1 --no-log");
+  const Outcome ran = tandem("run hold.toml --duration 1 --rate 2 --no-log");  // seen while held
   expect(ran, 1, "held until these are homed: joint1 (tandem joint home NAME");
   expect(ran, 1, "fault: 1.");
   expect(ran, 1, "joint1: it was not homed, for which the controllers waited");
