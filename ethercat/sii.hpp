@@ -33,6 +33,9 @@ enum class Category : std::uint16_t {
   kEnd = 0xFFFF,
 };
 
+/// A vendor id that nobody owns, of emulated slaves: "TEST", twice. No product may carry it.
+inline constexpr std::uint32_t kNobodysVendor = 0x7E577E57;
+
 struct Identity {
   std::uint32_t vendor = 0;
   std::uint32_t product = 0;

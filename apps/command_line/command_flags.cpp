@@ -158,7 +158,8 @@ own. cyclictest is in Debian's rt-tests; the load is made by stress-ng. The resu
 
 const char kDoctorExamples[] = R"(Examples:
   tandem doctor                                      kernel, CPUs, interrupts, limits, memory
-  tandem doctor config/coman/robot.toml              and the CAN interfaces of its buses
+  tandem doctor config/coman/robot.toml              and the interfaces of its buses
+  tandem doctor config/coman/robot_ethercat.toml     and the slaves behind an EtherCAT interface
   tandem doctor --json - | jq '.findings[] | select(.health != "ok")'
 Each finding comes with the command that fixes it. The exit status does not depend on them.)";
 
@@ -599,7 +600,8 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
 }
 
 void add_flags(CLI::App& app, DoctorOptions& o) {
-  app.add_option("robot", o.robot, "Robot TOML, to look at the CAN interfaces of its buses");
+  app.add_option("robot", o.robot,
+                 "Robot TOML, to look at the interfaces of its buses and its EtherCAT slaves");
   app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kDoctorExamples);

@@ -281,7 +281,7 @@ struct BenchOptions {
 
 /// tandem doctor [ROBOT]
 struct DoctorOptions {
-  std::string robot;       ///< robot.toml, whose CAN interfaces are looked at; may be empty
+  std::string robot;       ///< robot.toml, whose buses are looked at; may be empty
   std::string root = "/";  ///< of the files that are read
   std::string json;
 };

@@ -8,6 +8,7 @@
 
 #include "apps/machine/machine.hpp"
 #include "hal/config/robot_config.hpp"
+#include "hal/ethercat-can/ethercat/line_survey.hpp"
 
 namespace tandem::apps {
 
@@ -36,5 +37,32 @@ struct Finding {
 /// a cycle's frames, brought back after bus-off.
 [[nodiscard]] std::vector<Finding> examine_interfaces(const Machine& machine,
                                                       const hal::RobotConfig& robot);
+
+/// How well one slave's clock follows the line's reference.
+struct ClockFinding {
+  std::string bus;
+  std::size_t slave = 0;  ///< place in the line, 0 the first
+  std::string name;       ///< in robot.toml
+  std::uint32_t delay_ns = 0;
+  std::int64_t difference_ns = 0;  ///< the largest, without its sign
+  double jitter_ns = 0.0;          ///< standard deviation
+};
+
+/// The slaves behind an interface, and their clocks.
+struct LineFindings {
+  std::vector<Finding> findings;
+  std::vector<ClockFinding> clocks;
+};
+
+/// What a survey says about the bus: another master, slaves that are not there or are others than
+/// robot.toml's, clocks that do not follow.
+/// @param bus  an EtherCAT one of `robot`
+[[nodiscard]] LineFindings judge_line(const hal::RobotConfig& robot, const hal::BusConfig& bus,
+                                      const hal::ecat::SurveyTiming& timing,
+                                      const hal::ecat::LineSurvey& survey);
+
+/// Surveys the line behind the bus' interface; moves nothing, and sends nothing while another
+/// master is at work.
+[[nodiscard]] LineFindings look_at_line(const hal::RobotConfig& robot, const hal::BusConfig& bus);
 
 }  // namespace tandem::apps

@@ -24,6 +24,35 @@ Json findings_json(const std::vector<Finding>& findings) {
   return list;
 }
 
+Json clocks_json(const std::vector<ClockFinding>& clocks) {
+  Json list = Json::array();
+  for (const ClockFinding& one : clocks) {
+    list.push_back({{"bus", one.bus},
+                    {"slave", one.slave},
+                    {"name", one.name},
+                    {"delay_ns", one.delay_ns},
+                    {"difference_ns", one.difference_ns},
+                    {"jitter_ns", one.jitter_ns}});
+  }
+  return list;
+}
+
+/// Looks at the slaves behind each EtherCAT interface that frames can be sent on.
+void look_at_lines(const hal::RobotConfig& robot, std::vector<Finding>& findings,
+                   std::vector<ClockFinding>& clocks) {
+  for (const hal::BusConfig& bus : robot.buses) {
+    if (bus.kind != hal::BusKind::kEthercat) continue;
+    const bool bad = std::ranges::any_of(findings, [&bus](const Finding& one) {
+      return one.health == Health::kMissing &&
+             (one.name == bus.interface || one.name.starts_with(bus.interface + " "));
+    });
+    if (bad) continue;
+    const LineFindings line = look_at_line(robot, bus);
+    findings.insert(findings.end(), line.findings.begin(), line.findings.end());
+    clocks.insert(clocks.end(), line.clocks.begin(), line.clocks.end());
+  }
+}
+
 void print_findings(const std::vector<Finding>& findings, std::FILE* out) {
   Table table({"health", "finding", "value"});
   table.align_left();
@@ -52,6 +81,7 @@ Exit doctor_command(const DoctorOptions& options) {
   if (const Status s = check_writable(options.json); !s) return refuse(s.error());
   const Machine machine(options.root);
   std::vector<Finding> findings = examine_machine(machine);
+  std::vector<ClockFinding> clocks;
   if (!options.robot.empty()) {
     const auto robot = read_robot(options.robot);
     if (!robot) return refuse(robot.error());
@@ -61,11 +91,13 @@ Exit doctor_command(const DoctorOptions& options) {
     }
     const std::vector<Finding> more = examine_interfaces(machine, robot->config);
     findings.insert(findings.end(), more.begin(), more.end());
+    if (options.root == "/") look_at_lines(robot->config, findings, clocks);
   }
   std::FILE* out = human_output(options.json);
   print_findings(findings, out);
   print_verdict(findings, out);
-  const Json json{{"findings", findings_json(findings)}};
+  Json json{{"findings", findings_json(findings)}};
+  json["clocks"] = clocks_json(clocks);
   if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
   return Exit::kDone;
 }

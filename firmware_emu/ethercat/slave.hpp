@@ -19,16 +19,13 @@
 
 namespace tandem::firmware::esc {
 
-/// A vendor id that nobody owns: "TEST", twice. No product may carry it.
-inline constexpr std::uint32_t kNobodysVendor = 0x7E577E57;
-
 /// Where the memory of an emulated slave begins.
 inline constexpr std::uint16_t kMailboxAt = 0x1000;
 inline constexpr std::uint16_t kOutputsAt = 0x1800;
 inline constexpr std::uint16_t kInputsAt = 0x2400;
 
 struct SlaveSetup {
-  ethercat::sii::Identity identity{.vendor = kNobodysVendor};
+  ethercat::sii::Identity identity{.vendor = ethercat::sii::kNobodysVendor};
   std::string name;
   std::uint16_t mailbox_bytes = 128;  ///< each way, kMinMailboxBytes to 1024
   std::vector<PdoSetup> outputs{};    ///< 16xx, at most kMaxPdos

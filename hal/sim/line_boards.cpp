@@ -19,6 +19,14 @@ constexpr std::size_t kFramesAtOnce = 64;
 constexpr std::size_t kOwnObjects = 16;
 constexpr double kWorstDrift_ppm = 20.0;
 constexpr std::int64_t kJitterNs = 10;
+constexpr std::int64_t kSilenceNs = 100'000'000;  // as the watchdog of the outputs
+
+/// What the node's own object 1018 says; 0 where its sheet has no such entry.
+std::uint32_t identity(const canopen::ObjectDictionary& dictionary, canopen::IdentitySub sub) {
+  const auto entry = static_cast<std::uint8_t>(sub);
+  const bool there = dictionary.find(canopen::object::kIdentity, entry) != nullptr;
+  return there ? dictionary.value<std::uint32_t>(canopen::object::kIdentity, entry) : 0;
+}
 
 }  // namespace
 
@@ -54,6 +62,9 @@ void LineBoards::add_seat(const EmulatedRobot::Node& node, const Config& config)
   std::uint64_t random = config.seed + static_cast<std::uint64_t>(node.id);
   const double unit = static_cast<double>(split_mix(random) >> 11) * 0x1p-53;
   const firmware::esc::SlaveSetup setup{
+      .identity = {.vendor = ethercat::sii::kNobodysVendor,
+                   .product = identity(*node.dictionary, canopen::kProduct),
+                   .revision = identity(*node.dictionary, canopen::kRevision)},
       .name = node.name,
       .clock = {.drift_ppm = kWorstDrift_ppm * (2.0 * unit - 1.0),
                 .jitter_ns = kJitterNs,
@@ -82,6 +93,7 @@ void LineBoards::fetch() noexcept {
     first_ = 0;
     count_ = link_->receive(came_);
   }
+  if (config_.clock != nullptr) now_ns_ = config_.clock->now_ns();
   pass();
   if (first_ == count_) return;
   in_cycle_ = true;
@@ -159,6 +171,7 @@ void LineBoards::set_cables() noexcept {
 
 void LineBoards::begin_cycle() noexcept {
   now_ns_ = config_.clock != nullptr ? config_.clock->now_ns() : now_ns_ + config_.period_ns;
+  cycle_ns_ = now_ns_;
   if (robot_->injection().any()) set_cables();
   for (std::size_t place = 0; place < seats_.size(); ++place) run(seats_[place], place);
   inbox_.push(canopen::make_sync());
@@ -213,8 +226,18 @@ void LineBoards::watch_boot_up(Seat& seat, const Frame& frame) noexcept {
   seat.state = AlState::kInit;
 }
 
+/// On a wire, slaves also serve a master that has no process data: who scans, looks at clocks, or
+/// has just ended with INIT. Between two cycles of a running one they are left alone.
+void LineBoards::idle() noexcept {
+  if (config_.clock == nullptr) return;
+  for (Seat& seat : seats_) {
+    const bool alone = seat.slave->state() < AlState::kSafeOp || now_ns_ - cycle_ns_ > kSilenceNs;
+    if (alone && *seat.node.powered != 0) seat.slave->process(now_ns_);
+  }
+}
+
 void LineBoards::end_step() noexcept TANDEM_RT {
-  if (!in_cycle_) return;
+  if (!in_cycle_) return idle();
   for (Seat& seat : seats_) {
     if (*seat.node.powered != 0) seat.slave->publish();
   }

@@ -69,6 +69,7 @@ class LineBoards final : public hal::can::Bus {
   [[nodiscard]] bool begins_cycle(hal::ecat::FrameBuffer& frame) noexcept;
   void pass() noexcept;
   void begin_cycle() noexcept;
+  void idle() noexcept;
   void run(Seat& seat, std::size_t place) noexcept;
   void set_cables() noexcept;
   void pass(hal::ecat::FrameBuffer& frame) noexcept;
@@ -91,6 +92,7 @@ class LineBoards final : public hal::can::Bus {
   bool in_cycle_ = false;  ///< a cycle's frame waits for the step
   int cycle_index_ = -1;   ///< of the last cycle's datagrams
   std::int64_t now_ns_ = 0;
+  std::int64_t cycle_ns_ = 0;  ///< of the last cycle; counts in real time alone
   std::vector<canopen::Frame> storage_;
   canopen::FrameSink inbox_;  ///< for the boards
   std::size_t given_ = 0;

@@ -1,5 +1,7 @@
 // Robots on EtherCAT: in process, and master and boards in two processes on a cable of a network of
 // the test's own.
+#include <map>
+
 #include "tests/apps/program.hpp"
 #include "tests/ethercat/own_network.hpp"
 #include "tests/hil/process.hpp"
@@ -130,6 +132,45 @@ TEST_F(LineRun, NodesThatAreNotOneBehindTheOtherAreRefused) {
   EXPECT_EQ(outcome.status, 2);
   EXPECT_NE(outcome.err.find("has no node in place 1 of its line"), std::string::npos)
       << outcome.err;
+}
+
+/// Of the boards that wait for a run, and of a cable with nobody at its end.
+TEST_F(LineRun, TheDoctorLooksAtTheSlaves) {
+  edit("robot.toml", "interface = \"eth1\"",
+       "interface = \"" + std::string(test::kMasterEnd) + "\"");
+  edit("robot.toml", "slow_pdo_every = 4", "heartbeat_ms = 1000\ncommand_timeout_cycles = 1000");
+  edit("hold.toml", "seed = 1", "seed = 1\nperiod_ns = 2_000_000");
+  const auto doctor = [&] {
+    const Outcome outcome = tandem("doctor robot.toml --json doctor.json");
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    std::map<std::string, std::string> found;
+    const nlohmann::json all = json("doctor.json");
+    for (const auto& one : all["findings"]) found[one["name"]] = one["health"];
+    return found;
+  };
+  const int status = in_own_network([&] {
+    EXPECT_EQ(doctor()["ecat_m slaves"], "missing");
+    Process boards(
+        test::tandem({"emulate", file("hold.toml"), "--interface",
+                      std::string(test::kMasterEnd) + "=" + test::kSlaveEnd, "--no-socket"}),
+        file("boards.txt"));
+    EXPECT_TRUE(boards.says("Ctrl-C")) << boards.output();
+    auto found = doctor();
+    for (const char* name : {"master", "slaves", "identities"}) {
+      EXPECT_EQ(found["ecat_m " + std::string(name)], "ok") << name;
+    }
+    EXPECT_EQ(found.count("ecat_m states"), 0U) << "all are in INIT";
+    Process master(test::tandem({"run", file("hold.toml"), "--hal", "ethercat", "--no-socket",
+                                 "--no-log", "--duration", "0.2"}),
+                   file("run.txt"));
+    EXPECT_EQ(master.wait(), 0) << master.output();
+    found = doctor();
+    EXPECT_EQ(found["ecat_m identities"], "ok");
+    EXPECT_EQ(found.count("ecat_m states"), 0U) << "the run left them in INIT";
+    EXPECT_EQ(boards.interrupt(), 0) << boards.output();
+  });
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  EXPECT_EQ(status, 0);
 }
 
 /// The joints and everything about them are robot.toml's.
