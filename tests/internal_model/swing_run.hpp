@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/own_system_call.hpp"
 #include "internal_model/parallel_robot.hpp"
 #include "internal_model/prediction_service.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -40,7 +41,10 @@ class Dressed final : public hal::Backend {
   hal::Phase phase() const noexcept override { return robot_->phase(); }
   std::string status_text() const override { return robot_->status_text(); }
   Code read(const hal::CycleTime& time, hal::StateImage& state) noexcept override {
-    if (slow_.count() > 0) std::this_thread::sleep_for(slow_);
+    if (slow_.count() > 0) {
+      TANDEM_OWN_SYSTEM_CALL;
+      std::this_thread::sleep_for(slow_);
+    }
     return robot_->read(time, state);
   }
   Code write(const hal::CommandImage& command, const hal::ParameterImage& gains) noexcept override {
