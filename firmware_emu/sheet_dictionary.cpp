@@ -219,6 +219,21 @@ std::vector<MadeEntry> entries_of(const DataSheet& sheet, std::size_t axes, Obje
   return made;
 }
 
+/// What the sheet says that the entry holds at power-on. A drive knows its profile and its modes
+/// where the sheet leaves them to it.
+std::optional<std::int64_t> value_of(const DataSheet& sheet, const ObjectEntry& entry, int node_id,
+                                     std::size_t axes) {
+  constexpr std::int64_t kServoDrive = 0x0002'0192;  // CiA 402
+  const auto value = sheet.value(entry.index, entry.sub, node_id);
+  if (value && *value != 0) return value;
+  if (entry.index == co::kDeviceType) return kServoDrive;
+  for (std::size_t a = 0; a < axes; ++a) {
+    const int axis = static_cast<int>(a);
+    if (entry.index == of_axis(co::kSupportedModes, axis)) return emulated_modes(sheet, axis);
+  }
+  return value;
+}
+
 /// A mapping's entries come before its number, and both before what switches the PDO on.
 int order(const ObjectEntry& entry) {
   if (is_pdo_mapping(entry.index)) return entry.sub == 0 ? 1 : 0;
@@ -238,7 +253,7 @@ SheetDictionary::SheetDictionary(const DataSheet& sheet, int node_id, std::size_
                        " left out: texts, domains, numbers of 24 or more than 32 bit");
   }
   for (const MadeEntry& one : made) {
-    const auto value = sheet.value(one.entry.index, one.entry.sub, node_id);
+    const auto value = value_of(sheet, one.entry, node_id, axes);
     if (one.start == Start::kBoards || !value) continue;
     const auto number = static_cast<double>(*value);
     const bool fits = number >= one.entry.range.min && number <= one.entry.range.max;
@@ -278,7 +293,7 @@ void SheetDictionary::check_mappings(const ObjectDictionary& od) {
     }
     if (good && bits <= 64) continue;
     remarks_.push_back("the mapping " + text_of(index, 0) +
-                       " names what the stand-in lacks: it starts empty");
+                       " is too long, or names what the stand-in lacks: it starts empty");
     count.bits = 0;
   }
 }

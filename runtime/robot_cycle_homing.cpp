@@ -93,7 +93,8 @@ void RobotCycle::home_at_start() noexcept TANDEM_RT {
 bool RobotCycle::ends_unhomed() noexcept TANDEM_RT {
   if (!run_.in(RunPhase::kHeld)) return false;
   const auto joint = std::ranges::find_if(homes_, [&](std::size_t j) {
-    return has_to_be_homed(j) && controllers_->is_claimed(j, held_back_);
+    const bool done = homings_[j].state == HomingState::kHomed;
+    return robot_->joints[j].homing->required && !done && controllers_->is_claimed(j, held_back_);
   });
   if (joint == homes_.end()) return false;
   fault({.index = static_cast<std::int32_t>(*joint),

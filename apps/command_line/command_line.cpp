@@ -177,7 +177,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<ControllerOptions>(
       "controller", "Controllers of a running run: list, load, unload, start, stop, switch");
   commands.add<JointOptions>(
-      "joint", "Joints of a running run: list, show, move, stop, set, gains, reset, recover");
+      "joint", "Joints of a running run: list, show, move, home, stop, set, gains, reset, recover");
   commands.add<SensorOptions>("sensor", "Sensors of a running run: list");
   commands.add<ClockOptions>("clock", "Simulated time of a run: show, pause, resume, step, rate");
   commands.add<PredictOptions>("predict", "What a running robot will do: runs its model ahead");

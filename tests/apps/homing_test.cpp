@@ -66,6 +66,12 @@ TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
 }
 
+TEST_F(HomedJoints, ARunThatEndsWhileOneIsBeingHomedSaysSo) {
+  edit("robot.toml", "method = 35", "method = 17");
+  edit("robot.toml", "position_rad = 0.5 }", "position_rad = 0.5, at_start = true }");
+  expect(tandem("run hold.toml --duration 0.2 --no-log"), 1, "joint1: it was not homed");
+}
+
 TEST_F(HomedJoints, AreCheckedByName) {
   edit("robot.toml", "method = 35", "method = 0");
   expect(tandem("check robot.toml"), 2, "0 is no homing");

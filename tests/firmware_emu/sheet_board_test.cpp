@@ -132,6 +132,23 @@ TEST(SheetBoard, AnswersWithTheSheetsRightsLimitsAndValues) {
   EXPECT_EQ(rig.read<std::uint16_t>(0x1017, 0), 200) << "its value at power-on";
 }
 
+// Sheets of real drives leave these two to the drive; our master ended its start at 0.
+TEST(SheetBoard, KnowsItsProfileAndItsModesWhereTheSheetHasNoValue) {
+  for (const bool zero : {false, true}) {
+    DataSheet sheet = sheet_of("servo.eds");
+    for (const std::uint16_t index : {0x1000, 0x6502}) {
+      const auto entry = std::ranges::find(sheet.entries, index, &SheetEntry::index);
+      entry->value.reset();
+      if (zero) entry->value = canopen::SheetValue{.number = 0};
+    }
+    const std::uint32_t modes = emulated_modes(sheet, 0);
+    EXPECT_NE(modes & 0x80, 0U) << "cyclic position, whose objects it has";
+    StandIn rig(stand_in(std::move(sheet)));
+    EXPECT_EQ(rig.read<std::uint32_t>(0x1000, 0), 0x00020192U);
+    EXPECT_EQ(rig.read<std::uint32_t>(0x6502, 0), modes);
+  }
+}
+
 TEST(SheetBoard, SendsThePdosThatTheSheetMapsWithoutAnySetting) {
   DataSheet sheet = sheet_of("servo.eds");
   const auto set = [&](std::uint16_t index, std::uint8_t sub, std::int64_t value) {
