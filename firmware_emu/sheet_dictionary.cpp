@@ -136,6 +136,8 @@ std::optional<DataType> plain_type(const SheetEntry& entry) {
 }
 
 ObjectRange range_of(const SheetEntry& entry, ObjectRange range) {
+  // Sheets of real drives limit a consumer's time alone: its node stands above these 16 bits.
+  if (entry.index == co::kHeartbeatConsumer && entry.high && *entry.high <= 0xFFFF) return range;
   if (entry.low) range.min = std::max(range.min, static_cast<double>(*entry.low));
   if (entry.high) range.max = std::min(range.max, static_cast<double>(*entry.high));
   return range;

@@ -149,6 +149,16 @@ TEST(SheetBoard, KnowsItsProfileAndItsModesWhereTheSheetHasNoValue) {
   }
 }
 
+TEST(SheetBoard, WatchesAHeartbeatWhoseTimeAloneTheSheetLimits) {
+  DataSheet sheet = sheet_of("servo.eds");
+  const auto watched = std::ranges::find_if(
+      sheet.entries, [](const SheetEntry& e) { return e.index == 0x1016 && e.sub == 1; });
+  ASSERT_NE(watched, sheet.entries.end());
+  watched->high = 0xFFFF;
+  StandIn rig(stand_in(std::move(sheet)));
+  EXPECT_EQ(rig.write(0x1016, 1, std::uint32_t{127U << 16 | 100U}), 0U);
+}
+
 TEST(SheetBoard, SendsThePdosThatTheSheetMapsWithoutAnySetting) {
   DataSheet sheet = sheet_of("servo.eds");
   const auto set = [&](std::uint16_t index, std::uint8_t sub, std::int64_t value) {
