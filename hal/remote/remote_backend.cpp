@@ -24,7 +24,8 @@ bool RemoteBackend::there() noexcept {
     const Seen& seen = newest_.front();
     fresh_ = first_ || seen.cycle > last_cycle_;
   }
-  if (fresh_ || ending_ || lost_) return true;
+  // One more state comes after `done`, whatever is heard of the lease meanwhile.
+  if (fresh_ || (!left_in_ && (ending_ || lost_))) return true;
   const std::int64_t silent_ns =
       clock_ns(CLOCK_MONOTONIC) - heard_ns_.load(std::memory_order_relaxed);
   if (static_cast<double>(silent_ns) * 1e-9 > config_.server_timeout_s) gone_ = true;
@@ -32,6 +33,10 @@ bool RemoteBackend::there() noexcept {
 }
 
 void RemoteBackend::exchange(const hal::CycleTime&) noexcept {
+  if (done_ && config_.lockstep && !left_in_) {
+    const std::lock_guard lock(mutex_);
+    left_in_ = last_cycle_;
+  }
   if (pending_) send();
   fresh_ = false;
   missed_now_ = 0;

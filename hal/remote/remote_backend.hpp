@@ -129,6 +129,7 @@ class RemoteBackend final : public hal::Backend {
   std::uint64_t told_count_ = 0;
   bool several_ = false;  // servers were heard before one was chosen
   bool closing_ = false;
+  std::optional<std::uint64_t> left_in_;  // in lockstep: the server's cycle that `done` answers
   // Written by DDS' threads, read by any.
   std::atomic<std::uint64_t> run_{0};
   std::atomic<std::int64_t> heard_ns_{0};

@@ -255,6 +255,8 @@ void RemoteBackend::take_states() {
 
 /// False: not this robot's, or no numbers, which no server of it sends.
 bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
+  // The server goes on by itself after `done`: its next state is this run's last.
+  if (left_in_ && sample.cycle > *left_in_ + 1) return false;
   Seen& to = newest_.back();
   if (sample.state._length != to.state.bytes().size() ||
       sample.command._length != to.command.bytes().size() || sample.causes._length != joints_) {

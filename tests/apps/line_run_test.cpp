@@ -77,6 +77,18 @@ TEST_F(LineRun, ASquatOverACableIsTheInProcessRunBitForBit) {
   EXPECT_EQ(json("boards.json")["steps"], cycles);
 }
 
+/// Beside a robot at the other end of the cable, its exact twin in the master's process.
+TEST_F(LineRun, ATwinOfARobotOverACableIsTheSameToTheLastBit) {
+  edit("trajectory.toml", "[[controller]]", "[parallel]\n[[controller]]");
+  const int status =
+      run_over_cable(file("trajectory.toml"), {"--duration", "1", "-q", "--no-log"}, true);
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  ASSERT_EQ(status, 0);
+  const auto parallel = json("run.json")["parallel"];
+  EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
+  EXPECT_GT(parallel["compared"].get<int>(), 1000);
+}
+
 /// Of a whole start and run of 21 slaves, power-on to INIT, every frame is one that a stranger's
 /// program reads.
 TEST_F(LineRun, TsharkReadsEveryFrameOfAStartAndARun) {

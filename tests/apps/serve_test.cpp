@@ -73,6 +73,24 @@ TEST_F(Serve, InLockstepWithADelayGivesTheBitsOfOneDelayedProcess) {
 
 TEST_F(Serve, OfASquatInLockstepGivesTheBitsOfOneProcess) { compare(coman(), " --duration 0.5"); }
 
+/// A robot of another process, and its exact twin in the owner's: also in the last cycle, after
+/// which the server goes on without an owner.
+TEST_F(Serve, OfATwinIsTheSameToTheLastBit) {
+  const std::string twin = "'" TANDEM_SOURCE_DIR "/config/coman/squat_twin.toml'";
+  for (int repeat = 0; repeat < 4; ++repeat) {
+    const pid_t server =
+        begin("serve " + twin + domain() + " --lockstep --once --quiet --no-log", "serve");
+    const Outcome owner =
+        tandem("run " + twin + domain() +
+               " --duration 0.1 --hal dds --lockstep --no-log --no-socket --quiet --json run.json");
+    EXPECT_EQ(owner.status, 0) << owner.err;
+    EXPECT_TRUE(ended(server));
+    const auto parallel = json("run.json")["parallel"];
+    EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
+    EXPECT_GT(parallel["compared"].get<int>(), 1000) << "bring-up included";
+  }
+}
+
 /// The domain is every user's of this machine; the robot is not.
 TEST_F(Serve, AnotherUserOfTheMachineMovesNothing) {
   const std::string other = "setpriv --reuid 65534 --regid 65534 --clear-groups";
