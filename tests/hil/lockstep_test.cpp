@@ -1,4 +1,5 @@
 // Whole runs over the kernel's CAN, in lockstep: the bits of the run in process.
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/hil/process.hpp"
@@ -36,12 +37,18 @@ class Lockstep : public test::OwnFolder {
     ASSERT_EQ(alone.wait(), 0) << alone.output();
   }
   /// That all but the plant's truth is the same in both logs, and no frame was lost.
-  void expect_same_bits(const std::string& log, std::uint64_t cycles_at_least) {
+  /// @param estimated  the base's place in /tf is the estimate's here and the plant's there
+  void expect_same_bits(const std::string& log, std::uint64_t cycles_at_least,
+                        bool estimated = false) {
     Process diff(
         tandem({"log", "diff", in_process_ + log, over_can_ + log, "--json", file("diff.json")}),
         file("diff.txt"));
-    EXPECT_EQ(diff.wait(), 0) << diff.output();
-    const auto topics = json("diff.json")["topics"];
+    EXPECT_EQ(diff.wait(), estimated ? 1 : 0) << diff.output();
+    auto topics = json("diff.json")["topics"];
+    if (estimated) topics.erase("/tf");
+    for (const auto& topic : topics.items()) {
+      EXPECT_TRUE(topic.value()["equal"]) << topic.key() << "\n" << diff.output();
+    }
     for (const char* name : {"/tandem/state", "/tandem/command", "/tandem/event"}) {
       ASSERT_TRUE(topics.contains(name)) << diff.output();
       EXPECT_GT(topics[name]["messages"][0].get<int>(), 0) << name;
@@ -89,13 +96,19 @@ INSTANTIATE_TEST_SUITE_P(Robots, HilLockstep, testing::Values("coman", "walkman"
 
 using HilTwin = Lockstep;
 
-/// Beside a robot on the wire, its exact twin in the master's process.
-TEST_F(HilTwin, OfARobotOnCanIsTheSameToTheLastBit) {
-  const std::string twin = experiment("coman/squat_twin.toml");
+/// Beside a robot on the wire, its exact twin in the master's process; and the robot's base, which
+/// its sensors alone tell, is estimated as in process.
+TEST_F(HilTwin, OfARobotOnCanIsTheSameToTheLastBitAndSoIsTheEstimate) {
+  const std::string twin = file("twin.toml");
+  std::string text = test::text_of(experiment("coman/squat_twin.toml"));
+  text.replace(text.find("robot.toml"), 10, experiment("coman/robot.toml"));
+  std::ofstream(twin) << text << "\n[estimation.base]\n[estimation.observer]\n";
+  ASSERT_NO_FATAL_FAILURE(run_in_process(twin, {"--duration", "3"}));
+
   Process robot(emulate_words(twin), file("robot.txt"));
   ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
-  Process master(tandem({"run", twin, "--hal", "can", "--lockstep", "--no-socket", "--no-log",
-                         "--duration", "3", "--json", file("run.json")}),
+  Process master(tandem({"run", twin, "--hal", "can", "--lockstep", "--no-socket", "--log",
+                         over_can_, "--duration", "3", "--json", file("run.json")}),
                  file("run.txt"));
   ASSERT_EQ(master.wait(), 0) << master.output();
   ASSERT_EQ(robot.interrupt(), 0) << robot.output();
@@ -103,6 +116,8 @@ TEST_F(HilTwin, OfARobotOnCanIsTheSameToTheLastBit) {
   EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
   EXPECT_GT(parallel["compared"].get<int>(), 3000);
   EXPECT_EQ(parallel["missed"], 0);
+  expect_same_bits("/coman-twin-001.mcap", 3000, true);
+  EXPECT_TRUE(json("diff.json")["topics"].contains("/tandem/estimate"));
 }
 
 class HilDrives : public Lockstep, public testing::WithParamInterface<const char*> {};
