@@ -1,6 +1,8 @@
 // Where the time of a cycle goes: a squat as `tandem run` runs it, stage by stage, the stages of
 // the simulation inside `read` as well; and what tracing the stages costs.
 //   cycle_bench [EXPERIMENT] [KERNELS.so]      (default: COMAN's squat)
+//   cycle_bench EXPERIMENT KERNELS.so --paced   one cycle per period of the wall clock, 15 s at
+//   most
 // Times mean something on an idle machine only; the head says which one it was.
 #include <fmt/core.h>
 
@@ -60,13 +62,20 @@ void print_stages(const runtime::RobotCycle& cycle, const SimStages& sim) {
     }
   }
   row("all", total_ns, cycles, total_ns);
+  std::int64_t own_ns = total_ns;  // what a robot on a wire leaves to this computer
+  for (const sim::SimStage stage : {sim::SimStage::kPlant, sim::SimStage::kSense,
+                                    sim::SimStage::kBoards, sim::SimStage::kTruth}) {
+    own_ns -= sim.sum_ns[static_cast<std::size_t>(stage)];
+  }
+  row("all without the robot", own_ns, cycles, total_ns);
   const auto work = cycle.loop().work.percentiles();
   fmt::print("\ncycle p50 {:.1f} us, p99 {:.1f} us, max {:.1f} us\n", us(work.p50), us(work.p99),
              us(work.max));
 }
 
 /// One run, printed. @return the exit status.
-int run(const std::string& file, const std::string& library, bool logged) {
+/// @param paced  a cycle begins when its period does: the caches are the simulation's by then
+int run(const std::string& file, const std::string& library, bool logged, bool paced) {
   auto rig = make_sim_rig(file, library);
   if (!rig) return fail_with(rig.error());
   const std::string path = std::filesystem::temp_directory_path() / "tandem_cycle_bench.mcap";
@@ -82,7 +91,8 @@ int run(const std::string& file, const std::string& library, bool logged) {
   const auto cycle = (*rig)->cycle(e.cycles() + e.cycles() / 2, recorder.get());
   const std::int64_t begin_ns = stages.clock.now_ns();
   bool more = true;
-  while (more) {
+  for (std::int64_t i = 1; more && !(paced && i > 15'000); ++i) {
+    if (paced) stages.clock.sleep_until(begin_ns + i * e.loop.period_ns);
     stages.last_ns = stages.clock.now_ns();
     more = cycle->step();
   }
@@ -180,8 +190,9 @@ int main(int count, char** arguments) {
   const std::string file = count > 1 ? arguments[1] : TANDEM_CONFIG_FOLDER "/coman/squat.toml";
   const std::string library = count > 2 ? arguments[2] : TANDEM_MODEL_FOLDER "/coman_kernels.so";
   fmt::print("{}", tandem::bench::machine_text());
+  if (count > 3) return tandem::bench::run(file, library, false, true);
   for (const bool logged : {false, true}) {
-    const int status = tandem::bench::run(file, library, logged);
+    const int status = tandem::bench::run(file, library, logged, false);
     if (status != 0) return status;
   }
   const int status = tandem::bench::estimation_cost(file, library);
