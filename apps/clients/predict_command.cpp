@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <vector>
 
@@ -58,7 +59,11 @@ void print_prediction(const Json& answer) {
   const double ahead_s = static_cast<double>(answer.value("cycles", std::uint64_t{0})) * period_s;
   Facts facts;
   facts.add("from", fmt::format("{:.3f} s", answer.value("from_s", 0.0)));
-  facts.add("ahead", fmt::format("{:.3f} s, to its {}", ahead_s, answer.value("end", "?")));
+  const std::string end = answer.value("end", "?");
+  facts.add("ahead", fmt::format("{:.3f} s, {}", ahead_s,
+                                 end == "horizon"    ? "as far as was asked for"
+                                 : end == "run over" ? "then the run is over"
+                                                     : "then it diverges"));
   facts.add("computed in", fmt::format("{:.1f} ms of one core: {:.0f} x real time", cpu_s * 1e3,
                                        cpu_s > 0.0 ? ahead_s / cpu_s : 0.0));
   facts.add("cost the loop",
@@ -81,6 +86,9 @@ void print_prediction(const Json& answer) {
 }  // namespace
 
 Exit predict_command(const PredictOptions& options) {
+  if (!std::isfinite(options.horizon_s)) {
+    return refuse(Error{"--horizon is no number of seconds", "from one cycle to 10 s", {}, 0, {}});
+  }
   const auto run = ControlClient::open(options.target, "run");
   if (!run) return refuse(run.error());
   Json question{{"do", "predict"}, {"horizon_s", options.horizon_s}};

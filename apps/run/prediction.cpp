@@ -1,5 +1,7 @@
 #include "apps/run/prediction.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -7,13 +9,15 @@
 #include <vector>
 
 #include "apps/control/fault_table.hpp"
+#include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
 #include "rt/clock.hpp"
 
 namespace tandem::apps {
 namespace {
 
-constexpr std::size_t kRowsAnswered = 100;  // unless asked otherwise
+constexpr std::size_t kRowsAnswered = 100;        // unless asked otherwise
+constexpr std::size_t kNumbersAnswered = 90'000;  // an answer of more is read by no client
 
 struct RunFork final : internal_model::Fork {
   [[nodiscard]] bool diverged() const override { return robot->plant().diverged(); }
@@ -41,17 +45,25 @@ Status add_controllers_again(const Composition& c, runtime::ControllerHost& host
                   nothing->root(), false);
 }
 
-/// Every `every`th row of one joint.
+/// Every `every`th cycle of `cycles`, and the last one.
+std::vector<std::size_t> rows_answered(std::size_t cycles, std::size_t every) {
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < cycles; i += every) rows.push_back(i);
+  if (!rows.empty() && rows.back() != cycles - 1) rows.push_back(cycles - 1);
+  return rows;
+}
+
 Json column(const hal::Prediction& p, const std::vector<double>& of, std::size_t joint,
-            std::size_t every) {
+            const std::vector<std::size_t>& rows) {
   Json values = Json::array();
-  for (std::size_t i = 0; i < p.cycles; i += every) values.push_back(p.row(of, i)[joint]);
+  for (const std::size_t i : rows) values.push_back(p.row(of, i)[joint]);
   return values;
 }
 
-Json base_rows(const hal::Prediction& p, std::size_t first, std::size_t count, std::size_t every) {
+Json base_rows(const hal::Prediction& p, std::size_t first, std::size_t count,
+               const std::vector<std::size_t>& of) {
   Json rows = Json::array();
-  for (std::size_t i = 0; i < p.cycles; i += every) {
+  for (const std::size_t i : of) {
     const auto begin = p.base.begin() + static_cast<std::ptrdiff_t>(7 * i + first);
     rows.push_back(std::vector<double>(begin, begin + static_cast<std::ptrdiff_t>(count)));
   }
@@ -62,6 +74,7 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
                  std::size_t every) {
   const hal::Prediction& p = answer.prediction;
   const auto period_s = static_cast<double>(p.period_ns) * 1e-9;
+  const std::vector<std::size_t> rows = rows_answered(p.cycles, every);
   Json json{{"first_cycle", p.first_cycle},
             {"from_s", static_cast<double>(p.first_cycle) * period_s},
             {"period_ns", p.period_ns},
@@ -77,13 +90,13 @@ Json answer_json(const internal_model::Answer& answer, const hal::RobotConfig& r
             {"base", nullptr}};
   for (std::size_t j = 0; j < robot.joints.size(); ++j) {
     json["joints"][robot.joints[j].name] = {{"slides", robot.joints[j].slides},
-                                            {"reference_rad", column(p, p.reference_rad, j, every)},
-                                            {"position_rad", column(p, p.position_rad, j, every)},
-                                            {"torque_Nm", column(p, p.torque_Nm, j, every)}};
+                                            {"reference_rad", column(p, p.reference_rad, j, rows)},
+                                            {"position_rad", column(p, p.position_rad, j, rows)},
+                                            {"torque_Nm", column(p, p.torque_Nm, j, rows)}};
   }
   if (robot.model.floating_base) {
-    json["base"] = {{"position_m", base_rows(p, 0, 3, every)},
-                    {"quaternion", base_rows(p, 3, 4, every)}};
+    json["base"] = {{"position_m", base_rows(p, 0, 3, rows)},
+                    {"quaternion", base_rows(p, 3, 4, rows)}};
   }
   return json;
 }
@@ -136,34 +149,41 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
 
 void add_predict(ControlRegistry& registry, internal_model::PredictionService* service,
                  const hal::RobotConfig& robot) {
-  registry.add(
-      "predict", ControlEffect::kReads, "what the robot will do, by running its model ahead",
-      {{.name = "horizon_s",
-        .type = ControlKey::Type::kNumber,
-        .doc = "[s] from one cycle to 10; default 1"},
-       {.name = "every_cycles",
-        .type = ControlKey::Type::kInteger,
-        .doc = "cycles between two rows of the answer; default: about 100 rows"}},
-      [service, &robot](const Json& request) -> Result<Json> {
-        if (service == nullptr) {
-          return fail("this run has no model of its robot to predict with",
-                      "add [parallel] to the experiment (docs/internal-model.md)");
-        }
-        const double horizon_s = request.value("horizon_s", 1.0);
-        const auto every = request.value("every_cycles", std::int64_t{0});
-        constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
-        if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
-          return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
-        }
-        if (request.contains("every_cycles") && every < 1) {
-          return fail("predict: \"every_cycles\" is less than 1");
-        }
-        const auto answer = service->predict(std::llround(horizon_s * 1e9));
-        if (!answer) return std::unexpected(answer.error());
-        const std::size_t cycles = answer->prediction.cycles;
-        const std::size_t rows = std::max<std::size_t>(1, cycles / kRowsAnswered);
-        return answer_json(*answer, robot, every > 0 ? static_cast<std::size_t>(every) : rows);
-      });
+  registry.add("predict", ControlEffect::kReads,
+               "what the robot will do, by running its model ahead",
+               {{.name = "horizon_s",
+                 .type = ControlKey::Type::kNumber,
+                 .doc = "[s] from one cycle to 10; default 1"},
+                {.name = "every_cycles",
+                 .type = ControlKey::Type::kInteger,
+                 .doc = "cycles between two rows of the answer; default: about 100 rows"}},
+               [service, &robot](const Json& request) -> Result<Json> {
+                 if (service == nullptr) {
+                   return fail("this run has no model of its robot to predict with",
+                               "add [parallel] to the experiment (docs/internal-model.md)");
+                 }
+                 const double horizon_s = request.value("horizon_s", 1.0);
+                 const auto every = request.value("every_cycles", std::int64_t{0});
+                 constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
+                 if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
+                   return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
+                 }
+                 if (request.contains("every_cycles") && every < 1) {
+                   return fail("predict: \"every_cycles\" is less than 1");
+                 }
+                 const auto answer = service->predict(std::llround(horizon_s * 1e9));
+                 if (!answer) return std::unexpected(answer.error());
+                 const std::size_t cycles = answer->prediction.cycles;
+                 const std::size_t usual = std::max<std::size_t>(1, cycles / kRowsAnswered);
+                 const std::size_t step = every > 0 ? static_cast<std::size_t>(every) : usual;
+                 const std::size_t most = kNumbersAnswered / (3 * robot.joints.size() + 7);
+                 if (cycles / step >= most) {
+                   return fail(fmt::format("predict: {} rows of {} are too many for an answer",
+                                           cycles / step, counted(robot.joints.size(), "joint")),
+                               fmt::format("every_cycles from {} on", cycles / most + 1));
+                 }
+                 return answer_json(*answer, robot, step);
+               });
 }
 
 }  // namespace tandem::apps

@@ -98,7 +98,7 @@ TEST_F(Predict, SaysWhatTheRunWillDo) {
   EXPECT_EQ(answer["cycles"], 500);
   EXPECT_EQ(answer["every_cycles"], 5);
   EXPECT_EQ(answer["end"], "horizon");
-  EXPECT_EQ(answer["joints"]["joint1"]["position_rad"].size(), 100U);
+  EXPECT_EQ(answer["joints"]["joint1"]["position_rad"].size(), 101U) << "the last cycle too";
   EXPECT_TRUE(answer["base"].is_null());
   EXPECT_TRUE(answer["faults"].empty());
   const Outcome table = to_run("predict --horizon 0.2 --every 10");
@@ -109,6 +109,21 @@ TEST_F(Predict, SaysWhatTheRunWillDo) {
     EXPECT_EQ(refused.status, 2) << wrong;
     EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
   }
+  EXPECT_EQ(end(), 0);
+}
+
+/// However far apart the rows are, "then" is the horizon's end; and an answer has its size.
+TEST_F(Predict, AnswersWithTheLastCycleAndNoMoreRowsThanAClientReads) {
+  begin("");
+  const Outcome far = to_run("predict --horizon 0.5 --every 1000000 --json -");
+  ASSERT_EQ(far.status, 0) << far.err;
+  EXPECT_EQ(nlohmann::json::parse(far.out)["joints"]["joint1"]["position_rad"].size(), 2U);
+  const Outcome all = to_run("predict --horizon 6 --every 1 --json -");
+  ASSERT_EQ(all.status, 0) << all.err;
+  EXPECT_EQ(nlohmann::json::parse(all.out)["joints"]["joint1"]["position_rad"].size(), 6000U);
+  const Outcome many = to_run("predict --horizon 9 --every 1");
+  EXPECT_EQ(many.status, 2) << many.out;
+  EXPECT_NE(many.err.find("every_cycles from 2 on"), std::string::npos) << many.err;
   EXPECT_EQ(end(), 0);
 }
 
