@@ -158,7 +158,8 @@ void add_motion_facts(const RunSummary& summary, Facts& facts) {
 /// The time that is not in the line above: nothing has run then.
 void add_stopped(const LoopTimes& times, Facts& facts) {
   std::string text;
-  if (times.stopped_s > 0.0) text = fmt::format("{:.2f} s in fault or held", times.stopped_s);
+  if (times.stopped_s > 0.0)
+    text = fmt::format("{:.2f} s of the clock in fault or held", times.stopped_s);
   if (times.stood_s > 0.0) {
     text += fmt::format("{}{:.2f} s paused or suspended", text.empty() ? "" : ", ", times.stood_s);
   }

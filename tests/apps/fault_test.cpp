@@ -153,7 +153,7 @@ TEST_F(Faults, StopARunForATimeThatItsTableTells) {
   EXPECT_EQ(end(), 0);
   const std::string table = read_text(folder_ / "table.txt");
   EXPECT_NE(table.find("  not running  "), std::string::npos) << table;
-  EXPECT_NE(table.find(" s in fault or held"), std::string::npos) << table;
+  EXPECT_NE(table.find(" s of the clock in fault or held"), std::string::npos) << table;
   EXPECT_GT(json("run.json")["stopped_seconds"].get<double>(), 0.0);
 }
 
