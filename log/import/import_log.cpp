@@ -165,7 +165,7 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
                                 : read_csv_recording(files, imported.map, robot);
   if (!recording) return refuse(recording.error());
   imported.recording = std::move(*recording);
-  if (Status s = clean(imported.recording, imported.map); !s) return refuse(s.error());
+  if (Status s = clean(imported.recording, imported.map, robot); !s) return refuse(s.error());
   return imported;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -38,23 +39,26 @@ class Reader {
   }
 
  private:
-  std::size_t joint_of(TomlTable& table, std::string_view key, const std::string& name) {
+  std::optional<std::size_t> joint_of(TomlTable& table, std::string_view key,
+                                      const std::string& name) {
     const int index = robot_.joint_index(name);
     if (index >= 0) return static_cast<std::size_t>(index);
     std::vector<std::string> names;
     for (const hal::JointConfig& joint : robot_.joints) names.push_back(joint.name);
     table.error(key, "the robot '" + robot_.name + "' has no joint '" + name + "'",
                 suggest(name, names));
-    return 0;
+    return std::nullopt;
   }
 
   void read_joints(TomlTable& root) {
     std::vector<int> seen(robot_.joints.size(), 0);
     TomlTable missing = root.table_or_empty("missing_joints");
     for (const std::string& name : missing.keys()) {
-      const std::size_t joint = joint_of(missing, name, name);
-      map_.missing[joint] = missing.number(name);
-      ++seen[joint];
+      const double position = missing.number(name);
+      const auto joint = joint_of(missing, name, name);
+      if (!joint) continue;
+      map_.missing[*joint] = position;
+      ++seen[*joint];
     }
     missing.finish();
     const bool listed = root.has("joints");
@@ -62,11 +66,14 @@ class Reader {
       root.error("joints", "is missing: which joints do the columns belong to?",
                  "list the robot's joints in the order of the columns");
     }
+    bool all_known = true;
     for (const std::string& name : root.texts_or("joints", {})) {
-      map_.joints.push_back(joint_of(root, "joints", name));
-      ++seen[map_.joints.back()];
+      const auto joint = joint_of(root, "joints", name);
+      all_known = all_known && joint;
+      map_.joints.push_back(joint.value_or(0));
+      if (joint) ++seen[*joint];
     }
-    if (root.has_errors()) return;
+    if (!all_known || root.has_errors()) return;
     for (std::size_t j = 0; j < seen.size(); ++j) {
       const std::string& name = robot_.joints[j].name;
       if (!listed && seen[j] == 0) map_.joints.push_back(j);
@@ -122,6 +129,10 @@ class Reader {
     if (sampling == "nearest") map_.sampling = Sampling::kNearest;
     if (sampling == "previous") map_.sampling = Sampling::kPrevious;
     if (!bag_) read_time_column(time);
+    if (bag_ && time.has("column")) {
+      time.error("column", "is a table's: this recording is a bag, whose samples have their times",
+                 "remove it; [bag] stamp says which time is a sample's");
+    }
     time.finish();
   }
 
@@ -169,11 +180,12 @@ class Reader {
     if (bag.has("stamp")) map_.stamp = bag.choice("stamp", {"header", "log"});
     TomlTable names = bag.table_or_empty("names");
     for (const std::string& name : names.keys()) {
-      const std::size_t joint = joint_of(names, name, names.text(name));
+      const auto joint = joint_of(names, name, names.text(name));
+      if (!joint) continue;
       const bool twice =
-          std::ranges::any_of(map_.names, [&](const auto& one) { return one.second == joint; });
+          std::ranges::any_of(map_.names, [&](const auto& one) { return one.second == *joint; });
       if (twice) names.error(name, "another name leads to the same joint");
-      map_.names[name] = joint;
+      map_.names[name] = *joint;
     }
     names.finish();
     bag.finish();
@@ -200,6 +212,13 @@ class Reader {
       return columns;
     }
     columns = table.texts_or("columns", {});
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      if (std::find(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(i),
+                    columns[i]) == columns.begin() + static_cast<std::ptrdiff_t>(i)) {
+        continue;
+      }
+      table.error("columns", "names '" + columns[i] + "' twice", "a column is one number's");
+    }
     if (columns.size() != count) {
       table.error("columns",
                   "has " + std::to_string(columns.size()) + " columns for " +

@@ -1,5 +1,7 @@
 #include "log/import/sampling.hpp"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +15,7 @@ namespace {
 constexpr std::size_t kFewRows = 10;  // fewer that are equal say nothing
 constexpr std::int64_t kGapSteps = 3;
 constexpr std::uint64_t kMostCycles = 1'000'000'000;
+constexpr std::int64_t kMostRatio = 50;  // of the log's period to the recording's, either way
 
 std::string in_seconds(std::int64_t ns) {
   std::string text = std::to_string(static_cast<double>(ns) * 1e-9);
@@ -127,6 +130,42 @@ Status check_frozen(Series& series, const ImportMap& map, Exclusions& excluded) 
   return {};
 }
 
+/// A unit of time or a period that is off by orders of magnitude: almost no row would be used, or
+/// almost every cycle would be made up.
+Status check_period(const Series& series, const ImportMap& map) {
+  const std::vector<std::int64_t> steps = sorted_steps(series);
+  const std::int64_t step = std::max<std::int64_t>(1, steps[steps.size() / 2]);
+  if (map.period_ns / kMostRatio < step && step / kMostRatio < map.period_ns) return {};
+  return std::unexpected(Error{"a cycle of the log is " + in_seconds(map.period_ns) +
+                                   ", and the recording has a sample every " + in_seconds(step),
+                               "are [time] unit and period_s right?", map.file, 0,
+                               "time.period_s"});
+}
+
+/// Positions further outside of a joint's range than it is wide: another unit, or no number of it.
+Status check_range(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+  for (const ImportedColumn& column : series.columns) {
+    if (column.target.field != "position_rad") continue;
+    const hal::JointConfig& joint = robot.joints[column.target.index];
+    const double width = joint.max_position_rad - joint.min_position_rad;
+    if (!(width > 0.0)) continue;  // no robot.toml says it
+    for (std::size_t row = 0; row < column.values.size(); ++row) {
+      const double value = column.values[row];
+      if (value >= joint.min_position_rad - width && value <= joint.max_position_rad + width) {
+        continue;
+      }
+      const std::string unit = joint.slides ? " m" : " rad";
+      const auto number = [](double one) { return fmt::format("{:.6g}", one); };
+      return std::unexpected(row_error(
+          series, row,
+          column.name + " is " + number(value) + unit + "; '" + joint.name + "' moves from " +
+              number(joint.min_position_rad) + " to " + number(joint.max_position_rad) + unit,
+          "is its unit right in " + map.file + "? leave a bad row out by begin_s or end_s"));
+    }
+  }
+  return {};
+}
+
 /// A quaternion and its negative are one rotation: neighbours get the signs that are near.
 void unwrap(Series& series) {
   for (const std::size_t first : series.quaternions) {
@@ -177,7 +216,7 @@ void keep_rows(Series& series, const std::vector<std::size_t>& rows) {
   for (ImportedColumn& column : series.columns) keep(column.values);
 }
 
-Status clean(Recording& recording, const ImportMap& map) {
+Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig& robot) {
   for (Series& series : recording.series) {
     if (Status s = check_order(series, map, recording.excluded); !s) return s;
   }
@@ -197,6 +236,10 @@ Status clean(Recording& recording, const ImportMap& map) {
               "say [time] period_s", map.file, 0, "time.period_s"});
   }
   for (Series& series : recording.series) {
+    if (!series.joints.empty()) {
+      if (Status s = check_period(series, map); !s) return s;
+    }
+    if (Status s = check_range(series, map, robot); !s) return s;
     if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
     if (Status s = check_frozen(series, map, recording.excluded); !s) return s;
     unwrap(series);

@@ -241,6 +241,7 @@ unit = "rad"
 }
 
 TEST_F(Csv, CommandsSensorsAndMissingJointsAreDeclared) {
+  robot_.joints[0].max_position_rad = 20.0;
   const std::string map = R"(
 joints = ["joint1"]
 [missing_joints]
@@ -387,6 +388,30 @@ TEST_F(Csv, WhatIsAmbiguousIsAskedForByName) {
              "a.csv: the map does not say what these columns are: 'tau1', 'tau2'");
   EXPECT_EQ(imported({file}, "ignore = [\"*\"]" + without(torque)).excluded.ignored.size(), 2U);
   EXPECT_HAS(refusal({file}, "ignore = [\"tau3\"]" + without(torque)), "no column 'tau3' is left");
+}
+
+/// Degrees that are called rad, seconds that are called ms: no log of nonsense.
+TEST_F(Csv, ImpossibleNumbersAreRefused) {
+  robot_.joints[0].min_position_rad = -1.5;
+  robot_.joints[0].max_position_rad = 1.5;
+  const auto shifted = [](double by) {
+    return plain_rows(50, [by](int i, std::string row) {
+      return i == 7 ? "0.07," + std::to_string(by) + row.substr(row.find(',', 5)) : row;
+    });
+  };
+  EXPECT_EQ(imported({write("a.csv", shifted(2.0))}, kPlain).cycles, 50U) << "half a range beyond";
+  EXPECT_HAS(refusal({write("a.csv", shifted(57.0))}, kPlain),
+             "a.csv:9: rows: q1 is 57 rad; 'joint1' moves from -1.5 to 1.5 rad");
+  EXPECT_HAS(refusal({write("a.csv", shifted(1e30))}, kPlain), "a.csv:9: rows: q1 is 1e+30 rad");
+  const std::string file = write("a.csv", plain_rows(50));
+  const auto with = [](const std::string& line, const std::string& by) {
+    std::string map = kPlain;
+    return map.replace(map.find(line), line.size(), by);
+  };
+  EXPECT_HAS(refusal({file}, with("unit = \"s\"", "unit = \"ms\"")),
+             "time.period_s: a cycle of the log is 0.010000 s, and the recording has a sample");
+  EXPECT_HAS(refusal({file}, with("period_s = 0.01", "period_s = 10.0")), "time.period_s");
+  EXPECT_HAS(refusal({file}, with("period_s = 0.01", "period_s = 1e-6")), "time.period_s");
 }
 
 TEST_F(Csv, OfOtherKindsIsRefusedWithWhatToDo) {

@@ -49,6 +49,20 @@ TEST(ImportMap, IsStrict) {
              "command.temperature");
 }
 
+/// One mistake is one error.
+TEST(ImportMap, SaysWhatIsWrongOnce) {
+  std::string map = kWhole;
+  map.replace(map.find("joint2"), 6, "joint3");
+  const std::string misspelt = errors_of(map);
+  EXPECT_HAS(misspelt, "has no joint 'joint3'");
+  EXPECT_EQ(misspelt.find("twice"), std::string::npos) << misspelt;
+  EXPECT_EQ(misspelt.find("lacks"), std::string::npos) << misspelt;
+  map = kWhole;
+  map.replace(map.find("\"q{1}\""), 6, "[\"q1\", \"q1\"]");
+  EXPECT_HAS(errors_of(map), "position.columns: names 'q1' twice");
+  EXPECT_HAS(errors_of("[time]\ncolumn = \"t\"\n", true), "this recording is a bag");
+}
+
 TEST(ImportMap, OfABagNeedsNoColumns) {
   EXPECT_EQ(errors_of("", true), "");
   EXPECT_HAS(errors_of("[current]\nunit = \"A\"\n", true), "current");
