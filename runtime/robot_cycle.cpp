@@ -322,7 +322,7 @@ void RobotCycle::write() noexcept TANDEM_RT {
 /// To the log, the threads that watch the run, and those that wait for an answer.
 void RobotCycle::hand_over() noexcept TANDEM_RT {
   if (run_.in(RunPhase::kRunning)) {
-    statistics_.take(state_, command_, truth_, limits_.counters());
+    statistics_.take(state_, command_, truth_, limits_.counters(), estimate());
   }
   log_.images(time_, state_, command_, truth_, estimate());
   progress_.dropped.store(log_.dropped(), std::memory_order_relaxed);

@@ -1,18 +1,28 @@
 #include "runtime/run_statistics.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "runtime/fall_watch.hpp"
 
 namespace tandem::runtime {
+namespace {
+
+/// W's z axis in the frame of a body, whose quaternion is x y z w.
+std::array<double, 3> upwards(std::span<const double> q) {
+  return {2.0 * (q[0] * q[2] - q[3] * q[1]), 2.0 * (q[1] * q[2] + q[3] * q[0]),
+          1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1])};
+}
+
+}  // namespace
 
 RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops)
-    : errors_(joints), limited_(joints), feet_(feet), loops_(loops) {}
+    : errors_(joints), limited_(joints), feet_(feet), loops_(loops), external_Nm_(joints) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
-                         const hal::TruthImage* truth,
-                         std::span<const hal::LimitCounters> limits) noexcept TANDEM_RT {
+                         const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
+                         const hal::EstimateImage* estimate) noexcept TANDEM_RT {
   for (std::size_t j = 0; j < limits.size(); ++j) {
     const hal::LimitCounters& now = limits[j];
     const std::uint64_t count = std::uint64_t{now.not_finite} + now.out_of_range + now.too_fast;
@@ -38,6 +48,26 @@ void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& 
         std::max(one.max_velocity_error_m_s, truth->loop_velocity_error_m_s()[l]);
   }
   if (truth != nullptr && truth->hoist_share()[0] <= 0.0) take_ground(*truth);
+  if (estimate != nullptr) take_estimate(*estimate, truth);
+}
+
+void RunStatistics::take_estimate(const hal::EstimateImage& estimate,
+                                  const hal::TruthImage* truth) noexcept TANDEM_RT {
+  for (std::size_t j = 0; j < estimate.joints(); ++j) {
+    external_Nm_[j] = std::max(external_Nm_[j], std::abs(estimate.external_torque_Nm()[j]));
+  }
+  if (!estimate.has_base()) return;
+  ++base_cycles_;
+  if (truth == nullptr || truth->hoist_share()[0] > 0.0) return;
+  ++compared_;
+  const std::array<double, 3> here = upwards(estimate.base_quaternion());
+  const std::array<double, 3> there = upwards(truth->base_quaternion());
+  double square = 0.0;  // of the chord between the two, whose angle is small
+  for (std::size_t i = 0; i < 3; ++i) square += (here[i] - there[i]) * (here[i] - there[i]);
+  const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * std::sqrt(square)));
+  tilt_error_rad_ = std::max(tilt_error_rad_, angle);
+  height_error_m_ = std::max(height_error_m_,
+                             std::abs(estimate.base_position_m()[2] - truth->base_position_m()[2]));
 }
 
 void RunStatistics::take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT {
@@ -86,8 +116,13 @@ std::optional<BaseFigures> RunStatistics::base() const {
   return BaseFigures{min_height_m_, max_height_m_, tilt_rad_};
 }
 
+EstimateFigures RunStatistics::estimate() const {
+  return {base_cycles_, compared_, tilt_error_rad_, height_error_m_, external_Nm_};
+}
+
 void RunStatistics::archive(Archive& ar) {
-  ar(errors_, limited_, cycles_, feet_, loops_, free_cycles_, force_sum_N_, slip_m_, min_height_m_,
+  ar(errors_, limited_, cycles_, feet_, loops_, base_cycles_, compared_, tilt_error_rad_,
+     height_error_m_, external_Nm_, free_cycles_, force_sum_N_, slip_m_, min_height_m_,
      max_height_m_, tilt_rad_);
 }
 

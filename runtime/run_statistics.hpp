@@ -11,6 +11,7 @@
 #include "base/archive.hpp"
 #include "base/realtime.hpp"
 #include "hal/command_limits.hpp"
+#include "hal/estimate.hpp"
 #include "hal/image.hpp"
 #include "hal/truth.hpp"
 
@@ -34,6 +35,17 @@ struct BaseFigures {
   double final_tilt_rad = 0.0;  ///< angle between the base's z axis and W's
 };
 
+/// What the loop estimated while the controllers ran.
+struct EstimateFigures {
+  std::uint64_t base_cycles = 0;  ///< in which the base's estimate had started
+  /// Of these with a free base and a truth: the angle between the two estimates of what is
+  /// upwards, and of the base's height. 0 without a truth.
+  std::uint64_t compared = 0;
+  double max_tilt_error_rad = 0.0;
+  double max_height_error_m = 0.0;
+  std::vector<double> max_external_Nm;  ///< of each joint, absolute; empty without an observer
+};
+
 /// From the plant's truth: how far one closed loop was open at most, over every cycle.
 struct LoopFigures {
   double max_position_error_m = 0.0;
@@ -45,10 +57,11 @@ class RunStatistics {
   /// @param feet, loops  of the truth image; 0 without one.
   RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0);
 
-  /// A cycle in which the controllers ran. `truth` may be null; `limits` are CommandLimits' own.
+  /// A cycle in which the controllers ran. `truth` and `estimate` may be null; `limits` are
+  /// CommandLimits' own.
   void take(const hal::StateImage& state, const hal::CommandImage& command,
-            const hal::TruthImage* truth,
-            std::span<const hal::LimitCounters> limits) noexcept TANDEM_RT;
+            const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
+            const hal::EstimateImage* estimate = nullptr) noexcept TANDEM_RT;
 
   [[nodiscard]] std::vector<TrackingError> tracking() const;
   /// Per joint: cycles in which a controller's command was not what the joint was given.
@@ -56,6 +69,8 @@ class RunStatistics {
   /// Empty when there was no truth, no foot, or no cycle with a free base.
   [[nodiscard]] std::optional<GroundFigures> ground(double weight_N) const;
   [[nodiscard]] std::optional<BaseFigures> base() const;
+
+  [[nodiscard]] EstimateFigures estimate() const;
 
   /// Per loop; empty when there was no truth.
   [[nodiscard]] const std::vector<LoopFigures>& loops() const { return loops_; }
@@ -77,12 +92,17 @@ class RunStatistics {
     std::uint64_t touching = 0;
   };
   void take_ground(const hal::TruthImage& truth) noexcept TANDEM_RT;
+  void take_estimate(const hal::EstimateImage& estimate,
+                     const hal::TruthImage* truth) noexcept TANDEM_RT;
 
   std::vector<Error> errors_;
   std::vector<Limited> limited_;
   std::uint64_t cycles_ = 0;
   std::vector<Foot> feet_;
   std::vector<LoopFigures> loops_;
+  std::uint64_t base_cycles_ = 0, compared_ = 0;  // of the estimate
+  double tilt_error_rad_ = 0.0, height_error_m_ = 0.0;
+  std::vector<double> external_Nm_;  // of each joint: the largest
   std::uint64_t free_cycles_ = 0;
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
   double min_height_m_ = 0.0, max_height_m_ = 0.0, tilt_rad_ = 0.0;

@@ -330,10 +330,8 @@ class Session {
       fmt::print(out_, "\n");
       summary.print(out_);
     }
-    if (c_.master != nullptr) {
-      for (const std::string& warning : c_.master->warnings()) {
-        fmt::print(stderr, "warning: {}\n", warning);
-      }
+    for (const std::string& warning : summary.warnings()) {
+      fmt::print(stderr, "warning: {}\n", warning);
     }
     for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
     add_report(options_, summary, out_);

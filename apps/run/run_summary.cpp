@@ -66,6 +66,26 @@ Json base_json(const std::optional<runtime::BaseFigures>& base) {
           {"final_tilt_rad", base->final_tilt_rad}};
 }
 
+/// What was estimated; null without [estimation].
+Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures) {
+  if (c.estimator == nullptr) return nullptr;
+  const hal::EstimateImage& image = c.estimator->image();
+  Json json{{"base", nullptr}, {"external_torque_Nm", nullptr}};
+  if (image.estimates_base()) {
+    json["base"] = {{"cycles", figures.base_cycles},
+                    {"max_tilt_error_rad", nullptr},
+                    {"max_height_error_m", nullptr}};
+    if (figures.compared > 0) {
+      json["base"]["max_tilt_error_rad"] = figures.max_tilt_error_rad;
+      json["base"]["max_height_error_m"] = figures.max_height_error_m;
+    }
+  }
+  for (std::size_t j = 0; j < image.joints(); ++j) {
+    json["external_torque_Nm"][c.experiment.robot.joints[j].name] = figures.max_external_Nm[j];
+  }
+  return json;
+}
+
 Json loops_json(const hal::RobotConfig& robot, const std::vector<runtime::LoopFigures>& loops) {
   Json json = Json::object();
   for (std::size_t l = 0; l < loops.size(); ++l) {
@@ -155,6 +175,30 @@ void add_motion_facts(const RunSummary& summary, Facts& facts) {
   }
 }
 
+/// What the loop estimated: against the truth, where there is one.
+void add_estimate_facts(const RunSummary& summary, Facts& facts) {
+  const Composition& c = summary.composition;
+  if (c.estimator == nullptr) return;
+  const runtime::EstimateFigures figures = summary.cycle.statistics().estimate();
+  const hal::EstimateImage& image = c.estimator->image();
+  if (figures.compared > 0) {
+    facts.add("base estimate",
+              fmt::format("off by {:.3f} deg of tilt and {:.1f} mm of height at most",
+                          figures.max_tilt_error_rad * kDegrees, figures.max_height_error_m * 1e3));
+  } else if (image.has_base()) {
+    const auto deviation = image.base_deviation();
+    facts.add("base estimate",
+              fmt::format("standard deviation {:.3f} deg of tilt, {:.1f} mm of height at the end",
+                          std::hypot(deviation[0], deviation[1]) * kDegrees, deviation[8] * 1e3));
+  }
+  if (image.joints() == 0) return;
+  const auto most = std::ranges::max_element(figures.max_external_Nm);
+  const auto j = static_cast<std::size_t>(most - figures.max_external_Nm.begin());
+  const hal::JointConfig& joint = c.experiment.robot.joints[j];
+  facts.add("external torque",
+            fmt::format("{:.2f} {} at most ({})", *most, joint.slides ? "N" : "Nm", joint.name));
+}
+
 /// The time that is not in the line above: nothing has run then.
 void add_stopped(const LoopTimes& times, Facts& facts) {
   std::string text;
@@ -217,6 +261,9 @@ void add_link_facts(const remote::TeleBackend* link, double period_s, Facts& fac
   facts.add("without commands",
             fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
                         counted(figures.holds, "time")));
+  facts.add(
+      "without a state",
+      fmt::format("{:.3f} s at most", static_cast<double>(figures.most_silent_cycles) * period_s));
 }
 
 Json link_json(const remote::TeleBackend* link) {
@@ -232,7 +279,11 @@ Json link_json(const remote::TeleBackend* link) {
   json["down"] = counts(figures.down);
   json["starved_cycles"] = figures.starved_cycles;
   json["holds"] = figures.holds;
-  json["worst_prediction_rad"] = figures.worst_prediction_rad;
+  json["silent_cycles"] = figures.silent_cycles;
+  json["most_silent_cycles"] = figures.most_silent_cycles;
+  json["compared"] = figures.compared;
+  json["worst_prediction_rad"] = nullptr;
+  if (figures.compared > 0) json["worst_prediction_rad"] = figures.worst_prediction_rad;
   return json;
 }
 
@@ -326,6 +377,7 @@ Json RunSummary::json() const {
   json["loops"] = loops_json(e.robot, cycle.statistics().loops());
   json["parallel"] = parallel ? parallel_json(e.parallel->robot, *parallel, *differences) : Json();
   json["base"] = base_json(cycle.statistics().base());
+  json["estimate"] = estimate_json(composition, cycle.statistics().estimate());
   const hal::can::DriveMaster* master = composition.master;
   json["round_trips"] = master == nullptr ? Json::array() : round_trips_json(master->round_trips());
   json["start"] = start_json(master);
@@ -333,11 +385,34 @@ Json RunSummary::json() const {
   json["remote"] = remote_json(server, composition.remote);
   json["teleoperation"] = link_json(composition.tele);
   json["faults"] = faults;
-  json["warnings"] = master == nullptr ? std::vector<std::string>() : master->warnings();
+  json["warnings"] = warnings();
   json["fault_log"] = faults_json(cycle.faults());
   json["kernel_variant"] = composition.kernels->variant;
   add_engine_json(e, json);
   return json;
+}
+
+std::vector<std::string> RunSummary::warnings() const {
+  std::vector<std::string> all;
+  if (composition.master != nullptr) all = composition.master->warnings();
+  const bool estimates =
+      composition.estimator != nullptr && composition.estimator->image().estimates_base();
+  if (estimates && cycle.running_cycles() > 0 && cycle.statistics().estimate().base_cycles == 0) {
+    all.push_back(fmt::format(
+        "the base's estimate never started, so no external torque and no collision was looked for: "
+        "the robot has to stand still on its feet for {} s ([estimation.base] rest_s)",
+        composition.experiment.estimation.base->rest_s));
+  }
+  if (composition.tele == nullptr) return all;
+  const remote::TeleConfig& link = composition.experiment.teleoperation->link;
+  const double silent_s = static_cast<double>(composition.tele->figures().silent_cycles) *
+                          static_cast<double>(composition.experiment.loop.period_ns) * 1e-9;
+  if (silent_s > 1.0 + 2.0 * link.down.delay_s) {
+    all.push_back(fmt::format(
+        "no state of the robot came in the last {:.3f} s: what the operator saw then was {}",
+        silent_s, link.predict ? "the prediction alone" : "the last state"));
+  }
+  return all;
 }
 
 void RunSummary::print(std::FILE* out) const {
@@ -355,6 +430,7 @@ void RunSummary::print(std::FILE* out) const {
   Facts facts;
   add_limited(*this, facts);
   add_motion_facts(*this, facts);
+  add_estimate_facts(*this, facts);
   add_timing_facts(*this, facts);
   add_remote_facts(server, composition.remote, facts);
   add_link_facts(composition.tele,

@@ -42,6 +42,8 @@ struct RunSummary {
   /// docs/json.md
   [[nodiscard]] Json json() const;
   void print(std::FILE* out) const;
+  /// What was tolerated: missing feedback, refused values; a link that was silent at the end.
+  [[nodiscard]] std::vector<std::string> warnings() const;
 };
 
 }  // namespace tandem::apps

@@ -60,7 +60,7 @@ hal::Phase TeleBackend::phase() const noexcept {
 void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   linked_ = true;
   linked_ns_ = time.time_ns;
-  linked_cycle_ = arrived_cycle_ = time.cycle;
+  linked_cycle_ = arrived_cycle_ = heard_cycle_ = time.cycle;
   arrived_.assign(robot_state_);
   playout_.start(time.cycle, robot_command_);
   limits_.follow(robot_command_);
@@ -81,6 +81,7 @@ void TeleBackend::correct(const Head& head) noexcept TANDEM_RT {
   const std::uint64_t same = head.source_cycle + 1;  // the twin read its state after that command
   const std::uint64_t now = now_.cycle;
   if (same < linked_cycle_ || same > now || now - same >= past_cycles_) return;
+  ++compared_;
   const double passed =
       static_cast<double>(head.cycle - arrived_cycle_) * static_cast<double>(period_ns_);
   const double share =
@@ -110,14 +111,16 @@ void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
   (void)down_.send(time.time_ns, pack({time.cycle, playout_.source_cycle()}, robot_state_.bytes()));
   for (;;) {
     const std::span<const std::byte> message = down_.receive(time.time_ns);
-    if (message.empty()) return;
+    if (message.empty()) break;
     Head head{};
     std::memcpy(&head, message.data(), sizeof head);
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
     if (twin_ && !ended_) correct(head);
     arrived_cycle_ = head.cycle;
+    heard_cycle_ = time.cycle;
   }
+  most_silent_ = std::max(most_silent_, time.cycle - heard_cycle_);
 }
 
 void TeleBackend::show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
@@ -222,7 +225,8 @@ bool TeleBackend::archive(Archive& ar) {
   if (robot_side_) robot_side_->archive(ar);
   if (twin_ && twin_side_) twin_side_->archive(ar);
   ar(up_, down_, playout_, limits_, robot_state_, twin_state_, arrived_, robot_command_, linked_,
-     ended_, now_, linked_ns_, arrived_cycle_, linked_cycle_, past_, correction_, worst_rad_);
+     ended_, now_, linked_ns_, arrived_cycle_, heard_cycle_, most_silent_, compared_, linked_cycle_,
+     past_, correction_, worst_rad_);
   return true;
 }
 
@@ -231,6 +235,9 @@ TeleFigures TeleBackend::figures() const noexcept {
           .down = down_.counts(),
           .starved_cycles = playout_.starved_cycles(),
           .holds = playout_.holds(),
+          .silent_cycles = linked_ ? now_.cycle - heard_cycle_ : 0,
+          .most_silent_cycles = most_silent_,
+          .compared = compared_,
           .worst_prediction_rad = worst_rad_};
 }
 

@@ -38,9 +38,12 @@ struct TeleConfig {
 /// it has stopped.
 struct TeleFigures {
   Network::Counts up, down;
-  std::uint64_t starved_cycles = 0;   ///< in which the robot had no command and braked or held
-  std::uint64_t holds = 0;            ///< how often that began
-  double worst_prediction_rad = 0.0;  ///< of a joint: the robot's state against its prediction
+  std::uint64_t starved_cycles = 0;      ///< in which the robot had no command and braked or held
+  std::uint64_t holds = 0;               ///< how often that began
+  std::uint64_t silent_cycles = 0;       ///< since the newest state came, until now
+  std::uint64_t most_silent_cycles = 0;  ///< the longest time without one, the first included
+  std::uint64_t compared = 0;            ///< states that were held against their prediction
+  double worst_prediction_rad = 0.0;     ///< of a joint of these: the state less its prediction
 };
 
 /// The loop that uses this backend is the operator's. Each of its cycles is one of the robot's.
@@ -140,6 +143,8 @@ class TeleBackend final : public hal::Backend {
   hal::CycleTime now_;
   std::int64_t linked_ns_ = 0;       // when it began
   std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has
+  std::uint64_t heard_cycle_ = 0;    // in which it came
+  std::uint64_t most_silent_ = 0, compared_ = 0;
   std::uint64_t linked_cycle_ = 0;
   std::size_t past_cycles_;
   std::vector<double> past_;        // the twin's positions, velocities, torques of past cycles

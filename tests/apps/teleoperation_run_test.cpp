@@ -62,5 +62,24 @@ TEST_F(TeleoperationRun, OverDdsInLockstepIsTheRunInOneProcess) {
   EXPECT_EQ(rows(one, "truth"), rows(served["log"]["path"], "truth")) << "what the robot does";
 }
 
+/// The prediction alone looks as good as ever: the run has to say that nothing came.
+TEST_F(TeleoperationRun, OverALinkThatDiesSaysSo) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  const auto run = [&](const std::string& link) {
+    write_text(folder_ / "operated.toml", plain.substr(0, at) + link + plain.substr(at));
+    return tandem("run operated.toml --duration 3 --no-log --json run.json");
+  };
+  const Outcome dead = run("[teleoperation.up]\nloss = 1.0\n[teleoperation.down]\nloss = 1.0\n");
+  EXPECT_NE(dead.err.find("no state of the robot came in the last"), std::string::npos) << dead.err;
+  EXPECT_TRUE(json("run.json")["teleoperation"]["worst_prediction_rad"].is_null());
+  EXPECT_EQ(json("run.json")["warnings"].size(), 1U);
+  const Outcome outage = run("[[teleoperation.outage]]\nfrom_s = 0.5\nto_s = 2.5\n");
+  EXPECT_EQ(outage.err.find("no state"), std::string::npos) << "it came back: " << outage.err;
+  const auto link = json("run.json")["teleoperation"];
+  EXPECT_NEAR(link["most_silent_cycles"].get<int>(), 2000, 2);
+  EXPECT_GT(link["compared"].get<int>(), 900);
+}
+
 }  // namespace
 }  // namespace tandem::apps

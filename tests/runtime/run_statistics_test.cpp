@@ -113,5 +113,35 @@ TEST_F(RunStatisticsOfTwo, GivesTheBasesHeightsAndItsLastTilt) {
   EXPECT_NEAR(base->final_tilt_rad, angle, 1e-15);
 }
 
+/// Against the truth, whatever the yaw, which no sensor tells.
+TEST_F(RunStatisticsOfTwo, GivesTheEstimatesWorstErrorsOfTiltAndHeight) {
+  hal::EstimateImage estimate({.base = 1, .feet = 2, .joints = 2});
+  const auto take_both = [&](double yaw, double tilt, double height_m) {
+    truth_.base_quaternion()[3] = 1.0;
+    truth_.base_position_m()[2] = 0.5;
+    const auto q = estimate.base_quaternion();  // a turn about z after one about x
+    q[0] = std::cos(yaw / 2) * std::sin(tilt / 2);
+    q[1] = std::sin(yaw / 2) * std::sin(tilt / 2);
+    q[2] = std::sin(yaw / 2) * std::cos(tilt / 2);
+    q[3] = std::cos(yaw / 2) * std::cos(tilt / 2);
+    estimate.base_position_m()[2] = height_m;
+    statistics_.take(state_, command_, &truth_, limits_, &estimate);
+  };
+  estimate.external_torque_Nm()[1] = -3.0;
+  take_both(0.0, 1.0, 9.0);
+  EXPECT_EQ(statistics_.estimate().base_cycles, 0U) << "it has not started";
+  EXPECT_EQ(statistics_.estimate().max_external_Nm[1], 3.0);
+  estimate.base_valid()[0] = 1;
+  take_both(1.2, 0.01, 0.498);
+  take_both(2.5, 0.02, 0.501);
+  truth_.hoist_share()[0] = 0.5;
+  take_both(0.0, 1.0, 9.0);
+  const EstimateFigures figures = statistics_.estimate();
+  EXPECT_EQ(figures.base_cycles, 3U);
+  EXPECT_EQ(figures.compared, 2U) << "not on the hoist";
+  EXPECT_NEAR(figures.max_tilt_error_rad, 0.02, 1e-12);
+  EXPECT_NEAR(figures.max_height_error_m, 0.002, 1e-15);
+}
+
 }  // namespace
 }  // namespace tandem::runtime
