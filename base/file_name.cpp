@@ -38,6 +38,17 @@ std::string topic_name_problem(std::string_view name) {
   return is_digit(name.front()) ? "begins with a digit" : "";
 }
 
+std::string interface_name_problem(std::string_view name) {
+  constexpr std::size_t kLongest = 15;  // IFNAMSIZ less the closing zero
+  if (name.empty()) return "is empty";
+  if (name.size() > kLongest) {
+    return "is longer than " + std::to_string(kLongest) + " characters, which Linux allows";
+  }
+  const auto forbidden = [](char c) { return c == '/' || c == ':' || c == 0x7F || (c >= 0 && c <= ' '); };
+  if (std::ranges::any_of(name, forbidden)) return "has a blank, '/' or ':'";
+  return name == "." || name == ".." ? "is a folder's name" : "";
+}
+
 std::string topic_token(std::string_view name) {
   std::string token(name.substr(0, kLongestFileName));
   std::ranges::replace_if(

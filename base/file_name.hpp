@@ -1,4 +1,4 @@
-// Which names may become part of a file's name, or of a topic's.
+// Which names may become part of a file's name, of a topic's, or name a network interface.
 // Layer: base.  Thread: non-RT only.
 #pragma once
 
@@ -18,6 +18,10 @@ inline constexpr std::size_t kLongestFileName = 64;
 /// Why `name` cannot be part of a ROS 2 topic's name, or empty when it can: letters, digits and `_`
 /// of ASCII, no digit at the front, 1 to kLongestFileName characters.
 [[nodiscard]] std::string topic_name_problem(std::string_view name);
+
+/// Why no network interface of Linux can have the name, or empty when one can: 1 to 15 characters,
+/// none of them a blank, `/` or `:`, and neither `.` nor `..`.
+[[nodiscard]] std::string interface_name_problem(std::string_view name);
 
 /// The nearest name that can: what is neither letter nor digit becomes `_`.
 [[nodiscard]] std::string topic_token(std::string_view name);

@@ -12,6 +12,7 @@
 
 #include "canopen/ini_text.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/sheet_mappings.hpp"
 #include "canopen/sheet_number.hpp"
 #include "canopen/sheet_objects.hpp"
 
@@ -58,6 +59,7 @@ class SheetReader {
     }
     read_identity();
     read_dummies();
+    for (const OddMapping& odd : odd_mappings(sheet_)) remarks_.add(odd.line, odd.text);
     sheet_.remarks = remarks_.take();
     return std::move(sheet_);
   }

@@ -6,6 +6,7 @@
 #include <set>
 #include <thread>
 
+#include "base/file_name.hpp"
 #include "base/nearest.hpp"
 #include "hal/ethercat-can/foreign_master.hpp"
 #include "rt/clock.hpp"
@@ -134,8 +135,13 @@ Status replace_interfaces(hal::RobotConfig& robot, std::span<const std::string> 
       return fail("no bus of " + robot.file + " has the interface '" + from + "'",
                   suggest(from, known));
     }
+    const std::string to = text.substr(equals + 1);
+    if (const std::string problem = interface_name_problem(to); !problem.empty()) {
+      return fail("--interface " + text + ": '" + to + "' " + problem,
+                  "name an interface that `ip link` lists");
+    }
     for (std::size_t b = 0; b < known.size(); ++b) {
-      if (known[b] == from) robot.buses[b].interface = text.substr(equals + 1);
+      if (known[b] == from) robot.buses[b].interface = to;
     }
   }
   return {};

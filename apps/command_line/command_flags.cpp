@@ -602,6 +602,7 @@ void add_flags(CLI::App& app, LatencyOptions& o) {
 void add_flags(CLI::App& app, DoctorOptions& o) {
   app.add_option("robot", o.robot,
                  "Robot TOML, to look at the interfaces of its buses and its EtherCAT slaves");
+  app.add_option("--interface", o.interfaces, kInterfaceHelp);
   app.add_option("--root", o.root, "Folder with copies of /proc and /sys")->group("");
   app.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   app.footer(kDoctorExamples);

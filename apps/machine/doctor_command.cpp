@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "apps/can/can_sockets.hpp"
 #include "apps/machine/commands.hpp"
 #include "apps/machine/doctor.hpp"
 #include "apps/robot/robot_files.hpp"
@@ -82,9 +83,17 @@ Exit doctor_command(const DoctorOptions& options) {
   const Machine machine(options.root);
   std::vector<Finding> findings = examine_machine(machine);
   std::vector<ClockFinding> clocks;
+  if (options.robot.empty() && !options.interfaces.empty()) {
+    return refuse(fail("--interface replaces those of a robot, and none is named",
+                       "tandem doctor ROBOT.toml --interface " + options.interfaces.front())
+                      .error());
+  }
   if (!options.robot.empty()) {
-    const auto robot = read_robot(options.robot);
+    auto robot = read_robot(options.robot);
     if (!robot) return refuse(robot.error());
+    if (Status done = replace_interfaces(robot->config, options.interfaces); !done) {
+      return refuse(done.error());
+    }
     const auto is_can = [](const hal::BusConfig& bus) { return bus.kind == hal::BusKind::kCan; };
     if (std::ranges::none_of(robot->config.buses, is_can)) {
       std::erase_if(findings, [](const Finding& one) { return one.name == kCanSupport; });

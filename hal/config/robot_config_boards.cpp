@@ -2,6 +2,9 @@
 // list.
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
 
 #include "canopen/drive_abilities.hpp"
 #include "canopen/frame.hpp"
@@ -32,6 +35,11 @@ void add_bus(TomlTable& table, RobotConfig& robot) {
   bus.name = read_own_name(table);
   check_unique(table, robot.buses, bus.name, "bus");
   bus.interface = table.text_or("interface", bus.name);
+  const std::string problem = interface_name_problem(bus.interface);
+  if (table.has("interface") && !problem.empty()) {
+    table.error("interface", "'" + bus.interface + "' " + problem,
+                "name it as `ip link` does, for instance \"can0\"");
+  }
   if (bus.fd && bus.data_bitrate < bus.bitrate) {
     table.error("data_bitrate", "is lower than the bitrate of the arbitration phase",
                 "raise it, or set fd = false");
@@ -62,21 +70,52 @@ BoardConfig read_board(TomlTable& table) {
   return board;
 }
 
-/// Reads the data sheet that the board names.
-void read_sheet(TomlTable& table, const std::string& robot_file, BoardConfig& board) {
+/// The data sheets of a robot's drives, each read once.
+class Sheets {
+ public:
+  /// Reads the data sheet that the board names. What is wrong with it is said of the first board.
+  void read(TomlTable& table, const std::string& robot_file, BoardConfig& board) {
+    if (board.eds.empty()) return;
+    namespace fs = std::filesystem;
+    const std::string path = (fs::path(robot_file).parent_path() / board.eds).string();
+    const auto [known, is_new] = read_.try_emplace(path);
+    if (is_new) {
+      if (auto sheet = canopen::load_data_sheet(path); sheet) {
+        known->second = std::move(*sheet);
+      } else {
+        table.error("eds", sheet.error().to_string(), "`tandem eds show` checks a sheet by itself");
+      }
+    }
+    if (!known->second) return;
+    board.eds = path;
+    auto sheet = std::make_shared<canopen::DataSheet>(*known->second);
+    if (table.boolean_or("fd", false)) {
+      sheet->most_pdo_bytes = static_cast<int>(canopen::kMaxFrameBytes);
+    }
+    board.sheet = std::move(sheet);
+  }
+
+ private:
+  std::map<std::string, std::optional<canopen::DataSheet>> read_;  // none: it has an error
+};
+
+/// Whether the sheet is of the drive that robot.toml describes.
+void check_identity(TomlTable& table, const BoardConfig& board) {
   if (board.eds.empty()) return;
-  namespace fs = std::filesystem;
-  const std::string path = (fs::path(robot_file).parent_path() / board.eds).string();
-  auto sheet = canopen::load_data_sheet(path);
-  if (!sheet) {
-    table.error("eds", sheet.error().to_string(), "`tandem eds show` checks a sheet by itself");
-    return;
-  }
-  board.eds = path;
-  if (table.boolean_or("fd", false)) {
-    sheet->most_pdo_bytes = static_cast<int>(canopen::kMaxFrameBytes);
-  }
-  board.sheet = std::make_shared<const canopen::DataSheet>(std::move(*sheet));
+  const canopen::DataSheet& sheet = *board.sheet;
+  const auto other = [&](const char* key, std::uint32_t wanted, std::uint32_t said) {
+    table.error(key,
+                "is " + hex(wanted) + ", and its drive's sheet (" + board.eds + ") is of " +
+                    hex(said),
+                "get the sheet of this drive, or remove the key: then the sheet's counts");
+  };
+  const auto compare = [&](const char* key, std::optional<std::uint32_t> wanted,
+                           std::optional<std::uint32_t> said, std::uint32_t shift) {
+    if (wanted && said && *wanted >> shift != *said >> shift) other(key, *wanted, *said);
+  };
+  compare("vendor_id", board.vendor_id, sheet.vendor, 0);
+  compare("product_code", board.product_code, sheet.product, 0);
+  compare("revision", board.revision, sheet.revision, 16);
 }
 
 /// What only a drive of another make may, or can, be told.
@@ -129,12 +168,13 @@ std::vector<std::string> read_list(TomlTable& table, const std::string& board,
 
 /// @param bus  whose table holds this one; empty for a [[board]]
 void add_board(TomlTable table, const std::string& bus, NodeIds& ids,
-               std::vector<BoardTable>& boards, RobotConfig& robot) {
+               std::vector<BoardTable>& boards, Sheets& sheets, RobotConfig& robot) {
   BoardConfig board = read_board(table);
   board.line = table.line();
   board.name = read_own_name(table);
   check_unique(table, robot.boards, board.name, "board");
-  read_sheet(table, robot.file, board);
+  sheets.read(table, robot.file, board);
+  check_identity(table, board);
   board.bus = read_bus_name(table, bus);
   check_reference(table, "bus", board.bus, robot.buses, "bus");
   check_drive_keys(table, robot, board);
@@ -153,20 +193,21 @@ std::vector<BoardTable> read_buses(TomlTable& root, NodeIds& ids, RobotConfig& r
   const TomlTable bus_defaults = read_defaults(root, "bus_defaults", read_bus);
   const TomlTable board_defaults = read_defaults(root, "board_defaults", read_board);
   std::vector<BoardTable> boards;
+  Sheets sheets;
   for (TomlTable& bus : root.tables("bus")) {
     bus.inherit(bus_defaults);
     add_bus(bus, robot);
     const std::string name = robot.buses.back().name;
     for (TomlTable& board : bus.tables("boards")) {
       board.inherit(board_defaults);
-      add_board(board, name, ids, boards, robot);
+      add_board(board, name, ids, boards, sheets, robot);
     }
     for (TomlTable& sensor : bus.tables("sensors")) sensors.push_back({std::move(sensor), name});
     bus.finish();
   }
   for (TomlTable& board : root.tables("board")) {
     board.inherit(board_defaults);
-    add_board(board, {}, ids, boards, robot);
+    add_board(board, {}, ids, boards, sheets, robot);
   }
   return boards;
 }

@@ -175,12 +175,6 @@ void read_axis(TomlTable& table, std::span<const AxisAssignment> listed, const R
   }
 }
 
-std::string hex(std::uint32_t value) {
-  std::array<char, 16> text{};
-  (void)std::snprintf(text.data(), text.size(), "0x%08X", value);
-  return text.data();
-}
-
 /// The units of a drive of another make: the table's, else those of its sheet.
 void complete_units(TomlTable& table, const RobotConfig& robot, JointConfig& joint) {
   const BoardConfig* board = robot.board(joint.board);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdio>
 #include <map>
 #include <set>
 #include <span>
@@ -34,6 +36,13 @@ inline std::string read_own_name(TomlTable& table) {
     table.error("name", "'" + name + "' " + problem, "use letters, digits, _, - and .");
   }
   return name;
+}
+
+/// "0x00000192"
+inline std::string hex(std::uint32_t value) {
+  std::array<char, 16> text{};
+  (void)std::snprintf(text.data(), text.size(), "0x%08X", value);
+  return text.data();
 }
 
 /// Of a node.

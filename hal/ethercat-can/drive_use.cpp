@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 
 #include "base/counted.hpp"
 #include "canopen/drive_abilities.hpp"
 #include "canopen/objects.hpp"
+#include "canopen/sheet_mappings.hpp"
 
 namespace tandem::hal::can {
 namespace {
@@ -119,6 +121,17 @@ std::vector<std::string> unwatched(const NodePlan& node, const DataSheet& sheet)
   return out;
 }
 
+/// A mapping that no drive can have: the sheet is another one's, or wrong.
+void warn_of_mappings(const DataSheet& sheet, Diagnostics& warnings) {
+  for (canopen::OddMapping& odd : canopen::odd_mappings(sheet)) {
+    warnings.push_back({.message = std::move(odd.text),
+                        .hint = "is it the sheet of this drive? Where the mapping can be written, "
+                                "the master writes its own",
+                        .file = sheet.file,
+                        .line = odd.line});
+  }
+}
+
 }  // namespace
 
 DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
@@ -189,10 +202,12 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
   const auto layout = make_pdo_layout(robot);
   if (!layout) return std::unexpected(layout.error());
   Diagnostics warnings;
+  std::set<std::string> seen;  // sheets that several boards have
   for (const NodePlan& node : layout->nodes) {
     if (node.board < 0) continue;
     const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
     if (board.eds.empty()) continue;
+    if (seen.insert(board.eds).second) warn_of_mappings(*board.sheet, warnings);
     for (std::string& text : unwatched(node, *board.sheet)) {
       warnings.push_back({.message = std::move(text),
                           .hint = "set the drive's own time-out",

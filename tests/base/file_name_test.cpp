@@ -20,6 +20,15 @@ TEST(FileName, WhatLeadsElsewhereOrHidesIsRefused) {
   EXPECT_NE(file_name_problem(std::string_view("a\0b", 3)), "");
 }
 
+TEST(InterfaceName, HasFifteenCharactersAtMost) {
+  for (const char* name : {"can0", "eth0.100", "enp0s31f6", "a23456789012345"}) {
+    EXPECT_EQ(interface_name_problem(name), "") << name;
+  }
+  for (const char* name : {"", "a234567890123456", "can 0", "a/b", "eth0:1", ".", "..", "a\n"}) {
+    EXPECT_NE(interface_name_problem(name), "") << name;
+  }
+}
+
 TEST(TopicName, LettersDigitsAndUnderscoresAreAllowed) {
   for (const char* name : {"imu", "_1", "Left_Foot_2"}) EXPECT_EQ(topic_name_problem(name), "");
   for (const char* name : {"", "a/1", "a-1", "a.1", "1a", "a b", "é"}) {

@@ -101,6 +101,18 @@ std::string remarks(const DataSheet& sheet) {
   return all;
 }
 
+/// [1A00] with a value and more of sub 0, and so many entries.
+std::string mapping(int count, const std::string& of_count, int entries, const std::string& entry) {
+  const auto sub = [](int number, const std::string& type, const std::string& value) {
+    return "[1A00sub" + std::to_string(number) + "]\nParameterName=S\nDataType=" + type +
+           "\nAccessType=rw\nDefaultValue=" + value + "\n";
+  };
+  std::string text = "[1A00]\nObjectType=9\nSubNumber=" + std::to_string(entries + 1) + "\n" +
+                     sub(0, "5", std::to_string(count)) + of_count;
+  for (int i = 1; i <= entries; ++i) text += sub(i, "7", entry);
+  return plus(text);
+}
+
 /// What is wrong with `text`: the error as a user reads it.
 std::string refusal(const std::string& text) {
   const auto sheet = read_data_sheet(text, "drive.eds");
@@ -371,6 +383,13 @@ TEST(DataSheet, RemarksWhatContradictsItself) {
            {variable("DataType=5\nAccessType=rw\nHighLimit=256\n"),
             "HighLimit: '256' is no limit of this DataType: left out"},
            {plus("[2000]" + sub + "[2000]" + sub), "line 67: [2000] comes again"},
+           {mapping(9, "HighLimit=8\n", 9, "0x60400010"),
+            "line 66: [1A00] maps 9 objects, and has room for 8"},
+           {mapping(65, "", 2, "0x60400001"), "[1A00] maps 65 objects, and has room for 64"},
+           {mapping(3, "", 2, "0x60400010"), "[1A00] maps 3 objects, of which 1 are not defined"},
+           {mapping(7, "", 7, "0x60400010"),
+            "line 66: [1A00] maps 112 bits, and a frame has at most 64; one of CAN FD 512"},
+           {mapping(3, "", 3, "0x604000FF"), "[1A00] maps 765 bits, and a frame has at most 64\n"},
        }) {
     const auto sheet = read_data_sheet(row.text, "drive.eds");
     ASSERT_TRUE(sheet.has_value()) << row.remark << sheet.error().to_string();

@@ -251,5 +251,22 @@ TEST(Sheet, OfADriveThatMissesADeadMasterIsWarnedOf) {
   EXPECT_TRUE(drive_warnings(test::classic_config())->empty()) << "our own boards";
 }
 
+TEST(Sheet, WhoseMappingNoFrameCarriesIsWarnedOfOnceForAllItsBoards) {
+  SheetRig rig(servo());
+  auto sheet = std::make_shared<canopen::DataSheet>(*rig.robot.boards[0].sheet);
+  for (canopen::SheetEntry& entry : sheet->entries) {
+    if (entry.index != 0x1A00) continue;
+    if (entry.sub == 0) entry.line = 700;
+    entry.value = canopen::SheetValue{.number = entry.sub == 0 ? 3 : 0x60640020};
+  }
+  sheet->file = "drive.eds";
+  rig.robot.boards[0].sheet = sheet;
+  const auto warnings = drive_warnings(rig.robot);
+  ASSERT_TRUE(warnings);
+  ASSERT_EQ(warnings->size(), 1U);
+  EXPECT_TRUE((*warnings)[0].to_string().starts_with("drive.eds:700: [1A00] maps 96 bits"))
+      << (*warnings)[0].to_string();
+}
+
 }  // namespace
 }  // namespace tandem::hal::can

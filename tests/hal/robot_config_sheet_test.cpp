@@ -138,6 +138,42 @@ TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
   EXPECT_NE(folder_of_it.find("is a folder"), std::string::npos) << folder_of_it;
 }
 
+TEST_F(BoardSheet, OfTwoBoardsSaysOnceWhatIsWrongWithIt) {
+  const std::string second = with(
+      with(kArm, "[[joint]]\n", "[[board]]\nname = \"other\"\nbus = \"arm\"\neds = \"drive.eds\"\n"
+                               "joints = [\"wrist\"]\n[[joint]]\n"),
+      "name = \"elbow\"\nactuator", "names = [\"elbow\", \"wrist\"]\nactuator");
+  EXPECT_EQ(refused(second), "taken");
+  sheet = with(sheet, "AccessType=const", "AccessType=sometimes");
+  EXPECT_NE(refused(second).find("sometimes"), std::string::npos) << refused(second);
+}
+
+TEST_F(BoardSheet, OfAnotherDriveThanTheRobotsIsRefused) {
+  const auto of = [](const std::string& key) {
+    return with(kArm, "eds = \"drive.eds\"\n", "eds = \"drive.eds\"\n" + key + "\n");
+  };
+  for (const auto& [key, part] :
+       {std::pair{"vendor_id = 0xFFF2", "vendor_id: is 0x0000FFF2, and its drive's sheet ("},
+        {"product_code = 0x65", "product_code: is 0x00000065"},
+        {"revision = 0x00020000", "revision: is 0x00020000"}}) {
+    const std::string error = refused(of(key));
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+    EXPECT_NE(error.find("drive.eds) is of 0x"), std::string::npos) << error;
+  }
+  EXPECT_EQ(refused(of("vendor_id = 0xFFF1")), "taken");
+  EXPECT_EQ(refused(of("revision = 0x00010007")), "taken") << "a later minor revision";
+}
+
+TEST_F(BoardSheet, IsOnAnInterfaceThatLinuxCanHave) {
+  const auto of = [](const std::string& name) {
+    return with(kArm, "fd = false\n", "fd = false\ninterface = \"" + name + "\"\n");
+  };
+  EXPECT_EQ(refused(of("enp0s31f6")), "taken");
+  const std::string error = refused(of("a_name_that_has_thirty_letters"));
+  EXPECT_NE(error.find("is longer than 15 characters"), std::string::npos) << error;
+  EXPECT_NE(error.find("robot.toml:18: bus"), std::string::npos) << error;
+}
+
 constexpr const char* kLast = "max_torque_Nm = 10.0\n";
 
 /// The arm with more of its joint, or of its board.

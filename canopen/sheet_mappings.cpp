@@ -1,0 +1,66 @@
+// Entries and bits, counted as the sheet's values map them.
+#include "canopen/sheet_mappings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+
+#include "canopen/frame.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::canopen {
+namespace {
+
+constexpr std::uint16_t kMappings = 0x200;  // of each direction
+constexpr std::int64_t kMostEntries = 64;   // CiA 301, 7.4.8.2
+
+std::string section(std::uint16_t index) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "[%04X]", index);
+  return text.data();
+}
+
+/// @param count  the mapping's sub 0
+void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMapping>& odd) {
+  const std::int64_t entries = count.value->number;
+  const std::string name = section(count.index);
+  if (entries >= 0xFE) return;  // CiA 301: multiplexed PDOs
+  const std::int64_t most_entries = std::min(count.high.value_or(kMostEntries), kMostEntries);
+  if (entries > most_entries) {
+    odd.push_back({count.line, name + " maps " + std::to_string(entries) +
+                                   " objects, and has room for " + std::to_string(most_entries)});
+  }
+  int bits = 0;
+  std::int64_t missing = 0;
+  for (std::int64_t sub = 1; sub <= std::min(entries, kMostEntries); ++sub) {
+    const SheetEntry* entry = sheet.find(count.index, static_cast<std::uint8_t>(sub));
+    if (entry == nullptr) ++missing;
+    if (entry != nullptr && entry->value) bits += static_cast<int>(entry->value->number & 0xFF);
+  }
+  if (missing > 0) {
+    odd.push_back({count.line, name + " maps " + std::to_string(entries) + " objects, of which " +
+                                   std::to_string(missing) + " are not defined"});
+  }
+  const int most = 8 * sheet.most_pdo_bytes;
+  if (bits <= most) return;
+  const bool fits_fd = bits <= 8 * static_cast<int>(kMaxFrameBytes);
+  odd.push_back({count.line, name + " maps " + std::to_string(bits) +
+                                 " bits, and a frame has at most " + std::to_string(most) +
+                                 (fits_fd ? "; one of CAN FD 512" : "")});
+}
+
+}  // namespace
+
+std::vector<OddMapping> odd_mappings(const DataSheet& sheet) {
+  std::vector<OddMapping> odd;
+  for (const std::uint16_t first : {object::kRpdoMapping, object::kTpdoMapping}) {
+    auto at = std::ranges::lower_bound(sheet.entries, first, {}, &SheetEntry::index);
+    for (; at != sheet.entries.end() && at->index < first + kMappings; ++at) {
+      if (at->sub == 0 && at->value) check(sheet, *at, odd);
+    }
+  }
+  return odd;
+}
+
+}  // namespace tandem::canopen
