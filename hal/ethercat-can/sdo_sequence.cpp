@@ -249,6 +249,8 @@ void add_axis(Steps& steps, const RobotConfig& robot, const NodePlan& node, std:
   if (takes(object::kQuickStopOption, 0)) {
     add(object::kQuickStopOption, 0, std::int16_t{2});  // the ramp, then disabled
   }
+  // The drive adds it to every target: what somebody left there would shift the joint.
+  if (takes(object::kPositionOffset, 0)) add(object::kPositionOffset, 0, std::int32_t{0});
   const JointConfig& joint = robot.joints[node.joints[axis]];
   const StopOptions& stop = joint.stop_options;
   for (const auto& [index, value] : {std::pair{object::kShutdownOption, stop.shutdown},

@@ -47,6 +47,12 @@ TEST(Sheet, TheDriveKnowsTheCycleAndWatchesTheMaster) {
   EXPECT_EQ(rig.drive.value(0x605A), 2);
 }
 
+TEST(Sheet, AnOffsetOfPositionsThatSomebodyLeftIsSetToZero) {
+  SheetRig rig(servo().add(0x60B0, 0, kInteger32, canopen::kReadWrite, 777));
+  ASSERT_TRUE(rig.bring_up());
+  EXPECT_EQ(rig.drive.value(0x60B0), 0) << "the drive adds it to every target";
+}
+
 TEST(Sheet, PdosThatAreNotUsedAreSwitchedOff) {
   SheetRig rig(servo());
   ASSERT_TRUE(rig.bring_up());
