@@ -42,9 +42,11 @@ std::string interface_name_problem(std::string_view name) {
   constexpr std::size_t kLongest = 15;  // IFNAMSIZ less the closing zero
   if (name.empty()) return "is empty";
   if (name.size() > kLongest) {
-    return "is longer than " + std::to_string(kLongest) + " characters, which Linux allows";
+    return "is longer than " + std::to_string(kLongest) + " characters, the limit of Linux";
   }
-  const auto forbidden = [](char c) { return c == '/' || c == ':' || c == 0x7F || (c >= 0 && c <= ' '); };
+  const auto forbidden = [](char c) {
+    return c == '/' || c == ':' || c == 0x7F || (c >= 0 && c <= ' ');
+  };
   if (std::ranges::any_of(name, forbidden)) return "has a blank, '/' or ':'";
   return name == "." || name == ".." ? "is a folder's name" : "";
 }

@@ -281,9 +281,9 @@ struct BenchOptions {
 
 /// tandem doctor [ROBOT]
 struct DoctorOptions {
-  std::string robot;       ///< robot.toml, whose buses are looked at; may be empty
+  std::string robot;                    ///< robot.toml, whose buses are looked at; may be empty
   std::vector<std::string> interfaces;  ///< "can0=vcan0"
-  std::string root = "/";  ///< of the files that are read
+  std::string root = "/";               ///< of the files that are read
   std::string json;
 };
 

@@ -59,6 +59,10 @@ std::string text_of(const Identity& identity) {
                      identity.product, identity.revision);
 }
 
+/// Where what is looked at may be a program.
+constexpr const char* kLockstep =
+    "; `tandem emulate --lockstep` answers a run alone: leave --lockstep out";
+
 std::string slave_text(std::size_t slave, const std::string& name) {
   return fmt::format("slave {} ({})", slave, name);
 }
@@ -89,7 +93,8 @@ Finding slaves(const hal::BusConfig& bus, const std::vector<SlavePlan>& plans,
   finding.health = Health::kMissing;
   if (survey.found == 0) {
     finding.why = "no frame comes back";
-    finding.mend = "look at the cable to " + slave_text(0, plans.front().name) + " and its power";
+    finding.mend =
+        "look at the cable to " + slave_text(0, plans.front().name) + " and its power" + kLockstep;
   } else if (survey.found < plans.size()) {
     const std::string first = slave_text(survey.found, plans[survey.found].name);
     finding.why = first + " is the first that no frame reaches";
@@ -110,8 +115,9 @@ Finding identities(const hal::BusConfig& bus, const std::vector<SlavePlan>& plan
     const SurveyedSlave& slave = survey.slaves[i];
     const std::string who = slave_text(i, plans[i].name);
     if (!slave.identified) {
-      return {name, Health::kMissing, who + ": none", "its information memory cannot be read",
-              "switch it off and on; its maker's tool writes the memory anew"};
+      return {
+          name, Health::kMissing, who + ": none", "its information memory cannot be read",
+          std::string("switch it off and on; its maker's tool writes the memory anew") + kLockstep};
     }
     Identity found = slave.identity;
     if (found.vendor == ethercat::sii::kNobodysVendor) {  // test equipment stands for any maker's

@@ -258,6 +258,14 @@ Exit emulate_command(const EmulateOptions& options) {
                counted(e.subject.robot.boards.size(), "board"),
                counted(e.subject.robot.sensors.size(), "sensor"), interfaces_of(e.subject.robot),
                options.lockstep ? "a step per SYNC" : "in real time");
+    const bool has_line = std::ranges::any_of(e.subject.robot.buses, [](const hal::BusConfig& bus) {
+      return bus.kind == hal::BusKind::kEthercat;
+    });
+    if (options.lockstep && has_line) {
+      fmt::print(out,
+                 "in lockstep its slaves answer `tandem run --lockstep` alone, and no scan: "
+                 "for `tandem doctor` leave --lockstep out\n");
+    }
     std::fflush(out);
   }
   TaskQueue tasks;

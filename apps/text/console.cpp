@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "rt/stop_signal.hpp"
 
@@ -189,21 +190,61 @@ void print_warnings(const Diagnostics& warnings) {
   for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
 }
 
+namespace {
+
+/// `text` in lines of at most `most` characters, broken at blanks; a longer word is a line.
+std::vector<std::string> broken(const std::string& text, std::size_t most) {
+  std::vector<std::string> lines(1);
+  std::istringstream words(text);
+  if (width(text) <= most) return {text};
+  for (std::string word; words >> word;) {
+    std::string& line = lines.back();
+    if (!line.empty() && width(line) + 1 + width(word) > most) {
+      lines.push_back(std::move(word));
+    } else {
+      line += (line.empty() ? "" : " ") + word;
+    }
+  }
+  return lines;
+}
+
+/// Makes the widest column so narrow that a line has at most 100 characters, or it has 24.
+void narrow(std::vector<std::size_t>& columns) {
+  constexpr std::size_t kLine = 100;
+  constexpr std::size_t kLeast = 24;
+  std::size_t line = 0;
+  for (const std::size_t column : columns) line += column + 2;
+  const auto widest = std::ranges::max_element(columns);
+  if (line <= kLine || *widest <= kLeast) return;
+  *widest = std::max(kLeast, *widest - std::min(*widest, line - kLine));
+}
+
+}  // namespace
+
 void Table::print(std::FILE* out) const {
   std::vector<std::size_t> columns;
   for (const auto& row : rows_) {
     columns.resize(std::max(columns.size(), row.size()), 0);
     for (std::size_t i = 0; i < row.size(); ++i) columns[i] = std::max(columns[i], width(row[i]));
   }
+  if (left_) narrow(columns);
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     if (rows_[r].empty()) continue;
-    std::string line;
+    std::vector<std::vector<std::string>> cells;
+    std::size_t lines = 1;
     for (std::size_t i = 0; i < rows_[r].size(); ++i) {
-      const std::string& cell = rows_[r][i];
-      line += "  " + (i == 0 || left_ ? left(cell, columns[i]) : right(cell, columns[i]));
+      cells.push_back(broken(rows_[r][i], columns[i]));
+      lines = std::max(lines, cells.back().size());
     }
-    line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print(out, "{}\n", line);
+    for (std::size_t l = 0; l < lines; ++l) {
+      std::string line;
+      for (std::size_t i = 0; i < cells.size(); ++i) {
+        const std::string cell = l < cells[i].size() ? cells[i][l] : "";
+        line += "  " + (i == 0 || left_ ? left(cell, columns[i]) : right(cell, columns[i]));
+      }
+      line.erase(line.find_last_not_of(' ') + 1);
+      fmt::print(out, "{}\n", line);
+    }
     if (r > 0) continue;
     std::size_t rule = 0;
     for (const std::size_t column : columns) rule += column + 2;

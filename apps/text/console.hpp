@@ -81,7 +81,8 @@ void remember_error(Error error);
 void write_failure(const std::string& file);
 
 /// A table of two or more columns, the first left-aligned and the others to the right, unless all
-/// are texts.
+/// are texts. A table of texts that is wider than 100 characters breaks the widest column's lines
+/// at blanks.
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}

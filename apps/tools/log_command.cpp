@@ -50,10 +50,25 @@ std::string cut_text(const log::LogFile& file) {
                      file.bytes());
 }
 
+/// What of a log that is cut can be used.
+std::string readable_text(const log::LogFile& file) {
+  std::int64_t end_ns = 0;
+  for (const log::Topic& topic : file.topics()) {
+    if (topic.messages > 0) end_ns = std::max(end_ns, topic.last_ns);
+  }
+  if (file.messages() == 0) return "the settings of its run, and no message";
+  return fmt::format("{}, up to {:.3f} s", counted(file.messages(), "message"),
+                     static_cast<double>(end_ns) * 1e-9);
+}
+
 void print_info(const log::LogFile& file, std::FILE* out) {
   const log::RunInfo& info = file.info();
-  fmt::print(out, "{}{}\n", file.path(), file.truncated() ? "  (" + cut_text(file) + ")" : "");
+  fmt::print(out, "{}\n", file.path());
   Facts facts;
+  if (file.truncated()) {
+    facts.add("not whole", cut_text(file));
+    facts.add("readable", readable_text(file));
+  }
   facts.add("robot", fmt::format("{}, {}, {}", info.robot, counted(info.joints.size(), "joint"),
                                  counted(info.sensors.size(), "sensor")));
   facts.add("backend", info.hal);
@@ -67,6 +82,7 @@ void print_info(const log::LogFile& file, std::FILE* out) {
   }
   facts.add("data sha256", file.data_sha256());
   facts.print(out);
+  if (file.topics().empty()) return;
   Table table({"topic", "messages", "from [s]", "to [s]", "fields"});
   for (const log::Topic& topic : file.topics()) {
     table.add({topic.name, std::to_string(topic.messages),

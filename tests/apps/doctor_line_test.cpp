@@ -84,6 +84,7 @@ TEST_F(DoctorLine, NamesTheFirstSlaveThatIsNotThere) {
   survey_.found = 0;
   survey_.slaves.clear();
   expect("eth1 slaves", Health::kMissing, "0 of 2", "slave 0 (board_1)");
+  expect("eth1 slaves", Health::kMissing, "0 of 2", "leave --lockstep out");
   survey_.found = 5;
   expect("eth1 slaves", Health::kMissing, "5 of 2", "robot.toml");
 }
@@ -97,6 +98,7 @@ TEST_F(DoctorLine, NamesTheFirstSlaveThatIsAnother) {
   expect("eth1 identities", Health::kMissing, "slave 1 (board_2)", "robot.toml");
   survey_.slaves[1].identified = false;
   expect("eth1 identities", Health::kMissing, "slave 1 (board_2): none", "switch it off");
+  expect("eth1 identities", Health::kMissing, "slave 1", "leave --lockstep out");
 }
 
 TEST_F(DoctorLine, EmulatedSlavesStandForAnyMakersButForNoOtherProduct) {

@@ -39,6 +39,26 @@ TEST_F(LogAndReport, InfoTellsTheHashOnce) {
   EXPECT_NE(outcome.out.find("double_pendulum, 2 joints, 0 sensors"), std::string::npos);
 }
 
+TEST_F(LogAndReport, InfoOfALogThatIsCutTellsWhatOfItCanBeRead) {
+  const auto whole = std::filesystem::file_size(folder_ / log_);
+  bool was_empty = false;
+  for (const auto bytes : {whole / 2, whole / 8, whole / 16, std::uintmax_t{20'000}}) {
+    std::filesystem::resize_file(folder_ / log_, bytes);
+    const Outcome info = tandem("log info " + log_ + " --json info.json");
+    ASSERT_EQ(info.status, 0) << bytes << info.err;
+    EXPECT_EQ(json("info.json")["complete"], false);
+    EXPECT_NE(info.out.find("cut after " + std::to_string(bytes) + " bytes"), std::string::npos)
+        << info.out;
+    const int messages = json("info.json")["messages"];
+    was_empty = was_empty || messages == 0;
+    const std::string readable = messages == 0 ? "the settings of its run, and no message"
+                                               : std::to_string(messages) + " messages, up to 0.";
+    EXPECT_NE(info.out.find(readable), std::string::npos) << info.out;
+    EXPECT_EQ(info.out.find("fields") != std::string::npos, messages > 0) << info.out;
+  }
+  EXPECT_TRUE(was_empty) << "its first chunk is not whole";
+}
+
 TEST_F(LogAndReport, InfoOfATopicListsItsFieldsWithUnits) {
   const Outcome outcome = tandem("log info " + log_ + " --topic truth");
   ASSERT_EQ(outcome.status, 0) << outcome.err;

@@ -31,6 +31,15 @@ TEST_F(RefusedFlags, AReportWithoutALog) {
   refused("run hold.toml --no-log --report", "--no-log excludes --report");
 }
 
+TEST_F(RefusedFlags, AnInterfaceThatLinuxCannotHave) {
+  for (const char* command : {"run hold.toml --no-log", "emulate hold.toml", "doctor robot.toml"}) {
+    refused(std::string(command) + " --interface can0=a_name_that_has_thirty_letters",
+            "'a_name_that_has_thirty_letters' is longer than 15 characters");
+  }
+  refused("doctor robot.toml --interface can7=vcan0", "no bus of robot.toml has the interface");
+  refused("doctor --interface can0=vcan0", "tandem doctor ROBOT.toml --interface can0=vcan0");
+}
+
 TEST_F(RefusedFlags, FilesWithoutAName) {
   refused("run hold.toml --log ''", "--log: is empty (name a folder, or leave it out)");
   refused("run hold.toml --no-log --json ''", "--json: is empty (name a file, or leave it out)");
