@@ -129,6 +129,16 @@ bool is_increments_per_s(std::uint32_t unit) { return unit == kIncrementsPerSeco
 
 }  // namespace
 
+std::vector<int> homing_methods(const DataSheet& sheet, int axis) {
+  const std::uint16_t index = of_axis(object::kHomingMethods, axis);
+  std::vector<int> methods;
+  for (const SheetEntry& entry : sheet.entries) {
+    if (entry.index != index || entry.sub == 0 || !entry.value) continue;
+    if (entry.value->number != 0) methods.push_back(static_cast<int>(entry.value->number));
+  }
+  return methods;
+}
+
 DriveUnits units_of(const DataSheet& sheet, int axis) {
   const auto at = [axis](std::uint16_t index) { return of_axis(index, axis); };
   DriveUnits units;

@@ -72,6 +72,9 @@ struct DriveUnits {
   std::uint32_t unknown_velocity = 0;
 };
 
+/// The homing methods of an axis, as 60E3 lists them; empty: not said. @param axis  from 0
+[[nodiscard]] std::vector<int> homing_methods(const DataSheet& sheet, int axis);
+
 /// @param axis  from 0
 [[nodiscard]] DriveUnits units_of(const DataSheet& sheet, int axis);
 

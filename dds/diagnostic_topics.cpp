@@ -7,6 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "hal/homing.hpp"
+
 namespace tandem::dds {
 namespace {
 
@@ -120,6 +122,10 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
                  {"temperature [C]", fmt::format("{:.1f}", temperature_C)},
                  {"current [A]", fmt::format("{:.2f}", state.current_A()[index])},
                  {"age [cycles]", std::to_string(age)}}};
+  const auto homing = static_cast<hal::HomingState>(state.homing()[index]);
+  if (homing != hal::HomingState::kNone) {
+    status.values.push_back({"homing", hal::to_string(homing)});
+  }
   const std::string fault = latched_text(sample.faults, config.name);
   if (state.fault()[index] != 0 || !fault.empty()) {
     status.level = Level::kError;
@@ -133,6 +139,9 @@ HealthStatus DiagnosticTopics::joint(const CycleSample& sample, std::size_t inde
                                  temperature_limit_C_[index]);
   } else if (drive == hal::DriveState::kQuickStopActive) {
     status.level = Level::kWarn;
+  } else if (homing == hal::HomingState::kNotHomed && config.homing && config.homing->required) {
+    status.level = Level::kWarn;
+    status.message += ", not homed";
   }
   return status;
 }

@@ -3,6 +3,7 @@
 #include "firmware_emu/axis.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "canopen/bytes.hpp"
 
@@ -39,6 +40,10 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
                           : 1.0),
       zero_at_power_on_(setup.zero_counts),
       zero_counts_(setup.zero_counts),
+      home_switch_from_rad_(setup.home_switch_from_rad),
+      home_switch_to_rad_(setup.home_switch_to_rad),
+      index_rad_(setup.index_rad),
+      index_pitch_rad_(setup.index_pitch_rad),
       counts_from_power_on_(setup.counts_from_power_on),
       at_power_on_(setup.counts_from_power_on),
       power_on_(AxisObjects::from(setup, board.command_timeout_syncs)),
@@ -46,6 +51,7 @@ Axis::Axis(const AxisSetup& setup, const BoardSetup& board, int index, ObjectDic
       torque_sensor_({.noise = setup.torque_noise_Nm, .quantum = setup.torque_quantum_Nm},
                      NoiseGenerator::stream(board.seed, static_cast<std::uint64_t>(index))) {
   objects_.add_to(od, index, *this);
+  profile_.allow_homing(setup.homing_methods);
   if ((modes_ & kProfileModes) != 0) profile_.add_to(od, index, modes_);
   apply_settings();
   take_demands();
@@ -60,6 +66,7 @@ void Axis::power_on() noexcept TANDEM_RT {
   machine_.reset();
   protection_ = {};
   mode_ = Mode::kNone;
+  index_turn_ = kNoTurn;
   stopping_s_ = 0.0;
   resting_s_ = 0.0;
   slowest_rad_s_ = 0.0;
@@ -260,16 +267,32 @@ AxisEvents Axis::supervise(ErrorCode connection, bool heartbeat_lost) noexcept T
     objects_.error_code = 0;
   }
   if (now == DriveState::kOperationEnabled && before != now) seed_references();
+  index_turn_ = profile ? index_turn_ : kNoTurn;
   if (profile) run_profile();
   return events;
 }
 
-void Axis::run_profile() noexcept {
+HomingSenses Axis::senses() noexcept {
+  if (mode_ != Mode::kHm) return {};
+  const double at_rad = measured_.link_position_rad;
   const AxisObjects& o = objects_;
   const ControllerConfig config = o.controller();
-  const double at_rad = measured_.link_position_rad;
   const bool at_min = at_rad <= config.min_position_rad + kSwitch_rad;
   const bool at_max = at_rad >= config.max_position_rad - kSwitch_rad;
+  HomingSenses seen{
+      .at_low_switch = reversed_ ? at_max : at_min,
+      .at_high_switch = reversed_ ? at_min : at_max,
+      .at_home_switch = at_rad >= home_switch_from_rad_ && at_rad <= home_switch_to_rad_};
+  if (index_pitch_rad_ <= 0.0) return seen;
+  const std::int64_t turn = static_cast<std::int64_t>(
+      std::floor((measured_.motor_position_rad - index_rad_) / index_pitch_rad_));
+  const std::int64_t before = std::exchange(index_turn_, turn);
+  if (before != kNoTurn && turn != before) seen.index = (turn > before) == reversed_ ? -1 : 1;
+  return seen;
+}
+
+void Axis::run_profile() noexcept {
+  const AxisObjects& o = objects_;
   profiled_ = profile_.step({.mode = mode_,
                              .controlword = o.controlword,
                              .follows = machine_.motion() == DriveMotion::kFollow,
@@ -279,8 +302,7 @@ void Axis::run_profile() noexcept {
                              .velocity_units = velocity_units_,
                              .target_torque = o.target_torque,
                              .torque = o.torque,
-                             .at_low_switch = reversed_ ? at_max : at_min,
-                             .at_high_switch = reversed_ ? at_min : at_max},
+                             .senses = senses()},
                             period_s_);
   if (!profiled_.homed) return;
   const std::int32_t counts = from_wire(o.position);
@@ -450,7 +472,7 @@ void Axis::archive(Archive& ar) {
   ar(controller_, protection_, machine_, link_encoder_, motor_encoder_, torque_sensor_,
      link_velocity_, motor_velocity_, torque_rate_, measured_, temperature_C_, stiffness_Nm_rad_,
      damping_Nms_rad_, stopping_s_, resting_s_, slowest_rad_s_, stalled_s_, brake_periods_, stop_,
-     mode_, sensors_valid_);
+     mode_, index_turn_, sensors_valid_);
 }
 
 }  // namespace tandem::firmware

@@ -64,6 +64,8 @@ class Axis final : private canopen::ObjectOwner {
   [[nodiscard]] double shown_shift_rad() const noexcept;
   /// The modes in which the drive makes its own way: one period of them.
   void run_profile() noexcept;
+  /// Switches and index pulses, in the drive's direction.
+  [[nodiscard]] HomingSenses senses() noexcept;
   void show_actual() noexcept;
   void show_controller() noexcept;
   void take_demands() noexcept;
@@ -86,12 +88,18 @@ class Axis final : private canopen::ObjectOwner {
     return machine_.motion() != canopen::DriveMotion::kNone;
   }
 
+  static constexpr std::int64_t kNoTurn = INT64_MIN;  // not in homing mode
+
   double period_s_;
   std::uint32_t modes_;
   bool reversed_;
   double velocity_units_;  ///< in a count per second
   std::int32_t zero_at_power_on_;
   std::int32_t zero_counts_;  ///< homing changes it
+  double home_switch_from_rad_;
+  double home_switch_to_rad_;
+  double index_rad_;
+  double index_pitch_rad_;
   bool counts_from_power_on_;
   bool at_power_on_;  ///< no sample yet, from which it counts
   AxisObjects power_on_;
@@ -119,6 +127,7 @@ class Axis final : private canopen::ObjectOwner {
   std::int64_t brake_periods_ = 0;                           ///< since the brake's command changed
   canopen::DriveMotion stop_ = canopen::DriveMotion::kNone;  ///< the one whose rest is timed
   canopen::Mode mode_ = canopen::Mode::kNone;
+  std::int64_t index_turn_ = kNoTurn;  ///< how many index pulses the motor is above index_rad_
   bool sensors_valid_ = true;
   bool settings_changed_ = false;
 };

@@ -1,4 +1,4 @@
-// Set-points by handshake, ramps, and homing to the end of the range.
+// Set-points by handshake, ramps, and the motions of homing.
 #include "firmware_emu/profile_modes.hpp"
 
 #include <algorithm>
@@ -194,12 +194,14 @@ void ProfileModes::end_homing(Homing how) noexcept {
 }
 
 void ProfileModes::homing_mode(const ProfileInputs& in, double dt_s) noexcept {
-  constexpr int kLowSwitch = 17;
-  constexpr int kHighSwitch = 18;
   const bool starts = (in.controlword & kBit4) != 0;
   if (starts && !bit_4_) {
-    homing_ = Homing::kSeeks;
     out_.bit_12 = out_.bit_13 = out_.target_reached = false;
+    const int method = homing_method_;
+    const bool has = HomingSearch::has(method) && (homing_methods_ >> method & 1U) != 0;
+    if (!has) return end_homing(Homing::kFailed);
+    homing_ = Homing::kSeeks;
+    search_.begin(method);
   }
   if (homing_ != Homing::kSeeks) return;
   if (!starts) {  // interrupted: it stays here
@@ -208,35 +210,34 @@ void ProfileModes::homing_mode(const ProfileInputs& in, double dt_s) noexcept {
     out_.velocity = 0;
     return;
   }
-  const int method = homing_method_;
-  if (method == 35 || method == 37) {
-    out_.position = in.position;
-    end_homing(Homing::kDone);
-    return;
+  HomingSenses seen = in.senses;
+  seen.position = in.position;
+  switch (search_.step(seen)) {
+    case HomingSearch::Result::kFound:
+      out_.position = in.position;
+      return end_homing(Homing::kDone);
+    case HomingSearch::Result::kFailed: return end_homing(Homing::kFailed);
+    case HomingSearch::Result::kMoves: break;
   }
-  if (method != kLowSwitch && method != kHighSwitch) {
-    end_homing(Homing::kFailed);
-    return;
-  }
-  const bool low = method == kLowSwitch;
-  if (low ? in.at_low_switch : in.at_high_switch) {
-    end_homing(Homing::kDone);
-    return;
-  }
-  const double speed = homing_speeds_[0] / in.velocity_units;
+  if (search_.turned()) motion_.velocity = 0.0;
+  const std::uint32_t speed = homing_speeds_[search_.slow() && homing_speeds_[1] != 0 ? 1 : 0];
   const double acceleration = homing_acceleration_ / in.velocity_units;
-  motion_.run(low ? -speed : speed, acceleration, acceleration, dt_s);
+  motion_.run(search_.direction() * (speed / in.velocity_units), acceleration, acceleration, dt_s);
   out_.position = plus(start_, clamp_round<std::int32_t>(motion_.position));
   out_.velocity = clamp_round<std::int32_t>(motion_.velocity);
 }
 
-void ProfileModes::power_on() noexcept TANDEM_RT { *this = ProfileModes{}; }
+void ProfileModes::power_on() noexcept TANDEM_RT {
+  const std::uint64_t methods = homing_methods_;
+  *this = ProfileModes{};
+  homing_methods_ = methods;
+}
 
 void ProfileModes::archive(Archive& ar) {
   ar(speed_, acceleration_, deceleration_, torque_slope_, homing_speeds_, homing_acceleration_,
      home_offset_, homing_method_, mode_, motion_.position, motion_.velocity, start_, target_,
-     next_target_, torque_, followed_, bit_4_, waiting_, homing_, out_.position, out_.velocity,
-     out_.torque, out_.target_reached, out_.bit_12, out_.bit_13, out_.homed);
+     next_target_, torque_, followed_, bit_4_, waiting_, homing_, search_, out_.position,
+     out_.velocity, out_.torque, out_.target_reached, out_.bit_12, out_.bit_13, out_.homed);
 }
 
 }  // namespace tandem::firmware

@@ -9,6 +9,7 @@
 #include "base/realtime.hpp"
 #include "canopen/object_dictionary.hpp"
 #include "canopen/objects.hpp"
+#include "firmware_emu/homing_search.hpp"
 
 namespace tandem {
 class Archive;
@@ -39,8 +40,7 @@ struct ProfileInputs {
   double velocity_units = 1.0;       ///< in a count per second: of 60FF, 6081, 6083, …
   std::int16_t target_torque = 0;    ///< 6071
   std::int16_t torque = 0;           ///< 6077
-  bool at_low_switch = false;        ///< homing's: the axis is at the end of its range
-  bool at_high_switch = false;
+  HomingSenses senses{};             ///< homing's
 };
 
 /// Where the joint controllers go, and bits of the statusword.
@@ -56,8 +56,8 @@ struct ProfileOutputs {
 
 /// Stepped once per control period.
 ///
-/// Homing takes the methods 35 and 37 (here), 17 and 18 (the low, the high end of the range, which
-/// has a switch); every other one ends at once with a homing error.
+/// Homing has the methods of HomingSearch, or those of them that the drive names; every other one
+/// ends at once with a homing error.
 class ProfileModes {
  public:
   /// Adds 6098, 6099, 609A and 607C of the axis, and for a drive with profile modes also 6081, 6083
@@ -65,6 +65,8 @@ class ProfileModes {
   /// @param modes  the axis', bits of 6502
   /// @return false when `od` is full.
   bool add_to(canopen::ObjectDictionary& od, int axis, std::uint32_t modes);
+  /// @param methods  bit n: the drive has homing method n
+  void allow_homing(std::uint64_t methods) noexcept { homing_methods_ = methods; }
 
   /// Is it one of these modes?
   [[nodiscard]] static bool has(canopen::Mode mode) noexcept TANDEM_RT;
@@ -98,6 +100,8 @@ class ProfileModes {
   std::uint32_t homing_acceleration_ = 0;
   std::int32_t home_offset_ = 0;
   std::int8_t homing_method_ = 0;
+  std::uint64_t homing_methods_ = ~std::uint64_t{0};
+  HomingSearch search_;
 
   canopen::Mode mode_ = canopen::Mode::kNone;
   Trapezoid motion_;  ///< its position counts from start_

@@ -40,6 +40,13 @@ struct AxisSetup {
   /// The encoder counts from where it stands at power-on, which 6064 shows as `zero_counts` until
   /// homing finds the joint's place.
   bool counts_from_power_on = false;
+  std::uint64_t homing_methods = ~std::uint64_t{0};  ///< bit n: it has method n, if emulated
+  /// The home switch is active where the joint is from here to there; from above to: nowhere.
+  double home_switch_from_rad = 1.0;
+  double home_switch_to_rad = -1.0;
+  /// The motor's encoder gives an index pulse here, and every so often of the link's way; 0: none.
+  double index_rad = 0.0;
+  double index_pitch_rad = 0.0;
   double link_counts_per_rev = 524288.0;  ///< 608F
   /// Velocity units (606C, 60FF, 60B1, 6081, 6099; accelerations in them per second) at one
   /// revolution of the link per second; 0: counts per second.

@@ -24,4 +24,18 @@ const char* to_string(HomingError error) noexcept {
   return "";
 }
 
+const char* next_step(HomingError error) noexcept {
+  switch (error) {
+    case HomingError::kNone: return "";
+    case HomingError::kDrive:
+      return "give homing.method a number that the drive has, and look at its switches";
+    case HomingError::kTimeout:
+      return "look at the switch, or raise homing.timeout_s or homing.speed_rad_s";
+    case HomingError::kMode: return "look in the drive's manual when it takes mode 6";
+    case HomingError::kStopped:
+    case HomingError::kInterrupted: return "home it again";
+  }
+  return "";
+}
+
 }  // namespace tandem::hal

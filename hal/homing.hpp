@@ -27,6 +27,9 @@ enum class HomingError : std::uint8_t {
 /// "the drive reports a homing error"; empty for kNone.
 [[nodiscard]] const char* to_string(HomingError error) noexcept;
 
+/// What to do about it: "give homing.method …"; empty for kNone.
+[[nodiscard]] const char* next_step(HomingError error) noexcept;
+
 struct Homing {
   HomingState state = HomingState::kNone;
   HomingError error = HomingError::kNone;  ///< of the last one

@@ -202,6 +202,10 @@ class ControllerHost {
   [[nodiscard]] std::int32_t owner(std::size_t joint) const noexcept TANDEM_RT {
     return owner_[joint];
   }
+  /// Whether recover() leads `joint` back to its limits.
+  [[nodiscard]] bool recovers(std::size_t joint) const noexcept TANDEM_RT {
+    return recovers_[joint] != 0;
+  }
   /// Whether move() or recover() leads `joint`. The rest of a transfer is no motion.
   [[nodiscard]] bool leads(std::size_t joint) const noexcept TANDEM_RT {
     return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0;

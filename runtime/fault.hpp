@@ -26,7 +26,7 @@ enum class FaultSource : std::uint8_t {
   kEmergencyStop,  ///< asked for from outside; `code` is an EmergencyInput
   kOwner,          ///< the owner in another process; `code` is a hal::OwnerLoss, kNone: it asked
   kStray,          ///< a controller wrote what it had not claimed; `index` joint, `code` controller
-  kNotHomed,       ///< controllers waited for a joint that nobody homed
+  kNotHomed,       ///< controllers waited for a joint that was not homed; `code`: its HomingError
   kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
   kCollision,      ///< something pushes a joint; `code` is its external torque [mNm or mN]
 };

@@ -37,6 +37,17 @@ std::string in_units(const FaultRecord& record, const FaultContext& about) {
   return text;
 }
 
+std::string not_homed_text(const FaultRecord& record, const FaultContext& about) {
+  const auto error = static_cast<hal::HomingError>(record.code);
+  const auto& homing = about.robot.joints[static_cast<std::size_t>(record.index)].homing;
+  if (error == hal::HomingError::kNone || !homing) {
+    return std::string("it was not homed, for which the controllers waited: tandem joint home") +
+           (homing && homing->at_start ? ", or a longer run" : ", or homing.at_start = true");
+  }
+  return "its homing (method " + std::to_string(homing->method) +
+         ") failed: " + hal::to_string(error) + "; " + hal::next_step(error);
+}
+
 std::string text_of(const FaultRecord& record, const FaultContext& about) {
   const std::string count = std::to_string(record.code);
   const char* code = tandem::to_string(static_cast<Code>(record.code));
@@ -54,9 +65,7 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
       return std::to_string(about.config.loop.stop_late) + " of the last " +
              std::to_string(about.config.loop.stop_window) + " cycles were late";
     case FaultSource::kBringUp: return "the drives were not enabled in time";
-    case FaultSource::kNotHomed:
-      return "it was not homed, for which the controllers waited: tandem joint home, or "
-             "homing.at_start = true";
+    case FaultSource::kNotHomed: return not_homed_text(record, about);
     case FaultSource::kEmergencyStop:
       return emergency_text(static_cast<EmergencyInput>(record.code));
     case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));

@@ -176,6 +176,9 @@ class RobotCycle {
   void hold_unhomed(hal::CommandImage& command) noexcept TANDEM_RT;
   void wait_for_homing() noexcept TANDEM_RT;
   [[nodiscard]] bool ends_unhomed() noexcept TANDEM_RT;
+  /// The fault of a joint that controllers cannot have: why its homing failed, or that there was
+  /// none.
+  void not_homed(std::size_t joint) noexcept TANDEM_RT;
   [[nodiscard]] bool has_to_be_homed(std::size_t joint) const noexcept TANDEM_RT;
   [[nodiscard]] bool claims_unhomed(ControllerSet controllers) const noexcept TANDEM_RT;
 

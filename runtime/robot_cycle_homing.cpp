@@ -60,6 +60,8 @@ void RobotCycle::watch_homing() noexcept TANDEM_RT {
       event(EventKind::kHomingFailed, joint, static_cast<std::uint32_t>(now.error));
     }
     controllers_->hold(j, state_, controlled());
+    // The end of the range may be a little outside of the limits: the homing ends inside.
+    if (now.state == HomingState::kHomed) (void)controllers_->recover(j, controlled());
   }
   home_at_start();
 }
@@ -73,16 +75,18 @@ void RobotCycle::wait_for_homing() noexcept TANDEM_RT {
 }
 
 /// One joint after the other; when all that the controllers wait for are homed, they start. One
-/// that fails is the operator's.
+/// that fails is the operator's; where nobody waits, it ends the run.
 void RobotCycle::home_at_start() noexcept TANDEM_RT {
   if (!homes_at_start_ || !run_.in(RunPhase::kHeld)) return;
   for (const std::size_t joint : homes_) {
     const hal::Homing& is = homings_[joint];
-    if (is.state == HomingState::kHoming) return;
+    if (is.state == HomingState::kHoming || controllers_->recovers(joint)) return;
     if (!robot_->joints[joint].homing->at_start || is.state == HomingState::kHomed) continue;
     homes_at_start_ =
         is.error == hal::HomingError::kNone && home_joint(joint).reason == RejectReason::kNone;
     if (homes_at_start_) event(EventKind::kHomingRequested, static_cast<std::int32_t>(joint));
+    const bool failed = is.error != hal::HomingError::kNone;
+    if (failed && config_.after_stop == AfterStop::kEnd) not_homed(joint);
     return;
   }
   homes_at_start_ = false;
@@ -97,10 +101,15 @@ bool RobotCycle::ends_unhomed() noexcept TANDEM_RT {
     return robot_->joints[j].homing->required && !done && controllers_->is_claimed(j, held_back_);
   });
   if (joint == homes_.end()) return false;
-  fault({.index = static_cast<std::int32_t>(*joint),
+  not_homed(*joint);
+  return true;
+}
+
+void RobotCycle::not_homed(std::size_t joint) noexcept TANDEM_RT {
+  fault({.index = static_cast<std::int32_t>(joint),
+         .code = static_cast<std::uint32_t>(homings_[joint].error),
          .source = FaultSource::kNotHomed,
          .category = hal::StopCategory::kCategory1});
-  return true;
 }
 
 /// A joint that is homed has no reference; one that has to be homed stays where it is, whoever has

@@ -229,11 +229,13 @@ Result<Json> wait_for_reset(ControlClient& run, const std::string& name) {
   }
 }
 
-/// The joint once its homing has ended; after Ctrl-C at once.
+/// The joint once its homing has ended and it is within its limits; after Ctrl-C at once.
 Result<Json> wait_for_homing(ControlClient& run, const std::string& name) {
   for (;;) {
     Result<Json> now = look(run, name);
-    if (!now || now->value("homing", "") != "under way" || rt::stop_requested()) return now;
+    if (!now || rt::stop_requested()) return now;
+    const bool led = now->value("homing", "") == "homed" && now->value("moving", false);
+    if (now->value("homing", "") != "under way" && !led) return now;
     std::this_thread::sleep_for(kLook);
   }
 }
@@ -324,9 +326,13 @@ Exit tell_homing(const JointOptions& options, const Json& joint) {
                options.joint);
     return Exit::kFault;
   }
-  print_errors({{.message = "the homing failed: " + joint.value("homing_error", ""),
-                 .hint = "see its drive: tandem joint show " + options.joint +
-                         "; then tandem joint home " + options.joint + " again",
+  const Json method = joint.value("homing_method", Json());
+  const std::string which =
+      method.is_number() ? fmt::format("(method {}) ", method.get<int>()) : std::string();
+  const std::string advice = joint.value("homing_advice", "");
+  print_errors({{.message = "the homing " + which + "failed: " + joint.value("homing_error", ""),
+                 .hint = (advice.empty() ? "" : advice + "; ") + "tandem joint home " +
+                         options.joint + " tries again",
                  .file = {},
                  .key = options.joint}});
   return Exit::kFault;

@@ -62,6 +62,7 @@ const char* feedback_of(const runtime::JointStatus& look) {
 Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t index) {
   const runtime::JointStatus& look = joint.look;
   const hal::JointCapabilities& limit = run.limits[index];
+  const auto& homing = run.robot.joints[index].homing;
   Json gains = Json::object();
   for (const hal::PidLoop loop : kLoops) {
     const hal::PidGains& of = joint.gains[static_cast<std::size_t>(loop)];
@@ -96,6 +97,8 @@ Json joint_json(const Run& run, const runtime::JointInfo& joint, std::size_t ind
           {"resetting", look.resetting != 0},
           {"homing", hal::to_string(look.homing.state)},
           {"homing_error", hal::to_string(look.homing.error)},
+          {"homing_method", homing ? Json(homing->method) : Json(nullptr)},
+          {"homing_advice", hal::next_step(look.homing.error)},
           {"age_cycles", look.age_cycles},
           {"feedback", feedback_of(look)},
           {"gains", std::move(gains)}};

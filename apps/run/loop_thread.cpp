@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "apps/can/bus_watch.hpp"
 #include "apps/control/clock_commands.hpp"
@@ -22,10 +24,11 @@ std::string progress_note(const runtime::RobotCycle& cycle) {
   return phase == runtime::RunPhase::kRunning ? "" : runtime::to_string(phase);
 }
 
-/// Says once why a run that was just enabled does not start.
+/// Says once why a run that was just enabled does not start, and at once which homing failed.
 class HomingNote {
  public:
-  void look(const runtime::RobotCycle& cycle, const hal::RobotConfig& robot) {
+  void look(runtime::RobotCycle& cycle, const hal::RobotConfig& robot) {
+    look_for_failures(cycle, robot);
     if (told_ || cycle.progress().phase.load() != runtime::RunPhase::kHeld) return;
     told_ = true;
     if (cycle.progress().resets.load() > 0) return;
@@ -42,7 +45,24 @@ class HomingNote {
   }
 
  private:
+  void look_for_failures(runtime::RobotCycle& cycle, const hal::RobotConfig& robot) {
+    if (std::ranges::none_of(robot.joints, [](const auto& one) { return one.homing.has_value(); }))
+      return;
+    failures_.resize(robot.joints.size());
+    const auto joints = cycle.services().joints();
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      const hal::HomingError error = joints[j].look.homing.error;
+      if (std::exchange(failures_[j], error) == error || error == hal::HomingError::kNone) continue;
+      fmt::print(stderr,
+                 "{}{}: the homing (method {}) failed: {}; {}; tandem joint home {} tries again\n",
+                 is_terminal(stderr) ? "\r\x1b[K" : "", joints[j].name,
+                 robot.joints[j].homing ? robot.joints[j].homing->method : 0, hal::to_string(error),
+                 hal::next_step(error), joints[j].name);
+    }
+  }
+
   bool told_ = false;
+  std::vector<hal::HomingError> failures_;  // by joint: of its last homing
 };
 
 /// Prints each fault when it happens, for a run that waits for its reset.
@@ -114,7 +134,7 @@ void LoopThread::run(runtime::RobotCycle& cycle, const rt::ThreadConfig& config)
   done_.store(true, std::memory_order_release);
 }
 
-void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
+void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
            const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet) {
   const runtime::Experiment& e = c.experiment;

@@ -43,7 +43,7 @@ class LoopThread {
 /// waits. Either way it warns when the log is lost.
 /// @param recorder  null: nothing is logged
 /// @param waits  the run waits after a fault: each is printed when it happens, not at the end alone
-void watch(const runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
+void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition& c,
            const LoopGuard& guard, const log::Recorder* recorder, std::FILE* out, bool waits,
            bool quiet);
 

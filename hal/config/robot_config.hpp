@@ -131,7 +131,10 @@ struct HomingConfig {
   double timeout_s = 60.0;
   bool required = true;   ///< until it is done, nothing else moves the joint
   bool at_start = false;  ///< it is done once the drives are enabled, without a request
-  int line = 0;           ///< in the TOML, for messages
+  /// In simulation: where the home switch is active, the joint's angles; empty: by the method.
+  std::optional<std::array<double, 2>> home_switch_rad = {};
+  double index_rad = 0.0;  ///< in simulation: where the motor's encoder gives an index pulse
+  int line = 0;            ///< in the TOML, for messages
 };
 
 /// A joint's `stop_options`: 605B to 605E of its drive; what is empty stays as the drive has it.

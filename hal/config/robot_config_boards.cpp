@@ -104,10 +104,9 @@ void check_identity(TomlTable& table, const BoardConfig& board) {
   if (board.eds.empty()) return;
   const canopen::DataSheet& sheet = *board.sheet;
   const auto other = [&](const char* key, std::uint32_t wanted, std::uint32_t said) {
-    table.error(key,
-                "is " + hex(wanted) + ", and its drive's sheet (" + board.eds + ") is of " +
-                    hex(said),
-                "get the sheet of this drive, or remove the key: then the sheet's counts");
+    table.error(
+        key, "is " + hex(wanted) + ", and its drive's sheet (" + board.eds + ") is of " + hex(said),
+        "get the sheet of this drive, or remove the key: then the sheet's counts");
   };
   const auto compare = [&](const char* key, std::optional<std::uint32_t> wanted,
                            std::optional<std::uint32_t> said, std::uint32_t shift) {

@@ -70,6 +70,15 @@ std::optional<HomingConfig> read_homing(TomlTable& table) {
   if (h.at_start && !h.required) {
     homing.error("at_start", "goes with required = true", "remove one of the two");
   }
+  if (homing.has("home_switch_rad")) {
+    const std::vector<double> at = homing.numbers_or("home_switch_rad", {}, kAnyNumber, 2);
+    if (at.size() == 2 && at[0] < at[1]) {
+      h.home_switch_rad = {at[0], at[1]};
+    } else if (!homing.has_errors()) {
+      homing.error("home_switch_rad", "is no range", "give the lower angle first: [0.1, 0.2]");
+    }
+  }
+  h.index_rad = homing.number_or("index_rad", 0.0);
   homing.finish();
   return h;
 }
@@ -240,6 +249,17 @@ void check_homing(TomlTable& table, const RobotConfig& robot, const JointConfig&
                     " has no mode 6, its method (6098) cannot be written, or its "
                     "mode (6060) is in no PDO",
                 "remove this key, and home the drive by its own program");
+    return;
+  }
+  const std::vector<int> methods = canopen::homing_methods(sheet, joint.axis);
+  if (!methods.empty() && std::ranges::find(methods, joint.homing->method) == methods.end()) {
+    std::string list;
+    for (const int method : methods) list += (list.empty() ? "" : ", ") + std::to_string(method);
+    table.error("homing",
+                "the drive of joint '" + joint.name + "' has no method " +
+                    std::to_string(joint.homing->method) + ": 60E3 of " + board->eds + " lists " +
+                    list,
+                "give one of these");
     return;
   }
   if (canopen::writable(sheet, canopen::of_axis(canopen::object::kHomeOffset, joint.axis), 0)) {

@@ -261,6 +261,7 @@ void AxisMaster::fill(StateImage& state, std::size_t joint) const noexcept TANDE
     state.drive_state()[joint] = static_cast<std::uint8_t>(DriveState::kUnknown);
     state.mode()[joint] = static_cast<std::int8_t>(ControlMode::kIdle);
   }
+  state.homing()[joint] = static_cast<std::uint8_t>(homing().state);
   state.acceleration_rad_s2()[joint] = acceleration_rad_s2_;
   state.age_cycles()[joint] = age_cycles_;
   state.fault()[joint] = error_ != AxisError::kNone ? fault_code_ : 0u;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <span>
 
+#include "hal/homing.hpp"
 #include "hal/remote/remote_backend.hpp"
 #include "hal/run_phase.hpp"
 
@@ -49,9 +50,11 @@ bool is_sound(const hal::StateImage& state) {
         state.current_A(), state.voltage_V(), state.temperature_C(), state.sensor()}) {
     if (!all_finite(values)) return false;
   }
-  return std::ranges::all_of(state.drive_state(), [](std::uint8_t one) {
-    return one <= static_cast<std::uint8_t>(hal::DriveState::kFault);
-  });
+  const auto up_to = [](auto last) {
+    return [last](std::uint8_t one) { return one <= static_cast<std::uint8_t>(last); };
+  };
+  return std::ranges::all_of(state.drive_state(), up_to(hal::DriveState::kFault)) &&
+         std::ranges::all_of(state.homing(), up_to(hal::HomingState::kHomed));
 }
 
 Status same_protocol(std::uint32_t here, std::uint32_t there) {

@@ -137,6 +137,7 @@ void TeleBackend::show(const hal::CycleTime& time, hal::StateImage& state) noexc
     std::ranges::copy(arrived_.fault(), state.fault().begin());
     std::ranges::copy(arrived_.statusword(), state.statusword().begin());
     std::ranges::copy(arrived_.drive_state(), state.drive_state().begin());
+    std::ranges::copy(arrived_.homing(), state.homing().begin());
   }
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;

@@ -3,8 +3,13 @@
 #include "hal/sim/setup.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
 
+#include "canopen/drive_abilities.hpp"
 #include "canopen/frame.hpp"
 #include "firmware_emu/sheet_dictionary.hpp"
 #include "hal/sim/actuator.hpp"
@@ -37,6 +42,24 @@ firmware::Pid::Config pid(const hal::PidConfig& config, double limit) {
           .output_limit = config.output_limit > 0.0 ? config.output_limit : limit};
 }
 
+/// Where a joint's home switch is active: as robot.toml says, else from the middle of its range to
+/// the end that the method means, or 0.05 rad about the middle. Upper and lower are the drive's.
+std::array<double, 2> home_switch_rad(const hal::JointConfig& joint) {
+  constexpr double kHalf_rad = 0.05;
+  if (joint.homing && joint.homing->home_switch_rad) return *joint.homing->home_switch_rad;
+  const double min = joint.min_position_rad;
+  const double max = joint.max_position_rad;
+  const double middle = std::isfinite(min) && std::isfinite(max) ? 0.5 * (min + max) : 0.0;
+  const int method = joint.homing ? joint.homing->method : 0;
+  const int number = method > 16 ? method - 16 : method;  // 17 to 30: as 1 to 14
+  const bool upper = number == 3 || number == 4;
+  const bool lower = number == 5 || number == 6;
+  if (!upper && !lower) return {middle - kHalf_rad, middle + kHalf_rad};
+  constexpr double kEnd = std::numeric_limits<double>::infinity();
+  if (upper == joint.reversed) return {-kEnd, middle};
+  return {middle, kEnd};
+}
+
 firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
   const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
   const hal::GainsConfig& gains = robot.gains_of(joint);
@@ -64,6 +87,11 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.reversed = joint.reversed;
   axis.zero_counts = joint.zero_counts;
   axis.velocity_units_per_rev = joint.velocity_units_per_rev;
+  const auto [from_rad, to_rad] = home_switch_rad(joint);
+  axis.home_switch_from_rad = from_rad;
+  axis.home_switch_to_rad = to_rad;
+  axis.index_rad = joint.homing ? joint.homing->index_rad : 0.0;
+  axis.index_pitch_rad = 2.0 * std::numbers::pi / actuator.gear_ratio;
   axis.counts_from_power_on = joint.homing && joint.homing->required;
   axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
@@ -101,7 +129,13 @@ void stand_in_for(const hal::BoardConfig& config, firmware::BoardSetup& board) {
   board.max_pdo_bytes =
       std::min(board.max_pdo_bytes, static_cast<std::size_t>(config.sheet->most_pdo_bytes));
   for (std::size_t a = 0; a < board.axes.size(); ++a) {
-    board.axes[a].modes = firmware::emulated_modes(*config.sheet, static_cast<int>(a));
+    const int axis = static_cast<int>(a);
+    board.axes[a].modes = firmware::emulated_modes(*config.sheet, axis);
+    const std::vector<int> methods = canopen::homing_methods(*config.sheet, axis);
+    if (!methods.empty()) board.axes[a].homing_methods = 0;
+    for (const int method : methods) {
+      if (method > 0 && method < 64) board.axes[a].homing_methods |= std::uint64_t{1} << method;
+    }
   }
 }
 

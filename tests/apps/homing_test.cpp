@@ -19,7 +19,7 @@ class HomedJoints : public Running {
     joint.replace(joint.find(both), both.size(), "name = \"joint1\"\n" + homing);
     std::string other = joint;
     other.replace(other.find("joint1"), 6, "joint2");
-    other.replace(other.find("method = 35"), 11, "method = 1");
+    other.replace(other.find("method = 35"), 11, "method = 15");
     other.replace(other.find("position_rad = 0.5"), 18, "required = false");
     write_text(folder_ / "robot.toml", robot.substr(0, from) + joint + other + robot.substr(to));
   }
@@ -38,8 +38,11 @@ TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
          "joint1: has to be homed first: its position is not known (tandem joint home joint1)");
   expect(to_run("controller start"), 2, "tandem joint home joint1");
   expect(to_run("joint home jiont1"), 2, "did you mean 'joint1'?");
-  expect(to_run("joint home joint2"), 1,
-         "joint2: the homing failed: the drive reports a homing error (statusword bit 13)");
+  const Outcome failed = to_run("joint home joint2");
+  expect(failed, 1,
+         "joint2: the homing (method 15) failed: the drive reports a homing error (statusword bit "
+         "13)");
+  expect(failed, 1, "give homing.method a number that the drive has");
   expect(to_run("joint show joint2"), 0, "not homed: the drive reports a homing error");
   expect(to_run("joint home joint1"), 0, "joint1 is homed: it is at 0.");
   const auto shown = nlohmann::json::parse(to_run("joint show joint1 --json -").out);
@@ -64,6 +67,33 @@ TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {
   const Outcome ran = tandem("run hold.toml --duration 1 --no-log --json run.json");
   EXPECT_EQ(ran.status, 0) << ran.err;
   EXPECT_EQ(json("run.json")["fault_log"].size(), 0U);
+}
+
+TEST_F(HomedJoints, ARunThatCannotHomeOneEndsAtOnceAndSaysWhy) {
+  edit("robot.toml", "method = 35", "method = 16");
+  edit("robot.toml", "position_rad = 0.5 }", "position_rad = 0.5, at_start = true }");
+  const Outcome ran = tandem("run hold.toml --duration 50 --no-log --json run.json");
+  expect(ran, 1, "its homing (method 16) failed: the drive reports a homing error");
+  const auto faults = json("run.json")["fault_log"];
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_EQ(faults[0]["joint"], "joint1");
+  EXPECT_LT(faults[0]["time_s"].get<double>(), 5.0) << "not when the run's time is over";
+  EXPECT_NE(faults[0]["cause"].get<std::string>().find("give homing.method a number"),
+            std::string::npos);
+  std::istringstream lines(ran.out + ran.err);
+  for (std::string line; std::getline(lines, line);) EXPECT_LT(line.size(), 130U) << line;
+}
+
+TEST_F(HomedJoints, OneThatEndsOutsideOfItsLimitsIsLedInside) {
+  edit("robot.toml", "position_rad = 0.5 }", "position_rad = -6.35 }");
+  start("--rate 20 --duration 2000 --on-fault wait");
+  until(R"("phase": "held")");
+  expect(to_run("joint home joint1"), 0, "joint1 is homed");
+  const auto shown = nlohmann::json::parse(to_run("joint show joint1 --json -").out);
+  EXPECT_EQ(shown["moving"], false);
+  EXPECT_GE(shown["commanded_position_rad"].get<double>(), shown["min_position_rad"].get<double>());
+  expect(to_run("joint move joint1 --to -6.2 --wait"), 0, "joint1");
+  EXPECT_EQ(end(), 0);
 }
 
 TEST_F(HomedJoints, ARunThatEndsWhileOneIsBeingHomedSaysSo) {

@@ -1,5 +1,7 @@
 // Robots on EtherCAT: in process, and master and boards in two processes on a cable of a network of
 // the test's own.
+#include <algorithm>
+#include <cstdio>
 #include <map>
 
 #include "tests/apps/program.hpp"
@@ -87,6 +89,42 @@ TEST_F(LineRun, ATwinOfARobotOverACableIsTheSameToTheLastBit) {
   const auto parallel = json("run.json")["parallel"];
   EXPECT_EQ(parallel["unequal"], 0) << "first in cycle " << parallel["first_unequal"];
   EXPECT_GT(parallel["compared"].get<int>(), 1000);
+}
+
+/// Joints that know nothing of their place are homed over the cable by the run itself, then move.
+TEST_F(LineRun, AHomingOverACableAndTheMotionBehindItAreTheInProcessRunBitForBit) {
+  edit("robot.toml", "motor_encoder_counts_per_rev = 65536\n",
+       "motor_encoder_counts_per_rev = 65536\n"
+       "homing = { method = 24, speed_rad_s = 2.0, acceleration_rad_s2 = 20.0, position_rad = 0.6, "
+       "home_switch_rad = [0.6, 0.75], at_start = true }\n");
+  edit("hold.toml", "plugin = \"hold\"", "plugin = \"joint_trajectory\"");
+  write_text(folder_ / "hold.toml",
+             read_text(folder_ / "hold.toml") +
+                 "[controller.parameters]\n[[controller.parameters.waypoint]]\n"
+                 "time_s = 0.8\nposition_rad = [-0.3, 0.4]\n");
+  const Outcome alone = tandem("run hold.toml --duration 3 --no-socket -q --log '" +
+                               file("in_process") + "' --json in.json");
+  ASSERT_EQ(alone.status, 0) << alone.err;
+  const int status = run_over_cable(file("hold.toml"),
+                                    {"--duration", "3", "-q", "--log", file("over_cable")}, true);
+  if (status == kNoNetwork) GTEST_SKIP() << "this machine lets nobody have a network of his own";
+  ASSERT_EQ(status, 0);
+  const std::string log = "/double_pendulum-hold-001.mcap";
+  const Outcome diff = tandem("log diff in_process" + log + " over_cable" + log + " --json -");
+  EXPECT_EQ(diff.status, 0) << diff.out;
+  const std::string csv =
+      tandem("log csv over_cable" + log + " --topic state --fields homing,position_rad").out;
+  const std::string last = csv.substr(std::min(csv.size(), csv.find("\n4.9,") + 1), 100);
+  double time_s = 0.0, first_rad = 0.0, second_rad = 0.0;
+  int first = 0, second = 0;
+  ASSERT_EQ(std::sscanf(last.c_str(), "%lf,%lf,%lf,%d,%d", &time_s, &first_rad, &second_rad, &first,
+                        &second),
+            5)
+      << last;
+  EXPECT_EQ(first, 3);
+  EXPECT_EQ(second, 3);
+  EXPECT_NEAR(first_rad, -0.3, 0.02);
+  EXPECT_NEAR(second_rad, 0.4, 0.02);
 }
 
 /// Of a whole start and run of 21 slaves, power-on to INIT, every frame is one that a stranger's

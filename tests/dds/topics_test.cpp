@@ -339,6 +339,9 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
   rig.state.age_cycles()[5] = 40;
   rig.state.temperature_C()[8] = 107.9;
   rig.state.temperature_C()[9] = 108.0;  // docs/faults.md: with a warning from 108
+  rig.robot.config.joints[10].homing = hal::HomingConfig{};
+  rig.state.homing()[10] = static_cast<std::uint8_t>(hal::HomingState::kNotHomed);
+  rig.state.homing()[11] = static_cast<std::uint8_t>(hal::HomingState::kHomed);
   rig.set_faults({{12, 0.012, joints[12].name, joints[12].board, "following error",
                    hal::StopCategory::kCategory1, true, 0.0}});
   auto reader = rig.reader<diagnostic_msgs::DiagnosticArray>("diagnostics");
@@ -360,6 +363,9 @@ TEST(Topics, OfDiagnosticsSayWhichJointAndBoardIsNotWell) {
       EXPECT_EQ(of(8).first, 0);
       EXPECT_EQ(of(9),
                 (std::pair<int, std::string>(1, "the winding is hot: 108 of at most 120 C")));
+      EXPECT_EQ(of(10).first, 1);
+      EXPECT_TRUE(of(10).second.ends_with(", not homed")) << of(10).second;
+      EXPECT_EQ(of(11).first, 0);
       EXPECT_EQ(found.at("tandem: run").first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).first, 2);
       EXPECT_EQ(found.at("tandem: board " + joints[0].board).second,

@@ -299,9 +299,23 @@ TEST(SheetBoard, HomesAtTheEndOfItsRange) {
   EXPECT_EQ(rig.error(), 0);
 }
 
+TEST(SheetBoard, AHomingMethodThatItsSheetDoesNotListIsAHomingError) {
+  BoardSetup setup = stand_in(servo_with_profiles());
+  setup.axes[0].homing_methods = std::uint64_t{1} << 35;
+  StandIn rig(setup);
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{17}), 0U);
+  rig.enable_by_sdo(6);
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(13));
+  rig.word(0x0F);
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{35}), 0U);
+  rig.word(0x1F);
+  EXPECT_TRUE(rig.bit(12));
+}
+
 TEST(SheetBoard, AHomingMethodThatItHasNotIsAHomingError) {
   StandIn rig(stand_in(servo_with_profiles()));
-  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{3}), 0U);
+  ASSERT_EQ(rig.write(0x6098, 0, std::int8_t{15}), 0U);
   rig.enable_by_sdo(6);
   rig.word(0x1F);
   EXPECT_TRUE(rig.bit(13));

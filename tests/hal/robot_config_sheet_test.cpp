@@ -139,10 +139,11 @@ TEST_F(BoardSheet, ThatCannotBeReadIsRefusedWithItsOwnLine) {
 }
 
 TEST_F(BoardSheet, OfTwoBoardsSaysOnceWhatIsWrongWithIt) {
-  const std::string second = with(
-      with(kArm, "[[joint]]\n", "[[board]]\nname = \"other\"\nbus = \"arm\"\neds = \"drive.eds\"\n"
-                               "joints = [\"wrist\"]\n[[joint]]\n"),
-      "name = \"elbow\"\nactuator", "names = [\"elbow\", \"wrist\"]\nactuator");
+  const std::string second =
+      with(with(kArm, "[[joint]]\n",
+                "[[board]]\nname = \"other\"\nbus = \"arm\"\neds = \"drive.eds\"\n"
+                "joints = [\"wrist\"]\n[[joint]]\n"),
+           "name = \"elbow\"\nactuator", "names = [\"elbow\", \"wrist\"]\nactuator");
   EXPECT_EQ(refused(second), "taken");
   sheet = with(sheet, "AccessType=const", "AccessType=sometimes");
   EXPECT_NE(refused(second).find("sometimes"), std::string::npos) << refused(second);
@@ -198,6 +199,43 @@ TEST_F(BoardSheet, LetsAJointBeHomed) {
   EXPECT_DOUBLE_EQ(homing->zero_speed_rad_s, 0.05);
   EXPECT_EQ(homing->timeout_s, 60.0);
   EXPECT_TRUE(homing->required && !homing->at_start);
+  EXPECT_FALSE(homing->home_switch_rad.has_value());
+  EXPECT_EQ(homing->index_rad, 0.0);
+}
+
+TEST_F(BoardSheet, LetsAHomingHaveSwitchesInSimulation) {
+  const std::string homing =
+      "homing = { method = 8, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0, home_switch_rad = "
+      "[-0.2, 0.1], index_rad = 0.03 }\n";
+  const auto robot = read(joint_with(homing));
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  EXPECT_EQ(robot->joints[0].homing->home_switch_rad, (std::array{-0.2, 0.1}));
+  EXPECT_EQ(robot->joints[0].homing->index_rad, 0.03);
+  EXPECT_NE(refused(joint_with(with(homing, "[-0.2, 0.1]", "[0.1, -0.2]"))).find("is no range"),
+            std::string::npos);
+  EXPECT_NE(refused(joint_with(with(homing, "[-0.2, 0.1]", "[0.1]"))).find("home_switch_rad"),
+            std::string::npos);
+}
+
+TEST_F(BoardSheet, ThatListsHomingMethodsHasNoOther) {
+  const std::string variable =
+      "\nParameterName=Method\nObjectType=0x7\nDataType=0x0002\n"
+      "AccessType=ro\nDefaultValue=";
+  sheet +=
+      "[60E3]\nParameterName=Supported homing methods\nObjectType=0x8\nSubNumber=3\n"
+      "[60E3sub0]" +
+      with(variable, "0x0002", "0x0005") + "2\n[60E3sub1]" + variable + "35\n[60E3sub2]" +
+      variable + "-3\n";
+  const auto of = [](const std::string& method) {
+    return joint_with("homing = { method = " + method +
+                      ", speed_rad_s = 0.5, acceleration_rad_s2 = 2.0 }\n");
+  };
+  EXPECT_EQ(refused(of("35")), "taken");
+  EXPECT_EQ(refused(of("-3")), "taken");
+  const std::string error = refused(of("17"));
+  EXPECT_NE(error.find("the drive of joint 'elbow' has no method 17: 60E3 of "), std::string::npos)
+      << error;
+  EXPECT_NE(error.find("lists 35, -3"), std::string::npos) << error;
 }
 
 TEST_F(BoardSheet, RefusesAHomingThatIsNoneOrThatTheDriveHasNot) {

@@ -169,5 +169,50 @@ TEST_F(HilServe, ARobotOnCanDrivenOverDdsIsTheInProcessRunBitForBit) {
   expect_same_bits("/double_pendulum-trajectory-001.mcap", 1000);
 }
 
+class HilHoming : public Lockstep {
+ protected:
+  /// The double pendulum, whose joints have to be homed: by a switch's edge, from the left.
+  void SetUp() override {
+    const std::string from = experiment("double_pendulum_classic/");
+    std::string robot = test::text_of(from + "robot.toml");
+    const auto put = [&](const std::string& old, const std::string& now) {
+      ASSERT_NE(robot.find(old), std::string::npos) << old;
+      robot.replace(robot.find(old), old.size(), now);
+    };
+    put("../double_pendulum/", experiment("double_pendulum/"));
+    put("motor_encoder_counts_per_rev = 65536\n",
+        "motor_encoder_counts_per_rev = 65536\n"
+        "homing = { method = 24, speed_rad_s = 2.0, acceleration_rad_s2 = 20.0, position_rad = "
+        "0.2, "
+        "home_switch_rad = [0.6, 0.75], at_start = true }\n");
+    std::ofstream(folder_ / "robot.toml") << robot;
+    std::ofstream(folder_ / "trajectory.toml") << test::text_of(from + "trajectory.toml");
+  }
+};
+
+/// Joints that know nothing of their place are homed over the wire by the run itself, then move.
+TEST_F(HilHoming, OverCanAndTheMotionBehindItAreTheInProcessRunBitForBit) {
+  const std::string trajectory = file("trajectory.toml");
+  ASSERT_NO_FATAL_FAILURE(run_in_process(trajectory, {"--duration", "3"}));
+  Process robot(emulate_words(trajectory), file("robot.txt"));
+  ASSERT_TRUE(robot.says("Ctrl-C")) << robot.output();
+  Process master(tandem({"run", trajectory, "--hal", "can", "--lockstep", "--no-socket",
+                         "--duration", "3", "--log", over_can_, "--json", file("run.json")}),
+                 file("run.txt"));
+  ASSERT_EQ(master.wait(), 0) << master.output();
+  ASSERT_EQ(robot.interrupt(), 0) << robot.output();
+  const std::string log = "/double_pendulum-trajectory-001.mcap";
+  expect_same_bits(log, 2000);
+  EXPECT_EQ(json("run.json")["faults"].size(), 0U);
+  Process states(tandem({"log", "csv", over_can_ + log, "--topic", "state", "--fields", "homing",
+                         "-o", file("homing.csv")}),
+                 file("csv.txt"));
+  ASSERT_EQ(states.wait(), 0) << states.output();
+  const std::string csv = test::text_of(file("homing.csv"));
+  EXPECT_NE(csv.find(",1,1\n"), std::string::npos) << "neither was homed at first";
+  EXPECT_NE(csv.find(",2,1\n"), std::string::npos) << "one after the other";
+  EXPECT_TRUE(csv.ends_with(",3,3\n")) << csv.substr(csv.size() - 100);
+}
+
 }  // namespace
 }  // namespace tandem
