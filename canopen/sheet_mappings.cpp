@@ -39,8 +39,8 @@ void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMappi
     if (entry != nullptr && entry->value) bits += static_cast<int>(entry->value->number & 0xFF);
   }
   if (missing > 0) {
-    odd.push_back({count.line, name + " maps " + std::to_string(entries) + " objects, of which " +
-                                   std::to_string(missing) + " are not defined"});
+    odd.push_back({count.line, name + " maps " + std::to_string(entries) +
+                                   " objects, and defines " + std::to_string(entries - missing)});
   }
   const int most = 8 * sheet.most_pdo_bytes;
   if (bits <= most) return;

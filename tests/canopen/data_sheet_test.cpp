@@ -386,7 +386,7 @@ TEST(DataSheet, RemarksWhatContradictsItself) {
            {mapping(9, "HighLimit=8\n", 9, "0x60400010"),
             "line 66: [1A00] maps 9 objects, and has room for 8"},
            {mapping(65, "", 2, "0x60400001"), "[1A00] maps 65 objects, and has room for 64"},
-           {mapping(3, "", 2, "0x60400010"), "[1A00] maps 3 objects, of which 1 are not defined"},
+           {mapping(3, "", 2, "0x60400010"), "[1A00] maps 3 objects, and defines 2"},
            {mapping(7, "", 7, "0x60400010"),
             "line 66: [1A00] maps 112 bits, and a frame has at most 64; one of CAN FD 512"},
            {mapping(3, "", 3, "0x604000FF"), "[1A00] maps 765 bits, and a frame has at most 64\n"},
