@@ -16,8 +16,10 @@ namespace tandem::internal_model {
 
 /// A call of the loop's beside read() and write().
 struct BackendCall {
-  bool reset = false;  ///< reset(); else stop(category)
-  hal::StopCategory category = hal::StopCategory::kWarn;
+  enum class What : std::uint8_t { kStop, kReset, kHome, kStopHoming };
+  What what = What::kStop;
+  hal::StopCategory category = hal::StopCategory::kWarn;  ///< of kStop
+  std::uint16_t joint = 0;                                ///< of kHome, kStopHoming
 
   bool operator==(const BackendCall&) const = default;
 };

@@ -122,10 +122,11 @@ void ParallelRobot::make_up(const CommandRecord& record) {
 }
 
 void ParallelRobot::call(const BackendCall& call) noexcept {
-  if (call.reset) {
-    second_->reset();
-  } else {
-    second_->stop(call.category);
+  switch (call.what) {
+    case BackendCall::What::kStop: return second_->stop(call.category);
+    case BackendCall::What::kReset: return second_->reset();
+    case BackendCall::What::kHome: (void)second_->home(call.joint); return;
+    case BackendCall::What::kStopHoming: return second_->stop_homing(call.joint);
   }
 }
 

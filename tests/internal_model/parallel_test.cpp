@@ -53,6 +53,24 @@ TEST(ParallelRobot, GetsStopsResetsAndGainsAsTheFirstDoes) {
   expect_same(run.beside->differences());
 }
 
+TEST(ParallelRobot, IsHomedWithTheFirst) {
+  SwingRun run({.homing = hal::HomingConfig{.method = 17,
+                                            .speed_rad_s = 1.5,
+                                            .zero_speed_rad_s = 0.1,
+                                            .acceleration_rad_s2 = 5.0,
+                                            .position_rad = -2.995,
+                                            .timeout_s = 10.0,
+                                            .required = true,
+                                            .at_start = true}});
+  for (int i = 0; i < 6000 && run.cycle->phase() != RunPhase::kRunning; ++i) run.cycle->step();
+  ASSERT_EQ(run.first->homing(0).state, hal::HomingState::kHomed) << run.first->status_text();
+  run.steps(100);
+  const std::uint64_t cycles = run.cycle->loop().cycles;
+  EXPECT_EQ(run.beside->finish().cycles, cycles);
+  EXPECT_EQ(run.second->homing(0).state, hal::HomingState::kHomed);
+  expect_same(run.beside->differences());
+}
+
 TEST(ParallelRobot, OfOtherGainsDiffersAndTheFirstIsNotChanged) {
   SwingRun alone({.beside = false});
   SwingRun run({.kp = 300.0});
