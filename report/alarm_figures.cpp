@@ -1,0 +1,43 @@
+#include "report/alarm_figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tandem::report {
+namespace {
+
+constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond, CurveStyle::kFourth,
+                                  CurveStyle::kFifth,    CurveStyle::kSixth,  CurveStyle::kThird};
+
+/// What is not counted or not found interrupts the line.
+Curve drawn(const AlarmCurve& one, CurveStyle style, const std::vector<double>& time_ms) {
+  Curve curve{one.label, style, {}, {}};
+  for (std::size_t i = 0; i < time_ms.size(); ++i) {
+    const bool known = one.alarms_per_hour[i] > 0.0 && std::isfinite(time_ms[i]);
+    curve.x.push_back(one.alarms_per_hour[i]);
+    curve.y.push_back(known ? time_ms[i] : std::numeric_limits<double>::quiet_NaN());
+  }
+  return curve;
+}
+
+}  // namespace
+
+std::vector<Figure> alarm_figures(const std::string& name, const std::string& title,
+                                  std::span<const AlarmCurve> curves) {
+  std::vector<Figure> figures(2);
+  for (const bool worst : {false, true}) {
+    Figure& figure = figures[worst ? 1 : 0];
+    figure.name = name + (worst ? "_worst" : "_median");
+    figure.title = title + (worst ? ": the worst push" : ": the median push");
+    figure.x_label = "false alarms an hour, counted";
+    figure.y_label = "time to detection [ms]";
+    figure.log_axes = true;
+    for (std::size_t c = 0; c < std::min(curves.size(), std::size(kStyles)); ++c)
+      figure.curves.push_back(
+          drawn(curves[c], kStyles[c], worst ? curves[c].worst_ms : curves[c].median_ms));
+  }
+  return figures;
+}
+
+}  // namespace tandem::report
