@@ -10,13 +10,18 @@ namespace {
 constexpr CurveStyle kStyles[] = {CurveStyle::kMeasured, CurveStyle::kSecond, CurveStyle::kFourth,
                                   CurveStyle::kFifth,    CurveStyle::kSixth,  CurveStyle::kThird};
 
+/// Of more there is always one: no threshold that anybody takes.
+constexpr double kMostAlarms_per_hour = 3600.0;
+
 /// What is not counted or not found interrupts the line.
 Curve drawn(const AlarmCurve& one, CurveStyle style, const std::vector<double>& time_ms) {
   Curve curve{one.label, style, {}, {}};
   for (std::size_t i = 0; i < time_ms.size(); ++i) {
-    const bool known = one.alarms_per_hour[i] > 0.0 && std::isfinite(time_ms[i]);
-    curve.x.push_back(one.alarms_per_hour[i]);
-    curve.y.push_back(known ? time_ms[i] : std::numeric_limits<double>::quiet_NaN());
+    const double rate = one.alarms_per_hour[i];
+    const bool known = rate > 0.0 && rate <= kMostAlarms_per_hour && std::isfinite(time_ms[i]);
+    constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+    curve.x.push_back(known ? rate : kGap);
+    curve.y.push_back(known ? time_ms[i] : kGap);
   }
   return curve;
 }

@@ -55,10 +55,9 @@ TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
 TEST_F(HomedJoints, AreNotHomedOverALink) {
   const std::string plain = read_text(folder_ / "hold.toml");
   const std::size_t at = plain.find("[[controller]]");
-  write_text(folder_ / "operated.toml", plain.substr(0, at) + "[teleoperation]\n" +
-                                            "[teleoperation.up]\ndelay_s = 0.1\n" +
-                                            "[teleoperation.down]\ndelay_s = 0.1\n" +
-                                            plain.substr(at));
+  write_text(folder_ / "operated.toml",
+             plain.substr(0, at) + "[teleoperation]\n" + "[teleoperation.up]\ndelay_s = 0.1\n" +
+                 "[teleoperation.down]\ndelay_s = 0.1\n" + plain.substr(at));
   expect(tandem("run operated.toml --duration 1"), 2,
          "nothing is homed over the link, and joint1 has `homing`");
 }

@@ -1,5 +1,5 @@
-// Time to detection against false alarms: both counted, over hours of motion and hundreds of pushes.
-// TANDEM_FREE_HOURS: hours of free motion of each robot; prints docs/estimation.md's table.
+// Time to detection against false alarms: both counted, over hours of motion and hundreds of
+// pushes. TANDEM_FREE_HOURS: hours of free motion of each robot; prints docs/estimation.md's table.
 // TANDEM_COLLISION_FIGURES: a folder for its pictures.
 #include <fmt/core.h>
 
@@ -79,7 +79,8 @@ TEST_P(CollisionCurve, OfPushesAgainstFalseAlarmsInHours) {
   std::vector<double> per_hour;
   for (std::size_t f = 0; f < factors_.size(); ++f) {
     per_hour.push_back(static_cast<double>(alarms.alarms(factors_[f])) / hours);
-    fmt::print("  {:.2f} of them: {} in {:.2f} h\n", factors_[f], alarms.alarms(factors_[f]), hours);
+    fmt::print("  {:.2f} of them: {} in {:.2f} h\n", factors_[f], alarms.alarms(factors_[f]),
+               hours);
   }
   EXPECT_LE(per_hour.back(), 1.0) << "thresholds for one an hour";
   const std::size_t last = factors_.size() - 1;
@@ -103,9 +104,8 @@ TEST_P(CollisionCurve, OfPushesAgainstFalseAlarmsInHours) {
         EXPECT_LE(times[k].with(last).median, 20.0) << s.places[place].first;
       }
     }
-    for (report::Figure& figure :
-         report::alarm_figures(s.places[place].first,
-                               fmt::format("{}, {}", s.robot, s.places[place].first), curves))
+    for (report::Figure& figure : report::alarm_figures(
+             s.places[place].first, fmt::format("{}, {}", s.robot, s.places[place].first), curves))
       figures.push_back(std::move(figure));
   }
   if (const char* folder = std::getenv("TANDEM_COLLISION_FIGURES")) {

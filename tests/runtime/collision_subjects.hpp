@@ -80,8 +80,8 @@ inline std::vector<double> learned(const Subject& s, const std::vector<std::uint
   }
   std::vector<double> thresholds;
   for (const auto& runs : all)
-    thresholds.push_back(estimation::learn_threshold(runs, 1e-3 * kBlock,
-                                                     1.0 / static_cast<double>(all.size())));
+    thresholds.push_back(
+        estimation::learn_threshold(runs, 1e-3 * kBlock, 1.0 / static_cast<double>(all.size())));
   return thresholds;
 }
 
@@ -95,8 +95,7 @@ void pushed(const Subject& s, std::size_t place, double force_N, std::uint64_t s
   way *= force_N / way.norm();
   const double at_s = 2.0 + 3.0 * std::uniform_real_distribution<double>()(random);
   const auto& [joint, point] = s.places[place];
-  EstimatedRun run(s.robot, s.experiment,
-                   {.seed = seed + 100, .estimation = observer_of(s.robot)});
+  EstimatedRun run(s.robot, s.experiment, {.seed = seed + 100, .estimation = observer_of(s.robot)});
   const sim::Fault push =
       push_on(run.experiment->robot, joint, {way.x(), way.y(), way.z()}, at_s, 0.2, point);
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
