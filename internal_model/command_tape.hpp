@@ -47,7 +47,8 @@ struct CommandRecord {
   std::size_t calls_made = 0;
   std::size_t calls_before = 0;  ///< of them: made before read(), after the last cycle's write()
   std::array<BackendCall, kMostCalls> calls{};
-  hal::StateImage state;  ///< of the first robot
+  hal::StateImage state;         ///< of the first robot
+  std::array<double, 7> base{};  ///< its base by its truth: position [m], quaternion x y z w
   hal::CommandImage command;
   hal::ParameterImage gains;
 };

@@ -7,8 +7,9 @@
 namespace tandem::internal_model {
 
 DuplicatingBackend::DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
-                                       const std::atomic<std::uint64_t>& done)
-    : ForwardingBackend(first), tape_(&tape), done_(&done), revisions_(joints) {}
+                                       const std::atomic<std::uint64_t>& done,
+                                       const hal::TruthImage* truth)
+    : ForwardingBackend(first), tape_(&tape), done_(&done), truth_(truth), revisions_(joints) {}
 
 void DuplicatingBackend::exchange(const hal::CycleTime& time) noexcept {
   if (to().pace() == hal::Pace::kSimulatedClock) {
@@ -33,6 +34,10 @@ Code DuplicatingBackend::read(const hal::CycleTime& time,
   record.calls_made = record.calls_before = late_calls_;
   std::copy_n(late_.begin(), late_calls_, record.calls.begin());
   record.state.assign(state);
+  if (truth_ != nullptr) {
+    std::ranges::copy(truth_->base_position_m(), record.base.begin());
+    std::ranges::copy(truth_->base_quaternion(), record.base.begin() + 3);
+  }
   late_calls_ = 0;
   return code;
 }

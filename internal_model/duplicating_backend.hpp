@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "hal/forwarding_backend.hpp"
+#include "hal/truth.hpp"
 #include "internal_model/command_tape.hpp"
 
 namespace tandem::internal_model {
@@ -25,10 +26,11 @@ class DuplicatingBackend final : public hal::ForwardingBackend {
   /// Cycles that the second robot may be behind in simulated time.
   static constexpr std::uint64_t kMostBehind = 64;
 
-  /// @param done  how many records the second robot has carried out
+  /// @param done   how many records the second robot has carried out
+  /// @param truth  the first robot's, filled by its read(); null: none
   /// All outlive it.
   DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
-                     const std::atomic<std::uint64_t>& done);
+                     const std::atomic<std::uint64_t>& done, const hal::TruthImage* truth);
 
   /// Cycles so far. The loop's. @rt
   [[nodiscard]] std::uint64_t cycles() const noexcept TANDEM_RT { return cycles_; }
@@ -52,6 +54,7 @@ class DuplicatingBackend final : public hal::ForwardingBackend {
 
   CommandTape* tape_;
   const std::atomic<std::uint64_t>* done_;
+  const hal::TruthImage* truth_;
   CommandRecord* record_ = nullptr;  // of this cycle; null: there was no place
   std::uint64_t cycles_ = 0;
   std::array<BackendCall, CommandRecord::kMostCalls> late_{};  // since the last record's end
