@@ -5,6 +5,24 @@
 #include <numbers>
 
 namespace tandem::estimation {
+namespace {
+
+/// What the Gumbel distribution of these blocks' mean and variance exceeds with this probability;
+/// not below the largest.
+double quantile(std::span<const double> largest, double probability) {
+  double mean = 0.0, variance = 0.0, most = 0.0;
+  const auto n = static_cast<double>(largest.size());
+  for (const double one : largest) {
+    mean += one / n;
+    most = std::max(most, one);
+  }
+  for (const double one : largest) variance += (one - mean) * (one - mean) / (n - 1.0);
+  const double scale = std::sqrt(6.0 * variance) / std::numbers::pi;
+  const double location = mean - std::numbers::egamma * scale;
+  return std::max(most, location - scale * std::log(-std::log1p(-probability)));
+}
+
+}  // namespace
 
 CollisionWatch::CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet)
     : threshold_Nm_(std::move(threshold_Nm)), quiet_for_(threshold_Nm_.size()), quiet_(quiet) {}
@@ -31,18 +49,16 @@ std::optional<CollisionWatch::Found> CollisionWatch::look(
   return found;
 }
 
-double learn_threshold(std::span<const double> largest_Nm, double block_s, double alarms_per_hour) {
-  double mean = 0.0, variance = 0.0, most = 0.0;
-  const auto n = static_cast<double>(largest_Nm.size());
-  for (const double one : largest_Nm) {
-    mean += one / n;
-    most = std::max(most, one);
-  }
-  for (const double one : largest_Nm) variance += (one - mean) * (one - mean) / (n - 1.0);
-  const double scale = std::sqrt(6.0 * variance) / std::numbers::pi;
-  const double location = mean - std::numbers::egamma * scale;
+double learn_threshold(std::span<const std::vector<double>> largest_Nm, double block_s,
+                       double alarms_per_hour) {
   const double in_block = std::min(0.5, alarms_per_hour * block_s / 3600.0);
-  return std::max(most, location - scale * std::log(-std::log1p(-in_block)));
+  std::vector<double> all;
+  double threshold = 0.0;
+  for (const std::vector<double>& run : largest_Nm) {
+    all.insert(all.end(), run.begin(), run.end());
+    threshold = std::max(threshold, quantile(run, in_block));
+  }
+  return std::max(threshold, quantile(all, in_block));
 }
 
 }  // namespace tandem::estimation

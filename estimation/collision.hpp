@@ -41,14 +41,17 @@ class CollisionWatch {
   std::uint32_t quiet_;
 };
 
-/// The threshold that a joint's torque without a collision exceeds with this rate, from the largest
-/// magnitudes in blocks of equal length: the quantile of the Gumbel distribution of the same mean
-/// and variance, which is what maxima of many samples tend to, and never less than the largest.
-/// Beyond what was recorded it is an extrapolation: a rate of one an hour from a minute of motion
-/// assumes that the hour is like the minute.
-/// @param largest_Nm        of each block; at least 8
+/// The threshold that a joint's torque without a collision exceeds with this rate at most, from the
+/// largest magnitudes in blocks of equal length of several runs.
+///
+/// The quantile of the Gumbel distribution of the same mean and variance, which is what maxima of
+/// many samples tend to, and never less than the largest: of all blocks, and of each run's alone,
+/// whichever is larger. Runs differ, as a joint sticks in one and slips in the next, and a fit of
+/// all blocks alone is too low where few of the runs slip. Beyond what was recorded it is an
+/// extrapolation; it holds for motion like that of the runs.
+/// @param largest_Nm        by run, of each block; at least 8 a run
 /// @param alarms_per_hour   of this joint; above 0
-[[nodiscard]] double learn_threshold(std::span<const double> largest_Nm, double block_s,
-                                     double alarms_per_hour);
+[[nodiscard]] double learn_threshold(std::span<const std::vector<double>> largest_Nm,
+                                     double block_s, double alarms_per_hour);
 
 }  // namespace tandem::estimation

@@ -16,8 +16,10 @@ namespace tandem::internal_model {
 
 /// A call of the loop's beside read() and write().
 struct BackendCall {
-  bool reset = false;  ///< reset(); else stop(category)
-  hal::StopCategory category = hal::StopCategory::kWarn;
+  enum class What : std::uint8_t { kStop, kReset, kHome, kStopHoming };
+  What what = What::kStop;
+  hal::StopCategory category = hal::StopCategory::kWarn;  ///< of kStop
+  std::uint16_t joint = 0;                                ///< of kHome, kStopHoming
 
   bool operator==(const BackendCall&) const = default;
 };
@@ -45,7 +47,8 @@ struct CommandRecord {
   std::size_t calls_made = 0;
   std::size_t calls_before = 0;  ///< of them: made before read(), after the last cycle's write()
   std::array<BackendCall, kMostCalls> calls{};
-  hal::StateImage state;  ///< of the first robot
+  hal::StateImage state;         ///< of the first robot
+  std::array<double, 7> base{};  ///< its base by its truth: position [m], quaternion x y z w
   hal::CommandImage command;
   hal::ParameterImage gains;
 };

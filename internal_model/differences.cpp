@@ -27,6 +27,21 @@ void Differences::take(const hal::StateImage& first, const hal::StateImage& seco
     channels_[c].take(first.sensor()[c] - second.sensor()[c]);
 }
 
+void Differences::take_base(std::span<const double, 7> first,
+                            std::span<const double, 7> second) noexcept {
+  bases_ = true;
+  base_position_m_.take(
+      std::hypot(first[0] - second[0], first[1] - second[1], first[2] - second[2]));
+  const double* a = &first[3];
+  const double* b = &second[3];
+  // The vector part of a's conjugate times b: exactly 0 for equal ones.
+  const double x = a[3] * b[0] - a[0] * b[3] - (a[1] * b[2] - a[2] * b[1]);
+  const double y = a[3] * b[1] - a[1] * b[3] - (a[2] * b[0] - a[0] * b[2]);
+  const double z = a[3] * b[2] - a[2] * b[3] - (a[0] * b[1] - a[1] * b[0]);
+  const double w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  base_angle_rad_.take(2.0 * std::atan2(std::hypot(x, y, z), std::abs(w)));
+}
+
 double Differences::rms(const Difference& one) const noexcept {
   return std::sqrt(one.square_sum / static_cast<double>(std::max<std::uint64_t>(cycles_, 1)));
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "hal/image.hpp"
@@ -33,6 +34,9 @@ class Differences {
   /// Figures of a cycle in which both follow their command. @pre the same
   void take(const hal::StateImage& first, const hal::StateImage& second) noexcept;
 
+  /// Of the same cycle, where both bases are known. @param first, second  position [m], quaternion
+  void take_base(std::span<const double, 7> first, std::span<const double, 7> second) noexcept;
+
   /// Cycles of compare().
   [[nodiscard]] std::uint64_t compared() const noexcept { return compared_; }
   /// Cycles of take().
@@ -44,12 +48,21 @@ class Differences {
   [[nodiscard]] const std::vector<JointDifference>& joints() const noexcept { return joints_; }
   /// All sensors' channels, one sensor after another, in their own units.
   [[nodiscard]] const std::vector<Difference>& channels() const noexcept { return channels_; }
+  /// How far the bases are apart [m], and by which angle they are turned [rad]. Null: not known.
+  [[nodiscard]] const Difference* base_position_m() const noexcept {
+    return bases_ ? &base_position_m_ : nullptr;
+  }
+  [[nodiscard]] const Difference* base_angle_rad() const noexcept {
+    return bases_ ? &base_angle_rad_ : nullptr;
+  }
   /// The root of the mean square of one of them.
   [[nodiscard]] double rms(const Difference& one) const noexcept;
 
  private:
   std::vector<JointDifference> joints_;
   std::vector<Difference> channels_;
+  Difference base_position_m_, base_angle_rad_;
+  bool bases_ = false;
   std::uint64_t compared_ = 0, cycles_ = 0, unequal_ = 0;
   std::int64_t first_unequal_ = -1;
 };

@@ -7,44 +7,62 @@
 namespace tandem::internal_model {
 
 DuplicatingBackend::DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
-                                       const std::atomic<std::uint64_t>& done)
-    : first_(&first), tape_(&tape), done_(&done), revisions_(joints) {}
+                                       const std::atomic<std::uint64_t>& done,
+                                       const hal::TruthImage* truth)
+    : ForwardingBackend(first), tape_(&tape), done_(&done), truth_(truth), revisions_(joints) {}
 
 void DuplicatingBackend::exchange(const hal::CycleTime& time) noexcept {
-  if (first_->pace() == hal::Pace::kSimulatedClock) {
+  if (to().pace() == hal::Pace::kSimulatedClock) {
     while (cycles_ - done_->load(std::memory_order_acquire) >= kMostBehind) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
     }
   }
-  first_->exchange(time);
+  to().exchange(time);
 }
 
 Code DuplicatingBackend::read(const hal::CycleTime& time,
                               hal::StateImage& state) noexcept TANDEM_RT {
-  const Code code = first_->read(time, state);
+  const Code code = to().read(time, state);
   record_ = tape_->begin_push();
   ++cycles_;
   if (record_ == nullptr) return code;
   CommandRecord& record = *record_;
   record.number = cycles_;
   record.time = time;
-  record.phase = first_->phase();
+  record.phase = to().phase();
   record.written = record.shut_down = record.new_gains = false;
   record.calls_made = record.calls_before = late_calls_;
   std::copy_n(late_.begin(), late_calls_, record.calls.begin());
   record.state.assign(state);
+  if (truth_ != nullptr) {
+    std::ranges::copy(truth_->base_position_m(), record.base.begin());
+    std::ranges::copy(truth_->base_quaternion(), record.base.begin() + 3);
+  }
   late_calls_ = 0;
   return code;
 }
 
 void DuplicatingBackend::stop(hal::StopCategory category) noexcept TANDEM_RT {
-  first_->stop(category);
-  note({.category = category});
+  to().stop(category);
+  note({.what = BackendCall::What::kStop, .category = category});
 }
 
 void DuplicatingBackend::reset() noexcept TANDEM_RT {
-  first_->reset();
-  note({.reset = true});
+  to().reset();
+  note({.what = BackendCall::What::kReset});
+}
+
+bool DuplicatingBackend::home(std::size_t joint) noexcept TANDEM_RT {
+  const bool begins = to().home(joint);
+  if (begins) {
+    note({.what = BackendCall::What::kHome, .joint = static_cast<std::uint16_t>(joint)});
+  }
+  return begins;
+}
+
+void DuplicatingBackend::stop_homing(std::size_t joint) noexcept TANDEM_RT {
+  to().stop_homing(joint);
+  note({.what = BackendCall::What::kStopHoming, .joint = static_cast<std::uint16_t>(joint)});
 }
 
 /// What is called after write() belongs to the next record.
@@ -67,13 +85,13 @@ Code DuplicatingBackend::write(const hal::CommandImage& command,
     gains_known_ = true;
   }
   end_record();
-  return first_->write(command, gains);
+  return to().write(command, gains);
 }
 
 bool DuplicatingBackend::shut_down() noexcept TANDEM_RT {
   if (record_ != nullptr) record_->shut_down = true;
   end_record();
-  return first_->shut_down();
+  return to().shut_down();
 }
 
 /// The cycle's last call: the second robot may go on.

@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/backend.hpp"
+#include "hal/forwarding_backend.hpp"
+#include "hal/truth.hpp"
 #include "internal_model/command_tape.hpp"
 
 namespace tandem::internal_model {
@@ -20,56 +21,30 @@ namespace tandem::internal_model {
 /// In simulated time no cycle is left out: exchange(), the only call that may block, waits until
 /// the second robot is at most kMostBehind cycles behind. On a clock nothing waits: a cycle that
 /// finds no free record is counted (CommandTape::dropped()).
-class DuplicatingBackend final : public hal::Backend {
+class DuplicatingBackend final : public hal::ForwardingBackend {
  public:
   /// Cycles that the second robot may be behind in simulated time.
   static constexpr std::uint64_t kMostBehind = 64;
 
-  /// @param done  how many records the second robot has carried out
+  /// @param done   how many records the second robot has carried out
+  /// @param truth  the first robot's, filled by its read(); null: none
   /// All outlive it.
   DuplicatingBackend(hal::Backend& first, CommandTape& tape, std::size_t joints,
-                     const std::atomic<std::uint64_t>& done);
+                     const std::atomic<std::uint64_t>& done, const hal::TruthImage* truth);
 
   /// Cycles so far. The loop's. @rt
   [[nodiscard]] std::uint64_t cycles() const noexcept TANDEM_RT { return cycles_; }
 
-  [[nodiscard]] hal::Pace pace() const noexcept override { return first_->pace(); }
-  [[nodiscard]] hal::Phase phase() const noexcept override { return first_->phase(); }
-  [[nodiscard]] std::string status_text() const override { return first_->status_text(); }
-  [[nodiscard]] bool waits_for_bus() const noexcept override { return first_->waits_for_bus(); }
   void exchange(const hal::CycleTime& time) noexcept override;
   [[nodiscard]] Code read(const hal::CycleTime& time,
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& gains) noexcept TANDEM_RT override;
-  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
-    return first_->fault_cause(joint);
-  }
-  [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
-    return first_->fault_text(cause, code);
-  }
   void stop(hal::StopCategory category) noexcept TANDEM_RT override;
   void reset() noexcept TANDEM_RT override;
-  [[nodiscard]] bool resets_one_joint() const noexcept TANDEM_RT override {
-    return first_->resets_one_joint();
-  }
+  bool home(std::size_t joint) noexcept TANDEM_RT override;
+  void stop_homing(std::size_t joint) noexcept TANDEM_RT override;
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override {
-    first_->last_command(command);
-  }
-  [[nodiscard]] bool command_in_force(
-      hal::CommandImage& command) const noexcept TANDEM_RT override {
-    return first_->command_in_force(command);
-  }
-  [[nodiscard]] std::uint64_t missed() const noexcept TANDEM_RT override {
-    return first_->missed();
-  }
-  [[nodiscard]] std::int64_t clock_shift_ns() const noexcept TANDEM_RT override {
-    return first_->clock_shift_ns();
-  }
-  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
-    return first_->next_injected();
-  }
   /// Of two robots, one of which is on another thread: false.
   [[nodiscard]] bool archive(Archive&) override { return false; }
 
@@ -77,9 +52,9 @@ class DuplicatingBackend final : public hal::Backend {
   void note(const BackendCall& call) noexcept TANDEM_RT;
   void end_record() noexcept TANDEM_RT;
 
-  hal::Backend* first_;
   CommandTape* tape_;
   const std::atomic<std::uint64_t>* done_;
+  const hal::TruthImage* truth_;
   CommandRecord* record_ = nullptr;  // of this cycle; null: there was no place
   std::uint64_t cycles_ = 0;
   std::array<BackendCall, CommandRecord::kMostCalls> late_{};  // since the last record's end

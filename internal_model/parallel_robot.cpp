@@ -1,6 +1,7 @@
 #include "internal_model/parallel_robot.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <utility>
 
@@ -26,7 +27,8 @@ ParallelRobot::ParallelRobot(const ParallelParts& parts, const hal::ImageShape& 
       recorder_(parts.recorder),
       all_counts_(parts.first.pace() == hal::Pace::kSimulatedClock),
       tape_(shape, gains, all_counts_ ? 2 * DuplicatingBackend::kMostBehind : kRecords),
-      backend_(parts.first, tape_, shape.joints, done_),
+      backend_(parts.first, tape_, shape.joints, done_, parts.first_truth),
+      bases_(parts.first_truth != nullptr && parts.truth != nullptr),
       state_(shape),
       command_(shape),
       gains_(gains),
@@ -103,9 +105,20 @@ void ParallelRobot::play(const CommandRecord& record) {
   const bool asked = record.calls_made > 0 || record.shut_down;
   if (second_->phase() == hal::Phase::kFault && !asked && result_.fault.empty()) note_fault();
   differences_.compare(record.state, state_);
-  if (both_follow(record)) differences_.take(record.state, state_);
+  if (both_follow(record)) {
+    differences_.take(record.state, state_);
+    compare_bases(record);
+  }
   log(record.time.time_ns);
   show(record);
+}
+
+void ParallelRobot::compare_bases(const CommandRecord& record) {
+  if (!bases_) return;
+  std::array<double, 7> base{};
+  std::ranges::copy(truth_->base_position_m(), base.begin());
+  std::ranges::copy(truth_->base_quaternion(), base.begin() + 3);
+  differences_.take_base(record.base, base);
 }
 
 /// Cycles whose records found no place: the second robot goes on by its last command.
@@ -122,10 +135,11 @@ void ParallelRobot::make_up(const CommandRecord& record) {
 }
 
 void ParallelRobot::call(const BackendCall& call) noexcept {
-  if (call.reset) {
-    second_->reset();
-  } else {
-    second_->stop(call.category);
+  switch (call.what) {
+    case BackendCall::What::kStop: return second_->stop(call.category);
+    case BackendCall::What::kReset: return second_->reset();
+    case BackendCall::What::kHome: (void)second_->home(call.joint); return;
+    case BackendCall::What::kStopHoming: return second_->stop_homing(call.joint);
   }
 }
 

@@ -31,6 +31,9 @@ struct ParallelParts {
   hal::Backend& second;                    ///< a simulation; this thread's from start() on
   const hal::TruthImage* truth = nullptr;  ///< the second's, filled by its read(); null: none
   log::Recorder* recorder = nullptr;       ///< not started yet; null: nothing is logged
+  /// The first's, where it is a simulation with a floating base, as the second; null: no figures of
+  /// the bases.
+  const hal::TruthImage* first_truth = nullptr;
 };
 
 /// What a run in parallel amounts to.
@@ -85,6 +88,7 @@ class ParallelRobot final : public hal::ParallelSource {
   void play(const CommandRecord& record);
   void make_up(const CommandRecord& record);
   void call(const BackendCall& call) noexcept;
+  void compare_bases(const CommandRecord& record);
   [[nodiscard]] bool both_follow(const CommandRecord& record) const;
   void note_fault();
   void take_snapshot();
@@ -99,6 +103,7 @@ class ParallelRobot final : public hal::ParallelSource {
   CommandTape tape_;
   std::atomic<std::uint64_t> done_{0};
   DuplicatingBackend backend_;
+  bool bases_;  // both are known
 
   // The second robot's thread's.
   hal::StateImage state_;

@@ -108,8 +108,9 @@ Exit status: 0 the same; 1 they differ; 2 a log that cannot be read.)";
 
 const char kLogThresholdsExamples[] = R"(Examples:
   tandem log thresholds runs/coman-squat-001.mcap            [estimation.collision] for one an hour
-  tandem log thresholds runs/panda.mcap --per-hour 0.1 --from 5 >> my_experiment.toml
-The log is of free motion with [estimation.observer], at least 8 s of it. What was not moved there
+  tandem log thresholds a.mcap b.mcap c.mcap --per-hour 0.1 --from 5 >> my_experiment.toml
+  tandem log thresholds a.mcap b.mcap c.mcap --against free.mcap pushed.mcap -o alarms
+The logs are of free motion with [estimation.observer], at least 8 s each. What was not moved there
 is not known: docs/estimation.md.)";
 const char kLogImportExamples[] = R"(Examples:
   tandem log import q.csv --robot config/ur5e/robot.toml --map ur5e_csv.toml
@@ -488,8 +489,14 @@ void add_flags(CLI::App& app, LogOptions& o) {
   diff->footer(kLogDiffExamples);
   diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
   CLI::App* thresholds =
-      app.add_subcommand("thresholds", "Collision thresholds from a run that touched nothing");
-  thresholds->add_option("log", o.log, "MCAP file")->required();
+      app.add_subcommand("thresholds", "Collision thresholds from runs that touched nothing");
+  thresholds->add_option("logs", o.files, "MCAP files of such runs, better three than one")
+      ->required();
+  thresholds->add_option("--against", o.against,
+                         "MCAP files of other runs, with pushes or without: count and time alarms");
+  thresholds->add_option("-o,--output", o.output, "Folder for that as a page with figures")
+      ->needs("--against")
+      ->check(is_given(kNameAFile));
   thresholds
       ->add_option("--per-hour", o.alarms_per_hour,
                    "False alarms per hour of all joints together (default: 1)")

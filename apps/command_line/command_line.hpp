@@ -191,7 +191,7 @@ struct NewOptions {
   std::string json;
 };
 
-/// tandem log info|csv|diff|thresholds LOG [LOG_B], tandem log import FILE...
+/// tandem log info|csv|diff LOG [LOG_B], tandem log import FILE..., tandem log thresholds LOG...
 struct LogOptions {
   enum class Action : std::uint8_t {
     kInfo,
@@ -203,14 +203,16 @@ struct LogOptions {
   double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
   double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
   std::string log;
-  std::string other;                ///< diff: the log that `log` is compared with
-  std::string topic;                ///< csv: empty is the state; info: whose fields are listed
-  std::vector<std::string> fields;  ///< empty: all
-  std::size_t every = 1;            ///< n: each n-th message
-  std::string output;               ///< csv: empty is standard output; import: runs/
-  std::vector<std::string> files;   ///< import: tables or bags
-  std::string robot;                ///< import: robot.toml
-  std::string map;                  ///< import: what the columns or topics mean
+  std::string other;                 ///< diff: the log that `log` is compared with
+  std::string topic;                 ///< csv: empty is the state; info: whose fields are listed
+  std::vector<std::string> fields;   ///< empty: all
+  std::size_t every = 1;             ///< n: each n-th message
+  std::string output;                ///< csv: empty is standard output; import: runs/;
+                                     ///< thresholds: a folder, or empty
+  std::vector<std::string> files;    ///< import: tables or bags; thresholds: runs to learn from
+  std::vector<std::string> against;  ///< thresholds: other runs
+  std::string robot;                 ///< import: robot.toml
+  std::string map;                   ///< import: what the columns or topics mean
   std::string json;
 };
 

@@ -278,6 +278,14 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "teleoperation"}};
   }
+  const auto homed = std::ranges::find_if(
+      e.robot.joints, [](const hal::JointConfig& joint) { return joint.homing.has_value(); });
+  if (e.teleoperation && homed != e.robot.joints.end()) {
+    return {{.message = "nothing is homed over the link, and " + homed->name + " has `homing`",
+             .hint = "leave out [teleoperation], or give the joint an absolute encoder",
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
   if (e.teleoperation && overrides.serves) {
     return {{.message = "the link is at the operator's end",
              .hint = "serve the robot by an experiment without this table",

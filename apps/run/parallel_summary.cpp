@@ -84,6 +84,18 @@ void print_sensors_apart(const hal::RobotConfig& robot, const Differences& all, 
   table.print(out);
 }
 
+void print_bases_apart(const Differences& all, std::FILE* out) {
+  if (all.base_position_m() == nullptr) return;
+  const Difference &place = *all.base_position_m(), &angle = *all.base_angle_rad();
+  Table table({"base", "rms", "max"});
+  table.add({"apart", fmt::format("{:.3f} mm", all.rms(place) * kMillimetresApart),
+             fmt::format("{:.3f} mm", place.max * kMillimetresApart)});
+  table.add({"turned", fmt::format("{:.4f} deg", all.rms(angle) * kDegreesApart),
+             fmt::format("{:.4f} deg", angle.max * kDegreesApart)});
+  fmt::print(out, "\n");
+  table.print(out);
+}
+
 std::string sameness(const Differences& all) {
   if (all.unequal() == 0) {
     return fmt::format("the same bits in all {}", counted(all.compared(), "cycle"));
@@ -105,8 +117,13 @@ Json parallel_json(const hal::RobotConfig& second, const ParallelResult& result,
             {"missed", result.missed},
             {"most_behind", result.most_behind},
             {"fault", result.fault.empty() ? Json() : Json(result.fault)},
+            {"base", Json()},
             {"joints", Json::object()},
             {"sensors", Json::object()}};
+  if (all.base_position_m() != nullptr) {
+    json["base"] = {{"position_m", figures_json(all, *all.base_position_m())},
+                    {"angle_rad", figures_json(all, *all.base_angle_rad())}};
+  }
   for (std::size_t j = 0; j < all.joints().size(); ++j) {
     const JointDifference& one = all.joints()[j];
     json["joints"][second.joints[j].name] = {
@@ -130,6 +147,7 @@ void print_parallel(const hal::RobotConfig& second, const ParallelResult& result
   if (all.unequal() > 0) {
     print_joints_apart(second, all, out);
     print_sensors_apart(second, all, out);
+    print_bases_apart(all, out);
   }
   fmt::print(out, "\n");
   Facts facts;

@@ -205,7 +205,8 @@ class Session {
       parallel_.emplace(
           internal_model::ParallelParts{
               *c_.backend, *c_.parallel,
-              experiment().sim.ground_truth ? &c_.parallel->truth() : nullptr, recorder_.get()},
+              experiment().sim.ground_truth ? &c_.parallel->truth() : nullptr, recorder_.get(),
+              c_.sim != nullptr && c_.tree.floating_base ? &c_.sim->truth() : nullptr},
           experiment().robot.shape(), c_.controllers->gains(), experiment().loop.period_ns);
     }
     waits_ = config.after_stop == runtime::AfterStop::kWait;
@@ -313,7 +314,7 @@ class Session {
 
   /// Closes what the loop wrote to, and prints what the run amounts to.
   Exit finish(const LoopTimes& times) {
-    RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}};
+    RunSummary summary{c_, *cycle_, times, std::nullopt, std::nullopt, {}, {}, {}};
     summary.server = server_.get();
     if (parallel_) {
       summary.parallel = parallel_->finish();

@@ -205,6 +205,10 @@ Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
 
 Exit log_command(const LogOptions& options) {
   if (options.action == LogOptions::Action::kImport) return log_import_command(options);
+  if (options.action == LogOptions::Action::kThresholds) {
+    const Status printed = print_thresholds(options);
+    return printed ? Exit::kDone : refuse(printed.error());
+  }
   const Result<log::LogFile> file = log::LogFile::open(options.log);
   Status done;
   Exit exit = Exit::kDone;
@@ -216,8 +220,6 @@ Exit log_command(const LogOptions& options) {
     const Result<Exit> compared = diff(*file, options);
     if (compared) exit = *compared;
     if (!compared) done = std::unexpected(compared.error());
-  } else if (options.action == LogOptions::Action::kThresholds) {
-    done = print_thresholds(*file, options);
   } else if (!options.topic.empty()) {
     done = print_fields(*file, full_topic(options.topic), human_output(options.json));
     if (done) done = write_json(options.json, info_json(*file));

@@ -4,107 +4,121 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "apps/text/console.hpp"
+#include "apps/tools/log_alarms.hpp"
+#include "apps/tools/log_torques.hpp"
 #include "estimation/collision.hpp"
-#include "log/event.hpp"
 
 namespace tandem::apps {
 namespace {
 
 constexpr double kBlock_s = 0.5;
 constexpr std::size_t kLeastBlocks = 16;
-constexpr const char* kField = "external_torque_nm";
+constexpr std::size_t kFewRuns = 3;  // of fewer the rate is a guess
 
-std::unexpected<Error> log_error(const log::LogFile& file, std::string message, std::string hint) {
-  return std::unexpected(Error{std::move(message), std::move(hint), file.path(), 0, {}});
-}
-
-/// The largest magnitudes of a joint's torque, block by block; the last part of a block is left
-/// out.
-std::vector<double> largest_of(const std::vector<double>& time_s,
-                               const std::vector<double>& torque) {
+/// The largest magnitudes of a joint's torque in free motion, block by block; the last part of a
+/// block is left out.
+std::vector<double> largest_of(const ExternalTorques& run, std::size_t joint) {
   std::vector<double> largest;
-  double begin = time_s.front(), most = 0.0;
-  for (std::size_t i = 0; i < time_s.size(); ++i) {
-    if (time_s[i] - begin >= kBlock_s) {
+  if (run.time_s.empty()) return largest;
+  double begin = run.time_s.front(), most = 0.0;
+  for (std::size_t i = 0; i < run.free_rows(); ++i) {
+    if (run.time_s[i] - begin >= kBlock_s) {
       largest.push_back(most);
       most = 0.0;
-      begin = time_s[i];
+      begin = run.time_s[i];
     }
-    most = std::max(most, std::abs(torque[i]));
+    most = std::max(most, std::abs(run.torque_Nm[joint][i]));
   }
   return largest;
 }
 
-/// Where the robot was under control: from the bring-up to the end of the controllers, a request to
-/// stop, or the first fault.
-struct Span {
-  double begin_s = 0.0, end_s = std::numeric_limits<double>::infinity();
-};
-Result<Span> under_control(const log::LogFile& file) {
-  const auto events = file.events();
-  if (!events) return std::unexpected(events.error());
-  Span span;
-  for (const auto& [event, text] : *events) {
-    const double time_s = static_cast<double>(event.time_ns) * 1e-9;
-    if (event.kind == log::EventKind::kBringUpDone) span.begin_s = std::max(span.begin_s, time_s);
-    const bool ends = event.kind == log::EventKind::kControllersDone ||
-                      event.kind == log::EventKind::kStopRequested || log::is_fault(event.kind);
-    if (ends) span.end_s = std::min(span.end_s, time_s);
+/// All runs to learn from, or to try the thresholds on.
+Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths, double from_s,
+                                           std::vector<std::string>& joints) {
+  std::vector<NamedTorques> all;
+  for (const std::string& path : paths) {
+    const Result<log::LogFile> file = log::LogFile::open(path);
+    if (!file) return std::unexpected(file.error());
+    if (joints.empty()) joints = file->info().joints;
+    if (file->info().joints != joints) {
+      return std::unexpected(
+          Error{"the logs are of different robots", "learn from one robot's runs", path, 0, {}});
+    }
+    Result<ExternalTorques> torques = read_external_torques(*file, from_s);
+    if (!torques) return std::unexpected(torques.error());
+    all.push_back({path, std::move(*torques)});
   }
-  return span;
+  return all;
+}
+
+/// By joint, in the order of the logs. Rounded up: a threshold of 0, where nothing was ever felt,
+/// would be one of noise.
+Result<std::vector<double>> learn(const std::vector<NamedTorques>& runs, std::size_t joints,
+                                  double alarms_per_hour) {
+  std::vector<double> thresholds;
+  const double share = alarms_per_hour / static_cast<double>(joints);
+  for (std::size_t j = 0; j < joints; ++j) {
+    std::vector<std::vector<double>> largest;
+    for (const NamedTorques& run : runs) {
+      largest.push_back(largest_of(run.torques, j));
+      if (largest.back().size() >= kLeastBlocks) continue;
+      return std::unexpected(
+          Error{"there are less than 8 s of external torques to learn from",
+                "record a longer run without faults and pushes, or choose an earlier --from",
+                run.path,
+                0,
+                {}});
+    }
+    const double learned = estimation::learn_threshold(largest, kBlock_s, share);
+    thresholds.push_back(std::ceil(1e3 * std::max(1e-3, learned)) * 1e-3);
+  }
+  return thresholds;
+}
+
+void print_learned(const std::vector<NamedTorques>& runs, const std::vector<std::string>& joints,
+                   const std::vector<double>& thresholds, const LogOptions& options) {
+  std::FILE* out = human_output(options.json);
+  for (const NamedTorques& run : runs) {
+    const std::size_t rows = run.torques.free_rows();
+    fmt::print(out, "# {} s of {}\n",
+               std::round(run.torques.time_s[rows - 1] - run.torques.time_s.front()), run.path);
+  }
+  fmt::print(out, "# {} false alarms an hour at most\n", options.alarms_per_hour);
+  if (runs.size() < kFewRuns) {
+    fmt::print(out,
+               "# Runs differ, as a joint sticks in one and slips in another: give {} or more.\n",
+               kFewRuns);
+  }
+  fmt::print(out, "[estimation.collision.threshold_Nm]\n");
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    fmt::print(out, "\"{}\" = {:.3f}\n", joints[j], thresholds[j]);
 }
 
 }  // namespace
 
-Status print_thresholds(const log::LogFile& file, const LogOptions& options) {
-  const std::vector<std::string>& joints = file.info().joints;
-  const log::Topic* topic = file.find("/tandem/estimate");
-  const hal::Field* field = topic == nullptr ? nullptr : topic->layout.find(kField);
-  if (field == nullptr || field->count != joints.size() || joints.empty()) {
-    return log_error(file, "this log has no external torques",
-                     "record a run whose experiment has [estimation.observer]");
-  }
-  std::vector<log::Column> columns;
-  for (std::size_t j = 0; j < joints.size(); ++j) columns.push_back({kField, j});
-  auto table = file.read("/tandem/estimate", columns);
-  if (!table) return std::unexpected(table.error());
-  const Result<Span> span = under_control(file);
-  if (!span) return std::unexpected(span.error());
-  const double from_s = std::max(options.from_s, span->begin_s);
-  const auto first = std::ranges::lower_bound(table->time_s, from_s) - table->time_s.begin();
-  const auto last =
-      std::max(first, std::ranges::lower_bound(table->time_s, span->end_s) - table->time_s.begin());
-  const std::vector<double> time_s(table->time_s.begin() + first, table->time_s.begin() + last);
-  fmt::print(human_output(options.json), "# {} s of {}, {} false alarms an hour\n",
-             time_s.empty() ? 0.0 : std::round(time_s.back() - time_s.front()), file.path(),
-             options.alarms_per_hour);
-  std::string text = "[estimation.collision.threshold_Nm]\n";
+Status print_thresholds(const LogOptions& options) {
+  std::vector<std::string> joints;
+  const auto runs = read_all(options.files, options.from_s, joints);
+  if (!runs) return std::unexpected(runs.error());
+  const auto thresholds = learn(*runs, joints.size(), options.alarms_per_hour);
+  if (!thresholds) return std::unexpected(thresholds.error());
+  const auto others = read_all(options.against, options.from_s, joints);
+  if (!others) return std::unexpected(others.error());
+  const AlarmTable table = alarm_table(*others, *thresholds);
+  Result<std::string> page = std::string();
+  if (!options.output.empty()) page = write_alarm_page(table, options.output);
+  if (!page) return std::unexpected(page.error());
+  print_learned(*runs, joints, *thresholds, options);
   Json json{{"alarms_per_hour", options.alarms_per_hour}, {"threshold_Nm", Json::object()}};
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::vector<double> torque(table->columns[j].begin() + first,
-                                     table->columns[j].begin() + last);
-    if (!std::ranges::all_of(torque, [](double t) { return std::isfinite(t); })) {
-      return log_error(file, "the external torque of " + joints[j] + " is not finite",
-                       "record the run again");
-    }
-    const std::vector<double> largest =
-        time_s.empty() ? std::vector<double>() : largest_of(time_s, torque);
-    if (largest.size() < kLeastBlocks) {
-      return log_error(file, "there are less than 8 s of external torques to learn from",
-                       "record a longer run without faults, or choose an earlier --from");
-    }
-    const double share = options.alarms_per_hour / static_cast<double>(joints.size());
-    // Rounded up: a threshold of 0, where nothing was ever felt, would be one of noise.
-    const double threshold =
-        std::ceil(1e3 * std::max(1e-3, estimation::learn_threshold(largest, kBlock_s, share))) *
-        1e-3;
-    text += fmt::format("\"{}\" = {:.3f}\n", joints[j], threshold);
-    json["threshold_Nm"][joints[j]] = threshold;
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    json["threshold_Nm"][joints[j]] = (*thresholds)[j];
+  if (!others->empty()) {
+    print_alarms(table, human_output(options.json));
+    json["against"] = alarms_json(table);
   }
-  fmt::print(human_output(options.json), "{}", text);
+  if (!page->empty()) fmt::print(human_output(options.json), "# {}\n", *page);
   return write_json(options.json, json);
 }
 

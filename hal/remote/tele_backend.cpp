@@ -25,7 +25,8 @@ std::uint64_t round_trip_cycles(const TeleConfig& config, std::int64_t period_ns
 
 TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
                          const TeleConfig& config, std::int64_t period_ns)
-    : robot_(std::move(robot.robot)),
+    : ForwardingBackend(*robot.robot),
+      robot_(std::move(robot.robot)),
       twin_(std::move(twin.robot)),
       robot_side_(std::move(robot.side)),
       twin_side_(std::move(twin.side)),

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/backend.hpp"
 #include "hal/command_limits.hpp"
+#include "hal/forwarding_backend.hpp"
 #include "hal/remote/network.hpp"
 #include "hal/remote/playout.hpp"
 #include "hal/remote/robot_side.hpp"
@@ -58,7 +58,7 @@ struct TeleFigures {
 ///   description that follows each command at once. It is corrected by what arrives: the low-passed
 ///   difference of a state and of what the twin was when it had been given the same commands.
 /// - Bring-up, stops, resets and shut-down do not cross the network.
-class TeleBackend final : public hal::Backend {
+class TeleBackend final : public hal::ForwardingBackend {
  public:
   /// A robot, and control of its own; that may be null.
   struct End {
@@ -69,38 +69,17 @@ class TeleBackend final : public hal::Backend {
   TeleBackend(const hal::Robot& description, End robot, End twin, const TeleConfig& config,
               std::int64_t period_ns);
 
-  [[nodiscard]] hal::Pace pace() const noexcept override { return robot_->pace(); }
   [[nodiscard]] hal::Phase phase() const noexcept override;
-  [[nodiscard]] std::string status_text() const override { return robot_->status_text(); }
-  [[nodiscard]] bool waits_for_bus() const noexcept override { return robot_->waits_for_bus(); }
-  void exchange(const hal::CycleTime& time) noexcept override { robot_->exchange(time); }
   [[nodiscard]] Code read(const hal::CycleTime& time,
                           hal::StateImage& state) noexcept TANDEM_RT override;
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
-  [[nodiscard]] hal::FaultCause fault_cause(std::size_t joint) const noexcept TANDEM_RT override {
-    return robot_->fault_cause(joint);
-  }
-  [[nodiscard]] std::string fault_text(hal::FaultCause cause, std::uint32_t code) const override {
-    return robot_->fault_text(cause, code);
-  }
   void stop(hal::StopCategory category) noexcept TANDEM_RT override;
   void reset() noexcept TANDEM_RT override;
   [[nodiscard]] bool resets_one_joint() const noexcept TANDEM_RT override { return false; }
+  /// Nothing is homed over the link: a command is on its way for too long.
+  bool home(std::size_t /*joint*/) noexcept TANDEM_RT override { return false; }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
-  void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override {
-    robot_->last_command(command);
-  }
-  [[nodiscard]] bool command_in_force(
-      hal::CommandImage& command) const noexcept TANDEM_RT override {
-    return robot_->command_in_force(command);
-  }
-  [[nodiscard]] std::uint64_t missed() const noexcept TANDEM_RT override {
-    return robot_->missed();
-  }
-  [[nodiscard]] hal::InjectedFault next_injected() noexcept TANDEM_RT override {
-    return robot_->next_injected();
-  }
   [[nodiscard]] bool archive(Archive& ar) override;
 
   [[nodiscard]] TeleFigures figures() const noexcept;

@@ -55,6 +55,16 @@ TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
   EXPECT_EQ(end(), 0);
 }
 
+TEST_F(HomedJoints, AreNotHomedOverALink) {
+  const std::string plain = read_text(folder_ / "hold.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  write_text(folder_ / "operated.toml",
+             plain.substr(0, at) + "[teleoperation]\n" + "[teleoperation.up]\ndelay_s = 0.1\n" +
+                 "[teleoperation.down]\ndelay_s = 0.1\n" + plain.substr(at));
+  expect(tandem("run operated.toml --duration 1"), 2,
+         "nothing is homed over the link, and joint1 has `homing`");
+}
+
 TEST_F(HomedJoints, ARunThatDoesNotWaitSaysWhichWasNotHomed) {
   const Outcome ran = tandem("run hold.toml --duration 1 --rate 2 --no-log");  // seen while held
   expect(ran, 1, "held until these are homed: joint1 (tandem joint home NAME");

@@ -1,4 +1,5 @@
 // [parallel] and `tandem predict` of the binary: figures, and one clear error for each wrong input.
+#include "apps/run/prediction.hpp"
 #include "tests/apps/bad_input.hpp"
 #include "tests/apps/running.hpp"
 
@@ -46,6 +47,30 @@ TEST_F(Parallel, OfOtherGainsDiffersInTableLogAndReport) {
   }
   const Outcome info = tandem("log info logs/double_pendulum-trajectory-001.mcap");
   EXPECT_NE(info.out.find("/tandem/parallel/state"), std::string::npos) << info.out;
+}
+
+/// COMAN, whose base floats: how far the two bases are apart is known, and nothing for a twin.
+TEST_F(Parallel, OfAFloatingBaseComparesTheBases) {
+  const Outcome twin = tandem("run '" TANDEM_SOURCE_DIR
+                              "/config/coman/squat_twin.toml' --duration 0.5 --no-log --json "
+                              "run.json");
+  ASSERT_EQ(twin.status, 0) << twin.err;
+  EXPECT_EQ(json("run.json")["parallel"]["base"]["position_m"]["max"], 0.0);
+  EXPECT_EQ(json("run.json")["parallel"]["base"]["angle_rad"]["max"], 0.0);
+  const std::string config = TANDEM_SOURCE_DIR "/config/coman/";
+  std::string soft = read_text(config + "robot.toml");
+  soft.replace(soft.find("coman.urdf"), 10, config + "coman.urdf");
+  write_text(folder_ / "soft.toml", soft);
+  edit("soft.toml", "spring_Nm_rad = 395.46", "spring_Nm_rad = 300.0");
+  std::string squat = read_text(config + "squat_twin.toml");
+  squat.replace(squat.find("\"robot.toml\""), 12, "\"" + config + "robot.toml\"");
+  const std::size_t at = squat.find("[parallel]") + 10;
+  write_text(folder_ / "squat.toml",
+             squat.substr(0, at) + "\nrobot = \"soft.toml\"\n" + squat.substr(at));
+  const Outcome softer = tandem("run squat.toml --duration 1 --no-log --json run.json");
+  ASSERT_EQ(softer.status, 0) << softer.err;
+  EXPECT_GT(json("run.json")["parallel"]["base"]["position_m"]["max"].get<double>(), 1e-6);
+  EXPECT_NE(softer.out.find("  turned"), std::string::npos) << softer.out;
 }
 
 TEST_F(Parallel, WithAHeavierLinkNeedsKernelsOfItsOwn) {
@@ -136,6 +161,17 @@ TEST_F(Predict, OfARunThatIsPausedSaysSo) {
   EXPECT_EQ(to_run("clock resume").status, 0);
   EXPECT_EQ(to_run("predict").status, 0) << "it is not kept from the next one";
   EXPECT_EQ(end(), 0);
+}
+
+/// A robot on a wire, without [parallel].
+TEST(PredictCommand, OfARunWithoutAModelSaysWhatIsMissing) {
+  ControlRegistry registry;
+  const hal::RobotConfig robot;
+  add_predict(registry, nullptr, robot);
+  const Json answer = registry.answer(R"({"do": "predict"})");
+  EXPECT_EQ(answer["ok"], false);
+  EXPECT_EQ(answer["error"], "this run has no model of its robot to predict with");
+  EXPECT_NE(answer["hint"].get<std::string>().find("add [parallel]"), std::string::npos) << answer;
 }
 
 TEST_F(Predict, WithoutARunIsAnError) {

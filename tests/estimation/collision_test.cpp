@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "estimation/alarm_curve.hpp"
 
 namespace tandem::estimation {
 namespace {
@@ -35,7 +38,7 @@ TEST(LearnedThreshold, IsPassedAsOftenAsItSays) {
   };
   std::vector<double> largest;
   for (int i = 0; i < 600; ++i) largest.push_back(block());
-  const double threshold = learn_threshold(largest, 1.0, 6.0);
+  const double threshold = learn_threshold({&largest, 1}, 1.0, 6.0);
   int alarms = 0;
   constexpr int kHours = 50;
   for (int i = 0; i < 3600 * kHours; ++i) alarms += block() > threshold ? 1 : 0;
@@ -43,13 +46,58 @@ TEST(LearnedThreshold, IsPassedAsOftenAsItSays) {
               static_cast<double>(alarms) / kHours);
   EXPECT_LT(alarms, 6 * kHours);  // maxima of normal samples have a lighter tail than Gumbel's
   EXPECT_GT(alarms, 0);
-  EXPECT_GT(learn_threshold(largest, 1.0, 0.1), threshold);
+  EXPECT_GT(learn_threshold({&largest, 1}, 1.0, 0.1), threshold);
+}
+
+// Runs in which a joint sticks, and one in which it slips all the time, as COMAN's waist does.
+TEST(LearnedThreshold, HoldsWhereFewOfTheRunsSlip) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> gauss;
+  const auto run_of = [&](double mean, double deviation, int blocks) {
+    std::vector<double> run;
+    for (int i = 0; i < blocks; ++i) run.push_back(mean + deviation * std::abs(gauss(random)));
+    return run;
+  };
+  std::vector<std::vector<double>> runs(9, std::vector<double>());
+  for (auto& run : runs) run = run_of(0.6, 0.1, 40);
+  runs.push_back(run_of(1.0, 0.4, 40));
+  const double threshold = learn_threshold(runs, 0.5, 1.0);
+  const std::vector<double> slips = run_of(1.0, 0.4, 7200 * 20);  // 20 h
+  EXPECT_LT(std::ranges::count_if(slips, [&](double t) { return t > threshold; }), 20);
+  EXPECT_LT(learn_threshold({runs.data(), 9}, 0.5, 1.0), threshold);
+}
+
+TEST(FalseAlarms, AreBlocksInWhichAJointIsBeyond) {
+  FalseAlarms alarms(std::vector{1.0, 10.0}, 5);
+  for (int run = 0; run < 2; ++run) {
+    alarms.begin_run();
+    for (int i = 0; i < 13; ++i) alarms.look(std::vector{i == 7 ? -1.5 : 0.1, i < 5 ? 8.0 : 0.0});
+  }
+  EXPECT_EQ(alarms.cycles(), 20U) << "two blocks a run; what is left is not counted";
+  EXPECT_EQ(alarms.alarms(1.0), 2U);
+  EXPECT_EQ(alarms.alarms(0.7), 4U);
+  EXPECT_EQ(alarms.alarms(2.0), 0U);
+}
+
+TEST(DetectionTimes, CountFromThePushesFirstCycle) {
+  DetectionTimes times(std::vector{1.0, 10.0}, std::vector{0.5, 1.0, 4.0});
+  for (const double rate : {0.1, 0.3, 0.9}) {  // Nm a cycle
+    times.begin_push();
+    for (int i = 1; i <= 10; ++i) times.look(std::vector{-rate * i, 0.0});
+  }
+  const DetectionTimes::Summary half = times.with(0);
+  EXPECT_EQ(half.pushes, 3U);
+  EXPECT_EQ(half.found, 3U);
+  EXPECT_EQ(half.median, 2.0);
+  EXPECT_EQ(half.worst, 6.0);
+  EXPECT_EQ(times.with(2).found, 1U);
+  EXPECT_TRUE(std::isinf(times.with(2).median));
 }
 
 TEST(LearnedThreshold, IsNeverBelowWhatWasSeen) {
   std::vector<double> largest(20, 1.0);
   largest[7] = 50.0;
-  EXPECT_GE(learn_threshold(largest, 1.0, 3000.0), 50.0);
+  EXPECT_GE(learn_threshold({&largest, 1}, 1.0, 3000.0), 50.0);
 }
 
 }  // namespace

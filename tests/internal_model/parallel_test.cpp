@@ -36,6 +36,25 @@ TEST(ParallelRobot, IsItsExactTwinToTheLastBitFromPowerOnToShutDown) {
   expect_same(run.beside->differences());
 }
 
+TEST(Differences, OfBasesAreADistanceAndAnAngle) {
+  Differences differences(hal::ImageShape{});
+  EXPECT_EQ(differences.base_position_m(), nullptr);
+  const double half = 0.05;  // rad, about y; both turned by another rotation before
+  const std::array<double, 7> a{0.0, 0.0, 0.5, 0.6, 0.0, 0.0, 0.8};
+  const std::array<double, 7> b{0.03,
+                                0.04,
+                                0.5,
+                                0.6 * std::cos(half),
+                                0.8 * std::sin(half),
+                                0.6 * std::sin(half),
+                                0.8 * std::cos(half)};
+  differences.take_base(a, a);
+  EXPECT_EQ(differences.base_angle_rad()->max, 0.0);
+  differences.take_base(a, b);
+  EXPECT_NEAR(differences.base_position_m()->max, 0.05, 1e-12);
+  EXPECT_NEAR(differences.base_angle_rad()->max, 2.0 * half, 1e-12);
+}
+
 /// Calls that a loop makes before and after write(), and parameters.
 TEST(ParallelRobot, GetsStopsResetsAndGainsAsTheFirstDoes) {
   SwingRun run;
@@ -50,6 +69,24 @@ TEST(ParallelRobot, GetsStopsResetsAndGainsAsTheFirstDoes) {
   EXPECT_EQ(run.cycle->phase(), RunPhase::kHeld);
   const std::uint64_t cycles = run.cycle->loop().cycles;
   EXPECT_EQ(run.beside->finish().cycles, cycles);
+  expect_same(run.beside->differences());
+}
+
+TEST(ParallelRobot, IsHomedWithTheFirst) {
+  SwingRun run({.homing = hal::HomingConfig{.method = 17,
+                                            .speed_rad_s = 1.5,
+                                            .zero_speed_rad_s = 0.1,
+                                            .acceleration_rad_s2 = 5.0,
+                                            .position_rad = -2.995,
+                                            .timeout_s = 10.0,
+                                            .required = true,
+                                            .at_start = true}});
+  for (int i = 0; i < 6000 && run.cycle->phase() != RunPhase::kRunning; ++i) run.cycle->step();
+  ASSERT_EQ(run.first->homing(0).state, hal::HomingState::kHomed) << run.first->status_text();
+  run.steps(100);
+  const std::uint64_t cycles = run.cycle->loop().cycles;
+  EXPECT_EQ(run.beside->finish().cycles, cycles);
+  EXPECT_EQ(run.second->homing(0).state, hal::HomingState::kHomed);
   expect_same(run.beside->differences());
 }
 
@@ -133,6 +170,31 @@ TEST(ParallelRobot, ThatIsLateIsLateAlone) {
   EXPECT_GT(view->behind_cycles, 10U);
   EXPECT_EQ(run.cycle->faults().size(), 0U);
   EXPECT_GT(cycles, 300U);
+}
+
+/// Cycles that found no place on the tape: the second robot makes them up with its last command,
+/// and the first has not noticed.
+TEST(ParallelRobot, MakesUpWhatItMissed) {
+  SwingRun run(
+      {.cycles = 1500, .pace = hal::Pace::kWallClock, .slow = std::chrono::milliseconds(1)});
+  for (int i = 0; i < 1400; ++i) {  // faster than the second robot's 1 ms
+    ASSERT_TRUE(run.cycle->step());
+  }
+  const std::uint64_t made = run.cycle->loop().cycles;
+  while (run.beside->newest() == nullptr || run.beside->newest()->behind_cycles > 400) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));  // there is a place again
+  }
+  run.steps(1);
+  const ParallelResult result = run.beside->finish();
+  EXPECT_GT(result.missed, 400U);
+  EXPECT_EQ(result.cycles + result.missed, made + 1) << "each is played, or made up";
+  EXPECT_EQ(run.second->truth().time_ns()[0], run.first->truth().time_ns()[0])
+      << "it is where the first is in time";
+  EXPECT_EQ(result.fault, "");
+  EXPECT_EQ(run.cycle->faults().size(), 0U);
+  EXPECT_LT(std::abs(run.second->truth().position_rad()[0] - run.first->truth().position_rad()[0]),
+            0.25)
+      << "its command was old, not none";
 }
 
 }  // namespace

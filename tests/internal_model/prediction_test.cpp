@@ -195,6 +195,48 @@ TEST(Prediction, ForAControllerIsThereInTheNextCycleOfSimulatedTime) {
   }
 }
 
+/// Asks for ten seconds, and 20 cycles later for 50 ms.
+class ChangesItsMind final : public runtime::test::Sine {
+ public:
+  ChangesItsMind() : Sine({0}) {}
+  Status configure(ControllerSetup& setup) override {
+    predictor = setup.predictor;
+    if (const Status prepared = predictor->prepare(hal::kMostHorizon_ns); !prepared)
+      return prepared;
+    return Sine::configure(setup);
+  }
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
+              hal::CommandImage& command) noexcept override {
+    if (cycle == 10) (void)predictor->ask(hal::kMostHorizon_ns);
+    if (cycle == 30) (void)predictor->ask(50'000'000);
+    ++cycle;
+    if (const hal::Prediction* seen = predictor->newest(); seen != nullptr && first == 0)
+      first = seen->cycles;
+    return Sine::update(time, state, command);
+  }
+  hal::Predictor* predictor = nullptr;
+  int cycle = 0;
+  std::size_t first = 0;  // cycles of the first answer
+};
+
+TEST(Prediction, ThatIsNewerCancelsTheOneBeforeOnTheWallClock) {
+  auto asks = std::make_shared<ChangesItsMind>();
+  PredictionService service(test::kPeriod_ns);
+  RunOptions options{
+      .cycles = 100'000, .pace = hal::Pace::kWallClock, .predictor = &service, .controller = asks};
+  SwingRun run(options, &service);
+  service.attach(*run.cycle, &*run.beside, [&]() -> Result<std::unique_ptr<Fork>> {
+    return std::make_unique<SwingFork>(options);
+  });
+  run.run_to(RunPhase::kRunning);
+  for (int i = 0; i < 60'000 && asks->first == 0; ++i) {
+    run.steps(1);
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  EXPECT_EQ(asks->first, 50U) << "the one of ten seconds never came";
+  service.close();
+}
+
 /// On the wall clock the loop writes itself down under the traps, and waits for nobody.
 TEST(Prediction, OnTheWallClockTakesNoHeapAndNoLockInTheCycle) {
   auto asks = std::make_shared<Asks>();

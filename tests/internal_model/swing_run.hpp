@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/own_system_call.hpp"
+#include "hal/forwarding_backend.hpp"
 #include "internal_model/parallel_robot.hpp"
 #include "internal_model/prediction_service.hpp"
 #include "runtime/robot_cycle.hpp"
@@ -33,32 +34,23 @@ inline std::unique_ptr<sim::SimRobot> make_swing(const hal::RobotConfig& robot) 
 }
 
 /// A simulated robot that passes for one on the wall clock, or is slow.
-class Dressed final : public hal::Backend {
+class Dressed final : public hal::ForwardingBackend {
  public:
   Dressed(sim::SimRobot& robot, hal::Pace pace, std::chrono::microseconds slow = {})
-      : robot_(&robot), pace_(pace), slow_(slow) {}
+      : ForwardingBackend(robot), pace_(pace), slow_(slow) {}
   hal::Pace pace() const noexcept override { return pace_; }
-  hal::Phase phase() const noexcept override { return robot_->phase(); }
-  std::string status_text() const override { return robot_->status_text(); }
   Code read(const hal::CycleTime& time, hal::StateImage& state) noexcept override {
     if (slow_.count() > 0) {
       TANDEM_OWN_SYSTEM_CALL;
       std::this_thread::sleep_for(slow_);
     }
-    return robot_->read(time, state);
+    return to().read(time, state);
   }
-  Code write(const hal::CommandImage& command, const hal::ParameterImage& gains) noexcept override {
-    return robot_->write(command, gains);
-  }
-  void stop(hal::StopCategory category) noexcept override { robot_->stop(category); }
-  void reset() noexcept override { robot_->reset(); }
-  bool shut_down() noexcept override { return robot_->shut_down(); }
   bool archive(Archive& ar) override {
-    return pace_ == hal::Pace::kSimulatedClock && robot_->archive(ar);
+    return pace_ == hal::Pace::kSimulatedClock && to().archive(ar);
   }
 
  private:
-  sim::SimRobot* robot_;
   hal::Pace pace_;
   std::chrono::microseconds slow_;
 };
@@ -72,12 +64,13 @@ struct RunOptions {
   log::Recorder* recorder = nullptr;
   hal::Predictor* predictor = nullptr;
   std::shared_ptr<Controller> controller = nullptr;  ///< null: a sine
+  std::optional<hal::HomingConfig> homing = {};      ///< of its joint
 };
 
 /// The first swing on a sine, and the second.
 struct SwingRun {
   explicit SwingRun(const RunOptions& options = {}, runtime::SnapshotPort* snapshots = nullptr)
-      : robot(tandem::test::swing_robot()),
+      : robot(swing(options)),
         second_robot(robot),
         host(robot, tandem::test::swing_kernels(2), kPeriod_ns),
         first(make_swing(robot)),
@@ -111,6 +104,11 @@ struct SwingRun {
                             .truth = &first->truth(),
                             .snapshots = snapshots},
         config);
+  }
+  static hal::RobotConfig swing(const RunOptions& options) {
+    hal::RobotConfig robot = tandem::test::swing_robot();
+    robot.joints[0].homing = options.homing;
+    return robot;
   }
   ~SwingRun() {
     if (beside) (void)beside->finish();

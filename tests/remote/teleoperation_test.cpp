@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -19,6 +18,8 @@
 #include "runtime/experiment.hpp"
 #include "runtime/local_controllers.hpp"
 #include "runtime/robot_cycle.hpp"
+#include "tests/remote/hand_path.hpp"
+#include "tests/runtime/test_controllers.hpp"
 
 namespace tandem::remote {
 namespace {
@@ -31,11 +32,37 @@ struct Row {
   double tilt = 0.0, height_m = 0.0;
 };
 
+/// How the robot differs from its twin, and who leads it.
+struct Real {
+  double gain = 1.0;        ///< on its position loops
+  double payload_kg = 0.0;  ///< whose weight, without inertia, hangs at its hand
+  bool hand = false;        ///< hand.csv by inverse kinematics, not the experiment's controllers
+};
+
+/// The arm that the hand leads, by robot.
+struct Led {
+  const char* hand;                 ///< link
+  const char* last;                 ///< joint, which carries the payload
+  double scale;                     ///< of the path
+  double elbow_rad;                 ///< where the path begins; the others as in the posture
+  std::vector<std::string> joints;  ///< the fourth is the elbow
+};
+const Led& led(const std::string& robot) {
+  static const Led panda{"panda_hand",
+                         "panda_joint7",
+                         1.0,
+                         -2.356,
+                         {"panda_joint1", "panda_joint2", "panda_joint3", "panda_joint4",
+                          "panda_joint5", "panda_joint6", "panda_joint7"}};
+  static const Led coman{"LSoftHand", "LWrj2", 0.4, -1.2, {"LShSag", "LShLat", "LShYaw", "LElbj"}};
+  return robot == "panda" ? panda : coman;
+}
+
 /// A bundled robot's teleoperation.toml with a link of one's own.
 class Operated {
  public:
   Operated(const std::string& robot, double one_way_s, double loss, bool predict,
-           double seconds = 8.0, std::vector<Outage> outages = {}, double robot_gain = 1.0)
+           double seconds = 8.0, std::vector<Outage> outages = {}, const Real& of = {})
       : kernels_(*model::load_kernels(TANDEM_BINARY_DIR "/lib/models/" + robot + "_kernels.so")) {
     auto read =
         runtime::read_experiment(TANDEM_SOURCE_DIR "/config/" + robot + "/teleoperation.toml");
@@ -48,15 +75,22 @@ class Operated {
     config.predict = predict;
     config.outages = std::move(outages);
     host_ = std::make_unique<runtime::ControllerHost>(e.robot, kernels_.get(), e.loop.period_ns);
+    arm_ = std::make_unique<test::Arm>(e.robot.model.urdf, e.robot.model.floating_base,
+                                       led(robot).hand, led(robot).joints);
+    if (of.hand) {
+      EXPECT_TRUE(host_->add("hand", follows_hand(robot), runtime::test::parameters()));
+    }
     for (const runtime::ControllerSpec& spec : e.controllers) {
+      if (of.hand) break;
       auto plugin = load_controller(spec.plugin, {TANDEM_BINARY_DIR "/lib/controllers"});
       EXPECT_TRUE(plugin) << plugin.error().to_string();
       EXPECT_TRUE(host_->add(spec.name, std::move(*plugin), spec.parameters));
     }
     hal::RobotConfig real = e.robot;  // which the twin need not be like
-    for (hal::GainsConfig& gains : real.gains) gains.position.gains.kp *= robot_gain;
+    for (hal::GainsConfig& gains : real.gains) gains.position.gains.kp *= of.gain;
     auto far = sim::SimRobot::create(real, kernels_.get(), e.sim_robot_config());
     far_ = far->get();
+    if (of.payload_kg > 0.0) hang(led(robot).last, of.payload_kg);
     TeleBackend::End robot_end{std::move(*far), side()};
     TeleBackend::End twin;
     if (predict) {
@@ -120,15 +154,13 @@ class Operated {
     }
     return std::sqrt(sum / static_cast<double>(count));
   }
-  /// RMS distance of the first site from where the hand led it, of an arm on a fixed base [m].
+  /// RMS distance of the hand, in the base's frame, from where it was led [m].
   double tool_error(std::vector<double> Row::*what, std::size_t later = 0) const {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (std::size_t i = 1200; i + later < rows.size(); i += 10, ++count) {
-      const auto a = tool(rows[i + later].*what), b = tool(rows[i].hand);
-      for (std::size_t k = 0; k < 3; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
-    }
-    return std::sqrt(sum / static_cast<double>(count));
+    return tool_distance(rows, what, later, &Row::hand);
+  }
+  /// RMS distance of the hand that the operator saw from where the robot's was a moment later [m].
+  double prediction_error(std::size_t later) const {
+    return tool_distance(rows, &Row::robot, later, &Row::seen);
   }
   std::vector<std::size_t> moved() const {
     std::vector<std::size_t> joints;
@@ -145,20 +177,48 @@ class Operated {
   std::vector<Row> rows;
 
  private:
-  std::array<double, 3> tool(const std::vector<double>& image) const {
-    const tandem_kernels& k = *kernels_.get();
-    std::vector<double> q(k.nq), zero(k.nv), pose(12 * k.sites), twist(6 * k.sites),
-        acc(6 * k.sites);
-    for (std::size_t j = 0; j < k.joints; ++j) {
-      const int index = experiment_->robot.joint_index(k.joint_names[j]);
-      q[j] = image[static_cast<std::size_t>(index)];
+  double tool_distance(const std::vector<Row>& all, std::vector<double> Row::*a, std::size_t later,
+                       std::vector<double> Row::*b) const {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (std::size_t i = 1200; i + later < all.size(); i += 10, ++count)
+      sum += (arm_->hand_m(in_tree(all[i + later].*a)) - arm_->hand_m(in_tree(all[i].*b)))
+                 .squaredNorm();
+    return std::sqrt(sum / static_cast<double>(count));
+  }
+  std::vector<double> in_tree(const std::vector<double>& image) const {
+    std::vector<double> q(arm_->tree().joints.size());
+    for (std::size_t j = 0; j < q.size(); ++j) {
+      const int index = experiment_->robot.joint_index(arm_->tree().joints[j].name);
+      if (index >= 0) q[j] = image[static_cast<std::size_t>(index)];
     }
-    k.site_motion(q.data(), zero.data(), zero.data(), pose.data(), twist.data(), acc.data());
-    return {pose[9], pose[10], pose[11]};
+    return q;
+  }
+  /// From the posture in which the robot starts.
+  std::unique_ptr<Controller> follows_hand(const std::string& robot) const {
+    const runtime::Experiment& e = *experiment_;
+    const test::HandPath path = test::read_hand_path(led(robot).scale);
+    const auto* posture = e.robot.posture(e.posture);
+    std::vector<std::size_t> joints;
+    for (const std::string& joint : led(robot).joints)
+      joints.push_back(static_cast<std::size_t>(e.robot.joint_index(joint)));
+    std::vector<double> q = in_tree(posture->position_rad);
+    q[static_cast<std::size_t>(arm_->tree().joint_index(led(robot).joints[3]))] =
+        led(robot).elbow_rad;
+    return std::make_unique<test::PlaysJoints>(joints, arm_->follow(path, q), path.step_s);
+  }
+  void hang(const std::string& joint, double mass_kg) {
+    sim::Fault weight;
+    weight.kind = hal::FaultKind::kPush;
+    weight.from = sim::FaultFrom::kEnabled;
+    weight.joint = experiment_->robot.joint_index(joint);
+    weight.force_N = {0.0, 0.0, -9.81 * mass_kg};
+    EXPECT_EQ(far_->robot().inject(weight), Code::kOk);
   }
 
   model::KernelLibrary kernels_;
   std::unique_ptr<runtime::Experiment> experiment_;
+  std::unique_ptr<test::Arm> arm_;
   std::unique_ptr<runtime::ControllerHost> host_;
   sim::SimRobot* far_ = nullptr;
   rt::WallClock clock_;
@@ -191,8 +251,8 @@ TEST_P(Teleoperation, PredictionShowsTheHandAtAQuarterOfASecond) {
 
 TEST_P(Teleoperation, PredictionIsCorrectedWhereTheRobotIsNotItsModel) {
   // The robot's position loops have two thirds of the stiffness that the twin's have.
-  Operated predicted(GetParam(), 0.25, 0.1, true, 8.0, {}, 0.66);
-  Operated plain(GetParam(), 0.25, 0.1, false, 8.0, {}, 0.66);
+  Operated predicted(GetParam(), 0.25, 0.1, true, 8.0, {}, {.gain = 0.66});
+  Operated plain(GetParam(), 0.25, 0.1, false, 8.0, {}, {.gain = 0.66});
   predicted.run();
   plain.run();
   const double with = predicted.error(&Row::seen), without = plain.error(&Row::seen);
@@ -215,6 +275,26 @@ TEST_P(Teleoperation, PredictionIsCorrectedWhereTheRobotIsNotItsModel) {
     }
   }
   EXPECT_LT(std::sqrt(sum / static_cast<double>(count)), without / 5.0);
+}
+
+// The recorded path of a hand, by inverse kinematics, with a kilogram in the robot's hand that its
+// twin knows nothing of.
+TEST_P(Teleoperation, FollowsARecordedHandAndAnUnknownPayload) {
+  const Real bare{.hand = true}, loaded{.payload_kg = 1.0, .hand = true};
+  Operated predicted(GetParam(), 0.25, 0.1, true, 8.0, {}, bare);
+  Operated plain(GetParam(), 0.25, 0.1, false, 8.0, {}, bare);
+  Operated carries(GetParam(), 0.25, 0.1, true, 8.0, {}, loaded);
+  for (Operated* one : {&predicted, &plain, &carries}) one->run();
+  const double with = predicted.tool_error(&Row::seen), without = plain.tool_error(&Row::seen);
+  const std::size_t later = cycles_of(0.27);
+  fmt::print(
+      "{}: hand.csv: {:.2f} mm of error with prediction, {:.1f} without: {:.1f} x; what is seen "
+      "differs from what the robot does by {:.2f} mm, with 1 kg in its hand by {:.2f} mm\n",
+      GetParam(), 1e3 * with, 1e3 * without, without / with,
+      1e3 * predicted.prediction_error(later), 1e3 * carries.prediction_error(later));
+  EXPECT_GT(without, 5.0 * with);
+  EXPECT_GT(without, 5.0 * carries.prediction_error(later));
+  EXPECT_GT(without, 0.01) << "the hand moves";
 }
 
 /// The worst of a run.
@@ -280,32 +360,33 @@ TEST(TeleoperationLink, IsAFunctionOfItsSeed) {
   }
 }
 
-/// The table and the figure of docs/teleoperation.md. TANDEM_TELEOPERATION: a file for the table.
+/// The table of docs/teleoperation.md. TANDEM_TELEOPERATION: a file for it.
 TEST(TeleoperationTable, OfDelaysAndLosses) {
   const char* file = std::getenv("TANDEM_TELEOPERATION");
   if (file == nullptr) GTEST_SKIP() << "TANDEM_TELEOPERATION names no file for the table";
   std::ofstream out(file);
-  out << "robot delay_ms loss predicted_mrad plain_mrad robot_mrad starved_ms predicted_tool_mm "
-         "plain_tool_mm\n";
+  out << "robot delay_ms loss predicted_mm plain_mm robot_mm prediction_mm loaded_prediction_mm "
+         "starved_ms\n";
   for (const char* robot : {"panda", "coman"}) {
     for (const double delay_s : {0.0, 0.1, 0.25, 0.5}) {
       for (const double loss : {0.0, 0.05, 0.2}) {
-        Operated predicted(robot, delay_s, loss, true, 12.0),
-            plain(robot, delay_s, loss, false, 12.0);
-        predicted.run();
-        plain.run();
-        const bool arm = std::string(robot) == "panda";
+        const Real bare{.hand = true}, loaded{.payload_kg = 1.0, .hand = true};
+        Operated predicted(robot, delay_s, loss, true, 12.0, {}, bare);
+        Operated plain(robot, delay_s, loss, false, 12.0, {}, bare);
+        Operated carries(robot, delay_s, loss, true, 12.0, {}, loaded);
+        for (Operated* one : {&predicted, &plain, &carries}) one->run();
         EXPECT_EQ(predicted.link->figures().starved_cycles, 0U) << robot << " " << delay_s;
+        const double with = predicted.tool_error(&Row::seen);
+        const double without = plain.tool_error(&Row::seen);
         if (delay_s >= 0.25) {
-          EXPECT_GT(plain.error(&Row::seen), 5.0 * predicted.error(&Row::seen));
+          EXPECT_GT(without, 5.0 * with) << robot << " " << delay_s;
         }
-        out << fmt::format("{} {:.0f} {:.2f} {:.3f} {:.3f} {:.3f} {} {:.3f} {:.3f}\n", robot,
-                           1e3 * delay_s, loss, 1e3 * predicted.error(&Row::seen),
-                           1e3 * plain.error(&Row::seen),
-                           1e3 * predicted.error(&Row::robot, cycles_of(delay_s + 0.02)),
-                           predicted.link->figures().starved_cycles,
-                           arm ? 1e3 * predicted.tool_error(&Row::seen) : 0.0,
-                           arm ? 1e3 * plain.tool_error(&Row::seen) : 0.0);
+        const std::size_t later = cycles_of(delay_s + 0.02);
+        out << fmt::format(
+            "{} {:.0f} {:.2f} {:.3f} {:.3f} {:.3f} {:.3f} {:.3f} {}\n", robot, 1e3 * delay_s, loss,
+            1e3 * with, 1e3 * without, 1e3 * predicted.tool_error(&Row::robot, later),
+            1e3 * predicted.prediction_error(later), 1e3 * carries.prediction_error(later),
+            predicted.link->figures().starved_cycles);
         out.flush();
       }
     }

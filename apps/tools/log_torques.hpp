@@ -1,0 +1,28 @@
+// External torques of a log, where its robot was under control.
+// Layer: apps/tools.  Thread: main.
+#pragma once
+
+#include <vector>
+
+#include "base/result.hpp"
+#include "log/log_file.hpp"
+
+namespace tandem::apps {
+
+struct ExternalTorques {
+  std::vector<double> time_s;
+  std::vector<std::vector<double>> torque_Nm;  ///< by joint, as long as time_s
+  std::vector<double> push_s;                  ///< when an injected push began
+  /// Rows before the first push: motion that touched nothing.
+  [[nodiscard]] std::size_t free_rows() const;
+  /// Of all joints. @param row  of time_s
+  [[nodiscard]] std::vector<double> at(std::size_t row) const;
+};
+
+/// From the bring-up, or `from_s` of the log's time, to the controllers' end, a request to stop, or
+/// the first fault; but a collision, which may have been warned of only.
+/// Errors: no external torques in the log; torques that are not finite; a log cut in the middle.
+[[nodiscard]] Result<ExternalTorques> read_external_torques(const log::LogFile& file,
+                                                            double from_s);
+
+}  // namespace tandem::apps

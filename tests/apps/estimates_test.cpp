@@ -1,0 +1,134 @@
+// What is estimated in a run, by the binary: thresholds from its logs, and its report.
+#include "tests/apps/bad_input.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class Thresholds : public Program {
+ protected:
+  /// An experiment NAME.toml of the trajectory, with an observer or without.
+  void experiment(const std::string& name, bool observer = true) const {
+    const std::string plain = read_text(folder_ / "trajectory.toml");
+    write_text(folder_ / (name + ".toml"), plain + (observer ? "\n[estimation.observer]\n" : "\n"));
+  }
+  /// Runs it. @return the log
+  [[nodiscard]] std::string run(const std::string& name, const std::string& flags = {}) const {
+    const Outcome outcome =
+        tandem("run " + name + ".toml --duration 9 --quiet --json " + name + ".json " + flags);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return json(name + ".json")["log"]["path"];
+  }
+  void expect_refused(const std::vector<std::string>& texts, const std::string& arguments) const {
+    const Outcome outcome = tandem(arguments);
+    EXPECT_EQ(outcome.status, 2) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    for (const std::string& text : texts) {
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    }
+  }
+};
+
+TEST_F(Thresholds, OfThreeRunsHoldInAFourthAndFindItsPushes) {
+  experiment("swing");
+  std::string logs;
+  for (const char* seed : {"1", "2", "3"})
+    logs += " " + run("swing", std::string("--seed ") + seed);
+  const std::string free = run("swing", "--seed 4");
+  write_text(folder_ / "pushes.toml",
+             "[[fault]]\nkind = \"push\"\njoint = \"joint2\"\nforce_N = [0.0, 3.0, 0.0]\n"
+             "point_m = [0.0, 0.0, 0.1]\nafter_enabled_s = 3.0\nfor_s = 0.2\n"
+             "[[fault]]\nkind = \"push\"\njoint = \"joint2\"\nforce_N = [0.0, 3.0, 0.0]\n"
+             "point_m = [0.0, 0.0, 0.1]\nafter_enabled_s = 6.0\nfor_s = 0.2\n");
+  const std::string pushed = run("swing", "--seed 5 --scenario pushes.toml");
+  const Outcome outcome = tandem("log thresholds" + logs + " --json learned.json --against " +
+                                 free + " " + pushed + " -o alarms");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("[estimation.collision.threshold_Nm]\n\"joint1\" = "),
+            std::string::npos)
+      << outcome.out;
+  EXPECT_EQ(outcome.out.find("Runs differ"), std::string::npos) << "three are enough";
+  const auto learned = json("learned.json");
+  EXPECT_GT(learned["threshold_Nm"]["joint2"].get<double>(), 0.0);
+  EXPECT_GT(learned["against"]["free_s"].get<double>(), 10.0) << "until the first push";
+  for (const auto& one : learned["against"]["factors"]) {
+    if (one["factor"].get<double>() < 0.99) continue;
+    EXPECT_EQ(one["alarms"], 0) << one;
+    const auto& times = one["pushed"].begin().value();
+    EXPECT_EQ(times["pushes"], 2);
+    EXPECT_EQ(times["found"], 2) << times;
+    EXPECT_LT(times["worst_ms"].get<double>(), 200.0);
+  }
+  for (const char* file : {"report.html", "alarms_median.png", "alarms_worst.png"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "alarms" / file)) << file;
+  // What was learned is what an experiment takes.
+  const std::string tables = outcome.out.substr(0, outcome.out.find("\n\n"));
+  write_text(folder_ / "watched.toml", read_text(folder_ / "swing.toml") +
+                                           "[estimation.collision]\nreaction = \"hold\"\n" +
+                                           tables + "\n");
+  EXPECT_EQ(tandem("run watched.toml --duration 5 --no-log --quiet").status, 0);
+  EXPECT_EQ(tandem("run watched.toml --duration 5 --no-log --quiet --scenario pushes.toml").status,
+            1);
+}
+
+TEST_F(Thresholds, OfOneRunSayThatRunsDiffer) {
+  experiment("swing");
+  const Outcome outcome = tandem("log thresholds " + run("swing"));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("give 3 or more"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Thresholds, OfALogThatCannotTeachAreRefused) {
+  experiment("swing");
+  experiment("plain", false);
+  const std::string log = run("swing"), without = run("plain");
+  expect_refused({"this log has no external torques", "[estimation.observer]"},
+                 "log thresholds " + without);
+  expect_refused({"less than 8 s of external torques", "--from"},
+                 "log thresholds " + log + " --from 5");
+  expect_refused({"--against"}, "log thresholds " + log + " -o alarms");
+  expect_refused({"no log has a push to draw", "[[fault]]"},
+                 "log thresholds " + log + " --against " + log + " -o alarms");
+}
+
+/// COMAN squats; its log has no truth, so that the base is the estimate's or unknown.
+class EstimatedReport : public Program {
+ protected:
+  [[nodiscard]] Outcome report(const std::string& name, const std::string& tables) const {
+    const std::string config = TANDEM_SOURCE_DIR "/config/coman/";
+    std::string text = read_text(config + "squat.toml");
+    text.replace(text.find("robot.toml"), 10, config + "robot.toml");
+    write_text(folder_ / (name + ".toml"), text + "\n[sim]\nground_truth = false\n" + tables);
+    return tandem("run " + name + ".toml --duration 2 --log logs --report");
+  }
+  [[nodiscard]] std::string page(const std::string& name) const {
+    return read_text(folder_ / "logs" / ("coman-" + name + "-001") / "report.html");
+  }
+};
+
+TEST_F(EstimatedReport, TakesTheBaseFromTheEstimateWhereTheLogHasNoTruth) {
+  const Outcome with = report("with", "[estimation.base]\n");
+  ASSERT_EQ(with.status, 0) << with.err;
+  EXPECT_NE(page("with").find("and by inverse dynamics"), std::string::npos);
+  EXPECT_NE(tandem("log info logs/coman-with-001.mcap").out.find("/tf"), std::string::npos);
+  const Outcome without = report("without", "");
+  ASSERT_EQ(without.status, 0) << without.err;
+  EXPECT_EQ(page("without").find("and by inverse dynamics"), std::string::npos);
+  EXPECT_NE((without.out + without.err).find("the log lacks the base's motion"), std::string::npos)
+      << without.out << without.err;
+  EXPECT_EQ(tandem("log info logs/coman-without-001.mcap").out.find("/tf"), std::string::npos);
+}
+
+TEST_F(EstimatedReport, RefusesARobotWhoseFeetHaveNoSensors) {
+  const std::string config = TANDEM_SOURCE_DIR "/config/anymal_c/";
+  std::string text = read_text(config + "squat.toml");
+  text.replace(text.find("robot.toml"), 10, config + "robot.toml");
+  write_text(folder_ / "squat.toml", text + "\n[estimation.base]\n");
+  const Outcome refused = tandem("run squat.toml --duration 1 --no-log");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("estimation.base"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
+  EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
+}
+
+}  // namespace
+}  // namespace tandem::apps
