@@ -34,15 +34,15 @@ std::string literal(double value) {
 class Emitter {
  public:
   Emitter(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
-          std::uint32_t part_operations, bool batch)
+          std::uint32_t part_operations, std::uint32_t states)
       : nodes_(graph.nodes()),
         kernel_(kernel),
         lanes_(lanes),
         part_operations_(part_operations),
-        number_(batch ? "four" : "double"),
-        array_(batch ? "four_at" : "double"),
-        name_(kernel.shape.name + (batch ? "_four" : "")),
-        batch_(batch),
+        states_(states),
+        number_(states == 1 ? "double" : states == 4 ? "four" : "eight"),
+        array_(states == 1 ? number_ : number_ + "_at"),
+        name_(kernel.shape.name + (states == 1 ? "" : "_" + number_)),
         live_(live_nodes(graph, kernel.outputs)),
         uses_(nodes_.size(), 0),
         part_of_(nodes_.size(), kNowhere),
@@ -136,7 +136,7 @@ class Emitter {
     for (const std::uint32_t angle : single)
       if (angle_[angle] == kNowhere) add(angle);
     const auto angles = static_cast<std::uint32_t>(angles_.size());
-    table_ = batch_ ? angles : (angles + 3) / 4 * 4;  // whole vectors of four
+    table_ = states_ == 1 ? (angles + 3) / 4 * 4 : angles;  // whole vectors of four
     workspace_ = 3 * table_;
   }
 
@@ -372,7 +372,7 @@ class Emitter {
   }
 
   std::string constant(double value) const {
-    return batch_ ? "four{} + " + literal(value) : literal(value);
+    return states_ == 1 ? literal(value) : number_ + "{} + " + literal(value);
   }
 
   std::uint32_t take_slot(std::uint32_t i) {
@@ -409,7 +409,8 @@ class Emitter {
   void write_entry() {
     std::string body;
     if (workspace_ > 0)
-      body += "  alignas(32) " + number_ + " w[" + std::to_string(workspace_) + "];\n";
+      body += (states_ == 1 ? "  alignas(32) " : "  ") + number_ + " w[" +
+              std::to_string(workspace_) + "];\n";
     else
       body += "  " + number_ + "* w = nullptr;\n";
     for (const KernelArray& out : kernel_.shape.outputs)
@@ -425,10 +426,10 @@ class Emitter {
       body += "  w[" + std::to_string(k) + "] = 0.0;\n";
     const auto doubles = [&](std::uint32_t at) {
       const std::string from = "w + " + std::to_string(at);
-      return batch_ ? "reinterpret_cast<double*>(" + from + ")" : from;
+      return states_ == 1 ? from : "reinterpret_cast<double*>(" + from + ")";
     };
     if (!angles_.empty())
-      body += "  sines_and_cosines(" + std::to_string((batch_ ? 4 : 1) * table_) + ", " +
+      body += "  sines_and_cosines(" + std::to_string(states_ * table_) + ", " +
               doubles(0) + ", " + doubles(table_) + ", " + doubles(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
@@ -457,8 +458,8 @@ class Emitter {
   const TracedKernel& kernel_;
   Lanes lanes_;
   std::uint32_t part_operations_;
+  std::uint32_t states_;               // at once: 1, 4 or 8
   std::string number_, array_, name_;  // types of a number and of what arguments point at
-  bool batch_;                         // four states at once
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, part_of_, last_part_, slot_, angle_;
   std::vector<std::string> text_;                       // written where it is used
@@ -518,12 +519,12 @@ TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
 
 EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
                           std::uint32_t part_operations) {
-  return Emitter(graph, kernel, lanes, part_operations, false).run();
+  return Emitter(graph, kernel, lanes, part_operations, 1).run();
 }
 
-EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel,
+EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel, std::uint32_t states,
                          std::uint32_t part_operations) {
-  return Emitter(graph, kernel, {}, part_operations, true).run();
+  return Emitter(graph, kernel, {}, part_operations, states).run();
 }
 
 }  // namespace tandem::model

@@ -42,8 +42,9 @@ struct EmittedKernel {
 [[nodiscard]] EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
                                         const Lanes& lanes, std::uint32_t part_operations);
 
-/// The same kernel for four states at once, as "NAME_four": each number is a vector of four.
+/// The same kernel for four or eight states at once, as "NAME_four" or "NAME_eight": each number is
+/// a vector of as many.
 [[nodiscard]] EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel,
-                                       std::uint32_t part_operations);
+                                       std::uint32_t states, std::uint32_t part_operations);
 
 }  // namespace tandem::model

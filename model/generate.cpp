@@ -34,7 +34,7 @@ constexpr std::string_view kBanner =
 // calls the kernel for one state after another: as fast, and half as much to compile.
 constexpr std::uint32_t kMostBatchOperations = 20'000;
 
-// Vectors of two lanes, of four states, and as wide as the variant has them.
+// Vectors of two lanes, of four and eight states, and as wide as the variant has them.
 constexpr std::string_view kVectors =
     R"(typedef double two __attribute__((vector_size(16), may_alias));
 typedef long long two_bits __attribute__((vector_size(16), may_alias));
@@ -54,7 +54,21 @@ static inline four cosine(four x) {
   return four{cosine(x[0]), cosine(x[1]), cosine(x[2]), cosine(x[3])};
 }
 #if defined(__AVX512F__)
-typedef double wide __attribute__((vector_size(64), may_alias));
+typedef double eight __attribute__((vector_size(64), may_alias));
+typedef double eight_at __attribute__((vector_size(64), may_alias, aligned(8)));
+static inline eight root(eight x) {
+  for (int i = 0; i < 8; ++i) x[i] = root(x[i]);
+  return x;
+}
+static inline eight sine(eight x) {
+  for (int i = 0; i < 8; ++i) x[i] = sine(x[i]);
+  return x;
+}
+static inline eight cosine(eight x) {
+  for (int i = 0; i < 8; ++i) x[i] = cosine(x[i]);
+  return x;
+}
+typedef eight wide;
 #elif defined(__AVX2__)
 typedef four wide;
 #else
@@ -73,11 +87,23 @@ static inline void put(double* to, T value) {
 }
 )";
 
+// With shorter vectors four or eight states at once are slower than one or four after another.
+constexpr std::string_view kIfFourLanes = "#ifdef __AVX2__\n";
+constexpr std::string_view kIfEightLanes = "#ifdef __AVX512F__\n";
+
 /// Everything that a library holds.
 struct Emitted {
-  std::vector<EmittedKernel> kernels;      // by number
-  std::vector<EmittedKernel> batches;      // may be empty
-  std::vector<EmittedKernel> derivatives;  // of inverse and forward dynamics, or none
+  using Some = std::vector<EmittedKernel>;
+  Some kernels;        // by number
+  Some fours, eights;  // batches; may be empty
+  Some derivatives;    // of inverse and forward dynamics, or none
+
+  /// `text` of one of these, for the variants that have it.
+  std::string guarded(const Some& of, const std::string& text) const {
+    if (&of == &fours) return std::string(kIfFourLanes) + text + "#endif\n";
+    if (&of == &eights) return std::string(kIfEightLanes) + text + "#endif\n";
+    return text;
+  }
 };
 
 std::string name_table(const std::string& name, const std::vector<std::string>& values) {
@@ -94,60 +120,62 @@ std::string count_table(const std::vector<KernelCount>& counts) {
   return text + "};\n";
 }
 
-// With shorter vectors four states at once are slower than one after another.
-constexpr std::string_view kIfFourLanes = "#ifdef __AVX2__\n";
-
 constexpr Kernel kBatches[] = {Kernel::kForwardDynamics, Kernel::kInverseDynamics};
 
-// A kernel's function for many states, `four` at a time or one by one, in arrays of its own but for
-// exactly four, which stand as they are wanted.
-std::string batch_source(const KernelShape& shape, bool four) {
-  const std::string number = four ? "four" : "double";
-  std::string parameters, arrays, in, out, own, given;
+// The loop of a batch over its states, `step` (1, 4, 8) at a time, in arrays of its own but for
+// exactly as many, which stand as they are wanted.
+std::string states_source(const KernelShape& shape, int step) {
+  const std::string number = step == 1 ? "double" : step == 4 ? "four" : "eight";
+  const std::string call = shape.name + (step == 1 ? "" : "_" + number);
+  std::string arrays, in, out, own, given;
   const auto add = [&](const KernelArray& array, bool output) {
-    const int size = std::max(array.size, 1);
     const std::string& name = array.name;
-    parameters += fmt::format(", {}double* {}", output ? "" : "const ", name);
-    arrays += fmt::format("    {} {}_[{}];\n", number, name, size);
+    arrays += fmt::format("    {} {}_[{}];\n", number, name, std::max(array.size, 1));
     const std::string copy =
         output ? fmt::format("put({0} + i * states + s, {0}_[i])", name)
                : fmt::format("{0}_[i] = get<{1}>({0} + i * states + s)", name, number);
     (output ? out : in) += fmt::format("    for (int i = 0; i < {}; ++i) {};\n", array.size, copy);
     const auto argument = [&](const std::string& from) {
-      return !four ? from
-                   : fmt::format("reinterpret_cast<{}four_at*>({})", output ? "" : "const ", from);
+      return step == 1 ? from
+                       : fmt::format("reinterpret_cast<{}{}_at*>({})", output ? "" : "const ",
+                                     number, from);
     };
     given += (given.empty() ? "" : ", ") + argument(name);
     own += (own.empty() ? "" : ", ") + argument(name + "_");
   };
   for (const KernelArray& array : shape.inputs) add(array, false);
   for (const KernelArray& array : shape.outputs) add(array, true);
-  const std::string call = shape.name + (four ? "_four" : "");
-  std::string text = fmt::format("void {}_batch(uint32_t states{}) {{\n", shape.name, parameters);
-  if (four) text += fmt::format("  if (states == 4) return {}({});\n", call, given);
-  text += fmt::format("  for (uint32_t s = 0; s + {0} <= states; s += {0}) {{\n", four ? 4 : 1);
-  return text + arrays + in + "    " + call + "(" + own + ");\n" + out + "  }\n}\n\n";
+  std::string text;
+  if (step > 1) text += fmt::format("  if (states == {}) return {}({});\n", step, call, given);
+  text += fmt::format("  for (; s + {0} <= states; s += {0}) {{\n", step);
+  return text + arrays + in + "    " + call + "(" + own + ");\n" + out + "  }\n";
+}
+
+// A kernel's function for many states: with `vectors`, as many at a time as the variant can.
+std::string batch_source(const KernelShape& shape, bool vectors) {
+  std::string text = fmt::format("void {}_batch(uint32_t states", shape.name);
+  for (const KernelArray& array : shape.inputs) text += ", const double* " + array.name;
+  for (const KernelArray& array : shape.outputs) text += ", double* " + array.name;
+  text += ") {\n  uint32_t s = 0;\n";
+  if (vectors)
+    text += fmt::format("{}{}#endif\n{}{}#else\n", kIfEightLanes, states_source(shape, 8),
+                        kIfFourLanes, states_source(shape, 4));
+  text += states_source(shape, 1);
+  return text + (vectors ? "#endif\n}\n\n" : "}\n\n");
 }
 
 // The entries of one variant and its table.
 std::string variant_source(const Mechanism& m, const GeneratedKernels& result, const Emitted& all) {
-  const auto& [kernels, batches, derivatives] = all;
+  const auto& [kernels, fours, eights, derivatives] = all;
   std::string text{kBanner};
   text += "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\nnamespace {\n\n";
   text += kTrigSource;
   text += "\n";
-  for (const auto* some : {&kernels, &derivatives})
-    for (const EmittedKernel& kernel : *some) text += kernel.entry + "\n";
-  if (batches.empty()) {
-    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), false);
-  } else {
-    text += kIfFourLanes;
-    for (const EmittedKernel& kernel : batches) text += kernel.entry + "\n";
-    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), true);
-    text += "#else\n";
-    for (const Kernel kernel : kBatches) text += batch_source(kernel_shape(kernel, m), false);
-    text += "#endif\n";
-  }
+  for (const auto* some : {&kernels, &fours, &eights, &derivatives})
+    for (const EmittedKernel& kernel : *some)
+      text += all.guarded(*some, kernel.entry + "\n");
+  for (const Kernel kernel : kBatches)
+    text += batch_source(kernel_shape(kernel, m), !fours.empty());
   text += name_table("joints", m.joint_names) + name_table("sites", m.site_names) +
           name_table("wrenches", m.wrench_names) + name_table("sensors", m.sensor_names) +
           count_table(result.counts) + "\n}  // namespace\n\n";
@@ -169,16 +197,17 @@ std::string parts_header(const Emitted& all) {
   std::string text{kBanner};
   text += "#pragma once\n#include \"kernels.h\"\n\nnamespace TANDEM_VARIANT {\n";
   text += kVectors;
-  for (const auto* some : {&all.kernels, &all.batches, &all.derivatives})
+  for (const auto* some : {&all.kernels, &all.fours, &all.eights, &all.derivatives})
     for (const EmittedKernel& kernel : *some)
-      for (const std::string& declaration : kernel.declarations) text += declaration;
+      for (const std::string& declaration : kernel.declarations)
+        text += all.guarded(*some, declaration);
   return text + "}  // namespace TANDEM_VARIANT\n";
 }
 
 // The parts, gathered into files of about the same length. Straight-line code that has outgrown the
 // caches gains nothing from -O2; the derivatives' parts have loops, which do.
 void add_part_files(const Emitted& all, GeneratedKernels& result) {
-  const bool light = all.batches.empty() && all.derivatives.empty();
+  const bool light = all.fours.empty() && all.derivatives.empty();
   std::string body;
   std::uint32_t operations = 0;
   int number = 0;
@@ -192,13 +221,11 @@ void add_part_files(const Emitted& all, GeneratedKernels& result) {
     body.clear();
     operations = 0;
   };
-  for (const auto* some : {&all.kernels, &all.batches, &all.derivatives})
+  for (const auto* some : {&all.kernels, &all.fours, &all.eights, &all.derivatives})
     for (const EmittedKernel& kernel : *some)
       for (std::size_t part = 0; part < kernel.parts.size(); ++part) {
         if (operations + kernel.sizes[part] > kFileOperations) close();
-        if (some == &all.batches) body += kIfFourLanes;
-        body += kernel.parts[part] + "\n";
-        if (some == &all.batches) body += "#endif\n";
+        body += all.guarded(*some, kernel.parts[part] + "\n");
         operations += kernel.sizes[part];
       }
   close();
@@ -305,7 +332,7 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   result.robot = spec.robot;
   result.hash = description_hash(tree, spec);
   Emitted all;
-  auto& [kernels, batches, derivatives] = all;
+  auto& [kernels, fours, eights, derivatives] = all;
   for (int k = 0; k < kKernels; ++k) {
     Graph graph;
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
@@ -318,7 +345,8 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
     result.counts.push_back({kernels.back().name, kernels.back().count});
     if (std::ranges::find(kBatches, static_cast<Kernel>(k)) != std::end(kBatches) &&
         kernels.front().count.add + kernels.front().count.mul <= kMostBatchOperations)
-      batches.push_back(emit_batch(graph, kernel, kPartOperations));
+      for (auto [states, batches] : {std::pair(4, &fours), std::pair(8, &eights)})
+        batches->push_back(emit_batch(graph, kernel, states, kPartOperations));
   }
   if (spec.derivatives) {
     if (Status status = add_derivatives(*mechanism, all); !status)
