@@ -26,11 +26,11 @@ struct Used {
   std::vector<std::size_t> instant;
 };
 
-Used used_rows(const ChannelRows& rows, const std::vector<bool>& used) {
+Used used_rows(const ChannelRows& rows, const std::vector<bool>& used, Index columns) {
   Used out;
   for (const std::size_t at : rows.instant)
     if (used[at]) out.instant.push_back(at);
-  out.X.resize(static_cast<Index>(out.instant.size()), rows.X.cols());
+  out.X.resize(static_cast<Index>(out.instant.size()), columns);
   out.y.resize(static_cast<Index>(out.instant.size()));
   Index to = 0;
   for (Index row = 0; row < rows.rows(); ++row) {
@@ -49,6 +49,7 @@ struct Normal {
 
 Normal normal_of(const Used& rows) {
   Normal normal{MatrixXd::Zero(rows.X.cols(), rows.X.cols()), VectorXd::Zero(rows.X.cols())};
+  if (rows.y.size() == 0) return normal;  // no log has this channel
   normal.gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.X.transpose());
   normal.gram = MatrixXd(normal.gram.selfadjointView<Eigen::Lower>());
   normal.target = rows.X.transpose() * rows.y;
@@ -117,7 +118,7 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
   DataEstimate out;
   double total = 0.0;
   for (const ChannelRows& channel : equations.channels) {
-    rows.push_back(used_rows(channel, used));
+    rows.push_back(used_rows(channel, used, equations.columns));
     normals.push_back(normal_of(rows.back()));
     const auto n = static_cast<double>(std::max<Index>(1, rows.back().y.size()));
     total += n;
@@ -132,7 +133,7 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
     MatrixXd half = unit.matrixL().solve(A);
     return MatrixXd(unit.matrixL().solve(half.transpose()));
   };
-  MatrixXd covariance;
+  MatrixXd covariance, link_covariance;
   for (int round = 0; round < kReweightings; ++round) {
     out.information = MatrixXd::Zero(equations.columns, equations.columns);
     out.target = VectorXd::Zero(equations.columns);
@@ -148,6 +149,8 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
     out.mean = prior.mean + unit.matrixU().solve(z);
     if (round + 1 == kReweightings) {
       covariance = solver.solve(MatrixXd::Identity(A.rows(), A.cols()));
+      A.diagonal().array() += kBelieved - kFaint;
+      link_covariance = A.ldlt().solve(MatrixXd::Identity(A.rows(), A.cols()));
       break;
     }
     for (std::size_t c = 0; c < rows.size(); ++c) {
@@ -162,8 +165,12 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
       out.noise[c] = model + long_run_variance(residual, rows[c].instant, lags) * n / free;
     }
   }
-  const MatrixXd half = unit.matrixU().solve(covariance);
-  out.covariance = unit.matrixU().solve(half.transpose());
+  const auto in_units = [&](const MatrixXd& A) {
+    const MatrixXd half = unit.matrixU().solve(A);
+    return MatrixXd(unit.matrixU().solve(half.transpose()));
+  };
+  out.covariance = in_units(covariance);
+  out.link_covariance = in_units(link_covariance);
   MatrixXd gram(base.count(), base.count());
   for (Index i = 0; i < base.count(); ++i)
     for (Index k = 0; k < base.count(); ++k)

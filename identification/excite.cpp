@@ -29,7 +29,8 @@ constexpr int kMeasured = 60;           // of them, for the condition
 constexpr double kPositionShare = 0.9;  // of the way from the start to a limit
 constexpr double kFreeTurn_rad = 2.0;   // of a joint without limits
 constexpr double kBalance_m = 0.04;
-constexpr double kStandingShare = 0.5;  // of the speeds that an arm has: what stands sways
+constexpr double kSwayingShare = 0.5;  // of the speeds that an arm has: what stands or hangs sways
+constexpr double kFreeFeet_m = 0.15;   // of a robot that hangs: above the ground
 constexpr double kSlip = 0.25;
 constexpr double kLeastShare = 0.4;  // a foot that carries little may swing on its spring
 constexpr double kStep_s = 1e-3;     // of the base's differences
@@ -69,12 +70,11 @@ class Search {
         request_(request),
         start_(std::move(start)),
         distance_(tree, spread(start_)),
-        base_(structural_base(identified, tree)),
+        base_(structural_base(identified, tree, request.hung)),
         seed_(request.seed) {
-    if (tree.floating_base) {
-      standing_.emplace(tree, robot, identified.regressor, start_);
-      for (const Index c : standing_->leg_coordinates()) std::erase(free, c);
-    }
+    if (tree.floating_base) feet_.emplace(tree, robot, identified.regressor, start_);
+    if (stands())
+      for (const Index c : feet_->leg_coordinates()) std::erase(free, c);
     free_ = std::move(free);
     described_ = whole_body_.described();
   }
@@ -109,6 +109,7 @@ class Search {
     }
     return position;
   }
+  [[nodiscard]] bool stands() const { return feet_.has_value() && !request_.hung; }
   [[nodiscard]] const hal::JointConfig& joint(Index coordinate) const {
     return robot_.joints[static_cast<std::size_t>(
         identified_.facts.joint[static_cast<std::size_t>(coordinate)])];
@@ -129,7 +130,7 @@ class Search {
     VectorXd from(static_cast<Index>(free_.size()));
     for (Index i = 0; i < from.size(); ++i) from[i] = start_[free_[static_cast<std::size_t>(i)]];
     candidate.free = random_series(from, request_.harmonics, request_.period_s, seed_);
-    if (standing_)
+    if (stands())
       candidate.base =
           random_series(VectorXd::Zero(6), request_.harmonics, request_.period_s, seed_);
     return candidate;
@@ -151,13 +152,13 @@ class Search {
 
   /// Makes each coordinate, and the base, as large as positions and speeds allow.
   void scale(Candidate& candidate) {
-    const double speed = standing_ ? kStandingShare * request_.share : request_.share;
+    const double speed = feet_ ? kSwayingShare * request_.share : request_.share;
     for (Index i = 0; i < candidate.free.start.size(); ++i) {
       const auto [down, up] = reach(free_[static_cast<std::size_t>(i)]);
       scale_column(candidate.free, i, down, up,
                    speed * joint(free_[static_cast<std::size_t>(i)]).max_velocity_rad_s);
     }
-    for (Index i = 0; standing_ && i < 6; ++i) {
+    for (Index i = 0; stands() && i < 6; ++i) {
       const double most = base_reach()[i];
       scale_column(candidate.base, i, most, i == 2 ? 0.3 * most : most,
                    std::numeric_limits<double>::infinity());
@@ -183,8 +184,7 @@ class Search {
 
   /// The series of all coordinates. @return false: the legs cannot follow
   bool make_whole(Candidate& candidate) const {
-    const bool stands = standing_.has_value();
-    const int harmonics = stands ? kLegHarmonics * request_.harmonics : request_.harmonics;
+    const int harmonics = stands() ? kLegHarmonics * request_.harmonics : request_.harmonics;
     candidate.whole = {request_.period_s, start_, MatrixXd::Zero(harmonics, start_.size()),
                        MatrixXd::Zero(harmonics, start_.size())};
     for (std::size_t i = 0; i < free_.size(); ++i) {
@@ -193,13 +193,13 @@ class Search {
       candidate.whole.b.col(free_[i]).head(request_.harmonics) =
           candidate.free.b.col(static_cast<Index>(i));
     }
-    if (!stands) return true;
-    const auto& legs = standing_->leg_coordinates();
+    if (!stands()) return true;
+    const auto& legs = feet_->leg_coordinates();
     MatrixXd positions(kSamples, static_cast<Index>(legs.size()));
     VectorXd q = start_;
     for (int k = 0; k < kSamples; ++k) {
       const BasePose pose = candidate.base.at(request_.period_s * k / kSamples).x;
-      if (!standing_->solve_legs(pose, q)) return false;
+      if (!feet_->solve_legs(pose, q)) return false;
       for (std::size_t i = 0; i < legs.size(); ++i)
         positions(k, static_cast<Index>(i)) = q[legs[i]];
     }
@@ -222,7 +222,7 @@ class Search {
     out.instant.a = -identified_.facts.gravity_m_s2;
     out.instant.wrenches.assign(identified_.regressor.sensor_count(),
                                 Eigen::Matrix<double, 6, 1>::Zero());
-    if (!standing_) return out;
+    if (!stands()) return out;
     const Series::State base = candidate.base.at(t_s);
     out.pose = base.x;
     const auto turned = [&](double t) { return Standing::placement(candidate.base.at(t).x).R; };
@@ -264,17 +264,18 @@ class Search {
       out.room_m = std::min(out.room_m, distance_.room(spread(now.instant.q)));
       whole_body_.evaluate(now.instant, Y, known);
       VectorXd torque = Y * described_ + known;
-      if (standing_) {
-        const Standing::Load load = standing_->load(now.pose, now.instant.q, torque.head<6>());
+      if (feet_) out.lowest_m = std::min(out.lowest_m, feet_->lowest(now.instant.q));
+      if (stands()) {
+        const Standing::Load load = feet_->load(now.pose, now.instant.q, torque.head<6>());
         out.margin_m = std::min(out.margin_m, load.margin_m);
         if (load.slip > kSlip || load.least_share < kLeastShare) return false;
-        torque = (torque.tail(start_.size()) + load.foot_torque).eval();
+        torque.tail(start_.size()) += load.foot_torque;
       }
-      if (!add_shares(now.instant, torque, out)) return false;
+      if (!add_shares(now.instant, torque.tail(start_.size()), out)) return false;
     }
     if (out.room_m < 0.0) return false;
-    if (!standing_) out.margin_m = 0.0;
-    return !standing_ || out.margin_m > kBalance_m;
+    if (!stands()) out.margin_m = 0.0;
+    return !stands() || out.margin_m > kBalance_m;
   }
 
   bool add_shares(const Instant& now, const VectorXd& torque, Excitation& out) const {
@@ -308,6 +309,10 @@ class Search {
       MatrixXd rows(Y.rows(), count);
       for (Index r = 0; r < Y.rows(); ++r) {
         const Channel& channel = identified_.regressor.channels()[static_cast<std::size_t>(r)];
+        if (request_.hung && channel.kind == Channel::Kind::kBase) {
+          rows.row(r).setZero();
+          continue;
+        }
         VectorXd x = VectorXd::Zero(columns);
         x.head(Y.cols()) = Y.row(r);
         double scale = 1.0;
@@ -351,7 +356,7 @@ class Search {
           fmt::format("standing still takes {:.0f} % of a joint's torque", 100.0 * f.torque_share);
     else if (f.room_m < 0.0)
       why = "links are too near to each other";
-    else if (standing_ && f.margin_m <= kBalance_m)
+    else if (stands() && f.margin_m <= kBalance_m)
       why = fmt::format("its balance is {:.1f} cm from the edge of the feet", 100.0 * f.margin_m);
     return fail("the start posture cannot be moved from: " + why,
                 "choose another --posture, or a larger --share");
@@ -361,6 +366,7 @@ class Search {
     Excitation out = std::move(best.figures);
     out.condition_number = best.condition;
     out.base_parameters = static_cast<std::size_t>(base_.count());
+    if (request_.hung) out.lift_m = kFreeFeet_m - std::min(0.0, out.lowest_m);
     std::vector<Index> moving;
     for (std::size_t j = 0; j < robot_.joints.size(); ++j) {
       const auto found = std::ranges::find(identified_.facts.joint, static_cast<int>(j));
@@ -369,7 +375,7 @@ class Search {
                          (best.whole.a.col(c).norm() + best.whole.b.col(c).norm()) > 1e-6;
       (moves ? out.joints : out.still).push_back(robot_.joints[j].name);
       if (moves) moving.push_back(c);
-      if (moves && standing_ && std::ranges::count(standing_->leg_coordinates(), c) > 0)
+      if (moves && stands() && std::ranges::count(feet_->leg_coordinates(), c) > 0)
         out.legs.push_back(robot_.joints[j].name);
     }
     out.series = {request_.period_s, VectorXd(static_cast<Index>(moving.size())),
@@ -393,7 +399,7 @@ class Search {
   SelfDistance distance_;
   BaseParameters base_;
   std::uint64_t seed_;
-  std::optional<Standing> standing_;
+  std::optional<Standing> feet_;  // of a floating base
   std::vector<Index> free_;
 };
 
@@ -403,6 +409,8 @@ Result<Excitation> excite(const hal::RobotConfig& robot, const model::Tree& tree
                           const ExciteRequest& request) {
   auto identified = make_identified_robot(tree, robot);
   if (!identified) return std::unexpected(identified.error());
+  if (request.hung && !tree.floating_base)
+    return fail("a robot with a fixed base cannot hang", "leave out --hung");
   auto whole_body = Regressor::create(tree, {});
   if (!whole_body) return std::unexpected(whole_body.error());
   const auto& names = identified->regressor.coordinates();

@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,9 +23,10 @@ using Eigen::VectorXd;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kShortest_s = 5.0;
-constexpr double kTrained = 2.0 / 3.0;  // share of every log
-constexpr double kBetween_s = 1.2;      // of filter windows: neither trained nor held out
-constexpr double kIdentifiable = 0.3;   // of a link's scale
+constexpr double kTrained = 2.0 / 3.0;   // share of every log
+constexpr double kBetween_s = 1.2;       // of filter windows: neither trained nor held out
+constexpr double kIdentifiable = 0.3;    // of a link's scale
+constexpr double kNarrowed = 2.0 / 3.0;  // of the interval that the description has by itself
 constexpr double kStill_rad = 0.02;
 
 constexpr const char* kJointNames[] = {"viscous_Nms_rad", "coulomb_Nm", "offset_Nm",
@@ -72,7 +74,8 @@ Ten physical(const LinkParameters& p) {
   return out;
 }
 
-void describe_link(const LinkParameters& p, const Eigen::Matrix<double, 10, 10>& covariance,
+/// @param covariance  of the ten parameters by data and description; @param believed  by the latter
+void describe_link(const LinkParameters& p, const Matrix10& covariance, const Matrix10& believed,
                    double quantile, LinkResult& link) {
   link.changed = true;
   link.identified = inertia_of(p);
@@ -82,24 +85,24 @@ void describe_link(const LinkParameters& p, const Eigen::Matrix<double, 10, 10>&
     const LinkParameters change = step * LinkParameters::Unit(k);
     J.col(k) = (physical(p + change) - physical(p - change)) / (2.0 * step);
   }
-  const Eigen::Matrix<double, 10, 1> ci =
-      quantile * (J * covariance * J.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+  const auto interval = [&](const Matrix10& of) -> Ten {
+    return quantile * (J * of * J.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+  };
+  const Ten ci = interval(covariance), before = interval(believed);
   const double mass = link.described.mass_kg;
   const double moment = std::max(link.described.about_com_kg_m2.trace() / 2.0, 1e-6 * mass);
   const double radius = std::max(std::sqrt(moment / mass), 0.01);
-  // Where the data say nothing there is nothing to say: not even how little.
-  const auto told = [](double value, double scale) { return value < 3.0 * scale ? value : kNone; };
-  link.mass_ci95 = told(ci[0], mass);
-  link.mass_identifiable = ci[0] <= kIdentifiable * mass;
+  // Known is what is narrow, and narrow because of the data.
+  const auto known = [&](int k, double scale) {
+    return ci[k] <= kIdentifiable * scale && ci[k] <= kNarrowed * before[k];
+  };
+  link.mass_ci95 = ci[0];
+  link.com_ci95 = ci.segment<3>(1);
+  link.inertia_ci95 = ci.tail<6>();
+  link.mass_identifiable = known(0, mass);
   link.com_identifiable = link.inertia_identifiable = true;
-  for (int k = 0; k < 3; ++k) {
-    link.com_ci95[k] = told(ci[1 + k], radius);
-    link.com_identifiable = link.com_identifiable && ci[1 + k] <= kIdentifiable * radius;
-  }
-  for (int k = 0; k < 6; ++k) {
-    link.inertia_ci95[k] = told(ci[4 + k], moment);
-    link.inertia_identifiable = link.inertia_identifiable && ci[4 + k] <= kIdentifiable * moment;
-  }
+  for (int k = 1; k < 4; ++k) link.com_identifiable &= known(k, radius);
+  for (int k = 4; k < 10; ++k) link.inertia_identifiable &= known(k, moment);
 }
 
 /// What goes into the result, from the estimates.
@@ -111,6 +114,7 @@ class Answer {
     base_ = structural_base(robot_, tree_);
     prior_ = make_prior(robot_);
     data_ = estimate_from_data(equations_, split_.trained, prior_, base_);
+    believed_ = prior_.metric.inverse() / kBelieved;
     links_ = robot_.regressor.columns();
     possible_ = possible_parameters(data_, prior_, links_);
     described_ = VectorXd::Zero(equations_.columns);
@@ -149,8 +153,8 @@ class Answer {
       for (std::size_t i = 0; i < robot_.regressor.pieces().size(); ++i) {
         if (robot_.regressor.pieces()[i].link != static_cast<int>(l)) continue;
         const Index at = 10 * static_cast<Index>(i);
-        describe_link(possible_.segment<10>(at), data_.covariance.block<10, 10>(at, at),
-                      data_.quantile, result);
+        describe_link(possible_.segment<10>(at), data_.link_covariance.block<10, 10>(at, at),
+                      believed_.block<10, 10>(at, at), data_.quantile, result);
       }
       out.links.push_back(std::move(result));
     }
@@ -199,6 +203,7 @@ class Answer {
     const ChannelRows* rows = rows_of(c);
     if (rows == nullptr)
       out.link_viscous_Nms_rad.identifiable = out.link_coulomb_Nm.identifiable = false;
+    out.motor_viscous_Nms_rad = motor.viscous_Nms_rad;
     out.viscous_Nms_rad = together(out.link_viscous_Nms_rad, motor.viscous_Nms_rad);
     out.coulomb_Nm = together(out.link_coulomb_Nm, motor.coulomb_Nm);
     out.offset_Nm = together(rows == nullptr ? Estimate{} : offset, motor.offset_Nm);
@@ -250,13 +255,11 @@ class Answer {
       for (Index k = 0; k < C.cols(); ++k)
         if (C(i, k) != 0.0) one.terms.emplace_back(column_name(robot_, tree_, k), C(i, k));
       const VectorXd combination = C.row(i).transpose();
-      const double own =
-          std::sqrt(1.0 / prior_.metric(base_.independent[static_cast<std::size_t>(i)],
-                                        base_.independent[static_cast<std::size_t>(i)]));
       one.described = combination.dot(described_);
       one.estimate.value = combination.dot(data_.mean);
       one.estimate.ci95 = data_.quantile * deviation(combination, data_.covariance);
-      one.estimate.identifiable = one.estimate.ci95 <= kIdentifiable * own;
+      one.estimate.identifiable =
+          one.estimate.ci95 <= kIdentifiable * data_.quantile * deviation(combination, believed_);
       out.base.push_back(std::move(one));
     }
   }
@@ -324,6 +327,7 @@ class Answer {
   BaseParameters base_;
   Prior prior_;
   DataEstimate data_;
+  MatrixXd believed_;  // covariance of the description by itself
   Index links_ = 0;
   VectorXd possible_, described_;
 };
@@ -342,7 +346,7 @@ std::string column_name(const IdentifiedRobot& robot, const model::Tree& tree, I
          kJointNames[(column - links) % kJointColumns];
 }
 
-BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree) {
+BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree, bool hung) {
   const Index links = robot.regressor.columns();
   const auto joints = static_cast<Index>(robot.facts.joint.size());
   const auto channels = static_cast<Index>(robot.regressor.channels().size());
@@ -353,8 +357,14 @@ BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree) 
   VectorXd known;
   std::uint64_t seed = 1;
   for (Index i = 0; i < instants; ++i) {
-    const Instant at = random_instant(robot.regressor, tree, robot.regressor.sensor_count(), seed);
+    Instant at = random_instant(robot.regressor, tree, robot.regressor.sensor_count(), seed);
+    if (hung) {
+      at.w.setZero();
+      at.al.setZero();
+      at.a = -robot.facts.gravity_m_s2;
+    }
     robot.regressor.evaluate(at, Y, known);
+    if (hung) Y.topRows(6).setZero();  // the hoist's force is not known
     X.block(channels * i, 0, channels, links) = Y;
     for (Index c = 0; c < channels; ++c) {
       const Channel& channel = robot.regressor.channels()[static_cast<std::size_t>(c)];
@@ -381,6 +391,11 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   for (const Recording& recording : recordings) {
     for (const std::string& remark : recording.remarks)
       out.remarks.push_back(recordings.size() > 1 ? recording.path + ": " + remark : remark);
+    if (recording.hangs && identified->floating) {
+      out.remarks.push_back(recording.path +
+                            ": the robot hangs from a hoist, whose force is not known: the base's "
+                            "equations are left out");
+    }
     if (const Status s = add_equations(recording, options.cutoff_Hz, *identified, equations); !s)
       return std::unexpected(s.error());
   }
@@ -393,6 +408,13 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
               recordings.empty() ? "" : recordings.front().path,
               0,
               {}});
+  }
+  if (equations.held_s > 0.0) {
+    out.warnings.push_back(fmt::format(
+        "for {:.1f} s something else than the measured feet seems to carry the robot, or push it: "
+        "the base's equations are left out there. Of a robot that hangs on purpose the experiment "
+        "should say so: [sim] hoist.lift_m",
+        equations.held_s));
   }
   const Split split = split_of(equations);
   Answer(robot, tree, *identified, equations, split).fill(out);

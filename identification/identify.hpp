@@ -24,7 +24,9 @@ struct IdentifyOptions {
 struct Estimate {
   double value = 0.0;
   double ci95 = 0.0;
-  bool identifiable = false;  ///< the data alone give it, to within a third of its scale
+  /// The data give it: to within 30 % of its scale. A base parameter's is what the description
+  /// would be wrong by, as kBelieved says.
+  bool identifiable = false;
 };
 
 /// A link of the description, in its own frame. What was not identifiable is as described, or what
@@ -32,6 +34,9 @@ struct Estimate {
 struct LinkResult {
   std::string name;
   model::Inertia described, identified;
+  // By the data, and as far as these leave a choice by the description, believed as kBelieved says.
+  // Identifiable: within 30 % of the mass, of the radius of gyration, of the largest moment, every
+  // component; and a third less than the description has by itself.
   double mass_ci95 = 0.0;
   Eigen::Vector3d com_ci95;                  ///< [m]
   Eigen::Matrix<double, 6, 1> inertia_ci95;  ///< ixx ixy ixz iyy iyz izz about the com [kg m^2]
@@ -46,6 +51,7 @@ struct JointResult {
   bool slides = false;
   Estimate viscous_Nms_rad, coulomb_Nm, rotor_inertia_kg_m2, offset_Nm;
   Estimate link_viscous_Nms_rad, link_coulomb_Nm;  ///< the share behind the torque measurement
+  Estimate motor_viscous_Nms_rad;                  ///< the share before it
   double delay_s = 0.0;         ///< by which the torque is sampled later than the position
   double rms_Nm = 0.0;          ///< of the residual, on held-out data
   double relative_error = 0.0;  ///< over the torque, both as RMS; NaN without held-out data
@@ -90,7 +96,9 @@ struct Identification {
                                               const IdentifyOptions& options = {});
 
 /// Base parameters of all columns of the equations, those of joints but for the delays included.
-[[nodiscard]] BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree);
+/// @param hung  of a floating base: of the joints' equations alone, with a base at rest
+[[nodiscard]] BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree,
+                                             bool hung = false);
 
 /// "LINK.mass_kg", "JOINT.viscous_Nms_rad": of a column of the equations.
 [[nodiscard]] std::string column_name(const IdentifiedRobot& robot, const model::Tree& tree,

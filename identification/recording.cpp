@@ -244,17 +244,24 @@ bool jumps(const Signal& signal, Stretch stretch) {
 constexpr double kFrozen_s = 0.2;
 constexpr double kMoves_rad = 0.02;
 
-/// [sim] substep_ns of the experiment that a log carries.
-std::int64_t substep_ns(const log::StringMap& configuration) {
-  constexpr std::int64_t kDefault_ns = 250'000;
+/// What [sim] says in the experiment that a log carries.
+struct SimFacts {
+  std::int64_t substep_ns = 250'000;
+  bool hangs = false;
+};
+SimFacts sim_facts(const log::StringMap& configuration) {
+  SimFacts facts;
   for (const auto& [file, text] : configuration) {
     if (!file.ends_with(".toml")) continue;
     const Result<TomlDocument> document = TomlDocument::parse(text, file);
     if (!document || !document->root().has("robot")) continue;
     TomlTable root = document->root();
-    return root.table_or_empty("sim").integer_or("substep_ns", kDefault_ns, 1, 1'000'000'000);
+    TomlTable sim = root.table_or_empty("sim");
+    facts.substep_ns = sim.integer_or("substep_ns", facts.substep_ns, 1, 1'000'000'000);
+    facts.hangs = sim.table_or_empty("hoist").number_or("lift_m", 0.0) > 0.0;
+    break;
   }
-  return kDefault_ns;
+  return facts;
 }
 
 Status check_positions(const Recording& recording, const hal::RobotConfig& robot) {
@@ -431,10 +438,11 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   recording.path = path;
   recording.period_s = grid->period_s;
   recording.time_s = grid->time_s;
+  const SimFacts sim = sim_facts(info.configuration);
+  recording.hangs = sim.hangs;
   if (info.hal == "sim" && !robot.boards.empty()) {
     const std::int64_t hold_ns = robot.boards.front().control_period_ns;
-    recording.voltage_hold_s =
-        0.5e-9 * static_cast<double>(hold_ns + substep_ns(info.configuration));
+    recording.voltage_hold_s = 0.5e-9 * static_cast<double>(hold_ns + sim.substep_ns);
   }
   if (window.fault_s < 1e299) {
     recording.remarks.push_back(

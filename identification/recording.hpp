@@ -20,6 +20,7 @@ struct Recording {
   std::string path;
   double period_s = 0.0;
   double voltage_hold_s = 0.0;             ///< see read_recording()
+  bool hangs = false;                      ///< the whole log, from a hoist
   std::vector<double> time_s;              ///< since the log's time 0
   std::vector<Signal> position_rad;        ///< per joint, link side
   std::vector<Signal> torque_Nm;           ///< per joint, on the link
@@ -34,8 +35,8 @@ struct Recording {
 
 /// In a simulated log the voltage of a motor is held for a control period, and its torque is
 /// sampled at the end: where no spring is between, the back-EMF has by then reduced it.
-/// voltage_hold_s is the time by which that torque is late, for a rigid drive's equation; 0 in
-/// other logs.
+/// voltage_hold_s is the time by which that torque is late, for a rigid drive's equation, and the
+/// current behind a spring; 0 in other logs.
 ///
 /// Reads the part of a log in which controllers ran, puts it on a grid and takes out what lies:
 /// gaps, NaN, samples that are old, signals that stand still while the robot moves, torques that

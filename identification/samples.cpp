@@ -22,6 +22,8 @@ std::unexpected<Error> cannot(const hal::RobotConfig& robot, std::string message
 
 /// Channels of an IMU: quaternion, angular velocity, specific force.
 constexpr std::size_t kGyro = 4, kAccelerometer = 7;
+/// Of the robot's weight: a force on the base that is larger has another cause than a wrong mass.
+constexpr double kUnexplained = 0.3;
 
 Vector3d filtered(const LowPass& filter, const Recording& r, std::size_t channel, std::size_t at,
                   bool rate = false) {
@@ -106,6 +108,7 @@ class Writer {
  public:
   Writer(const Recording& recording, const LowPass& filter, IdentifiedRobot& robot, Equations& all)
       : r_(recording), filter_(filter), robot_(robot), all_(all) {
+    for (Index i = 0; i < described_.size(); i += 10) mass_kg_ += described_[i];
     for (std::size_t c = 0; c < robot.facts.joint.size(); ++c) {
       const auto j = static_cast<std::size_t>(robot.facts.joint[c]);
       direction_.push_back(directions(r_.position_rad[j], r_.period_s));
@@ -119,6 +122,7 @@ class Writer {
     Instant now;
     read(at, now);
     robot_.regressor.evaluate(now, Y_, known_);
+    const bool free = base_is_free();
     bool any = false;
     for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
       const Channel& channel = robot_.regressor.channels()[c];
@@ -126,7 +130,9 @@ class Writer {
       double measured = 0.0;
       Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
       x.head(Y_.cols()) = Y_.row(row);
-      if (channel.kind == Channel::Kind::kJoint) {
+      if (channel.kind == Channel::Kind::kBase) {
+        if (!free) continue;
+      } else if (channel.kind == Channel::Kind::kJoint) {
         measured = filter_.value(r_.torque_Nm[joint(channel.index)], at);
         const auto k = static_cast<std::size_t>(channel.index);
         if (robot_.facts.rigid[k])
@@ -145,7 +151,21 @@ class Writer {
     all_.time_s.push_back(r_.time_s[at]);
   }
 
+  /// Instants at which something else than the measured feet holds the base, though no experiment
+  /// says that it hangs.
+  [[nodiscard]] std::size_t held() const { return held_; }
+
  private:
+  /// Whether the equations of a floating base hold: nothing acts on it but what is measured. The
+  /// description's masses are near enough to see a hoist, or somebody's hand.
+  bool base_is_free() {
+    if (!robot_.floating || r_.hangs) return false;
+    const Vector3d needed = Y_.topRows<3>() * described_;
+    const double weight_N = mass_kg_ * robot_.facts.gravity_m_s2.norm();
+    const bool free = (needed + known_.head<3>()).norm() < kUnexplained * weight_N;
+    held_ += free ? 0 : 1;
+    return free;
+  }
   [[nodiscard]] std::size_t joint(int coordinate) const {
     return static_cast<std::size_t>(robot_.facts.joint[static_cast<std::size_t>(coordinate)]);
   }
@@ -199,6 +219,8 @@ class Writer {
     one.torque = filter_.value(r_.torque_Nm[j], at);
     one.velocity = rigid ? now.v[coordinate] : filter_.rate(motor, at);
     one.acceleration = rigid ? 0.0 : filter_.second_rate(motor, at);
+    // The held voltage makes less current at the period's end than on its mean: back-EMF.
+    if (!rigid) one.drive += robot_.facts.damping_Nms_rad[c] * r_.voltage_hold_s * one.acceleration;
     one.direction = filter_.value(motor_direction_[c], at);
     const double sum =
         one.drive + one.drive_rate + one.torque + one.velocity + one.acceleration + one.direction;
@@ -212,6 +234,9 @@ class Writer {
   std::vector<Signal> direction_, motor_direction_;
   Eigen::MatrixXd Y_;
   Eigen::VectorXd known_;
+  Eigen::VectorXd described_ = robot_.regressor.described();
+  double mass_kg_ = 0.0;
+  std::size_t held_ = 0;
 };
 
 }  // namespace
@@ -252,6 +277,7 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();
        at += filter.stride())
     writer.add(at);
+  equations.held_s += static_cast<double>(writer.held() * filter.stride()) * recording.period_s;
   const std::size_t added = equations.time_s.size() - equations.first_of_log.back();
   equations.usable_s += static_cast<double>(added * filter.stride()) * recording.period_s;
   for (std::size_t c = 0; c < coordinates; ++c) {

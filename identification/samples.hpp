@@ -80,6 +80,7 @@ struct Equations {
   std::vector<double> travel_rad;                 ///< per coordinate: range of its position
   Eigen::Index columns = 0;
   double usable_s = 0.0;  ///< time that the instants stand for
+  double held_s = 0.0;    ///< of them: something else than the feet holds the base, as it seems
 };
 
 /// Appends the instants of a recording.

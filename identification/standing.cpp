@@ -85,6 +85,7 @@ Standing::Standing(const model::Tree& tree, const hal::RobotConfig& robot,
     }
     for (const auto& p : foot.points_m) {
       const Vector3d at = leg.foot.R * Vector3d(p.data()) + leg.foot.p;
+      leg.points_m.emplace_back(p.data());
       points.emplace_back(at.x(), at.y());
       ground = std::min(ground, at.z());
     }
@@ -136,6 +137,17 @@ bool Standing::solve_leg(const Leg& leg, const model::Placement& base, VectorXd&
 bool Standing::solve_legs(const BasePose& pose, VectorXd& q) const {
   const model::Placement base = placement(pose);
   return std::ranges::all_of(standing_, [&](const Leg& leg) { return solve_leg(leg, base, q); });
+}
+
+double Standing::lowest(const VectorXd& q) const {
+  const std::vector<model::Placement> at = model::place_bodies(*tree_, spread(q));
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Leg& leg : standing_) {
+    const model::Placement foot = at[static_cast<std::size_t>(leg.body)] * leg.in_body;
+    for (const Vector3d& point : leg.points_m)
+      lowest = std::min(lowest, (foot.R * point + foot.p).z());
+  }
+  return lowest - ground_m_;
 }
 
 Standing::Load Standing::load(const BasePose& pose, const VectorXd& q,

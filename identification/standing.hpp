@@ -38,14 +38,17 @@ class Standing {
   /// @param wrench  force and moment that the base's six equations want, base axes and origin
   [[nodiscard]] Load load(const BasePose& pose, const Eigen::VectorXd& q,
                           const Eigen::Matrix<double, 6, 1>& wrench) const;
+  /// The soles' lowest point with the base as at the start, above their lowest one there.
+  [[nodiscard]] double lowest(const Eigen::VectorXd& q) const;
   /// At rest in the start posture.
   [[nodiscard]] static model::Placement placement(const BasePose& pose);
 
  private:
   struct Leg {
-    int body;                        // of the foot
-    std::vector<int> joints;         // from the base to the foot
-    model::Placement foot, in_body;  // the sole at the start; the same in its body
+    int body;                               // of the foot
+    std::vector<int> joints;                // from the base to the foot
+    model::Placement foot, in_body;         // the sole at the start; the same in its body
+    std::vector<Eigen::Vector3d> points_m;  // of the sole
   };
   [[nodiscard]] std::vector<double> spread(const Eigen::VectorXd& q) const;
   [[nodiscard]] bool solve_leg(const Leg& leg, const model::Placement& base,

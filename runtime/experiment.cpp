@@ -63,6 +63,9 @@ SimOptions read_sim(TomlTable table) {
   TomlTable hoist = table.table_or_empty("hoist");
   sim.hoist = hoist.boolean_or("enabled", sim.hoist);
   sim.hoist_release_s = hoist.number_or("release_s", sim.hoist_release_s, {0.0, 60.0});
+  sim.hoist_lift_m = hoist.number_or("lift_m", sim.hoist_lift_m, {0.0, 10.0});
+  if (sim.hoist_lift_m > 0.0 && !sim.hoist)
+    hoist.error("lift_m", "without a hoist nothing lifts the base", "leave out enabled = false");
   hoist.finish();
   table.finish();
   return sim;
@@ -322,6 +325,10 @@ void combine(Experiment& e, TomlTable& root) {
   check_reference(report, "position_of", e.report.position_of, e.robot.joints, "joint");
   check_reference(report, "torque_of", e.report.torque_of, e.robot.joints, "joint");
   check_reference(report, "foot", e.report.foot, e.robot.sensors, "sensor");
+  if (e.sim.hoist_lift_m > 0.0 && !e.robot.model.floating_base) {
+    root.table("sim").table("hoist").error("lift_m", "a fixed base cannot be lifted",
+                                           "leave it out");
+  }
   if (root.has("estimation")) e.estimation = read_estimation(root.table("estimation"), e.robot);
   apply_order(e, e.robot, root.table_or_empty("sim"));
   if (!e.sim.noise) remove_noise(e.robot);
@@ -396,6 +403,7 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .posture = posture,
           .hold = sim.hoist,
           .release_ns = std::llround(sim.hoist_release_s * 1e9),
+          .lift_m = sim.hoist_lift_m,
           .seed = seed,
           .truth = sim.ground_truth,
           .bus_timing = sim.bus_timing,

@@ -56,6 +56,7 @@ struct SimOptions {
   bool bus_timing = false;            ///< frames take the time that they need on a real bus
   std::int64_t bus_latency_ns = 0;    ///< with it: of every node's driver or firmware
   double hoist_release_s = 1.0;       ///< then let the base down over this time
+  double hoist_lift_m = 0.0;          ///< not 0: it hangs so much higher, to the end
 };
 
 /// [remote]: what peers may ask over DDS. Reading, and stopping the robot, they may always.

@@ -145,6 +145,7 @@ of the logs with that robot. Of every log the last third is held back, and compa
 const char kExciteExamples[] = R"(Examples:
   tandem excite config/panda/robot.toml --out excite.toml
   tandem excite config/coman/robot.toml --out excite.toml --period 12   it stands while it moves
+  tandem excite config/coman/robot.toml --out hung.toml --hung         from its hoist, feet in the air
   tandem excite robot.toml --out excite.toml --seed 7 --share 0.4       gently, in another way
   tandem excite robot.toml --out excite.toml --joints elbow,wrist       the others are held
 The experiment is an ordinary one: `tandem check excite.toml`, `tandem run excite.toml`.)";
@@ -563,14 +564,17 @@ void add_flags(CLI::App& app, ExciteOptions& o) {
   app.add_option("--posture", o.posture, "Start posture (default: the robot's first, or all at 0)");
   app.add_option("--joints", o.joints, "Joints that move, by comma (default: all that can)")
       ->delimiter(',');
-  app.add_option("--period", o.period_s, "Seconds of a period (default: 10)")
+  app.add_option("--period", o.period_s, "Seconds of a period (default: 10, with --hung 3)")
       ->check(CLI::Range(2.0, 120.0));
-  app.add_option("--periods", o.periods, "Periods (default: 3)")->check(CLI::Range(1, 100));
+  app.add_option("--periods", o.periods, "Periods (default: 3, with --hung 20)")
+      ->check(CLI::Range(1, 100));
   app.add_option("--harmonics", o.harmonics, "Harmonics of each series (default: 5)")
       ->check(CLI::Range(2, 20));
   app.add_option("--seed", o.seed, "Seed of the search (default: 1)")->check(is_seed());
   app.add_option("--share", o.share, "Share of the limits of speed and torque (default: 0.7)")
       ->check(CLI::Range(0.05, 1.0));
+  app.add_flag("--hung", o.hung,
+               "A robot that stands: it hangs from its hoist instead, and moves every joint");
   app.add_option("--tries", o.tries,
                  "Candidates that are compared (default: 300; of more than 12 joints 60)")
       ->check(CLI::Range(1, 100'000));

@@ -248,12 +248,13 @@ struct ExciteOptions {
   std::string output;               ///< experiment; "-" for standard output
   std::string posture;              ///< start; empty: the robot's first, else every joint at 0
   std::vector<std::string> joints;  ///< that move; empty: all that can
-  double period_s = 10.0;           ///< of the series
-  int periods = 3;
+  double period_s = 0.0;            ///< of the series; 0: 10, of a robot that hangs 3
+  int periods = 0;                  ///< 0: 3, of a robot that hangs 20
   int harmonics = 5;
   std::uint64_t seed = 1;
   double share = 0.7;  ///< of limits of speed and torque that are used
   int tries = 0;       ///< candidates; 0: 300, of many joints 60
+  bool hung = false;   ///< from its hoist
   std::string json;
 };
 

@@ -3,7 +3,11 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include "apps/command_line/command_line.hpp"
+#include "base/result.hpp"
 
 namespace tandem::apps {
 
@@ -16,8 +20,12 @@ namespace tandem::apps {
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);
-/// An experiment that excites a robot's dynamics.
-[[nodiscard]] Exit excite_command(const ExciteOptions& options);
+/// Simulates the experiment in a file. @return what ended it early; empty: nothing
+/// Errors: it cannot be started.
+using Trial = std::function<Result<std::string>(const std::string& experiment)>;
+/// An experiment that excites a robot's dynamics. Of a floating base it is tried, and made gentler
+/// until it runs through.
+[[nodiscard]] Exit excite_command(const ExciteOptions& options, const Trial& trial);
 /// Masses, inertias and friction from logs; writes a robot with them, and a page.
 [[nodiscard]] Exit identify_command(const IdentifyOptions& options);
 

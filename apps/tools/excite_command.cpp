@@ -83,6 +83,12 @@ std::string experiment_text(const identification::Excitation& result, const Exci
       path_from(options.output, options.robot),
       posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
       options.periods * options.period_s + 1.0);
+  if (options.hung) {
+    text += fmt::format(
+        "\n[sim]\nhoist.lift_m = {:.2f}   # it hangs: a real robot's feet must be in the air, "
+        "too\n",
+        result.lift_m);
+  }
   std::vector<std::string> others;
   for (const std::string& joint : result.joints)
     if (std::ranges::find(result.legs, joint) == result.legs.end()) others.push_back(joint);
@@ -95,33 +101,66 @@ std::string experiment_text(const identification::Excitation& result, const Exci
   return text;
 }
 
+/// A robot that stands or hangs on soft springs sways, which the search does not know: it is
+/// simulated, and excited more gently until it runs through.
+constexpr int kTrials = 8;
+constexpr double kGentler = 0.8;
+
+struct Found {
+  identification::Excitation excitation;
+  double share = 0.0;
+  std::string refused;  // what ended the last trial that failed
+};
+
+Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
+                     const std::string& posture, const Trial& trial) {
+  identification::ExciteRequest request{.posture = posture,
+                                        .joints = options.joints,
+                                        .period_s = options.period_s,
+                                        .harmonics = options.harmonics,
+                                        .seed = options.seed,
+                                        .share = options.share,
+                                        .tries = options.tries,
+                                        .hung = options.hung};
+  Found found;
+  for (int attempt = 0; attempt < kTrials; ++attempt) {
+    auto result = identification::excite(robot.config, robot.tree, request);
+    if (!result && found.refused.empty()) return std::unexpected(result.error());
+    if (!result) break;
+    found.excitation = std::move(*result);
+    found.share = request.share;
+    const std::string text = experiment_text(found.excitation, options, robot.config, posture);
+    if (const Status s = write_file(options.output, text); !s) return std::unexpected(s.error());
+    if (!robot.tree.floating_base || options.output == "-") return found;
+    auto end = trial(options.output);
+    if (!end) return std::unexpected(end.error());
+    if (end->empty()) return found;
+    found.refused = std::move(*end);
+    request.share *= kGentler;
+  }
+  return fail("no experiment runs through in simulation; the gentlest ended with: " + found.refused,
+              "give another --seed, a longer --period, or --share less");
+}
+
 }  // namespace
 
-Exit excite_command(const ExciteOptions& options) {
+Exit excite_command(const ExciteOptions& given, const Trial& trial) {
+  ExciteOptions options = given;
+  if (options.period_s <= 0.0) options.period_s = options.hung ? 3.0 : 10.0;
+  if (options.periods <= 0) options.periods = options.hung ? 20 : 3;
   const auto robot = read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   std::string posture = options.posture;
   if (posture.empty() && !robot->config.postures.empty())
     posture = robot->config.postures.front().name;
-  const int tries =
-      options.tries > 0 ? options.tries : (robot->config.joints.size() > 12 ? 60 : 300);
-  const auto result = identification::excite(robot->config, robot->tree,
-                                             {.posture = posture,
-                                              .joints = options.joints,
-                                              .period_s = options.period_s,
-                                              .harmonics = options.harmonics,
-                                              .seed = options.seed,
-                                              .share = options.share,
-                                              .tries = tries});
-  if (!result) {
-    Error error = result.error();
+  if (options.tries <= 0) options.tries = robot->config.joints.size() > 12 ? 60 : 300;
+  const auto found = search(*robot, options, posture, trial);
+  if (!found) {
+    Error error = found.error();
     if (error.file.empty()) error.file = options.robot;
     return refuse(error);
   }
-  if (const Status s =
-          write_file(options.output, experiment_text(*result, options, robot->config, posture));
-      !s)
-    return refuse(s.error());
+  const identification::Excitation* const result = &found->excitation;
   std::FILE* out = human_output(options.json);
   Facts facts;
   facts.add("experiment", options.output);
@@ -134,8 +173,16 @@ Exit excite_command(const ExciteOptions& options) {
   facts.add("torque", fmt::format("{:.0f} % of a limit at most", 100.0 * result->torque_share));
   if (std::isfinite(result->room_m))
     facts.add("self-distance", fmt::format("{:.0f} mm more than required", 1e3 * result->room_m));
-  if (robot->tree.floating_base)
+  if (options.hung) facts.add("hoist", fmt::format("lifts it {:.2f} m", result->lift_m));
+  if (robot->tree.floating_base && !options.hung)
     facts.add("balance", fmt::format("{:.0f} mm inside the feet", 1e3 * result->margin_m));
+  if (robot->tree.floating_base && options.output != "-") {
+    facts.add("simulated",
+              found->refused.empty()
+                  ? std::string("it runs through")
+                  : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
+                                found->share, found->refused));
+  }
   facts.print(out);
   const auto number = [](double value) {
     return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -148,6 +195,8 @@ Exit excite_command(const ExciteOptions& options) {
                   {"position_share", result->position_share},
                   {"speed_share", result->speed_share},
                   {"torque_share", result->torque_share},
+                  {"share", found->share},
+                  {"lift_m", result->lift_m},
                   {"room_m", number(result->room_m)},
                   {"margin_m", result->margin_m}};
   if (const Status s = write_json(options.json, json); !s) return refuse(s.error());

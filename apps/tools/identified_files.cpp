@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <regex>
@@ -41,13 +42,82 @@ std::string with_sheet(const std::string& line, const fs::path& folder) {
          match.suffix().str();
 }
 
-Status check_read_back(const std::string& file, const identification::Identification& result) {
-  const auto read = read_robot(file);
-  if (!read) return std::unexpected(read.error().front());
+/// A mean of estimates, each weighted by its interval.
+class Mean {
+ public:
+  void add(const identification::Estimate& one) {
+    if (!one.identifiable || !std::isfinite(one.value)) return;
+    const double weight = 1.0 / std::max(1e-24, one.ci95 * one.ci95);
+    sum_ += weight * one.value;
+    weight_ += weight;
+  }
+  [[nodiscard]] std::optional<double> value() const {
+    return weight_ > 0.0 ? std::optional(sum_ / weight_) : std::nullopt;
+  }
+
+ private:
+  double sum_ = 0.0, weight_ = 0.0;
+};
+
+/// Sets `key` in the table whose head is line `head`, or adds it below the head.
+void set_number(std::vector<std::string>& lines, std::ptrdiff_t head, const std::string& key,
+                const std::optional<double>& value) {
+  if (!value) return;
+  const std::regex pattern("^(\\s*" + key + "\\s*=\\s*)([^#\\s]+)(.*)$");
+  static const std::regex next(R"(^\s*\[.*$)");
+  for (auto i = static_cast<std::size_t>(head) + 1; i < lines.size(); ++i) {
+    if (std::regex_match(lines[i], next)) break;
+    std::smatch match;
+    if (!std::regex_match(lines[i], match, pattern)) continue;
+    lines[i] = fmt::format("{}{:.6g}{}", match[1].str(), *value, match[3].str());
+    return;
+  }
+  lines.insert(lines.begin() + head + 1, fmt::format("{} = {:.6g}", key, *value));
+}
+
+/// What of the joints robot.toml cannot say, in a sentence each.
+std::vector<std::string> not_carried(const RobotFiles& written,
+                                     const identification::Identification& result,
+                                     const std::vector<ActuatorFigures>& figures) {
+  std::vector<std::string> notes;
+  std::string names, drives;
+  for (const identification::JointResult& joint : result.joints) {
+    const auto there = [](const identification::Estimate& one) {
+      return one.identifiable && std::abs(one.value) > one.ci95;
+    };
+    if (there(joint.coulomb_Nm) || there(joint.offset_Nm))
+      names += (names.empty() ? "" : ", ") + joint.name;
+  }
+  for (const ActuatorFigures& one : figures) {
+    for (const hal::ActuatorConfig& got : written.config.actuators) {
+      if (got.name != one.name) continue;
+      const bool there =
+          (!one.inertia_kg_m2 || std::abs(got.inertia_kg_m2 / *one.inertia_kg_m2 - 1.0) < 1e-4) &&
+          (!one.damping_Nms_rad || std::abs(got.damping_Nms_rad - *one.damping_Nms_rad) <
+                                       1e-4 * (1.0 + std::abs(*one.damping_Nms_rad)));
+      if (!there) drives += (drives.empty() ? "" : ", ") + one.name;
+    }
+  }
+  if (!names.empty()) {
+    notes.push_back(
+        "robot.toml has no Coulomb friction and no torque offsets: those of these joints are in "
+        "the report and in JSON only: " +
+        names);
+  }
+  if (!drives.empty()) {
+    notes.push_back(
+        "the figures of these actuators could not be put into robot.toml, which "
+        "writes them in another way than [actuator.NAME]: " +
+        drives);
+  }
+  return notes;
+}
+
+Status check_read_back(const RobotFiles& read, const identification::Identification& result) {
   for (const identification::LinkResult& link : result.links) {
-    const int index = read->tree.link_index(link.name);
+    const int index = read.tree.link_index(link.name);
     if (index < 0) continue;
-    const model::Inertia& got = read->tree.links[static_cast<std::size_t>(index)].inertia;
+    const model::Inertia& got = read.tree.links[static_cast<std::size_t>(index)].inertia;
     const model::Inertia& want = link.identified;
     const double off =
         std::abs(got.mass_kg - want.mass_kg) / want.mass_kg + (got.com_m - want.com_m).norm() +
@@ -56,7 +126,7 @@ Status check_read_back(const std::string& file, const identification::Identifica
     return std::unexpected(
         Error{"what was written does not give link '" + link.name + "' the identified inertia",
               "put it there by hand: report.html has the figures",
-              file,
+              read.config.file,
               0,
               {}});
   }
@@ -109,10 +179,51 @@ std::string moved_robot(const std::string& text, const std::string& folder, cons
   return out;
 }
 
-Result<std::vector<std::string>> write_identified(const RobotFiles& robot,
-                                                  const identification::Identification& result,
-                                                  const std::vector<std::string>& logs,
-                                                  const std::string& folder) {
+std::vector<ActuatorFigures> actuator_figures(const hal::RobotConfig& robot,
+                                              const identification::Identification& result) {
+  std::vector<ActuatorFigures> all;
+  for (const hal::ActuatorConfig& actuator : robot.actuators) {
+    Mean inertia, friction;
+    for (std::size_t j = 0; j < robot.joints.size() && j < result.joints.size(); ++j) {
+      if (robot.actuator_of(robot.joints[j]).name != actuator.name) continue;
+      const identification::JointResult& joint = result.joints[j];
+      inertia.add(joint.rotor_inertia_kg_m2);
+      friction.add(actuator.order < 2 ? joint.viscous_Nms_rad : joint.motor_viscous_Nms_rad);
+    }
+    const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+    const double back_emf =  // of a data sheet that has less, less
+        std::min(per_A * per_A / actuator.resistance_ohm, actuator.damping_Nms_rad);
+    ActuatorFigures figures{actuator.name, inertia.value(), friction.value()};
+    if (figures.inertia_kg_m2 && !(*figures.inertia_kg_m2 > 0.0)) figures.inertia_kg_m2.reset();
+    if (figures.damping_Nms_rad)
+      *figures.damping_Nms_rad = std::max(0.0, *figures.damping_Nms_rad) + back_emf;
+    all.push_back(std::move(figures));
+  }
+  return all;
+}
+
+std::string with_actuators(const std::string& text, const std::vector<ActuatorFigures>& figures) {
+  std::istringstream in(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  for (const ActuatorFigures& one : figures) {
+    const std::regex head("^\\s*\\[\\s*actuator\\s*\\.\\s*\"?" + one.name + "\"?\\s*\\].*$");
+    const auto begin = std::ranges::find_if(
+        lines, [&](const std::string& line) { return std::regex_match(line, head); });
+    if (begin == lines.end()) continue;
+    const auto at = begin - lines.begin();
+    set_number(lines, at, "inertia_kg_m2", one.inertia_kg_m2);
+    set_number(lines, at, "damping_Nms_rad", one.damping_Nms_rad);
+  }
+  std::string out;
+  for (const std::string& line : lines) out += line + "\n";
+  return out;
+}
+
+Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
+                                         const identification::Identification& result,
+                                         const std::vector<std::string>& logs,
+                                         const std::string& folder) {
   const hal::RobotConfig& config = robot.config;
   std::vector<std::pair<std::string, model::Inertia>> inertias;
   for (const identification::LinkResult& link : result.links)
@@ -122,18 +233,24 @@ Result<std::vector<std::string>> write_identified(const RobotFiles& robot,
   const std::string description = fs::path(config.model.urdf).filename().string();
   const std::string name =
       config.name.ends_with("_identified") ? config.name : config.name + "_identified";
+  const std::vector<ActuatorFigures> figures = actuator_figures(config, result);
   std::vector<std::pair<std::string, std::string>> files{
-      {"robot.toml", moved_robot(text_of(config.file), fs::path(config.file).parent_path().string(),
-                                 name, description)},
+      {"robot.toml",
+       with_actuators(moved_robot(text_of(config.file),
+                                  fs::path(config.file).parent_path().string(), name, description),
+                      figures)},
       {description, *urdf}};
   for (auto& experiment : experiments_of(logs)) files.push_back(std::move(experiment));
-  std::vector<std::string> written;
+  IdentifiedFiles written;
   for (const auto& [file, text] : files) {
-    written.push_back(folder + "/" + file);
-    if (const Status s = write_file(written.back(), text); !s) return std::unexpected(s.error());
+    written.paths.push_back(folder + "/" + file);
+    if (const Status s = write_file(written.paths.back(), text); !s)
+      return std::unexpected(s.error());
   }
-  if (const Status s = check_read_back(written.front(), result); !s)
-    return std::unexpected(s.error());
+  const auto read = read_robot(written.paths.front());
+  if (!read) return std::unexpected(read.error().front());
+  if (const Status s = check_read_back(*read, result); !s) return std::unexpected(s.error());
+  written.notes = not_carried(*read, result, figures);
   return written;
 }
 

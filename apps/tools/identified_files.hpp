@@ -2,6 +2,7 @@
 // Layer: apps/tools.  Thread: main.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,15 +12,36 @@
 
 namespace tandem::apps {
 
+/// What was written, and what robot.toml has no place for.
+struct IdentifiedFiles {
+  std::vector<std::string> paths;  ///< robot.toml first
+  std::vector<std::string> notes;
+};
+
+/// A drive's figures as robot.toml has them: the mean over the joints that it moves, each weighted
+/// by its own interval; nothing of what the data do not give.
+struct ActuatorFigures {
+  std::string name;
+  std::optional<double> inertia_kg_m2, damping_Nms_rad;
+};
+[[nodiscard]] std::vector<ActuatorFigures> actuator_figures(
+    const hal::RobotConfig& robot, const identification::Identification& result);
+
+/// The text with these figures in [actuator.NAME], comments kept. What stands in
+/// [actuator_defaults] only is added below the table's head; a table written in another way stays.
+[[nodiscard]] std::string with_actuators(const std::string& text,
+                                         const std::vector<ActuatorFigures>& figures);
+
 /// Writes into `folder`: ROBOT.urdf, the description with the identified inertias; robot.toml, the
-/// robot with that description, named NAME_identified; and the experiment of every log whose file
-/// carries it, with that robot. Then reads the robot back.
+/// robot with that description and its drives' friction and rotor inertia, named NAME_identified;
+/// and the experiment of every log whose file carries it, with that robot. Then reads the robot
+/// back.
 ///
-/// @return the paths written, robot.toml first
 /// Errors: a file cannot be written; what was written does not read back as what was identified.
-[[nodiscard]] Result<std::vector<std::string>> write_identified(
-    const RobotFiles& robot, const identification::Identification& result,
-    const std::vector<std::string>& logs, const std::string& folder);
+[[nodiscard]] Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
+                                                       const identification::Identification& result,
+                                                       const std::vector<std::string>& logs,
+                                                       const std::string& folder);
 
 /// A robot.toml's text for another folder: with this name and description, without
 /// [model.link.NAME], whose figures the description has now, and with paths that still lead to

@@ -127,7 +127,8 @@ Exit identify_command(const IdentifyOptions& options) {
   const auto written = write_identified(*robot, *result, options.logs, options.output);
   if (!written) return refuse(written.error());
   Facts files;
-  for (const std::string& file : *written) files.add("written", file);
+  for (const std::string& note : written->notes) fmt::print(stderr, "note: {}\n", note);
+  for (const std::string& file : written->paths) files.add("written", file);
   const auto page = write_identify_page(*result, robot->config.name, options.output);
   if (page) {
     files.add("report", *page);

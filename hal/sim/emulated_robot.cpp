@@ -32,6 +32,7 @@ Result<PlantConfig> plant_config(const hal::RobotConfig& robot, const tandem_ker
   plant.substep_ns = config.substep_ns;
   plant.held = config.hold;
   plant.release_ns = config.release_ns;
+  plant.lift_m = config.lift_m;
   plant.rate_limit = config.rate_limit;
   const hal::PostureConfig* posture = robot.posture(config.posture);
   if (posture == nullptr && !config.posture.empty()) {

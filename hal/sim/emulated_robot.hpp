@@ -31,8 +31,9 @@ struct SimRobotConfig {
   std::string posture;                      ///< where the robot starts; empty: every joint at 0
   bool hold = true;                         ///< hoist and brakes until every drive is enabled
   std::int64_t release_ns = 1'000'000'000;  ///< in which the hoist lets the base down
-  std::uint64_t seed = 1;                   ///< of every measurement's noise
-  bool truth = true;                        ///< keep truth() up to date
+  double lift_m = 0.0;              ///< the base hangs so much higher, and is never let down
+  std::uint64_t seed = 1;           ///< of every measurement's noise
+  bool truth = true;                ///< keep truth() up to date
   double rate_limit = 1000.0;       ///< any rate beyond it [rad/s or m/s] counts as diverged
   bool bus_timing = false;          ///< frames take the time that they need on a real bus
   std::int64_t bus_latency_ns = 0;  ///< with it: of every node's driver or firmware

@@ -74,6 +74,7 @@ Plant::Plant(const PlantConfig& config)
       integrator_(config.integrator),
       substep_ns_(config.substep_ns),
       release_ns_(config.release_ns),
+      lifted_(config.lift_m != 0.0),
       rate_limit_(config.rate_limit),
       base_q_(config.kernels->floating_base != 0 ? 7 : 0),
       base_v_(config.kernels->floating_base != 0 ? 6 : 0),
@@ -196,7 +197,7 @@ Status Plant::start(const PlantConfig& config) {
   std::vector<double> q(kernels_->nq, 0.0);
   const std::vector<double> v(kernels_->nv, 0.0);
   if (base_q_ != 0) {
-    q[2] = config.base_height_m;
+    q[2] = config.base_height_m + config.lift_m;
     q[6] = 1.0;
   }
   for (std::size_t j = 0; j < map_.size(); ++j)
@@ -294,7 +295,7 @@ void Plant::set_drive(std::size_t joint, double voltage_V, bool bridge_on) noexc
 void Plant::release() noexcept TANDEM_RT {
   if (released_ != 0) return;
   released_ = 1;
-  hoist_.release(release_ns_);
+  if (!lifted_) hoist_.release(release_ns_);
   for (const std::size_t i : map_) actuators_.set_brake(i, false, 0.0, 0.0);
 }
 

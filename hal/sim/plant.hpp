@@ -58,6 +58,7 @@ struct PlantConfig {
   /// Start held: the base by a hoist, every joint whose bridge is off by a brake, until release().
   bool held = false;
   std::int64_t release_ns = 1'000'000'000;  ///< how long the hoist takes to let the base down
+  double lift_m = 0.0;  ///< above base_height_m; not 0: the hoist never lets the base down
   std::vector<hal::PassiveConfig> passive;  ///< the kernels' joints without an actuator
   std::vector<model::LoopSpec> loops;
   /// Where joints end: of the kernels' joints, any of them. A passive joint whose loop starts it
@@ -203,6 +204,7 @@ class Plant {
   const tandem_kernels* kernels_;
   Integrator integrator_;
   std::int64_t substep_ns_, release_ns_;
+  bool lifted_;  // the hoist holds the base to the end
   double rate_limit_;
   std::size_t base_q_, base_v_;       // 7 and 6, or 0 and 0
   std::vector<std::size_t> map_;      // joint -> model joint

@@ -85,5 +85,24 @@ TEST(Excite, AHumanoidStandsOnBothFeetWhileItMoves) {
   EXPECT_LT(result->torque_share, 0.7);
 }
 
+TEST(Excite, AHumanoidThatHangsMovesItsLegsFreelyAboveTheGround) {
+  const Arm coman = arm("coman");
+  const auto result = excite(coman.robot, coman.tree,
+                             {.posture = "stand", .period_s = 3.0, .tries = 2, .hung = true});
+  ASSERT_TRUE(result) << result.error().to_string();
+  EXPECT_EQ(result->joints.size(), 29U);
+  EXPECT_TRUE(result->legs.empty());  // nothing stands on them
+  EXPECT_EQ(result->margin_m, 0.0);
+  EXPECT_GE(result->lift_m + result->lowest_m, 0.149);
+  // The base's own parameters do not show while it is at rest.
+  const auto standing = excite(coman.robot, coman.tree, {.posture = "stand", .tries = 1});
+  ASSERT_TRUE(standing);
+  EXPECT_LT(result->base_parameters, standing->base_parameters);
+  const Arm panda = arm("panda");
+  const auto arm_of = excite(panda.robot, panda.tree, {.posture = "ready", .hung = true});
+  ASSERT_FALSE(arm_of);
+  EXPECT_NE(arm_of.error().message.find("fixed base cannot hang"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace tandem::identification

@@ -91,6 +91,25 @@ TEST(Recording, GivesTheSameResultWithWhatLiesLeftOut) {
   ASSERT_FALSE(result->remarks.empty());
 }
 
+TEST(Recording, OfNumbersThatAreNoneGivesTheSameResultWithoutThem) {
+  Recording whole = good(), holed = good();
+  for (std::size_t at = 4000; at < 4200; ++at) {
+    holed.position_rad[1][at] = NAN;
+    holed.torque_Nm[4][at] = INFINITY;
+  }
+  for (const std::size_t at : {7000U, 7001U}) holed.torque_Nm[0][at] = NAN;
+  bridge_holes(holed);
+  const auto want = identify({whole}, panda().robot, panda().tree);
+  const auto got = identify({holed}, panda().robot, panda().tree);
+  ASSERT_TRUE(want && got);
+  EXPECT_LT(got->usable_s, want->usable_s);
+  for (std::size_t i = 0; i < got->base.size(); ++i) {
+    EXPECT_NEAR(got->base[i].estimate.value, want->base[i].estimate.value,
+                2.0 * got->base[i].estimate.ci95 + 1e-6)
+        << got->base[i].name;
+  }
+}
+
 TEST(Recording, UndoesTheHoldsOfASlowPdo) {
   Signal held, smooth;
   for (int i = 0; i < 400; ++i) smooth.push_back(std::sin(0.02 * i));

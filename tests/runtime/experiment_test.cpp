@@ -223,6 +223,15 @@ TEST(Experiment, RefusesAPeriodOfZero) {
             "arm/x.toml:4: period_ns: 0 is out of range (must be 10000 to 1000000000)\n");
 }
 
+TEST(Experiment, RefusesToLiftWhatNoHoistHolds) {
+  EXPECT_NE(errors_of(with("[sim]\nhoist = {lift_m = 0.2}"))
+                .find("sim.hoist.lift_m: a fixed base cannot be lifted"),
+            std::string::npos);
+  EXPECT_NE(errors_of(with("[sim]\nhoist = {enabled = false, lift_m = 0.2}"))
+                .find("sim.hoist.lift_m: without a hoist nothing lifts the base"),
+            std::string::npos);
+}
+
 TEST(Experiment, RefusesAPeriodThatDoesNotFitABoard) {
   EXPECT_EQ(errors_of(with("period_ns = 1_500_000")),
             "arm/x.toml:4: period_ns: 1500000 ns and the control period of board 'board', "
