@@ -40,7 +40,9 @@ class Emitter {
         lanes_(lanes),
         part_operations_(part_operations),
         states_(states),
-        number_(states == 1 ? "double" : states == 4 ? "four" : "eight"),
+        number_(states == 1   ? "double"
+                : states == 4 ? "four"
+                              : "eight"),
         array_(states == 1 ? number_ : number_ + "_at"),
         name_(kernel.shape.name + (states == 1 ? "" : "_" + number_)),
         live_(live_nodes(graph, kernel.outputs)),
@@ -429,8 +431,8 @@ class Emitter {
       return states_ == 1 ? from : "reinterpret_cast<double*>(" + from + ")";
     };
     if (!angles_.empty())
-      body += "  sines_and_cosines(" + std::to_string(states_ * table_) + ", " +
-              doubles(0) + ", " + doubles(table_) + ", " + doubles(2 * table_) + ");\n";
+      body += "  sines_and_cosines(" + std::to_string(states_ * table_) + ", " + doubles(0) + ", " +
+              doubles(table_) + ", " + doubles(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
     result_.entry = "void " + name_ + "(" + result_.parameters + ") {\n" + body + "}\n";

@@ -172,8 +172,7 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result, c
   text += kTrigSource;
   text += "\n";
   for (const auto* some : {&kernels, &fours, &eights, &derivatives})
-    for (const EmittedKernel& kernel : *some)
-      text += all.guarded(*some, kernel.entry + "\n");
+    for (const EmittedKernel& kernel : *some) text += all.guarded(*some, kernel.entry + "\n");
   for (const Kernel kernel : kBatches)
     text += batch_source(kernel_shape(kernel, m), !fours.empty());
   text += name_table("joints", m.joint_names) + name_table("sites", m.site_names) +
