@@ -263,7 +263,7 @@ Exit emulate_command(const EmulateOptions& options) {
     });
     if (options.lockstep && has_line) {
       fmt::print(out,
-                 "in lockstep its slaves answer `tandem run --lockstep` alone, and no scan: "
+                 "in lockstep its slaves answer a run's process data, and no scan: "
                  "for `tandem doctor` leave --lockstep out\n");
     }
     std::fflush(out);

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "hal/config/capabilities.hpp"
+#include "hal/config/drive_ranges.hpp"
 #include "hal/config/robot_config_read.hpp"
 
 namespace tandem::hal {
@@ -283,6 +284,7 @@ class Completion : private Check {
     }
     check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
     check_gains(joint);
+    std::ranges::move(check_drive_ranges(robot_, joint), std::back_inserter(errors_));
   }
 
   /// Slower than the full torque in a second nothing can be controlled, and 6087 has 32 bits.

@@ -208,6 +208,19 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
     const BoardConfig& board = robot.boards[static_cast<std::size_t>(node.board)];
     if (board.eds.empty()) continue;
     if (seen.insert(board.eds).second) warn_of_mappings(*board.sheet, warnings);
+    const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);
+    if (bus != robot.buses.end() && bus->kind == BusKind::kEthercat) continue;  // SM2's watchdog
+    const std::vector<int>& rates = board.sheet->bit_rates_kbit_s;
+    if (bus != robot.buses.end() && !rates.empty() &&
+        std::ranges::none_of(rates, [&](int kbit) { return 1000 * kbit == bus->bitrate; })) {
+      warnings.push_back(
+          {.message = fmt::format("bus '{}' has {} bit/s; the sheet {} has {} kbit/s", bus->name,
+                                  bus->bitrate, board.eds, fmt::join(rates, ", ")),
+           .hint = "set [[bus]] bitrate to one that the drive has",
+           .file = robot.file,
+           .line = bus->line,
+           .key = "board '" + board.name + "'"});
+    }
     for (std::string& text : unwatched(node, *board.sheet)) {
       warnings.push_back({.message = std::move(text),
                           .hint = "set the drive's own time-out",

@@ -4,9 +4,11 @@
 namespace tandem::apps {
 namespace {
 
+constexpr char kLost[] = "method = 23, home_switch_rad = [50.0, 51.0]";
+
 class HomedJoints : public Running {
  protected:
-  /// joint1 is homed where it stands; joint2's method is one that its drive has not.
+  /// joint1 is homed where it stands; joint2's home switch is where the joint never comes.
   void SetUp() override {
     Running::SetUp();
     const std::string homing =
@@ -19,7 +21,9 @@ class HomedJoints : public Running {
     joint.replace(joint.find(both), both.size(), "name = \"joint1\"\n" + homing);
     std::string other = joint;
     other.replace(other.find("joint1"), 6, "joint2");
-    other.replace(other.find("method = 35"), 11, "method = 15");
+    other.replace(other.find("method = 35"), 11, kLost);
+    other.replace(other.find("speed_rad_s = 0.5"), 17, "speed_rad_s = 5.0");
+    other.replace(other.find("acceleration_rad_s2 = 1.0"), 25, "acceleration_rad_s2 = 50.0");
     other.replace(other.find("position_rad = 0.5"), 18, "required = false");
     write_text(folder_ / "robot.toml", robot.substr(0, from) + joint + other + robot.substr(to));
   }
@@ -40,7 +44,7 @@ TEST_F(HomedJoints, AreHomedOnRequestAndItsControllersStartThen) {
   expect(to_run("joint home jiont1"), 2, "did you mean 'joint1'?");
   const Outcome failed = to_run("joint home joint2");
   expect(failed, 1,
-         "joint2: the homing (method 15) failed: the drive reports a homing error (statusword bit "
+         "joint2: the homing (method 23) failed: the drive reports a homing error (statusword bit "
          "13)");
   expect(failed, 1, "give homing.method a number that the drive has");
   expect(to_run("joint show joint2"), 0, "not homed: the drive reports a homing error");
@@ -80,10 +84,11 @@ TEST_F(HomedJoints, ARunHomesThoseThatAreDeclaredSo) {
 }
 
 TEST_F(HomedJoints, ARunThatCannotHomeOneEndsAtOnceAndSaysWhy) {
-  edit("robot.toml", "method = 35", "method = 16");
+  edit("robot.toml", "method = 35, speed_rad_s = 0.5, acceleration_rad_s2 = 1.0",
+       kLost + std::string(", speed_rad_s = 5.0, acceleration_rad_s2 = 50.0"));
   edit("robot.toml", "position_rad = 0.5 }", "position_rad = 0.5, at_start = true }");
   const Outcome ran = tandem("run hold.toml --duration 50 --no-log --json run.json");
-  expect(ran, 1, "its homing (method 16) failed: the drive reports a homing error");
+  expect(ran, 1, "its homing (method 23) failed: the drive reports a homing error");
   const auto faults = json("run.json")["fault_log"];
   ASSERT_EQ(faults.size(), 1U);
   EXPECT_EQ(faults[0]["joint"], "joint1");
@@ -95,6 +100,24 @@ TEST_F(HomedJoints, ARunThatCannotHomeOneEndsAtOnceAndSaysWhy) {
     const auto columns = std::ranges::count_if(line, [](char c) { return (c & 0xC0) != 0x80; });
     EXPECT_LE(columns, 100) << line;
   }
+}
+
+/// What would move too fast, not at all, or to a place that the joint has not.
+TEST_F(HomedJoints, AreCheckedBeforeAnythingMoves) {
+  const std::string whole = read_text(folder_ / "robot.toml");
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& part) {
+    write_text(folder_ / "robot.toml", whole);
+    edit("robot.toml", from, to);
+    expect(tandem("check robot.toml"), 2, "joint.joint1.homing." + part);
+  };
+  check("speed_rad_s = 0.5", "speed_rad_s = 60.0",
+        "speed_rad_s: 60 is more than the joint's max_velocity_rad_s");
+  check("speed_rad_s = 0.5", "speed_rad_s = 1e-9", "speed_rad_s: 1e-09 would be");
+  check("speed_rad_s = 0.5", "speed_rad_s = 0.5, zero_speed_rad_s = 0.6", "zero_speed_rad_s: is");
+  check("acceleration_rad_s2 = 1.0", "acceleration_rad_s2 = 1e12", "acceleration_rad_s2: 1e+12");
+  check("position_rad = 0.5", "position_rad = 100.0", "position_rad: 100 is far outside");
+  check("position_rad = 0.5", "position_rad = 1e9", "position_rad: 1e+09 is far outside");
+  check("method = 35", "method = 15", "method: our own boards have no homing method 15");
 }
 
 TEST_F(HomedJoints, OneThatEndsOutsideOfItsLimitsIsLedInside) {

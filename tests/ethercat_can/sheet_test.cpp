@@ -257,6 +257,23 @@ TEST(Sheet, OfADriveThatMissesADeadMasterIsWarnedOf) {
   EXPECT_TRUE(drive_warnings(test::classic_config())->empty()) << "our own boards";
 }
 
+TEST(Sheet, WithoutTheBusBitRateIsWarnedOfOnCanAlone) {
+  SheetRig rig(servo().remove(0x1016));
+  auto sheet = std::make_shared<canopen::DataSheet>(*rig.robot.boards[0].sheet);
+  sheet->bit_rates_kbit_s = {125, 250};
+  rig.robot.boards[0].sheet = sheet;
+  const auto warnings = drive_warnings(rig.robot);
+  ASSERT_TRUE(warnings);
+  ASSERT_EQ(warnings->size(), 2U);
+  EXPECT_NE((*warnings)[0].to_string().find("has 125, 250 kbit/s"), std::string::npos)
+      << (*warnings)[0].to_string();
+  rig.robot.buses[0].kind =
+      BusKind::kEthercat;  // and there the slave's watchdog sees a dead master
+  const auto others = drive_warnings(rig.robot);
+  ASSERT_TRUE(others) << others.error().to_string();
+  EXPECT_TRUE(others->empty());
+}
+
 TEST(Sheet, WhoseMappingNoFrameCarriesIsWarnedOfOnceForAllItsBoards) {
   SheetRig rig(servo());
   auto sheet = std::make_shared<canopen::DataSheet>(*rig.robot.boards[0].sheet);

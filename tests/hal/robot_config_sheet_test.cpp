@@ -7,6 +7,7 @@
 #include <string>
 
 #include "hal/config/capabilities.hpp"
+#include "hal/config/drive_ranges.hpp"
 #include "hal/config/robot_config.hpp"
 #include "tests/support/scratch_folder.hpp"
 
@@ -260,6 +261,37 @@ TEST_F(BoardSheet, RefusesAHomingThatIsNoneOrThatTheDriveHasNot) {
   EXPECT_TRUE(read(joint_with(homing))) << "home is at 0";
   EXPECT_NE(why("2.0 }", "2.0, position_rad = 0.1 }").find("no home offset (607C)"),
             std::string::npos);
+}
+
+/// Numbers that the sheet's limits or 32 bits exclude; with the joint's limits, so after the rest.
+TEST_F(BoardSheet, NumbersBeyondItsLimitsAreRefused) {
+  auto robot =
+      read(joint_with("homing = { method = 37, speed_rad_s = 0.5, acceleration_rad_s2 = 2.0 }\n"
+                      "stop_options = { fault = 2 }\n"));
+  ASSERT_TRUE(robot) << robot.error()[0].to_string();
+  JointConfig& joint = robot->joints[0];
+  joint.min_position_rad = -1.0;
+  joint.max_position_rad = 1.0;
+  joint.max_velocity_rad_s = 2.0;
+  EXPECT_TRUE(check_drive_ranges(*robot, joint).empty());
+  auto limited = std::make_shared<canopen::DataSheet>(*robot->boards[0].sheet);
+  for (canopen::SheetEntry& entry : limited->entries) {
+    if (entry.index == 0x6098) entry.high = 35;
+    if (entry.index == 0x605E) entry.high = 1;
+  }
+  robot->boards[0].sheet = limited;
+  const Diagnostics beyond = check_drive_ranges(*robot, joint);
+  ASSERT_EQ(beyond.size(), 2U);
+  EXPECT_EQ(beyond[0].key, "joint.elbow.homing.method");
+  EXPECT_NE(beyond[0].message.find("37 is more than 35, the limit of 6098"), std::string::npos);
+  EXPECT_EQ(beyond[1].key, "joint.elbow.stop_options.fault");
+  robot->boards[0].sheet = canopen::tandem_board_sheet();
+  for (const double units : {1e-9, 1e15}) {
+    joint.velocity_units_per_rev = units;
+    const Diagnostics unusable = check_drive_ranges(*robot, joint);
+    ASSERT_FALSE(unusable.empty());
+    EXPECT_EQ(unusable[0].key, "joint.elbow.velocity_units_per_rev");
+  }
 }
 
 TEST_F(BoardSheet, TakesStopOptionsThatTheDriveHas) {

@@ -51,7 +51,10 @@ std::string SlaveMaster::text() const {
     case SlaveError::kStateTimeout:
       return say(fmt::format("did not enter {} in time", to_string(wanted_)));
     case SlaveError::kClock:
-      return say(fmt::format("its clock is {} ns off the reference", difference_ns_));
+      return say(
+          fmt::format("its clock, {} ns off the reference, or its SYNC0 was not ready in "
+                      "time (a master in lockstep needs `tandem emulate --lockstep`)",
+                      difference_ns_));
     case SlaveError::kLeftState:
       return say(fmt::format("is in {}: {}", to_string(al_state_), code_text(al_code_)));
     case SlaveError::kMappingLost: return say("its FMMUs were changed, by a second master perhaps");

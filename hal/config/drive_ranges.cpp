@@ -1,0 +1,141 @@
+#include "hal/config/drive_ranges.hpp"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "canopen/data_sheet.hpp"
+#include "canopen/objects.hpp"
+
+namespace tandem::hal {
+namespace {
+
+constexpr double kMost = 2147483647.0;  // of an object of 32 bits with a sign
+
+class RangeCheck {
+ public:
+  RangeCheck(const RobotConfig& robot, const JointConfig& joint) : robot_(robot), joint_(joint) {}
+
+  Diagnostics run() {
+    check_velocity_units();
+    if (joint_.homing) check_homing(*joint_.homing);
+    const StopOptions& stop = joint_.stop_options;
+    using namespace canopen::object;
+    check_option("shutdown", stop.shutdown, kShutdownOption);
+    check_option("disable", stop.disable, kDisableOption);
+    check_option("halt", stop.halt, kHaltOption);
+    check_option("fault", stop.fault, kFaultReactionOption);
+    return std::move(errors_);
+  }
+
+ private:
+  void error(int line, const std::string& key, std::string message, std::string hint) {
+    errors_.push_back({std::move(message), std::move(hint), robot_.file, line,
+                       "joint." + joint_.name + "." + key});
+  }
+
+  [[nodiscard]] double velocity_units(double rad_s) const {
+    const double per_rev = joint_.velocity_units_per_rev > 0.0 ? joint_.velocity_units_per_rev
+                                                               : joint_.encoder_counts_per_rev;
+    return rad_s * per_rev / (2.0 * std::numbers::pi);
+  }
+
+  void check_velocity_units() {
+    if (!(joint_.velocity_units_per_rev > 0.0)) return;
+    const double most = velocity_units(joint_.max_velocity_rad_s);
+    if (most >= 1.0 && most <= kMost) return;
+    error(joint_.line, "velocity_units_per_rev",
+          fmt::format("the joint's maximum velocity, {:.6g} rad/s, would be {:.3g} of the drive's "
+                      "units, which are integers of 32 bits",
+                      joint_.max_velocity_rad_s, most),
+          "set it to the drive's velocity units at one revolution of the joint per second");
+  }
+
+  void check_homing(const HomingConfig& homing) {
+    const auto wrong = [&](const char* key, std::string message, std::string hint) {
+      error(homing.line, std::string("homing.") + key, std::move(message), std::move(hint));
+    };
+    if (homing.speed_rad_s > joint_.max_velocity_rad_s) {
+      wrong("speed_rad_s",
+            fmt::format("{:.6g} is more than the joint's max_velocity_rad_s, {:.6g}",
+                        homing.speed_rad_s, joint_.max_velocity_rad_s),
+            "homing is slow: the joint runs into a switch or a stop");
+    }
+    if (homing.zero_speed_rad_s > homing.speed_rad_s) {
+      wrong("zero_speed_rad_s", "is more than speed_rad_s",
+            "the last way, to the zero, is the slower one");
+    }
+    for (const auto& [key, value] : {std::pair{"speed_rad_s", homing.speed_rad_s},
+                                     {"zero_speed_rad_s", homing.zero_speed_rad_s},
+                                     {"acceleration_rad_s2", homing.acceleration_rad_s2}}) {
+      const double units = velocity_units(value);
+      if (units >= 0.5 && units <= kMost) continue;
+      wrong(key,
+            fmt::format("{:.6g} would be {:.3g} of the drive's units, which are integers of 32 bits",
+                        value, units),
+            "give a value between one of its units and 2^31");
+    }
+    const double width = joint_.max_position_rad - joint_.min_position_rad;
+    const double counts = homing.position_rad * joint_.encoder_counts_per_rev /
+                              (2.0 * std::numbers::pi) +
+                          joint_.zero_counts;
+    if (homing.position_rad < joint_.min_position_rad - 0.5 * width ||
+        homing.position_rad > joint_.max_position_rad + 0.5 * width || !(std::abs(counts) < kMost)) {
+      wrong("position_rad",
+            fmt::format("{:.6g} is far outside of the joint's range, {:.6g} to {:.6g}",
+                        homing.position_rad, joint_.min_position_rad, joint_.max_position_rad),
+            "give the joint's angle at the place that is found");
+    }
+    check_method(homing);
+  }
+
+  /// Our own boards have the standard's methods; another's sheet may say which values it takes.
+  void check_method(const HomingConfig& homing) {
+    const BoardConfig* board = robot_.board(joint_.board);
+    if (board == nullptr) return;
+    const int m = homing.method;
+    const bool standard =
+        (m >= 1 && m <= 14) || (m >= 17 && m <= 30) || (m >= 33 && m <= 35) || m == 37;
+    if (board->eds.empty() && !standard) {
+      error(homing.line, "homing.method",
+            fmt::format("our own boards have no homing method {}", m),
+            "give one of 1 to 14, 17 to 30, 33, 34, 35 and 37 (docs/firmware.md)");
+      return;
+    }
+    check_limits(homing.line, "homing.method", m, canopen::object::kHomingMethod);
+  }
+
+  void check_option(const char* key, std::optional<int> value, std::uint16_t index) {
+    if (value) check_limits(joint_.line, std::string("stop_options.") + key, *value, index);
+  }
+
+  void check_limits(int line, const std::string& key, int value, std::uint16_t index) {
+    const BoardConfig* board = robot_.board(joint_.board);
+    if (board == nullptr || board->eds.empty()) return;
+    const std::uint16_t of = canopen::of_axis(index, joint_.axis);
+    const canopen::SheetEntry* entry = board->sheet->find(of);
+    if (entry == nullptr) return;
+    const bool low = entry->low && value < *entry->low;
+    const bool high = entry->high && value > *entry->high;
+    if (!low && !high) return;
+    error(line, key,
+          fmt::format("{} is {} than {}, the limit of {:04X} in {}:{}", value,
+                      low ? "less" : "more", low ? *entry->low : *entry->high, of,
+                      board->sheet->file, entry->line),
+          "give a value that the drive takes");
+  }
+
+  const RobotConfig& robot_;
+  const JointConfig& joint_;
+  Diagnostics errors_;
+};
+
+}  // namespace
+
+Diagnostics check_drive_ranges(const RobotConfig& robot, const JointConfig& joint) {
+  return RangeCheck(robot, joint).run();
+}
+
+}  // namespace tandem::hal
