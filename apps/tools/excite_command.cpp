@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kExciteHead = "# Excites the dynamics for `tandem identify`";
 /// What of a spring a standing robot's legs are damped by: without it they swing for long.
 constexpr double kDamped_s = 0.03;
 
@@ -74,11 +75,11 @@ std::string path_from(const std::string& experiment, const std::string& robot) {
 std::string experiment_text(const identification::Excitation& result, const ExciteOptions& options,
                             const hal::RobotConfig& robot, const std::string& posture) {
   std::string text = fmt::format(
-      "# Excites the dynamics for `tandem identify`, written by `tandem excite --seed {}`.\n"
+      "{}, written by `tandem excite --seed {}`.\n"
       "# Condition number {:.1f} of {} base parameters; at most {:.0f} % of a joint's way to its\n"
       "# limits, {:.0f} % of its speed, {:.0f} % of its torque.\n"
       "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
-      options.seed, result.condition_number, result.base_parameters, 100.0 * result.position_share,
+      kExciteHead, options.seed, result.condition_number, result.base_parameters, 100.0 * result.position_share,
       100.0 * result.speed_share, 100.0 * result.torque_share,
       path_from(options.output, options.robot),
       posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
@@ -150,6 +151,8 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   if (options.periods <= 0) options.periods = options.hung ? 20 : 3;
   const auto robot = read_robot(options.robot);
   if (!robot) return refuse(robot.error());
+  if (const Status s = check_overwrites(options.output, kExciteHead, "experiment of `tandem excite`"); !s)
+    return refuse(s.error());
   std::string posture = options.posture;
   if (posture.empty() && !robot->config.postures.empty())
     posture = robot->config.postures.front().name;

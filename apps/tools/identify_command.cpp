@@ -117,6 +117,8 @@ Exit identify_command(const IdentifyOptions& options) {
                         0,
                         {}});
   }
+  if (const Status s = check_identified(*robot, options.logs, options.output); !s)
+    return refuse(s.error());
   const auto result = identification::identify(options.logs, robot->config, robot->tree,
                                                {.cutoff_Hz = options.cutoff_Hz});
   if (!result) return refuse(result.error());

@@ -117,6 +117,40 @@ TEST_F(Identify, GivesForATableOfTheLogWhatTheLogGives) {
   }
 }
 
+TEST_F(Identify, DestroysNoFileThatItDidNotWrite) {
+  const std::string robot = read_text(folder_ / "robot.toml");
+  const std::string urdf = read_text(folder_ / "double_pendulum.urdf");
+  const std::string trajectory = read_text(folder_ / "trajectory.toml");
+  for (const std::string file : {"robot.toml", "trajectory.toml"}) {
+    const Outcome excited = tandem("excite robot.toml --out " + file);
+    EXPECT_EQ(excited.status, 2) << file;
+    EXPECT_NE(excited.err.find("it is no experiment of `tandem excite`: it would be lost"),
+              std::string::npos)
+        << excited.err;
+  }
+  record("robot.toml");
+  record("robot.toml");  // its own experiment is written again
+  std::filesystem::create_directories(folder_ / "mine");
+  write_text(folder_ / "mine/report.html", "<title>mine</title>");
+  for (const std::string folder : {".", "mine"}) {
+    const Outcome found = tandem("identify " + log() + " --robot robot.toml --out " + folder);
+    EXPECT_EQ(found.status, 2) << folder;
+    EXPECT_NE(found.err.find("it would be lost"), std::string::npos) << found.err;
+  }
+  EXPECT_EQ(read_text(folder_ / "robot.toml"), robot);
+  EXPECT_EQ(read_text(folder_ / "double_pendulum.urdf"), urdf);
+  EXPECT_EQ(read_text(folder_ / "trajectory.toml"), trajectory);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "mine/robot.toml"));
+  for (const char* again : {"once", "twice"}) {
+    const Outcome found = tandem("identify " + log() + " --robot robot.toml --out found");
+    EXPECT_EQ(found.status, 0) << again << found.err;
+  }
+  // A folder of its own is no place for what is found from it, either.
+  const Outcome onto = tandem("identify " + log() + " --robot found/robot.toml --out found");
+  EXPECT_EQ(onto.status, 2);
+  EXPECT_NE(onto.err.find("describes the robot that is identified"), std::string::npos) << onto.err;
+}
+
 // The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
 // sensors are noisy.
 TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
