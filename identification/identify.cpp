@@ -391,6 +391,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   for (const Recording& recording : recordings) {
     for (const std::string& remark : recording.remarks)
       out.remarks.push_back(recordings.size() > 1 ? recording.path + ": " + remark : remark);
+    for (const LeftOut& one : recording.left_out) out.left_out.emplace_back(recording.path, one);
     if (recording.hangs && identified->floating) {
       out.remarks.push_back(recording.path +
                             ": the robot hangs from a hoist, whose force is not known: the base's "

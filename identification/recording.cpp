@@ -213,10 +213,12 @@ void remark(Recording& recording, const std::string& what, const std::vector<Str
   if (stretches.empty()) return;
   std::size_t samples = 0;
   for (const Stretch& one : stretches) samples += one.end - one.begin;
+  const LeftOut left{what, static_cast<double>(samples) * recording.period_s,
+                     recording.time_s[stretches[0].begin], recording.time_s[stretches[0].end - 1]};
   recording.remarks.push_back(
-      fmt::format("{}: {:.3f} s excluded, the first from {:.3f} to {:.3f} s", what,
-                  static_cast<double>(samples) * recording.period_s,
-                  recording.time_s[stretches[0].begin], recording.time_s[stretches[0].end - 1]));
+      fmt::format("{}: {:.3f} s excluded, the first from {:.3f} to {:.3f} s", what, left.sum_s,
+                  left.first_begin_s, left.first_end_s));
+  recording.left_out.push_back(left);
 }
 
 /// The smallest step of a signal: of its encoder or its wire.

@@ -15,6 +15,13 @@ namespace tandem::identification {
 
 using Signal = std::vector<double>;  ///< a sample per grid time
 
+/// What of a log was left out, for one reason.
+struct LeftOut {
+  std::string what;                             ///< which signal, and why
+  double sum_s = 0.0;                           ///< of all its stretches
+  double first_begin_s = 0.0, first_end_s = 0.0;  ///< of the first one, since the log's time 0
+};
+
 /// Joints and channels in the order of the robot's configuration, whatever the log's is.
 struct Recording {
   std::string path;
@@ -29,6 +36,7 @@ struct Recording {
   std::vector<Signal> reference_rad;       ///< commanded; the same. For checks only
   std::vector<Signal> sensor;              ///< per channel of all sensors
   std::vector<std::string> remarks;        ///< one sentence for everything excluded
+  std::vector<LeftOut> left_out;           ///< stretches of a signal; each is among the remarks, too
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
 };

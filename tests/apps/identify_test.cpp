@@ -151,6 +151,48 @@ TEST_F(Identify, DestroysNoFileThatItDidNotWrite) {
   EXPECT_NE(onto.err.find("describes the robot that is identified"), std::string::npos) << onto.err;
 }
 
+TEST_F(Identify, TellsProgramsWhatItTellsPeople) {
+  record("robot.toml");
+  write_text(folder_ / "map.toml", kMap);
+  ASSERT_EQ(tandem("log csv " + log() + " --fields position_rad,torque_nm -o run.csv").status, 0);
+  std::istringstream rows(read_text(folder_ / "run.csv"));
+  std::string line, edited;
+  std::getline(rows, line);
+  edited = line + "\n";
+  while (std::getline(rows, line)) {  // joint2 never says more than a tenth of what it may need
+    std::size_t comma = line.rfind(',');
+    const double torque = std::min(0.1, std::strtod(line.c_str() + comma + 1, nullptr));
+    edited += line.substr(0, comma + 1) + std::to_string(torque) + "\n";
+  }
+  write_text(folder_ / "run.csv", edited);
+  const Outcome imported =
+      tandem("log import run.csv --robot robot.toml --map map.toml -o bad.mcap");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  const Outcome found =
+      tandem("identify bad.mcap --robot robot.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  const nlohmann::json result = json("found.json");
+  ASSERT_GE(result["left_out"].size(), 1U) << found.err;
+  EXPECT_EQ(result["left_out"][0]["log"], "bad.mcap");
+  EXPECT_EQ(result["left_out"][0]["what"], "joint 'joint2': its torque is cut off at a limit");
+  EXPECT_GT(result["left_out"][0]["sum_s"].get<double>(), 0.1);
+  EXPECT_GT(result["left_out"][0]["first_end_s"].get<double>(),
+            result["left_out"][0]["first_begin_s"].get<double>());
+  for (const char* kind : {"notes", "warnings"}) {
+    const std::string word = kind == std::string("notes") ? "note: " : "warning: ";
+    for (const std::string text : result[kind])
+      EXPECT_NE(found.err.find(word + text), std::string::npos) << text << found.err;
+  }
+  EXPECT_GE(result["notes"].size(), 1U);
+  EXPECT_GT(result["total_mass_kg"]["described"].get<double>(), 0.3);
+  EXPECT_GT(result["total_mass_kg"]["ci95"].get<double>(), 0.0);
+  for (const auto& [name, joint] : result["joints"].items()) {
+    for (const auto& [key, interval] : joint["ci95"].items())
+      EXPECT_EQ(interval.is_null(), joint[key].is_null()) << name << "." << key;
+  }
+  EXPECT_GT(result["joints"]["joint1"]["ci95"]["coulomb_Nm"].get<double>(), 0.0);
+}
+
 // The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
 // sensors are noisy.
 TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
