@@ -246,6 +246,29 @@ bool jumps(const Signal& signal, Stretch stretch) {
 constexpr double kFrozen_s = 0.2;
 constexpr double kMoves_rad = 0.02;
 
+/// Whether a position lies that stands still, from itself alone: a joint has inertia, so it comes to
+/// rest little by little and leaves it so. A frozen encoder stops in one sample at full speed, or is
+/// somewhere else in one sample.
+bool stops_or_leaves_at_once(const Recording& recording, const Signal& position, Stretch one) {
+  constexpr double kNear_s = 0.02, kSlow_rad_s = 0.05;
+  const double least = std::max(5.0 * quantum_of(position), kSlow_rad_s * recording.period_s);
+  const auto near =
+      static_cast<std::size_t>(std::max(3.0, std::ceil(kNear_s / recording.period_s)));
+  if (one.begin > near) {
+    const double step = position[one.begin] - position[one.begin - 1];
+    const double way = position[one.begin] - position[one.begin - near];
+    // A joint that brakes evenly goes a fifth of the mean or less in the last of five samples.
+    const bool at_once = std::abs(step) * static_cast<double>(near) > 0.6 * std::abs(way);
+    if (at_once && std::abs(way) > least * static_cast<double>(near)) return true;
+  }
+  if (one.end + 2 < position.size()) {
+    const double leap = std::abs(position[one.end] - position[one.end - 1]);
+    const double next = std::abs(position[one.end + 2] - position[one.end]);
+    if (leap > least && leap > 1.5 * next) return true;
+  }
+  return false;
+}
+
 /// What [sim] says in the experiment that a log carries.
 struct SimFacts {
   std::int64_t substep_ns = 250'000;
@@ -298,7 +321,8 @@ void exclude_frozen(Recording& recording, const hal::RobotConfig& robot) {
     for (const Stretch& one : constant_stretches(position, least)) {
       const bool led = travel(recording.reference_rad[j], one) > kMoves_rad;
       const bool driven = travel(recording.motor_position_rad[j], one) > kMoves_rad;
-      if (led || driven) frozen_positions[j].push_back(one);
+      if (led || driven || stops_or_leaves_at_once(recording, position, one))
+        frozen_positions[j].push_back(one);
     }
     for (const Stretch& one : constant_stretches(recording.torque_Nm[j], least)) {
       if (travel(position, one) > 5.0 * kMoves_rad && jumps(recording.torque_Nm[j], one))
@@ -341,20 +365,26 @@ void exclude_clipped(Recording& recording, const hal::RobotConfig& robot) {
       low = std::min(low, one);
       high = std::max(high, one);
     }
-    // A smooth extremum that is rounded: half of its plateau's length away it is three steps lower.
-    // What is cut off by h is 3 h lower.
-    std::vector<Stretch> clipped;
+    // A smooth extremum that is rounded: within half of its plateau's length it is three steps lower.
+    // What is cut off by h is 3 h lower. Where one stretch is cut off, all at this value are.
+    bool cut[] = {false, false};
+    std::vector<Stretch> plateaus;
     for (const Stretch& one : constant_stretches(torque, least)) {
       const double value = torque[one.begin];
       if (value != low && value != high) continue;
       const std::size_t half = (one.end - one.begin) / 2;
-      const std::size_t before = one.begin - std::min(one.begin, half);
-      const std::size_t after = std::min(one.end + half, torque.size() - 1);
-      const double rise =
-          std::min(std::abs(torque[before] - value), std::abs(torque[after] - value));
+      const double before = travel(torque, {one.begin - std::min(one.begin, half), one.begin + 1});
+      const double after = travel(torque, {one.end - 1, std::min(one.end + half, torque.size())});
+      double rise = std::min(before, after);
+      if (one.begin == 0) rise = after;
+      if (one.end == torque.size()) rise = before;
       const bool at_limit = std::abs(value) >= 0.99 * robot.joints[j].max_torque_Nm;
-      if (at_limit || rise > 10.0 * quantum) clipped.push_back(one);
+      cut[value == high] |= at_limit || rise > 10.0 * quantum;
+      plateaus.push_back(one);
     }
+    std::vector<Stretch> clipped;
+    for (const Stretch& one : plateaus)
+      if (cut[torque[one.begin] == high]) clipped.push_back(one);
     for (const Stretch& one : clipped) erase(torque, one);
     remark(recording, "joint '" + robot.joints[j].name + "': its torque is cut off at a limit",
            clipped);
