@@ -28,6 +28,9 @@ constexpr double kBetween_s = 1.2;       // of filter windows: neither trained n
 constexpr double kIdentifiable = 0.3;    // of a link's scale
 constexpr double kNarrowed = 2.0 / 3.0;  // of the interval that the description has by itself
 constexpr double kStill_rad = 0.02;
+constexpr double kMuchLeftOver = 0.3;  // of a joint's torque: a warning
+constexpr double kNoTorque = 1e-3;    // of a joint's limit: a residual below it matters to nobody
+constexpr double kWorse = 1.2;        // times the residual of the description: a warning
 
 constexpr const char* kJointNames[] = {"viscous_Nms_rad", "coulomb_Nm", "offset_Nm",
                                        "rotor_inertia_kg_m2", "delay_s"};
@@ -298,13 +301,7 @@ class Answer {
           "and little of what they carry: " +
           still);
     }
-    for (const JointResult& joint : out.joints) {
-      if (!(joint.relative_error > 0.3) || !(joint.rms_Nm > 0.02 * torque_of(joint.name))) continue;
-      out.warnings.push_back(fmt::format(
-          "the model does not explain the torque of joint '{}': {:.0f} % of it is left over "
-          "({:.2f} Nm); look for contact, a wrong joint axis or a torque that is not the joint's",
-          joint.name, 100.0 * joint.relative_error, joint.rms_Nm));
-    }
+    for (const JointResult& joint : out.joints) warn_of(joint, out);
     std::string unseen;
     for (const int l : robot_.regressor.unseen_links())
       if (tree_.floating_base)
@@ -314,6 +311,24 @@ class Answer {
           "beyond the sensors in the feet nothing is measured, and stays as "
           "described: " +
           unseen);
+  }
+  void warn_of(const JointResult& joint, Identification& out) const {
+    if (!(joint.rms_Nm > kNoTorque * torque_of(joint.name))) return;
+    const char* unit = joint.slides ? "N" : "Nm";
+    if (joint.relative_error > kMuchLeftOver) {
+      out.warnings.push_back(fmt::format(
+          "the model does not explain the torque of joint '{}': {:.0f} % of it is left over "
+          "({:.2f} {}); look for contact, a wrong joint axis or a torque that is not the joint's",
+          joint.name, 100.0 * joint.relative_error, joint.rms_Nm, unit));
+    }
+    if (joint.rms_Nm > kWorse * joint.described_rms_Nm &&
+        joint.relative_error > joint.described_relative_error + 0.01) {
+      out.warnings.push_back(fmt::format(
+          "the result is worse than the description: of the torque of joint '{}' {:.1f} % is left "
+          "over, by the description {:.1f} %; part of the log is wrong, or the held back part is "
+          "another motion: do not use it",
+          joint.name, 100.0 * joint.relative_error, 100.0 * joint.described_relative_error));
+    }
   }
   [[nodiscard]] double torque_of(const std::string& joint) const {
     return config_.joints[static_cast<std::size_t>(config_.joint_index(joint))].max_torque_Nm;

@@ -135,6 +135,46 @@ TEST(Identify, FindsAHeavierLinkAndKeepsEveryBodyPossible) {
   EXPECT_GT(result->joints[1].described_rms_Nm, 1.0);
 }
 
+bool warns(const Identification& result, const std::string& of, const std::string& joint) {
+  return std::ranges::any_of(result.warnings, [&](const std::string& one) {
+    return one.find(of) != std::string::npos && one.find("'" + joint + "'") != std::string::npos;
+  });
+}
+
+TEST(Identify, WarnsOfTorquesThatTheModelDoesNotExplain) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = 0.0;
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  std::swap(recording.torque_Nm[2], recording.torque_Nm[4]);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  for (const JointResult& joint : result->joints) {
+    EXPECT_EQ(joint.relative_error > 0.3, warns(*result, "does not explain", joint.name))
+        << joint.name << " " << joint.relative_error;
+  }
+  EXPECT_TRUE(warns(*result, "does not explain", "panda_joint5"));
+  EXPECT_TRUE(warns(*result, "does not explain", "panda_joint3"));
+}
+
+TEST(Identify, WarnsWhenTheResultIsWorseThanTheDescription) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = 0.05;
+  reality.viscous_Nms_rad.clear();
+  reality.coulomb_Nm.clear();
+  reality.offset_Nm.clear();
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  for (std::size_t at = 0; at < recording.rows() / 2; ++at) recording.torque_Nm[3][at] *= 1.5;
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  EXPECT_TRUE(warns(*result, "worse than the description", "panda_joint4"));
+  const Recording good = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  const auto fine = identify({good}, panda.robot, panda.tree);
+  ASSERT_TRUE(fine) << fine.error().to_string();
+  EXPECT_TRUE(fine->warnings.empty()) << fine->warnings.front();
+}
+
 TEST(Identify, SaysWhatAMotionlessRobotDoesNotShow) {
   const Arm panda = arm("panda");
   Series still = wide_series(panda, 3);
