@@ -246,9 +246,9 @@ bool jumps(const Signal& signal, Stretch stretch) {
 constexpr double kFrozen_s = 0.2;
 constexpr double kMoves_rad = 0.02;
 
-/// Whether a position lies that stands still, from itself alone: a joint has inertia, so it comes to
-/// rest little by little and leaves it so. A frozen encoder stops in one sample at full speed, or is
-/// somewhere else in one sample.
+/// Whether a position lies that stands still, from itself alone: a joint has inertia, so it comes
+/// to rest little by little and leaves it so. A frozen encoder stops in one sample at full speed,
+/// or is somewhere else in one sample.
 bool stops_or_leaves_at_once(const Recording& recording, const Signal& position, Stretch one) {
   constexpr double kNear_s = 0.02, kSlow_rad_s = 0.05;
   const double least = std::max(5.0 * quantum_of(position), kSlow_rad_s * recording.period_s);
@@ -299,6 +299,28 @@ Status check_positions(const Recording& recording, const hal::RobotConfig& robot
         fmt::format("the position of joint '{}' is never valid{}", robot.joints[j].name, why),
         "every joint's position is needed: repair its encoder, and record again");
   }
+  return {};
+}
+
+Status check_torques(Recording& recording, const hal::RobotConfig& robot) {
+  std::string names;
+  std::size_t lacking = 0;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    if (!std::ranges::all_of(recording.torque_Nm[j], [](double v) { return std::isnan(v); }))
+      continue;
+    ++lacking;
+    names += (names.empty() ? "" : ", ") + robot.joints[j].name;
+  }
+  if (lacking == 0) return {};
+  const bool feels = std::ranges::any_of(robot.sensors, [](const hal::SensorConfig& sensor) {
+    return sensor.type == hal::SensorType::kForceTorque;
+  });
+  if (lacking == robot.joints.size() && !feels) {
+    return bad_log(recording.path, "the log has no torque of any joint",
+                   "masses and friction show in torques: record them, or import them with the "
+                   "map's [torque]");
+  }
+  recording.remarks.push_back("the log has no torque of these joints: " + names);
   return {};
 }
 
@@ -365,8 +387,9 @@ void exclude_clipped(Recording& recording, const hal::RobotConfig& robot) {
       low = std::min(low, one);
       high = std::max(high, one);
     }
-    // A smooth extremum that is rounded: within half of its plateau's length it is three steps lower.
-    // What is cut off by h is 3 h lower. Where one stretch is cut off, all at this value are.
+    // A smooth extremum that is rounded: within half of its plateau's length it is three steps
+    // lower. What is cut off by h is 3 h lower. Where one stretch is cut off, all at this value
+    // are.
     bool cut[] = {false, false};
     std::vector<Stretch> plateaus;
     for (const Stretch& one : constant_stretches(torque, least)) {
@@ -476,6 +499,13 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
     const std::int64_t hold_ns = robot.boards.front().control_period_ns;
     recording.voltage_hold_s = 0.5e-9 * static_cast<double>(hold_ns + sim.substep_ns);
   }
+  recording.voltage_hold_known = info.hal == "sim";
+  if (file->truncated()) {
+    recording.remarks.push_back(
+        fmt::format("the log is cut after {} bytes: its run was killed, or the copy is not whole; "
+                    "what can be read ends at {:.3f} s",
+                    file->bytes(), recording.time_s.back()));
+  }
   if (window.fault_s < 1e299) {
     recording.remarks.push_back(
         fmt::format("the run met a fault at {:.3f} s: what follows is not used", window.fault_s));
@@ -535,6 +565,7 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
         "{} are bridged, the others excluded",
         missing, recording.rows(), longest, kBridge));
   }
+  if (const Status s = check_torques(recording, robot); !s) return std::unexpected(s.error());
   bridge_holes(recording);
   exclude_frozen(recording, robot);
   exclude_clipped(recording, robot);

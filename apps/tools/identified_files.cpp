@@ -28,7 +28,8 @@ constexpr const char* kIdentifyPage = ": identification</title>";
 /// A file's text that says who wrote it, once.
 std::string marked(const std::string& text, bool toml) {
   if (text.find(kIdentifyMark) != std::string::npos) return text;
-  return toml ? fmt::format("# {}.\n{}", kIdentifyMark, text) : fmt::format("{}<!-- {}. -->\n", text, kIdentifyMark);
+  return toml ? fmt::format("# {}.\n{}", kIdentifyMark, text)
+              : fmt::format("{}<!-- {}. -->\n", text, kIdentifyMark);
 }
 
 /// Replaces the text of the first `key = "…"` of a line.
@@ -186,13 +187,13 @@ Status check_identified(const RobotFiles& robot, const std::vector<std::string>&
     const bool source =
         fs::equivalent(file, robot.config.file, none) || fs::equivalent(file, urdf, none);
     if (ours && !source) continue;
-    return std::unexpected(
-        Error{source ? "this file describes the robot that is identified: it would be lost"
-                     : "this file is there, and `tandem identify` did not write it: it would be lost",
-              "name another folder with --out",
-              file,
-              0,
-              {}});
+    return std::unexpected(Error{
+        source ? "this file describes the robot that is identified: it would be lost"
+               : "this file is there, and `tandem identify` did not write it: it would be lost",
+        "name another folder with --out",
+        file,
+        0,
+        {}});
   }
   return {};
 }

@@ -178,7 +178,8 @@ Exit identify_command(const IdentifyOptions& options) {
     fmt::print(stderr, "note: no report: {}\n", page.error().to_string());
   }
   files.print(out);
-  if (const Status s = write_json(options.json, result_json(*result, written->notes)); !s) return refuse(s.error());
+  if (const Status s = write_json(options.json, result_json(*result, written->notes)); !s)
+    return refuse(s.error());
   return Exit::kDone;
 }
 

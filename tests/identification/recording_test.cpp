@@ -76,9 +76,8 @@ TEST(Recording, LeavesOutAFrozenEncoderThatNothingElseContradicts) {
     }
     if (every == 2) {  // 4 ms
       recording.period_s *= 2.0;
-      for (auto* signals : {&recording.position_rad, &recording.torque_Nm,
-                            &recording.reference_rad, &recording.motor_position_rad,
-                            &recording.current_A}) {
+      for (auto* signals : {&recording.position_rad, &recording.torque_Nm, &recording.reference_rad,
+                            &recording.motor_position_rad, &recording.current_A}) {
         for (Signal& one : *signals) {
           for (std::size_t k = 0; 2 * k < one.size(); ++k) one[k] = one[2 * k];
           one.resize((one.size() + 1) / 2);
@@ -146,7 +145,8 @@ TEST(Recording, LeavesOutATorqueThatIsCutOffForMostOfTheTime) {
     for (double& one : torque) one = sign * std::clamp(one, low, high);
     exclude_clipped(recording, panda().robot);
     ASSERT_EQ(recording.remarks.size(), 1U);
-    EXPECT_LT(std::ranges::count(torque, sign * low) + std::ranges::count(torque, sign * high), 100);
+    EXPECT_LT(std::ranges::count(torque, sign * low) + std::ranges::count(torque, sign * high),
+              100);
   }
 }
 
