@@ -57,6 +57,8 @@ struct Recording {
 [[nodiscard]] Result<Recording> read_recording(const std::string& path,
                                                const hal::RobotConfig& robot);
 
+inline constexpr std::size_t kBridge_samples = 5;  ///< that a straight line replaces
+
 /// The checks of read_recording() on signals at hand; each answers a remark, or nothing.
 /// @param recording  in: raw; out: NaN where it cannot be used
 void bridge_holes(Recording& recording);
