@@ -12,6 +12,7 @@
 #include "base/counted.hpp"
 #include "base/split_mix.hpp"
 #include "identification/estimate.hpp"
+#include "identification/low_pass.hpp"
 #include "identification/motor.hpp"
 
 namespace tandem::identification {
@@ -28,6 +29,12 @@ constexpr double kBetween_s = 1.2;       // of filter windows: neither trained n
 constexpr double kIdentifiable = 0.3;    // of a link's scale
 constexpr double kNarrowed = 2.0 / 3.0;  // of the interval that the description has by itself
 constexpr double kStill_rad = 0.02;
+// A log in which no joint moves by more is of a robot that stands: weight, offsets and stiction are
+// one and the same there.
+constexpr double kStands_rad = 0.1, kStands_m = 0.02;
+constexpr double kMuchLeftOver = 0.3;  // of a joint's torque: a warning
+constexpr double kNoTorque = 1e-3;     // of a joint's limit: a residual below it matters to nobody
+constexpr double kWorse = 1.2;         // times the residual of the description: a warning
 
 constexpr const char* kJointNames[] = {"viscous_Nms_rad", "coulomb_Nm", "offset_Nm",
                                        "rotor_inertia_kg_m2", "delay_s"};
@@ -298,13 +305,7 @@ class Answer {
           "and little of what they carry: " +
           still);
     }
-    for (const JointResult& joint : out.joints) {
-      if (!(joint.relative_error > 0.3) || !(joint.rms_Nm > 0.02 * torque_of(joint.name))) continue;
-      out.warnings.push_back(fmt::format(
-          "the model does not explain the torque of joint '{}': {:.0f} % of it is left over "
-          "({:.2f} Nm); look for contact, a wrong joint axis or a torque that is not the joint's",
-          joint.name, 100.0 * joint.relative_error, joint.rms_Nm));
-    }
+    for (const JointResult& joint : out.joints) warn_of(joint, out);
     std::string unseen;
     for (const int l : robot_.regressor.unseen_links())
       if (tree_.floating_base)
@@ -314,6 +315,24 @@ class Answer {
           "beyond the sensors in the feet nothing is measured, and stays as "
           "described: " +
           unseen);
+  }
+  void warn_of(const JointResult& joint, Identification& out) const {
+    if (!(joint.rms_Nm > kNoTorque * torque_of(joint.name))) return;
+    const char* unit = joint.slides ? "N" : "Nm";
+    if (joint.relative_error > kMuchLeftOver) {
+      out.warnings.push_back(fmt::format(
+          "the model does not explain the torque of joint '{}': {:.0f} % of it is left over "
+          "({:.2f} {}); look for contact, a wrong joint axis or a torque that is not the joint's",
+          joint.name, 100.0 * joint.relative_error, joint.rms_Nm, unit));
+    }
+    if (joint.rms_Nm > kWorse * joint.described_rms_Nm &&
+        joint.relative_error > joint.described_relative_error + 0.01) {
+      out.warnings.push_back(fmt::format(
+          "the result is worse than the description: of the torque of joint '{}' {:.1f} % is left "
+          "over, by the description {:.1f} %; part of the log is wrong, or the held back part is "
+          "another motion: do not use it",
+          joint.name, 100.0 * joint.relative_error, 100.0 * joint.described_relative_error));
+    }
   }
   [[nodiscard]] double torque_of(const std::string& joint) const {
     return config_.joints[static_cast<std::size_t>(config_.joint_index(joint))].max_torque_Nm;
@@ -381,6 +400,58 @@ BaseParameters structural_base(IdentifiedRobot& robot, const model::Tree& tree, 
   return base_parameters_of(X, 1e-5);
 }
 
+namespace {
+
+bool stands(const hal::RobotConfig& robot, const IdentifiedRobot& identified,
+            const Equations& equations) {
+  for (std::size_t c = 0; c < equations.travel_rad.size(); ++c) {
+    const auto joint = static_cast<std::size_t>(identified.facts.joint[c]);
+    const double least = robot.joints[joint].slides ? kStands_m : kStands_rad;
+    if (equations.travel_rad[c] > least) return false;
+  }
+  return true;
+}
+
+/// Where the intervals are known to be too narrow.
+void warn_of_intervals(const std::vector<Recording>& recordings, const hal::RobotConfig& robot,
+                       const IdentifiedRobot& identified, double cutoff_Hz, Identification& out) {
+  if (cutoff_Hz != IdentifyOptions{}.cutoff_Hz) {
+    out.warnings.push_back(fmt::format(
+        "the intervals were checked with a cut-off of {} Hz only, not with {} Hz: do not trust "
+        "them. A higher one lets through errors of timing and of the model that are not in them, a "
+        "lower one loses motion",
+        IdentifyOptions{}.cutoff_Hz, cutoff_Hz));
+  }
+  if (std::ranges::all_of(recordings, &Recording::voltage_hold_known)) return;
+  std::string names;
+  for (std::size_t c = 0; c < identified.facts.joint.size(); ++c) {
+    if (!identified.facts.rigid[c]) continue;
+    const JointResult& joint = out.joints[static_cast<std::size_t>(identified.facts.joint[c])];
+    if (!joint.rotor_inertia_kg_m2.identifiable) continue;
+    names += (names.empty() ? "" : ", ") + joint.name;
+    if (robot.boards.empty()) continue;
+    const double hold_s = 0.5e-9 * static_cast<double>(robot.boards.front().control_period_ns);
+    names += fmt::format(" ({:.2g})", identified.facts.damping_Nms_rad[c] * hold_s);
+  }
+  if (names.empty()) return;
+  out.warnings.push_back(
+      "the log does not say for how long a motor's voltage was held, and in such a time the "
+      "back-EMF "
+      "looks like rotor inertia: of these joints, and of base parameters with their rotor_inertia, "
+      "the intervals do not hold (in brackets the error of a hold of one control period "
+      "[kg m2]): " +
+      names);
+}
+
+}  // namespace
+
+double shortest_motion_s(const IdentifyOptions& options) {
+  constexpr double kPeriod_s = 1e-3;
+  const LowPass filter(kPeriod_s, options.cutoff_Hz);
+  const double whole = kShortest_s + 2.0 * kPeriod_s * static_cast<double>(filter.reach());
+  return std::ceil(10.0 * whole) / 10.0;
+}
+
 Result<Identification> identify(const std::vector<Recording>& recordings,
                                 const hal::RobotConfig& robot, const model::Tree& tree,
                                 const IdentifyOptions& options) {
@@ -391,6 +462,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   for (const Recording& recording : recordings) {
     for (const std::string& remark : recording.remarks)
       out.remarks.push_back(recordings.size() > 1 ? recording.path + ": " + remark : remark);
+    for (const LeftOut& one : recording.left_out) out.left_out.emplace_back(recording.path, one);
     if (recording.hangs && identified->floating) {
       out.remarks.push_back(recording.path +
                             ": the robot hangs from a hoist, whose force is not known: the base's "
@@ -409,6 +481,16 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
               0,
               {}});
   }
+  if (stands(robot, *identified, equations)) {
+    return std::unexpected(
+        Error{fmt::format("the joints hardly move: nothing can be said of their masses (no joint "
+                          "moves by {} rad or {} mm)",
+                          kStands_rad, 1e3 * kStands_m),
+              "`tandem excite` writes an experiment that moves them",
+              recordings.front().path,
+              0,
+              {}});
+  }
   if (equations.held_s > 0.0) {
     out.warnings.push_back(fmt::format(
         "for {:.1f} s something else than the measured feet seems to carry the robot, or push it: "
@@ -418,6 +500,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   }
   const Split split = split_of(equations);
   Answer(robot, tree, *identified, equations, split).fill(out);
+  warn_of_intervals(recordings, robot, *identified, options.cutoff_Hz, out);
   return out;
 }
 

@@ -76,15 +76,21 @@ struct Identification {
   double usable_s = 0.0;          ///< of the logs, without what was excluded
   double held_out_s = 0.0;
   double described_mass_kg = 0.0, identified_mass_kg = 0.0;  ///< of everything that moves
-  Estimate mass_kg;                   ///< the same, as far as the equations reach
+  Estimate mass_kg;  ///< the same, as far as the equations reach
+  /// Stretches of a signal that were left out, with the path of their log.
+  std::vector<std::pair<std::string, LeftOut>> left_out;
   std::vector<std::string> remarks;   ///< what was excluded, and what was assumed
   std::vector<std::string> warnings;  ///< what to look at before the result is used
 };
 
+/// How long a motion has to be at least: what is used, and what the filter loses at both ends.
+[[nodiscard]] double shortest_motion_s(const IdentifyOptions& options = {});
+
 /// Identifies the robot from the first two thirds of every log, and compares on the last.
 ///
 /// @param tree  of robot's description; outlives nothing
-/// Errors: as read_recording() and make_identified_robot(); too little usable data.
+/// Errors: as read_recording() and make_identified_robot(); too little usable data; no joint that
+/// moves by 0.1 rad (or 20 mm).
 [[nodiscard]] Result<Identification> identify(const std::vector<std::string>& logs,
                                               const hal::RobotConfig& robot,
                                               const model::Tree& tree,

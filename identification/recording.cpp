@@ -22,7 +22,6 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kState = "/tandem/state";
 constexpr const char* kCommand = "/tandem/command";
 constexpr double kLongestGap_s = 600.0;
-constexpr std::size_t kBridge = 5;  // samples that a straight line replaces
 
 std::unexpected<Error> bad_log(const std::string& path, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
@@ -160,90 +159,6 @@ Signal on_grid(const Grid& grid, const std::vector<double>& time_s, Value value)
   return out;
 }
 
-void bridge(Signal& signal) {
-  std::size_t i = 0;
-  while (i < signal.size() && std::isnan(signal[i])) ++i;
-  while (i < signal.size()) {
-    while (i < signal.size() && !std::isnan(signal[i])) ++i;
-    const std::size_t hole = i;
-    while (i < signal.size() && std::isnan(signal[i])) ++i;
-    if (i == signal.size() || i - hole > kBridge) continue;
-    const double before = signal[hole - 1];
-    const double slope = (signal[i] - before) / static_cast<double>(i - hole + 1);
-    for (std::size_t k = hole; k < i; ++k)
-      signal[k] = before + slope * static_cast<double>(k - hole + 1);
-  }
-}
-
-/// A stretch of samples.
-struct Stretch {
-  std::size_t begin, end;
-};
-
-/// Stretches of at least `least` samples in which `signal` has one and the same value.
-std::vector<Stretch> constant_stretches(const Signal& signal, std::size_t least) {
-  std::vector<Stretch> found;
-  for (std::size_t i = 0; i < signal.size();) {
-    std::size_t k = i + 1;
-    while (k < signal.size() && signal[k] == signal[i]) ++k;
-    if (k - i >= least && !std::isnan(signal[i])) found.push_back({i, k});
-    i = k;
-  }
-  return found;
-}
-
-/// How far a signal goes within a stretch; NaN when it has no value there.
-double travel(const Signal& signal, Stretch stretch) {
-  double low = kMissing, high = kMissing;
-  for (std::size_t i = stretch.begin; i < stretch.end; ++i) {
-    if (std::isnan(signal[i])) continue;
-    low = std::isnan(low) ? signal[i] : std::min(low, signal[i]);
-    high = std::isnan(high) ? signal[i] : std::max(high, signal[i]);
-  }
-  return high - low;
-}
-
-void erase(Signal& signal, Stretch stretch) {
-  std::fill(signal.begin() + static_cast<std::ptrdiff_t>(stretch.begin),
-            signal.begin() + static_cast<std::ptrdiff_t>(stretch.end), kMissing);
-}
-
-/// One remark for all the stretches of a signal.
-void remark(Recording& recording, const std::string& what, const std::vector<Stretch>& stretches) {
-  if (stretches.empty()) return;
-  std::size_t samples = 0;
-  for (const Stretch& one : stretches) samples += one.end - one.begin;
-  recording.remarks.push_back(
-      fmt::format("{}: {:.3f} s excluded, the first from {:.3f} to {:.3f} s", what,
-                  static_cast<double>(samples) * recording.period_s,
-                  recording.time_s[stretches[0].begin], recording.time_s[stretches[0].end - 1]));
-}
-
-/// The smallest step of a signal: of its encoder or its wire.
-double quantum_of(const Signal& signal) {
-  double quantum = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < signal.size(); ++i) {
-    const double step = std::abs(signal[i] - signal[i - 1]);
-    if (step > 0.0) quantum = std::min(quantum, step);
-  }
-  return quantum;
-}
-
-/// Whether a signal goes on somewhere else after it stood still: a small one that is rounded stands
-/// still by itself, and goes on by one step.
-bool jumps(const Signal& signal, Stretch stretch) {
-  const double quantum = quantum_of(signal);
-  if (stretch.end == signal.size()) {
-    return stretch.end - stretch.begin > signal.size() / 10 &&
-           travel(signal, {0, signal.size()}) > 20.0 * quantum;
-  }
-  return std::abs(signal[stretch.end] - signal[stretch.begin]) > 5.0 * quantum;
-}
-
-/// Signals that a fault may freeze: what must move when the joint does, and by how much.
-constexpr double kFrozen_s = 0.2;
-constexpr double kMoves_rad = 0.02;
-
 /// What [sim] says in the experiment that a log carries.
 struct SimFacts {
   std::int64_t substep_ns = 250'000;
@@ -277,112 +192,29 @@ Status check_positions(const Recording& recording, const hal::RobotConfig& robot
   return {};
 }
 
+Status check_torques(Recording& recording, const hal::RobotConfig& robot) {
+  std::string names;
+  std::size_t lacking = 0;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    if (!std::ranges::all_of(recording.torque_Nm[j], [](double v) { return std::isnan(v); }))
+      continue;
+    ++lacking;
+    names += (names.empty() ? "" : ", ") + robot.joints[j].name;
+  }
+  if (lacking == 0) return {};
+  const bool feels = std::ranges::any_of(robot.sensors, [](const hal::SensorConfig& sensor) {
+    return sensor.type == hal::SensorType::kForceTorque;
+  });
+  if (lacking == robot.joints.size() && !feels) {
+    return bad_log(recording.path, "the log has no torque of any joint",
+                   "masses and friction show in torques: record them, or import them with the "
+                   "map's [torque]");
+  }
+  recording.remarks.push_back("the log has no torque of these joints: " + names);
+  return {};
+}
+
 }  // namespace
-
-void bridge_holes(Recording& recording) {
-  for (std::vector<Signal>* signals :
-       {&recording.position_rad, &recording.torque_Nm, &recording.motor_position_rad,
-        &recording.current_A, &recording.reference_rad, &recording.sensor}) {
-    for (Signal& signal : *signals) bridge(signal);
-  }
-}
-
-void exclude_frozen(Recording& recording, const hal::RobotConfig& robot) {
-  const auto least = static_cast<std::size_t>(std::ceil(kFrozen_s / recording.period_s));
-  std::vector<std::vector<Stretch>> frozen_positions(robot.joints.size());
-  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-    Signal& position = recording.position_rad[j];
-    std::vector<Stretch> torque;
-    for (const Stretch& one : constant_stretches(position, least)) {
-      const bool led = travel(recording.reference_rad[j], one) > kMoves_rad;
-      const bool driven = travel(recording.motor_position_rad[j], one) > kMoves_rad;
-      if (led || driven) frozen_positions[j].push_back(one);
-    }
-    for (const Stretch& one : constant_stretches(recording.torque_Nm[j], least)) {
-      if (travel(position, one) > 5.0 * kMoves_rad && jumps(recording.torque_Nm[j], one))
-        torque.push_back(one);
-    }
-    for (const Stretch& one : frozen_positions[j]) erase(position, one);
-    for (const Stretch& one : torque) erase(recording.torque_Nm[j], one);
-    const std::string joint = "joint '" + robot.joints[j].name + "': its ";
-    remark(recording, joint + "position stands still while the joint is moved",
-           frozen_positions[j]);
-    remark(recording, joint + "torque stands still while the joint moves", torque);
-  }
-  std::size_t channel = 0;
-  for (const hal::SensorConfig& sensor : robot.sensors) {
-    const std::size_t first = channel;
-    channel += sensor.channels();
-    std::vector<Stretch> frozen;
-    for (const Stretch& one : constant_stretches(recording.sensor[first], least)) {
-      bool same = true, moves = false;
-      for (std::size_t c = first; c < channel; ++c)
-        same = same && travel(recording.sensor[c], one) == 0.0;
-      for (const Signal& position : recording.position_rad)
-        moves = moves || travel(position, one) > 5.0 * kMoves_rad;
-      if (same && moves) frozen.push_back(one);
-    }
-    for (const Stretch& one : frozen)
-      for (std::size_t c = first; c < channel; ++c) erase(recording.sensor[c], one);
-    remark(recording, "sensor '" + sensor.name + "' stands still while the robot moves", frozen);
-  }
-}
-
-void exclude_clipped(Recording& recording, const hal::RobotConfig& robot) {
-  const auto least = static_cast<std::size_t>(std::ceil(0.03 / recording.period_s));
-  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
-    Signal& torque = recording.torque_Nm[j];
-    const double quantum = quantum_of(torque);
-    double low = 0.0, high = 0.0;
-    for (const double one : torque) {
-      if (std::isnan(one)) continue;
-      low = std::min(low, one);
-      high = std::max(high, one);
-    }
-    // A smooth extremum that is rounded: half of its plateau's length away it is three steps lower.
-    // What is cut off by h is 3 h lower.
-    std::vector<Stretch> clipped;
-    for (const Stretch& one : constant_stretches(torque, least)) {
-      const double value = torque[one.begin];
-      if (value != low && value != high) continue;
-      const std::size_t half = (one.end - one.begin) / 2;
-      const std::size_t before = one.begin - std::min(one.begin, half);
-      const std::size_t after = std::min(one.end + half, torque.size() - 1);
-      const double rise =
-          std::min(std::abs(torque[before] - value), std::abs(torque[after] - value));
-      const bool at_limit = std::abs(value) >= 0.99 * robot.joints[j].max_torque_Nm;
-      if (at_limit || rise > 10.0 * quantum) clipped.push_back(one);
-    }
-    for (const Stretch& one : clipped) erase(torque, one);
-    remark(recording, "joint '" + robot.joints[j].name + "': its torque is cut off at a limit",
-           clipped);
-  }
-}
-
-void undo_holds(Signal& signal) {
-  constexpr std::size_t kLongest = 20;
-  std::size_t every = 1, phase = 0;
-  for (std::size_t e = 2; e <= kLongest; ++e) {
-    std::vector<std::size_t> changes(e, 0);
-    std::size_t total = 0;
-    for (std::size_t i = 1; i < signal.size(); ++i) {
-      if (!(signal[i] != signal[i - 1]) || std::isnan(signal[i]) || std::isnan(signal[i - 1]))
-        continue;
-      ++changes[i % e];
-      ++total;
-    }
-    const auto most = std::ranges::max_element(changes);
-    if (total < 20 || static_cast<double>(*most) < 0.98 * static_cast<double>(total)) continue;
-    every = e;
-    phase = static_cast<std::size_t>(most - changes.begin());
-  }
-  if (every == 1) return;
-  for (std::size_t at = phase; at + every < signal.size(); at += every) {
-    const double from = signal[at], to = signal[at + every];
-    for (std::size_t k = 1; k < every; ++k)
-      signal[at + k] = from + (to - from) * static_cast<double>(k) / static_cast<double>(every);
-  }
-}
 
 Result<Recording> read_recording(const std::string& path, const hal::RobotConfig& robot) {
   auto file = log::LogFile::open(path);
@@ -444,6 +276,13 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
     const std::int64_t hold_ns = robot.boards.front().control_period_ns;
     recording.voltage_hold_s = 0.5e-9 * static_cast<double>(hold_ns + sim.substep_ns);
   }
+  recording.voltage_hold_known = info.hal == "sim";
+  if (file->truncated()) {
+    recording.remarks.push_back(
+        fmt::format("the log is cut after {} bytes: its run was killed, or the copy is not whole; "
+                    "what can be read ends at {:.3f} s",
+                    file->bytes(), recording.time_s.back()));
+  }
   if (window.fault_s < 1e299) {
     recording.remarks.push_back(
         fmt::format("the run met a fault at {:.3f} s: what follows is not used", window.fault_s));
@@ -501,8 +340,9 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
     recording.remarks.push_back(fmt::format(
         "{} of {} samples are missing, old or no numbers; the longest hole has {}; holes of up to "
         "{} are bridged, the others excluded",
-        missing, recording.rows(), longest, kBridge));
+        missing, recording.rows(), longest, kBridge_samples));
   }
+  if (const Status s = check_torques(recording, robot); !s) return std::unexpected(s.error());
   bridge_holes(recording);
   exclude_frozen(recording, robot);
   exclude_clipped(recording, robot);

@@ -15,11 +15,19 @@ namespace tandem::identification {
 
 using Signal = std::vector<double>;  ///< a sample per grid time
 
+/// What of a log was left out, for one reason.
+struct LeftOut {
+  std::string what;                               ///< which signal, and why
+  double sum_s = 0.0;                             ///< of all its stretches
+  double first_begin_s = 0.0, first_end_s = 0.0;  ///< of the first one, since the log's time 0
+};
+
 /// Joints and channels in the order of the robot's configuration, whatever the log's is.
 struct Recording {
   std::string path;
   double period_s = 0.0;
   double voltage_hold_s = 0.0;             ///< see read_recording()
+  bool voltage_hold_known = true;          ///< false of a log that is not simulated
   bool hangs = false;                      ///< the whole log, from a hoist
   std::vector<double> time_s;              ///< since the log's time 0
   std::vector<Signal> position_rad;        ///< per joint, link side
@@ -29,6 +37,7 @@ struct Recording {
   std::vector<Signal> reference_rad;       ///< commanded; the same. For checks only
   std::vector<Signal> sensor;              ///< per channel of all sensors
   std::vector<std::string> remarks;        ///< one sentence for everything excluded
+  std::vector<LeftOut> left_out;  ///< stretches of a signal; each is among the remarks, too
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
 };
@@ -43,9 +52,12 @@ struct Recording {
 /// are cut off. Holes of up to five samples are bridged by straight lines.
 ///
 /// Errors: as log::LogFile; joints or sensors of another robot; time that goes backwards or stands
-/// still; hardly any samples; a joint whose position is never valid.
+/// still; hardly any samples; a joint whose position is never valid; no torque of any joint, and no
+/// six-axis sensor.
 [[nodiscard]] Result<Recording> read_recording(const std::string& path,
                                                const hal::RobotConfig& robot);
+
+inline constexpr std::size_t kBridge_samples = 5;  ///< that a straight line replaces
 
 /// The checks of read_recording() on signals at hand; each answers a remark, or nothing.
 /// @param recording  in: raw; out: NaN where it cannot be used

@@ -9,13 +9,16 @@
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
+#include "base/counted.hpp"
 #include "identification/excite.hpp"
+#include "identification/identify.hpp"
 
 namespace tandem::apps {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kExciteHead = "# Excites the dynamics for `tandem identify`";
 /// What of a spring a standing robot's legs are damped by: without it they swing for long.
 constexpr double kDamped_s = 0.03;
 
@@ -74,12 +77,12 @@ std::string path_from(const std::string& experiment, const std::string& robot) {
 std::string experiment_text(const identification::Excitation& result, const ExciteOptions& options,
                             const hal::RobotConfig& robot, const std::string& posture) {
   std::string text = fmt::format(
-      "# Excites the dynamics for `tandem identify`, written by `tandem excite --seed {}`.\n"
+      "{}, written by `tandem excite --seed {}`.\n"
       "# Condition number {:.1f} of {} base parameters; at most {:.0f} % of a joint's way to its\n"
       "# limits, {:.0f} % of its speed, {:.0f} % of its torque.\n"
       "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
-      options.seed, result.condition_number, result.base_parameters, 100.0 * result.position_share,
-      100.0 * result.speed_share, 100.0 * result.torque_share,
+      kExciteHead, options.seed, result.condition_number, result.base_parameters,
+      100.0 * result.position_share, 100.0 * result.speed_share, 100.0 * result.torque_share,
       path_from(options.output, options.robot),
       posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
       options.periods * options.period_s + 1.0);
@@ -148,8 +151,24 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   ExciteOptions options = given;
   if (options.period_s <= 0.0) options.period_s = options.hung ? 3.0 : 10.0;
   if (options.periods <= 0) options.periods = options.hung ? 20 : 3;
+  const double needed_s = identification::shortest_motion_s();
+  if (options.periods * options.period_s < needed_s) {
+    return refuse(
+        Error{fmt::format("too short for `tandem identify`: {} of {} s, and it needs {:.1f} s",
+                          counted(static_cast<std::size_t>(options.periods), "period"),
+                          options.period_s, needed_s),
+              fmt::format("give --periods {} or more, or a longer --period",
+                          std::ceil(needed_s / options.period_s)),
+              {},
+              0,
+              {}});
+  }
   const auto robot = read_robot(options.robot);
   if (!robot) return refuse(robot.error());
+  if (const Status s =
+          check_overwrites(options.output, kExciteHead, "experiment of `tandem excite`");
+      !s)
+    return refuse(s.error());
   std::string posture = options.posture;
   if (posture.empty() && !robot->config.postures.empty())
     posture = robot->config.postures.front().name;

@@ -22,6 +22,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSame = 1e-9;  // of a link, relative
+constexpr const char* kIdentifyMark = "Written by `tandem identify`";
+constexpr const char* kIdentifyPage = ": identification</title>";
+
+/// A file's text that says who wrote it, once.
+std::string marked(const std::string& text, bool toml) {
+  if (text.find(kIdentifyMark) != std::string::npos) return text;
+  return toml ? fmt::format("# {}.\n{}", kIdentifyMark, text)
+              : fmt::format("{}<!-- {}. -->\n", text, kIdentifyMark);
+}
 
 /// Replaces the text of the first `key = "…"` of a line.
 std::string with_value(const std::string& line, const std::string& key, const std::string& value) {
@@ -163,6 +172,32 @@ std::vector<std::pair<std::string, std::string>> experiments_of(
 
 }  // namespace
 
+Status check_identified(const RobotFiles& robot, const std::vector<std::string>& logs,
+                        const std::string& folder) {
+  const std::string urdf = robot.config.model.urdf;
+  std::vector<std::string> names{"robot.toml", fs::path(urdf).filename().string(), "report.html"};
+  for (const auto& [name, text] : experiments_of(logs)) names.push_back(name);
+  for (const std::string& name : names) {
+    const std::string file = folder + "/" + name;
+    std::error_code none;
+    if (!fs::is_regular_file(file, none)) continue;
+    const std::string text = text_of(file);
+    const bool ours = text.empty() || text.find(kIdentifyMark) != std::string::npos ||
+                      (name == "report.html" && text.find(kIdentifyPage) != std::string::npos);
+    const bool source =
+        fs::equivalent(file, robot.config.file, none) || fs::equivalent(file, urdf, none);
+    if (ours && !source) continue;
+    return std::unexpected(Error{
+        source ? "this file describes the robot that is identified: it would be lost"
+               : "this file is there, and `tandem identify` did not write it: it would be lost",
+        "name another folder with --out",
+        file,
+        0,
+        {}});
+  }
+  return {};
+}
+
 std::string moved_robot(const std::string& text, const std::string& folder, const std::string& name,
                         const std::string& urdf) {
   std::istringstream in(text);
@@ -244,7 +279,8 @@ Result<IdentifiedFiles> write_identified(const RobotFiles& robot,
   IdentifiedFiles written;
   for (const auto& [file, text] : files) {
     written.paths.push_back(folder + "/" + file);
-    if (const Status s = write_file(written.paths.back(), text); !s)
+    const std::string whole = marked(text, file.ends_with(".toml"));
+    if (const Status s = write_file(written.paths.back(), whole); !s)
       return std::unexpected(s.error());
   }
   const auto read = read_robot(written.paths.front());

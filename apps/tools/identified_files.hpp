@@ -32,10 +32,17 @@ struct ActuatorFigures {
 [[nodiscard]] std::string with_actuators(const std::string& text,
                                          const std::vector<ActuatorFigures>& figures);
 
+/// Whether write_identified() and the report destroy nothing: every file of theirs that is there
+/// already was written by `tandem identify`, and is neither the robot nor its description.
+///
+/// Errors: the first file that would be lost.
+[[nodiscard]] Status check_identified(const RobotFiles& robot, const std::vector<std::string>& logs,
+                                      const std::string& folder);
+
 /// Writes into `folder`: ROBOT.urdf, the description with the identified inertias; robot.toml, the
 /// robot with that description and its drives' friction and rotor inertia, named NAME_identified;
 /// and the experiment of every log whose file carries it, with that robot. Then reads the robot
-/// back.
+/// back. Each of these files says that `tandem identify` wrote it.
 ///
 /// Errors: a file cannot be written; what was written does not read back as what was identified.
 [[nodiscard]] Result<IdentifiedFiles> write_identified(const RobotFiles& robot,

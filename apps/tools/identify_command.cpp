@@ -51,14 +51,23 @@ Json joints_json(const Identification& result) {
   const auto known = [](const Estimate& one) {
     return one.identifiable ? number(one.value) : Json(nullptr);
   };
+  const auto interval = [](const Estimate& one) {
+    return one.identifiable ? number(one.ci95) : Json(nullptr);
+  };
   Json joints = Json::object();
   for (const identification::JointResult& joint : result.joints) {
     joints[joint.name] = {{"viscous_Nms_rad", known(joint.viscous_Nms_rad)},
                           {"coulomb_Nm", known(joint.coulomb_Nm)},
                           {"rotor_inertia_kg_m2", known(joint.rotor_inertia_kg_m2)},
                           {"offset_Nm", known(joint.offset_Nm)},
+                          {"ci95",
+                           {{"viscous_Nms_rad", interval(joint.viscous_Nms_rad)},
+                            {"coulomb_Nm", interval(joint.coulomb_Nm)},
+                            {"rotor_inertia_kg_m2", interval(joint.rotor_inertia_kg_m2)},
+                            {"offset_Nm", interval(joint.offset_Nm)}}},
                           {"rms_Nm", number(joint.rms_Nm)},
-                          {"relative_error", number(joint.relative_error)}};
+                          {"relative_error", number(joint.relative_error)},
+                          {"described_relative_error", number(joint.described_relative_error)}};
   }
   return joints;
 }
@@ -76,6 +85,37 @@ Json base_json(const Identification& result) {
                     {"described", one.described}});
   }
   return base;
+}
+
+Json left_out_json(const Identification& result) {
+  Json list = Json::array();
+  for (const auto& [log, left] : result.left_out) {
+    list.push_back({{"log", log},
+                    {"what", left.what},
+                    {"sum_s", left.sum_s},
+                    {"first_begin_s", left.first_begin_s},
+                    {"first_end_s", left.first_end_s}});
+  }
+  return list;
+}
+
+Json result_json(const Identification& result, const std::vector<std::string>& file_notes) {
+  std::vector<std::string> notes = result.remarks;
+  notes.insert(notes.end(), file_notes.begin(), file_notes.end());
+  return {{"links", links_json(result)},
+          {"joints", joints_json(result)},
+          {"condition_number", number(result.condition_number)},
+          {"base_parameters", base_json(result)},
+          {"total_mass_kg",
+           {{"value", result.identified_mass_kg},
+            {"ci95", number(result.mass_kg.ci95)},
+            {"identifiable", result.mass_kg.identifiable},
+            {"described", result.described_mass_kg}}},
+          {"used_s", result.usable_s},
+          {"held_back_s", result.held_out_s},
+          {"left_out", left_out_json(result)},
+          {"notes", notes},
+          {"warnings", result.warnings}};
 }
 
 void print_result(std::FILE* out, const Identification& result) {
@@ -117,6 +157,8 @@ Exit identify_command(const IdentifyOptions& options) {
                         0,
                         {}});
   }
+  if (const Status s = check_identified(*robot, options.logs, options.output); !s)
+    return refuse(s.error());
   const auto result = identification::identify(options.logs, robot->config, robot->tree,
                                                {.cutoff_Hz = options.cutoff_Hz});
   if (!result) return refuse(result.error());
@@ -136,11 +178,8 @@ Exit identify_command(const IdentifyOptions& options) {
     fmt::print(stderr, "note: no report: {}\n", page.error().to_string());
   }
   files.print(out);
-  const Json json{{"links", links_json(*result)},
-                  {"joints", joints_json(*result)},
-                  {"condition_number", number(result->condition_number)},
-                  {"base_parameters", base_json(*result)}};
-  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
+  if (const Status s = write_json(options.json, result_json(*result, written->notes)); !s)
+    return refuse(s.error());
   return Exit::kDone;
 }
 

@@ -117,6 +117,82 @@ TEST_F(Identify, GivesForATableOfTheLogWhatTheLogGives) {
   }
 }
 
+TEST_F(Identify, DestroysNoFileThatItDidNotWrite) {
+  const std::string robot = read_text(folder_ / "robot.toml");
+  const std::string urdf = read_text(folder_ / "double_pendulum.urdf");
+  const std::string trajectory = read_text(folder_ / "trajectory.toml");
+  for (const std::string file : {"robot.toml", "trajectory.toml"}) {
+    const Outcome excited = tandem("excite robot.toml --out " + file);
+    EXPECT_EQ(excited.status, 2) << file;
+    EXPECT_NE(excited.err.find("it is no experiment of `tandem excite`: it would be lost"),
+              std::string::npos)
+        << excited.err;
+  }
+  record("robot.toml");
+  record("robot.toml");  // its own experiment is written again
+  std::filesystem::create_directories(folder_ / "mine");
+  write_text(folder_ / "mine/report.html", "<title>mine</title>");
+  for (const std::string folder : {".", "mine"}) {
+    const Outcome found = tandem("identify " + log() + " --robot robot.toml --out " + folder);
+    EXPECT_EQ(found.status, 2) << folder;
+    EXPECT_NE(found.err.find("it would be lost"), std::string::npos) << found.err;
+  }
+  EXPECT_EQ(read_text(folder_ / "robot.toml"), robot);
+  EXPECT_EQ(read_text(folder_ / "double_pendulum.urdf"), urdf);
+  EXPECT_EQ(read_text(folder_ / "trajectory.toml"), trajectory);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "mine/robot.toml"));
+  for (const char* again : {"once", "twice"}) {
+    const Outcome found = tandem("identify " + log() + " --robot robot.toml --out found");
+    EXPECT_EQ(found.status, 0) << again << found.err;
+  }
+  // A folder of its own is no place for what is found from it, either.
+  const Outcome onto = tandem("identify " + log() + " --robot found/robot.toml --out found");
+  EXPECT_EQ(onto.status, 2);
+  EXPECT_NE(onto.err.find("describes the robot that is identified"), std::string::npos) << onto.err;
+}
+
+TEST_F(Identify, TellsProgramsWhatItTellsPeople) {
+  record("robot.toml");
+  write_text(folder_ / "map.toml", kMap);
+  ASSERT_EQ(tandem("log csv " + log() + " --fields position_rad,torque_nm -o run.csv").status, 0);
+  std::istringstream rows(read_text(folder_ / "run.csv"));
+  std::string line, edited;
+  std::getline(rows, line);
+  edited = line + "\n";
+  while (std::getline(rows, line)) {  // joint2 never says more than a tenth of what it may need
+    std::size_t comma = line.rfind(',');
+    const double torque = std::min(0.1, std::strtod(line.c_str() + comma + 1, nullptr));
+    edited += line.substr(0, comma + 1) + std::to_string(torque) + "\n";
+  }
+  write_text(folder_ / "run.csv", edited);
+  const Outcome imported =
+      tandem("log import run.csv --robot robot.toml --map map.toml -o bad.mcap");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  const Outcome found =
+      tandem("identify bad.mcap --robot robot.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  const nlohmann::json result = json("found.json");
+  ASSERT_GE(result["left_out"].size(), 1U) << found.err;
+  EXPECT_EQ(result["left_out"][0]["log"], "bad.mcap");
+  EXPECT_EQ(result["left_out"][0]["what"], "joint 'joint2': its torque is cut off at a limit");
+  EXPECT_GT(result["left_out"][0]["sum_s"].get<double>(), 0.1);
+  EXPECT_GT(result["left_out"][0]["first_end_s"].get<double>(),
+            result["left_out"][0]["first_begin_s"].get<double>());
+  for (const char* kind : {"notes", "warnings"}) {
+    const std::string word = kind == std::string("notes") ? "note: " : "warning: ";
+    for (const std::string text : result[kind])
+      EXPECT_NE(found.err.find(word + text), std::string::npos) << text << found.err;
+  }
+  EXPECT_GE(result["notes"].size(), 1U);
+  EXPECT_GT(result["total_mass_kg"]["described"].get<double>(), 0.3);
+  EXPECT_GT(result["total_mass_kg"]["ci95"].get<double>(), 0.0);
+  for (const auto& [name, joint] : result["joints"].items()) {
+    for (const auto& [key, interval] : joint["ci95"].items())
+      EXPECT_EQ(interval.is_null(), joint[key].is_null()) << name << "." << key;
+  }
+  EXPECT_GT(result["joints"]["joint1"]["ci95"]["coulomb_Nm"].get<double>(), 0.0);
+}
+
 // The description lacks 1 kg of the torso, and has its centre of mass elsewhere; the robot's
 // sensors are noisy.
 TEST_F(Identify, FindsTheTorsoOfAHumanoidThatStands) {
@@ -223,16 +299,66 @@ TEST_F(Identify, OfAShortLogIsOneError) {
   EXPECT_NE(result.err.find("too short to identify anything"), std::string::npos) << result.err;
 }
 
-TEST_F(Identify, OfARobotThatRestsSaysWhatTheDataDoNotSay) {
+TEST_F(Identify, OfARobotThatStandsIsOneError) {
   ASSERT_EQ(tandem("run hold.toml --quiet --duration 12 --log logs").status, 0);
-  const Outcome result =
-      tandem("identify " + log() + " --robot robot.toml --out found --json found.json");
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("hardly move"), std::string::npos) << result.err;
-  for (const auto& [name, joint] : json("found.json")["joints"].items())
-    EXPECT_TRUE(joint["viscous_Nms_rad"].is_null()) << name;
-  for (const auto& [name, link] : json("found.json")["links"].items())
-    EXPECT_FALSE(link["inertia_kg_m2"]["identifiable"].get<bool>()) << name;
+  const Outcome result = tandem("identify " + log() + " --robot robot.toml --out found");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.err.find("the joints hardly move: nothing can be said of their masses"),
+            std::string::npos)
+      << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "found/robot.toml"));
+}
+
+TEST_F(Identify, OfALogWithoutTorquesSaysSo) {
+  ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 12 --log logs").status, 0);
+  const std::string map = kMap;
+  write_text(folder_ / "map.toml", map.substr(0, map.find("[torque]")));
+  ASSERT_EQ(tandem("log csv " + log() + " --fields position_rad -o run.csv").status, 0);
+  const Outcome imported =
+      tandem("log import run.csv --robot robot.toml --map map.toml -o bare.mcap");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  const Outcome result = tandem("identify bare.mcap --robot robot.toml --out found");
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.err.find("the log has no torque of any joint"), std::string::npos) << result.err;
+}
+
+TEST_F(Identify, SaysWhatMakesALogOrItsIntervalsDoubtful) {
+  record("robot.toml");
+  const std::string whole = log();
+  const auto size = std::filesystem::file_size(folder_ / whole);
+  std::filesystem::copy_file(folder_ / whole, folder_ / "cut.mcap");
+  std::filesystem::resize_file(folder_ / "cut.mcap", size * 4 / 5);
+  const Outcome cut = tandem("identify cut.mcap --robot robot.toml --out found");
+  ASSERT_EQ(cut.status, 0) << cut.err;
+  EXPECT_NE(cut.err.find("note: the log is cut after"), std::string::npos) << cut.err;
+  EXPECT_EQ(cut.err.find("the intervals"), std::string::npos) << cut.err;
+  const Outcome sharp = tandem("identify " + whole + " --robot robot.toml --out found --cutoff 50");
+  ASSERT_EQ(sharp.status, 0) << sharp.err;
+  EXPECT_EQ(sharp.err.find("the log is cut"), std::string::npos) << sharp.err;
+  EXPECT_NE(sharp.err.find("warning: the intervals were checked with a cut-off of 10 Hz only"),
+            std::string::npos)
+      << sharp.err;
+  write_text(folder_ / "map.toml", kMap);
+  ASSERT_EQ(tandem("log csv " + whole + " --fields position_rad,torque_nm -o run.csv").status, 0);
+  ASSERT_EQ(tandem("log import run.csv --robot robot.toml --map map.toml -o in.mcap").status, 0);
+  const Outcome imported = tandem("identify in.mcap --robot robot.toml --out found");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  EXPECT_NE(imported.err.find("for how long a motor's voltage was held"), std::string::npos)
+      << imported.err;
+}
+
+TEST_F(Identify, RefusesToExciteForTooShort) {
+  const Outcome excited = tandem("excite robot.toml --out e.toml --periods 1 --period 2");
+  EXPECT_EQ(excited.status, 2);
+  EXPECT_NE(excited.err.find("too short for `tandem identify`: 1 period of 2 s"), std::string::npos)
+      << excited.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "e.toml"));
+  // The shortest one that is written is long enough.
+  const Outcome shortest = tandem("excite robot.toml --out e.toml --periods 1 --period 6.1");
+  ASSERT_EQ(shortest.status, 0) << shortest.err;
+  ASSERT_EQ(tandem("run e.toml --quiet --log logs").status, 0);
+  const Outcome found = tandem("identify " + log() + " --robot robot.toml --out found");
+  EXPECT_EQ(found.status, 0) << found.err;
 }
 
 TEST_F(Identify, IsRefusedWhereLoopsAreClosed) {

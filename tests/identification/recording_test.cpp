@@ -66,6 +66,61 @@ TEST(Recording, LeavesOutAFrozenEncoderAndAFrozenTorque) {
   EXPECT_GE(missing(recording.torque_Nm[5]), 1000U);
 }
 
+// Logs of other programs have no reference, and often no motor's position.
+TEST(Recording, LeavesOutAFrozenEncoderThatNothingElseContradicts) {
+  for (const std::size_t every : {1U, 2U}) {
+    Recording recording = good();
+    for (std::size_t j = 0; j < 7; ++j) {
+      std::ranges::fill(recording.reference_rad[j], NAN);
+      std::ranges::fill(recording.motor_position_rad[j], NAN);
+    }
+    if (every == 2) {  // 4 ms
+      recording.period_s *= 2.0;
+      for (auto* signals : {&recording.position_rad, &recording.torque_Nm, &recording.reference_rad,
+                            &recording.motor_position_rad, &recording.current_A}) {
+        for (Signal& one : *signals) {
+          for (std::size_t k = 0; 2 * k < one.size(); ++k) one[k] = one[2 * k];
+          one.resize((one.size() + 1) / 2);
+        }
+      }
+      for (std::size_t k = 0; 2 * k < recording.time_s.size(); ++k)
+        recording.time_s[k] = recording.time_s[2 * k];
+      recording.time_s.resize((recording.time_s.size() + 1) / 2);
+    }
+    Signal& position = recording.position_rad[1];
+    const std::size_t length = 200 / every;  // 0.4 s
+    for (std::size_t at = 2000 / every; at < 2000 / every + length; ++at)
+      position[at] = position[2000 / every];
+    for (auto* signals : {&recording.position_rad, &recording.torque_Nm})
+      for (std::size_t at = 4000 / every; at < 4000 / every + length; ++at)
+        (*signals)[3][at] = (*signals)[3][4000 / every];
+    exclude_frozen(recording, panda().robot);
+    for (const std::size_t j : {1U, 3U}) {
+      EXPECT_GE(missing(recording.position_rad[j]), length) << j << " of " << every;
+      EXPECT_LT(missing(recording.position_rad[j]), length + 3) << j << " of " << every;
+    }
+    ASSERT_EQ(recording.remarks.size(), 2U);
+    EXPECT_NE(recording.remarks[0].find("joint 'panda_joint2': its position stands still"),
+              std::string::npos)
+        << recording.remarks[0];
+  }
+}
+
+TEST(Recording, KeepsAJointThatRestsAndStartsAgain) {
+  Recording recording = good();
+  for (std::size_t j = 0; j < 7; ++j) std::ranges::fill(recording.reference_rad[j], NAN);
+  // 3 s of a motion, 2 s of rest, 3 s of motion: braked and started with 2 rad/s^2.
+  for (std::size_t at = 0; at < recording.rows(); ++at) {
+    const double t = recording.time_s[at];
+    const double to = std::min(0.0, t - 3.0), from = std::max(0.0, t - 5.0);
+    const double q = 1.0 - to * to + from * from;
+    recording.position_rad[2][at] = 6e-6 * std::round(q / 6e-6);
+    recording.motor_position_rad[2][at] = NAN;
+  }
+  exclude_frozen(recording, panda().robot);
+  EXPECT_EQ(missing(recording.position_rad[2]), 0U);
+}
+
 TEST(Recording, LeavesOutATorqueThatIsCutOff) {
   Recording recording = good();
   double most = 0.0;
@@ -77,6 +132,22 @@ TEST(Recording, LeavesOutATorqueThatIsCutOff) {
   EXPECT_NE(recording.remarks[0].find("joint 'panda_joint2': its torque is cut off"),
             std::string::npos);
   EXPECT_EQ(std::ranges::count(recording.torque_Nm[1], 0.6 * most), 0);
+}
+
+// It may begin at the limit, and leave it for a short while only.
+TEST(Recording, LeavesOutATorqueThatIsCutOffForMostOfTheTime) {
+  for (const double sign : {1.0, -1.0}) {
+    Recording recording = good();
+    Signal& torque = recording.torque_Nm[1];
+    Signal sorted = torque;
+    std::ranges::sort(sorted);
+    const double low = sorted[sorted.size() / 5], high = sorted[sorted.size() * 3 / 5];
+    for (double& one : torque) one = sign * std::clamp(one, low, high);
+    exclude_clipped(recording, panda().robot);
+    ASSERT_EQ(recording.remarks.size(), 1U);
+    EXPECT_LT(std::ranges::count(torque, sign * low) + std::ranges::count(torque, sign * high),
+              100);
+  }
 }
 
 TEST(Recording, GivesTheSameResultWithWhatLiesLeftOut) {
