@@ -72,17 +72,19 @@ class RangeCheck {
                                      {"acceleration_rad_s2", homing.acceleration_rad_s2}}) {
       const double units = velocity_units(value);
       if (units >= 0.5 && units <= kMost) continue;
-      wrong(key,
-            fmt::format("{:.6g} would be {:.3g} of the drive's units, which are integers of 32 bits",
-                        value, units),
-            "give a value between one of its units and 2^31");
+      wrong(
+          key,
+          fmt::format("{:.6g} would be {:.3g} of the drive's units, which are integers of 32 bits",
+                      value, units),
+          "give a value between one of its units and 2^31");
     }
     const double width = joint_.max_position_rad - joint_.min_position_rad;
-    const double counts = homing.position_rad * joint_.encoder_counts_per_rev /
-                              (2.0 * std::numbers::pi) +
-                          joint_.zero_counts;
+    const double counts =
+        homing.position_rad * joint_.encoder_counts_per_rev / (2.0 * std::numbers::pi) +
+        joint_.zero_counts;
     if (homing.position_rad < joint_.min_position_rad - 0.5 * width ||
-        homing.position_rad > joint_.max_position_rad + 0.5 * width || !(std::abs(counts) < kMost)) {
+        homing.position_rad > joint_.max_position_rad + 0.5 * width ||
+        !(std::abs(counts) < kMost)) {
       wrong("position_rad",
             fmt::format("{:.6g} is far outside of the joint's range, {:.6g} to {:.6g}",
                         homing.position_rad, joint_.min_position_rad, joint_.max_position_rad),
@@ -99,8 +101,7 @@ class RangeCheck {
     const bool standard =
         (m >= 1 && m <= 14) || (m >= 17 && m <= 30) || (m >= 33 && m <= 35) || m == 37;
     if (board->eds.empty() && !standard) {
-      error(homing.line, "homing.method",
-            fmt::format("our own boards have no homing method {}", m),
+      error(homing.line, "homing.method", fmt::format("our own boards have no homing method {}", m),
             "give one of 1 to 14, 17 to 30, 33, 34, 35 and 37 (docs/firmware.md)");
       return;
     }
@@ -120,11 +121,11 @@ class RangeCheck {
     const bool low = entry->low && value < *entry->low;
     const bool high = entry->high && value > *entry->high;
     if (!low && !high) return;
-    error(line, key,
-          fmt::format("{} is {} than {}, the limit of {:04X} in {}:{}", value,
-                      low ? "less" : "more", low ? *entry->low : *entry->high, of,
-                      board->sheet->file, entry->line),
-          "give a value that the drive takes");
+    error(
+        line, key,
+        fmt::format("{} is {} than {}, the limit of {:04X} in {}:{}", value, low ? "less" : "more",
+                    low ? *entry->low : *entry->high, of, board->sheet->file, entry->line),
+        "give a value that the drive takes");
   }
 
   const RobotConfig& robot_;

@@ -8,8 +8,8 @@
 namespace tandem::hal {
 
 /// Homing that is faster than the joint, slower than its counts or far outside of its range, a
-/// method or stop option beyond what the drive's sheet takes, velocity units that its 32 bits cannot
-/// say. Each with file, line, key and joint.
+/// method or stop option beyond what the drive's sheet takes, velocity units that its 32 bits
+/// cannot say. Each with file, line, key and joint.
 /// @pre the joint's limits are known (complete_from_description())
 [[nodiscard]] Diagnostics check_drive_ranges(const RobotConfig& robot, const JointConfig& joint);
 
