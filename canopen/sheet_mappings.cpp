@@ -21,6 +21,26 @@ std::string section(std::uint16_t index) {
   return text.data();
 }
 
+/// An object that the sheet has not, or of another length. Fillers are data types, not objects.
+void check_entry(const DataSheet& sheet, const SheetEntry& entry, std::vector<OddMapping>& odd) {
+  const auto mapped = static_cast<std::uint32_t>(entry.value->number);
+  const auto index = static_cast<std::uint16_t>(mapped >> 16);
+  const auto sub = static_cast<std::uint8_t>(mapped >> 8 & 0xFF);
+  const auto bits = static_cast<int>(mapped & 0xFF);
+  if (mapped == 0 || index < 0x1000) return;
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "[%04Xsub%X] maps %04X:%02X, ", entry.index, entry.sub,
+                index, sub);
+  const SheetEntry* object = sheet.find(index, sub);
+  if (object == nullptr) {
+    odd.push_back({entry.line, std::string(text.data()) + "which the sheet does not define"});
+  } else if (object->size() > 0 && bits > 8 * object->size()) {
+    odd.push_back({entry.line, std::string(text.data()) + "which has " +
+                                   std::to_string(8 * object->size()) + " bits, with " +
+                                   std::to_string(bits)});
+  }
+}
+
 /// @param count  the mapping's sub 0
 void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMapping>& odd) {
   const std::int64_t entries = count.value->number;
@@ -36,7 +56,9 @@ void check(const DataSheet& sheet, const SheetEntry& count, std::vector<OddMappi
   for (std::int64_t sub = 1; sub <= std::min(entries, kMostEntries); ++sub) {
     const SheetEntry* entry = sheet.find(count.index, static_cast<std::uint8_t>(sub));
     if (entry == nullptr) ++missing;
-    if (entry != nullptr && entry->value) bits += static_cast<int>(entry->value->number & 0xFF);
+    if (entry == nullptr || !entry->value) continue;
+    bits += static_cast<int>(entry->value->number & 0xFF);
+    check_entry(sheet, *entry, odd);
   }
   if (missing > 0) {
     odd.push_back({count.line, name + " maps " + std::to_string(entries) +

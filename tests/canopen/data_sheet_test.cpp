@@ -389,6 +389,9 @@ TEST(DataSheet, RemarksWhatContradictsItself) {
            {mapping(3, "", 2, "0x60400010"), "[1A00] maps 3 objects, and defines 2"},
            {mapping(7, "", 7, "0x60400010"),
             "line 66: [1A00] maps 112 bits, and a frame has at most 64; one of CAN FD 512"},
+           {mapping(1, "", 1, "0x77770010"),
+            "[1A00sub1] maps 7777:00, which the sheet does not define"},
+           {mapping(1, "", 1, "0x10180140"), "[1A00sub1] maps 1018:01, which has 32 bits, with 64"},
            {mapping(3, "", 3, "0x604000FF"), "[1A00] maps 765 bits, and a frame has at most 64\n"},
        }) {
     const auto sheet = read_data_sheet(row.text, "drive.eds");
