@@ -102,13 +102,15 @@ void tell_feedback(const NodePlan& node, DriveUse& use) {
 }
 
 /// What would let a joint move on unseen.
-std::vector<std::string> unwatched(const NodePlan& node, const DataSheet& sheet) {
+/// @param line  EtherCAT, where the drive watches its outputs (sync manager 2) and the master its
+/// state
+std::vector<std::string> unwatched(const NodePlan& node, const DataSheet& sheet, bool line) {
   std::vector<std::string> out;
-  if (node.watch == NodeWatch::kNothing) {
+  if (!line && node.watch == NodeWatch::kNothing) {
     out.emplace_back(
         "the drive does not notice when the master dies, and the master watches its TPDOs alone: "
         "it has neither heartbeats (1016, 1017) nor guarding (100C, 100D)");
-  } else if (node.watch == NodeWatch::kHeartbeat &&
+  } else if (!line && node.watch == NodeWatch::kHeartbeat &&
              !canopen::writable(sheet, object::kHeartbeatConsumer, 1)) {
     out.emplace_back(
         "the drive does not notice when the master dies: it has no heartbeat consumer "
@@ -119,6 +121,21 @@ std::vector<std::string> unwatched(const NodePlan& node, const DataSheet& sheet)
     out.emplace_back("what the drive does when the connection is lost is its own: no 6007");
   }
   return out;
+}
+
+/// A bus that is faster or slower than the sheet allows; one without bit rates says nothing.
+void warn_of_bit_rate(const BusConfig& bus, const BoardConfig& board, const std::string& file,
+                      Diagnostics& warnings) {
+  const std::vector<int>& rates = board.sheet->bit_rates_kbit_s;
+  const auto is_the_bus = [&](int kbit) { return 1000 * kbit == bus.bitrate; };
+  if (rates.empty() || std::ranges::any_of(rates, is_the_bus)) return;
+  warnings.push_back(
+      {.message = fmt::format("bus '{}' has {} bit/s; the sheet {} has {} kbit/s", bus.name,
+                              bus.bitrate, board.eds, fmt::join(rates, ", ")),
+       .hint = "set [[bus]] bitrate to one that the drive has",
+       .file = file,
+       .line = bus.line,
+       .key = "board '" + board.name + "'"});
 }
 
 /// A mapping that no drive can have: the sheet is another one's, or wrong.
@@ -145,7 +162,7 @@ DriveUse use_of(const NodePlan& node, const DataSheet& sheet) {
   use.does.push_back({"homing", node.abilities[0].homing ? "mode 6, where a joint has `homing`"
                                                          : "by the drive's own program alone"});
   tell_feedback(node, use);
-  for (std::string& text : unwatched(node, sheet)) use.misses.push_back(std::move(text));
+  for (std::string& text : unwatched(node, sheet, false)) use.misses.push_back(std::move(text));
   return use;
 }
 
@@ -209,19 +226,9 @@ Result<Diagnostics> drive_warnings(const RobotConfig& robot) {
     if (board.eds.empty()) continue;
     if (seen.insert(board.eds).second) warn_of_mappings(*board.sheet, warnings);
     const auto bus = std::ranges::find(robot.buses, board.bus, &BusConfig::name);
-    if (bus != robot.buses.end() && bus->kind == BusKind::kEthercat) continue;  // SM2's watchdog
-    const std::vector<int>& rates = board.sheet->bit_rates_kbit_s;
-    if (bus != robot.buses.end() && !rates.empty() &&
-        std::ranges::none_of(rates, [&](int kbit) { return 1000 * kbit == bus->bitrate; })) {
-      warnings.push_back(
-          {.message = fmt::format("bus '{}' has {} bit/s; the sheet {} has {} kbit/s", bus->name,
-                                  bus->bitrate, board.eds, fmt::join(rates, ", ")),
-           .hint = "set [[bus]] bitrate to one that the drive has",
-           .file = robot.file,
-           .line = bus->line,
-           .key = "board '" + board.name + "'"});
-    }
-    for (std::string& text : unwatched(node, *board.sheet)) {
+    const bool line = bus != robot.buses.end() && bus->kind == BusKind::kEthercat;
+    if (bus != robot.buses.end() && !line) warn_of_bit_rate(*bus, board, robot.file, warnings);
+    for (std::string& text : unwatched(node, *board.sheet, line)) {
       warnings.push_back({.message = std::move(text),
                           .hint = "set the drive's own time-out",
                           .file = robot.file,

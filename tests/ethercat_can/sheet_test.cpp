@@ -272,6 +272,13 @@ TEST(Sheet, WithoutTheBusBitRateIsWarnedOfOnCanAlone) {
   const auto others = drive_warnings(rig.robot);
   ASSERT_TRUE(others) << others.error().to_string();
   EXPECT_TRUE(others->empty());
+  // What it does then is said nowhere, on either wire.
+  SheetRig mute(servo().remove(0x6007));
+  mute.robot.buses[0].kind = BusKind::kEthercat;
+  const auto unsaid = drive_warnings(mute.robot);
+  ASSERT_TRUE(unsaid) << unsaid.error().to_string();
+  ASSERT_EQ(unsaid->size(), 1U);
+  EXPECT_NE((*unsaid)[0].to_string().find("no 6007"), std::string::npos);
 }
 
 TEST(Sheet, WhoseMappingNoFrameCarriesIsWarnedOfOnceForAllItsBoards) {
