@@ -475,6 +475,8 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   return document;
 }
 
+const std::string& TomlTable::file() const { return shared_->file; }
+
 TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}, 1}; }
 const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
 const std::string& TomlDocument::file() const { return shared_->file; }

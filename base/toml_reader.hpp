@@ -102,6 +102,7 @@ class TomlTable {
   /// key that stands outside one is an error, for all of them.
   [[nodiscard]] bool holds_tables();
 
+  [[nodiscard]] const std::string& file() const;  ///< its document's, for paths relative to it
   [[nodiscard]] const std::string& path() const { return path_; }  ///< dotted, "" for the root
   [[nodiscard]] int line() const;
   [[nodiscard]] int line(std::string_view key) const;  ///< of the key's value; else the table's
