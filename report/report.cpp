@@ -14,6 +14,7 @@
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
 #include "report/parallel_figures.hpp"
+#include "report/replay.hpp"
 #include "report/run_figures.hpp"
 
 namespace tandem::report {
@@ -154,7 +155,7 @@ Page parallel_page(const RunData& run, const RunData& second) {
   return page;
 }
 
-Page page_of(const RunData& run, const OtherRuns& others) {
+Page page_of(const RunData& run, const OtherRuns& others, const std::vector<PageTable>& replays) {
   Page page;
   page.title =
       others.empty()
@@ -165,6 +166,7 @@ Page page_of(const RunData& run, const OtherRuns& others) {
                    ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
                    : " The run ended before its controllers started.";
   add_facts(run, others.empty() ? "" : " A", page.facts);
+  page.tables = replays;
   add_tables(run, others.empty() ? "" : " A", page);
   if (others.empty()) return page;
   page.lead += " A is " + run.path;
@@ -174,9 +176,10 @@ Page page_of(const RunData& run, const OtherRuns& others) {
   for (std::size_t i = 0; i < others.size(); ++i) {
     const double later_s = others[i]->drawn_later_s;
     if (std::abs(later_s) > 0.0) {
-      page.lead +=
-          fmt::format("{} is drawn {:.3f} s {}, so that both controllers start together.",
-                      kSides[i + 1], std::abs(later_s), later_s > 0.0 ? "later" : "earlier");
+      page.lead += fmt::format("{} is drawn {:.3f} s {}, so that {}.", kSides[i + 1],
+                               std::abs(later_s), later_s > 0.0 ? "later" : "earlier",
+                               others[i]->drawn_as_replay ? "the replay lies over its recording"
+                                                          : "both controllers start together");
     }
     add_facts(*others[i], kSides[i + 1], page.facts);
     add_tables(*others[i], kSides[i + 1], page);
@@ -184,9 +187,31 @@ Page page_of(const RunData& run, const OtherRuns& others) {
   return page;
 }
 
+/// Draws `other` where its controllers start with those of `run`; or where the replay that one of
+/// them is lies over its recording, the other one. Then a table is added.
+Status align(const RunData& run, RunData& other, const std::string& side,
+             std::vector<PageTable>& tables) {
+  other.drawn_later_s = run.time_s.front() - other.time_s.front();
+  for (const bool forth : {true, false}) {
+    const RunData& playing = forth ? other : run;
+    const RunData& played = forth ? run : other;
+    const auto replay = find_replay(playing, played);
+    if (!replay) return std::unexpected(replay.error());
+    if (!*replay) continue;
+    other.drawn_later_s = forth ? -(*replay)->later_s : (*replay)->later_s;
+    other.drawn_as_replay = true;
+    tables.push_back(replay_table(playing, played, **replay));
+    tables.back().title += side;
+    break;
+  }
+  return {};
+}
+
 /// The runs that are laid over `run`. Errors: more than fit; one of another robot.
+/// @param tables  of those that replay each other
 Result<std::vector<RunData>> read_others(const RunData& run, const std::vector<std::string>& logs,
-                                         const ErrorText& error_text) {
+                                         const ErrorText& error_text,
+                                         std::vector<PageTable>& tables) {
   if (logs.size() > kMostOthers)
     return fail("more than three logs", "lay up to three over each other");
   std::vector<RunData> others;
@@ -197,7 +222,9 @@ Result<std::vector<RunData>> read_others(const RunData& run, const std::vector<s
       return std::unexpected(Error{
           "the logs are of different robots", "lay runs of one robot over each other", log, 0, {}});
     }
-    other->drawn_later_s = run.time_s.front() - other->time_s.front();
+    if (Status s = align(run, *other, kSides[others.size() + 1], tables); !s) {
+      return std::unexpected(s.error());
+    }
     others.push_back(std::move(*other));
   }
   return others;
@@ -210,7 +237,8 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
                                 const ErrorText& error_text) {
   Result<RunData> run = read_run(log, error_text);
   if (!run) return std::unexpected(run.error());
-  Result<std::vector<RunData>> other_runs = read_others(*run, other_logs, error_text);
+  std::vector<PageTable> replays;
+  Result<std::vector<RunData>> other_runs = read_others(*run, other_logs, error_text, replays);
   if (!other_runs) return std::unexpected(other_runs.error());
   Result<std::optional<RunData>> beside = std::nullopt;
   if (other_runs->empty()) beside = read_parallel(*run);
@@ -247,7 +275,7 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
       figures.push_back(std::move(figure));
   }
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
-  const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others);
+  const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
   if (const Status s = write_page(page, figures, folder); !s) {
     return std::unexpected(s.error());
   }

@@ -62,6 +62,7 @@ struct RunData {
   double step_s = 0.0;           ///< between rows
   std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
   double drawn_later_s = 0.0;    ///< added to all times of this run in the figures
+  bool drawn_as_replay = false;  ///< so that a replay lies over its recording
   std::vector<RunFault> faults;  ///< in the order of their times
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control

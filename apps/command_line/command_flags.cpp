@@ -120,6 +120,18 @@ not say is asked for.
 
 Exit status: 0 done; 2 a file, a map or a robot that is wrong; then there is no log.)";
 
+const char kLogReplayExamples[] = R"(Examples:
+  tandem log replay runs/panda-trajectory-001.mcap --robot config/panda/robot.toml --out replay.toml
+  tandem run replay.toml                             and then, one over the other:
+  tandem report runs/panda-trajectory-001.mcap runs/panda-replay-001.mcap
+  tandem log replay runs/ur5e-q.mcap --robot config/ur5e/robot.toml --out q.toml --source state
+  tandem log replay run.mcap --robot robot.toml --out r.toml --from 2 --to 5 --joints elbow,wrist
+  tandem log replay squat.mcap --robot config/coman/robot.toml --out again.toml --torque
+The experiment is an ordinary one with the controller `recorded_motion`: `tandem check replay.toml`
+(docs/import.md, docs/controllers.md).
+
+Exit status: 0 done; 2 a log, a robot or a motion that is wrong; then there is no experiment.)";
+
 const char kEdsExamples[] = R"(Examples:
   tandem eds config/coman/robot.toml                 data sheets of its boards and sensors into eds/
   tandem eds my_robot.toml -o sheets --json -        the files and the nodes that each is for
@@ -467,6 +479,28 @@ void add_flags(CLI::App& app, NewOptions& o) {
   app.footer(kNewExamples);
 }
 
+static void add_replay_flags(CLI::App& replay, LogOptions& o) {
+  replay.add_option("log", o.log, "MCAP file, of a run or of `tandem log import`")->required();
+  replay.add_option("--robot", o.robot, "The robot that plays it: its TOML")->required();
+  replay.add_option("--out", o.output, "Experiment to write")
+      ->required()
+      ->check(is_given(kNameAFile));
+  replay
+      .add_option("--source", o.source,
+                  "What is played (default: the commands where the log has them)")
+      ->check(CLI::IsMember({"command", "state"}));
+  replay.add_option("--joints", o.joints, "Joints that are led, by comma (default: all)")
+      ->delimiter(',');
+  replay.add_option("--from", o.begin_s, "Of the log's time [s] (default: the controllers' start)");
+  replay.add_option("--to", o.end_s, "Of the log's time [s] (default: the controllers' end)");
+  replay.add_flag("--torque", o.torque, "Play the torques, too, as feed-forward");
+  replay.add_option("--posture", o.posture,
+                    "Start posture (default: the recording's, or the robot's first)");
+  replay.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  replay.footer(kLogReplayExamples);
+  replay.callback([&o] { o.action = LogOptions::Action::kReplay; });
+}
+
 void add_flags(CLI::App& app, LogOptions& o) {
   app.require_subcommand(1);
   CLI::App* info = app.add_subcommand("info", "What a log holds");
@@ -518,6 +552,8 @@ void add_flags(CLI::App& app, LogOptions& o) {
   taken->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   taken->footer(kLogImportExamples);
   taken->callback([&o] { o.action = LogOptions::Action::kImport; });
+  add_replay_flags(*app.add_subcommand("replay", "An experiment that plays the motion of a log"),
+                   o);
 }
 
 void add_flags(CLI::App& app, EdsOptions& o) {

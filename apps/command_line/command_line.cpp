@@ -167,7 +167,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<ReportOptions>("report", "Draw the plots of a log, or of up to three");
   commands.add<ExciteOptions>("excite", "An experiment that excites a robot's dynamics");
   commands.add<IdentifyOptions>("identify", "Masses, inertias and friction from logs");
-  commands.add<LogOptions>("log", "Logs: info, csv, diff, import, thresholds");
+  commands.add<LogOptions>("log", "Logs: info, csv, diff, import, replay, thresholds");
   commands.add<ModelOptions>("model", "A robot's generated kernels: build, info");
   commands.add<NewOptions>("new", "A robot's folder from its URDF alone");
   commands.add<EdsOptions>("eds",

@@ -198,21 +198,27 @@ struct LogOptions {
     kCsv,
     kDiff,
     kImport,
+    kReplay,
     kThresholds
   } action = Action::kInfo;
   double alarms_per_hour = 1.0;  ///< thresholds: false ones, of all joints together
   double from_s = 0.0;           ///< thresholds: leave out what was before, of the log's time
   std::string log;
-  std::string other;                 ///< diff: the log that `log` is compared with
-  std::string topic;                 ///< csv: empty is the state; info: whose fields are listed
-  std::vector<std::string> fields;   ///< empty: all
-  std::size_t every = 1;             ///< n: each n-th message
-  std::string output;                ///< csv: empty is standard output; import: runs/;
-                                     ///< thresholds: a folder, or empty
-  std::vector<std::string> files;    ///< import: tables or bags; thresholds: runs to learn from
-  std::vector<std::string> against;  ///< thresholds: other runs
-  std::string robot;                 ///< import: robot.toml
-  std::string map;                   ///< import: what the columns or topics mean
+  std::string other;                ///< diff: the log that `log` is compared with
+  std::string topic;                ///< csv: empty is the state; info: whose fields are listed
+  std::vector<std::string> fields;  ///< empty: all
+  std::size_t every = 1;            ///< n: each n-th message
+  std::string output;  ///< csv: empty is standard output; import: runs/; replay: experiment;
+                       ///< thresholds: a folder, or empty
+  std::vector<std::string> files;        ///< import: tables or bags; thresholds: runs to learn from
+  std::vector<std::string> against;      ///< thresholds: other runs
+  std::string robot;                     ///< import, replay: robot.toml
+  std::string map;                       ///< import: what the columns or topics mean
+  std::string source;                    ///< replay: "command", "state"; empty: what the log has
+  std::string posture;                   ///< replay: to start from; empty: the recording's
+  std::vector<std::string> joints;       ///< replay: that are led; empty: all
+  std::optional<double> begin_s, end_s;  ///< replay: of the log's time
+  bool torque = false;                   ///< replay: torques as feed-forward
   std::string json;
 };
 

@@ -17,6 +17,8 @@ namespace tandem::apps {
 [[nodiscard]] Exit log_command(const LogOptions& options);
 /// A part of log_command().
 [[nodiscard]] Exit log_import_command(const LogOptions& options);
+/// The same.
+[[nodiscard]] Exit log_replay_command(const LogOptions& options);
 /// Writes a data sheet per type of board and sensor; with `show`, prints what a sheet says.
 [[nodiscard]] Exit eds_command(const EdsOptions& options);
 [[nodiscard]] Exit report_command(const ReportOptions& options);

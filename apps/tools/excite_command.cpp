@@ -3,20 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/tools/commands.hpp"
+#include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "identification/excite.hpp"
 #include "identification/identify.hpp"
 
 namespace tandem::apps {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kExciteHead = "# Excites the dynamics for `tandem identify`";
 /// What of a spring a standing robot's legs are damped by: without it they swing for long.
@@ -66,14 +64,6 @@ double leg_damping(const hal::RobotConfig& robot, const std::vector<std::string>
   return std::isfinite(softest) ? kDamped_s * softest : 0.0;
 }
 
-/// The robot's path as the experiment has to say it: relative to the experiment where it can.
-std::string path_from(const std::string& experiment, const std::string& robot) {
-  const fs::path folder = fs::absolute(experiment).parent_path();
-  const fs::path relative =
-      fs::absolute(robot).lexically_normal().lexically_relative(folder.lexically_normal());
-  return relative.empty() ? fs::absolute(robot).lexically_normal().string() : relative.string();
-}
-
 std::string experiment_text(const identification::Excitation& result, const ExciteOptions& options,
                             const hal::RobotConfig& robot, const std::string& posture) {
   std::string text = fmt::format(
@@ -83,7 +73,7 @@ std::string experiment_text(const identification::Excitation& result, const Exci
       "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
       kExciteHead, options.seed, result.condition_number, result.base_parameters,
       100.0 * result.position_share, 100.0 * result.speed_share, 100.0 * result.torque_share,
-      path_from(options.output, options.robot),
+      relative_path(options.output, options.robot),
       posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
       options.periods * options.period_s + 1.0);
   if (options.hung) {

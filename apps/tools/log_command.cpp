@@ -205,6 +205,7 @@ Result<Exit> diff(const log::LogFile& file, const LogOptions& options) {
 
 Exit log_command(const LogOptions& options) {
   if (options.action == LogOptions::Action::kImport) return log_import_command(options);
+  if (options.action == LogOptions::Action::kReplay) return log_replay_command(options);
   if (options.action == LogOptions::Action::kThresholds) {
     const Status printed = print_thresholds(options);
     return printed ? Exit::kDone : refuse(printed.error());

@@ -1,0 +1,223 @@
+// `tandem log replay`: an experiment that plays the motion of a log.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "apps/robot/robot_files.hpp"
+#include "apps/text/console.hpp"
+#include "apps/tools/commands.hpp"
+#include "apps/tools/relative_path.hpp"
+#include "base/counted.hpp"
+#include "base/nearest.hpp"
+#include "controllers/motion_plan.hpp"
+#include "hal/config/capabilities.hpp"
+#include "log/joint_motion.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr const char* kReplayHead = "# Replays a log";
+constexpr std::int64_t kCycle_ns = 1'000'000;  // of an experiment that says nothing of it
+constexpr double kHeld_s = 1.0;                // at the end
+
+/// All that the experiment says.
+struct Replay {
+  hal::Robot robot;
+  std::vector<std::size_t> joints;
+  log::MotionRequest request;
+  log::JointMotion motion;
+  std::string data_sha256, posture;
+  double approach_s = 0.0, duration_s = 0.0;
+};
+
+/// The posture that the recorded run began in, if the robot has it; else its first; or what is
+/// asked for.
+Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robot,
+                               const log::RunInfo& info) {
+  std::vector<std::string> known;
+  for (const hal::Posture& one : robot.postures) known.push_back(one.name);
+  if (!options.posture.empty()) {
+    if (robot.posture(options.posture) != nullptr) return options.posture;
+    return std::unexpected(Error{"the robot has no posture '" + options.posture + "'",
+                                 suggest(options.posture, known),
+                                 robot.file,
+                                 0,
+                                 {}});
+  }
+  for (const auto& [file, text] : info.configuration) {
+    const auto document = TomlDocument::parse(text, file);
+    if (!file.ends_with(".toml") || !document || !document->root().has("robot")) continue;
+    const std::string posture = document->root().text_or("posture", "");
+    if (robot.posture(posture) != nullptr) return posture;
+  }
+  return known.empty() ? std::string() : known.front();
+}
+
+/// Indices of the joints that are played. Errors: one that the robot lacks; the recording has
+/// others, and none were chosen.
+Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal::Robot& robot,
+                                           const log::RunInfo& info) {
+  std::vector<std::string> names = options.joints, known;
+  for (const hal::Joint& joint : robot.joints) known.push_back(joint.name);
+  if (names.empty()) {
+    names = known;
+    for (const std::string& joint : info.joints) {
+      if (robot.joint_index(joint) >= 0) continue;
+      return std::unexpected(
+          Error{"is a recording of another robot: " + robot.file + " has no joint '" + joint + "'",
+                "give the robot that was recorded, or name the joints that both have with --joints",
+                options.log,
+                0,
+                {}});
+    }
+  }
+  std::vector<std::size_t> joints;
+  for (const std::string& name : names) {
+    const int index = robot.joint_index(name);
+    if (index < 0) {
+      return std::unexpected(
+          Error{"the robot has no joint '" + name + "'", suggest(name, known), robot.file, 0, {}});
+    }
+    joints.push_back(static_cast<std::size_t>(index));
+  }
+  return joints;
+}
+
+/// Reads and checks everything, as the run will.
+Result<Replay> plan(const LogOptions& options) {
+  const auto files = read_robot(options.robot);
+  if (!files) return std::unexpected(files.error().front());
+  const auto file = log::LogFile::open(options.log);
+  if (!file) return std::unexpected(file.error());
+  Replay replay;
+  replay.robot = hal::robot_of(files->config);
+  replay.data_sha256 = file->data_sha256();
+  auto posture = posture_of(options, replay.robot, file->info());
+  if (!posture) return std::unexpected(posture.error());
+  replay.posture = std::move(*posture);
+  auto joints = joints_of(options, replay.robot, file->info());
+  if (!joints) return std::unexpected(joints.error());
+  replay.joints = std::move(*joints);
+  log::MotionRequest& request = replay.request;
+  if (options.source == "command") request.source = log::MotionSource::kCommand;
+  if (options.source == "state") request.source = log::MotionSource::kState;
+  request.from_s = options.begin_s;
+  request.to_s = options.end_s;
+  request.torque = options.torque;
+  for (const std::size_t joint : replay.joints) {
+    request.joints.push_back(replay.robot.joints[joint].name);
+  }
+  auto motion = log::read_joint_motion(*file, request);
+  if (!motion) return std::unexpected(motion.error());
+  replay.motion = std::move(*motion);
+  const auto made = MotionPlan::make(replay.motion, replay.robot, replay.joints, kCycle_ns);
+  if (!made) {
+    return std::unexpected(
+        Error{made.error().message, made.error().hint, options.log, 0, made.error().key});
+  }
+  const hal::Posture* start = replay.robot.posture(replay.posture);
+  replay.approach_s = log::kReplayApproach_s;
+  for (std::size_t k = 0; k < replay.joints.size(); ++k) {
+    const std::size_t joint = replay.joints[k];
+    const double from = start == nullptr ? 0.0 : start->position_rad[joint];
+    const double time_s = approach_time_s(made->position(k, 0) - from, replay.robot.joints[joint]);
+    replay.approach_s = std::max(replay.approach_s, std::ceil(10.0 * time_s + 1.0) / 10.0);
+  }
+  replay.duration_s = replay.approach_s + made->duration_s() + kHeld_s;
+  return replay;
+}
+
+std::string experiment_text(const Replay& replay, const LogOptions& options) {
+  const auto quoted = [](const std::string& text) { return json_text(Json(text)); };
+  const double begin_s = static_cast<double>(replay.motion.begin_ns) * 1e-9;
+  const double end_s = static_cast<double>(replay.motion.end_ns) * 1e-9;
+  const double lead_s = replay.approach_s + log::kReplayRunUp_s;
+  std::string text = fmt::format(
+      "{}, written by `tandem log replay`: the joints' {} from {:.3f} to {:.3f} s.\n"
+      "# The recording begins {:.1f} s after the controllers: {:.1f} s to its first place, {:.1f} "
+      "s\n"
+      "# to its first speed. From a place farther away it takes longer: raise duration_s then.\n"
+      "robot = {}\n{}duration_s = {:.9g}\nseed = 1\n\n"
+      "[[controller]]\nplugin = \"recorded_motion\"\n[controller.parameters]\n"
+      "log = {}\ndata_sha256 = \"{}\"\nsource = \"{}\"\napproach_s = {:.9g}\n",
+      kReplayHead,
+      replay.motion.source == log::MotionSource::kCommand ? "commands" : "measured positions",
+      begin_s, end_s, lead_s, replay.approach_s, log::kReplayRunUp_s,
+      quoted(relative_path(options.output, options.robot)),
+      replay.posture.empty() ? "" : "posture = " + quoted(replay.posture) + "\n", replay.duration_s,
+      quoted(relative_path(options.output, options.log)), replay.data_sha256,
+      log::to_string(replay.motion.source), replay.approach_s);
+  if (options.torque) text += "torque = true\n";
+  if (options.begin_s) text += fmt::format("from_s = {:.9g}\n", *options.begin_s);
+  if (options.end_s) text += fmt::format("to_s = {:.9g}\n", *options.end_s);
+  if (options.joints.empty()) return text;
+  std::string names;
+  for (const std::string& joint : replay.request.joints) {
+    names += (names.empty() ? "" : ", ") + quoted(joint);
+  }
+  return text + "joints = [" + names + "]\n";
+}
+
+void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out) {
+  Facts facts;
+  const bool commanded = replay.motion.source == log::MotionSource::kCommand;
+  facts.add("experiment", options.output);
+  facts.add("plays", fmt::format("{:.3f} to {:.3f} s of {}",
+                                 static_cast<double>(replay.motion.begin_ns) * 1e-9,
+                                 static_cast<double>(replay.motion.end_ns) * 1e-9, options.log));
+  facts.add("references", commanded ? "the recorded commands (--source state: what was measured)"
+                                    : "what was measured of the joints");
+  const std::size_t held = replay.robot.joints.size() - replay.joints.size();
+  facts.add("joints", counted(replay.joints.size(), "joint") +
+                          (held == 0 ? "" : fmt::format(", {} more are held", held)));
+  facts.add("torques", options.torque ? "played as feed-forward" : "not played (--torque)");
+  facts.add("begins",
+            fmt::format("{:.1f} s after the controllers, from {}",
+                        replay.approach_s + log::kReplayRunUp_s,
+                        replay.posture.empty() ? "every joint at 0" : "posture " + replay.posture));
+  facts.add("next", "tandem run " + options.output);
+  facts.add("", fmt::format("tandem report {} RUN, RUN being the log that this writes: one over "
+                            "the other",
+                            options.log));
+  facts.print(out);
+}
+
+Json replay_json(const Replay& replay, const LogOptions& options) {
+  Json json;
+  json["experiment"] = options.output;
+  json["log"] = options.log;
+  json["data_sha256"] = replay.data_sha256;
+  json["source"] = log::to_string(replay.motion.source);
+  json["from_ns"] = replay.motion.begin_ns;
+  json["to_ns"] = replay.motion.end_ns;
+  json["joints"] = replay.request.joints;
+  json["torque"] = options.torque;
+  json["posture"] = replay.posture;
+  json["lead_in_s"] = replay.approach_s + log::kReplayRunUp_s;
+  json["duration_s"] = replay.duration_s;
+  return json;
+}
+
+}  // namespace
+
+Exit log_replay_command(const LogOptions& options) {
+  const auto replay = plan(options);
+  if (!replay) return refuse(replay.error());
+  if (const Status kept =
+          check_overwrites(options.output, kReplayHead, "experiment of `tandem log replay`");
+      !kept) {
+    return refuse(kept.error());
+  }
+  if (const Status s = write_file(options.output, experiment_text(*replay, options)); !s) {
+    return refuse(s.error());
+  }
+  print_facts(*replay, options, human_output(options.json));
+  if (const Status s = write_json(options.json, replay_json(*replay, options)); !s) {
+    return refuse(s.error());
+  }
+  return Exit::kDone;
+}
+
+}  // namespace tandem::apps

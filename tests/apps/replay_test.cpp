@@ -1,0 +1,162 @@
+// `tandem log replay` from the outside: a run and its replay have the same references; what was
+// imported is played, too; reports lay both over each other.
+#include <algorithm>
+#include <cmath>
+
+#include "log/log_file.hpp"
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+constexpr double kLead_s = 3.5;  // to the first place, and to the first speed
+
+class LogReplay : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    const Outcome run = tandem("run trajectory.toml --duration 2 --quiet --log logs");
+    ASSERT_EQ(run.status, 0) << run.err;
+  }
+  /// Writes the experiment `replay.toml` of a log, and runs it. @return the log of this run
+  std::string play(const std::string& log, const std::string& more = {}) const {
+    const Outcome made = tandem("log replay " + log +
+                                " --robot robot.toml --out replay.toml --json replay.json " + more);
+    EXPECT_EQ(made.status, 0) << made.err;
+    const Outcome run = tandem("run replay.toml --quiet --log again --json run.json");
+    EXPECT_EQ(run.status, 0) << run.err;
+    return json("run.json")["log"]["path"];
+  }
+  /// References of both joints.
+  [[nodiscard]] log::Table columns(const std::string& log, const std::string& topic) const {
+    const auto file = log::LogFile::open(folder_ / log);
+    EXPECT_TRUE(file) << log;
+    if (!file) return {};
+    auto table = file->read(topic, {{"position_rad", 0}, {"position_rad", 1}});
+    EXPECT_TRUE(table);
+    return table ? *table : log::Table{};
+  }
+  /// How far `replay` is from `recorded` at most, both as long as the recording's motion.
+  [[nodiscard]] double apart(const log::Table& recorded, const log::Table& replay) const {
+    const auto played = json("replay.json");
+    const double from_s = 1e-9 * played["from_ns"].get<double>();
+    const double to_s = 1e-9 * played["to_ns"].get<double>();
+    const double start_s = start_of(replay);
+    EXPECT_NEAR(played["lead_in_s"].get<double>(), kLead_s, 1e-12);
+    double most = 0.0;
+    std::size_t compared = 0;
+    for (std::size_t i = 0; i < recorded.time_s.size(); ++i) {
+      const double time_s = recorded.time_s[i];
+      if (time_s < from_s - 1e-9 || time_s > to_s + 1e-9) continue;
+      const auto row =
+          std::ranges::lower_bound(replay.time_s, time_s - from_s + start_s + kLead_s - 1e-9) -
+          replay.time_s.begin();
+      if (static_cast<std::size_t>(row) >= replay.time_s.size()) break;
+      for (std::size_t j = 0; j < 2; ++j) {
+        most = std::max(most, std::abs(recorded.columns[j][i] -
+                                       replay.columns[j][static_cast<std::size_t>(row)]));
+      }
+      ++compared;
+    }
+    EXPECT_GT(compared, 100U);
+    return most;
+  }
+  /// When the controllers started: the duration before the end.
+  [[nodiscard]] double start_of(const log::Table&) const {
+    const auto file =
+        log::LogFile::open(folder_ / json("run.json")["log"]["path"].get<std::string>());
+    const auto events = file->events();
+    for (const log::EventText& one : *events) {
+      if (one.event.kind == log::EventKind::kBringUpDone) {
+        return 1e-9 * static_cast<double>(one.event.time_ns) + settle_s_;
+      }
+    }
+    ADD_FAILURE() << "no bring-up";
+    return 0.0;
+  }
+  const std::string recording_ = "logs/double_pendulum-trajectory-001.mcap";
+  double settle_s_ = 1.0;  // by default, of the hoist
+};
+
+TEST_F(LogReplay, GivesTheRecordingsReferencesAgain) {
+  const std::string run = play(recording_);
+  // The same doubles in the same cycles: no tolerance.
+  EXPECT_EQ(apart(columns(recording_, "/tandem/command"), columns(run, "/tandem/command")), 0.0);
+  // The robot began elsewhere and rested before, so its springs and loops are in another state:
+  // measured, both follow the references by a milliradian.
+  EXPECT_LT(apart(columns(recording_, "/tandem/state"), columns(run, "/tandem/state")), 2e-3);
+  const Outcome report = tandem("report " + recording_ + " " + run + " -o both");
+  ASSERT_EQ(report.status, 0) << report.err;
+  const std::string page = read_text(folder_ / "both/report.html");
+  EXPECT_NE(page.find("3.500 s earlier, so that the replay lies over its recording"),
+            std::string::npos)
+      << page.substr(0, 3000);
+  EXPECT_NE(page.find("Replay B"), std::string::npos);
+  EXPECT_NE(page.find("0.0000 deg"), std::string::npos) << "of the references";
+  const Outcome turned = tandem("report " + run + " " + recording_ + " -o turned");
+  ASSERT_EQ(turned.status, 0) << turned.err;
+  EXPECT_NE(read_text(folder_ / "turned/report.html")
+                .find("3.500 s later, so that the replay lies over its recording"),
+            std::string::npos);
+}
+
+TEST_F(LogReplay, PlaysWhatWasMeasuredAndWhatWasImported) {
+  const std::string run = play(recording_, "--source state");
+  EXPECT_EQ(apart(columns(recording_, "/tandem/state"), columns(run, "/tandem/command")), 0.0);
+  ASSERT_EQ(tandem("log csv " + recording_ + " --fields position_rad -o run.csv").status, 0);
+  write_text(folder_ / "map.toml", R"(joints = ["joint1", "joint2"]
+allow_frozen = true
+[time]
+column = "time_s"
+unit = "s"
+period_s = 0.004
+begin_s = 1.5
+[position]
+columns = "position_rad.joint{1}"
+unit = "rad"
+)");
+  ASSERT_EQ(tandem("log import run.csv --robot robot.toml --map map.toml -o in.mcap").status, 0);
+  const std::string imported = play("in.mcap");
+  EXPECT_EQ(json("replay.json")["source"], "state");
+  // Every fourth cycle is a sample of the import.
+  EXPECT_LT(apart(columns("in.mcap", "/tandem/state"), columns(imported, "/tandem/command")),
+            1e-15);
+  const Outcome report = tandem("report in.mcap " + imported + " -o both");
+  ASSERT_EQ(report.status, 0) << report.err;
+  EXPECT_NE(read_text(folder_ / "both/report.html").find("so that the replay lies over"),
+            std::string::npos);
+}
+
+TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
+  const std::string to = " --robot robot.toml --out replay.toml";
+  const auto refused = [&](const std::string& arguments, const std::string& why) {
+    const Outcome said = tandem("log replay " + arguments);
+    EXPECT_EQ(said.status, 2) << arguments;
+    EXPECT_NE(said.err.find(why), std::string::npos) << said.err;
+    EXPECT_EQ(std::ranges::count(said.err, '\n'), 1) << said.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "replay.toml"));
+  };
+  refused("none.mcap" + to, "none.mcap");
+  refused(recording_ + to + " --from 90", "there is nothing from 90.000 s");
+  refused(recording_ + to + " --joints elbow", "the robot has no joint 'elbow'");
+  refused(recording_ + to + " --posture high", "the robot has no posture 'high'");
+  refused(recording_ + " --robot " TANDEM_SOURCE_DIR "/config/ur5e/robot.toml --out replay.toml",
+          "is a recording of another robot");
+  const std::string before = read_text(folder_ / "robot.toml");
+  EXPECT_EQ(tandem("log replay " + recording_ + " --robot robot.toml --out robot.toml").status, 2);
+  EXPECT_EQ(read_text(folder_ / "robot.toml"), before);
+  const std::string cut = "cut.mcap";
+  std::filesystem::copy_file(folder_ / recording_, folder_ / cut);
+  std::filesystem::resize_file(folder_ / cut, std::filesystem::file_size(folder_ / cut) * 3 / 4);
+  refused(cut + to, "the log is cut");
+  // `tandem check` looks into the log, too: one that has been replaced, a limit that is lower now.
+  ASSERT_EQ(tandem("log replay " + recording_ + to).status, 0);
+  ASSERT_EQ(tandem("check replay.toml").status, 0);
+  edit("replay.toml", "approach_s", "to_s = 90.0\napproach_s");
+  const Outcome checked = tandem("check replay.toml");
+  EXPECT_EQ(checked.status, 2);
+  EXPECT_NE(checked.err.find("there is nothing from"), std::string::npos) << checked.err;
+}
+
+}  // namespace
+}  // namespace tandem::apps
