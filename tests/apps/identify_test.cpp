@@ -2,6 +2,7 @@
 // simulated, found, and simulated again. TANDEM_IDENTIFY_ALL=1: a humanoid, too.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -278,6 +279,55 @@ TEST_F(Identify, WritesHumanoidsExperimentsThatRunThrough) {
       EXPECT_EQ(run.status, 0) << seed << how << run.err;
     }
   }
+}
+
+// A run's own log is a bag of ROS 2, too: of sensor_msgs/JointState, 50 times a second. In the
+// description to start from, link2 is a third too heavy.
+TEST_F(Identify, TakesAnImportedBag) {
+  record("robot.toml");
+  write_text(folder_ / "bag.toml", "[time]\nperiod_s = 0.02\n[bag]\nstamp = \"header\"\n");
+  const Outcome imported = tandem("log import " + log() +
+                                  " --robot robot.toml --map bag.toml -o in.mcap --json in.json");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  EXPECT_EQ(json("in.json")["format"], "mcap");
+  EXPECT_EQ(json("in.json")["series"][0]["median_ns"], 20'000'000);
+  std::filesystem::copy_file(folder_ / "robot.toml", folder_ / "wrong.toml");
+  std::filesystem::copy_file(folder_ / "double_pendulum.urdf", folder_ / "wrong.urdf");
+  edit("wrong.toml", "urdf = \"double_pendulum.urdf\"", "urdf = \"wrong.urdf\"");
+  edit("wrong.urdf", "value=\"0.33238\"", "value=\"0.43238\"");
+  const Outcome found = tandem("identify in.mcap --robot wrong.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  const nlohmann::json result = json("found.json");
+  for (const auto& [name, joint] : result["joints"].items()) {
+    EXPECT_LT(joint["relative_error"].get<double>(), 0.05) << name;
+    EXPECT_LT(joint["relative_error"].get<double>(),
+              0.5 * joint["described_relative_error"].get<double>())
+        << name;
+  }
+  const auto& mass = result["links"]["link2"]["mass_kg"];
+  EXPECT_NEAR(mass["value"].get<double>(), 0.33238, mass["ci95"].get<double>());
+}
+
+// Importing refuses it; a log in which it happened all the same was joined, or is damaged.
+TEST_F(Identify, OfTimeThatGoesBackIsOneError) {
+  ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 2 --log logs").status, 0);
+  write_text(folder_ / "map.toml", kMap);
+  ASSERT_EQ(tandem("log csv " + log() + " --fields position_rad,torque_nm -o run.csv").status, 0);
+  std::istringstream rows(read_text(folder_ / "run.csv"));
+  std::string line, joined;
+  std::size_t count = 0;
+  while (std::getline(rows, line) && ++count < 500) joined += line + "\n";
+  std::istringstream again(joined);
+  std::getline(again, line);
+  while (std::getline(again, line)) joined += line + "\n";
+  write_text(folder_ / "run.csv", joined);
+  const Outcome imported =
+      tandem("log import run.csv --robot robot.toml --map map.toml -o bad.mcap");
+  EXPECT_EQ(imported.status, 2);
+  EXPECT_NE(imported.err.find("run.csv:500: rows: time goes back"), std::string::npos)
+      << imported.err;
+  EXPECT_EQ(std::ranges::count(imported.err, '\n'), 1) << imported.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "bad.mcap"));
 }
 
 TEST_F(Identify, OfAnotherRobotsLogIsOneError) {

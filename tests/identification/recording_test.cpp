@@ -7,7 +7,9 @@
 #include <cmath>
 
 #include "identification/identify.hpp"
+#include "log/recorder.hpp"
 #include "tests/identification/synthetic.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::identification {
 namespace {
@@ -190,6 +192,33 @@ TEST(Recording, UndoesTheHoldsOfASlowPdo) {
   const Signal copy = smooth;
   undo_holds(smooth);
   EXPECT_EQ(smooth, copy);
+}
+
+// Two logs that were joined: the second begins at its own time 0.
+TEST(Recording, OfTimeThatGoesBackIsOneError) {
+  const tandem::test::ScratchFolder folder;
+  const std::string path = folder / "joined.mcap";
+  log::RunInfo info{.robot = "panda", .hal = "import", .period_ns = 1'000'000};
+  for (const auto& joint : panda().robot.joints) info.joints.push_back(joint.name);
+  for (const auto& sensor : panda().robot.sensors) {
+    info.sensors.push_back({sensor.name, sensor.channels()});
+  }
+  auto recorder = log::Recorder::open(path, info, {});
+  ASSERT_TRUE(recorder);
+  hal::StateImage state(panda().robot.shape());
+  const auto channel =
+      (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+  (*recorder)->start();
+  for (int i = 0; i < 400; ++i) {
+    (*recorder)->wait_for_space(1);
+    (*recorder)->push(channel, (i % 250) * 1'000'000, state.bytes());
+  }
+  ASSERT_EQ((*recorder)->close().error, "");
+  const auto read = read_recording(path, panda().robot);
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().file, path);
+  EXPECT_EQ(read.error().message, "time goes backwards in sample 250: 0.000000 s after 0.249000 s");
+  EXPECT_NE(read.error().hint.find("two were joined"), std::string::npos);
 }
 
 }  // namespace
