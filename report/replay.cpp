@@ -15,7 +15,8 @@ namespace tandem::report {
 namespace {
 
 constexpr std::size_t kProbes = 40;
-constexpr double kSame_rad = 1e-4;  // between two cycles of the run there is a line, not its cubic
+constexpr double kSame_rad = 1e-4;   // between two cycles of the run there is a line, not its cubic
+constexpr double kAlike_rad = 1e-2;  // what a declared limit of acceleration may take away
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// What the run's experiment plays of this recording.
@@ -62,10 +63,10 @@ double value_at(const RunData& run, const std::vector<double>& values, double ti
   return values[row] + (values[row + 1] - values[row]) * since / step;
 }
 
-/// How far the run's references are from the motion when it begins `later_s` later; kNever where
-/// it goes on after the run's end.
+/// How far the run's references are from the motion at most when it begins `later_s` later; kNever
+/// where that is `least` or more, or where the run ends before half of it.
 double probe_distance(const RunData& run, const log::JointMotion& motion,
-                      const std::vector<std::size_t>& joints, double later_s) {
+                      const std::vector<std::size_t>& joints, double later_s, double least) {
   double most = 0.0;
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const log::JointTrack& track = motion.tracks[k];
@@ -77,7 +78,7 @@ double probe_distance(const RunData& run, const log::JointMotion& motion,
       if (time_s > run.time_s.back()) break;  // it was ended before
       const double off =
           value_at(run, run.reference_rad[joints[k]], time_s) - track.position_rad[i];
-      if (!(std::abs(off) < kNever)) return kNever;
+      if (!(std::abs(off) < least)) return kNever;
       most = std::max(most, std::abs(off));
       ++compared;
     }
@@ -128,17 +129,19 @@ Result<std::optional<Replay>> find_replay(const RunData& run, const RunData& rec
   const auto whole = [period_s](double time_s) { return std::ceil(time_s / period_s - 1e-6); };
   const double lead_s =
       (whole(what->approach_s) + std::round(log::kReplayRunUp_s / period_s)) * period_s;
-  double best = kNever;
+  double best = kAlike_rad;
   for (double begin_s = run.time_s.front() + lead_s; begin_s < run.time_s.back();
        begin_s += period_s) {
     const double later_s = begin_s - replay.from_s;
-    const double off = probe_distance(run, *motion, replay.joints, later_s);
-    if (off >= best) continue;
-    best = off;
-    replay.later_s = later_s;
-    if (best < kSame_rad) return replay;
+    const double off = probe_distance(run, *motion, replay.joints, later_s, best);
+    if (off < best) {
+      best = off;
+      replay.later_s = later_s;
+    } else if (best < kSame_rad) {
+      break;
+    }
   }
-  return best < 100.0 * kSame_rad ? std::optional(replay) : std::nullopt;
+  return best < kAlike_rad ? std::optional(replay) : std::nullopt;
 }
 
 PageTable replay_table(const RunData& run, const RunData& recording, const Replay& replay) {

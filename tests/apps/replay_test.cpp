@@ -2,6 +2,7 @@
 // imported is played, too; reports lay both over each other.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
@@ -98,6 +99,34 @@ TEST_F(LogReplay, GivesTheRecordingsReferencesAgain) {
   EXPECT_NE(read_text(folder_ / "turned/report.html")
                 .find("3.500 s later, so that the replay lies over its recording"),
             std::string::npos);
+}
+
+// From far away the approach takes longer than the experiment says: the report looks for the
+// motion.
+TEST_F(LogReplay, IsFoundWhereItsApproachTookLonger) {
+  const Outcome made =
+      tandem("log replay " + recording_ + " --robot robot.toml --out far.toml --from 2.2 --to 3");
+  ASSERT_EQ(made.status, 0) << made.err;
+  edit("far.toml", "approach_s = 3", "approach_s = 0.01");
+  ASSERT_EQ(tandem("run far.toml --quiet --log again --json run.json").status, 0);
+  const std::string run = json("run.json")["log"]["path"];
+  const log::Table recorded = columns(recording_, "/tandem/command");
+  const log::Table played = columns(run, "/tandem/command");
+  const auto row = std::ranges::lower_bound(recorded.time_s, 2.5 - 1e-9) - recorded.time_s.begin();
+  const auto at = static_cast<std::size_t>(row);
+  std::size_t same = 0;  // the cycle with the same references
+  while (same < played.time_s.size() && (played.columns[0][same] != recorded.columns[0][at] ||
+                                         played.columns[1][same] != recorded.columns[1][at])) {
+    ++same;
+  }
+  ASSERT_LT(same, played.time_s.size());
+  const double later_s = played.time_s[same] - recorded.time_s[at];
+  EXPECT_GT(std::abs(later_s - (start_of(played) + 0.51 - 2.2)), 0.05) << "it did take longer";
+  ASSERT_EQ(tandem("report " + recording_ + " " + run + " -o both").status, 0);
+  char moved[64];
+  std::snprintf(moved, sizeof moved, "B is drawn %.3f s %s, so that the replay", std::abs(later_s),
+                later_s > 0.0 ? "earlier" : "later");
+  EXPECT_NE(read_text(folder_ / "both/report.html").find(moved), std::string::npos) << moved;
 }
 
 TEST_F(LogReplay, PlaysWhatWasMeasuredAndWhatWasImported) {

@@ -39,7 +39,7 @@ class RecordedMotion : public testing::Test {
   std::string record(const Spoil& spoil = {}, std::int64_t period_ns = 1'000'000,
                      int cycles = kCycles, bool commands = true) {
     const std::string path = folder_ / ("run" + std::to_string(count_++) + ".mcap");
-    log::RunInfo info{.robot = "fake", .hal = "import", .joints = joints_, .period_ns = period_ns};
+    log::RunInfo info{.robot = "fake", .hal = hal_, .joints = joints_, .period_ns = period_ns};
     auto recorder = log::Recorder::open(path, info, {});
     EXPECT_TRUE(recorder);
     const hal::Robot robot = hal::robot_of(hal::test::fake_robot());
@@ -51,6 +51,7 @@ class RecordedMotion : public testing::Test {
                                                           command.layout())
                                : states;
     (*recorder)->start();
+    for (const log::Event& event : events_) (*recorder)->push(event);
     for (int i = 0; i < cycles; ++i) {
       std::int64_t time_ns = i * period_ns;
       const double t = static_cast<double>(time_ns) * 1e-9;
@@ -88,6 +89,8 @@ class RecordedMotion : public testing::Test {
 
   test::ScratchFolder folder_;
   std::vector<std::string> joints_{"shoulder", "elbow", "wrist"};
+  std::string hal_ = "import";
+  std::vector<log::Event> events_;
   int count_ = 0;
 };
 
@@ -247,6 +250,25 @@ TEST_F(RecordedMotion, RefusesLogsThatLackSomething) {
             })),
             "experiment.toml:1: log: LOG: time goes backwards: 0.300 s after 0.499 s (the log is "
             "damaged, or two were joined: record it again)");
+}
+
+TEST_F(RecordedMotion, PlaysARunFromTheStartOfItsControllersAndNotPastAFault) {
+  hal_ = "sim";
+  EXPECT_EQ(problem(record()),
+            "experiment.toml:1: log: LOG: its controllers never ran (give the log of a run that "
+            "began)");
+  events_ = {{.cycle = 100, .time_ns = 100'000'000, .kind = log::EventKind::kBringUpDone}};
+  test::Harness run(hal::test::fake_robot(), "recorded_motion", "log = '" + record() + "'\n");
+  ASSERT_EQ(run.problem(), "");
+  run.start();
+  ASSERT_EQ(run.run(kLead_s + 0.001), Code::kOk);
+  EXPECT_EQ(run.command.position_rad()[0], wanted(0, 0.1));
+  events_.push_back({.cycle = 700, .time_ns = 700'000'000, .kind = log::EventKind::kFault});
+  const std::string path = record();
+  EXPECT_EQ(problem(path),
+            "experiment.toml:1: log: LOG: its run met a fault at 0.700 s (play what was before: "
+            "to_s)");
+  EXPECT_EQ(problem(path, "to_s = 0.6\n"), "");
 }
 
 TEST_F(RecordedMotion, RefusesCommandsThatLedNoPosition) {
