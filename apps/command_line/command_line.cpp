@@ -22,6 +22,7 @@ const char kExamples[] = R"(Examples:
   tandem report runs/coman-squat-001.mcap            draw the plots of a run
   tandem identify runs/panda-excite-001.mcap --robot config/panda/robot.toml --out identified
   tandem log csv runs/coman-squat-001.mcap --fields position_rad
+  tandem log replay runs/ur5e-q.mcap --robot config/ur5e/robot.toml --out replay.toml
   tandem model info config/coman/robot.toml          joints, mass, operation counts
   tandem doctor                                      is this machine fit for real time?
   tandem latency --load idle --duration 10           wake-up latency of this machine

@@ -55,8 +55,8 @@ Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robo
   return known.empty() ? std::string() : known.front();
 }
 
-/// Indices of the joints that are played. Errors: one that the robot lacks; the recording has
-/// others, and none were chosen.
+/// Indices of the joints that are played. Errors: one that the robot lacks, or that stands twice;
+/// the recording has others, and none were chosen.
 Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal::Robot& robot,
                                            const log::RunInfo& info) {
   std::vector<std::string> names = options.joints, known;
@@ -79,6 +79,9 @@ Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal:
     if (index < 0) {
       return std::unexpected(
           Error{"the robot has no joint '" + name + "'", suggest(name, known), robot.file, 0, {}});
+    }
+    if (std::ranges::find(joints, static_cast<std::size_t>(index)) != joints.end()) {
+      return fail("joint '" + name + "' stands twice", "name it once in --joints");
     }
     joints.push_back(static_cast<std::size_t>(index));
   }

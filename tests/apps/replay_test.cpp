@@ -168,6 +168,7 @@ TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   refused("none.mcap" + to, "none.mcap");
   refused(recording_ + to + " --from 90", "there is nothing from 90.000 s");
   refused(recording_ + to + " --joints elbow", "the robot has no joint 'elbow'");
+  refused(recording_ + to + " --joints joint1,joint1", "joint 'joint1' stands twice");
   refused(recording_ + to + " --posture high", "the robot has no posture 'high'");
   refused(recording_ + " --robot " TANDEM_SOURCE_DIR "/config/ur5e/robot.toml --out replay.toml",
           "is a recording of another robot");
