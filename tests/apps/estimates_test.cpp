@@ -118,6 +118,22 @@ TEST_F(EstimatedReport, TakesTheBaseFromTheEstimateWhereTheLogHasNoTruth) {
   EXPECT_EQ(tandem("log info logs/coman-without-001.mcap").out.find("/tf"), std::string::npos);
 }
 
+// COMAN's only site that is no foot: its pelvis, where nothing touches it.
+TEST_F(EstimatedReport, DrawsTheForceAtEachDeclaredPlace) {
+  const Outcome with = report("with",
+                              "[estimation.base]\n[estimation.observer]\n"
+                              "[[estimation.wrench]]\nsite = \"imu\"\n");
+  ASSERT_EQ(with.status, 0) << with.err;
+  EXPECT_NE(page("with").find("imu: force on the robot"), std::string::npos);
+  EXPECT_TRUE(
+      std::filesystem::exists(folder_ / "logs" / "coman-with-001" / "external_force_imu.png"));
+  const Outcome rows = tandem(
+      "log csv logs/coman-with-001.mcap --topic /tandem/estimate "
+      "--fields external_force_n,external_moment_nm,unexplained_torque_nm");
+  EXPECT_EQ(rows.status, 0) << rows.err;
+  EXPECT_NE(rows.out.find("unexplained_torque_nm"), std::string::npos);
+}
+
 TEST_F(EstimatedReport, RefusesARobotWhoseFeetHaveNoSensors) {
   const std::string config = TANDEM_SOURCE_DIR "/config/anymal_c/";
   std::string text = read_text(config + "squat.toml");
