@@ -14,7 +14,8 @@ std::vector<FrameEdge> edges_from(const FrameTree& frames, std::string link) {
       const auto edge = std::ranges::find(*some, link, &FrameEdge::child);
       if (edge == some->end()) continue;
       edges.push_back(*edge);
-      if (some == &frames.fixed) edges.back().multiplier = 0.0;  // whatever the image's joint 0 does
+      if (some == &frames.fixed)
+        edges.back().multiplier = 0.0;  // whatever the image's joint 0 does
       link = edge->parent;
       found = true;
       break;
@@ -63,8 +64,7 @@ void WrenchTopics::publish(const CycleSample& sample, Place& place) {
   const auto force = sample.estimate->external_force_N().subspan(3 * place.index, 3);
   const auto moment = sample.estimate->external_moment_Nm().subspan(3 * place.index, 3);
   const Eigen::Vector3d f = link_from_W * Eigen::Vector3d(force.data());
-  const Eigen::Vector3d m =
-      link_from_W * Eigen::Vector3d(moment.data()) + place.site_m.cross(f);
+  const Eigen::Vector3d m = link_from_W * Eigen::Vector3d(moment.data()) + place.site_m.cross(f);
   if (!f.allFinite() || !m.allFinite()) return;
   geometry_msgs::WrenchStamped message{};
   message.header = {ros_time(sample.stamp_ns), refer(place.link)};

@@ -40,6 +40,10 @@ class Estimator {
                                                                const EstimationConfig& config,
                                                                std::int64_t period_ns);
 
+  /// What can be said before there are kernels, which take minutes to build.
+  /// Errors: of [estimation.base], a base that does not move, and no foot, IMU or six-axis sensor.
+  [[nodiscard]] static Status check(const hal::Robot& robot, const EstimationConfig& config);
+
   void update(const hal::StateImage& state) noexcept TANDEM_RT;
   [[nodiscard]] const hal::EstimateImage& image() const noexcept { return image_; }
 

@@ -146,5 +146,21 @@ TEST_F(EstimatedReport, RefusesARobotWhoseFeetHaveNoSensors) {
   EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
 }
 
+TEST_F(EstimatedReport, RefusesThatRobotBeforeItsKernelsAreCompiled) {
+  const std::string config = TANDEM_SOURCE_DIR "/config/anymal_c/";
+  for (const auto& entry : std::filesystem::directory_iterator(config))
+    std::filesystem::copy(entry, folder_ / entry.path().filename(),
+                          std::filesystem::copy_options::overwrite_existing);
+  std::string robot = read_text(folder_ / "robot.toml");
+  robot.replace(robot.find("name = \"anymal_c\""), 17, "name = \"other\"");
+  write_text(folder_ / "robot.toml", robot);
+  write_text(folder_ / "squat.toml", read_text(folder_ / "squat.toml") + "\n[estimation.base]\n");
+  const Outcome refused = tandem("run squat.toml --duration 1 --no-log",
+                                 "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
+  EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;
+}
+
 }  // namespace
 }  // namespace tandem::apps

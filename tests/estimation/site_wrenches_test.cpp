@@ -14,7 +14,8 @@ using model::Kernel;
 
 struct Chain {
   Chain(const std::string& name, std::vector<double> posture, std::vector<model::SiteSpec> sites)
-      : tree(model::read_urdf(TANDEM_SOURCE_DIR "/config/" + name + "/" + name + ".urdf", {})->tree),
+      : tree(
+            model::read_urdf(TANDEM_SOURCE_DIR "/config/" + name + "/" + name + ".urdf", {})->tree),
         mechanism(*model::make_mechanism(tree, spec(name, std::move(sites)))),
         kernels(mechanism, name),
         q(std::move(posture)) {}
@@ -49,8 +50,7 @@ TEST(SiteWrenches, AreTheOnesThatExplainTheTorques) {
   std::vector<double> residual(6, 0.0);
   arm.add(residual, 0, wrench);
   sites->solve(arm.q.data(), residual);
-  for (std::size_t i = 0; i < 6; ++i)
-    EXPECT_NEAR(sites->wrench(0)[i], wrench[i], 0.05 * 30.0) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(sites->wrench(0)[i], wrench[i], 0.05 * 30.0) << i;
   EXPECT_LT(sites->unexplained_Nm(), 0.1);
 }
 
@@ -66,7 +66,8 @@ TEST(SiteWrenches, SayWhatTheyDoNotExplain) {
 
 // Two joints about parallel axes: a force in their plane. Along the axes nothing is seen.
 TEST(SiteWrenches, OfAShortChainHaveZerosWhereItsJointsSeeNothing) {
-  const Chain arm("double_pendulum", {0.4, 0.9}, {{.name = "tip", .link = "link2", .xyz_m = {0.0, 0.1, 0.4}}});
+  const Chain arm("double_pendulum", {0.4, 0.9},
+                  {{.name = "tip", .link = "link2", .xyz_m = {0.0, 0.1, 0.4}}});
   auto sites = SiteWrenches::make(*arm.kernels.get(), {"tip"});
   ASSERT_TRUE(sites) << sites.error().to_string();
   std::vector<double> in_plane(2, 0.0), along(2, 0.0);
@@ -88,7 +89,8 @@ TEST(SiteWrenches, RefuseSitesThatAreNotThereOrTwice) {
     const auto made = SiteWrenches::make(*arm.kernels.get(), sites);
     return made ? std::string() : made.error().to_string();
   };
-  EXPECT_NE(refused({"tool1"}).find("did you mean 'tool0'"), std::string::npos) << refused({"tool1"});
+  EXPECT_NE(refused({"tool1"}).find("did you mean 'tool0'"), std::string::npos)
+      << refused({"tool1"});
   EXPECT_NE(refused({"tool0", "tool0"}).find("twice"), std::string::npos);
   EXPECT_NE(refused(std::vector<std::string>(5, "tool0")).find("more than 4"), std::string::npos);
 }

@@ -16,8 +16,8 @@ struct Hand {
   const char* robot;
   const char* experiment;
   const char* site;
-  const char* joint;             ///< whose link is pushed
-  std::array<double, 3> at_m;    ///< there, in the link's frame
+  const char* joint;           ///< whose link is pushed
+  std::array<double, 3> at_m;  ///< there, in the link's frame
   std::array<double, 3> force_N;
 };
 const Hand kPanda{"panda", "hold", "hand", "panda_joint7", {0, 0, 0.107}, {12.0, -20.0, 15.0}};
@@ -51,8 +51,7 @@ Seen watch(EstimatedRun& run, const Hand& hand, estimation::Estimator* beside = 
       seen.mean[k] += value / kCycles;
       seen.worst[k] = std::max(seen.worst[k], std::abs(value - (k < 3 ? hand.force_N[k] : 0.0)));
     }
-    seen.unexplained_Nm =
-        std::max(seen.unexplained_Nm, estimate.unexplained_torque_Nm()[0]);
+    seen.unexplained_Nm = std::max(seen.unexplained_Nm, estimate.unexplained_torque_Nm()[0]);
   }
   EXPECT_TRUE(pushed());
   std::printf("%s: mean", hand.robot);
@@ -68,8 +67,7 @@ struct Bounds {
 };
 void expect_near(const Seen& seen, const Hand& hand, const Bounds& bounds) {
   for (std::size_t k = 0; k < 6; ++k) {
-    EXPECT_NEAR(seen.mean[k], k < 3 ? hand.force_N[k] : 0.0,
-                k < 3 ? bounds.mean_N : bounds.mean_Nm)
+    EXPECT_NEAR(seen.mean[k], k < 3 ? hand.force_N[k] : 0.0, k < 3 ? bounds.mean_N : bounds.mean_Nm)
         << k;
     EXPECT_LT(seen.worst[k], k < 3 ? bounds.worst_N : bounds.worst_Nm) << k;
   }
@@ -80,15 +78,14 @@ sim::Fault push_of(const hal::RobotConfig& robot, const Hand& hand) {
 }
 
 EstimatedRun::Options options_of(const Hand& hand) {
-  return {.estimation = {.observer = estimation::ObserverConfig{},
-                         .wrenches = {{.site = hand.site}}},
-          .change = [](Experiment& e) { e.duration_s = 5.0; }};
+  return {
+      .estimation = {.observer = estimation::ObserverConfig{}, .wrenches = {{.site = hand.site}}},
+      .change = [](Experiment& e) { e.duration_s = 5.0; }};
 }
 
 class Wrench : public testing::TestWithParam<const Hand*> {};
-INSTANTIATE_TEST_SUITE_P(Hands, Wrench, testing::Values(&kPanda, &kUr5e), [](const auto& test) {
-  return std::string(test.param->robot);
-});
+INSTANTIATE_TEST_SUITE_P(Hands, Wrench, testing::Values(&kPanda, &kUr5e),
+                         [](const auto& test) { return std::string(test.param->robot); });
 
 TEST_P(Wrench, AtThePushedHandIsThePush) {
   const Hand& hand = *GetParam();
@@ -112,8 +109,8 @@ TEST(WrenchOfComan, AtTheHandOfComansArmIsThePush) {
   const model::InterpretedKernels model(*model::make_mechanism(tree, spec));
   estimation::EstimationConfig config = options_of(hand).estimation;
   config.base = for_legs().base;
-  auto beside = estimation::Estimator::make(hal::robot_of(read->config), model.get(), config,
-                                            1'000'000);
+  auto beside =
+      estimation::Estimator::make(hal::robot_of(read->config), model.get(), config, 1'000'000);
   ASSERT_TRUE(beside) << beside.error().to_string();
   EstimatedRun run(hand.robot, hand.experiment,
                    {.change = [](Experiment& e) { e.duration_s = 5.0; }});
