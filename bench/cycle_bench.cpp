@@ -148,21 +148,26 @@ int estimation_cost(const std::string& file, const std::string& library) {
   const runtime::Experiment& e = (*rig)->run->experiment;
   const hal::Robot robot = hal::robot_of(e.robot);
   const bool floats = robot.floating_base;
-  const auto make = [&](bool observer) {
+  enum Parts { kBase, kObserver, kWrenches };
+  const auto make = [&](Parts parts) {
     estimation::EstimationConfig config;
     if (floats) config.base.emplace();
-    if (observer) config.observer.emplace();
+    if (parts >= kObserver) config.observer.emplace();
+    if (parts >= kWrenches && !robot.sites.empty())
+      config.wrenches.push_back({.site = robot.sites.front().name});
     return estimation::Estimator::make(robot, (*rig)->run->kernels.get(), config, e.loop.period_ns);
   };
-  auto base = floats ? make(false) : make(true);
-  auto both = make(true);
-  if (!base || !both) {
-    fmt::print("\nestimation none: {}\n", (base ? both : base).error().to_string());
+  auto base = make(floats ? kBase : kObserver);
+  auto both = make(kObserver);
+  auto all = make(kWrenches);
+  for (const auto* one : {&base, &both, &all}) {
+    if (*one) continue;
+    fmt::print("\nestimation none: {}\n", one->error().to_string());
     return 0;
   }
   const auto cycle = (*rig)->cycle(0, nullptr);
   rt::WallClock clock;
-  std::vector<double> base_us, both_us;
+  std::vector<double> base_us, both_us, all_us;
   for (int i = 0; cycle->step() && i < 12'000; ++i) {
     const auto time = [&](estimation::Estimator& one, std::vector<double>& times) {
       const std::int64_t begin_ns = clock.now_ns();
@@ -171,15 +176,17 @@ int estimation_cost(const std::string& file, const std::string& library) {
     };
     if (i % 2 == 0) time(**base, base_us);
     time(**both, both_us);
+    time(**all, all_us);
     if (i % 2 != 0) time(**base, base_us);
   }
-  const double one = median(base_us), all = median(both_us);
+  const double one = median(base_us), two = median(both_us), wrench = median(all_us) - two;
   if (floats) {
-    fmt::print("\nestimation median {:.2f} us base, {:.2f} us observer, {:.2f} us both\n", one,
-               all - one, all);
+    fmt::print("\nestimation median {:.2f} us base, {:.2f} us observer, {:.2f} us both", one,
+               two - one, two);
   } else {
-    fmt::print("\nestimation median {:.2f} us observer\n", all);
+    fmt::print("\nestimation median {:.2f} us observer", two);
   }
+  fmt::print(", {:.2f} us a wrench\n", wrench);
   return 0;
 }
 

@@ -56,7 +56,7 @@ class ControllerSetup {
   /// says; empty: not known, as while a run goes on. Valid during configure().
   std::span<const double> start_position_rad;
   /// What is estimated of the robot, of this cycle in start() and update(): the base's state,
-  /// contacts, external torques. Null without [estimation]; outlives the controller.
+  /// contacts, external torques and wrenches. Null without [estimation]; outlives the controller.
   const hal::EstimateImage* estimate;
   /// Runs the robot ahead of its time; null where the run has no model of it: a real robot without
   /// [parallel]. It outlives the controller. docs/internal-model.md
@@ -126,7 +126,7 @@ class Controller {
 
 /// Version of what a plugin sees: this header and those that it includes. Raised with every change
 /// of them after which a plugin has to be built again. How a robot is wired is in none of them.
-inline constexpr std::uint32_t kControllerInterface = 9;
+inline constexpr std::uint32_t kControllerInterface = 10;
 
 /// FNV-1a of some numbers, folded to 16 bits.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::initializer_list<std::size_t> numbers) noexcept {

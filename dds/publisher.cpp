@@ -14,6 +14,7 @@
 #include "dds/joint_topics.hpp"
 #include "dds/message_parts.hpp"
 #include "dds/sensor_topics.hpp"
+#include "dds/wrench_topics.hpp"
 
 namespace tandem::dds {
 namespace {
@@ -32,6 +33,7 @@ constexpr std::uint32_t kNeedsState = bit(Topic::kJointStates) | bit(Topic::kDyn
                                       bit(Topic::kDiagnostics) | bit(Topic::kState);
 constexpr std::uint32_t kNeedsCommand = bit(Topic::kCommand);
 constexpr std::uint32_t kNeedsTruth = bit(Topic::kTf) | bit(Topic::kOdom);
+constexpr std::uint32_t kNeedsEstimate = kNeedsTruth | bit(Topic::kWrench);
 
 constexpr std::size_t aligned(std::size_t bytes) { return (bytes + 15) / 16 * 16; }
 
@@ -49,8 +51,13 @@ std::int64_t wall_less_monotonic() {
   return offset;
 }
 
-Status check_names(const hal::RobotConfig& robot) {
-  std::set<std::string> names;
+Status check_names(const hal::RobotConfig& robot, const std::vector<std::string>& wrenches) {
+  std::set<std::string> names, sites;
+  for (const std::string& site : wrenches) {
+    if (sites.insert(ros_token(site)).second) continue;
+    return fail("two sites of [[estimation.wrench]] are called '" + ros_token(site) + "' in ROS 2",
+                "rename '" + site + "': only letters, digits and _ make a difference");
+  }
   for (const hal::SensorConfig& sensor : robot.sensors) {
     if (names.insert(ros_token(sensor.name)).second) continue;
     return fail("two sensors are called '" + ros_token(sensor.name) + "' in ROS 2",
@@ -63,7 +70,8 @@ Status check_names(const hal::RobotConfig& robot) {
 
 Result<std::unique_ptr<Publisher>> Publisher::create(Participant& participant,
                                                      const RunDescription& run) {
-  if (const Status names = check_names(run.robot); !names) return std::unexpected(names.error());
+  if (const Status names = check_names(run.robot, run.wrenches); !names)
+    return std::unexpected(names.error());
   std::unique_ptr<Publisher> made(new Publisher(participant, run));
   if (made->error_) return std::unexpected(*made->error_);
   return made;
@@ -90,6 +98,7 @@ Publisher::Publisher(Participant& participant, const RunDescription& run)
   if (run.simulated_time) clock_ = maker.periodic<rosgraph_msgs::Clock>(Topic::kClock, "clock");
   groups_.push_back(std::make_unique<JointTopics>(maker, run));
   groups_.push_back(std::make_unique<SensorTopics>(maker, run));
+  groups_.push_back(std::make_unique<WrenchTopics>(maker, run));
   groups_.push_back(std::make_unique<FrameTopics>(maker, run));
   groups_.push_back(std::make_unique<ImageTopics>(maker, run));
   groups_.push_back(std::make_unique<DiagnosticTopics>(maker, run));
@@ -129,7 +138,7 @@ void Publisher::copy_due(const hal::CycleView& view, std::uint64_t number) noexc
   if (slot.empty()) return;
   const std::int64_t wakeup_ns = std::max<std::int64_t>(0, view.times.wakeup_ns);
   const bool truth = truth_ && view.truth != nullptr && (due & kNeedsTruth) != 0;
-  const bool estimate = estimate_ && view.estimate != nullptr && (due & kNeedsTruth) != 0;
+  const bool estimate = estimate_ && view.estimate != nullptr && (due & kNeedsEstimate) != 0;
   const Head head{number, view.time,  view.times.begin_ns - wakeup_ns,
                   due,    view.phase, view.read_code,
                   truth,  estimate};

@@ -42,6 +42,7 @@ struct RunDescription {
   bool simulated_time = false;  ///< stamps are time_ns and `clock` publishes them; else wall clock
   const hal::TruthImage* truth = nullptr;        ///< the cycles'; null: they bring none
   const hal::EstimateImage* estimate = nullptr;  ///< the same
+  std::vector<std::string> wrenches{};           ///< sites of the estimate's wrenches, in its order
   bool parallel = false;                         ///< a second robot runs beside it
   std::uint64_t run = 0;                         ///< drawn at its start
 };

@@ -41,13 +41,24 @@ struct CollisionConfig {
   hal::StopCategory reaction = hal::StopCategory::kWarn;
 };
 
+/// [[estimation.wrench]]
+struct WrenchConfig {
+  std::string site;  ///< of robot.toml
+};
+
 /// [estimation]
 struct EstimationConfig {
   std::optional<BaseConfig> base = std::nullopt;
   std::optional<ObserverConfig> observer = std::nullopt;
   std::optional<CollisionConfig> collision = std::nullopt;
+  std::vector<WrenchConfig> wrenches = {};  ///< in the image's order
 
-  [[nodiscard]] bool any() const { return base || observer || collision; }
+  [[nodiscard]] std::vector<std::string> wrench_sites() const {
+    std::vector<std::string> sites;
+    for (const WrenchConfig& wrench : wrenches) sites.push_back(wrench.site);
+    return sites;
+  }
+  [[nodiscard]] bool any() const { return base || observer || collision || !wrenches.empty(); }
 };
 
 }  // namespace tandem::estimation

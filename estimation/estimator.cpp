@@ -27,6 +27,12 @@ Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionC
   return all;
 }
 
+Result<SiteWrenches> wrenches_of(const tandem_kernels& kernels, const EstimationConfig& config) {
+  if (!config.observer)
+    return fail("wrenches explain the observer's torques", "add [estimation.observer]");
+  return SiteWrenches::make(kernels, config.wrench_sites());
+}
+
 }  // namespace
 
 Estimator::Estimator(const tandem_kernels& kernels, const ModelJoints& joints,
@@ -63,11 +69,19 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
         fail("collisions are found in the observer's torques", "add [estimation.observer]").error(),
         "estimation.collision");
   }
+  std::optional<SiteWrenches> wrenches;
+  if (!config.wrenches.empty()) {
+    auto made = wrenches_of(*kernels, config);
+    if (!made) return in_table(made.error(), "estimation.wrench");
+    wrenches.emplace(std::move(*made));
+  }
   const hal::EstimateShape shape{.base = base ? 1U : 0U,
                                  .feet = base ? base->feet().feet() : 0U,
-                                 .joints = config.observer ? robot.joints.size() : 0U};
+                                 .joints = config.observer ? robot.joints.size() : 0U,
+                                 .wrenches = config.wrenches.size()};
   std::unique_ptr<Estimator> made(new Estimator(*kernels, *joints, shape));
   made->base_ = std::move(base);
+  made->wrenches_ = std::move(wrenches);
   if (config.observer) made->observer_.emplace(*kernels, config.observer->bandwidth_Hz, step_s);
   if (config.collision) {
     auto limits = thresholds(robot, *config.collision);
@@ -76,6 +90,32 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
     made->reaction_ = config.collision->reaction;
   }
   return made;
+}
+
+Status Estimator::check(const hal::Robot& robot, const EstimationConfig& config) {
+  if (!config.base) return {};
+  const auto has = [&](hal::SensorType type) {
+    return std::ranges::find(robot.sensors, type, &hal::Sensor::type) != robot.sensors.end();
+  };
+  const auto lacks = [&](std::string what, const std::string& add) {
+    return in_table(fail(std::move(what), add + "leave [estimation.base] out").error(),
+                    "estimation.base");
+  };
+  if (!robot.floating_base)
+    return lacks("the robot's base does not move: there is nothing to estimate", "");
+  if (robot.feet.empty()) {
+    return lacks("the robot has no feet: nothing carries its base's estimate",
+                 "declare [[contact.foot]] in " + robot.file + ", or ");
+  }
+  if (!has(hal::SensorType::kImu)) {
+    return lacks("the robot has no IMU",
+                 "declare a [[sensor]] of type \"imu\" in " + robot.file + ", or ");
+  }
+  if (!has(hal::SensorType::kForceTorque)) {
+    return lacks("the foot '" + robot.feet.front().site + "' has no force/torque sensor above it",
+                 "add a [[sensor]] of type \"force_torque\" to " + robot.file + ", or ");
+  }
+  return {};
 }
 
 void Estimator::update(const hal::StateImage& state) noexcept TANDEM_RT {
@@ -101,6 +141,17 @@ void Estimator::observe(const hal::StateImage& state) noexcept {
   joints_.to_model(state.torque_Nm(), tau_.data() + (floats ? 6 : 0));
   observer_->update(q_.data(), v_.data(), tau_.data(), wrench_.data());
   joints_.to_image(observer_->residual().data() + (floats ? 6 : 0), image_.external_torque_Nm());
+  if (wrenches_) explain();
+}
+
+void Estimator::explain() noexcept {
+  wrenches_->solve(q_.data(), observer_->residual());
+  for (std::size_t i = 0; i < wrenches_->size(); ++i) {
+    const auto wrench = wrenches_->wrench(i);
+    std::copy_n(wrench.data(), 3, image_.external_force_N().data() + 3 * i);
+    std::copy_n(wrench.data() + 3, 3, image_.external_moment_Nm().data() + 3 * i);
+  }
+  image_.unexplained_torque_Nm()[0] = wrenches_->unexplained_Nm();
 }
 
 std::optional<CollisionWatch::Found> Estimator::collision() noexcept TANDEM_RT {

@@ -15,11 +15,12 @@
 #include "estimation/config.hpp"
 #include "estimation/momentum_observer.hpp"
 #include "estimation/robot_model.hpp"
+#include "estimation/site_wrenches.hpp"
 #include "hal/estimate.hpp"
 
 namespace tandem::estimation {
 
-/// Base, then external torques, then collisions, from one state image:
+/// Base, then external torques and wrenches, then collisions, from one state image:
 ///
 ///   estimator.update(state);          // every cycle, after the robot was read
 ///   estimator.image();                // what controllers, log, DDS and report see
@@ -32,12 +33,16 @@ class Estimator {
  public:
   /// @param kernels  outlive it
   /// Errors, with the key's table and what to do: BaseEstimator::make()'s, ModelJoints::make()'s;
-  /// an observer on a floating base without [estimation.base]; collisions without an observer; a
-  /// joint that the robot lacks.
+  /// an observer on a floating base without [estimation.base]; collisions or wrenches without an
+  /// observer; a joint or a site that the robot lacks.
   [[nodiscard]] static Result<std::unique_ptr<Estimator>> make(const hal::Robot& robot,
                                                                const tandem_kernels* kernels,
                                                                const EstimationConfig& config,
                                                                std::int64_t period_ns);
+
+  /// What can be said before there are kernels, which take minutes to build.
+  /// Errors: of [estimation.base], a base that does not move, and no foot, IMU or six-axis sensor.
+  [[nodiscard]] static Status check(const hal::Robot& robot, const EstimationConfig& config);
 
   void update(const hal::StateImage& state) noexcept TANDEM_RT;
   [[nodiscard]] const hal::EstimateImage& image() const noexcept { return image_; }
@@ -58,12 +63,14 @@ class Estimator {
   Estimator(const tandem_kernels& kernels, const ModelJoints& joints,
             const hal::EstimateShape& shape);
   void observe(const hal::StateImage& state) noexcept;
+  void explain() noexcept;
 
   const tandem_kernels* kernels_;
   ModelJoints joints_;
   hal::EstimateImage image_;
   std::optional<BaseEstimator> base_;
   std::optional<MomentumObserver> observer_;
+  std::optional<SiteWrenches> wrenches_;  // all of it is scratch: nothing to archive
   std::optional<CollisionWatch> watch_;
   hal::StopCategory reaction_ = hal::StopCategory::kWarn;
   std::vector<double> q_, v_, tau_, wrench_;

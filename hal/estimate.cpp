@@ -10,7 +10,7 @@ namespace {
 
 // `count` of a row says these names.
 std::shared_ptr<const Layout> estimate_layout(const EstimateShape& shape) {
-  const auto [base, feet, joints] = shape;
+  const auto [base, feet, joints, wrenches] = shape;
   auto layout = std::make_shared<Layout>();
 #define TANDEM_FIELD(type, name, count, doc) \
   layout->add(wire_name(#name), field_type<type>(), count, doc);

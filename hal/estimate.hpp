@@ -13,9 +13,10 @@ namespace tandem::hal {
 
 /// What an EstimateImage has room for. Zero where nothing is declared.
 struct EstimateShape {
-  std::size_t base = 0;    ///< 1: a floating base
-  std::size_t feet = 0;    ///< of the robot's feet, in its order; with the base
-  std::size_t joints = 0;  ///< of the observer's external torques, in the state image's order
+  std::size_t base = 0;      ///< 1: a floating base
+  std::size_t feet = 0;      ///< of the robot's feet, in its order; with the base
+  std::size_t joints = 0;    ///< of the observer's external torques, in the state image's order
+  std::size_t wrenches = 0;  ///< declared places, in the order of [[estimation.wrench]]
 };
 
 /// The accessors of hal/estimate_fields.inc. W is z-up; its origin is below the base where the
@@ -36,6 +37,7 @@ class EstimateImage : public Image {
   [[nodiscard]] bool estimates_base() const noexcept { return base_valid_.count != 0; }
   [[nodiscard]] std::size_t feet() const noexcept { return contact_probability_.count; }
   [[nodiscard]] std::size_t joints() const noexcept { return external_torque_Nm_.count; }
+  [[nodiscard]] std::size_t wrenches() const noexcept { return external_force_N_.count / 3; }
 };
 
 }  // namespace tandem::hal

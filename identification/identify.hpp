@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,15 +48,17 @@ struct LinkResult {
 /// A joint. Friction and offset are the sum of what is lost between the motor's current and the
 /// measured torque, and between that and the motion. Not identifiable: NaN.
 struct JointResult {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   std::string name;
   bool slides = false;
   Estimate viscous_Nms_rad, coulomb_Nm, rotor_inertia_kg_m2, offset_Nm;
   Estimate link_viscous_Nms_rad, link_coulomb_Nm;  ///< the share behind the torque measurement
   Estimate motor_viscous_Nms_rad;                  ///< the share before it
-  double delay_s = 0.0;         ///< by which the torque is sampled later than the position
-  double rms_Nm = 0.0;          ///< of the residual, on held-out data
-  double relative_error = 0.0;  ///< over the torque, both as RMS; NaN without held-out data
-  double described_rms_Nm = 0.0, described_relative_error = 0.0;  ///< of the description alone
+  double delay_s = 0.0;              ///< by which the torque is sampled later than the position
+  double rms_Nm = kUnknown;          ///< of the residual, on held-out data; NaN without
+  double relative_error = kUnknown;  ///< over the torque, both as RMS; NaN without held-out data
+  double described_rms_Nm = kUnknown,
+         described_relative_error = kUnknown;  ///< of the description alone
   // On the held-out data:
   std::vector<double> time_s, measured_Nm, described_Nm, identified_Nm;
 };

@@ -78,9 +78,14 @@ std::string html_table(const PageTable& table) {
 
 }  // namespace
 
+std::string page_begin(const std::string& by) {
+  return "<!doctype html>\n<!-- Written by `" + by + "`. -->\n";
+}
+
 Status write_page(const Page& page, std::span<const Figure> figures, const std::string& folder) {
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+  std::string html = page_begin(page.by);
+  html += fmt::format(
+      "<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n<p>{2}</p>\n",
       xml_text(page.title), kStyle, xml_text(page.lead));

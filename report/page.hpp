@@ -27,7 +27,11 @@ struct Page {
   std::string lead;  ///< one sentence under the title
   Facts facts;
   std::vector<PageTable> tables;
+  std::string by = "tandem report";  ///< the command that writes it, for page_begin()
 };
+
+/// How the page of a command begins: by it a page is known that may be written over.
+[[nodiscard]] std::string page_begin(const std::string& by);
 
 /// Writes `folder`/report.html with the figures' SVG files (from draw()) inlined.
 /// Errors: an SVG file or the page cannot be read or written.

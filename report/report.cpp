@@ -16,6 +16,7 @@
 #include "report/parallel_figures.hpp"
 #include "report/replay.hpp"
 #include "report/run_figures.hpp"
+#include "report/wrench_figures.hpp"
 
 namespace tandem::report {
 namespace {
@@ -274,6 +275,10 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
     for (Figure& figure : difference_figures(*run, *others.front()))
       figures.push_back(std::move(figure));
   }
+  auto wrenches = wrench_figures(*run);
+  if (!wrenches) return std::unexpected(wrenches.error());
+  figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
+                 std::make_move_iterator(wrenches->end()));
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
   if (const Status s = write_page(page, figures, folder); !s) {

@@ -44,6 +44,8 @@ Status read_configuration(RunData& run) {
       run.position_of = report.text_or("position_of", {});
       run.torque_of = report.text_or("torque_of", {});
       run.foot = report.text_or("foot", {});
+      for (TomlTable& one : root.table_or_empty("estimation").tables("wrench"))
+        run.wrenches.push_back(one.text_or("site", {}));
       run.settle_s = log::settle_time_s(root);
     }
   }

@@ -56,6 +56,7 @@ struct RunData {
   hal::RobotConfig robot;  ///< as it was logged
   model::Tree tree;
   std::string position_of, torque_of, foot;  ///< the experiment's [report]; may be empty
+  std::vector<std::string> wrenches;         ///< sites of its [[estimation.wrench]]
 
   double settle_s = 0.0;         ///< from bring-up to the controllers' start
   bool controllers_ran = true;   ///< false: the rows are those in which they were waited for

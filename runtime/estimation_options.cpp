@@ -1,11 +1,17 @@
 #include "runtime/estimation_options.hpp"
 
+#include <algorithm>
+
+#include "base/nearest.hpp"
+#include "estimation/site_wrenches.hpp"
+
 namespace tandem::runtime {
 namespace {
 
 using estimation::BaseConfig;
 using estimation::CollisionConfig;
 using estimation::ObserverConfig;
+using estimation::WrenchConfig;
 
 BaseConfig read_base(TomlTable table) {
   BaseConfig base;
@@ -55,6 +61,30 @@ CollisionConfig read_collision(TomlTable table, const hal::RobotConfig& robot) {
   return collision;
 }
 
+std::vector<WrenchConfig> read_wrenches(TomlTable& parent, const hal::RobotConfig& robot) {
+  std::vector<std::string> sites;
+  for (const hal::SiteConfig& site : robot.model.sites) sites.push_back(site.name);
+  std::vector<WrenchConfig> wrenches;
+  for (TomlTable& table : parent.tables("wrench")) {
+    WrenchConfig wrench{.site = table.text("site")};
+    if (!wrench.site.empty() && std::ranges::find(sites, wrench.site) == sites.end()) {
+      table.error("site", "the robot has no site '" + wrench.site + "'",
+                  sites.empty() ? "declare the place as a [[site]] in " + robot.file
+                                : suggest(wrench.site, sites));
+    }
+    if (std::ranges::find(wrenches, wrench.site, &WrenchConfig::site) != wrenches.end())
+      table.error("site", "the site '" + wrench.site + "' is there twice", "leave one out");
+    table.finish();
+    wrenches.push_back(std::move(wrench));
+  }
+  if (wrenches.size() > estimation::kMostWrenches) {
+    parent.error("wrench",
+                 "wrenches at more than " + std::to_string(estimation::kMostWrenches) + " sites",
+                 "leave out those that nothing touches");
+  }
+  return wrenches;
+}
+
 }  // namespace
 
 estimation::EstimationConfig read_estimation(TomlTable table, const hal::RobotConfig& robot) {
@@ -62,6 +92,7 @@ estimation::EstimationConfig read_estimation(TomlTable table, const hal::RobotCo
   if (table.has("base")) config.base = read_base(table.table("base"));
   if (table.has("observer")) config.observer = read_observer(table.table("observer"));
   if (table.has("collision")) config.collision = read_collision(table.table("collision"), robot);
+  if (table.has("wrench")) config.wrenches = read_wrenches(table, robot);
   table.finish();
   return config;
 }

@@ -127,6 +127,8 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
   if (kernels && kernels->get() == nullptr &&
       overrides.missing_kernels != MissingKernels::kTolerate) {
     if (!overrides.serves) add_controllers(c, errors);
+    const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
+    if (!needs) errors.add(needs.error(), e.file, 0);
     if (!errors.empty()) return false;
     c.notes.clear();
     kernels = supply_kernels(robot, e.kernel_variant, overrides.missing_kernels);

@@ -42,6 +42,7 @@ Result<std::unique_ptr<DdsRun>> DdsRun::open(const Composition& c, const std::st
                       .simulated_time = c.backend->pace() == hal::Pace::kSimulatedClock,
                       .truth = truth,
                       .estimate = c.estimator == nullptr ? nullptr : &c.estimator->image(),
+                      .wrenches = e.estimation.wrench_sites(),
                       .parallel = c.parallel != nullptr,
                       .run = draw_run()});
   if (!publisher) return std::unexpected(publisher.error());

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "apps/control/fault_table.hpp"
+#include "apps/control/rate_limit.hpp"
+#include "base/clock_ns.hpp"
 #include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
 #include "rt/clock.hpp"
@@ -148,42 +150,50 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
 }
 
 void add_predict(ControlRegistry& registry, internal_model::PredictionService* service,
-                 const hal::RobotConfig& robot) {
-  registry.add("predict", ControlEffect::kReads,
-               "what the robot will do, by running its model ahead",
-               {{.name = "horizon_s",
-                 .type = ControlKey::Type::kNumber,
-                 .doc = "[s] from one cycle to 10; default 1"},
-                {.name = "every_cycles",
-                 .type = ControlKey::Type::kInteger,
-                 .doc = "cycles between two rows of the answer; default: about 100 rows"}},
-               [service, &robot](const Json& request) -> Result<Json> {
-                 if (service == nullptr) {
-                   return fail("this run has no model of its robot to predict with",
-                               "add [parallel] to the experiment (docs/internal-model.md)");
-                 }
-                 const double horizon_s = request.value("horizon_s", 1.0);
-                 const auto every = request.value("every_cycles", std::int64_t{0});
-                 constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
-                 if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
-                   return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
-                 }
-                 if (request.contains("every_cycles") && every < 1) {
-                   return fail("predict: \"every_cycles\" is less than 1");
-                 }
-                 const auto answer = service->predict(std::llround(horizon_s * 1e9));
-                 if (!answer) return std::unexpected(answer.error());
-                 const std::size_t cycles = answer->prediction.cycles;
-                 const std::size_t usual = std::max<std::size_t>(1, cycles / kRowsAnswered);
-                 const std::size_t step = every > 0 ? static_cast<std::size_t>(every) : usual;
-                 const std::size_t most = kNumbersAnswered / (3 * robot.joints.size() + 7);
-                 if (cycles / step >= most) {
-                   return fail(fmt::format("predict: {} rows of {} are too many for an answer",
-                                           cycles / step, counted(robot.joints.size(), "joint")),
-                               fmt::format("every_cycles from {} on", cycles / most + 1));
-                 }
-                 return answer_json(*answer, robot, step);
-               });
+                 const hal::RobotConfig& robot, std::function<std::int64_t()> now_ns) {
+  if (!now_ns) now_ns = [] { return clock_ns(CLOCK_MONOTONIC); };
+  registry.add(
+      "predict", ControlEffect::kReads, "what the robot will do, by running its model ahead",
+      {{.name = "horizon_s",
+        .type = ControlKey::Type::kNumber,
+        .doc = "[s] from one cycle to 10; default 1"},
+       {.name = "every_cycles",
+        .type = ControlKey::Type::kInteger,
+        .doc = "cycles between two rows of the answer; default: about 100 rows"}},
+      [service, &robot, now_ns = std::move(now_ns),
+       limit = RateLimit(kPredictionsPerSecond)](const Json& request) mutable -> Result<Json> {
+        if (service == nullptr) {
+          return fail("this run has no model of its robot to predict with",
+                      "add [parallel] to the experiment (docs/internal-model.md)");
+        }
+        const double horizon_s = request.value("horizon_s", 1.0);
+        const auto every = request.value("every_cycles", std::int64_t{0});
+        constexpr double kMost_s = 1e6;  // what no number of nanoseconds overflows
+        if (!std::isfinite(horizon_s) || std::abs(horizon_s) > kMost_s) {
+          return fail("predict: \"horizon_s\" is out of range", "from one cycle to 10 s");
+        }
+        if (request.contains("every_cycles") && every < 1) {
+          return fail("predict: \"every_cycles\" is less than 1");
+        }
+        if (!limit.take(now_ns())) {
+          return fail(fmt::format("predict: more than {} were asked for in a second",
+                                  kPredictionsPerSecond),
+                      "each costs the loop a copy: wait 0.1 s, or ask for a longer "
+                      "horizon and fewer times");
+        }
+        const auto answer = service->predict(std::llround(horizon_s * 1e9));
+        if (!answer) return std::unexpected(answer.error());
+        const std::size_t cycles = answer->prediction.cycles;
+        const std::size_t usual = std::max<std::size_t>(1, cycles / kRowsAnswered);
+        const std::size_t step = every > 0 ? static_cast<std::size_t>(every) : usual;
+        const std::size_t most = kNumbersAnswered / (3 * robot.joints.size() + 7);
+        if (cycles / step >= most) {
+          return fail(fmt::format("predict: {} rows of {} are too many for an answer",
+                                  cycles / step, counted(robot.joints.size(), "joint")),
+                      fmt::format("every_cycles from {} on", cycles / most + 1));
+        }
+        return answer_json(*answer, robot, step);
+      });
 }
 
 }  // namespace tandem::apps

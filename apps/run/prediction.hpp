@@ -3,6 +3,8 @@
 // the serving thread.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "apps/control/control_registry.hpp"
@@ -20,8 +22,14 @@ namespace tandem::apps {
 [[nodiscard]] Result<std::unique_ptr<internal_model::Fork>> make_fork(
     const Composition& composition, const runtime::CycleConfig& config);
 
-/// Adds "predict". @param service  null: the run has no model of its robot, which is the answer
+/// Predictions that all peers of a run together may ask for, over its socket and DDS: so many at
+/// once, then so many a second. Each costs one cycle a copy. Controllers are not counted.
+inline constexpr std::int64_t kPredictionsPerSecond = 10;
+
+/// Adds "predict", which refuses more than kPredictionsPerSecond.
+/// @param service  null: the run has no model of its robot, which is the answer
+/// @param now_ns   a clock that does not go back; empty: CLOCK_MONOTONIC
 void add_predict(ControlRegistry& registry, internal_model::PredictionService* service,
-                 const hal::RobotConfig& robot);
+                 const hal::RobotConfig& robot, std::function<std::int64_t()> now_ns = {});
 
 }  // namespace tandem::apps

@@ -392,6 +392,27 @@ Json RunSummary::json() const {
   return json;
 }
 
+namespace {
+
+/// The faults of the scenario that were due after the run's end.
+std::vector<std::string> never_injected(const Composition& c, const runtime::RobotCycle& cycle) {
+  std::vector<std::string> all;
+  if (c.sim == nullptr) return all;
+  const double ended_s = static_cast<double>(cycle.state().time_ns()[0]) * 1e-9;
+  for (const sim::FaultSlot& slot : c.sim->robot().faults()) {
+    if (slot.acted != 0) continue;
+    const bool enabled = slot.fault.from == sim::FaultFrom::kEnabled;
+    all.push_back(fmt::format(
+        "the fault '{}' was never injected: it is due {:.3f} s after {}, and the run ended {:.3f} "
+        "s after its first SYNC",
+        hal::to_string(slot.fault.kind), static_cast<double>(slot.fault.start_ns) * 1e-9,
+        enabled ? "the drives are enabled" : "the first SYNC", ended_s));
+  }
+  return all;
+}
+
+}  // namespace
+
 std::vector<std::string> RunSummary::warnings() const {
   std::vector<std::string> all;
   if (composition.master != nullptr) all = composition.master->warnings();
@@ -403,6 +424,7 @@ std::vector<std::string> RunSummary::warnings() const {
         "the robot has to stand still on its feet for {} s ([estimation.base] rest_s)",
         composition.experiment.estimation.base->rest_s));
   }
+  for (std::string& one : never_injected(composition, cycle)) all.push_back(std::move(one));
   if (composition.tele == nullptr) return all;
   const remote::TeleConfig& link = composition.experiment.teleoperation->link;
   const double silent_s = static_cast<double>(composition.tele->figures().silent_cycles) *

@@ -3,7 +3,9 @@
 #include <filesystem>
 
 #include "apps/robot/kernel_store.hpp"
+#include "apps/text/console.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
+#include "report/page.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -33,6 +35,11 @@ Result<report::ReportFiles> draw_report(const std::string& log,
     return kernels.get();
   };
   const std::string folder = output.empty() ? default_folder(log, others) : output;
+  if (const Status lost = check_overwrites(
+          folder + "/report.html", report::page_begin("tandem report"), "page of `tandem report`");
+      !lost) {
+    return std::unexpected(lost.error());
+  }
   return report::make_report(log, others, folder, find, hal::can::DriveMaster::error_text);
 }
 

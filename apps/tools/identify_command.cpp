@@ -148,6 +148,11 @@ void print_result(std::FILE* out, const Identification& result) {
 Exit identify_command(const IdentifyOptions& options) {
   const auto robot = read_robot(options.robot);
   if (!robot) return refuse(robot.error());
+  if (const Status s = check_identified(*robot, options.logs, options.output); !s)
+    return refuse(s.error());
+  const auto result = identification::identify(options.logs, robot->config, robot->tree,
+                                               {.cutoff_Hz = options.cutoff_Hz});
+  if (!result) return refuse(result.error());
   std::error_code problem;
   std::filesystem::create_directories(options.output, problem);
   if (problem) {
@@ -157,11 +162,6 @@ Exit identify_command(const IdentifyOptions& options) {
                         0,
                         {}});
   }
-  if (const Status s = check_identified(*robot, options.logs, options.output); !s)
-    return refuse(s.error());
-  const auto result = identification::identify(options.logs, robot->config, robot->tree,
-                                               {.cutoff_Hz = options.cutoff_Hz});
-  if (!result) return refuse(result.error());
   std::FILE* out = human_output(options.json);
   print_result(out, *result);
   for (const std::string& remark : result->remarks) fmt::print(stderr, "note: {}\n", remark);

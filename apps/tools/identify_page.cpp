@@ -54,8 +54,8 @@ report::PageTable joints_table(const Identification& result) {
        "viscous [Nms/rad]", "Coulomb [Nm]", "rotor [kg m2]", "offset [Nm]", "delay [ms]"},
       {}};
   for (const JointResult& joint : result.joints) {
-    table.rows.push_back({joint.name, fmt::format("{:.3f}", joint.described_rms_Nm),
-                          fmt::format("{:.3f}", joint.rms_Nm),
+    const auto rms = [](double Nm) { return std::isfinite(Nm) ? fmt::format("{:.3f}", Nm) : "-"; };
+    table.rows.push_back({joint.name, rms(joint.described_rms_Nm), rms(joint.rms_Nm),
                           percent(joint.described_relative_error), percent(joint.relative_error),
                           of(joint.viscous_Nms_rad), of(joint.coulomb_Nm),
                           of(joint.rotor_inertia_kg_m2), of(joint.offset_Nm),
@@ -129,6 +129,7 @@ Result<std::string> write_identify_page(const Identification& result, const std:
   for (std::size_t j = 0; j < result.joints.size(); ++j)
     if (!result.joints[j].time_s.empty()) figures.push_back(figure_of(result.joints[j], j));
   report::Page page;
+  page.by = "tandem identify";
   page.title = robot + ": identification";
   page.lead =
       "Measured torque of every joint on data that was held back, beside what the "

@@ -118,6 +118,22 @@ TEST_F(EstimatedReport, TakesTheBaseFromTheEstimateWhereTheLogHasNoTruth) {
   EXPECT_EQ(tandem("log info logs/coman-without-001.mcap").out.find("/tf"), std::string::npos);
 }
 
+// COMAN's only site that is no foot: its pelvis, where nothing touches it.
+TEST_F(EstimatedReport, DrawsTheForceAtEachDeclaredPlace) {
+  const Outcome with = report("with",
+                              "[estimation.base]\n[estimation.observer]\n"
+                              "[[estimation.wrench]]\nsite = \"imu\"\n");
+  ASSERT_EQ(with.status, 0) << with.err;
+  EXPECT_NE(page("with").find("imu: force on the robot"), std::string::npos);
+  EXPECT_TRUE(
+      std::filesystem::exists(folder_ / "logs" / "coman-with-001" / "external_force_imu.png"));
+  const Outcome rows = tandem(
+      "log csv logs/coman-with-001.mcap --topic /tandem/estimate "
+      "--fields external_force_n,external_moment_nm,unexplained_torque_nm");
+  EXPECT_EQ(rows.status, 0) << rows.err;
+  EXPECT_NE(rows.out.find("unexplained_torque_nm"), std::string::npos);
+}
+
 TEST_F(EstimatedReport, RefusesARobotWhoseFeetHaveNoSensors) {
   const std::string config = TANDEM_SOURCE_DIR "/config/anymal_c/";
   std::string text = read_text(config + "squat.toml");
@@ -128,6 +144,22 @@ TEST_F(EstimatedReport, RefusesARobotWhoseFeetHaveNoSensors) {
   EXPECT_NE(refused.err.find("estimation.base"), std::string::npos) << refused.err;
   EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
   EXPECT_EQ(error_lines(refused.err), 1) << refused.err;
+}
+
+TEST_F(EstimatedReport, RefusesThatRobotBeforeItsKernelsAreCompiled) {
+  const std::string config = TANDEM_SOURCE_DIR "/config/anymal_c/";
+  for (const auto& entry : std::filesystem::directory_iterator(config))
+    std::filesystem::copy(entry, folder_ / entry.path().filename(),
+                          std::filesystem::copy_options::overwrite_existing);
+  std::string robot = read_text(folder_ / "robot.toml");
+  robot.replace(robot.find("name = \"anymal_c\""), 17, "name = \"other\"");
+  write_text(folder_ / "robot.toml", robot);
+  write_text(folder_ / "squat.toml", read_text(folder_ / "squat.toml") + "\n[estimation.base]\n");
+  const Outcome refused = tandem("run squat.toml --duration 1 --no-log",
+                                 "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
+  EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;
 }
 
 }  // namespace

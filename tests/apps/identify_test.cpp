@@ -347,6 +347,7 @@ TEST_F(Identify, OfAShortLogIsOneError) {
   const Outcome result = tandem("identify " + log() + " --robot robot.toml --out found");
   EXPECT_EQ(result.status, 2);
   EXPECT_NE(result.err.find("too short to identify anything"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "found")) << "no folder for nothing";
 }
 
 TEST_F(Identify, OfARobotThatStandsIsOneError) {

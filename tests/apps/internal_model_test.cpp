@@ -174,6 +174,30 @@ TEST(PredictCommand, OfARunWithoutAModelSaysWhatIsMissing) {
   EXPECT_NE(answer["hint"].get<std::string>().find("add [parallel]"), std::string::npos) << answer;
 }
 
+/// By a clock of the test's own. The questions themselves are out of range, so that none is worked
+/// at.
+TEST(PredictCommand, IsRefusedToPeersThatAskAgainAndAgain) {
+  ControlRegistry registry;
+  const hal::RobotConfig robot;
+  internal_model::PredictionService service(1'000'000);
+  std::int64_t now_ns = 5'000'000'000;
+  add_predict(registry, &service, robot, [&] { return now_ns; });
+  const auto ask = [&] {
+    return registry.answer(R"({"do": "predict", "horizon_s": 100})")["error"].get<std::string>();
+  };
+  const std::string too_many = "predict: more than 10 were asked for in a second";
+  for (int i = 0; i < 10; ++i) EXPECT_NE(ask().find("a horizon of 100 s"), std::string::npos) << i;
+  EXPECT_EQ(ask(), too_many);
+  now_ns += 99'999'999;
+  EXPECT_EQ(ask(), too_many) << "those that are refused do not count";
+  now_ns += 1;
+  EXPECT_NE(ask(), too_many) << "one more each tenth of a second";
+  EXPECT_EQ(ask(), too_many);
+  now_ns += 60'000'000'000;
+  for (int i = 0; i < 10; ++i) EXPECT_NE(ask(), too_many) << "a long silence saves up no more";
+  EXPECT_EQ(ask(), too_many);
+}
+
 TEST_F(Predict, WithoutARunIsAnError) {
   const Outcome refused = to_run("predict");
   EXPECT_EQ(refused.status, 2);

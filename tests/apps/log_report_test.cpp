@@ -29,6 +29,19 @@ TEST_F(LogAndReport, InfoTellsTopicsAndMetadata) {
   EXPECT_EQ(json["data_sha256"].get<std::string>().size(), 64U);
 }
 
+TEST_F(LogAndReport, ReportDestroysNoPageThatItDidNotWrite) {
+  std::filesystem::create_directories(folder_ / "mine");
+  write_text(folder_ / "mine/report.html", "<!doctype html>\n<title>mine</title>\n");
+  const Outcome refused = tandem("report " + log_ + " -o mine");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_NE(refused.err.find("no page of `tandem report`: it would be lost"), std::string::npos)
+      << refused.err;
+  EXPECT_EQ(read_text(folder_ / "mine/report.html"), "<!doctype html>\n<title>mine</title>\n");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "mine/overview.png"));
+  for (const char* again : {"once", "twice"})
+    EXPECT_EQ(tandem("report " + log_ + " -o own").status, 0) << again << ": its own page is";
+}
+
 TEST_F(LogAndReport, InfoTellsTheHashOnce) {
   const Outcome outcome = tandem("log info " + log_);
   ASSERT_EQ(outcome.status, 0) << outcome.err;

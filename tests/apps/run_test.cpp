@@ -15,6 +15,20 @@ class Run : public Program {
   }
 };
 
+TEST_F(Run, WarnsOfAFaultOfTheScenarioThatIsDueAfterItsEnd) {
+  write_text(folder_ / "late.toml",
+             "[[fault]]\nkind = \"push\"\njoint = \"joint2\"\nforce_N = [0.0, 3.0, 0.0]\n"
+             "after_enabled_s = 0.1\nfor_s = 0.1\n"
+             "[[fault]]\nkind = \"push\"\njoint = \"joint1\"\nforce_N = [0.0, 3.0, 0.0]\n"
+             "at_s = 900\n");
+  const auto json = run("hold.toml --duration 0.5 --scenario late.toml");
+  ASSERT_EQ(json["warnings"].size(), 1U) << json["warnings"];
+  const std::string warning = json["warnings"][0];
+  EXPECT_NE(warning.find("'push' was never injected: it is due 900.000 s after the first SYNC"),
+            std::string::npos)
+      << warning;
+}
+
 TEST_F(Run, WritesTheDocumentedKeys) {
   const auto json = run("hold.toml --duration 0.5 --seed 7");
   for (const std::string key :

@@ -29,8 +29,9 @@ inline runtime::CompleteRobot robot_of(const std::string& name) {
 struct RigOptions {
   std::string robot = "double_pendulum";
   bool simulated_time = true;
-  bool estimated = false;  ///< a base's estimate beside the truth
-  bool parallel = false;   ///< a second robot
+  bool estimated = false;                  ///< a base's estimate beside the truth
+  bool parallel = false;                   ///< a second robot
+  std::vector<std::string> wrenches = {};  ///< sites of the estimate's; of a fixed base with it
   Config config = own_config();
 };
 
@@ -41,6 +42,10 @@ struct PublisherRig {
         command(robot.config.shape()),
         truth(robot.config.joints.size(), robot.config.contact.feet.size()) {
     if (options.estimated) estimate.emplace(hal::EstimateShape{.base = 1, .feet = 2, .joints = 0});
+    if (!options.wrenches.empty())
+      estimate.emplace(hal::EstimateShape{.base = options.estimated ? 1U : 0U,
+                                          .joints = robot.config.joints.size(),
+                                          .wrenches = options.wrenches.size()});
     for (std::size_t i = 0; i < state.joints(); ++i) {
       const auto x = static_cast<double>(i + 1);
       state.position_rad()[i] = 0.1 * x;
@@ -70,6 +75,7 @@ struct PublisherRig {
                                                  .simulated_time = options.simulated_time,
                                                  .truth = &truth,
                                                  .estimate = shown_estimate(),
+                                                 .wrenches = options.wrenches,
                                                  .parallel = options.parallel,
                                                  .run = 77});
     EXPECT_TRUE(made) << made.error().to_string();

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <map>
 
+#include "model/dynamics.hpp"
 #include "model/mechanism.hpp"
 #include "model/sites.hpp"
 #include "tests/dds/publisher_rig.hpp"
@@ -246,6 +247,61 @@ TEST(Topics, OfOdometryAreTheEstimateWhereThereIsOne) {
     EXPECT_EQ(m.pose.pose.orientation.w, 1.0);
     EXPECT_EQ(m.twist.twist.angular.z, -0.5);
   });
+}
+
+// The image has the wrench in W's axes about the site; the message has it in its frame.
+TEST(Topics, OfAnExternalWrenchHaveItInTheFrameOfTheSitesLink) {
+  PublisherRig rig({.robot = "panda", .wrenches = {"hand"}});
+  const model::Tree& tree = rig.robot.description.tree;
+  hal::SiteConfig& site = rig.robot.config.model.sites.front();
+  ASSERT_EQ(site.name, "hand");
+  const double f[] = {12.0, -20.0, 15.0}, m[] = {1.0, 2.0, -3.0};
+  std::ranges::copy(f, rig.estimate->external_force_N().begin());
+  std::ranges::copy(m, rig.estimate->external_moment_Nm().begin());
+  // Where the link is, by another way: the kernels' algorithms.
+  model::ModelSpec spec;
+  spec.sites.push_back({.name = "link", .link = site.link});
+  const auto mechanism = model::make_mechanism(tree, spec);
+  ASSERT_TRUE(mechanism);
+  std::vector<double> q(7);
+  for (std::size_t j = 0; j < 7; ++j) {
+    const int at = rig.robot.config.joint_index(mechanism->joint_names[j]);
+    q[j] = rig.state.position_rad()[static_cast<std::size_t>(at)];
+  }
+  const std::vector<double> zero(7, 0.0);
+  const auto pose =
+      model::evaluate_kernel(model::Kernel::kSiteMotion, *mechanism, {q, zero, zero})[0];
+  const Eigen::Matrix3d R =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.data());
+  const Eigen::Vector3d force = R.transpose() * Eigen::Vector3d(f);
+  const Eigen::Vector3d moment =
+      R.transpose() * Eigen::Vector3d(m) + Eigen::Vector3d(site.xyz_m.data()).cross(force);
+  publish_and_take<geometry_msgs::WrenchStamped>(rig, "external_wrench/hand", [&](const auto& w) {
+    EXPECT_EQ(w.header.frame_id, site.link);
+    EXPECT_EQ(ns(w.header.stamp), 20'000'000);
+    EXPECT_NEAR(w.wrench.force.x, force.x(), 1e-9);
+    EXPECT_NEAR(w.wrench.force.y, force.y(), 1e-9);
+    EXPECT_NEAR(w.wrench.force.z, force.z(), 1e-9);
+    EXPECT_NEAR(w.wrench.torque.x, moment.x(), 1e-9);
+    EXPECT_NEAR(w.wrench.torque.y, moment.y(), 1e-9);
+    EXPECT_NEAR(w.wrench.torque.z, moment.z(), 1e-9);
+  });
+}
+
+TEST(Topics, OfAnExternalWrenchAreSilentUntilTheBasesEstimateHasStarted) {
+  PublisherRig rig({.robot = "coman", .estimated = true, .wrenches = {"imu"}});
+  auto reader = rig.reader<geometry_msgs::WrenchStamped>("external_wrench/imu");
+  rig.start();
+  rig.show(20);
+  rig.estimate->base_valid()[0] = 1;
+  rig.estimate->base_quaternion()[3] = 1.0;
+  rig.show(30);
+  rig.publisher->stop();
+  std::vector<std::int64_t> stamps;
+  reader.take([&](const geometry_msgs::WrenchStamped& w, const auto&) {
+    stamps.push_back(ns(w.header.stamp));
+  });
+  EXPECT_EQ(stamps, std::vector<std::int64_t>{30'000'000});
 }
 
 /// Frames as a listener puts them together: each link's placement in the root of its chain.

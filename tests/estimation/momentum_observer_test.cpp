@@ -1,8 +1,6 @@
 // The observer on arms without a compiler: what it finds of a push, and what of nothing.
 #include "estimation/momentum_observer.hpp"
 
-#include "estimation/site_wrench.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -95,23 +93,6 @@ TEST(MomentumObserver, SeesAPushThroughAFirstOrderLowPass) {
                   0.05 * std::abs(arm.external[j]) + 0.05)
           << i;
   }
-}
-
-// J^T f of a wrench at the tool, for a posture that can tell all of it.
-TEST(SiteWrench, IsTheOneThatExplainsTheTorques) {
-  Arm arm;
-  arm.q = {0.3, -1.0, 1.2, -0.8, -1.3, 0.4};
-  auto site = SiteWrench::make(*arm.kernels.get(), "tool0");
-  ASSERT_TRUE(site) << site.error().to_string();
-  const auto J = evaluate_kernel(Kernel::kSiteJacobians, arm.mechanism, {arm.q})[0];
-  const std::vector<double> wrench{20.0, -30.0, 10.0, 1.0, -2.0, 0.5};
-  std::vector<double> residual(6, 0.0);
-  for (std::size_t i = 0; i < 6; ++i)
-    for (std::size_t row = 0; row < 6; ++row) residual[i] += J[row * 6 + i] * wrench[row];
-  const auto found = site->solve(arm.q.data(), residual);
-  for (std::size_t i = 0; i < 6; ++i)
-    EXPECT_NEAR(found[static_cast<int>(i)], wrench[i], 0.05 * 30.0) << i;
-  EXPECT_FALSE(SiteWrench::make(*arm.kernels.get(), "tool1"));
 }
 
 TEST(MomentumObserver, StartsAgainAfterNumbersThatAreNotFinite) {

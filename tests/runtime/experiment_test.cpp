@@ -297,6 +297,15 @@ TEST(Experiment, RefusesWhatCannotBeEstimated) {
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {knee = 1}", "knee"));
   EXPECT_TRUE(has("[estimation.collision]\nreaction = 'warn'", "threshold_Nm"));
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbow = -1}", "elbow"));
+  auto sited = robot();
+  sited.model.sites.push_back({});
+  sited.model.sites.back().name = "tip";
+  const auto e =
+      parse_experiment(with("[[estimation.wrench]]\nsite = 'tip'\n"), "arm/x.toml", sited);
+  ASSERT_TRUE(e.has_value()) << e.error().front().to_string();
+  EXPECT_EQ(e->estimation.wrench_sites(), std::vector<std::string>{"tip"});
+  EXPECT_TRUE(has("[[estimation.wrench]]\nsite = 'tap'", "the robot has no site 'tap'"));
+  EXPECT_TRUE(has("[[estimation.wrench]]\nlink = 'hand'", "site"));
 }
 
 TEST(Experiment, SuggestsTheNearestPosture) {
