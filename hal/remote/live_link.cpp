@@ -6,9 +6,9 @@
 namespace tandem::remote {
 namespace {
 
-constexpr std::uint64_t kDriftCycles = 100;   // between two corrections of the numbers by one
-constexpr std::uint64_t kMostLeftOut = 1000;  // numbers, in one cycle of the loop
-constexpr std::uint64_t kMostCatchUp = 20;    // cycles of the twin in one of the loop
+constexpr std::uint64_t kDriftCycles = 100;       // between two corrections of the numbers by one
+constexpr std::uint64_t kMostLeftOut = 1000;      // numbers, in one cycle of the loop
+constexpr std::uint64_t kMostCatchUp = 20;        // cycles of the twin in one of the loop
 constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
 
 std::uint64_t cycles(std::int64_t ns, std::int64_t period_ns) {

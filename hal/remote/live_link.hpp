@@ -19,7 +19,8 @@ namespace tandem::remote {
 ///   of the robot says the number of the command that the joints follow: it is compared with the
 ///   twin under that one.
 /// - The two clocks differ. The numbers follow the robot's clock: at most once in 100 cycles one is
-///   left out, for which the robot interpolates, or given twice, of which the robot takes the first.
+///   left out, for which the robot interpolates, or given twice, of which the robot takes the
+///   first.
 /// - The declared networks lie before the real link. Bring-up, stops, resets, gains and shut-down
 ///   cross the real link alone.
 class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {

@@ -41,8 +41,7 @@ void Prediction::correct(const hal::StateImage& arrived, std::uint64_t number, s
   ++compared_;
   const double passed_ns = static_cast<double>(passed) * static_cast<double>(period_ns_);
   const double share =
-      1.0 -
-      std::exp(-passed_ns / static_cast<double>(std::max<std::int64_t>(1, correction_ns_)));
+      1.0 - std::exp(-passed_ns / static_cast<double>(std::max<std::int64_t>(1, correction_ns_)));
   const double* then = past(same);
   const std::span<const double> values[] = {arrived.position_rad(), arrived.velocity_rad_s(),
                                             arrived.torque_Nm()};

@@ -48,17 +48,17 @@ class Operator {
     if (predict) twin.robot = std::make_unique<runtime::test::FirstOrderRobot>(robot);
     link = std::make_unique<LiveLink>(hal::robot_of(robot), std::move(*made), std::move(twin),
                                       config, 100'000'000, kPeriod_ns);
-    EXPECT_TRUE(host.add("sine",
-                         std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
+    EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
                          runtime::test::parameters("amplitude_rad = 0.2")));
     runtime::CycleConfig wanted = real_time(running);
     wanted.bring_up_cycles = ~std::uint64_t{0};
     wanted.loop.pacing = rt::Pacing::kWallClock;
-    cycle = std::make_unique<RobotCycle>(
-        runtime::CycleParts{
-            .robot = robot, .backend = *link, .controllers = host, .clock = clock,
-            .observer = &record},
-        wanted);
+    cycle = std::make_unique<RobotCycle>(runtime::CycleParts{.robot = robot,
+                                                             .backend = *link,
+                                                             .controllers = host,
+                                                             .clock = clock,
+                                                             .observer = &record},
+                                         wanted);
   }
   /// RMS difference of what the operator saw and what it asked for, of joint 0 [rad], once the
   /// first command can have been seen.
@@ -138,9 +138,10 @@ TEST(LiveLink, TheRobotHoldsWhenTheLinkIsGone) {
   double step = 0.0;
   const auto cycles = record.cycles();
   for (std::size_t i = 1; i < cycles.size(); ++i) {
-    if (cycles[i].phase != RunPhase::kRunning || cycles[i - 1].phase != RunPhase::kRunning) continue;
-    const double moved = std::abs(cycles[i].command.position_rad()[0] -
-                                  cycles[i - 1].command.position_rad()[0]);
+    if (cycles[i].phase != RunPhase::kRunning || cycles[i - 1].phase != RunPhase::kRunning)
+      continue;
+    const double moved =
+        std::abs(cycles[i].command.position_rad()[0] - cycles[i - 1].command.position_rad()[0]);
     rest = moved == 0.0 ? rest + 1 : 0;
     most = std::max(most, rest);
     step = std::max(step, moved);
