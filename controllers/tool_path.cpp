@@ -15,10 +15,10 @@ namespace tandem {
 namespace {
 
 constexpr std::size_t kMostPlaces = 1'000'000;
-constexpr double kLargest_m = 100.0;   // of a coordinate
-constexpr double kDamping = 1e-3;      // [m] of the pseudo-inverse
-constexpr double kHome_1_s = 5.0;      // rate at which what the path leaves free returns
-constexpr double kReach_m = 0.02;      // that the site may miss its path by, at configuration
+constexpr double kLargest_m = 100.0;  // of a coordinate
+constexpr double kDamping = 1e-3;     // [m] of the pseudo-inverse
+constexpr double kHome_1_s = 5.0;     // rate at which what the path leaves free returns
+constexpr double kReach_m = 0.02;     // that the site may miss its path by, at configuration
 constexpr std::string_view kHeader = "time_s,x_m,y_m,z_m";
 
 /// Where the site is to be at a time [m], from where the path begins.
@@ -29,8 +29,11 @@ struct Place {
 
 std::unexpected<Error> wrong_line(const std::string& file, int line, std::string message,
                                   std::string hint) {
-  return std::unexpected(Error{.message = std::move(message), .hint = std::move(hint), .file = file,
-                               .line = line, .key = {}});
+  return std::unexpected(Error{.message = std::move(message),
+                               .hint = std::move(hint),
+                               .file = file,
+                               .line = line,
+                               .key = {}});
 }
 
 /// "1.5,0,-0.25,3" in full; false: it is something else.
@@ -223,8 +226,8 @@ class ToolPath : public Controller {
     double share = 1.0;
     for (Eigen::Index k = 0; k < J_.cols(); ++k) {
       move_[k] = back_[k] + J_.col(k).dot(pull);
-      const double most = period_s_ * robot_->joints[joints_[static_cast<std::size_t>(k)]]
-                                          .max_velocity_rad_s;
+      const double most =
+          period_s_ * robot_->joints[joints_[static_cast<std::size_t>(k)]].max_velocity_rad_s;
       if (std::abs(move_[k]) > most) share = std::min(share, most / std::abs(move_[k]));
     }
     for (std::size_t k = 0; k < joints_.size(); ++k) {
