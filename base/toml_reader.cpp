@@ -475,15 +475,15 @@ Result<TomlDocument> TomlDocument::parse(std::string_view text, const std::strin
   return document;
 }
 
-const std::string& TomlTable::file() const { return shared_->file; }
-
 TomlTable TomlDocument::root() const { return {shared_, &shared_->root, {}, 1}; }
 const Diagnostics& TomlDocument::diagnostics() const { return shared_->diagnostics; }
 const std::string& TomlDocument::file() const { return shared_->file; }
 
-std::string TomlDocument::folder() const {
+std::string TomlTable::folder() const {
   const std::string folder = std::filesystem::path(shared_->file).parent_path().string();
   return folder.empty() ? "." : folder;
 }
+
+std::string TomlDocument::folder() const { return root().folder(); }
 
 }  // namespace tandem

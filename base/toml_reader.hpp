@@ -102,7 +102,8 @@ class TomlTable {
   /// key that stands outside one is an error, for all of them.
   [[nodiscard]] bool holds_tables();
 
-  [[nodiscard]] const std::string& file() const;  ///< its document's, for paths relative to it
+  /// The file's folder, for paths given relative to the file; "." when it has none.
+  [[nodiscard]] std::string folder() const;
   [[nodiscard]] const std::string& path() const { return path_; }  ///< dotted, "" for the root
   [[nodiscard]] int line() const;
   [[nodiscard]] int line(std::string_view key) const;  ///< of the key's value; else the table's

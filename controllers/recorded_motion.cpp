@@ -105,7 +105,7 @@ class RecordedMotion : public Controller {
   Status read_log(const ControllerSetup& setup, const std::string& path, const std::string& sha256,
                   const log::MotionRequest& request) {
     const auto file = log::LogFile::open(
-        (std::filesystem::path(setup.parameters.file()).parent_path() / path).string());
+        (std::filesystem::path(setup.parameters.folder()) / path).string());
     if (!file) return std::unexpected(file.error());
     if (!sha256.empty() && sha256 != file->data_sha256()) {
       return fail("is another recording than the one that data_sha256 names",

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "controllers/controller.hpp"
+#include "hal/remote/robot_side.hpp"
 #include "hal/remote_command.hpp"
 
 namespace tandem::runtime {
@@ -26,22 +27,30 @@ class OwnerController final : public Controller {
     }
     return {};
   }
+  /// Has joints of its own, whatever the owner commands. Outlives this; null: nobody does.
+  void beside(remote::RobotSide* side) { side_ = side; }
   /// What update() writes from now on.
   void follow(const hal::RemoteCommand& wish) noexcept TANDEM_RT {
     command_ = wish.live ? wish.command : nullptr;
     done_ = wish.done && wish.ends_run;
   }
 
-  void start(const hal::CycleTime&, const hal::StateImage&,
-             hal::CommandImage&) noexcept TANDEM_RT override {}
-  [[nodiscard]] Code update(const hal::CycleTime&, const hal::StateImage&,
+  void start(const hal::CycleTime& time, const hal::StateImage& state,
+             hal::CommandImage& command) noexcept TANDEM_RT override {
+    if (side_ != nullptr) side_->start(time, state, command);
+  }
+  [[nodiscard]] Code update(const hal::CycleTime& time, const hal::StateImage& state,
                             hal::CommandImage& command) noexcept TANDEM_RT override {
     if (command_ != nullptr) command.assign(*command_);
+    if (side_ != nullptr) {
+      if (const Code code = side_->update(time, state, command); code != Code::kOk) return code;
+    }
     return done_ ? Code::kStopped : Code::kOk;
   }
 
  private:
   const hal::CommandImage* command_ = nullptr;  // null: what was commanded last stays
+  remote::RobotSide* side_ = nullptr;
   bool done_ = false;
 };
 

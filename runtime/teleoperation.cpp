@@ -63,11 +63,18 @@ remote::NetworkConfig read_network(TomlTable table) {
 
 }  // namespace
 
+std::uint64_t playout_cycles(const Teleoperation& t, std::int64_t period_ns) {
+  const double down_s = t.link.down.delay_s + kPlayoutJitters * t.link.down.jitter_s;
+  const std::int64_t all_ns = t.link.playout_ns + ns(down_s);
+  return static_cast<std::uint64_t>((all_ns + period_ns - 1) / period_ns);
+}
+
 std::optional<Teleoperation> read_teleoperation(TomlTable& root) {
   if (!root.has("teleoperation")) return std::nullopt;
   TomlTable table = root.table("teleoperation");
   Teleoperation read;
   remote::TeleConfig& config = read.link;
+  read.real = table.choice_or("link", "modelled", {"modelled", "real"}) == "real";
   config.predict = table.boolean_or("predict", config.predict);
   config.up = read_network(table.table_or_empty("up"));
   config.down = read_network(table.table_or_empty("down"));

@@ -13,9 +13,15 @@ namespace tandem::runtime {
 
 struct Teleoperation {
   remote::TeleConfig link;  ///< its seed is left to the caller
+  /// The link is there, and slow by itself: in real time nothing is added to it.
+  bool real = false;
   /// [[teleoperation.robot_controller]]: at the robot's end, by its own state
   std::vector<ControllerSpec> robot_controllers;
 };
+
+/// The cycles of the robot from what an operator saw to the effect of what it commanded then: down,
+/// and play-out.
+[[nodiscard]] std::uint64_t playout_cycles(const Teleoperation& t, std::int64_t period_ns);
 
 /// Reads it, strictly; empty when the experiment has no such table.
 [[nodiscard]] std::optional<Teleoperation> read_teleoperation(TomlTable& root);

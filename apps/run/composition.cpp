@@ -175,6 +175,14 @@ void serve_only(runtime::Experiment& e, bool lockstep) {
   e.remote.lockstep = e.remote.lockstep || lockstep;
 }
 
+/// What stays at this end of a link, while its owner is at the other.
+void add_robot_side(Composition& c, runtime::OwnerController& owner, Collector& errors) {
+  auto side = robot_side_of(c);
+  if (!side) return errors.add(side.error());
+  c.robot_side = std::move(*side);
+  owner.beside(c.robot_side.get());
+}
+
 /// The controller that an owner in another process is.
 void add_owner(Composition& c, Collector& errors) {
   const runtime::Experiment& e = c.experiment;
@@ -186,6 +194,7 @@ void add_owner(Composition& c, Collector& errors) {
   const auto nothing = TomlDocument::parse("", e.file);
   const Status added = c.controllers->add(runtime::kOwnerController, owner, nothing->root(), false);
   if (!added) return errors.add(added.error(), e.file, 0);
+  if (e.teleoperation && e.controllers.empty()) add_robot_side(c, *owner, errors);
   c.owner = std::move(owner);
 }
 
@@ -271,12 +280,11 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
-  const bool at_any_speed =
-      e.hal.backend == runtime::BackendKind::kSim || (is_remote && e.hal.lockstep);
-  if (e.teleoperation && !at_any_speed) {
-    return {{.message = "the link's model runs in simulated time",
-             .hint = "leave out --hal, or add --hal dds --lockstep; on a real link use tc instead "
-                     "(tandem check prints the command)",
+  const bool is_wire = e.hal.backend == runtime::BackendKind::kWire;
+  if (e.teleoperation && is_wire && !overrides.serves) {
+    return {{.message = "the link lies between two processes",
+             .hint = "run with --hal dds, and serve the robot: tandem serve " + e.file + " --hal " +
+                     e.hal.wire,
              .file = e.file,
              .key = "teleoperation"}};
   }
@@ -288,9 +296,9 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "teleoperation"}};
   }
-  if (e.teleoperation && overrides.serves) {
-    return {{.message = "the link is at the operator's end",
-             .hint = "serve the robot by an experiment without this table",
+  if (e.teleoperation && overrides.serves && (overrides.lockstep || e.remote.lockstep)) {
+    return {{.message = "in lockstep the link is at the operator's end",
+             .hint = "leave --lockstep out, or serve the robot by an experiment without this table",
              .file = e.file,
              .key = "teleoperation"}};
   }
@@ -377,8 +385,9 @@ Diagnostics add_parallel(Composition& c, const Overrides& overrides) {
   return {};
 }
 
-/// The robot in simulation. @param scenario  a file of faults; may be empty
-Diagnostics add_simulation(Composition& c, const std::string& scenario) {
+/// The robot in simulation.
+Diagnostics add_simulation(Composition& c, const Overrides& overrides) {
+  const std::string& scenario = overrides.scenario;
   const runtime::Experiment& e = c.experiment;
   sim::SimRobotConfig sim = e.sim_robot_config();
   if (!scenario.empty()) {
@@ -392,6 +401,7 @@ Diagnostics add_simulation(Composition& c, const std::string& scenario) {
   c.sim = backend->get();
   c.master = &c.sim->master();
   c.backend = std::move(*backend);
+  if (overrides.serves) return {};  // the link is before this process
   return put_link_between(c);
 }
 
@@ -422,7 +432,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;
-  if (auto failed = add_simulation(*c, overrides.scenario); !failed.empty()) {
+  if (auto failed = add_simulation(*c, overrides); !failed.empty()) {
     return std::unexpected(failed);
   }
   return c;
@@ -439,17 +449,20 @@ Diagnostics connect_remote(Composition& c) {
   if (!participant) return {participant.error()};
   c.participant = std::move(*participant);
   const hal::Robot robot = hal::robot_of(e.robot);
+  const bool own_pace = e.teleoperation && !e.hal.lockstep;
   auto backend = remote::RemoteBackend::connect(
       *c.participant, robot,
       remote::identity_of(robot, c.kernels->description_hash, e.loop.period_ns),
       {.name = fmt::format("tandem run {}, process {}",
                            std::filesystem::path(e.file).filename().string(), ::getpid()),
        .lockstep = e.hal.lockstep,
+       .own_pace = own_pace,
        .before_asking = [&c] { have_admitted(*c.participant); },
        .interrupted = [] { return rt::stop_requested(); },
        .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});
   if (!backend) return {backend.error()};
   c.remote = backend->get();
+  if (own_pace) return operate_live(c, std::move(*backend));
   c.backend = std::move(*backend);
   return put_link_between(c);
 }

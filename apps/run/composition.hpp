@@ -27,6 +27,7 @@
 #include "model/kernel_library.hpp"
 #include "runtime/controller_host.hpp"
 #include "runtime/experiment.hpp"
+#include "runtime/local_controllers.hpp"
 #include "runtime/owner_controller.hpp"
 
 namespace tandem::apps {
@@ -66,7 +67,9 @@ struct Composition {
   std::unique_ptr<hal::Backend> backend;          ///< CAN's and DDS' only after connect()
   sim::SimRobot* sim = nullptr;                   ///< the robot, when it is the simulation
   const hal::can::DriveMaster* master = nullptr;  ///< the backend's, once that is there
-  remote::TeleBackend* tele = nullptr;      ///< the backend, when a link lies before the robot
+  remote::OperatorEnd* tele = nullptr;  ///< the backend, when a link lies before the robot
+  /// Controllers at the robot's end of a link, when this is it; null: there are none.
+  std::unique_ptr<runtime::LocalControllers> robot_side;
   model::KernelLibrary parallel_kernels;    ///< of [parallel]; may be those of `kernels`
   std::unique_ptr<sim::SimRobot> parallel;  ///< null: there is no second robot
   sim::SimRobotConfig simulation;           ///< of the second or, without one, of the first

@@ -4,6 +4,7 @@
 
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
+#include "hal/remote/live_link.hpp"
 #include "runtime/local_controllers.hpp"
 
 namespace tandem::apps {
@@ -15,12 +16,11 @@ std::string plugin_path(const runtime::Experiment& e, const std::string& plugin)
   return (folder / plugin).lexically_normal().string();
 }
 
-namespace {
-
-/// The controllers at the robot's end; null: there are none. Errors are added.
-std::unique_ptr<runtime::LocalControllers> robot_side_of(Composition& c, Diagnostics& errors) {
+std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_side_of(
+    const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   if (e.teleoperation->robot_controllers.empty()) return nullptr;
+  Diagnostics errors;
   auto side =
       std::make_unique<runtime::LocalControllers>(e.robot, c.kernels.get(), e.loop.period_ns);
   for (const runtime::ControllerSpec& spec : e.teleoperation->robot_controllers) {
@@ -35,15 +35,35 @@ std::unique_ptr<runtime::LocalControllers> robot_side_of(Composition& c, Diagnos
     errors.push_back(std::move(error));
   }
   for (const Error& error : e.document.diagnostics()) errors.push_back(error);
-  if (c.controllers == nullptr) return side;
-  if (const auto joint = side->shared_joint(*c.controllers)) {
-    errors.push_back({.message = "the joint '" + e.robot.joints[*joint].name +
-                                 "' is claimed at both ends of the link",
-                      .hint = "let the operator's controllers or the robot's have it",
-                      .file = e.file,
-                      .key = "teleoperation.robot_controller"});
-  }
+  if (!errors.empty()) return std::unexpected(std::move(errors));
   return side;
+}
+
+namespace {
+
+/// A joint that controllers of both ends claim.
+Diagnostics shared_joint(const Composition& c, const runtime::LocalControllers* side) {
+  if (side == nullptr || c.controllers == nullptr) return {};
+  const runtime::Experiment& e = c.experiment;
+  const auto joint = side->shared_joint(*c.controllers);
+  if (!joint) return {};
+  return {{.message = "the joint '" + e.robot.joints[*joint].name +
+                      "' is claimed at both ends of the link",
+           .hint = "let the operator's controllers or the robot's have it",
+           .file = e.file,
+           .key = "teleoperation.robot_controller"}};
+}
+
+/// A simulated robot that follows each command at once, with its own controllers.
+std::expected<remote::TeleBackend::End, Diagnostics> twin_of(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  auto side = robot_side_of(c);
+  if (!side) return std::unexpected(side.error());
+  sim::SimRobotConfig sim = e.sim_robot_config();
+  sim.seed = e.seed + 1;  // noise of its own
+  auto made = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
+  if (!made) return std::unexpected(Diagnostics{made.error()});
+  return remote::TeleBackend::End{std::move(*made), std::move(*side)};
 }
 
 }  // namespace
@@ -53,19 +73,43 @@ Diagnostics put_link_between(Composition& c) {
   if (!e.teleoperation) return {};
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
-  Diagnostics errors;
-  remote::TeleBackend::End robot{std::move(c.backend), robot_side_of(c, errors)};
+  auto side = robot_side_of(c);
+  if (!side) return side.error();
+  if (auto shared = shared_joint(c, side->get()); !shared.empty()) return shared;
+  remote::TeleBackend::End robot{std::move(c.backend), std::move(*side)};
   remote::TeleBackend::End twin;
-  if (!errors.empty()) return errors;
   if (config.predict) {
-    sim::SimRobotConfig sim = e.sim_robot_config();
-    sim.seed = e.seed + 1;  // noise of its own
-    auto made = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
-    if (!made) return {made.error()};
-    twin = {std::move(*made), robot_side_of(c, errors)};
+    auto made = twin_of(c);
+    if (!made) return made.error();
+    twin = std::move(*made);
   }
   auto link = std::make_unique<remote::TeleBackend>(hal::robot_of(e.robot), std::move(robot),
                                                     std::move(twin), config, e.loop.period_ns);
+  c.tele = link.get();
+  c.backend = std::move(link);
+  return {};
+}
+
+Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> robot) {
+  const runtime::Experiment& e = c.experiment;
+  remote::TeleConfig config = e.teleoperation->link;
+  config.seed = e.seed;
+  const auto delay_ns = static_cast<std::int64_t>(1e9 * config.down.delay_s);
+  if (e.teleoperation->real) config.up = config.down = {};
+  remote::TeleBackend::End twin;
+  if (config.predict) {
+    auto made = twin_of(c);
+    if (!made) return made.error();
+    if (auto shared =
+            shared_joint(c, static_cast<const runtime::LocalControllers*>(made->side.get()));
+        !shared.empty()) {
+      return shared;
+    }
+    twin = std::move(*made);
+  }
+  auto link = std::make_unique<remote::LiveLink>(
+      hal::robot_of(e.robot), std::move(robot), std::move(twin), config,
+      e.teleoperation->real ? 0 : delay_ns, e.loop.period_ns);
   c.tele = link.get();
   c.backend = std::move(link);
   return {};

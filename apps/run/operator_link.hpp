@@ -18,4 +18,14 @@ namespace tandem::apps {
 /// simulated.
 [[nodiscard]] Diagnostics put_link_between(Composition& c);
 
+/// [[teleoperation.robot_controller]], for the robot's end; null: there are none.
+/// Errors: plugins and parameters.
+[[nodiscard]] std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_side_of(
+    const Composition& c);
+
+/// In real time: the backend becomes a LiveLink to `robot`, with a twin. Errors as
+/// put_link_between()'s.
+[[nodiscard]] Diagnostics operate_live(Composition& c,
+                                       std::unique_ptr<remote::RemoteBackend> robot);
+
 }  // namespace tandem::apps

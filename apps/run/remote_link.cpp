@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "base/counted.hpp"
+
 namespace tandem::apps {
 namespace {
 
@@ -37,6 +39,17 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
     return fail("a robot in real time cannot wait for its owner's commands",
                 "leave --lockstep out");
   }
+  std::optional<remote::PlayoutConfig> playout;
+  std::uint64_t max_age = e.remote.max_age_cycles;
+  if (e.teleoperation && !e.remote.lockstep) {
+    const double period_s = static_cast<double>(e.loop.period_ns) * 1e-9;
+    playout = {.delay_cycles = runtime::playout_cycles(*e.teleoperation, e.loop.period_ns),
+               .brake_cycles = static_cast<std::uint64_t>(
+                   static_cast<double>(e.teleoperation->link.brake_ns) * 1e-9 / period_s)};
+    // An owner is as long away as its lease allows: until then play-out holds.
+    max_age = std::max(max_age, playout->delay_cycles + static_cast<std::uint64_t>(
+                                                            e.remote.lease_timeout_s / period_s));
+  }
   const hal::Robot robot = hal::robot_of(e.robot);
   return remote::Server::open(
       dds->participant(), robot, hal::initial_parameters(e.robot),
@@ -44,9 +57,10 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
       {.lockstep = e.remote.lockstep,
        .ends_with_owner = once,
        .lease_timeout_s = e.remote.lease_timeout_s,
-       .max_age_cycles = e.remote.max_age_cycles,
+       .max_age_cycles = max_age,
        .lockstep_timeout_s = e.remote.lockstep_timeout_s,
        .on_lost = e.remote.on_lost,
+       .playout = playout,
        .admits = [&admission](const remote::Sender& who) { return admission.admits(who); }});
 }
 
@@ -70,9 +84,15 @@ Json remote_json(const remote::Server* server, const remote::RemoteBackend* clie
   if (server == nullptr) return nullptr;
   Json commands = Json::object();
   for (const Verdict verdict : kVerdicts) commands[to_string(verdict)] = server->count(verdict);
+  Json playout = nullptr;
+  if (server->playout() != nullptr) {
+    playout = {{"starved_cycles", server->playout()->starved_cycles()},
+               {"holds", server->playout()->holds()}};
+  }
   return {{"leases", server->lease().given()},
           {"losses", server->losses()},
           {"commands", commands},
+          {"playout", playout},
           {"dropped", server->dropped()},
           {"age_ns", percentiles_json(server->age().percentiles())},
           {"age_cycles", percentiles_json(server->age_cycles().percentiles())}};
@@ -89,6 +109,10 @@ void add_remote_facts(const remote::Server* server, const remote::RemoteBackend*
   if (server == nullptr) return;
   facts.add("owners", fmt::format("{}, {} lost", server->lease().given(), server->losses()));
   facts.add("commands", counts(*server));
+  if (server->playout() != nullptr) {
+    facts.add("without commands", fmt::format("{} cycles, {}", server->playout()->starved_cycles(),
+                                              counted(server->playout()->holds(), "time")));
+  }
   if (server->age().count() == 0) return;
   facts.add("age of their state p50/p99/p99.9/max", microseconds(server->age()));
   const rt::Percentiles p = server->age_cycles().percentiles();

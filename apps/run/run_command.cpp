@@ -62,7 +62,8 @@ runtime::CycleConfig cycle_config(Composition& c, const RunOptions& options) {
   config.running_cycles = e.cycles();
   config.settle_cycles = e.settle_cycles();
   config.delay_cycles = e.hal.delay_cycles;
-  const bool waits = options.serves || e.loop.pacing == rt::Pacing::kWallClock;
+  const bool waits =
+      options.serves || (e.loop.pacing == rt::Pacing::kWallClock && c.remote == nullptr);
   config.after_stop = waits ? runtime::AfterStop::kWait : runtime::AfterStop::kEnd;
   if (c.remote != nullptr) config.bring_up_cycles = ~std::uint64_t{0};  // the server's is limited
   if (e.after_stop) config.after_stop = *e.after_stop;
@@ -103,7 +104,12 @@ std::string served_text(const runtime::Experiment& e) {
 
 /// Boards have clocks of their own.
 Status check_pace(const Composition& c, const RunOptions& options) {
-  if (c.backend->pace() == hal::Pace::kSimulatedClock) return {};
+  const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
+  if (options.serves && c.experiment.teleoperation && simulated &&
+      options.rate.value_or(c.experiment.loop.rate) != 1.0) {
+    return fail("a robot behind a link keeps real time, as its operator does", "add --realtime");
+  }
+  if (simulated) return {};
   if (options.start_paused) {
     return fail("boards on a bus keep real time, which cannot be paused",
                 "leave --start-paused out, or add --lockstep for emulated boards");

@@ -253,20 +253,22 @@ std::string counts_text(const remote::Network::Counts& counts) {
 }
 
 /// The link to the robot, and what both ends made of it.
-void add_link_facts(const remote::TeleBackend* link, double period_s, Facts& facts) {
+void add_link_facts(const remote::OperatorEnd* link, double period_s, Facts& facts) {
   if (link == nullptr) return;
   const remote::TeleFigures figures = link->figures();
   facts.add("commands over the link", counts_text(figures.up));
   facts.add("states over the link", counts_text(figures.down));
-  facts.add("without commands",
-            fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
-                        counted(figures.holds, "time")));
+  if (figures.robot_end) {
+    facts.add("without commands",
+              fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
+                          counted(figures.holds, "time")));
+  }
   facts.add(
       "without a state",
       fmt::format("{:.3f} s at most", static_cast<double>(figures.most_silent_cycles) * period_s));
 }
 
-Json link_json(const remote::TeleBackend* link) {
+Json link_json(const remote::OperatorEnd* link) {
   if (link == nullptr) return nullptr;
   const remote::TeleFigures figures = link->figures();
   const auto counts = [](const remote::Network::Counts& one) {
@@ -277,10 +279,11 @@ Json link_json(const remote::TeleBackend* link) {
   Json json;
   json["up"] = counts(figures.up);
   json["down"] = counts(figures.down);
-  json["starved_cycles"] = figures.starved_cycles;
-  json["holds"] = figures.holds;
+  json["starved_cycles"] = figures.robot_end ? Json(figures.starved_cycles) : Json(nullptr);
+  json["holds"] = figures.robot_end ? Json(figures.holds) : Json(nullptr);
   json["silent_cycles"] = figures.silent_cycles;
   json["most_silent_cycles"] = figures.most_silent_cycles;
+  json["clock_cycles"] = figures.clock_cycles;
   json["compared"] = figures.compared;
   json["worst_prediction_rad"] = nullptr;
   if (figures.compared > 0) json["worst_prediction_rad"] = figures.worst_prediction_rad;

@@ -38,6 +38,7 @@ void RemoteBackend::exchange(const hal::CycleTime&) noexcept {
     left_in_ = last_cycle_;
   }
   if (pending_) send();
+  if (config_.own_pace) return look();
   fresh_ = false;
   missed_now_ = 0;
   {
@@ -52,6 +53,25 @@ void RemoteBackend::exchange(const hal::CycleTime&) noexcept {
   missed_ += first_ || done_ ? 0 : cycle - last_cycle_ - 1;
   last_cycle_ = cycle;
   first_ = false;
+}
+
+/// For a state that is there, without waiting for one.
+void RemoteBackend::look() noexcept {
+  fresh_ = false;
+  {
+    const std::lock_guard lock(mutex_);
+    (void)there();
+  }
+  if (!fresh_) return;
+  const std::uint64_t cycle = newest_.front().cycle;
+  missed_ += first_ || done_ ? 0 : cycle - last_cycle_ - 1;
+  last_cycle_ = cycle;
+  first_ = false;
+}
+
+void RemoteBackend::post(const hal::CommandImage& command) noexcept {
+  command_.assign(command);
+  send();
 }
 
 Code RemoteBackend::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
@@ -99,7 +119,7 @@ hal::Phase RemoteBackend::phase() const noexcept {
 /// For the next exchange() to send; in the server's count of cycles.
 void RemoteBackend::keep(const hal::CommandImage& command) noexcept TANDEM_RT {
   command_.assign(command);
-  command_.cycle()[0] += cycles_ahead_;
+  if (!config_.own_pace) command_.cycle()[0] += cycles_ahead_;
   command_.time_ns()[0] += ahead_ns_;
   pending_ = true;
 }

@@ -23,6 +23,7 @@ namespace tandem::remote {
 struct ClientConfig {
   std::string name;                          ///< for people: "tandem run squat.toml, process 312"
   bool lockstep = false;                     ///< must be the server's
+  bool own_pace = false;                     ///< the loop waits for no state; not in lockstep
   std::uint64_t server = 0;                  ///< Server::number(); 0: the only one there is
   double connect_timeout_s = 10;             ///< for a server to be found, and to give the lease
   double server_timeout_s = 3;               ///< a server that is not heard for so long is gone
@@ -48,12 +49,13 @@ class RemoteBackend final : public hal::Backend {
   ~RemoteBackend() override;
 
   [[nodiscard]] hal::Pace pace() const noexcept override {
+    if (config_.own_pace) return hal::Pace::kWallClock;
     return config_.lockstep ? hal::Pace::kSimulatedClock : hal::Pace::kBus;
   }
   [[nodiscard]] hal::Phase phase() const noexcept override;
   [[nodiscard]] std::string status_text() const override;
-  [[nodiscard]] bool waits_for_bus() const noexcept override { return true; }
-  /// Sends the last command, waits for the next cycle's state.
+  [[nodiscard]] bool waits_for_bus() const noexcept override { return !config_.own_pace; }
+  /// Sends the last command, waits for the next cycle's state; with own_pace it does not wait.
   void exchange(const hal::CycleTime& time) noexcept override;
   [[nodiscard]] std::uint64_t missed() const noexcept TANDEM_RT override { return missed_now_; }
   [[nodiscard]] Code read(const hal::CycleTime& time,
@@ -73,6 +75,17 @@ class RemoteBackend final : public hal::Backend {
 
   /// From sending a command to the state that shows it, on this process' clock.
   [[nodiscard]] const rt::Histogram& turn_around() const noexcept { return turn_around_; }
+
+  // With own_pace.
+  /// Sends a command whose cycle() is its number; exchange() then has none to send. May block.
+  void post(const hal::CommandImage& command) noexcept;
+  /// A state has come in this cycle.
+  [[nodiscard]] bool is_fresh() const noexcept { return fresh_; }
+  /// The server's cycle of the newest state.
+  [[nodiscard]] std::uint64_t cycle() const noexcept { return newest_.front().cycle; }
+  /// The number of the command that the joints were under in it.
+  [[nodiscard]] std::uint64_t source_cycle() const noexcept { return newest_.front().source_cycle; }
+
   [[nodiscard]] std::uint64_t missed_cycles() const noexcept { return missed_; }
 
  private:
@@ -81,7 +94,7 @@ class RemoteBackend final : public hal::Backend {
     hal::StateImage state;
     hal::CommandImage command;
     std::vector<std::uint8_t> causes;
-    std::uint64_t cycle = 0, owner = 0, answered_cycle = 0;
+    std::uint64_t cycle = 0, owner = 0, answered_cycle = 0, source_cycle = 0;
     std::int64_t sent_ns = 0, answered_ns = 0;
     std::uint8_t phase = 0, code = 0;
     hal::StopCategory reaction = hal::StopCategory::kWarn;
@@ -112,6 +125,7 @@ class RemoteBackend final : public hal::Backend {
   void take_states();
   [[nodiscard]] bool unpack(const tandem_msgs::LinkState& sample);
   [[nodiscard]] bool there() noexcept;
+  void look() noexcept;
   [[nodiscard]] bool is_gone() const noexcept TANDEM_RT;
   void send() noexcept;
   void keep(const hal::CommandImage& command) noexcept TANDEM_RT;

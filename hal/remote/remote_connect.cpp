@@ -273,6 +273,7 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   to.cycle = sample.cycle;
   to.owner = sample.owner;
   to.answered_cycle = sample.answered_cycle;
+  to.source_cycle = sample.source_cycle;
   to.answered_ns = sample.answered_ns;
   to.sent_ns = sample.sent_ns;
   to.phase = sample.phase;

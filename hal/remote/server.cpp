@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::int64_t kLook_ns = 50'000'000;  // a waiting cycle looks around so often
 constexpr std::size_t kRingCycles = 64;
+constexpr std::size_t kCommands = 256;       // that may come within one cycle
+constexpr std::uint64_t kMostMadeUp = 1000;  // cycles of the loop that play-out makes up
 
 std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
@@ -51,11 +53,18 @@ Server::Server(Endpoints endpoints, const hal::Robot& robot, const hal::Paramete
       gains_(gains),
       newest_(Taken{hal::CommandImage(robot.shape()), gains_}),
       stop_(static_cast<std::uint8_t>(StopCategory::kWarn)),
+      played_(robot.shape()),
+      received_(robot.shape()),
       ring_(sizeof(Shown) + identity_.state_bytes + identity_.command_bytes + robot.joints.size(),
             kRingCycles),
       joints_(robot.joints.size()),
       capabilities_(robot.joints.begin(), robot.joints.end()),
       thread_([this] { run(); }) {
+  if (config_.playout) {
+    commands_.emplace(sizeof(std::uint64_t) + identity_.command_bytes, kCommands);
+    playout_.emplace(robot, config_.playout->delay_cycles, config_.playout->brake_cycles,
+                     identity_.period_ns);
+  }
   on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
   on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });
 }
@@ -135,8 +144,19 @@ Verdict Server::judge(const tandem_msgs::LinkCommand& sample, const std::optiona
   }
   if (!unpack(sample)) return Verdict::kMalformed;
   lease_.heard(clock_ns(CLOCK_MONOTONIC));
+  keep_for_playout(newest_.back());
   newest_.publish();
   return Verdict::kTaken;
+}
+
+/// Every command, where the loop takes the newest alone.
+void Server::keep_for_playout(const Taken& taken) {
+  if (!commands_ || !taken.live) return;
+  const std::span<std::byte> slot = commands_->begin_push();
+  if (slot.empty()) return;  // as if it were lost
+  std::memcpy(slot.data(), &taken.client, sizeof taken.client);
+  std::ranges::copy(taken.command.bytes(), slot.begin() + sizeof taken.client);
+  commands_->end_push();
 }
 
 void Server::note_stops(const tandem_msgs::LinkCommand& sample) {
@@ -254,9 +274,41 @@ hal::RemoteCommand Server::exchange(const hal::PortView& view) noexcept TANDEM_R
     // One that has commanded nothing yet leaves nothing behind.
     if (led_by_ != owner) wish.loss = OwnerLoss::kNone;
   }
+  if (wish.live) source_cycle_ = taken.command.cycle()[0];
+  if (playout_) play(view, led_by_ != owner, wish);
   led_by_ = wish.live ? owner : 0;
   waits_since_ns_ = 0;
   return wish;
+}
+
+/// What has arrived takes effect in its time. The first command of an owner begins from what the
+/// joints follow.
+void Server::play(const hal::PortView& view, bool begins,
+                  hal::RemoteCommand& wish) noexcept TANDEM_RT {
+  const std::uint64_t owner = lease_.owner(), cycle = view.time.cycle;
+  bool started = !begins;
+  for (std::size_t i = 0; i < kCommands; ++i) {
+    const std::span<const std::byte> slot = commands_->front();
+    if (slot.empty()) break;
+    std::uint64_t client = 0;
+    std::memcpy(&client, slot.data(), sizeof client);
+    std::ranges::copy(slot.subspan(sizeof client), received_.bytes().begin());
+    commands_->pop();
+    if (!wish.live || client != owner) continue;
+    if (!started) playout_->start(received_.cycle()[0], view.command);
+    if (!started) played_cycle_ = cycle - 1;
+    started = true;
+    playout_->take(cycle, received_);
+  }
+  if (!wish.live || !started) {
+    wish.live = false;
+    return;
+  }
+  const std::uint64_t first = std::max(played_cycle_ + 1, cycle - std::min(cycle, kMostMadeUp));
+  for (std::uint64_t one = first; one <= cycle; ++one) playout_->play(one, played_);
+  played_cycle_ = cycle;
+  source_cycle_ = playout_->source_cycle();
+  wish.command = &played_;
 }
 
 void Server::measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT {

@@ -17,10 +17,18 @@
 #include "base/triple_buffer.hpp"
 #include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
+#include "hal/remote/playout.hpp"
 #include "hal/remote_command.hpp"
 #include "rt/histogram.hpp"
 
 namespace tandem::remote {
+
+/// Commands take effect so many cycles after the robot's cycle that their numbers are, which is the
+/// one that their owner saw when it gave them.
+struct PlayoutConfig {
+  std::uint64_t delay_cycles = 0;    ///< there and back: what comes later has no effect
+  std::uint64_t brake_cycles = 250;  ///< in which references come to rest when commands end
+};
 
 struct ServerConfig {
   bool lockstep = false;
@@ -29,6 +37,7 @@ struct ServerConfig {
   std::uint64_t max_age_cycles = 100;  ///< of the state that a command answers
   double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a living owner's command
   hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
+  std::optional<PlayoutConfig> playout = {};  ///< empty: the newest command is followed at once
   /// Whether this participant may own the robot; called on DDS' threads. Empty: everybody may.
   std::function<bool(const Sender&)> admits = {};
 };
@@ -68,6 +77,8 @@ class Server final : public hal::RemoteCommandPort {
   [[nodiscard]] std::uint64_t losses() const noexcept {
     return losses_.load(std::memory_order_relaxed);
   }
+  /// For when the loop has stopped; null: commands are followed at once.
+  [[nodiscard]] const Playout* playout() const noexcept { return playout_ ? &*playout_ : nullptr; }
   // For when the loop has stopped: of the state that each new command answers.
   [[nodiscard]] const rt::Histogram& age() const noexcept { return age_; }
   /// In cycles instead of nanoseconds.
@@ -85,7 +96,7 @@ class Server final : public hal::RemoteCommandPort {
   };
   /// A cycle on its way to the thread that sends; the images follow it.
   struct Shown {
-    std::uint64_t cycle, answered_cycle, owner;
+    std::uint64_t cycle, answered_cycle, source_cycle, owner;
     std::int64_t time_ns, sent_ns, answered_ns;
     std::uint8_t phase, code, reaction, padding[5];
   };
@@ -114,9 +125,11 @@ class Server final : public hal::RemoteCommandPort {
   [[nodiscard]] Verdict judge(const tandem_msgs::LinkCommand& sample,
                               const std::optional<Sender>& sender);
   [[nodiscard]] bool unpack(const tandem_msgs::LinkCommand& sample);
+  void keep_for_playout(const Taken& taken);
   void note_stops(const tandem_msgs::LinkCommand& sample);
   [[nodiscard]] hal::OwnerLoss loss_of(const hal::PortView& view,
                                        std::uint64_t owner) const noexcept TANDEM_RT;
+  void play(const hal::PortView& view, bool begins, hal::RemoteCommand& wish) noexcept TANDEM_RT;
   void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
 
   Endpoints endpoints_;
@@ -137,7 +150,8 @@ class Server final : public hal::RemoteCommandPort {
   hal::ParameterImage gains_;  // the newest
   std::uint64_t gains_number_ = 0;
   TripleBuffer<Taken> newest_;
-  std::atomic<std::uint8_t> stop_;  // a hal::StopCategory, to be carried out
+  std::optional<SpscRing> commands_;  // that play-out has not seen: client, image
+  std::atomic<std::uint8_t> stop_;    // a hal::StopCategory, to be carried out
   std::atomic<bool> reset_{false};
   std::mutex ring_mutex_;
   std::function<void()> on_news_;
@@ -147,6 +161,10 @@ class Server final : public hal::RemoteCommandPort {
   std::uint64_t led_by_ = 0;             // client whose commands are followed; 0: nobody's
   std::uint64_t answered_sequence_ = 0, answered_cycle_ = 0, done_client_ = 0;
   std::uint64_t gains_taken_ = 0;
+  std::uint64_t source_cycle_ = 0;  // of the command that the joints are under
+  std::optional<Playout> playout_;
+  std::uint64_t played_cycle_ = 0;
+  hal::CommandImage played_, received_;
   std::int64_t answered_ns_ = 0, waits_since_ns_ = 0;
   rt::Histogram age_, age_cycles_;
 

@@ -99,6 +99,7 @@ Server::Shown Server::shown_of(const hal::PortView& view) noexcept TANDEM_RT {
   cycle_.store(view.time.cycle, std::memory_order_release);
   return {.cycle = view.time.cycle,
           .answered_cycle = answered_cycle_,
+          .source_cycle = source_cycle_,
           .owner = lease_.owner(),
           .time_ns = view.time.time_ns,
           .sent_ns = clock_ns(CLOCK_MONOTONIC),
@@ -155,6 +156,7 @@ void Server::write_state(const Shown& shown, std::span<const std::byte> state,
   sample.owner = shown.owner;
   sample.answered_cycle = shown.answered_cycle;
   sample.answered_ns = shown.answered_ns;
+  sample.source_cycle = shown.source_cycle;
   sample.phase = shown.phase;
   sample.code = shown.code;
   sample.reaction = shown.reaction;

@@ -1,7 +1,6 @@
 #include "hal/remote/tele_backend.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 namespace tandem::remote {
@@ -31,8 +30,6 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       robot_side_(std::move(robot.side)),
       twin_side_(std::move(twin.side)),
       config_(config),
-      period_ns_(period_ns),
-      joints_(description.joints.size()),
       up_(config.up, config.seed,
           sizeof(Head) + hal::CommandImage(description.shape()).bytes().size()),
       down_(config.down, config.seed + 1,
@@ -47,9 +44,8 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       twin_command_(description.shape()),
       received_(description.shape()),
       packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), received_.bytes().size())),
-      past_cycles_(round_trip_cycles(config, period_ns)),
-      past_(past_cycles_ * 3 * joints_),
-      correction_(3 * joints_) {}
+      prediction_(description.joints.size(), round_trip_cycles(config, period_ns),
+                  config.correction_ns, period_ns) {}
 
 hal::Phase TeleBackend::phase() const noexcept {
   const hal::Phase phase = robot_->phase();
@@ -61,11 +57,11 @@ hal::Phase TeleBackend::phase() const noexcept {
 void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   linked_ = true;
   linked_ns_ = time.time_ns;
-  linked_cycle_ = arrived_cycle_ = heard_cycle_ = time.cycle;
+  arrived_cycle_ = heard_cycle_ = time.cycle;
   arrived_.assign(robot_state_);
   playout_.start(time.cycle, robot_command_);
   limits_.follow(robot_command_);
-  std::ranges::fill(correction_, 0.0);
+  prediction_.start(time.cycle);
   if (robot_side_) robot_side_->start(time, robot_state_, robot_command_);
   if (twin_ && twin_side_) twin_side_->start(time, twin_state_, twin_command_);
 }
@@ -75,30 +71,6 @@ std::span<const std::byte> TeleBackend::pack(const Head& head,
   std::memcpy(packed_.data(), &head, sizeof head);
   std::memcpy(packed_.data() + sizeof head, image.data(), image.size());
   return {packed_.data(), sizeof head + image.size()};
-}
-
-/// What is known of the robot by a state that arrived, against the twin under the same commands.
-void TeleBackend::correct(const Head& head) noexcept TANDEM_RT {
-  const std::uint64_t same = head.source_cycle + 1;  // the twin read its state after that command
-  const std::uint64_t now = now_.cycle;
-  if (same < linked_cycle_ || same > now || now - same >= past_cycles_) return;
-  ++compared_;
-  const double passed =
-      static_cast<double>(head.cycle - arrived_cycle_) * static_cast<double>(period_ns_);
-  const double share =
-      1.0 -
-      std::exp(-passed / static_cast<double>(std::max<std::int64_t>(1, config_.correction_ns)));
-  const double* past = &past_[this->past(same)];
-  const std::span<const double> values[] = {arrived_.position_rad(), arrived_.velocity_rad_s(),
-                                            arrived_.torque_Nm()};
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t j = 0; j < joints_; ++j) {
-      double& correction = correction_[k * joints_ + j];
-      const double error = values[k][j] - past[k * joints_ + j] - correction;
-      if (k == 0) worst_rad_ = std::max(worst_rad_, std::abs(error));
-      correction += share * error;
-    }
-  }
 }
 
 /// The robot's state of this cycle goes down; what has arrived is taken, the newest last.
@@ -117,7 +89,9 @@ void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     std::memcpy(&head, message.data(), sizeof head);
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
-    if (twin_ && !ended_) correct(head);
+    if (twin_ && !ended_) {
+      prediction_.correct(arrived_, head.source_cycle, time.cycle, head.cycle - arrived_cycle_);
+    }
     arrived_cycle_ = head.cycle;
     heard_cycle_ = time.cycle;
   }
@@ -129,16 +103,7 @@ void TeleBackend::show(const hal::CycleTime& time, hal::StateImage& state) noexc
     state.assign(arrived_);
   } else {
     state.assign(twin_state_);
-    for (std::size_t j = 0; j < joints_; ++j) {
-      state.position_rad()[j] += correction_[j];
-      state.velocity_rad_s()[j] += correction_[joints_ + j];
-      state.torque_Nm()[j] += correction_[2 * joints_ + j];
-    }
-    // Faults are the robot's own.
-    std::ranges::copy(arrived_.fault(), state.fault().begin());
-    std::ranges::copy(arrived_.statusword(), state.statusword().begin());
-    std::ranges::copy(arrived_.drive_state(), state.drive_state().begin());
-    std::ranges::copy(arrived_.homing(), state.homing().begin());
+    prediction_.show(arrived_, state);
   }
   state.cycle()[0] = time.cycle;
   state.time_ns()[0] = time.time_ns;
@@ -157,12 +122,7 @@ Code TeleBackend::read(const hal::CycleTime& time, hal::StateImage& state) noexc
     state.assign(robot_state_);
     return code;
   }
-  if (twin_) {
-    double* past = &past_[this->past(time.cycle)];
-    std::ranges::copy(twin_state_.position_rad(), past);
-    std::ranges::copy(twin_state_.velocity_rad_s(), past + joints_);
-    std::ranges::copy(twin_state_.torque_Nm(), past + 2 * joints_);
-  }
+  if (twin_) prediction_.keep(time.cycle, twin_state_);
   carry_state(time);
   show(time, state);
   return code;
@@ -227,8 +187,7 @@ bool TeleBackend::archive(Archive& ar) {
   if (robot_side_) robot_side_->archive(ar);
   if (twin_ && twin_side_) twin_side_->archive(ar);
   ar(up_, down_, playout_, limits_, robot_state_, twin_state_, arrived_, robot_command_, linked_,
-     ended_, now_, linked_ns_, arrived_cycle_, heard_cycle_, most_silent_, compared_, linked_cycle_,
-     past_, correction_, worst_rad_);
+     ended_, now_, linked_ns_, arrived_cycle_, heard_cycle_, most_silent_, prediction_);
   return true;
 }
 
@@ -239,8 +198,8 @@ TeleFigures TeleBackend::figures() const noexcept {
           .holds = playout_.holds(),
           .silent_cycles = linked_ ? now_.cycle - heard_cycle_ : 0,
           .most_silent_cycles = most_silent_,
-          .compared = compared_,
-          .worst_prediction_rad = worst_rad_};
+          .compared = prediction_.compared(),
+          .worst_prediction_rad = prediction_.worst_rad()};
 }
 
 }  // namespace tandem::remote

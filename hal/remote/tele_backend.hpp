@@ -12,6 +12,7 @@
 #include "hal/forwarding_backend.hpp"
 #include "hal/remote/network.hpp"
 #include "hal/remote/playout.hpp"
+#include "hal/remote/prediction.hpp"
 #include "hal/remote/robot_side.hpp"
 #include "hal/robot.hpp"
 
@@ -38,12 +39,22 @@ struct TeleConfig {
 /// it has stopped.
 struct TeleFigures {
   Network::Counts up, down;
+  bool robot_end = true;                 ///< it is here: the next two are known
   std::uint64_t starved_cycles = 0;      ///< in which the robot had no command and braked or held
   std::uint64_t holds = 0;               ///< how often that began
   std::uint64_t silent_cycles = 0;       ///< since the newest state came, until now
   std::uint64_t most_silent_cycles = 0;  ///< the longest time without one, the first included
-  std::uint64_t compared = 0;            ///< states that were held against their prediction
-  double worst_prediction_rad = 0.0;     ///< of a joint of these: the state less its prediction
+  /// By which the numbers of commands followed the robot's clock: negative when it is the slower
+  /// one. 0 in simulated time.
+  std::int64_t clock_cycles = 0;
+  std::uint64_t compared = 0;         ///< states that were held against their prediction
+  double worst_prediction_rad = 0.0;  ///< of a joint of these: the state less its prediction
+};
+
+class OperatorEnd {
+ public:
+  virtual ~OperatorEnd() = default;
+  [[nodiscard]] virtual TeleFigures figures() const noexcept = 0;
 };
 
 /// The loop that uses this backend is the operator's. Each of its cycles is one of the robot's.
@@ -58,7 +69,7 @@ struct TeleFigures {
 ///   description that follows each command at once. It is corrected by what arrives: the low-passed
 ///   difference of a state and of what the twin was when it had been given the same commands.
 /// - Bring-up, stops, resets and shut-down do not cross the network.
-class TeleBackend final : public hal::ForwardingBackend {
+class TeleBackend final : public hal::ForwardingBackend, public OperatorEnd {
  public:
   /// A robot, and control of its own; that may be null.
   struct End {
@@ -82,7 +93,7 @@ class TeleBackend final : public hal::ForwardingBackend {
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& ar) override;
 
-  [[nodiscard]] TeleFigures figures() const noexcept;
+  [[nodiscard]] TeleFigures figures() const noexcept override;
   /// The robot's own state in this cycle, which the operator has not seen yet.
   [[nodiscard]] const hal::StateImage& robot_state() const noexcept { return robot_state_; }
   /// What the robot follows in this cycle.
@@ -97,20 +108,14 @@ class TeleBackend final : public hal::ForwardingBackend {
 
   void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
   void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
-  void correct(const Head& head) noexcept TANDEM_RT;
   void show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT;
   void carry_command(const hal::CommandImage& command) noexcept TANDEM_RT;
   [[nodiscard]] std::span<const std::byte> pack(
       const Head& head, std::span<const std::byte> image) noexcept TANDEM_RT;
-  [[nodiscard]] std::size_t past(std::uint64_t cycle) const noexcept {
-    return cycle % past_cycles_ * 3 * joints_;
-  }
 
   std::unique_ptr<hal::Backend> robot_, twin_;
   std::unique_ptr<RobotSide> robot_side_, twin_side_;
   TeleConfig config_;
-  std::int64_t period_ns_;
-  std::size_t joints_;
   Network up_, down_;
   Playout playout_;
   hal::CommandLimits limits_;
@@ -123,12 +128,8 @@ class TeleBackend final : public hal::ForwardingBackend {
   std::int64_t linked_ns_ = 0;       // when it began
   std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has
   std::uint64_t heard_cycle_ = 0;    // in which it came
-  std::uint64_t most_silent_ = 0, compared_ = 0;
-  std::uint64_t linked_cycle_ = 0;
-  std::size_t past_cycles_;
-  std::vector<double> past_;        // the twin's positions, velocities, torques of past cycles
-  std::vector<double> correction_;  // the same, added to the twin
-  double worst_rad_ = 0.0;
+  std::uint64_t most_silent_ = 0;
+  Prediction prediction_;
 };
 
 }  // namespace tandem::remote

@@ -81,5 +81,47 @@ TEST_F(TeleoperationRun, OverALinkThatDiesSaysSo) {
   EXPECT_GT(link["compared"].get<int>(), 900);
 }
 
+/// One file for both ends: the server's has play-out, the operator's the prediction.
+TEST_F(TeleoperationRun, InRealTimeTheTwoEndsAreTwoProcesses) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  const std::string link =
+      "[teleoperation.up]\ndelay_s = 0.1\n[teleoperation.down]\ndelay_s = 0.1\nloss = 0.1\n";
+  write_text(folder_ / "operated.toml",
+             plain.substr(0, at) + "[remote]\nlease_timeout_s = 30.0\n" + link + plain.substr(at));
+  const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
+  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve operated.toml" +
+                           domain +
+                           " --realtime --once --no-log --quiet --json served.json 2>serve.err & " +
+                           program + "run operated.toml" + domain +
+                           " --duration 1.5 --hal dds --realtime --no-log --no-socket --quiet "
+                           "--json owner.json 2>owner.err; wait; } </dev/null >both.txt";
+  ASSERT_EQ(std::system(both.c_str()), 0);
+  const auto there = json("owner.json")["teleoperation"], served = json("served.json");
+  EXPECT_GT(there["compared"].get<int>(), 100);
+  EXPECT_LT(there["worst_prediction_rad"].get<double>(), 0.1);
+  EXPECT_TRUE(there["holds"].is_null()) << "the robot's end is the server's";
+  EXPECT_TRUE(served["teleoperation"].is_null()) << "the link is declared once";
+  EXPECT_TRUE(served["remote"]["playout"]["holds"].is_number());
+  EXPECT_EQ(served["remote"]["losses"], 0);
+}
+
+TEST_F(TeleoperationRun, NeedsRealTimeAtBothEnds) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  write_text(folder_ / "operated.toml",
+             plain.substr(0, at) + "[teleoperation]\n" + plain.substr(at));
+  const Outcome fast = tandem("serve operated.toml --once --no-log");
+  EXPECT_EQ(fast.status, 2);
+  EXPECT_NE(fast.err.find("add --realtime"), std::string::npos) << fast.err;
+  const Outcome lockstep = tandem("serve operated.toml --lockstep --once --no-log");
+  EXPECT_EQ(lockstep.status, 2);
+  EXPECT_NE(lockstep.err.find("in lockstep the link is at the operator's end"), std::string::npos)
+      << lockstep.err;
+  const Outcome wire = tandem("run operated.toml --hal can --no-log");
+  EXPECT_EQ(wire.status, 2) << wire.err;
+}
+
 }  // namespace
 }  // namespace tandem::apps

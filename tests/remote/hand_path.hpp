@@ -25,9 +25,9 @@ struct HandPath {
   std::vector<Eigen::Vector3d> place_m;
 };
 
-/// tests/data/recordings/hand.csv: time_s,x_m,y_m,z_m.
+/// config/panda/hand.csv: time_s,x_m,y_m,z_m.
 inline HandPath read_hand_path(double scale) {
-  std::ifstream in(TANDEM_SOURCE_DIR "/tests/data/recordings/hand.csv");
+  std::ifstream in(TANDEM_SOURCE_DIR "/config/panda/hand.csv");
   std::string line;
   std::getline(in, line);
   EXPECT_EQ(line, "time_s,x_m,y_m,z_m");

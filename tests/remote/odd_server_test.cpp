@@ -105,11 +105,11 @@ TEST(OtherVersions, AreRefusedAndToldWhichIsOlder) {
     EXPECT_EQ((*server)->lease().owner(), 0U);
     return owner ? "" : owner.error().to_string();
   };
-  EXPECT_EQ(refusal(2),
-            "the server is of an older version of Tandem: the link's protocol is 2 there, 3 here ("
+  EXPECT_EQ(refusal(3),
+            "the server is of an older version of Tandem: the link's protocol is 3 there, 4 here ("
             "install the same version on both; the older one is the server's)");
-  EXPECT_EQ(refusal(4),
-            "the server is of a newer version of Tandem: the link's protocol is 4 there, 3 here ("
+  EXPECT_EQ(refusal(5),
+            "the server is of a newer version of Tandem: the link's protocol is 5 there, 4 here ("
             "install the same version on both; the older one is this one)");
 }
 

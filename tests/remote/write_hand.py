@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/data/recordings/hand.csv: the path of a hand that reaches and rests, 12 s at 100 Hz.
+"""Writes config/panda/hand.csv: the path of a hand that reaches and rests, 12 s at 100 Hz.
 
 A made-up recording, the same from its seed on every machine: minimum-jerk strokes (Flash and Hogan
 1985), most of them followed by a smaller correcting one that overlaps it, rests between them, and a

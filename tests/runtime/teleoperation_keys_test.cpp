@@ -34,12 +34,15 @@ TEST(TeleoperationKeys, HaveTheirDefaults) {
   EXPECT_TRUE(one.link.predict);
   EXPECT_EQ(one.link.playout_ns, 310'000'000) << "delay, four jitters, 20 ms";
   EXPECT_EQ(one.link.brake_ns, 250'000'000);
+  EXPECT_FALSE(one.real);
+  EXPECT_EQ(playout_cycles(one, 1'000'000), 310U);
   EXPECT_EQ(one.link.down, (remote::NetworkConfig{.limit = 10'000}));
   EXPECT_TRUE(one.robot_controllers.empty());
 }
 
 TEST(TeleoperationKeys, AreRead) {
   const Teleoperation one = read(R"(predict = false
+link = "real"
 playout_s = 0.5
 [[teleoperation.outage]]
 from_s = 2.0
@@ -53,6 +56,7 @@ distribution = "pareto"
 keeps_order = true
 )");
   EXPECT_FALSE(one.link.predict);
+  EXPECT_TRUE(one.real);
   EXPECT_EQ(one.link.playout_ns, 500'000'000);
   ASSERT_EQ(one.link.outages.size(), 1U);
   EXPECT_EQ(one.link.outages[0].to_ns, 3'500'000'000);

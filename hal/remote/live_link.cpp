@@ -1,0 +1,221 @@
+#include "hal/remote/live_link.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace tandem::remote {
+namespace {
+
+constexpr std::uint64_t kDriftCycles = 100;       // between two corrections of the numbers by one
+constexpr std::uint64_t kMostLeftOut = 1000;      // numbers, in one cycle of the loop
+constexpr std::uint64_t kMostCatchUp = 20;        // cycles of the twin in one of the loop
+constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
+
+std::uint64_t cycles(std::int64_t ns, std::int64_t period_ns) {
+  return static_cast<std::uint64_t>((ns + period_ns - 1) / period_ns);
+}
+
+}  // namespace
+
+LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot,
+                   TeleBackend::End twin, const TeleConfig& config, std::int64_t delay_ns,
+                   std::int64_t period_ns)
+    : ForwardingBackend(*robot),
+      robot_(std::move(robot)),
+      twin_(std::move(twin.robot)),
+      twin_side_(std::move(twin.side)),
+      config_(config),
+      delay_cycles_(cycles(delay_ns, period_ns)),
+      up_(config.up, config.seed,
+          sizeof(Head) + hal::CommandImage(description.shape()).bytes().size()),
+      down_(config.down, config.seed + 1,
+            sizeof(Head) + hal::StateImage(description.shape()).bytes().size()),
+      robot_state_(description.shape()),
+      twin_state_(description.shape()),
+      arrived_(description.shape()),
+      sent_(description.shape()),
+      twin_command_(description.shape()),
+      packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), sent_.bytes().size())),
+      prediction_(description.joints.size(),
+                  cycles(config.playout_ns + 2 * delay_ns + kPast_ns, period_ns),
+                  config.correction_ns, period_ns) {}
+
+hal::Phase LiveLink::phase() const noexcept {
+  const hal::Phase phase = robot_->phase();
+  const bool waits = !linked_ && twin_ && twin_->phase() == hal::Phase::kBringUp;
+  return phase == hal::Phase::kOperational && waits ? hal::Phase::kBringUp : phase;
+}
+
+void LiveLink::exchange(const hal::CycleTime& time) noexcept {
+  while (linked_) {
+    const std::span<const std::byte> message = up_.receive(time.time_ns);
+    if (message.empty()) break;
+    std::ranges::copy(message.subspan(sizeof(Head)), sent_.bytes().begin());
+    robot_->post(sent_);
+  }
+  robot_->exchange(time);
+}
+
+void LiveLink::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
+  linked_ = true;
+  linked_ns_ = time.time_ns;
+  heard_cycle_ = time.cycle;
+  arrived_.assign(robot_state_);
+  arrived_cycle_ = robot_->cycle();
+  number_ = arrived_cycle_ - std::min(arrived_cycle_, delay_cycles_);
+  kept_ = number_ - 1;
+  led_ = count_ = 0;
+  drift_ = 0;
+  (void)robot_->command_in_force(sent_);
+  sent_.cycle()[0] = number_;
+  prediction_.start(number_);
+  if (!twin_) return;
+  prediction_.assume(robot_state_, twin_state_);
+  if (twin_side_) twin_side_->start(time, twin_state_, twin_command_);
+}
+
+/// The number of this cycle's command. Once in a while it is brought nearer to the robot's cycle
+/// that came with the least delay, for the two clocks differ.
+void LiveLink::count_on(const hal::CycleTime& time) noexcept TANDEM_RT {
+  const std::uint64_t passed = time.cycle - now_.cycle;
+  late_ = passed - 1;
+  number_ = static_cast<std::uint64_t>(static_cast<std::int64_t>(number_ + passed) + drift_);
+  drifted_ += drift_;
+  drift_ = 0;
+  if (++count_ < kDriftCycles) return;
+  if (led_ > 0) drift_ = least_lead_ > 0 ? -1 : (least_lead_ < 0 ? 1 : 0);
+  led_ = count_ = 0;
+}
+
+/// Of numbers that were left out, too: the robot interpolates.
+void LiveLink::keep_twin() noexcept TANDEM_RT {
+  if (!twin_) return;
+  if (kept_ + kMostLeftOut < number_) kept_ = number_ - kMostLeftOut;
+  while (kept_ < number_) prediction_.keep(++kept_, twin_state_);
+}
+
+std::span<const std::byte> LiveLink::pack(const Head& head,
+                                          std::span<const std::byte> image) noexcept TANDEM_RT {
+  std::memcpy(packed_.data(), &head, sizeof head);
+  std::memcpy(packed_.data() + sizeof head, image.data(), image.size());
+  return {packed_.data(), sizeof head + image.size()};
+}
+
+/// What came over the real link crosses the declared network; what has, is taken, the newest last.
+void LiveLink::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
+  const std::int64_t since_ns = time.time_ns - linked_ns_;
+  const bool cut = std::ranges::any_of(config_.outages, [since_ns](const Outage& one) {
+    return since_ns >= one.from_ns && since_ns < one.to_ns;
+  });
+  up_.cut(cut);
+  down_.cut(cut);
+  if (robot_->is_fresh()) {
+    const Head head{robot_->cycle(), robot_->source_cycle()};
+    (void)down_.send(time.time_ns, pack(head, robot_state_.bytes()));
+  }
+  for (;;) {
+    const std::span<const std::byte> message = down_.receive(time.time_ns);
+    if (message.empty()) break;
+    Head head{};
+    std::memcpy(&head, message.data(), sizeof head);
+    if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
+    std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
+    if (twin_ && !ended_) {
+      prediction_.correct(arrived_, head.source, number_, head.cycle - arrived_cycle_);
+    }
+    const auto lead = static_cast<std::int64_t>(number_ - head.cycle);
+    least_lead_ = led_ == 0 ? lead : std::min(least_lead_, lead);
+    ++led_;
+    arrived_cycle_ = head.cycle;
+    heard_cycle_ = time.cycle;
+  }
+  most_silent_ = std::max(most_silent_, time.cycle - heard_cycle_);
+}
+
+Code LiveLink::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
+  Code code = robot_->read(time, robot_state_);
+  if (code == Code::kTimeout) code = Code::kOk;  // no state came since the last cycle
+  if (twin_) {
+    const Code twin = twin_->read(time, twin_state_);
+    if (code == Code::kOk) code = twin;
+  }
+  if (linked_) {
+    count_on(time);
+  } else if (phase() == hal::Phase::kOperational) {
+    begin_link(time);
+  }
+  now_ = time;
+  if (!linked_) {
+    state.assign(robot_state_);
+    return code;
+  }
+  keep_twin();
+  carry_state(time);
+  state.assign(twin_ ? twin_state_ : arrived_);
+  if (twin_) prediction_.show(arrived_, state);
+  state.cycle()[0] = time.cycle;
+  state.time_ns()[0] = time.time_ns;
+  return code;
+}
+
+/// Cycles that the loop left out are the twin's as well.
+void LiveLink::move_twin(const hal::CommandImage& command,
+                         const hal::ParameterImage& parameters) noexcept TANDEM_RT {
+  twin_command_.assign(command);
+  if (linked_ && twin_side_) (void)twin_side_->update(now_, twin_state_, twin_command_);
+  for (std::uint64_t i = 0; i < std::min(late_, kMostCatchUp); ++i) {
+    (void)twin_->write(twin_command_, parameters);
+    (void)twin_->read(now_, twin_state_);
+  }
+  late_ = 0;
+  (void)twin_->write(twin_command_, parameters);
+}
+
+Code LiveLink::write(const hal::CommandImage& command,
+                     const hal::ParameterImage& parameters) noexcept TANDEM_RT {
+  if (twin_) move_twin(command, parameters);
+  if (!linked_) {  // commands have no numbers yet: none is to be followed
+    const bool waits = robot_->phase() == hal::Phase::kOperational;
+    return waits ? Code::kOk : robot_->write(command, parameters);
+  }
+  twin_command_.assign(command);
+  twin_command_.cycle()[0] = number_;
+  (void)up_.send(now_.time_ns, pack({number_, 0}, twin_command_.bytes()));
+  return robot_->write(sent_, parameters);  // once more: the robot knows its number
+}
+
+void LiveLink::last_command(const hal::CommandImage& command) noexcept TANDEM_RT {
+  robot_->last_command(linked_ ? sent_ : command);
+}
+
+void LiveLink::stop(hal::StopCategory category) noexcept TANDEM_RT {
+  ended_ = true;
+  robot_->stop(category);
+  if (twin_) twin_->stop(category);
+}
+
+void LiveLink::reset() noexcept TANDEM_RT {
+  linked_ = ended_ = false;
+  robot_->reset();
+  if (twin_) twin_->reset();
+}
+
+bool LiveLink::shut_down() noexcept TANDEM_RT {
+  ended_ = true;
+  const bool robot = robot_->shut_down();
+  const bool twin = twin_ == nullptr || twin_->shut_down();
+  return robot && twin;
+}
+
+TeleFigures LiveLink::figures() const noexcept {
+  return {.up = up_.counts(),
+          .down = down_.counts(),
+          .robot_end = false,
+          .silent_cycles = linked_ ? now_.cycle - heard_cycle_ : 0,
+          .most_silent_cycles = most_silent_,
+          .clock_cycles = drifted_,
+          .compared = prediction_.compared(),
+          .worst_prediction_rad = prediction_.worst_rad()};
+}
+
+}  // namespace tandem::remote

@@ -1,0 +1,92 @@
+// The operator's end of a link in real time: a loop with a clock of its own, and the predicted
+// robot.
+// Layer: hal/remote.  Thread: made non-RT; the rest the loop's, as hal::Backend says.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "hal/remote/remote_backend.hpp"
+#include "hal/remote/tele_backend.hpp"
+
+namespace tandem::remote {
+
+/// The operator's loop keeps the wall clock's time and waits for no state. The robot's end is
+/// another process (Server with a Playout).
+///
+/// - Commands are numbered by the robot's cycle that the operator sees when it gives them. A state
+///   of the robot says the number of the command that the joints follow: it is compared with the
+///   twin under that one.
+/// - The two clocks differ. The numbers follow the robot's clock: at most once in 100 cycles one is
+///   left out, for which the robot interpolates, or given twice, of which the robot takes the
+///   first.
+/// - The declared networks lie before the real link. Bring-up, stops, resets, gains and shut-down
+///   cross the real link alone.
+class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {
+ public:
+  /// @param robot    with a pace of its own (ClientConfig::own_pace)
+  /// @param twin     without a robot when config.predict is false
+  /// @param config   its networks are what is added to the real link
+  /// @param delay_ns of states that are on their way: the numbers begin so much before the robot's
+  /// cycle
+  LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot,
+           TeleBackend::End twin, const TeleConfig& config, std::int64_t delay_ns,
+           std::int64_t period_ns);
+
+  [[nodiscard]] hal::Phase phase() const noexcept override;
+  /// Sends what has crossed the declared network.
+  void exchange(const hal::CycleTime& time) noexcept override;
+  [[nodiscard]] Code read(const hal::CycleTime& time,
+                          hal::StateImage& state) noexcept TANDEM_RT override;
+  [[nodiscard]] Code write(const hal::CommandImage& command,
+                           const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
+  void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override;
+  void stop(hal::StopCategory category) noexcept TANDEM_RT override;
+  void reset() noexcept TANDEM_RT override;
+  bool home(std::size_t /*joint*/) noexcept TANDEM_RT override { return false; }
+  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
+  [[nodiscard]] bool archive(Archive& /*ar*/) override { return false; }
+
+  [[nodiscard]] TeleFigures figures() const noexcept override;
+
+ private:
+  /// Before the bytes of an image.
+  struct Head {
+    std::uint64_t cycle;   ///< up: the command's number; down: the robot's cycle
+    std::uint64_t source;  ///< down: number of the command that the joints follow
+  };
+
+  void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
+  void count_on(const hal::CycleTime& time) noexcept TANDEM_RT;
+  void keep_twin() noexcept TANDEM_RT;
+  void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
+  void move_twin(const hal::CommandImage& command,
+                 const hal::ParameterImage& parameters) noexcept TANDEM_RT;
+  [[nodiscard]] std::span<const std::byte> pack(
+      const Head& head, std::span<const std::byte> image) noexcept TANDEM_RT;
+
+  std::unique_ptr<RemoteBackend> robot_;
+  std::unique_ptr<hal::Backend> twin_;
+  std::unique_ptr<RobotSide> twin_side_;
+  TeleConfig config_;
+  std::uint64_t delay_cycles_;
+  Network up_, down_;
+  hal::StateImage robot_state_, twin_state_, arrived_;
+  hal::CommandImage sent_, twin_command_;
+  std::vector<std::byte> packed_;
+  Prediction prediction_;
+  bool linked_ = false, ended_ = false;
+  hal::CycleTime now_;
+  std::int64_t linked_ns_ = 0;
+  std::uint64_t number_ = 0;           // of the next command
+  std::uint64_t kept_ = 0;             // the newest number whose twin is kept
+  std::uint64_t late_ = 0;             // cycles that the loop left out before this one
+  std::int64_t least_lead_ = 0;        // of the numbers before the robot's cycles, lately
+  std::uint64_t led_ = 0, count_ = 0;  // states and cycles, lately
+  std::int64_t drift_ = 0;             // what the next number is corrected by
+  std::int64_t drifted_ = 0;           // all of it
+  std::uint64_t arrived_cycle_ = 0, heard_cycle_ = 0, most_silent_ = 0;
+};
+
+}  // namespace tandem::remote
