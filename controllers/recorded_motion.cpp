@@ -104,8 +104,8 @@ class RecordedMotion : public Controller {
   /// Errors: of the log; joints that it has and the robot lacks; those of the plan.
   Status read_log(const ControllerSetup& setup, const std::string& path, const std::string& sha256,
                   const log::MotionRequest& request) {
-    const auto file = log::LogFile::open(
-        (std::filesystem::path(setup.parameters.folder()) / path).string());
+    const auto file =
+        log::LogFile::open((std::filesystem::path(setup.parameters.folder()) / path).string());
     if (!file) return std::unexpected(file.error());
     if (!sha256.empty() && sha256 != file->data_sha256()) {
       return fail("is another recording than the one that data_sha256 names",
