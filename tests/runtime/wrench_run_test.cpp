@@ -1,6 +1,7 @@
 // The wrench that the loop estimates at a hand which is pushed with a known force.
 #include <array>
 
+#include "base/own_system_call.hpp"
 #include "hal/sim/setup.hpp"
 #include "model/interpreted_kernels.hpp"
 #include "model/mechanism.hpp"
@@ -35,7 +36,10 @@ Seen watch(EstimatedRun& run, const Hand& hand, estimation::Estimator* beside = 
   const hal::EstimateImage& estimate = beside == nullptr ? run.estimate() : beside->image();
   const auto step = [&] {
     const bool more = run.cycle->step();
-    if (beside != nullptr) beside->update(run.cycle->state());
+    if (beside != nullptr) {
+      TANDEM_OWN_SYSTEM_CALL;  // its kernels are interpreted and take heap
+      beside->update(run.cycle->state());
+    }
     return more;
   };
   const auto pushed = [&] { return run.backend->robot().faults()[0].active != 0; };
