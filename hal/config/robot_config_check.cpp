@@ -60,9 +60,9 @@ namespace {
 
 /// "'a'", "'a' and 'b'", "'a', 'b' and 27 more".
 std::string quoted(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 4;
+  constexpr std::size_t kShown = 4;
   std::string text = "'" + names.front() + "'";
-  const std::size_t shown = names.size() <= kMost ? names.size() : 2;
+  const std::size_t shown = names.size() <= kShown ? names.size() : 2;
   for (std::size_t i = 1; i < shown; ++i) {
     text += (i + 1 == names.size() ? " and '" : ", '") + names[i] + "'";
   }

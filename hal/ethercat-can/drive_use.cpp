@@ -145,7 +145,8 @@ void warn_of_mappings(const DataSheet& sheet, Diagnostics& warnings) {
                         .hint = "is it the sheet of this drive? Where the mapping can be written, "
                                 "the master writes its own",
                         .file = sheet.file,
-                        .line = odd.line});
+                        .line = odd.line,
+                        .key = {}});
   }
 }
 

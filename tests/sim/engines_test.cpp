@@ -181,8 +181,8 @@ TEST_P(Engines, MoveSlidersAndRotorsOnAnyBase) {
 /// COMAN with its boards, whose drives hold the posture "stand".
 class Standing : public HeldRobot {
  public:
-  explicit Standing(const std::string& engine, const test::TestRobot& robot)
-      : HeldRobot(robot.robot, made(engine, robot), "stand") {}
+  explicit Standing(const std::string& engine, const test::TestRobot& coman)
+      : HeldRobot(coman.robot, made(engine, coman), "stand") {}
   void run(int cycles) {
     for (int i = 0; i < cycles; ++i) ASSERT_EQ(step(), Code::kOk) << robot->status_text();
   }
