@@ -16,9 +16,11 @@ namespace {
 
 constexpr std::size_t kMostPlaces = 1'000'000;
 constexpr double kLargest_m = 100.0;  // of a coordinate
-constexpr double kDamping = 1e-3;     // [m] of the pseudo-inverse
-constexpr double kHome_1_s = 5.0;     // rate at which what the path leaves free returns
-constexpr double kReach_m = 0.02;     // that the site may miss its path by, at configuration
+constexpr double kLongest_s = 3600.0;
+constexpr double kNearest_s = 1e-4;  // between two places: a cycle passes few of them
+constexpr double kDamping = 1e-3;    // [m] of the pseudo-inverse
+constexpr double kHome_1_s = 5.0;    // rate at which what the path leaves free returns
+constexpr double kReach_m = 0.02;    // that the site may miss its path by, at configuration
 constexpr std::string_view kHeader = "time_s,x_m,y_m,z_m";
 
 /// Where the site is to be at a time [m], from where the path begins.
@@ -51,8 +53,8 @@ bool read_row(const std::string& line, Place& place) {
 }
 
 /// Errors, with file and line: a file that cannot be read; another header; a row that is not four
-/// numbers; times that do not start at 0 or do not grow; a coordinate beyond 100 m; one place or
-/// more than a million.
+/// numbers; times that do not start at 0, do not grow by 0.1 ms, or are beyond an hour; a
+/// coordinate beyond 100 m; one place or more than a million.
 Result<std::vector<Place>> read_path(const std::string& file) {
   std::ifstream in(file);
   if (!in) return wrong_line(file, 0, "cannot be read", "is `path` right?");
@@ -80,6 +82,14 @@ Result<std::vector<Place>> read_path(const std::string& file) {
       return wrong_line(file, number, "its time is not later than the one before",
                         "sort the rows by time");
     }
+    if (!places.empty() && place.time_s < places.back().time_s + kNearest_s) {
+      return wrong_line(file, number, "its time is less than 0.1 ms after the one before",
+                        "leave places out; is `time_s` in seconds?");
+    }
+    if (place.time_s > kLongest_s) {
+      return wrong_line(file, number, "its time is beyond an hour",
+                        "cut the path into parts; is `time_s` in seconds?");
+    }
     if (place.p_m.cwiseAbs().maxCoeff() > kLargest_m) {
       return wrong_line(file, number, "is more than 100 m away", "coordinates are in metres");
     }
@@ -94,9 +104,9 @@ Result<std::vector<Place>> read_path(const std::string& file) {
   return places;
 }
 
-/// Parameters: site, path (a CSV file), joints (all), scale (1), stop_at_end
-/// (false). The path begins where the site is at the start. Joints return to where they began as
-/// far as the path leaves them free.
+/// Parameters: site, path (a CSV file), joints (all), scale (1), stop_at_end (false). The path
+/// begins where the site is at the start. Joints return to where they began as far as the path
+/// leaves them free.
 class ToolPath : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {

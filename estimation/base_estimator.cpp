@@ -51,10 +51,8 @@ BaseEstimator::BaseEstimator(const tandem_kernels& kernels, const ModelJoints& j
   }
 }
 
-Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_kernels& kernels,
-                                          const ModelJoints& joints, const BaseConfig& config,
-                                          double step_s) {
-  if (kernels.floating_base == 0) {
+Result<std::size_t> BaseEstimator::find_imu(const hal::Robot& robot, const BaseConfig& config) {
+  if (!robot.floating_base) {
     return fail("the robot's base does not move: there is nothing to estimate",
                 "leave [estimation.base] out");
   }
@@ -73,7 +71,15 @@ Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_
     for (const std::size_t s : imus) names += (names.empty() ? "" : ", ") + robot.sensors[s].name;
     return fail("the robot has several IMUs", "say which one: imu = \"…\", of " + names);
   }
-  const hal::Sensor& imu = robot.sensors[imus.front()];
+  return imus.front();
+}
+
+Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_kernels& kernels,
+                                          const ModelJoints& joints, const BaseConfig& config,
+                                          double step_s) {
+  const auto found = find_imu(robot, config);
+  if (!found) return std::unexpected(found.error());
+  const hal::Sensor& imu = robot.sensors[*found];
   const int site = imu_site(robot, imu, kernels);
   if (site < 0) {
     return fail("the robot's kernels have no site for the IMU '" + imu.name + "'",
@@ -85,7 +91,7 @@ Result<BaseEstimator> BaseEstimator::make(const hal::Robot& robot, const tandem_
     return fail("the base's estimate has room for " + std::to_string(ContactFilter::kMostFeet) +
                 " feet, the robot has " + std::to_string(feet->feet()));
   }
-  return BaseEstimator(kernels, joints, config, std::move(*feet), imus.front(),
+  return BaseEstimator(kernels, joints, config, std::move(*feet), *found,
                        static_cast<std::size_t>(site), step_s);
 }
 

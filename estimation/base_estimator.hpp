@@ -25,8 +25,12 @@ namespace tandem::estimation {
 /// touches down again its place is new.
 class BaseEstimator {
  public:
+  /// Index of the sensor that the estimate rests on; needs no kernels.
   /// Errors, each with the missing thing's name: the base does not float; no IMU, several and none
-  /// named, an IMU where the model has no site; FootSensors::make()'s.
+  /// named.
+  [[nodiscard]] static Result<std::size_t> find_imu(const hal::Robot& robot,
+                                                    const BaseConfig& config);
+  /// Errors: find_imu()'s; an IMU where the model has no site; FootSensors::make()'s.
   [[nodiscard]] static Result<BaseEstimator> make(const hal::Robot& robot,
                                                   const tandem_kernels& kernels,
                                                   const ModelJoints& joints,

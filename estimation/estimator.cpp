@@ -94,26 +94,10 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
 
 Status Estimator::check(const hal::Robot& robot, const EstimationConfig& config) {
   if (!config.base) return {};
-  const auto has = [&](hal::SensorType type) {
-    return std::ranges::find(robot.sensors, type, &hal::Sensor::type) != robot.sensors.end();
-  };
-  const auto lacks = [&](std::string what, const std::string& add) {
-    return in_table(fail(std::move(what), add + "leave [estimation.base] out").error(),
-                    "estimation.base");
-  };
-  if (!robot.floating_base)
-    return lacks("the robot's base does not move: there is nothing to estimate", "");
-  if (robot.feet.empty()) {
-    return lacks("the robot has no feet: nothing carries its base's estimate",
-                 "declare [[contact.foot]] in " + robot.file + ", or ");
-  }
-  if (!has(hal::SensorType::kImu)) {
-    return lacks("the robot has no IMU",
-                 "declare a [[sensor]] of type \"imu\" in " + robot.file + ", or ");
-  }
-  if (!has(hal::SensorType::kForceTorque)) {
-    return lacks("the foot '" + robot.feet.front().site + "' has no force/torque sensor above it",
-                 "add a [[sensor]] of type \"force_torque\" to " + robot.file + ", or ");
+  const auto imu = BaseEstimator::find_imu(robot, *config.base);
+  if (!imu) return in_table(imu.error(), "estimation.base");
+  if (Status feet = FootSensors::check(robot); !feet) {
+    return in_table(feet.error(), "estimation.base");
   }
   return {};
 }

@@ -3,6 +3,7 @@
 #include "estimation/foot_sensors.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -62,13 +63,29 @@ bool carries(const Matrix6& A) {
   return true;
 }
 
+std::unexpected<Error> lacks_sensor(const hal::Robot& robot, const hal::Foot& foot,
+                                    const char* where) {
+  return fail("the foot '" + foot.site + "' has no force/torque sensor " + where,
+              "add a [[sensor]] of type \"force_torque\" to " + robot.file +
+                  ", or leave [estimation.base] out");
+}
+
 }  // namespace
 
-Result<FootSensors> FootSensors::make(const hal::Robot& robot, const tandem_kernels& kernels) {
+Status FootSensors::check(const hal::Robot& robot) {
   if (robot.feet.empty()) {
     return fail("the robot has no feet: nothing carries its base's estimate",
                 "declare [[contact.foot]] in " + robot.file + ", or leave [estimation.base] out");
   }
+  if (std::ranges::find(robot.sensors, hal::SensorType::kForceTorque, &hal::Sensor::type) ==
+      robot.sensors.end()) {
+    return lacks_sensor(robot, robot.feet.front(), "above it");
+  }
+  return {};
+}
+
+Result<FootSensors> FootSensors::make(const hal::Robot& robot, const tandem_kernels& kernels) {
+  if (Status feet = check(robot); !feet) return std::unexpected(feet.error());
   FootSensors feet;
   Probe probe(kernels);
   for (const hal::Foot& declared : robot.feet) {
@@ -105,10 +122,7 @@ Result<FootSensors> FootSensors::make(const hal::Robot& robot, const tandem_kern
       foot.weight = weight * gravity.inverse();
     }
     if (!found) {
-      return fail("the foot '" + declared.site + "' has no force/torque sensor " +
-                      (bends ? "without a joint between the two" : "above it"),
-                  "add a [[sensor]] of type \"force_torque\" to " + robot.file +
-                      ", or leave [estimation.base] out");
+      return lacks_sensor(robot, declared, bends ? "without a joint between the two" : "above it");
     }
     feet.feet_.push_back(foot);
   }

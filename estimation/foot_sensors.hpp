@@ -22,9 +22,11 @@ using Wrench = Eigen::Matrix<double, 6, 1>;  ///< force [N], moment [Nm]
 /// its mass times that is missing: while it stands it does not.
 class FootSensors {
  public:
+  /// What needs no kernels. Errors: the robot has no feet, or no force/torque sensor at all.
+  [[nodiscard]] static Status check(const hal::Robot& robot);
   /// Finds for every foot the force/torque sensor through which all of its wrench passes, the
   /// nearest where there are several.
-  /// Errors: the robot has no feet; a foot without such a sensor; a joint between the two.
+  /// Errors: check()'s; a foot without such a sensor; a joint between the two.
   [[nodiscard]] static Result<FootSensors> make(const hal::Robot& robot,
                                                 const tandem_kernels& kernels);
 

@@ -1,7 +1,6 @@
 #include "hal/remote/live_link.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace tandem::remote {
 namespace {
@@ -26,16 +25,13 @@ LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend>
       twin_side_(std::move(twin.side)),
       config_(config),
       delay_cycles_(cycles(delay_ns, period_ns)),
-      up_(config.up, config.seed,
-          sizeof(Head) + hal::CommandImage(description.shape()).bytes().size()),
-      down_(config.down, config.seed + 1,
-            sizeof(Head) + hal::StateImage(description.shape()).bytes().size()),
+      up_(config.up, config.seed, hal::CommandImage(description.shape()).bytes().size()),
+      down_(config.down, config.seed + 1, hal::StateImage(description.shape()).bytes().size()),
       robot_state_(description.shape()),
       twin_state_(description.shape()),
       arrived_(description.shape()),
       sent_(description.shape()),
       twin_command_(description.shape()),
-      packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), sent_.bytes().size())),
       prediction_(description.joints.size(),
                   cycles(config.playout_ns + 2 * delay_ns + kPast_ns, period_ns),
                   config.correction_ns, period_ns) {}
@@ -48,9 +44,9 @@ hal::Phase LiveLink::phase() const noexcept {
 
 void LiveLink::exchange(const hal::CycleTime& time) noexcept {
   while (linked_) {
-    const std::span<const std::byte> message = up_.receive(time.time_ns);
-    if (message.empty()) break;
-    std::ranges::copy(message.subspan(sizeof(Head)), sent_.bytes().begin());
+    const std::span<const std::byte> image = up_.receive(time.time_ns).image;
+    if (image.empty()) break;
+    std::ranges::copy(image, sent_.bytes().begin());
     robot_->post(sent_);
   }
   robot_->exchange(time);
@@ -94,32 +90,20 @@ void LiveLink::keep_twin() noexcept TANDEM_RT {
   while (kept_ < number_) prediction_.keep(++kept_, twin_state_);
 }
 
-std::span<const std::byte> LiveLink::pack(const Head& head,
-                                          std::span<const std::byte> image) noexcept TANDEM_RT {
-  std::memcpy(packed_.data(), &head, sizeof head);
-  std::memcpy(packed_.data() + sizeof head, image.data(), image.size());
-  return {packed_.data(), sizeof head + image.size()};
-}
-
 /// What came over the real link crosses the declared network; what has, is taken, the newest last.
 void LiveLink::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
   const std::int64_t since_ns = time.time_ns - linked_ns_;
-  const bool cut = std::ranges::any_of(config_.outages, [since_ns](const Outage& one) {
-    return since_ns >= one.from_ns && since_ns < one.to_ns;
-  });
+  const bool cut = config_.is_cut(since_ns);
   up_.cut(cut);
   down_.cut(cut);
   if (robot_->is_fresh()) {
-    const Head head{robot_->cycle(), robot_->source_cycle()};
-    (void)down_.send(time.time_ns, pack(head, robot_state_.bytes()));
+    down_.send(time.time_ns, {robot_->cycle(), robot_->source_cycle()}, robot_state_.bytes());
   }
   for (;;) {
-    const std::span<const std::byte> message = down_.receive(time.time_ns);
-    if (message.empty()) break;
-    Head head{};
-    std::memcpy(&head, message.data(), sizeof head);
+    const auto [head, image] = down_.receive(time.time_ns);
+    if (image.empty()) break;
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
-    std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
+    std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
       prediction_.correct(arrived_, head.source, number_, head.cycle - arrived_cycle_);
     }
@@ -180,7 +164,7 @@ Code LiveLink::write(const hal::CommandImage& command,
   }
   twin_command_.assign(command);
   twin_command_.cycle()[0] = number_;
-  (void)up_.send(now_.time_ns, pack({number_, 0}, twin_command_.bytes()));
+  up_.send(now_.time_ns, {number_, 0}, twin_command_.bytes());
   return robot_->write(sent_, parameters);  // once more: the robot knows its number
 }
 

@@ -51,30 +51,21 @@ class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {
   [[nodiscard]] TeleFigures figures() const noexcept override;
 
  private:
-  /// Before the bytes of an image.
-  struct Head {
-    std::uint64_t cycle;   ///< up: the command's number; down: the robot's cycle
-    std::uint64_t source;  ///< down: number of the command that the joints follow
-  };
-
   void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
   void count_on(const hal::CycleTime& time) noexcept TANDEM_RT;
   void keep_twin() noexcept TANDEM_RT;
   void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
   void move_twin(const hal::CommandImage& command,
                  const hal::ParameterImage& parameters) noexcept TANDEM_RT;
-  [[nodiscard]] std::span<const std::byte> pack(
-      const Head& head, std::span<const std::byte> image) noexcept TANDEM_RT;
 
   std::unique_ptr<RemoteBackend> robot_;
   std::unique_ptr<hal::Backend> twin_;
   std::unique_ptr<RobotSide> twin_side_;
   TeleConfig config_;
   std::uint64_t delay_cycles_;
-  Network up_, down_;
+  ImageNetwork up_, down_;
   hal::StateImage robot_state_, twin_state_, arrived_;
   hal::CommandImage sent_, twin_command_;
-  std::vector<std::byte> packed_;
   Prediction prediction_;
   bool linked_ = false, ended_ = false;
   hal::CycleTime now_;

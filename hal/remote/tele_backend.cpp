@@ -1,7 +1,6 @@
 #include "hal/remote/tele_backend.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 namespace tandem::remote {
 namespace {
@@ -30,10 +29,8 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       robot_side_(std::move(robot.side)),
       twin_side_(std::move(twin.side)),
       config_(config),
-      up_(config.up, config.seed,
-          sizeof(Head) + hal::CommandImage(description.shape()).bytes().size()),
-      down_(config.down, config.seed + 1,
-            sizeof(Head) + hal::StateImage(description.shape()).bytes().size()),
+      up_(config.up, config.seed, hal::CommandImage(description.shape()).bytes().size()),
+      down_(config.down, config.seed + 1, hal::StateImage(description.shape()).bytes().size()),
       playout_(description, cycles(config.playout_ns, period_ns),
                cycles(config.brake_ns, period_ns), period_ns),
       limits_(description, period_ns),
@@ -43,7 +40,6 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       robot_command_(description.shape()),
       twin_command_(description.shape()),
       received_(description.shape()),
-      packed_(sizeof(Head) + std::max(robot_state_.bytes().size(), received_.bytes().size())),
       prediction_(description.joints.size(), round_trip_cycles(config, period_ns),
                   config.correction_ns, period_ns) {}
 
@@ -66,31 +62,20 @@ void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   if (twin_ && twin_side_) twin_side_->start(time, twin_state_, twin_command_);
 }
 
-std::span<const std::byte> TeleBackend::pack(const Head& head,
-                                             std::span<const std::byte> image) noexcept TANDEM_RT {
-  std::memcpy(packed_.data(), &head, sizeof head);
-  std::memcpy(packed_.data() + sizeof head, image.data(), image.size());
-  return {packed_.data(), sizeof head + image.size()};
-}
-
 /// The robot's state of this cycle goes down; what has arrived is taken, the newest last.
 void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
   const std::int64_t since_ns = time.time_ns - linked_ns_;
-  const bool cut = std::ranges::any_of(config_.outages, [since_ns](const Outage& one) {
-    return since_ns >= one.from_ns && since_ns < one.to_ns;
-  });
+  const bool cut = config_.is_cut(since_ns);
   up_.cut(cut);
   down_.cut(cut);
-  (void)down_.send(time.time_ns, pack({time.cycle, playout_.source_cycle()}, robot_state_.bytes()));
+  down_.send(time.time_ns, {time.cycle, playout_.source_cycle()}, robot_state_.bytes());
   for (;;) {
-    const std::span<const std::byte> message = down_.receive(time.time_ns);
-    if (message.empty()) break;
-    Head head{};
-    std::memcpy(&head, message.data(), sizeof head);
+    const auto [head, image] = down_.receive(time.time_ns);
+    if (image.empty()) break;
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
-    std::ranges::copy(message.subspan(sizeof head), arrived_.bytes().begin());
+    std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
-      prediction_.correct(arrived_, head.source_cycle, time.cycle, head.cycle - arrived_cycle_);
+      prediction_.correct(arrived_, head.source, time.cycle, head.cycle - arrived_cycle_);
     }
     arrived_cycle_ = head.cycle;
     heard_cycle_ = time.cycle;
@@ -132,11 +117,11 @@ Code TeleBackend::read(const hal::CycleTime& time, hal::StateImage& state) noexc
 void TeleBackend::carry_command(const hal::CommandImage& command) noexcept TANDEM_RT {
   received_.assign(command);
   received_.cycle()[0] = now_.cycle;
-  (void)up_.send(now_.time_ns, pack({now_.cycle, 0}, received_.bytes()));
+  up_.send(now_.time_ns, {now_.cycle, 0}, received_.bytes());
   for (;;) {
-    const std::span<const std::byte> message = up_.receive(now_.time_ns);
-    if (message.empty()) break;
-    std::ranges::copy(message.subspan(sizeof(Head)), received_.bytes().begin());
+    const std::span<const std::byte> image = up_.receive(now_.time_ns).image;
+    if (image.empty()) break;
+    std::ranges::copy(image, received_.bytes().begin());
     playout_.take(now_.cycle, received_);
   }
   playout_.play(now_.cycle, robot_command_);

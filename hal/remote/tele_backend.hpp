@@ -2,6 +2,7 @@
 // Layer: hal/remote.  Thread: made non-RT; the rest the loop's, as hal::Backend says.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -10,7 +11,7 @@
 
 #include "hal/command_limits.hpp"
 #include "hal/forwarding_backend.hpp"
-#include "hal/remote/network.hpp"
+#include "hal/remote/image_network.hpp"
 #include "hal/remote/playout.hpp"
 #include "hal/remote/prediction.hpp"
 #include "hal/remote/robot_side.hpp"
@@ -33,6 +34,12 @@ struct TeleConfig {
   std::int64_t correction_ns = 500'000'000;  ///< time constant of the prediction's correction
   std::int64_t brake_ns = 250'000'000;       ///< in which the robot stops when commands end
   std::vector<Outage> outages;
+
+  [[nodiscard]] bool is_cut(std::int64_t since_ns) const noexcept TANDEM_RT {
+    return std::ranges::any_of(outages, [since_ns](const Outage& one) {
+      return since_ns >= one.from_ns && since_ns < one.to_ns;
+    });
+  }
 };
 
 /// What the operator's end knows of the link and of the prediction. For the loop's thread, or when
@@ -51,6 +58,7 @@ struct TeleFigures {
   double worst_prediction_rad = 0.0;  ///< of a joint of these: the state less its prediction
 };
 
+/// What a run's table, JSON and report ask of the operator's end, whichever it is.
 class OperatorEnd {
  public:
   virtual ~OperatorEnd() = default;
@@ -100,28 +108,19 @@ class TeleBackend final : public hal::ForwardingBackend, public OperatorEnd {
   [[nodiscard]] const hal::CommandImage& robot_command() const noexcept { return robot_command_; }
 
  private:
-  /// Before the bytes of an image.
-  struct Head {
-    std::uint64_t cycle;
-    std::uint64_t source_cycle;  ///< down: the command that the robot follows is of this cycle
-  };
-
   void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
   void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
   void show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT;
   void carry_command(const hal::CommandImage& command) noexcept TANDEM_RT;
-  [[nodiscard]] std::span<const std::byte> pack(
-      const Head& head, std::span<const std::byte> image) noexcept TANDEM_RT;
 
   std::unique_ptr<hal::Backend> robot_, twin_;
   std::unique_ptr<RobotSide> robot_side_, twin_side_;
   TeleConfig config_;
-  Network up_, down_;
+  ImageNetwork up_, down_;
   Playout playout_;
   hal::CommandLimits limits_;
   hal::StateImage robot_state_, twin_state_, arrived_;
   hal::CommandImage robot_command_, twin_command_, received_;
-  std::vector<std::byte> packed_;
   bool linked_ = false;
   bool ended_ = false;  // the robot follows no command any more: it says nothing of the model
   hal::CycleTime now_;

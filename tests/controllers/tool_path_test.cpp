@@ -90,6 +90,8 @@ TEST(ToolPath, RefusesWhatIsNoPath) {
       {head + "0,0,0,0\n1,0,0,x\n", ":3: is not four numbers"},
       {head + "0.5,0,0,0\n1,0,0,0\n", ":2: the first time is not 0"},
       {head + "0,0,0,0\n0,0,0,0\n", ":3: its time is not later"},
+      {head + "0,0,0,0\n1e-9,0,0,0\n", ":3: its time is less than 0.1 ms after"},
+      {head + "0,0,0,0\n1e300,0,0,0\n", ":3: its time is beyond an hour"},
       {head + "0,0,0,0\n1,0,0,500\n", ":3: is more than 100 m away"},
       {head + "0,0,0,0\n", "has fewer than two places"},
   };
