@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "canopen/object_dictionary.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::canopen {
 namespace {
@@ -495,19 +496,16 @@ TEST(DataSheet, HasALimitOnItsSize) {
 }
 
 TEST(DataSheet, OfAFileThatIsNoneIsAnError) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "data_sheet";
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
+  const test::ScratchFolder folder;
   const std::string file = folder / "drive.eds";
   EXPECT_EQ(load_data_sheet(file).error().message, "cannot read this file");
-  EXPECT_EQ(load_data_sheet(folder).error().message, "this is a folder");
+  EXPECT_EQ(load_data_sheet(folder.path()).error().message, "this is a folder");
   EXPECT_EQ(load_data_sheet("/dev/zero").error().message, "this is no regular file");
   std::ofstream(file) << kSheet;
   EXPECT_EQ(load_data_sheet(file)->entries.size(), 5U);
   std::filesystem::resize_file(file, 100'000'000);  // takes no place on the disk
   EXPECT_EQ(load_data_sheet(file).error().message,
             "has 100000000 bytes, and a data sheet may have 4000000");
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

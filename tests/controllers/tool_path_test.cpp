@@ -2,6 +2,7 @@
 #include <fstream>
 
 #include "tests/controllers/harness.hpp"
+#include "tests/support/scratch_folder.hpp"
 #include "tests/support/test_robot.hpp"
 
 namespace tandem {
@@ -12,9 +13,10 @@ const test::TestRobot& panda() {
   return robot;
 }
 
-/// The folder of a file with these rows.
+/// The path of a file with these rows, in a folder of this process.
 std::string write_rows(const std::string& text) {
-  const std::string file = testing::TempDir() + "tool_path_test.csv";
+  static const test::ScratchFolder folder;
+  const std::string file = folder / "path.csv";
   std::ofstream(file) << text;
   return file;
 }
