@@ -93,7 +93,10 @@ const toml::node* TomlTable::require(std::string_view key) {
   return node;
 }
 
-bool TomlTable::has(std::string_view key) const { return get(key) != nullptr; }
+bool TomlTable::has(std::string_view key) const {
+  looked_for_.emplace(key);
+  return get(key) != nullptr;
+}
 
 bool TomlTable::is_text(std::string_view key) const {
   const toml::node* node = get(key);
@@ -147,7 +150,9 @@ void TomlTable::report_unknown(std::string_view key, const std::vector<std::stri
 }
 
 void TomlTable::finish() {
-  const std::vector<std::string> known(asked_.begin(), asked_.end());
+  std::set<std::string, std::less<>> all = asked_;
+  all.insert(looked_for_.begin(), looked_for_.end());
+  const std::vector<std::string> known(all.begin(), all.end());
   for (const auto& [key, node] : *table_) {
     if (!asked_.contains(key.str()) && !has_errors(key.str())) report_unknown(key.str(), known);
   }

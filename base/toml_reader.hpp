@@ -127,6 +127,7 @@ class TomlTable {
   std::string defaults_path_;
   bool partial_ = false;
   std::set<std::string, std::less<>> asked_;
+  mutable std::set<std::string, std::less<>> looked_for_;  // by has(): known, and not read by it
 };
 
 /// A parsed file. Copies and tables share it.

@@ -8,6 +8,7 @@
 
 #include "identification/answer.hpp"
 #include "identification/low_pass.hpp"
+#include "log/log_file.hpp"
 
 namespace tandem::identification {
 namespace {
@@ -56,6 +57,22 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const hal::Robo
       "the intervals do not hold (in brackets the error of a hold of one control period "
       "[kg m2]): " +
       names);
+}
+
+/// A torque with the wrong sign is 200 % of itself away from every description of the robot.
+void warn_of_signs(Identification& out) {
+  std::size_t opposite = 0, known = 0;
+  for (const JointResult& joint : out.joints) {
+    if (!std::isfinite(joint.described_relative_error)) continue;
+    ++known;
+    opposite += std::abs(joint.described_relative_error - 2.0) < 0.2 ? 1 : 0;
+  }
+  if (known == 0 || 2 * opposite <= known) return;
+  out.warnings.push_back(fmt::format(
+      "of {} of {} joints the torques are about the opposite of what the description says: they "
+      "may have the other sign (a positive torque moves its joint towards positive positions). "
+      "Then nothing of this result is true: record or import them with the right sign",
+      opposite, known));
 }
 
 }  // namespace
@@ -114,6 +131,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
         equations.held_s));
   }
   answer(robot, tree, *identified, equations, out);
+  warn_of_signs(out);
   warn_of_intervals(recordings, robot, *identified, options.cutoff_Hz, out);
   return out;
 }
@@ -121,9 +139,12 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
 Result<Identification> identify(const std::vector<std::string>& logs, const hal::RobotConfig& robot,
                                 const model::Tree& tree, const IdentifyOptions& options) {
   std::vector<Recording> recordings;
-  for (const std::string& log : logs) {
-    auto recording = read_recording(log, robot);
+  for (const std::string& path : logs) {
+    auto recording = read_recording(path, robot);
     if (!recording) return std::unexpected(recording.error());
+    const auto twin =
+        std::ranges::find(recordings, recording->data_sha256, &Recording::data_sha256);
+    if (twin != recordings.end()) return std::unexpected(log::same_data(path, twin->path));
     recordings.push_back(std::move(*recording));
   }
   return identify(recordings, robot, tree, options);

@@ -221,6 +221,12 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   if (!file) return std::unexpected(file.error());
   if (const auto topic = file->require(kState); !topic) return std::unexpected(topic.error());
   const log::RunInfo& info = file->info();
+  if (info.operators_view) {
+    return bad_log(
+        path,
+        "its state is what a tele-operator saw, predicted or late: nothing in it was measured",
+        "identify from the log of the robot's end, `tandem serve`");
+  }
   std::vector<std::string> joints, sensors, logged_sensors;
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint.name);
   for (const hal::SensorConfig& sensor : robot.sensors) sensors.push_back(sensor.name);
@@ -268,6 +274,7 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
 
   Recording recording;
   recording.path = path;
+  recording.data_sha256 = file->data_sha256();
   recording.period_s = grid->period_s;
   recording.time_s = grid->time_s;
   const SimFacts sim = sim_facts(info.configuration);

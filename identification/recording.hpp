@@ -25,6 +25,7 @@ struct LeftOut {
 /// Joints and channels in the order of the robot's configuration, whatever the log's is.
 struct Recording {
   std::string path;
+  std::string data_sha256;  ///< of the log; empty: it is none
   double period_s = 0.0;
   double voltage_hold_s = 0.0;             ///< see read_recording()
   bool voltage_hold_known = true;          ///< false of a log that is not simulated

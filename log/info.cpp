@@ -6,6 +6,8 @@
 namespace tandem::log {
 namespace {
 
+constexpr const char* kOperatorsView = "of a tele-operator";
+
 /// Lines of "name" or "name count".
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
@@ -36,6 +38,7 @@ StringMap to_map(const RunInfo& info) {
                 {"period_ns", std::to_string(info.period_ns)},
                 {"kernel_variant", info.kernel_variant},
                 {"description_hash", info.description_hash}};
+  if (info.operators_view) map.emplace_back("state", kOperatorsView);
   if (!info.engine.empty()) map.emplace_back("engine", info.engine);
   return map;
 }
@@ -53,6 +56,7 @@ RunInfo info_from(const StringMap& map) {
   }
   info.seed = std::strtoull(value_of(map, "seed").c_str(), nullptr, 10);
   info.period_ns = std::strtoll(value_of(map, "period_ns").c_str(), nullptr, 10);
+  info.operators_view = value_of(map, "state") == kOperatorsView;
   info.engine = value_of(map, "engine");
   info.kernel_variant = value_of(map, "kernel_variant");
   info.description_hash = value_of(map, "description_hash");

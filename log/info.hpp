@@ -26,6 +26,8 @@ struct RunInfo {
   std::vector<SensorInfo> sensors{};  ///< the image's order
   std::uint64_t seed = 0;
   std::int64_t period_ns = 0;
+  /// The state is what a tele-operator saw, predicted or late; false: what was measured.
+  bool operators_view = false;
   std::string engine{};            ///< "mujoco 2.2.2", which moved the bodies; empty: Tandem's own
   std::string kernel_variant{};    ///< "x86-64-v3"; may change a result's last bits
   std::string description_hash{};  ///< of what the kernels were made from

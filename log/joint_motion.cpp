@@ -188,6 +188,12 @@ Result<JointTrack> track_of(const LogFile& file, const Rows& rows, std::size_t j
     if (request.torque) track.torque_Nm.push_back(torque);
     fast = fast && std::isfinite(velocity);
   }
+  if (motion.end_ns - motion.begin_ns <= longest_ns && track.time_ns.size() < 2) {
+    return refuse(file,
+                  "joint '" + track.joint + "' has fewer than two samples from " +
+                      seconds(motion.begin_ns) + " to " + seconds(motion.end_ns),
+                  "play a longer stretch: from_s and to_s");
+  }
   if (motion.end_ns - before_ns > longest_ns || track.time_ns.size() < 2) {
     return wrong("has a gap: nothing of it was recorded after this time", before_ns, kOtherStretch);
   }

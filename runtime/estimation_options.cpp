@@ -52,7 +52,9 @@ CollisionConfig read_collision(TomlTable table, const hal::RobotConfig& robot) {
     if (!limits.has(joint.name)) continue;
     collision.thresholds.push_back({joint.name, limits.number(joint.name, {1e-3, 1e5})});
   }
-  limits.finish();  // a joint that the robot lacks is an unknown key
+  std::vector<std::string> joints;
+  for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint.name);
+  (void)limits.holds_only(joints);
   if (table.has("threshold_Nm") && collision.thresholds.empty()) {
     table.error("threshold_Nm", "no joint has a threshold, so nothing is watched",
                 "take what `tandem log thresholds` prints of free motion");

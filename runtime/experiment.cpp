@@ -339,6 +339,12 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
   if (!e.parallel) return;
   ParallelOptions& parallel = *e.parallel;
   TomlTable table = root.table("parallel");
+  std::error_code ignored;
+  if (table.has("robot") && !std::filesystem::is_regular_file(parallel.robot_file, ignored)) {
+    table.error("robot", "there is no file " + parallel.robot_file,
+                "give the path of a robot's TOML, from the experiment's folder");
+    return;
+  }
   auto read = read_robot(parallel.robot_file);
   if (!read) {
     errors.insert(errors.end(), read.error().begin(), read.error().end());

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 
@@ -123,6 +124,20 @@ std::optional<Exit> check_commands(const CLI::App& app, const std::vector<std::s
   return std::nullopt;
 }
 
+/// CLI11 takes "nan" and "inf" for numbers, and a range does not keep "nan" out.
+/// @throw CLI::ValidationError  of the first such value of an option that was given
+void refuse_not_finite(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_type_name().find("FLOAT") == std::string::npos) continue;
+    for (const std::string& text : option->results()) {
+      double number = 0.0;
+      if (CLI::detail::lexical_cast(text, number) && std::isfinite(number)) continue;
+      throw CLI::ValidationError(option->get_name(), "'" + text + "' is no finite number");
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) refuse_not_finite(*command);
+}
+
 /// The subcommands with their options; the one that was named, once the line is parsed.
 class Subcommands {
  public:
@@ -197,6 +212,7 @@ Command parse_command_line(int argc, const char* const* argv) {
   }
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
+    refuse_not_finite(app);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) return report_usage_error(app, error);
     if (const auto unknown = check_commands(app, words)) return *unknown;

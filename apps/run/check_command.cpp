@@ -69,6 +69,38 @@ void add_simulation_facts(const runtime::Experiment& e, Facts& facts) {
                                       static_cast<double>(e.sim.substep_ns) * 1e-3));
 }
 
+/// How many joints move the link: they alone feel a wrench at it.
+int joints_before(const model::Tree& tree, const std::string& link) {
+  int joints = 0;
+  for (int at = tree.link_index(link); at >= 0;
+       at = tree.links[static_cast<std::size_t>(at)].parent)
+    joints += tree.links[static_cast<std::size_t>(at)].moving >= 0 ? 1 : 0;
+  return joints;
+}
+
+/// What [estimation] adds.
+void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
+  const estimation::EstimationConfig& config = e.estimation;
+  if (config.base) facts.add("estimates", "the floating base");
+  if (config.observer) facts.add("estimates", "external torques of the joints");
+  if (config.collision)
+    facts.add("estimates",
+              "collisions, of " + counted(config.collision->thresholds.size(), "joint"));
+  for (const estimation::WrenchConfig& wrench : config.wrenches) {
+    const auto site = std::ranges::find(e.robot.model.sites, wrench.site, &hal::SiteConfig::name);
+    const int joints = e.tree == nullptr || site == e.robot.model.sites.end()
+                           ? 6
+                           : joints_before(*e.tree, site->link);
+    facts.add(
+        "estimates",
+        "the wrench at " + wrench.site +
+            (joints >= 6
+                 ? ""
+                 : fmt::format(": {} see at most {} of its 6 numbers, the others are shown as 0",
+                               counted(static_cast<std::size_t>(joints), "joint"), joints)));
+  }
+}
+
 /// What a run would do.
 void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
   const runtime::Experiment& e = c.experiment;
@@ -89,6 +121,7 @@ void print_plan(const Composition& c, const LoopStudy& loops, std::FILE* out) {
                                 counted(e.cycles(), "cycle"), e.duration_s));
   add_simulation_facts(e, facts);
   facts.add("seed", std::to_string(e.seed));
+  add_estimation_facts(e, facts);
   if (e.teleoperation) {
     facts.add("link to the robot", remote::tc_command(e.teleoperation->link.up, "INTERFACE"));
     facts.add("link back", remote::tc_command(e.teleoperation->link.down, "INTERFACE"));

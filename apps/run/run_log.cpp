@@ -31,6 +31,7 @@ log::RunInfo info_of(const Composition& c) {
   }
   info.seed = e.seed;
   info.period_ns = e.loop.period_ns;
+  info.operators_view = c.tele != nullptr;
   if (c.sim != nullptr) info.engine = sim::engine_text(e.sim.engine);
   info.kernel_variant = c.kernels->variant;
   info.description_hash = c.kernels->description_hash;

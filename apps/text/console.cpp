@@ -99,8 +99,11 @@ Status write_file(const std::filesystem::path& file, const std::string& text) {
   out << text;
   out.close();
   if (out) return {};
-  return std::unexpected(
-      Error{"the file cannot be written", "choose another folder with -o", file.string(), 0, {}});
+  return std::unexpected(Error{"the file cannot be written",
+                               "name a file in a folder that is there, and that you may write to",
+                               file.string(),
+                               0,
+                               {}});
 }
 
 Status check_overwrites(const std::string& file, std::string_view begins, const std::string& what) {

@@ -64,15 +64,24 @@ double leg_damping(const hal::RobotConfig& robot, const std::vector<std::string>
   return std::isfinite(softest) ? kDamped_s * softest : 0.0;
 }
 
+/// "9.3 of 69 base parameters".
+std::string condition_text(const identification::Excitation& result) {
+  if (std::isfinite(result.condition_number))
+    return fmt::format("{:.1f} of {} base parameters", result.condition_number,
+                       result.base_parameters);
+  return fmt::format("infinite: of {} base parameters these joints leave some untouched",
+                     result.base_parameters);
+}
+
 std::string experiment_text(const identification::Excitation& result, const ExciteOptions& options,
                             const hal::RobotConfig& robot, const std::string& posture) {
   std::string text = fmt::format(
       "{}, written by `tandem excite --seed {}`.\n"
-      "# Condition number {:.1f} of {} base parameters; at most {:.0f} % of a joint's way to its\n"
-      "# limits, {:.0f} % of its speed, {:.0f} % of its torque.\n"
+      "# Condition number {}.\n# At most {:.0f} % of a joint's way to its limits, {:.0f} % of its "
+      "speed, {:.0f} % of its torque.\n"
       "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
-      kExciteHead, options.seed, result.condition_number, result.base_parameters,
-      100.0 * result.position_share, 100.0 * result.speed_share, 100.0 * result.torque_share,
+      kExciteHead, options.seed, condition_text(result), 100.0 * result.position_share,
+      100.0 * result.speed_share, 100.0 * result.torque_share,
       relative_path(options.output, options.robot),
       posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
       options.periods * options.period_s + 1.0);
@@ -173,8 +182,7 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   std::FILE* out = human_output(options.json);
   Facts facts;
   facts.add("experiment", options.output);
-  facts.add("condition number", fmt::format("{:.1f} of {} base parameters",
-                                            result->condition_number, result->base_parameters));
+  facts.add("condition number", condition_text(*result));
   facts.add("joints",
             fmt::format("{} move, {} are held", result->joints.size(), result->still.size()));
   facts.add("way to limits", fmt::format("{:.0f} % at most", 100.0 * result->position_share));

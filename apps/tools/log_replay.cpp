@@ -88,6 +88,21 @@ Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal:
   return joints;
 }
 
+/// What the controller's parameters are called on this command line.
+Error with_options(Error error) {
+  const std::pair<std::string_view, std::string_view> names[] = {
+      {"from_s and to_s", "--from and --to"},
+      {"to_s", "--to"},
+      {"source = \"state\"", "--source state"},
+      {"`joints`", "--joints"},
+      {"play it without: torque = false", "leave out --torque"}};
+  for (const auto& [key, option] : names) {
+    const std::size_t at = error.hint.find(key);
+    if (at != std::string::npos) error.hint.replace(at, key.size(), option);
+  }
+  return error;
+}
+
 /// Reads and checks everything, as the run will.
 Result<Replay> plan(const LogOptions& options) {
   const auto files = read_robot(options.robot);
@@ -113,7 +128,7 @@ Result<Replay> plan(const LogOptions& options) {
     request.joints.push_back(replay.robot.joints[joint].name);
   }
   auto motion = log::read_joint_motion(*file, request);
-  if (!motion) return std::unexpected(motion.error());
+  if (!motion) return std::unexpected(with_options(motion.error()));
   replay.motion = std::move(*motion);
   const auto made = MotionPlan::make(replay.motion, replay.robot, replay.joints, kCycle_ns);
   if (!made) {

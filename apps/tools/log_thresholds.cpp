@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "apps/text/console.hpp"
 #include "apps/tools/log_alarms.hpp"
@@ -38,9 +39,12 @@ std::vector<double> largest_of(const ExternalTorques& run, std::size_t joint) {
 Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths, double from_s,
                                            std::vector<std::string>& joints) {
   std::vector<NamedTorques> all;
+  std::map<std::string, std::string> seen;  // data's digest -> path
   for (const std::string& path : paths) {
     const Result<log::LogFile> file = log::LogFile::open(path);
     if (!file) return std::unexpected(file.error());
+    const auto [twin, is_new] = seen.emplace(file->data_sha256(), path);
+    if (!is_new) return std::unexpected(log::same_data(path, twin->second));
     if (joints.empty()) joints = file->info().joints;
     if (file->info().joints != joints) {
       return std::unexpected(

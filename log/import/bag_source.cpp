@@ -205,6 +205,12 @@ class BagSource {
     if (listed("*") || listed(name.c_str())) return {};
     std::vector<std::string> known;
     for (const hal::JointConfig& joint : robot_.joints) known.push_back(joint.name);
+    if (std::ranges::find(known, name) != known.end()) {
+      return refuse("the recording's joint '" + name +
+                        "' has the name of a joint that [bag.names] "
+                        "gives to another",
+                    "correct [bag.names], or name it in `ignore`", name);
+    }
     return refuse("the recording's joint '" + name + "' is none of the robot's",
                   "say whose it is in [bag.names], or name it in `ignore`; " + suggest(name, known),
                   name);

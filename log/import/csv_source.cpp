@@ -42,14 +42,19 @@ class CsvSource {
     return std::filesystem::path(files_[file].path).stem().string() + "." + column;
   }
 
-  /// Error: no file has it.
+  /// Errors: no file has it; it is somebody else's already.
   Result<CsvPlace> find(const std::string& name, int line, const std::string& key) {
     std::vector<std::string> names;
     for (std::size_t f = 0; f < rows_.size(); ++f) {
       for (std::size_t c = 0; c < rows_[f].names().size(); ++c) {
         names.push_back(full_name(f, rows_[f].names()[c]));
         if (names.back() != name) continue;
-        used_.push_back(names.back());
+        if (std::ranges::find(used_, name) != used_.end()) {
+          return std::unexpected(Error{"the column '" + name + "' is used twice",
+                                       "a column is one number's: leave one of the two out",
+                                       map_.file, line, key});
+        }
+        used_.push_back(name);
         return CsvPlace{.file = f, .column = c};
       }
     }

@@ -36,6 +36,22 @@ Status read_bytes(const std::string& path, Sha256& hash, std::string* text) {
       Error{"cannot read this file", "check the path and its permissions", path, 0, {}});
 }
 
+/// Of a table. Errors: bytes that no text has, such as those of a picture or of UTF-16.
+Status is_text(const ImportFile& file) {
+  const auto control = [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 &&
+           std::string_view("\t\n\v\f\r").find(c) == std::string_view::npos;
+  };
+  const auto found = std::ranges::find_if(file.text, control);
+  if (found == file.text.end()) return {};
+  return std::unexpected(
+      Error{"is no text: byte " + std::to_string(found - file.text.begin()) + " is no character",
+            "give a table in UTF-8 or ASCII, or a bag in MCAP",
+            file.path,
+            0,
+            {}});
+}
+
 bool begins(std::string_view text, std::string_view magic) { return text.starts_with(magic); }
 
 /// What a file is by its first bytes. Errors: a kind that is known and not read.
@@ -56,7 +72,12 @@ Result<bool> is_bag(const std::string& path) {
   if (begins(first, "\x28\xB5\x2F\xFD")) return refuse("is compressed", "decompress it: zstd -d");
   if (begins(first, "\x1F\x8B")) return refuse("is compressed", "decompress it: gunzip");
   const auto magic = std::as_bytes(std::span(head)).first(kMagicBytes);
-  return first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic);
+  if (first.size() >= kMagicBytes && std::ranges::equal(magic, kMagic)) return true;
+  if (path.ends_with(".mcap")) {
+    return refuse(first.empty() ? "is empty" : "is no MCAP file: it does not begin as one",
+                  "give the bag's .mcap file; a table needs another ending");
+  }
+  return false;
 }
 
 /// "position_rad", "command torque_nm": what the recording fills, each once.
@@ -152,6 +173,7 @@ std::expected<Imported, Diagnostics> read_recording(const ImportRequest& request
     if (Status read = read_bytes(path, hash, *bag ? nullptr : &files.back().text); !read) {
       return refuse(read.error());
     }
+    if (Status text = is_text(files.back()); !text) return refuse(text.error());
   }
   imported.sha256 = hash.finish();
   Sha256 ignored;

@@ -315,6 +315,12 @@ class Reader {
       table.error("scale", "is there beside counts_per_turn", "give one of the two");
     }
     one.scale = per_joint(table, "scale", count, 1.0);
+    for (const char* key : {"scale", "counts_per_turn"}) {
+      const std::vector<double> given =
+          table.has(key) ? table.numbers_or(key, {}) : std::vector{1.0};
+      if (std::ranges::find(given, 0.0) == given.end()) continue;
+      table.error(key, "is 0: every number would be lost", "give the true one");
+    }
     one.offset = per_joint(table, "offset", count, 0.0);
     const std::vector<double> counts = per_joint(table, "counts_per_turn", count, 0.0);
     for (std::size_t j = 0; j < count && j < one.scale.size() && j < counts.size(); ++j) {

@@ -92,6 +92,23 @@ TEST_F(CommandLine, ARateBeyondItsRangeIsRefused) {
   EXPECT_EQ(tandem("run hold.toml --rate fast").status, 2);
 }
 
+// `log thresholds --from nan` gave thresholds, `excite --period nan` an experiment of nan seconds.
+TEST_F(CommandLine, OfNumbersThatAreNotFiniteAreRefused) {
+  for (const char* command :
+       {"log thresholds a.mcap --from", "log thresholds a.mcap --per-hour",
+        "log replay a.mcap --robot r.toml --out e.toml --from",
+        "identify a.mcap --robot r --out o --cutoff", "excite r.toml --out e.toml --period",
+        "excite r.toml --out e.toml --share", "predict --horizon", "clock rate",
+        "run hold.toml --rate", "run hold.toml --duration", "joint move elbow",
+        "topic hz /tf --wait"}) {
+    for (const char* number : {"nan", "inf", "1e999"}) {
+      const Outcome outcome = tandem(command + std::string(" ") + number);
+      EXPECT_EQ(outcome.status, 2) << command;
+      EXPECT_NE(outcome.err.find(number), std::string::npos) << command << ": " << outcome.err;
+    }
+  }
+}
+
 TEST_F(CommandLine, RateAndRealTimeExcludeEachOther) {
   EXPECT_EQ(tandem("run hold.toml --rate 2 --realtime").status, 2);
 }

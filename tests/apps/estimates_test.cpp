@@ -29,6 +29,8 @@ class Thresholds : public Program {
 };
 
 TEST_F(Thresholds, OfThreeRunsHoldInAFourthAndFindItsPushes) {
+  edit("robot.toml", "min_position_rad = -6.3\n",
+       "min_position_rad = -6.3\ntorque_noise_Nm = 0.01\n");
   experiment("swing");
   std::string logs;
   for (const char* seed : {"1", "2", "3"})
@@ -68,6 +70,15 @@ TEST_F(Thresholds, OfThreeRunsHoldInAFourthAndFindItsPushes) {
   EXPECT_EQ(tandem("run watched.toml --duration 5 --no-log --quiet").status, 0);
   EXPECT_EQ(tandem("run watched.toml --duration 5 --no-log --quiet --scenario pushes.toml").status,
             1);
+}
+
+// Without noise every seed makes the same run: three of them were taken for three runs.
+TEST_F(Thresholds, OfOneRunTwiceAreRefused) {
+  experiment("swing");
+  const std::string log = run("swing");
+  const Outcome outcome = tandem("log thresholds " + log + " " + log);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.err.find("has the same data as " + log), std::string::npos) << outcome.err;
 }
 
 TEST_F(Thresholds, OfOneRunSayThatRunsDiffer) {

@@ -118,6 +118,34 @@ TEST_F(Identify, GivesForATableOfTheLogWhatTheLogGives) {
   }
 }
 
+// The intervals of one log that was given twice were 0.7 of its own.
+TEST_F(Identify, OfOneLogTwiceIsOneError) {
+  ASSERT_EQ(tandem("run trajectory.toml --quiet --duration 8 --log logs").status, 0);
+  const Outcome twice =
+      tandem("identify " + log() + " " + log() + " --robot robot.toml --out found");
+  EXPECT_EQ(twice.status, 2);
+  EXPECT_NE(twice.err.find("has the same data as"), std::string::npos) << twice.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "found"));
+}
+
+// A robot of 13 kg instead of 17 was written, without a word of the signs.
+TEST_F(Identify, OfTorquesOfTheOtherSignSaysSo) {
+  record("robot.toml");
+  std::string map = kMap;
+  ASSERT_EQ(tandem("log csv " + log() + " --fields position_rad,torque_nm -o run.csv").status, 0);
+  const std::size_t torque = map.find("[torque]");
+  map.insert(map.find('\n', torque) + 1, "scale = [-1]\n");
+  write_text(folder_ / "map.toml", map);
+  const Outcome imported =
+      tandem("log import run.csv --robot robot.toml --map map.toml -o in.mcap");
+  ASSERT_EQ(imported.status, 0) << imported.err;
+  const Outcome found = tandem("identify in.mcap --robot robot.toml --out found");
+  ASSERT_EQ(found.status, 0) << found.err;
+  EXPECT_NE(found.err.find("of 2 of 2 joints the torques are about the opposite"),
+            std::string::npos)
+      << found.err;
+}
+
 TEST_F(Identify, DestroysNoFileThatItDidNotWrite) {
   const std::string robot = read_text(folder_ / "robot.toml");
   const std::string urdf = read_text(folder_ / "double_pendulum.urdf");

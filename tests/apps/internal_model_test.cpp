@@ -98,6 +98,11 @@ TEST_F(Parallel, OfAnotherLayoutIsRefusedByName) {
   expect_refused({"hold.toml:", "parallel.robot", "another layout", "'joint2'", "'jointX'"});
 }
 
+TEST_F(Parallel, OfAFileThatIsNotThereIsRefusedWhereItIsNamed) {
+  add("[parallel]\nrobot = \"nosuch.toml\"\n");
+  expect_refused({"hold.toml:", "parallel.robot", "there is no file", "nosuch.toml"});
+}
+
 TEST_F(Parallel, WithWrongKeysIsRefused) {
   add("[parallel]\nrobt = \"robot.toml\"\n");
   expect_refused({"hold.toml:", "robt", "robot"});

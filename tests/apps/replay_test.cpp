@@ -167,6 +167,8 @@ TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   };
   refused("none.mcap" + to, "none.mcap");
   refused(recording_ + to + " --from 90", "there is nothing from 90.000 s");
+  refused(recording_ + to + " --from 90", "correct --from and --to");
+  refused(recording_ + to + " --from 3 --to 3.0001", "has fewer than two samples from 3.000 s");
   refused(recording_ + to + " --joints elbow", "the robot has no joint 'elbow'");
   refused(recording_ + to + " --joints joint1,joint1", "joint 'joint1' stands twice");
   refused(recording_ + to + " --posture high", "the robot has no posture 'high'");

@@ -107,6 +107,20 @@ TEST_F(TeleoperationRun, InRealTimeTheTwoEndsAreTwoProcesses) {
   EXPECT_EQ(served["remote"]["losses"], 0);
 }
 
+// It was taken for measurements, of a robot that never moved.
+TEST_F(TeleoperationRun, IsNoRecordingToIdentifyFrom) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  write_text(folder_ / "operated.toml",
+             plain.substr(0, at) + "[teleoperation]\n" + plain.substr(at));
+  ASSERT_EQ(tandem("run operated.toml --duration 1 --quiet --log logs").status, 0);
+  const std::string log = "logs/double_pendulum-operated-001.mcap";
+  EXPECT_NE(tandem("log info " + log).out.find("what the tele-operator saw"), std::string::npos);
+  const Outcome found = tandem("identify " + log + " --robot robot.toml --out found");
+  EXPECT_EQ(found.status, 2);
+  EXPECT_NE(found.err.find("what a tele-operator saw"), std::string::npos) << found.err;
+}
+
 TEST_F(TeleoperationRun, NeedsRealTimeAtBothEnds) {
   const std::string plain = read_text(folder_ / "trajectory.toml");
   const std::size_t at = plain.find("[[controller]]");

@@ -89,6 +89,13 @@ TEST_F(Bag, WithoutChunksInBigEndianFromSeveralPublishers) {
   EXPECT_NEAR(table({{"position_rad", 0}}).columns[0][1], position(0, 0.010001), 1e-8);
 }
 
+// "none of the robot's (… did you mean 'joint1'?)" was said of joint1.
+TEST_F(Bag, WhoseJointWasGivenToAnotherNameSaysSo) {
+  EXPECT_HAS(refusal({kFolder + "big_endian.mcap"}, kTime + "[bag.names]\nfoo = \"joint1\"\n"),
+             "the recording's joint 'joint1' has the name of a joint that [bag.names] gives to "
+             "another");
+}
+
 TEST_F(Bag, WithSensorsAtRatesOfTheirOwn) {
   const std::string file = kFolder + "lz4.mcap";
   const std::string ft = "[sensor.ft]\ntopic = \"/ft\"\nmeasures = \"parent_on_child\"\n";

@@ -63,6 +63,37 @@ TEST_F(Csv, GivesItsNumbersBitForBit) {
   }
 }
 
+TEST_F(Csv, AColumnIsOneNumbers) {
+  const std::string file = write("a.csv", plain_rows(50));
+  std::string map = kPlain;
+  EXPECT_EQ(refusal({file}, map + "[current]\ncolumns = \"tau{1}\"\nunit = \"A\"\n"),
+            "map.toml:16: current.columns: the column 'tau1' is used twice (a column is one "
+            "number's: leave one of the two out)");
+  map.replace(map.find("q{1}"), 4, "t{1}");
+  map.replace(map.find("t{1}"), 4, "q{1}");
+  EXPECT_HAS(
+      refusal({file},
+              "ignore = [\"*\"]\n" + map +
+                  "[sensor.ft]\ncolumns = [\"t\", \"dq1\", \"a\", \"b\", \"c\", \"d\"]\nforce_unit "
+                  "= \"N\"\nmoment_unit = \"Nm\"\nmeasures = \"child_on_parent\"\n"),
+      "the column 't' is used twice");
+}
+
+// They were taken for tables, and bytes of theirs printed to the terminal.
+TEST_F(Csv, OfBytesIsRefused) {
+  const std::string noise("\x01\x02\x03\xFF\x00q1,\x1B[2J\n", 14);
+  EXPECT_EQ(refusal({write("a.mcap", noise)}, kPlain),
+            "a.mcap: is no MCAP file: it does not begin as one (give the bag's .mcap file; a table "
+            "needs another ending)");
+  EXPECT_EQ(refusal({write("b.mcap", "")}, "[bag]\nstamp = \"log\"\n"),
+            "b.mcap: is empty (give the bag's .mcap file; a table needs another ending)");
+  EXPECT_EQ(
+      refusal({write("a.csv", "t,q1\n0," + std::string(1, '\0'))}, kPlain),
+      "a.csv: is no text: byte 7 is no character (give a table in UTF-8 or ASCII, or a bag in "
+      "MCAP)");
+  EXPECT_HAS(refusal({write("c.csv", "t,q1\x1B[2J\n")}, kPlain), "is no text: byte 4");
+}
+
 TEST_F(Csv, IsTheSameLogTwice) {
   const std::string file = write("a.csv", plain_rows(50));
   const ImportSummary first = imported({file}, kPlain);

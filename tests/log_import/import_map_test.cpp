@@ -49,6 +49,20 @@ TEST(ImportMap, IsStrict) {
              "command.temperature");
 }
 
+/// The file was blamed for it: "tau1: never changes".
+TEST(ImportMap, RefusesAScaleOfNothing) {
+  EXPECT_HAS(errors_of(kWhole + "scale = [0]\n"), "position.scale: is 0");
+  EXPECT_HAS(errors_of(kWhole + "scale = [1, 0]\n"), "position.scale: is 0");
+  EXPECT_HAS(errors_of(kWhole + "counts_per_turn = [0]\n"), "position.counts_per_turn: is 0");
+}
+
+/// A key that is only looked for, not read, is known all the same.
+TEST(ImportMap, SuggestsTheKeyThatIsMeant) {
+  std::string map = kWhole;
+  map.replace(map.find("unit"), 0, "peroid_s = 0.01\n");
+  EXPECT_HAS(errors_of(map), "did you mean 'period_s'?");
+}
+
 /// One mistake is one error.
 TEST(ImportMap, SaysWhatIsWrongOnce) {
   std::string map = kWhole;

@@ -295,6 +295,8 @@ TEST(Experiment, RefusesWhatCannotBeEstimated) {
   EXPECT_TRUE(has("[estimation.observer]\nbandwidth_Hz = 0", "bandwidth_Hz"));
   EXPECT_TRUE(has("[estimation.collision]\nreaction = 'stop'\nthreshold_Nm = {elbow = 1}", "hold"));
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {knee = 1}", "knee"));
+  EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbw = 1}", "did you mean 'elbow'?"))
+      << "the robot's joints are known, not those that the table has";
   EXPECT_TRUE(has("[estimation.collision]\nreaction = 'warn'", "threshold_Nm"));
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbow = -1}", "elbow"));
   auto sited = robot();
