@@ -83,8 +83,8 @@ class Operated {
     auto far = sim::SimRobot::create(real, of.payload ? loaded_->get() : kernels_.get(),
                                      e.sim_robot_config());
     far_ = far->get();
-    TeleBackend::End robot_end{std::move(*far), side()};
-    TeleBackend::End twin;
+    OperatorEnd::End robot_end{std::move(*far), side()};
+    OperatorEnd::End twin;
     if (predict) {
       auto sim = e.sim_robot_config();
       sim.seed = e.seed + 1;
