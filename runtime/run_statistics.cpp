@@ -17,8 +17,14 @@ std::array<double, 3> upwards(std::span<const double> q) {
 
 }  // namespace
 
-RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops)
-    : errors_(joints), limited_(joints), feet_(feet), loops_(loops), external_Nm_(joints) {}
+RunStatistics::RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops,
+                             std::size_t wrenches)
+    : errors_(joints),
+      limited_(joints),
+      feet_(feet),
+      loops_(loops),
+      external_Nm_(joints),
+      wrenches_(wrenches) {}
 
 void RunStatistics::take(const hal::StateImage& state, const hal::CommandImage& command,
                          const hal::TruthImage* truth, std::span<const hal::LimitCounters> limits,
@@ -56,6 +62,13 @@ void RunStatistics::take_estimate(const hal::EstimateImage& estimate,
   for (std::size_t j = 0; j < estimate.joints(); ++j) {
     external_Nm_[j] = std::max(external_Nm_[j], std::abs(estimate.external_torque_Nm()[j]));
   }
+  const std::int64_t now_ns = estimate.time_ns()[0];
+  const auto norm = [](const double* v) { return std::hypot(v[0], v[1], v[2]); };
+  for (std::size_t i = 0; i < wrenches_.size(); ++i) {
+    wrenches_[i].force_N.take(norm(&estimate.external_force_N()[3 * i]), now_ns);
+    wrenches_[i].moment_Nm.take(norm(&estimate.external_moment_Nm()[3 * i]), now_ns);
+  }
+  if (!wrenches_.empty()) unexplained_Nm_.take(estimate.unexplained_torque_Nm()[0], now_ns);
   if (!estimate.has_base()) return;
   ++base_cycles_;
   if (truth == nullptr || truth->hoist_share()[0] > 0.0) return;
@@ -117,13 +130,14 @@ std::optional<BaseFigures> RunStatistics::base() const {
 }
 
 EstimateFigures RunStatistics::estimate() const {
-  return {base_cycles_, compared_, tilt_error_rad_, height_error_m_, external_Nm_};
+  return {base_cycles_, compared_, tilt_error_rad_, height_error_m_,
+          external_Nm_, wrenches_, unexplained_Nm_};
 }
 
 void RunStatistics::archive(Archive& ar) {
   ar(errors_, limited_, cycles_, feet_, loops_, base_cycles_, compared_, tilt_error_rad_,
-     height_error_m_, external_Nm_, free_cycles_, force_sum_N_, slip_m_, min_height_m_,
-     max_height_m_, tilt_rad_);
+     height_error_m_, external_Nm_, wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_,
+     min_height_m_, max_height_m_, tilt_rad_);
 }
 
 }  // namespace tandem::runtime

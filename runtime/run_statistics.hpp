@@ -35,6 +35,21 @@ struct BaseFigures {
   double final_tilt_rad = 0.0;  ///< angle between the base's z axis and W's
 };
 
+/// The largest of one component of an estimate, and when.
+struct Peak {
+  double value = 0.0;
+  std::int64_t time_ns = 0;  ///< nominal, of the cycle; 0 where `value` is
+
+  void take(double other, std::int64_t at_ns) noexcept {
+    if (other > value) *this = {other, at_ns};
+  }
+};
+
+/// Of the wrench at one [[estimation.wrench]]: norms of force and moment.
+struct WrenchFigures {
+  Peak force_N, moment_Nm;
+};
+
 /// What the loop estimated while the controllers ran.
 struct EstimateFigures {
   std::uint64_t base_cycles = 0;  ///< in which the base's estimate had started
@@ -44,6 +59,8 @@ struct EstimateFigures {
   double max_tilt_error_rad = 0.0;
   double max_height_error_m = 0.0;
   std::vector<double> max_external_Nm;  ///< of each joint, absolute; empty without an observer
+  std::vector<WrenchFigures> wrenches;  ///< of each declared place, in their order
+  Peak unexplained_Nm;                  ///< of external torques that these wrenches do not explain
 };
 
 /// From the plant's truth: how far one closed loop was open at most, over every cycle.
@@ -55,7 +72,9 @@ struct LoopFigures {
 class RunStatistics {
  public:
   /// @param feet, loops  of the truth image; 0 without one.
-  RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0);
+  /// @param wrenches     of the estimate; 0 without one
+  RunStatistics(std::size_t joints, std::size_t feet, std::size_t loops = 0,
+                std::size_t wrenches = 0);
 
   /// A cycle in which the controllers ran. `truth` and `estimate` may be null; `limits` are
   /// CommandLimits' own.
@@ -103,6 +122,8 @@ class RunStatistics {
   std::uint64_t base_cycles_ = 0, compared_ = 0;  // of the estimate
   double tilt_error_rad_ = 0.0, height_error_m_ = 0.0;
   std::vector<double> external_Nm_;  // of each joint: the largest
+  std::vector<WrenchFigures> wrenches_;
+  Peak unexplained_Nm_;
   std::uint64_t free_cycles_ = 0;
   double force_sum_N_ = 0.0, slip_m_ = 0.0;
   double min_height_m_ = 0.0, max_height_m_ = 0.0, tilt_rad_ = 0.0;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/toml_reader.hpp"
-#include "hal/remote/tele_backend.hpp"
+#include "hal/remote/operator_end.hpp"
 #include "runtime/controller_spec.hpp"
 
 namespace tandem::runtime {

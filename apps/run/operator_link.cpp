@@ -5,6 +5,7 @@
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/remote/live_link.hpp"
+#include "hal/remote/tele_backend.hpp"
 #include "runtime/local_controllers.hpp"
 
 namespace tandem::apps {
@@ -55,7 +56,7 @@ Diagnostics shared_joint(const Composition& c, const runtime::LocalControllers* 
 }
 
 /// A simulated robot that follows each command at once, with its own controllers.
-std::expected<remote::TeleBackend::End, Diagnostics> twin_of(const Composition& c) {
+std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& c) {
   const runtime::Experiment& e = c.experiment;
   auto side = robot_side_of(c);
   if (!side) return std::unexpected(side.error());
@@ -63,7 +64,7 @@ std::expected<remote::TeleBackend::End, Diagnostics> twin_of(const Composition& 
   sim.seed = e.seed + 1;  // noise of its own
   auto made = sim::SimRobot::create(e.robot, c.kernels.get(), sim);
   if (!made) return std::unexpected(Diagnostics{made.error()});
-  return remote::TeleBackend::End{std::move(*made), std::move(*side)};
+  return remote::OperatorEnd::End{std::move(*made), std::move(*side)};
 }
 
 }  // namespace
@@ -76,8 +77,8 @@ Diagnostics put_link_between(Composition& c) {
   auto side = robot_side_of(c);
   if (!side) return side.error();
   if (auto shared = shared_joint(c, side->get()); !shared.empty()) return shared;
-  remote::TeleBackend::End robot{std::move(c.backend), std::move(*side)};
-  remote::TeleBackend::End twin;
+  remote::OperatorEnd::End robot{std::move(c.backend), std::move(*side)};
+  remote::OperatorEnd::End twin;
   if (config.predict) {
     auto made = twin_of(c);
     if (!made) return made.error();
@@ -96,7 +97,7 @@ Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> 
   config.seed = e.seed;
   const auto delay_ns = static_cast<std::int64_t>(1e9 * config.down.delay_s);
   if (e.teleoperation->real) config.up = config.down = {};
-  remote::TeleBackend::End twin;
+  remote::OperatorEnd::End twin;
   if (config.predict) {
     auto made = twin_of(c);
     if (!made) return made.error();

@@ -66,11 +66,16 @@ Json base_json(const std::optional<runtime::BaseFigures>& base) {
           {"final_tilt_rad", base->final_tilt_rad}};
 }
 
+double seconds(const runtime::Peak& peak) { return static_cast<double>(peak.time_ns) * 1e-9; }
+
 /// What was estimated; null without [estimation].
 Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures) {
   if (c.estimator == nullptr) return nullptr;
   const hal::EstimateImage& image = c.estimator->image();
-  Json json{{"base", nullptr}, {"external_torque_Nm", nullptr}};
+  Json json{{"base", nullptr},
+            {"external_torque_Nm", nullptr},
+            {"wrenches", Json::object()},
+            {"unexplained_torque_Nm", nullptr}};
   if (image.estimates_base()) {
     json["base"] = {{"cycles", figures.base_cycles},
                     {"max_tilt_error_rad", nullptr},
@@ -83,6 +88,15 @@ Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures
   for (std::size_t j = 0; j < image.joints(); ++j) {
     json["external_torque_Nm"][c.experiment.robot.joints[j].name] = figures.max_external_Nm[j];
   }
+  for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
+    const runtime::WrenchFigures& one = figures.wrenches[i];
+    json["wrenches"][c.experiment.estimation.wrenches[i].site] = {
+        {"max_force_N", one.force_N.value},
+        {"max_force_s", seconds(one.force_N)},
+        {"max_moment_Nm", one.moment_Nm.value},
+        {"max_moment_s", seconds(one.moment_Nm)}};
+  }
+  if (!figures.wrenches.empty()) json["unexplained_torque_Nm"] = figures.unexplained_Nm.value;
   return json;
 }
 
@@ -197,6 +211,15 @@ void add_estimate_facts(const RunSummary& summary, Facts& facts) {
   const hal::JointConfig& joint = c.experiment.robot.joints[j];
   facts.add("external torque",
             fmt::format("{:.2f} {} at most ({})", *most, joint.slides ? "N" : "Nm", joint.name));
+  for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
+    const runtime::WrenchFigures& one = figures.wrenches[i];
+    facts.add("wrench at " + c.experiment.estimation.wrenches[i].site,
+              fmt::format("{:.1f} N at most at {:.3f} s, {:.2f} Nm at {:.3f} s", one.force_N.value,
+                          seconds(one.force_N), one.moment_Nm.value, seconds(one.moment_Nm)));
+  }
+  if (!figures.wrenches.empty())
+    facts.add("not explained by them",
+              fmt::format("{:.2f} Nm at most", figures.unexplained_Nm.value));
 }
 
 /// The time that is not in the line above: nothing has run then.

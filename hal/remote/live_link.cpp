@@ -10,21 +10,14 @@ constexpr std::uint64_t kMostLeftOut = 1000;      // numbers, in one cycle of th
 constexpr std::uint64_t kMostCatchUp = 20;        // cycles of the twin in one of the loop
 constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
 
-std::uint64_t cycles(std::int64_t ns, std::int64_t period_ns) {
-  return static_cast<std::uint64_t>((ns + period_ns - 1) / period_ns);
-}
-
 }  // namespace
 
-LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot,
-                   TeleBackend::End twin, const TeleConfig& config, std::int64_t delay_ns,
-                   std::int64_t period_ns)
-    : ForwardingBackend(*robot),
+LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot, End twin,
+                   const TeleConfig& config, std::int64_t delay_ns, std::int64_t period_ns)
+    : OperatorEnd(*robot, std::move(twin)),
       robot_(std::move(robot)),
-      twin_(std::move(twin.robot)),
-      twin_side_(std::move(twin.side)),
       config_(config),
-      delay_cycles_(cycles(delay_ns, period_ns)),
+      delay_cycles_(cycles_in(delay_ns, period_ns)),
       up_(config.up, config.seed, hal::CommandImage(description.shape()).bytes().size()),
       down_(config.down, config.seed + 1, hal::StateImage(description.shape()).bytes().size()),
       robot_state_(description.shape()),
@@ -33,14 +26,8 @@ LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend>
       sent_(description.shape()),
       twin_command_(description.shape()),
       prediction_(description.joints.size(),
-                  cycles(config.playout_ns + 2 * delay_ns + kPast_ns, period_ns),
+                  cycles_in(config.playout_ns + 2 * delay_ns + kPast_ns, period_ns),
                   config.correction_ns, period_ns) {}
-
-hal::Phase LiveLink::phase() const noexcept {
-  const hal::Phase phase = robot_->phase();
-  const bool waits = !linked_ && twin_ && twin_->phase() == hal::Phase::kBringUp;
-  return phase == hal::Phase::kOperational && waits ? hal::Phase::kBringUp : phase;
-}
 
 void LiveLink::exchange(const hal::CycleTime& time) noexcept {
   while (linked_) {
@@ -170,25 +157,6 @@ Code LiveLink::write(const hal::CommandImage& command,
 
 void LiveLink::last_command(const hal::CommandImage& command) noexcept TANDEM_RT {
   robot_->last_command(linked_ ? sent_ : command);
-}
-
-void LiveLink::stop(hal::StopCategory category) noexcept TANDEM_RT {
-  ended_ = true;
-  robot_->stop(category);
-  if (twin_) twin_->stop(category);
-}
-
-void LiveLink::reset() noexcept TANDEM_RT {
-  linked_ = ended_ = false;
-  robot_->reset();
-  if (twin_) twin_->reset();
-}
-
-bool LiveLink::shut_down() noexcept TANDEM_RT {
-  ended_ = true;
-  const bool robot = robot_->shut_down();
-  const bool twin = twin_ == nullptr || twin_->shut_down();
-  return robot && twin;
 }
 
 TeleFigures LiveLink::figures() const noexcept {

@@ -7,8 +7,11 @@
 #include <memory>
 #include <vector>
 
+#include "hal/remote/image_network.hpp"
+#include "hal/remote/operator_end.hpp"
+#include "hal/remote/prediction.hpp"
 #include "hal/remote/remote_backend.hpp"
-#include "hal/remote/tele_backend.hpp"
+#include "hal/robot.hpp"
 
 namespace tandem::remote {
 
@@ -23,18 +26,16 @@ namespace tandem::remote {
 ///   first.
 /// - The declared networks lie before the real link. Bring-up, stops, resets, gains and shut-down
 ///   cross the real link alone.
-class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {
+class LiveLink final : public OperatorEnd {
  public:
   /// @param robot    with a pace of its own (ClientConfig::own_pace)
   /// @param twin     without a robot when config.predict is false
   /// @param config   its networks are what is added to the real link
   /// @param delay_ns of states that are on their way: the numbers begin so much before the robot's
   /// cycle
-  LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot,
-           TeleBackend::End twin, const TeleConfig& config, std::int64_t delay_ns,
-           std::int64_t period_ns);
+  LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot, End twin,
+           const TeleConfig& config, std::int64_t delay_ns, std::int64_t period_ns);
 
-  [[nodiscard]] hal::Phase phase() const noexcept override;
   /// Sends what has crossed the declared network.
   void exchange(const hal::CycleTime& time) noexcept override;
   [[nodiscard]] Code read(const hal::CycleTime& time,
@@ -42,10 +43,6 @@ class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
   void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override;
-  void stop(hal::StopCategory category) noexcept TANDEM_RT override;
-  void reset() noexcept TANDEM_RT override;
-  bool home(std::size_t /*joint*/) noexcept TANDEM_RT override { return false; }
-  [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& /*ar*/) override { return false; }
 
   [[nodiscard]] TeleFigures figures() const noexcept override;
@@ -59,15 +56,12 @@ class LiveLink final : public hal::ForwardingBackend, public OperatorEnd {
                  const hal::ParameterImage& parameters) noexcept TANDEM_RT;
 
   std::unique_ptr<RemoteBackend> robot_;
-  std::unique_ptr<hal::Backend> twin_;
-  std::unique_ptr<RobotSide> twin_side_;
   TeleConfig config_;
   std::uint64_t delay_cycles_;
   ImageNetwork up_, down_;
   hal::StateImage robot_state_, twin_state_, arrived_;
   hal::CommandImage sent_, twin_command_;
   Prediction prediction_;
-  bool linked_ = false, ended_ = false;
   hal::CycleTime now_;
   std::int64_t linked_ns_ = 0;
   std::uint64_t number_ = 0;           // of the next command

@@ -8,31 +8,25 @@ namespace {
 constexpr std::int64_t kMargin_ns = 1'000'000'000;  // of the past, beyond the delays
 constexpr double kJitters = 8.0;
 
-std::uint64_t cycles(std::int64_t ns, std::int64_t period_ns) {
-  return static_cast<std::uint64_t>((ns + period_ns - 1) / period_ns);
-}
-
 /// From a command to the state that shows it, at most; later states correct nothing.
 std::uint64_t round_trip_cycles(const TeleConfig& config, std::int64_t period_ns) {
   const double down_s = config.down.delay_s + kJitters * config.down.jitter_s;
-  return cycles(config.playout_ns + static_cast<std::int64_t>(1e9 * down_s) + kMargin_ns,
-                period_ns);
+  return cycles_in(config.playout_ns + static_cast<std::int64_t>(1e9 * down_s) + kMargin_ns,
+                   period_ns);
 }
 
 }  // namespace
 
 TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
                          const TeleConfig& config, std::int64_t period_ns)
-    : ForwardingBackend(*robot.robot),
+    : OperatorEnd(*robot.robot, std::move(twin)),
       robot_(std::move(robot.robot)),
-      twin_(std::move(twin.robot)),
       robot_side_(std::move(robot.side)),
-      twin_side_(std::move(twin.side)),
       config_(config),
       up_(config.up, config.seed, hal::CommandImage(description.shape()).bytes().size()),
       down_(config.down, config.seed + 1, hal::StateImage(description.shape()).bytes().size()),
-      playout_(description, cycles(config.playout_ns, period_ns),
-               cycles(config.brake_ns, period_ns), period_ns),
+      playout_(description, cycles_in(config.playout_ns, period_ns),
+               cycles_in(config.brake_ns, period_ns), period_ns),
       limits_(description, period_ns),
       robot_state_(description.shape()),
       twin_state_(description.shape()),
@@ -42,12 +36,6 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       received_(description.shape()),
       prediction_(description.joints.size(), round_trip_cycles(config, period_ns),
                   config.correction_ns, period_ns) {}
-
-hal::Phase TeleBackend::phase() const noexcept {
-  const hal::Phase phase = robot_->phase();
-  const bool waits = !linked_ && twin_ && twin_->phase() == hal::Phase::kBringUp;
-  return phase == hal::Phase::kOperational && waits ? hal::Phase::kBringUp : phase;
-}
 
 /// From now on the network lies between the two.
 void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
@@ -146,25 +134,6 @@ Code TeleBackend::write(const hal::CommandImage& command,
     (void)twin_->write(twin_command_, parameters);
   }
   return robot_->write(robot_command_, parameters);
-}
-
-void TeleBackend::stop(hal::StopCategory category) noexcept TANDEM_RT {
-  ended_ = true;
-  robot_->stop(category);
-  if (twin_) twin_->stop(category);
-}
-
-void TeleBackend::reset() noexcept TANDEM_RT {
-  linked_ = ended_ = false;
-  robot_->reset();
-  if (twin_) twin_->reset();
-}
-
-bool TeleBackend::shut_down() noexcept TANDEM_RT {
-  ended_ = true;
-  const bool robot = robot_->shut_down();
-  const bool twin = twin_ == nullptr || twin_->shut_down();
-  return robot && twin;
 }
 
 bool TeleBackend::archive(Archive& ar) {

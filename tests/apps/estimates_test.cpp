@@ -107,12 +107,16 @@ class EstimatedReport : public Program {
   [[nodiscard]] Outcome report(const std::string& name, const std::string& tables) const {
     const std::string config = TANDEM_SOURCE_DIR "/config/coman/";
     std::string text = read_text(config + "squat.toml");
-    text.replace(text.find("robot.toml"), 10, config + "robot.toml");
+    text.replace(text.find("robot.toml"), 10, config + "robot_hands.toml");
     write_text(folder_ / (name + ".toml"), text + "\n[sim]\nground_truth = false\n" + tables);
-    return tandem("run " + name + ".toml --duration 2 --log logs --report");
+    return tandem("run " + name + ".toml --duration 2 --log logs --report --json " + name +
+                  ".json");
+  }
+  [[nodiscard]] std::filesystem::path folder(const std::string& name) const {
+    return folder_ / "logs" / ("coman_hands-" + name + "-001");
   }
   [[nodiscard]] std::string page(const std::string& name) const {
-    return read_text(folder_ / "logs" / ("coman-" + name + "-001") / "report.html");
+    return read_text(folder(name) / "report.html");
   }
 };
 
@@ -120,26 +124,34 @@ TEST_F(EstimatedReport, TakesTheBaseFromTheEstimateWhereTheLogHasNoTruth) {
   const Outcome with = report("with", "[estimation.base]\n");
   ASSERT_EQ(with.status, 0) << with.err;
   EXPECT_NE(page("with").find("and by inverse dynamics"), std::string::npos);
-  EXPECT_NE(tandem("log info logs/coman-with-001.mcap").out.find("/tf"), std::string::npos);
+  EXPECT_NE(tandem("log info logs/coman_hands-with-001.mcap").out.find("/tf"), std::string::npos);
   const Outcome without = report("without", "");
   ASSERT_EQ(without.status, 0) << without.err;
   EXPECT_EQ(page("without").find("and by inverse dynamics"), std::string::npos);
   EXPECT_NE((without.out + without.err).find("the log lacks the base's motion"), std::string::npos)
       << without.out << without.err;
-  EXPECT_EQ(tandem("log info logs/coman-without-001.mcap").out.find("/tf"), std::string::npos);
+  EXPECT_EQ(tandem("log info logs/coman_hands-without-001.mcap").out.find("/tf"),
+            std::string::npos);
 }
 
-// COMAN's only site that is no foot: its pelvis, where nothing touches it.
-TEST_F(EstimatedReport, DrawsTheForceAtEachDeclaredPlace) {
+TEST_F(EstimatedReport, DrawsTheWrenchAtEachDeclaredPlace) {
   const Outcome with = report("with",
                               "[estimation.base]\n[estimation.observer]\n"
-                              "[[estimation.wrench]]\nsite = \"imu\"\n");
+                              "[[estimation.wrench]]\nsite = \"l_hand\"\n");
   ASSERT_EQ(with.status, 0) << with.err;
-  EXPECT_NE(page("with").find("imu: force on the robot"), std::string::npos);
-  EXPECT_TRUE(
-      std::filesystem::exists(folder_ / "logs" / "coman-with-001" / "external_force_imu.png"));
+  for (const std::string what : {"force", "moment"}) {
+    EXPECT_NE(page("with").find("l_hand: " + what + " on the robot"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::exists(folder("with") / ("external_" + what + "_l_hand.png")));
+  }
+  EXPECT_NE((with.out + with.err).find("wrench at l_hand"), std::string::npos) << with.err;
+  const auto estimate = json("with.json")["estimate"];
+  const auto wrench = estimate["wrenches"]["l_hand"];
+  EXPECT_GT(wrench["max_force_N"].get<double>(), 0.0);
+  EXPECT_GT(wrench["max_moment_Nm"].get<double>(), 0.0);
+  EXPECT_GT(wrench["max_moment_s"].get<double>(), 0.0);
+  EXPECT_GT(estimate["unexplained_torque_Nm"].get<double>(), 0.0);
   const Outcome rows = tandem(
-      "log csv logs/coman-with-001.mcap --topic /tandem/estimate "
+      "log csv logs/coman_hands-with-001.mcap --topic /tandem/estimate "
       "--fields external_force_n,external_moment_nm,unexplained_torque_nm");
   EXPECT_EQ(rows.status, 0) << rows.err;
   EXPECT_NE(rows.out.find("unexplained_torque_nm"), std::string::npos);

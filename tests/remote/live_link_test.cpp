@@ -44,7 +44,7 @@ class Operator {
     config.predict = predict;
     config.playout_ns = 150'000'000;
     config.outages = std::move(outages);
-    TeleBackend::End twin;
+    OperatorEnd::End twin;
     if (predict) twin.robot = std::make_unique<runtime::test::FirstOrderRobot>(robot);
     link = std::make_unique<LiveLink>(hal::robot_of(robot), std::move(*made), std::move(twin),
                                       config, 100'000'000, kPeriod_ns);
@@ -148,6 +148,27 @@ TEST(LiveLink, TheRobotHoldsWhenTheLinkIsGone) {
   }
   EXPECT_GT(most, 200U) << "it holds";
   EXPECT_LT(step, 0.02) << "and returns without a step";
+}
+
+/// The robot has held since, and the hand has moved on: a person takes it again, nobody else.
+TEST(LiveLink, DoesNotTakeTheRobotAgainThatItHasLost) {
+  ServerConfig config = robots_end();
+  config.max_age_cycles = 500;
+  Served served(config, real_time());
+  served.begin();
+  Operator one(true, 20'000);
+  while (one.cycle->phase() != RunPhase::kRunning && one.cycle->step()) {
+  }
+  for (int i = 0; i < 300; ++i) (void)one.cycle->step();
+  ASSERT_TRUE(eventually([&] { return served.server->losses() == 1; })) << "nothing comes";
+  one.cycle->run();  // and the link is back
+  EXPECT_FALSE(one.cycle->faults().empty());
+  EXPECT_NE(one.link->status_text().find("took the robot away"), std::string::npos)
+      << one.link->status_text();
+  EXPECT_EQ(served.server->lease().owner(), 0U);
+  EXPECT_EQ(served.server->losses(), 1U) << "it had it once";
+  EXPECT_EQ(served.phase(), RunPhase::kRunning) << "the robot holds";
+  served.end();
 }
 
 }  // namespace

@@ -1,15 +1,20 @@
 #!/usr/bin/env python3
-"""Writes config/panda/hand.csv: the path of a hand that reaches and rests, 12 s at 100 Hz.
+"""Writes the path of a hand that reaches and rests, 12 s at 100 Hz. Nobody's hand: it is made up.
 
-A made-up recording, the same from its seed on every machine: minimum-jerk strokes (Flash and Hogan
-1985), most of them followed by a smaller correcting one that overlaps it, rests between them, and a
-physiological tremor around 9 Hz of 0.3 mm RMS an axis. python3 write_hand.py > hand.csv
+The same from its seed on every machine: minimum-jerk strokes (Flash and Hogan 1985), most of them
+followed by a smaller correcting one that overlaps it, rests between them, and a physiological tremor
+around 9 Hz of 0.3 mm RMS an axis. Arguments: the seed, and how far targets are from the first place
+along each axis [m].
+
+  write_hand.py 14 0.10 0.14 0.09 > config/panda/hand.csv
+  write_hand.py 29 0.08 0.10 0.08 > config/coman/hand.csv
 """
 import math
 import random
+import sys
 
-SECONDS, RATE_HZ, SEED = 12.0, 100, 14
-REACH_M = (0.10, 0.14, 0.09)  # of a target from the first place, each axis
+SECONDS, RATE_HZ = 12.0, 100
+SEED, *REACH_M = int(sys.argv[1]), *map(float, sys.argv[2:5])
 TREMOR_HZ, TREMOR_M = 9.0, 0.3e-3
 
 

@@ -27,12 +27,31 @@ TEST_P(BundledRobot, IsCompleteWithItsDescription) {
   }
 }
 
+std::string text_of(const std::string& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// But for its name, two sites and a posture.
+TEST(ComanHands, IsTheSameRobot) {
+  const std::string plain = text_of(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  std::string hands = text_of(TANDEM_SOURCE_DIR "/config/coman/robot_hands.toml");
+  hands.erase(hands.find("\n# Standing, forearms forward"));
+  for (const char* site : {"l_hand", "r_hand"}) {
+    const std::size_t from = hands.find(std::string("[[site]]\nname = \"") + site);
+    ASSERT_NE(from, std::string::npos) << site;
+    hands.erase(from, hands.find("\n\n", from) + 2 - from);
+  }
+  const auto after_name = [](const std::string& text) { return text.substr(text.find("[model]")); };
+  EXPECT_EQ(after_name(hands), after_name(plain));
+  EXPECT_TRUE(read_robot(TANDEM_SOURCE_DIR "/config/coman/robot_hands.toml"));
+}
+
 /// A bundled humanoid whose posture leaves the base's height to the description: that height, less
 /// how far flat soles sink into the ground under its weight.
 double sunk_height_m(const std::string& name, const std::string& given) {
   const std::string file = TANDEM_SOURCE_DIR "/config/" + name + "/robot.toml";
-  std::ifstream in(file);
-  std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::string text = text_of(file);
   const std::string before = "base_height_m = " + given;
   auto robot = hal::parse_robot_config(
       text.replace(text.find(before), before.size(), "base_height_m = \"auto\""), file);

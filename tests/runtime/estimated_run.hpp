@@ -56,12 +56,12 @@ struct EstimatedRun {
     experiment->seed = options.seed;
     if (options.noise) add_noise(experiment->robot);
     options.change(*experiment);
-    compose(robot, options);
+    compose(options);
   }
-  void compose(const std::string& robot, const Options& options) {
+  void compose(const Options& options) {
     Experiment& e = *experiment;
-    auto loaded = model::load_kernels(std::string(TANDEM_BINARY_DIR) + "/lib/models/" + robot +
-                                      "_kernels.so");
+    auto loaded = model::load_kernels(std::string(TANDEM_BINARY_DIR) + "/lib/models/" +
+                                      e.robot.name + "_kernels.so");
     ASSERT_TRUE(loaded) << loaded.error().to_string();
     kernels = *loaded;
     auto made = estimation::Estimator::make(hal::robot_of(e.robot), kernels.get(),

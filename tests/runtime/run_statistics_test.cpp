@@ -51,6 +51,30 @@ TEST_F(RunStatisticsOfTwo, GivesRmsAndMaximumOfTheTrackingError) {
   EXPECT_EQ(tracking[1].rms_rad, 0.0);  // never in position control
 }
 
+TEST_F(RunStatisticsOfTwo, KeepTheLargestWrenchOfEachPlaceAndItsTime) {
+  hal::EstimateImage estimate({.joints = 2, .wrenches = 2});
+  RunStatistics statistics(2, 2, 0, 2);
+  const auto at = [&](std::int64_t time_ns, double force_x_N, double moment_z_Nm, double rest_Nm) {
+    estimate.time_ns()[0] = time_ns;
+    estimate.external_force_N()[3] = force_x_N;
+    estimate.external_moment_Nm()[5] = moment_z_Nm;
+    estimate.unexplained_torque_Nm()[0] = rest_Nm;
+    statistics.take(state_, command_, nullptr, limits_, &estimate);
+  };
+  estimate.external_force_N()[4] = 4.0;
+  at(1, 0.0, 0.5, 0.1);
+  at(2, -3.0, 0.2, 0.3);
+  at(3, 1.0, -0.7, 0.2);
+  const EstimateFigures figures = statistics.estimate();
+  ASSERT_EQ(figures.wrenches.size(), 2U);
+  EXPECT_EQ(figures.wrenches[0].force_N.value, 0.0);
+  EXPECT_DOUBLE_EQ(figures.wrenches[1].force_N.value, 5.0);
+  EXPECT_EQ(figures.wrenches[1].force_N.time_ns, 2);
+  EXPECT_DOUBLE_EQ(figures.wrenches[1].moment_Nm.value, 0.7);
+  EXPECT_EQ(figures.wrenches[1].moment_Nm.time_ns, 3);
+  EXPECT_DOUBLE_EQ(figures.unexplained_Nm.value, 0.3);
+}
+
 TEST_F(RunStatisticsOfTwo, GivesTheMeanForceOfBothFeetOnceTheBaseIsFree) {
   truth_.base_quaternion()[3] = 1.0;
   truth_.hoist_share()[0] = 0.5;
