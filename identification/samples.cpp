@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -121,6 +122,7 @@ class Writer {
   void add(std::size_t at) {
     Instant now;
     read(at, now);
+    hold(now);
     robot_.regressor.evaluate(now, Y_, known_);
     const bool free = base_is_free();
     bool any = false;
@@ -134,9 +136,7 @@ class Writer {
         if (!free) continue;
       } else if (channel.kind == Channel::Kind::kJoint) {
         measured = filter_.value(r_.torque_Nm[joint(channel.index)], at);
-        const auto k = static_cast<std::size_t>(channel.index);
-        if (robot_.facts.rigid[k])
-          measured += robot_.facts.damping_Nms_rad[k] * r_.voltage_hold_s * now.vdot[channel.index];
+        measured += held_Nm_[channel.index];
         joint_columns(channel.index, at, now, x);
       } else if (channel.kind == Channel::Kind::kSensor) {
         measured = now.wrenches[static_cast<std::size_t>(channel.index)][channel.component];
@@ -165,6 +165,46 @@ class Writer {
     const bool free = (needed + known_.head<3>()).norm() < kUnexplained * weight_N;
     held_ += free ? 0 : 1;
     return free;
+  }
+  /// held_Nm_: what a rigid drive's torque has lost at its sample by back-EMF, since the mean of
+  /// the time in which its voltage was held. The mean speed of that time follows from the joints'
+  /// time constants, to second order: by the description's inertia about the joints.
+  void hold(Instant& now) {
+    const auto n = static_cast<Index>(robot_.facts.joint.size());
+    held_Nm_.setZero(n);
+    const bool any = std::ranges::find(robot_.facts.rigid, true) != robot_.facts.rigid.end();
+    if (!(r_.voltage_hold_s > 0.0) || !any) return;
+    Eigen::VectorXd damping(n);
+    for (Index c = 0; c < n; ++c) {
+      const auto k = static_cast<std::size_t>(c);
+      damping[c] = robot_.facts.rigid[k] ? robot_.facts.damping_Nms_rad[k] : 0.0;
+    }
+    const Eigen::VectorXd braked = damping.cwiseProduct(now.vdot);
+    const Eigen::VectorXd answer = joint_inertia(now).ldlt().solve(braked);
+    held_Nm_ = r_.voltage_hold_s * braked - r_.voltage_hold_s2 * damping.cwiseProduct(answer);
+  }
+  /// Of the description with its rotors, a floating base held.
+  Eigen::MatrixXd joint_inertia(const Instant& now) {
+    const auto n = static_cast<Index>(robot_.facts.joint.size());
+    Instant still = now;
+    still.v.setZero();
+    still.w.setZero();
+    still.al.setZero();
+    still.a.setZero();
+    for (auto& wrench : still.wrenches) wrench.setZero();
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);
+    for (Index c = 0; c < n; ++c) {
+      still.vdot = Eigen::VectorXd::Unit(n, c);
+      robot_.regressor.evaluate(still, Y_, known_);
+      for (std::size_t row = 0; row < robot_.regressor.channels().size(); ++row) {
+        const Channel& channel = robot_.regressor.channels()[row];
+        if (channel.kind != Channel::Kind::kJoint) continue;
+        const auto at = static_cast<Index>(row);
+        M(channel.index, c) = Y_.row(at).dot(described_) + known_[at];
+      }
+      M(c, c) += robot_.facts.rotor_kg_m2[static_cast<std::size_t>(c)];
+    }
+    return M;
   }
   [[nodiscard]] std::size_t joint(int coordinate) const {
     return static_cast<std::size_t>(robot_.facts.joint[static_cast<std::size_t>(coordinate)]);
@@ -220,7 +260,10 @@ class Writer {
     one.velocity = rigid ? now.v[coordinate] : filter_.rate(motor, at);
     one.acceleration = rigid ? 0.0 : filter_.second_rate(motor, at);
     // The held voltage makes less current at the period's end than on its mean: back-EMF.
-    if (!rigid) one.drive += robot_.facts.damping_Nms_rad[c] * r_.voltage_hold_s * one.acceleration;
+    const double damping = robot_.facts.damping_Nms_rad[c];
+    const double rotor = robot_.facts.rotor_kg_m2[c];
+    const double gives_way = rotor > 0.0 ? r_.voltage_hold_s2 * damping / rotor : 0.0;
+    if (!rigid) one.drive += damping * (r_.voltage_hold_s - gives_way) * one.acceleration;
     one.direction = filter_.value(motor_direction_[c], at);
     const double sum =
         one.drive + one.drive_rate + one.torque + one.velocity + one.acceleration + one.direction;
@@ -235,6 +278,7 @@ class Writer {
   Eigen::MatrixXd Y_;
   Eigen::VectorXd known_;
   Eigen::VectorXd described_ = robot_.regressor.described();
+  Eigen::VectorXd held_Nm_;
   double mass_kg_ = 0.0;
   std::size_t held_ = 0;
 };

@@ -1,5 +1,5 @@
 // Identification of recordings whose truth is known: parameters, and whether the intervals hold
-// what they promise. TANDEM_IDENTIFY_SEEDS=100: the whole proof of the latter.
+// what they promise. TANDEM_IDENTIFY_SEEDS=1000: the whole proof of the latter.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -93,7 +93,7 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
   std::string name;
   for (const auto& [parameter, times] : inside) {
     const double share = static_cast<double>(times) / seeds;
-    if (share < 0.92 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
+    if (share < 0.93 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
     if (share < worst) name = parameter;
     worst = std::min(worst, share);
   }
@@ -103,9 +103,10 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
               inside.size(), 100.0 * share, name.c_str(), 100.0 * worst);
   EXPECT_GT(share, 0.90);
   EXPECT_LT(share, 0.995);  // intervals that are too wide are wrong, too
-  // Of 69 exact intervals one is below 90 of 100 by chance (a binomial's 1.2 %), none below 86.
-  if (seeds >= 100) {
-    EXPECT_GE(worst, 0.86) << name;
+  // Of 1,000 seeds an exact interval holds 950, give or take 7: not one may be under 900. (Of 100
+  // seeds one of 69 exact intervals is under 90 by chance alone.)
+  if (seeds >= 1000) {
+    EXPECT_GE(worst, 0.90) << name;
   }
 }
 
