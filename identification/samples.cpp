@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -25,6 +26,8 @@ std::unexpected<Error> cannot(const hal::RobotConfig& robot, std::string message
 constexpr std::size_t kGyro = 4, kAccelerometer = 7;
 /// Of the robot's weight: a force on the base that is larger has another cause than a wrong mass.
 constexpr double kUnexplained = 0.3;
+/// Every so many instants it is computed what the IMU's noise does to the equations, six ways.
+constexpr std::size_t kNoiseEvery = 6;
 
 Vector3d filtered(const LowPass& filter, const Recording& r, std::size_t channel, std::size_t at,
                   bool rate = false) {
@@ -47,6 +50,20 @@ Signal directions(const Signal& position, double period_s) {
     out[i] = std::tanh(v / kStick_rad_s);
   }
   return out;
+}
+
+/// Variance of a signal's white noise: by what a sample is off the line through its neighbours. A
+/// motion is smooth over three samples, noise is not.
+double noise_of(const Signal& signal) {
+  double sum = 0.0;
+  std::size_t n = 0;
+  for (std::size_t i = 1; i + 1 < signal.size(); ++i) {
+    const double off = signal[i + 1] - 2.0 * signal[i] + signal[i - 1];
+    if (!std::isfinite(off)) continue;
+    sum += off * off / 6.0;
+    ++n;
+  }
+  return n > 0 ? sum / static_cast<double>(n) : 0.0;
 }
 
 }  // namespace
@@ -117,6 +134,11 @@ class Writer {
                                      ? direction_.back()
                                      : directions(r_.motor_position_rad[j], r_.period_s));
     }
+    for (std::size_t i = 0; robot.floating && i < 3; ++i) {
+      const std::size_t imu = robot.facts.imu_channel + i;
+      imu_noise_[i] = noise_of(r_.sensor[imu + kGyro]) * filter.noise(1);
+      imu_noise_[i + 3] = noise_of(r_.sensor[imu + kAccelerometer]) * filter.noise(0);
+    }
   }
 
   void add(std::size_t at) {
@@ -147,6 +169,7 @@ class Writer {
       any = true;
     }
     if (!any) return;
+    if (robot_.floating && all_.time_s.size() % kNoiseEvery == 0) add_noise(at, now);
     for (Index c = 0; c < now.q.size(); ++c) add_motor(c, at, now);
     all_.time_s.push_back(r_.time_s[at]);
   }
@@ -165,6 +188,29 @@ class Writer {
     const bool free = (needed + known_.head<3>()).norm() < kUnexplained * weight_N;
     held_ += free ? 0 : 1;
     return free;
+  }
+  /// The equations are linear in the base's accelerations, so a unit of each shows what its noise
+  /// does. In the angular velocity noise is small: nothing is differentiated.
+  void add_noise(std::size_t at, const Instant& now) {
+    const ImuMotion imu = imu_at(at);
+    Eigen::MatrixXd moved;
+    Eigen::VectorXd known;
+    for (std::size_t i = 0; i < imu_noise_.size(); ++i) {
+      ImuMotion one = imu;
+      (i < 3 ? one.al : one.a)[static_cast<Index>(i % 3)] += 1.0;
+      Instant then = now;
+      robot_.regressor.base_from_link(robot_.facts.imu_link, one.w, one.al, one.a, then);
+      robot_.regressor.evaluate(then, moved, known);
+      const double share = std::sqrt(imu_noise_[i] * static_cast<double>(kNoiseEvery));
+      for (std::size_t c = 0; c < all_.channels.size(); ++c) {
+        const auto& used = all_.channels[c].instant;
+        if (used.empty() || used.back() != all_.time_s.size()) continue;
+        const auto row = static_cast<Index>(c);
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
+        x.head(Y_.cols()) = share * (moved.row(row) - Y_.row(row));
+        all_.sensor_noise[c].append(x, share * (known_[row] - known[row]), 0.0, all_.time_s.size());
+      }
+    }
   }
   /// held_Nm_: what a rigid drive's torque has lost at its sample by back-EMF, since the mean of
   /// the time in which its voltage was held. The mean speed of that time follows from the joints'
@@ -231,10 +277,16 @@ class Writer {
     now.al.setZero();
     now.a = -facts.gravity_m_s2;
     if (!robot_.floating) return;
-    robot_.regressor.base_from_link(
-        facts.imu_link, filtered(filter_, r_, facts.imu_channel + kGyro, at),
-        filtered(filter_, r_, facts.imu_channel + kGyro, at, true),
-        filtered(filter_, r_, facts.imu_channel + kAccelerometer, at), now);
+    const ImuMotion imu = imu_at(at);
+    robot_.regressor.base_from_link(facts.imu_link, imu.w, imu.al, imu.a, now);
+  }
+  struct ImuMotion {
+    Vector3d w, al, a;
+  };
+  [[nodiscard]] ImuMotion imu_at(std::size_t at) const {
+    const std::size_t imu = robot_.facts.imu_channel;
+    return {filtered(filter_, r_, imu + kGyro, at), filtered(filter_, r_, imu + kGyro, at, true),
+            filtered(filter_, r_, imu + kAccelerometer, at)};
   }
 
   void joint_columns(int coordinate, std::size_t at, const Instant& now, Eigen::VectorXd& x) const {
@@ -279,6 +331,7 @@ class Writer {
   Eigen::VectorXd known_;
   Eigen::VectorXd described_ = robot_.regressor.described();
   Eigen::VectorXd held_Nm_;
+  std::array<double, 6> imu_noise_{};  // variances after the filter: angular, linear acceleration
   double mass_kg_ = 0.0;
   std::size_t held_ = 0;
 };
@@ -314,6 +367,7 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   const std::size_t coordinates = robot.facts.joint.size();
   equations.columns = robot.regressor.columns() + kJointColumns * static_cast<Index>(coordinates);
   equations.channels.resize(robot.regressor.channels().size());
+  equations.sensor_noise.resize(equations.channels.size());
   equations.motors.resize(coordinates);
   equations.travel_rad.resize(coordinates, 0.0);
   equations.first_of_log.push_back(equations.time_s.size());

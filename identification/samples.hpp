@@ -73,9 +73,12 @@ struct MotorInstant {
 
 /// All equations of a log, or of several.
 struct Equations {
-  std::vector<double> time_s;                     ///< of each instant
-  std::vector<std::size_t> first_of_log;          ///< instant
-  std::vector<ChannelRows> channels;              ///< as the regressor's
+  std::vector<double> time_s;             ///< of each instant
+  std::vector<std::size_t> first_of_log;  ///< instant
+  std::vector<ChannelRows> channels;      ///< as the regressor's
+  /// By how much the noise of the IMU moves X and y of a channel: rows whose sum of squares is
+  /// what that noise adds to the rows' own, on average. Empty of a fixed base.
+  std::vector<ChannelRows> sensor_noise;
   std::vector<std::vector<MotorInstant>> motors;  ///< per coordinate
   std::vector<double> travel_rad;                 ///< per coordinate: range of its position
   Eigen::Index columns = 0;
