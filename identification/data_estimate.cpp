@@ -221,6 +221,28 @@ class LeastSquares {
   double quantile_ = 0.0;
 };
 
+/// Adds the rotors' doubt to the covariance that `information` is the inverse of.
+void doubt_rotors(const Equations& equations, MatrixXd& information, VectorXd& target) {
+  std::vector<Index> rotors;
+  std::vector<double> precision;
+  const auto joints = static_cast<Index>(equations.rotor_doubt_kg_m2.size());
+  for (Index c = 0; c < joints; ++c) {
+    const double doubt = equations.rotor_doubt_kg_m2[static_cast<std::size_t>(c)];
+    if (!(doubt > 0.0)) continue;
+    rotors.push_back(equations.columns + kJointColumns * (c - joints) +
+                     static_cast<Index>(JointColumn::kRotor));
+    precision.push_back(1.0 / (doubt * doubt));
+  }
+  if (rotors.empty()) return;
+  MatrixXd inner = information(rotors, rotors);
+  for (std::size_t i = 0; i < rotors.size(); ++i)
+    inner(static_cast<Index>(i), static_cast<Index>(i)) += precision[i];
+  const MatrixXd cross = information(Eigen::all, rotors);
+  const Eigen::LLT<MatrixXd> solver(inner);
+  target -= cross * solver.solve(VectorXd(target(rotors)));
+  information -= cross * solver.solve(MatrixXd(cross.transpose()));
+}
+
 }  // namespace
 
 MatrixXd long_run_covariance(const MatrixXd& residuals, int lags) {
@@ -252,6 +274,7 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
   out.information = less.gram * spread.solve(less.gram);
   out.information = 0.5 * (out.information + MatrixXd(out.information.transpose()));
   out.target = less.gram * spread.solve(less.target);
+  doubt_rotors(equations, out.information, out.target);
   out.mean = squares.solved(out.information, out.target);
   out.covariance = squares.covariance(out.information, kFaint);
   out.link_covariance = squares.covariance(out.information, kBelieved);

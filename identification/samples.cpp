@@ -28,6 +28,11 @@ constexpr std::size_t kGyro = 4, kAccelerometer = 7;
 constexpr double kUnexplained = 0.3;
 /// Every so many instants it is computed what the IMU's noise does to the equations, six ways.
 constexpr std::size_t kNoiseEvery = 6;
+/// Of a control period: half of it a voltage may have been held, and when in it the torque was
+/// sampled is not known better than to another quarter.
+constexpr double kUnknownHold = 0.75;
+/// Standard deviations in half of a 95 % interval.
+constexpr double kSpreads = 1.96;
 
 Vector3d filtered(const LowPass& filter, const Recording& r, std::size_t channel, std::size_t at,
                   bool rate = false) {
@@ -115,6 +120,8 @@ Result<IdentifiedRobot> make_identified_robot(const model::Tree& tree,
     facts.max_torque_Nm.push_back(config.max_torque_Nm);
     facts.max_velocity_rad_s.push_back(config.max_velocity_rad_s);
   }
+  if (!robot.boards.empty())
+    facts.control_period_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
   facts.gravity_m_s2 = Vector3d(robot.model.gravity_m_s2.data());
   return IdentifiedRobot{std::move(*regressor), std::move(facts), tree.floating_base};
 }
@@ -370,6 +377,12 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   equations.sensor_noise.resize(equations.channels.size());
   equations.motors.resize(coordinates);
   equations.travel_rad.resize(coordinates, 0.0);
+  equations.rotor_doubt_kg_m2.resize(coordinates, 0.0);
+  for (std::size_t c = 0; c < coordinates; ++c) {
+    if (recording.voltage_hold_known || !robot.facts.rigid[c]) continue;
+    equations.rotor_doubt_kg_m2[c] =
+        kUnknownHold * robot.facts.damping_Nms_rad[c] * robot.facts.control_period_s / kSpreads;
+  }
   equations.first_of_log.push_back(equations.time_s.size());
   Writer writer(recording, filter, robot, equations);
   for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();

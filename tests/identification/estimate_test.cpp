@@ -277,6 +277,72 @@ TEST(Identify, RefusesARobotThatStands) {
   }
 }
 
+// A link's mass moves with those that it carries: only sums with them are in any torque.
+TEST(Identify, SaysWhatNoLogCanShowByItself) {
+  const Arm panda = arm("panda");
+  const Recording recording =
+      synthetic_recording(panda.tree, wide_series(panda, 3), panda_reality(), 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  std::size_t sums = 0;
+  for (const LinkResult& link : result->links) {
+    if (!link.changed) continue;
+    EXPECT_NE(link.mass_seen, Seen::kAlone) << link.name;
+    EXPECT_NE(link.inertia_seen, Seen::kAlone) << link.name;
+    sums += link.inertia_seen == Seen::kInSums ? 1 : 0;
+    for (const std::string& name : link.base_parameters) {
+      const auto base = std::ranges::find(result->base, name, &BaseParameter::name);
+      ASSERT_NE(base, result->base.end()) << name;
+      EXPECT_TRUE(std::ranges::any_of(base->terms, [&](const auto& term) {
+        return term.first.starts_with(link.name + ".");
+      })) << name;
+    }
+  }
+  EXPECT_GE(sums, 6U);
+}
+
+// The first joint's rotor is one sum with the inertia that it turns: where it does not move, it is
+// as described, and that is said.
+TEST(Identify, SaysWhichRotorsAreAssumed) {
+  const Arm panda = arm("panda");
+  const Recording recording =
+      synthetic_recording(panda.tree, reduced(panda, 0.0, 1), panda_reality(), 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  const auto note = std::ranges::find_if(result->remarks, [](const std::string& one) {
+    return one.find("rotors: their inertia is assumed") != std::string::npos;
+  });
+  ASSERT_NE(note, result->remarks.end());
+  for (const JointResult& joint : result->joints) {
+    EXPECT_EQ(note->find(joint.name) != std::string::npos, !joint.rotor_inertia_kg_m2.identifiable)
+        << joint.name;
+  }
+  EXPECT_NE(note->find("panda_joint5"), std::string::npos);
+}
+
+// The same log, of a simulation and of something else: as far as the hold of a voltage goes, only
+// the rotors are doubted more, and no value changes.
+TEST(Identify, DoubtsRotorsWhereTheHoldOfAVoltageIsNotKnown) {
+  const Arm panda = arm("panda");
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), panda_reality(), 1);
+  const auto known = identify({recording}, panda.robot, panda.tree);
+  recording.voltage_hold_known = false;
+  const auto unknown = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(known && unknown);
+  for (std::size_t i = 0; i < known->base.size(); ++i) {
+    const BaseParameter& a = known->base[i];
+    const BaseParameter& b = unknown->base[i];
+    double doubt = 0.0;  // 0.75 ms of 165 or 26 Nms/rad
+    for (const auto& [term, factor] : a.terms)
+      if (term.ends_with("rotor_inertia_kg_m2"))
+        doubt = 0.75e-3 * std::abs(factor) * (term[11] < '5' ? 165.0 : 26.0);
+    EXPECT_NEAR(b.estimate.value, a.estimate.value, 1e-2 * a.estimate.ci95 + 1e-3 * doubt)
+        << a.name;
+    EXPECT_NEAR(b.estimate.ci95, std::hypot(a.estimate.ci95, 1.02 * doubt), 0.03 * b.estimate.ci95)
+        << a.name;
+  }
+}
+
 TEST(Identify, SaysWhichJointsDoNotMove) {
   const Arm panda = arm("panda");
   const Recording recording =
