@@ -53,7 +53,7 @@ test-all: test
 	@TANDEM_DERIVATIVES_ALL=1 build/release/bin/model_test --gtest_filter='Derivatives.OfAHumanoid*' --gtest_brief=1
 	@TANDEM_SEEDS=200 build/release/bin/estimation_test --gtest_filter='ContactFilter.*' --gtest_brief=1
 	@TANDEM_LONG_RUNS=1 TANDEM_FREE_HOURS=1 TANDEM_COLLISION_FIGURES=build/collisions build/release/bin/estimation_run_test --gtest_brief=1
-	@TANDEM_IDENTIFY_SEEDS=100 build/release/bin/identification_test --gtest_filter='Identify.Intervals*'
+	@TANDEM_IDENTIFY_SEEDS=1000 build/release/bin/identification_test --gtest_filter='Identify.Intervals*'
 	@TANDEM_IDENTIFY_ALL=1 build/release/bin/identify_test --gtest_brief=1
 	@TANDEM_NEW_ALL=1 build/release/bin/apps_test --gtest_filter='New.*' --gtest_brief=1
 	@TANDEM_TELEOPERATION=build/teleoperation.txt build/release/bin/teleoperation_test --gtest_filter='*Table*' --gtest_brief=1

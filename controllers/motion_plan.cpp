@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::size_t kMostNumbers = 200'000'000;  // 1.6 GB
 constexpr double kRounding = 1e-9;                 // of a limit
-constexpr double kSpeedOver_s = 0.01;              // over which the speed at both ends is taken
-constexpr double kRest = 0.01;                     // of a joint's speed: it is said to rest
+constexpr double kSpeedOver_s = 0.01;              // of the recording: for the speed at both ends
+constexpr double kRest = 0.01;                     // of a joint's speed, as recorded: it rests
 constexpr double kApproachShare = 0.5;             // of a joint's speed
 
 /// The slope of a track at sample `i`, by its neighbours.
@@ -51,15 +51,18 @@ std::unexpected<Error> beyond(const hal::Joint& joint, double at_s, const char* 
 }  // namespace
 
 Result<MotionPlan> MotionPlan::make(const log::JointMotion& motion, const hal::Robot& robot,
-                                    const std::vector<std::size_t>& joints,
-                                    std::int64_t period_ns) {
+                                    const std::vector<std::size_t>& joints, std::int64_t period_ns,
+                                    double speed) {
   MotionPlan plan;
   plan.joints_ = joints.size();
   plan.period_ns_ = period_ns;
   plan.period_s_ = static_cast<double>(period_ns) * 1e-9;
+  plan.speed_ = speed;
   plan.run_up_ =
       static_cast<std::size_t>(std::max(1.0, std::round(log::kReplayRunUp_s / plan.period_s_)));
-  plan.recorded_ = static_cast<std::size_t>((motion.end_ns - motion.begin_ns) / period_ns) + 1;
+  const double takes_ns = static_cast<double>(motion.end_ns - motion.begin_ns) / speed;
+  plan.recorded_ =
+      static_cast<std::size_t>(std::floor(takes_ns / static_cast<double>(period_ns))) + 1;
   plan.cycles_ = plan.recorded_ + 2 * plan.run_up_;
   const bool torque = !motion.tracks.empty() && !motion.tracks.front().torque_Nm.empty();
   if (plan.recorded_ < 2) {
@@ -76,7 +79,7 @@ Result<MotionPlan> MotionPlan::make(const log::JointMotion& motion, const hal::R
   if (torque) plan.torque_Nm_.resize(numbers);
   for (std::size_t k = 0; k < joints.size(); ++k) {
     plan.sample(motion.tracks[k], k, motion.begin_ns);
-    plan.ramp(k, kRest * robot.joints[joints[k]].max_velocity_rad_s);
+    plan.ramp(k, speed * kRest * robot.joints[joints[k]].max_velocity_rad_s);
     if (Status s = plan.check(motion, robot.joints[joints[k]], k); !s) {
       return std::unexpected(s.error());
     }
@@ -88,7 +91,8 @@ void MotionPlan::sample(const log::JointTrack& track, std::size_t joint, std::in
   std::size_t i = 0;
   const std::size_t last = track.time_ns.size() - 1;
   for (std::size_t cycle = 0; cycle < recorded_; ++cycle) {
-    const std::int64_t t_ns = begin_ns + static_cast<std::int64_t>(cycle) * period_ns_;
+    const double since_ns = speed_ * static_cast<double>(cycle) * static_cast<double>(period_ns_);
+    const std::int64_t t_ns = begin_ns + std::llround(since_ns);
     while (i < last && track.time_ns[i + 1] <= t_ns) ++i;
     double share = 0.0;  // before its first and after its last sample it stands there
     if (i < last && t_ns > track.time_ns[i]) {
@@ -99,7 +103,8 @@ void MotionPlan::sample(const log::JointTrack& track, std::size_t joint, std::in
     const std::size_t at = (run_up_ + cycle) * joints_ + joint;
     position_rad_[at] = now.position;
     velocity_rad_s_[at] =
-        track.velocity_rad_s.empty() ? now.velocity : line(track.velocity_rad_s, i, share);
+        speed_ *
+        (track.velocity_rad_s.empty() ? now.velocity : line(track.velocity_rad_s, i, share));
     if (has_torque()) torque_Nm_[at] = line(track.torque_Nm, i, share);
   }
 }
@@ -107,7 +112,7 @@ void MotionPlan::sample(const log::JointTrack& track, std::size_t joint, std::in
 void MotionPlan::ramp(std::size_t joint, double rest_rad_s) {
   const std::size_t first = run_up_, last = run_up_ + recorded_ - 1;
   const auto over = std::clamp<std::size_t>(
-      static_cast<std::size_t>(std::ceil(kSpeedOver_s / period_s_)), 1, recorded_ - 1);
+      static_cast<std::size_t>(std::ceil(kSpeedOver_s / (speed_ * period_s_))), 1, recorded_ - 1);
   const double over_s = static_cast<double>(over) * period_s_;
   const double ramp_s = static_cast<double>(run_up_) * period_s_;
   const auto moving = [&](double way) {  // what rests stays exactly where it is
@@ -138,11 +143,16 @@ Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limit
   const char* const where =
       "leave it out of `joints`, play another stretch with from_s and to_s, or correct the limits "
       "of robot.toml";
+  const char* const slower =
+      "play it slower (speed), leave it out of `joints`, play another stretch with from_s and "
+      "to_s, "
+      "or correct the limits of robot.toml";
   const double fastest = limits.max_velocity_rad_s;
   const double strongest = limits.max_torque_Nm;
   for (std::size_t cycle = 0; cycle < cycles_; ++cycle) {
-    const double at_s = static_cast<double>(motion.begin_ns) * 1e-9 +
-                        (static_cast<double>(cycle) - static_cast<double>(run_up_)) * period_s_;
+    const double at_s =
+        static_cast<double>(motion.begin_ns) * 1e-9 +
+        (static_cast<double>(cycle) - static_cast<double>(run_up_)) * period_s_ * speed_;
     const double here = position(joint, cycle);
     if (here < limits.min_position_rad - kRounding || here > limits.max_position_rad + kRounding) {
       return beyond(limits, at_s, "be at", here, limits.min_position_rad, limits.max_position_rad,
@@ -151,7 +161,7 @@ Status MotionPlan::check(const log::JointMotion& motion, const hal::Joint& limit
     const double step = cycle == 0 ? 0.0 : (here - position(joint, cycle - 1)) / period_s_;
     for (const double speed : {step, velocity(joint, cycle)}) {
       if (std::abs(speed) <= fastest * (1.0 + kRounding) + kRounding) continue;
-      return beyond(limits, at_s, "move with", speed, -fastest, fastest, speed_unit, where);
+      return beyond(limits, at_s, "move with", speed, -fastest, fastest, speed_unit, slower);
     }
     if (!has_torque() || std::abs(torque(joint, cycle)) <= strongest * (1.0 + kRounding)) continue;
     return beyond(limits, at_s, "get", torque(joint, cycle), -strongest, strongest,

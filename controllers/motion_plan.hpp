@@ -25,12 +25,14 @@ namespace tandem {
 class MotionPlan {
  public:
   /// @param joints  of `robot`, one for each of the motion's tracks
+  /// @param speed   times as fast as recorded, above 0: times are divided, velocities multiplied by
+  ///                it; torques stay, and run-up and run-down take as long
   /// Errors: a joint that leaves its limits of position, speed or (where it is played) torque, with
   /// the recording's time; more cycles than memory is meant for.
   [[nodiscard]] static Result<MotionPlan> make(const log::JointMotion& motion,
                                                const hal::Robot& robot,
                                                const std::vector<std::size_t>& joints,
-                                               std::int64_t period_ns);
+                                               std::int64_t period_ns, double speed = 1.0);
 
   [[nodiscard]] std::size_t cycles() const noexcept TANDEM_RT { return cycles_; }
   [[nodiscard]] double duration_s() const noexcept {
@@ -57,7 +59,7 @@ class MotionPlan {
 
   std::size_t joints_ = 0, cycles_ = 0, run_up_ = 0, recorded_ = 0;
   std::int64_t period_ns_ = 0;
-  double period_s_ = 0.0;
+  double period_s_ = 0.0, speed_ = 1.0;
   std::vector<double> position_rad_, velocity_rad_s_, torque_Nm_;  // [cycle][joint]
 };
 

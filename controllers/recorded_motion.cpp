@@ -14,8 +14,8 @@ namespace tandem {
 namespace {
 
 /// Parameters: log (relative to the experiment), data_sha256 (any), joints (all), source (the
-/// commands where the log has them), from_s, to_s (while its controllers ran), torque (false),
-/// approach_s (3, and longer where the way is), stop_at_end (false).
+/// commands where the log has them), from_s, to_s (while its controllers ran), speed (1), torque
+/// (false), approach_s (3, and longer where the way is), stop_at_end (false).
 class RecordedMotion : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
@@ -29,6 +29,11 @@ class RecordedMotion : public Controller {
     if (parameters.has("from_s")) request.from_s = parameters.number("from_s");
     if (parameters.has("to_s")) request.to_s = parameters.number("to_s");
     request.torque = parameters.boolean_or("torque", false);
+    speed_ = parameters.number_or("speed", 1.0, {log::kReplaySlowest, log::kReplayFastest});
+    if (request.torque && speed_ > 1.0) {
+      parameters.error("torque", "the recorded torques are those of a slower motion",
+                       "play it without: torque = false; or not faster than recorded: speed = 1");
+    }
     approach_s_ = parameters.number_or("approach_s", log::kReplayApproach_s, kPositive);
     stop_at_end_ = parameters.boolean_or("stop_at_end", false);
     joints_ = joints_parameter(setup);
@@ -120,7 +125,7 @@ class RecordedMotion : public Controller {
     }
     const auto motion = log::read_joint_motion(*file, request);
     if (!motion) return std::unexpected(motion.error());
-    auto plan = MotionPlan::make(*motion, setup.robot, joints_, setup.period_ns);
+    auto plan = MotionPlan::make(*motion, setup.robot, joints_, setup.period_ns, speed_);
     if (!plan) return std::unexpected(plan.error());
     plan_ = std::move(*plan);
     return {};
@@ -129,7 +134,7 @@ class RecordedMotion : public Controller {
   std::vector<std::size_t> joints_;
   std::vector<hal::Joint> limits_;
   MotionPlan plan_;
-  double approach_s_ = 0.0;
+  double approach_s_ = 0.0, speed_ = 1.0;
   bool stop_at_end_ = false;
   std::int64_t start_ns_ = 0, approach_cycles_ = 0;
   std::vector<From> from_;

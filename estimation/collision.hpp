@@ -2,6 +2,7 @@
 // Layer: estimation.  Thread: CollisionWatch made non-RT, the rest RT; learn_threshold() non-RT.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -13,15 +14,21 @@
 
 namespace tandem::estimation {
 
-/// Compares external torques with a threshold by joint. A joint is found once: again after its
-/// torque has been below the threshold for `quiet` cycles.
+/// What is watched of a floating base, beside its joints: names as in `threshold_Nm` and in the
+/// order of EstimateImage::external_base_wrench.
+inline constexpr std::array<const char*, 6> kBaseChannels{"base_force_x",  "base_force_y",
+                                                          "base_force_z",  "base_moment_x",
+                                                          "base_moment_y", "base_moment_z"};
+
+/// Compares external torques with a threshold by joint; behind the joints by kBaseChannels. A joint
+/// is found once: again after its torque has been below the threshold for `quiet` cycles.
 class CollisionWatch {
  public:
   /// @param threshold_Nm  by joint; infinite: not watched
   CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet);
 
   struct Found {
-    std::size_t joint = 0;
+    std::size_t joint = 0;  ///< or, from the number of joints on, which of kBaseChannels
     double torque_Nm = 0.0;
   };
   /// One cycle: marks the joints that are beyond their thresholds. The first that is new, the one

@@ -37,7 +37,7 @@ struct CollisionConfig {
     std::string joint;
     double torque_Nm = 0.0;
   };
-  std::vector<Threshold> thresholds;  ///< a joint without one is not watched
+  std::vector<Threshold> thresholds;  ///< of joints and kBaseChannels; what has none is not watched
   hal::StopCategory reaction = hal::StopCategory::kWarn;
 };
 

@@ -15,12 +15,21 @@ std::unexpected<Error> in_table(Error error, const char* key) {
   return std::unexpected(std::move(error));
 }
 
-Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionConfig& config) {
-  std::vector<double> all(robot.joints.size(), std::numeric_limits<double>::infinity());
+/// @param of_base  the base floats, and is estimated
+Result<std::vector<double>> thresholds(const hal::Robot& robot, const CollisionConfig& config,
+                                       bool of_base) {
+  const std::size_t joints = robot.joints.size();
+  std::vector<double> all(joints + (of_base ? kBaseChannels.size() : 0),
+                          std::numeric_limits<double>::infinity());
   std::vector<std::string> names;
   for (const hal::Joint& joint : robot.joints) names.push_back(joint.name);
   for (const auto& [joint, torque_Nm] : config.thresholds) {
     const int at = robot.joint_index(joint);
+    const auto channel = std::ranges::find(kBaseChannels, joint) - kBaseChannels.begin();
+    if (at < 0 && of_base && channel < 6) {
+      all[joints + static_cast<std::size_t>(channel)] = torque_Nm;
+      continue;
+    }
     if (at < 0) return fail("the robot has no joint '" + joint + "'", suggest(joint, names));
     all[static_cast<std::size_t>(at)] = torque_Nm;
   }
@@ -84,8 +93,10 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
   made->wrenches_ = std::move(wrenches);
   if (config.observer) made->observer_.emplace(*kernels, config.observer->bandwidth_Hz, step_s);
   if (config.collision) {
-    auto limits = thresholds(robot, *config.collision);
+    auto limits = thresholds(robot, *config.collision, made->image_.estimates_base());
     if (!limits) return in_table(limits.error(), "estimation.collision.threshold_Nm");
+    made->felt_.resize(limits->size());
+    made->found_.resize(limits->size());
     made->watch_.emplace(std::move(*limits), static_cast<std::uint32_t>(kQuiet_s / step_s));
     made->reaction_ = config.collision->reaction;
   }
@@ -125,6 +136,7 @@ void Estimator::observe(const hal::StateImage& state) noexcept {
   joints_.to_model(state.torque_Nm(), tau_.data() + (floats ? 6 : 0));
   observer_->update(q_.data(), v_.data(), tau_.data(), wrench_.data());
   joints_.to_image(observer_->residual().data() + (floats ? 6 : 0), image_.external_torque_Nm());
+  if (floats) std::copy_n(observer_->residual().data(), 6, image_.external_base_wrench().data());
   if (wrenches_) explain();
 }
 
@@ -140,7 +152,16 @@ void Estimator::explain() noexcept {
 
 std::optional<CollisionWatch::Found> Estimator::collision() noexcept TANDEM_RT {
   if (!watch_) return std::nullopt;
-  return watch_->look(image_.external_torque_Nm(), image_.collided());
+  const std::size_t joints = image_.joints();
+  std::ranges::copy(image_.external_torque_Nm(), felt_.begin());
+  std::ranges::copy(image_.external_base_wrench(),
+                    felt_.begin() + static_cast<std::ptrdiff_t>(joints));
+  const auto found = watch_->look(felt_, found_);
+  std::copy_n(found_.begin(), joints, image_.collided().begin());
+  if (image_.estimates_base())
+    image_.base_collided()[0] =
+        *std::max_element(found_.begin() + static_cast<std::ptrdiff_t>(joints), found_.end());
+  return found;
 }
 
 void Estimator::archive(Archive& ar) {

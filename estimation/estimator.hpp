@@ -74,6 +74,8 @@ class Estimator {
   std::optional<CollisionWatch> watch_;
   hal::StopCategory reaction_ = hal::StopCategory::kWarn;
   std::vector<double> q_, v_, tau_, wrench_;
+  std::vector<double> felt_;         // by joint, then the base's: scratch
+  std::vector<std::uint8_t> found_;  // the same
 };
 
 }  // namespace tandem::estimation

@@ -150,9 +150,33 @@ class Answer {
         const Index at = 10 * static_cast<Index>(i);
         describe_link(possible_.segment<10>(at), data_.link_covariance.block<10, 10>(at, at),
                       believed_.block<10, 10>(at, at), data_.quantile, result);
+        describe_sight(at, result);
       }
       out.links.push_back(std::move(result));
     }
+  }
+
+  /// Of the ten columns from `at`: a moment of inertia about the centre of mass shows by itself
+  /// when the mass, the first moments and the second ones do.
+  void describe_sight(Index at, LinkResult& link) const {
+    const auto seen = [&](Index from, Index to) {
+      bool any = false, alone = true;
+      for (Index k = at + from; k < at + to; ++k) {
+        any = any || !base_.combination.col(k).isZero(0.0);
+        const auto found = std::ranges::find(base_.independent, k);
+        const Index row = found - base_.independent.begin();
+        alone = alone && found != base_.independent.end() &&
+                (base_.combination.row(row).array() != 0.0).count() == 1;
+      }
+      return alone ? Seen::kAlone : any ? Seen::kInSums : Seen::kNot;
+    };
+    link.mass_seen = seen(0, 1);
+    link.com_seen = seen(1, 4) == Seen::kNot ? Seen::kNot : seen(0, 4);
+    link.inertia_seen = seen(4, 10) == Seen::kNot ? Seen::kNot : seen(0, 10);
+    for (Index i = 0; i < base_.count(); ++i)
+      if (!base_.combination.row(i).segment<10>(at).isZero(0.0))
+        link.base_parameters.push_back(
+            column_name(robot_, tree_, base_.independent[static_cast<std::size_t>(i)]));
   }
 
   /// A column's estimate; not identifiable where the joint does not move.
@@ -293,6 +317,16 @@ class Answer {
           "and little of what they carry: " +
           still);
     }
+    std::string assumed;
+    for (const JointResult& joint : out.joints)
+      if (!joint.rotor_inertia_kg_m2.identifiable)
+        assumed += (assumed.empty() ? "" : ", ") + joint.name;
+    if (!assumed.empty()) {
+      out.remarks.push_back(
+          "the log does not show these joints' rotors: their inertia is assumed "
+          "to be the description's: " +
+          assumed);
+    }
     for (const JointResult& joint : out.joints) warn_of(joint, out);
     std::string unseen;
     for (const int l : robot_.regressor.unseen_links())
@@ -340,6 +374,15 @@ class Answer {
 };
 
 }  // namespace
+
+const char* to_string(Seen seen) noexcept {
+  switch (seen) {
+    case Seen::kNot: return "not";
+    case Seen::kInSums: return "in sums";
+    case Seen::kAlone: return "alone";
+  }
+  return "not";
+}
 
 void answer(const hal::RobotConfig& config, const model::Tree& tree, IdentifiedRobot& robot,
             const Equations& equations, Identification& out) {

@@ -1,4 +1,4 @@
-// Everything is quadratic in the parameters, so the rows are needed for residuals only.
+// What is known before the log, and bodies that can exist.
 #include "identification/estimate.hpp"
 
 #include <Eigen/Cholesky>
@@ -12,49 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kFaint = 1e-2;  // weight of the description where the data decide alone
-// Of a channel's mean square: errors of the model and of timing, which no length of a log averages.
-constexpr double kModelError = 3e-6;
-constexpr int kReweightings = 4;
 constexpr double kFreedom = 10.0;  // of a link's distribution: as many as its parameters
 constexpr double kDelay_s = 0.005;
-
-/// Rows of one channel that are used, as matrices of their own.
-struct Used {
-  MatrixXd X;
-  VectorXd y;
-  std::vector<std::size_t> instant;
-};
-
-Used used_rows(const ChannelRows& rows, const std::vector<bool>& used, Index columns) {
-  Used out;
-  for (const std::size_t at : rows.instant)
-    if (used[at]) out.instant.push_back(at);
-  out.X.resize(static_cast<Index>(out.instant.size()), columns);
-  out.y.resize(static_cast<Index>(out.instant.size()));
-  Index to = 0;
-  for (Index row = 0; row < rows.rows(); ++row) {
-    if (!used[rows.instant[static_cast<std::size_t>(row)]]) continue;
-    out.X.row(to) = rows.X.row(row);
-    out.y[to++] = rows.y[row];
-  }
-  return out;
-}
-
-/// X^T X and X^T y of the columns that a channel has anything in.
-struct Normal {
-  MatrixXd gram;
-  VectorXd target;
-};
-
-Normal normal_of(const Used& rows) {
-  Normal normal{MatrixXd::Zero(rows.X.cols(), rows.X.cols()), VectorXd::Zero(rows.X.cols())};
-  if (rows.y.size() == 0) return normal;  // no log has this channel
-  normal.gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.X.transpose());
-  normal.gram = MatrixXd(normal.gram.selfadjointView<Eigen::Lower>());
-  normal.target = rows.X.transpose() * rows.y;
-  return normal;
-}
 
 }  // namespace
 
@@ -109,74 +68,6 @@ double long_run_variance(const VectorXd& residual, const std::vector<std::size_t
     sum += 2.0 * (1.0 - lag / (lags + 1.0)) * product;
   }
   return std::max(sum, 0.1 * residual.squaredNorm()) / static_cast<double>(n);
-}
-
-DataEstimate estimate_from_data(const Equations& equations, const std::vector<bool>& used,
-                                const Prior& prior, const BaseParameters& base) {
-  std::vector<Used> rows;
-  std::vector<Normal> normals;
-  DataEstimate out;
-  double total = 0.0;
-  for (const ChannelRows& channel : equations.channels) {
-    rows.push_back(used_rows(channel, used, equations.columns));
-    normals.push_back(normal_of(rows.back()));
-    const auto n = static_cast<double>(std::max<Index>(1, rows.back().y.size()));
-    total += n;
-    out.noise.push_back(std::max(1e-4 * rows.back().y.squaredNorm() / n, 1e-12));
-  }
-  const double mean_rows = total / static_cast<double>(std::max<std::size_t>(1, rows.size()));
-  const int lags = lags_of(mean_rows);
-  out.quantile = quantile95(mean_rows, lags);
-  // In units of the prior everything is of the order of one.
-  const Eigen::LLT<MatrixXd> unit(prior.metric);
-  const auto scaled = [&](const MatrixXd& A) {
-    MatrixXd half = unit.matrixL().solve(A);
-    return MatrixXd(unit.matrixL().solve(half.transpose()));
-  };
-  MatrixXd covariance, link_covariance;
-  for (int round = 0; round < kReweightings; ++round) {
-    out.information = MatrixXd::Zero(equations.columns, equations.columns);
-    out.target = VectorXd::Zero(equations.columns);
-    for (std::size_t c = 0; c < rows.size(); ++c) {
-      out.information += normals[c].gram / out.noise[c];
-      out.target += normals[c].target / out.noise[c];
-    }
-    MatrixXd A = scaled(out.information);
-    A.diagonal().array() += kFaint;
-    const Eigen::LDLT<MatrixXd> solver(A);
-    const VectorXd right = unit.matrixL().solve(out.target - out.information * prior.mean);
-    const VectorXd z = solver.solve(right);
-    out.mean = prior.mean + unit.matrixU().solve(z);
-    if (round + 1 == kReweightings) {
-      covariance = solver.solve(MatrixXd::Identity(A.rows(), A.cols()));
-      A.diagonal().array() += kBelieved - kFaint;
-      link_covariance = A.ldlt().solve(MatrixXd::Identity(A.rows(), A.cols()));
-      break;
-    }
-    for (std::size_t c = 0; c < rows.size(); ++c) {
-      if (rows[c].y.size() == 0) continue;
-      const VectorXd residual = rows[c].y - rows[c].X * out.mean;
-      const auto n = static_cast<double>(rows[c].y.size());
-      // A channel's share of the freedom that the fit has used up: of slow errors, which count up
-      // to lags + 1 times in the long-run variance.
-      const double spent = solver.solve(scaled(normals[c].gram)).trace() / out.noise[c];
-      const double free = std::max(0.2 * n, n - 0.5 * (lags + 1.0) * spent);
-      const double model = kModelError * rows[c].y.squaredNorm() / n + 1e-14;
-      out.noise[c] = model + long_run_variance(residual, rows[c].instant, lags) * n / free;
-    }
-  }
-  const auto in_units = [&](const MatrixXd& A) {
-    const MatrixXd half = unit.matrixU().solve(A);
-    return MatrixXd(unit.matrixU().solve(half.transpose()));
-  };
-  out.covariance = in_units(covariance);
-  out.link_covariance = in_units(link_covariance);
-  MatrixXd gram(base.count(), base.count());
-  for (Index i = 0; i < base.count(); ++i)
-    for (Index k = 0; k < base.count(); ++k)
-      gram(i, k) = out.information(base.independent[i], base.independent[k]);
-  out.condition = condition_number(gram);
-  return out;
 }
 
 namespace {

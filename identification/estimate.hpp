@@ -32,9 +32,8 @@ struct DataEstimate {
   /// The same when the description is believed as by kBelieved: most parameters of a link show in
   /// combinations with those of its neighbours only, and vary by what those may be wrong.
   Eigen::MatrixXd link_covariance;
-  Eigen::MatrixXd information;  ///< sum of X^T X over the channels, each over its noise
-  Eigen::VectorXd target;       ///< the same of X^T y
-  std::vector<double> noise;    ///< per channel: long-run variance of the residual
+  Eigen::MatrixXd information;  ///< inverse of the covariance by the data: singular
+  Eigen::VectorXd target;       ///< information times the data's solution
   double quantile = 0.0;   ///< of 95 %, in standard deviations: of Student's t distribution, for
                            ///< the noise is estimated, too
   double condition = 0.0;  ///< of the base parameters' columns, weighted and scaled
@@ -42,7 +41,9 @@ struct DataEstimate {
 
 /// Rows of `equations` of whose instants `used` is true. Each channel is weighted by the inverse of
 /// its residual's long-run variance (Newey, West 1987): what the mean of correlated noise varies
-/// by, so that the covariance accounts for filtered noise and for errors of the model.
+/// by, so that the covariance accounts for filtered noise and for errors of the model. The
+/// covariance is a sandwich (White 1980): it holds with errors that channels have in common. What
+/// equations.sensor_noise adds to the sums is taken away (errors in variables).
 [[nodiscard]] DataEstimate estimate_from_data(const Equations& equations,
                                               const std::vector<bool>& used, const Prior& prior,
                                               const BaseParameters& base);
@@ -61,6 +62,10 @@ struct DataEstimate {
 /// estimated with these lags: Student's t with as many degrees of freedom as Bartlett's window
 /// leaves, 3 n / 4 lags.
 [[nodiscard]] double quantile95(double n, int lags);
+
+/// Covariance of the sum of correlated rows, one column a channel; a row of zeros is one that is
+/// missing. Positive semidefinite, by Bartlett's window.
+[[nodiscard]] Eigen::MatrixXd long_run_covariance(const Eigen::MatrixXd& residuals, int lags);
 
 /// Variance of the sum of a correlated sequence over its length: autocovariances up to `lags`,
 /// weighted by Bartlett's window.

@@ -28,9 +28,9 @@ bool stands(const hal::RobotConfig& robot, const IdentifiedRobot& identified,
   return true;
 }
 
-/// Where the intervals are known to be too narrow.
-void warn_of_intervals(const std::vector<Recording>& recordings, const hal::RobotConfig& robot,
-                       const IdentifiedRobot& identified, double cutoff_Hz, Identification& out) {
+/// Where the intervals are known to be too narrow, and which ones allow for what.
+void warn_of_intervals(const std::vector<Recording>& recordings, const IdentifiedRobot& identified,
+                       double cutoff_Hz, Identification& out) {
   if (cutoff_Hz != IdentifyOptions{}.cutoff_Hz) {
     out.warnings.push_back(fmt::format(
         "the intervals were checked with a cut-off of {} Hz only, not with {} Hz: do not trust "
@@ -45,17 +45,12 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const hal::Robo
     const JointResult& joint = out.joints[static_cast<std::size_t>(identified.facts.joint[c])];
     if (!joint.rotor_inertia_kg_m2.identifiable) continue;
     names += (names.empty() ? "" : ", ") + joint.name;
-    if (robot.boards.empty()) continue;
-    const double hold_s = 0.5e-9 * static_cast<double>(robot.boards.front().control_period_ns);
-    names += fmt::format(" ({:.2g})", identified.facts.damping_Nms_rad[c] * hold_s);
   }
   if (names.empty()) return;
-  out.warnings.push_back(
+  out.remarks.push_back(
       "the log does not say for how long a motor's voltage was held, and in such a time the "
-      "back-EMF "
-      "looks like rotor inertia: of these joints, and of base parameters with their rotor_inertia, "
-      "the intervals do not hold (in brackets the error of a hold of one control period "
-      "[kg m2]): " +
+      "back-EMF looks like rotor inertia: the intervals of these joints' rotors allow for a hold "
+      "of up to one control period: " +
       names);
 }
 
@@ -132,7 +127,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   }
   answer(robot, tree, *identified, equations, out);
   warn_of_signs(out);
-  warn_of_intervals(recordings, robot, *identified, options.cutoff_Hz, out);
+  warn_of_intervals(recordings, *identified, options.cutoff_Hz, out);
   return out;
 }
 

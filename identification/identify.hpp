@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
@@ -30,6 +31,14 @@ struct Estimate {
   bool identifiable = false;
 };
 
+/// How a link's quantity shows in the equations, whatever the log holds: no motion changes it.
+enum class Seen : std::uint8_t {
+  kNot,     ///< no equation depends on it
+  kInSums,  ///< only in sums with parameters of other links or of rotors: base parameters
+  kAlone,   ///< by itself
+};
+[[nodiscard]] const char* to_string(Seen seen) noexcept;  ///< "not", "in sums", "alone"
+
 /// A link of the description, in its own frame. What was not identifiable is as described, or what
 /// fits the others best: the dynamics are those of the base parameters either way.
 struct LinkResult {
@@ -42,6 +51,8 @@ struct LinkResult {
   Eigen::Vector3d com_ci95;                  ///< [m]
   Eigen::Matrix<double, 6, 1> inertia_ci95;  ///< ixx ixy ixz iyy iyz izz about the com [kg m^2]
   bool mass_identifiable = false, com_identifiable = false, inertia_identifiable = false;
+  Seen mass_seen = Seen::kNot, com_seen = Seen::kNot, inertia_seen = Seen::kNot;
+  std::vector<std::string> base_parameters;  ///< names of those with a parameter of this link
   bool changed = false;  ///< it is the heaviest of its piece: only such are changed
 };
 

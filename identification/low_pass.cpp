@@ -44,6 +44,12 @@ LowPass::LowPass(double period_s, double cutoff_Hz)
   }
 }
 
+double LowPass::noise(int order) const {
+  double sum = 0.0;
+  for (const double one : weights_[order]) sum += one * one;
+  return sum;
+}
+
 double LowPass::sum(int order, std::span<const double> signal, std::size_t at) const {
   const std::vector<double>& w = weights_[order];
   const double* first = signal.data() + (at - reach());

@@ -32,6 +32,10 @@ class LowPass {
     return sum(2, signal, at);
   }
 
+  /// Of value(), rate() and second_rate(): its variance when the signal is white noise of
+  /// variance 1.
+  [[nodiscard]] double noise(int order) const;
+
  private:
   [[nodiscard]] double sum(int order, std::span<const double> signal, std::size_t at) const;
 

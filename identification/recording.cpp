@@ -280,8 +280,10 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   const SimFacts sim = sim_facts(info.configuration);
   recording.hangs = sim.hangs;
   if (info.hal == "sim" && !robot.boards.empty()) {
-    const std::int64_t hold_ns = robot.boards.front().control_period_ns;
-    recording.voltage_hold_s = 0.5e-9 * static_cast<double>(hold_ns + sim.substep_ns);
+    const double hold_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
+    const double substep_s = 1e-9 * static_cast<double>(sim.substep_ns);
+    recording.voltage_hold_s = 0.5 * (hold_s + substep_s);
+    recording.voltage_hold_s2 = (hold_s * hold_s - substep_s * substep_s) / 12.0;
   }
   recording.voltage_hold_known = info.hal == "sim";
   if (file->truncated()) {

@@ -28,6 +28,7 @@ struct Recording {
   std::string data_sha256;  ///< of the log; empty: it is none
   double period_s = 0.0;
   double voltage_hold_s = 0.0;             ///< see read_recording()
+  double voltage_hold_s2 = 0.0;            ///< the same
   bool voltage_hold_known = true;          ///< false of a log that is not simulated
   bool hangs = false;                      ///< the whole log, from a hoist
   std::vector<double> time_s;              ///< since the log's time 0
@@ -46,7 +47,9 @@ struct Recording {
 /// In a simulated log the voltage of a motor is held for a control period, and its torque is
 /// sampled at the end: where no spring is between, the back-EMF has by then reduced it.
 /// voltage_hold_s is the time by which that torque is late, for a rigid drive's equation, and the
-/// current behind a spring; 0 in other logs.
+/// current behind a spring. The joint gives way to a new voltage within the hold, so its mean speed
+/// there is not the one at half of it: voltage_hold_s2 is what this takes away, over the joint's
+/// time constant (inertia over damping). Both are 0 in other logs.
 ///
 /// Reads the part of a log in which controllers ran, puts it on a grid and takes out what lies:
 /// gaps, NaN, samples that are old, signals that stand still while the robot moves, torques that

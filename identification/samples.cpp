@@ -3,7 +3,9 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -24,6 +26,13 @@ std::unexpected<Error> cannot(const hal::RobotConfig& robot, std::string message
 constexpr std::size_t kGyro = 4, kAccelerometer = 7;
 /// Of the robot's weight: a force on the base that is larger has another cause than a wrong mass.
 constexpr double kUnexplained = 0.3;
+/// Every so many instants it is computed what the IMU's noise does to the equations, six ways.
+constexpr std::size_t kNoiseEvery = 6;
+/// Of a control period: half of it a voltage may have been held, and when in it the torque was
+/// sampled is not known better than to another quarter.
+constexpr double kUnknownHold = 0.75;
+/// Standard deviations in half of a 95 % interval.
+constexpr double kSpreads = 1.96;
 
 Vector3d filtered(const LowPass& filter, const Recording& r, std::size_t channel, std::size_t at,
                   bool rate = false) {
@@ -46,6 +55,20 @@ Signal directions(const Signal& position, double period_s) {
     out[i] = std::tanh(v / kStick_rad_s);
   }
   return out;
+}
+
+/// Variance of a signal's white noise: by what a sample is off the line through its neighbours. A
+/// motion is smooth over three samples, noise is not.
+double noise_of(const Signal& signal) {
+  double sum = 0.0;
+  std::size_t n = 0;
+  for (std::size_t i = 1; i + 1 < signal.size(); ++i) {
+    const double off = signal[i + 1] - 2.0 * signal[i] + signal[i - 1];
+    if (!std::isfinite(off)) continue;
+    sum += off * off / 6.0;
+    ++n;
+  }
+  return n > 0 ? sum / static_cast<double>(n) : 0.0;
 }
 
 }  // namespace
@@ -97,6 +120,8 @@ Result<IdentifiedRobot> make_identified_robot(const model::Tree& tree,
     facts.max_torque_Nm.push_back(config.max_torque_Nm);
     facts.max_velocity_rad_s.push_back(config.max_velocity_rad_s);
   }
+  if (!robot.boards.empty())
+    facts.control_period_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
   facts.gravity_m_s2 = Vector3d(robot.model.gravity_m_s2.data());
   return IdentifiedRobot{std::move(*regressor), std::move(facts), tree.floating_base};
 }
@@ -116,11 +141,17 @@ class Writer {
                                      ? direction_.back()
                                      : directions(r_.motor_position_rad[j], r_.period_s));
     }
+    for (std::size_t i = 0; robot.floating && i < 3; ++i) {
+      const std::size_t imu = robot.facts.imu_channel + i;
+      imu_noise_[i] = noise_of(r_.sensor[imu + kGyro]) * filter.noise(1);
+      imu_noise_[i + 3] = noise_of(r_.sensor[imu + kAccelerometer]) * filter.noise(0);
+    }
   }
 
   void add(std::size_t at) {
     Instant now;
     read(at, now);
+    hold(now);
     robot_.regressor.evaluate(now, Y_, known_);
     const bool free = base_is_free();
     bool any = false;
@@ -134,9 +165,7 @@ class Writer {
         if (!free) continue;
       } else if (channel.kind == Channel::Kind::kJoint) {
         measured = filter_.value(r_.torque_Nm[joint(channel.index)], at);
-        const auto k = static_cast<std::size_t>(channel.index);
-        if (robot_.facts.rigid[k])
-          measured += robot_.facts.damping_Nms_rad[k] * r_.voltage_hold_s * now.vdot[channel.index];
+        measured += held_Nm_[channel.index];
         joint_columns(channel.index, at, now, x);
       } else if (channel.kind == Channel::Kind::kSensor) {
         measured = now.wrenches[static_cast<std::size_t>(channel.index)][channel.component];
@@ -147,6 +176,7 @@ class Writer {
       any = true;
     }
     if (!any) return;
+    if (robot_.floating && all_.time_s.size() % kNoiseEvery == 0) add_noise(at, now);
     for (Index c = 0; c < now.q.size(); ++c) add_motor(c, at, now);
     all_.time_s.push_back(r_.time_s[at]);
   }
@@ -165,6 +195,69 @@ class Writer {
     const bool free = (needed + known_.head<3>()).norm() < kUnexplained * weight_N;
     held_ += free ? 0 : 1;
     return free;
+  }
+  /// The equations are linear in the base's accelerations, so a unit of each shows what its noise
+  /// does. In the angular velocity noise is small: nothing is differentiated.
+  void add_noise(std::size_t at, const Instant& now) {
+    const ImuMotion imu = imu_at(at);
+    Eigen::MatrixXd moved;
+    Eigen::VectorXd known;
+    for (std::size_t i = 0; i < imu_noise_.size(); ++i) {
+      ImuMotion one = imu;
+      (i < 3 ? one.al : one.a)[static_cast<Index>(i % 3)] += 1.0;
+      Instant then = now;
+      robot_.regressor.base_from_link(robot_.facts.imu_link, one.w, one.al, one.a, then);
+      robot_.regressor.evaluate(then, moved, known);
+      const double share = std::sqrt(imu_noise_[i] * static_cast<double>(kNoiseEvery));
+      for (std::size_t c = 0; c < all_.channels.size(); ++c) {
+        const auto& used = all_.channels[c].instant;
+        if (used.empty() || used.back() != all_.time_s.size()) continue;
+        const auto row = static_cast<Index>(c);
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
+        x.head(Y_.cols()) = share * (moved.row(row) - Y_.row(row));
+        all_.sensor_noise[c].append(x, share * (known_[row] - known[row]), 0.0, all_.time_s.size());
+      }
+    }
+  }
+  /// held_Nm_: what a rigid drive's torque has lost at its sample by back-EMF, since the mean of
+  /// the time in which its voltage was held. The mean speed of that time follows from the joints'
+  /// time constants, to second order: by the description's inertia about the joints.
+  void hold(Instant& now) {
+    const auto n = static_cast<Index>(robot_.facts.joint.size());
+    held_Nm_.setZero(n);
+    const bool any = std::ranges::find(robot_.facts.rigid, true) != robot_.facts.rigid.end();
+    if (!(r_.voltage_hold_s > 0.0) || !any) return;
+    Eigen::VectorXd damping(n);
+    for (Index c = 0; c < n; ++c) {
+      const auto k = static_cast<std::size_t>(c);
+      damping[c] = robot_.facts.rigid[k] ? robot_.facts.damping_Nms_rad[k] : 0.0;
+    }
+    const Eigen::VectorXd braked = damping.cwiseProduct(now.vdot);
+    const Eigen::VectorXd answer = joint_inertia(now).ldlt().solve(braked);
+    held_Nm_ = r_.voltage_hold_s * braked - r_.voltage_hold_s2 * damping.cwiseProduct(answer);
+  }
+  /// Of the description with its rotors, a floating base held.
+  Eigen::MatrixXd joint_inertia(const Instant& now) {
+    const auto n = static_cast<Index>(robot_.facts.joint.size());
+    Instant still = now;
+    still.v.setZero();
+    still.w.setZero();
+    still.al.setZero();
+    still.a.setZero();
+    for (auto& wrench : still.wrenches) wrench.setZero();
+    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);
+    for (Index c = 0; c < n; ++c) {
+      still.vdot = Eigen::VectorXd::Unit(n, c);
+      robot_.regressor.evaluate(still, Y_, known_);
+      for (std::size_t row = 0; row < robot_.regressor.channels().size(); ++row) {
+        const Channel& channel = robot_.regressor.channels()[row];
+        if (channel.kind != Channel::Kind::kJoint) continue;
+        const auto at = static_cast<Index>(row);
+        M(channel.index, c) = Y_.row(at).dot(described_) + known_[at];
+      }
+      M(c, c) += robot_.facts.rotor_kg_m2[static_cast<std::size_t>(c)];
+    }
+    return M;
   }
   [[nodiscard]] std::size_t joint(int coordinate) const {
     return static_cast<std::size_t>(robot_.facts.joint[static_cast<std::size_t>(coordinate)]);
@@ -191,10 +284,16 @@ class Writer {
     now.al.setZero();
     now.a = -facts.gravity_m_s2;
     if (!robot_.floating) return;
-    robot_.regressor.base_from_link(
-        facts.imu_link, filtered(filter_, r_, facts.imu_channel + kGyro, at),
-        filtered(filter_, r_, facts.imu_channel + kGyro, at, true),
-        filtered(filter_, r_, facts.imu_channel + kAccelerometer, at), now);
+    const ImuMotion imu = imu_at(at);
+    robot_.regressor.base_from_link(facts.imu_link, imu.w, imu.al, imu.a, now);
+  }
+  struct ImuMotion {
+    Vector3d w, al, a;
+  };
+  [[nodiscard]] ImuMotion imu_at(std::size_t at) const {
+    const std::size_t imu = robot_.facts.imu_channel;
+    return {filtered(filter_, r_, imu + kGyro, at), filtered(filter_, r_, imu + kGyro, at, true),
+            filtered(filter_, r_, imu + kAccelerometer, at)};
   }
 
   void joint_columns(int coordinate, std::size_t at, const Instant& now, Eigen::VectorXd& x) const {
@@ -220,7 +319,10 @@ class Writer {
     one.velocity = rigid ? now.v[coordinate] : filter_.rate(motor, at);
     one.acceleration = rigid ? 0.0 : filter_.second_rate(motor, at);
     // The held voltage makes less current at the period's end than on its mean: back-EMF.
-    if (!rigid) one.drive += robot_.facts.damping_Nms_rad[c] * r_.voltage_hold_s * one.acceleration;
+    const double damping = robot_.facts.damping_Nms_rad[c];
+    const double rotor = robot_.facts.rotor_kg_m2[c];
+    const double gives_way = rotor > 0.0 ? r_.voltage_hold_s2 * damping / rotor : 0.0;
+    if (!rigid) one.drive += damping * (r_.voltage_hold_s - gives_way) * one.acceleration;
     one.direction = filter_.value(motor_direction_[c], at);
     const double sum =
         one.drive + one.drive_rate + one.torque + one.velocity + one.acceleration + one.direction;
@@ -235,6 +337,8 @@ class Writer {
   Eigen::MatrixXd Y_;
   Eigen::VectorXd known_;
   Eigen::VectorXd described_ = robot_.regressor.described();
+  Eigen::VectorXd held_Nm_;
+  std::array<double, 6> imu_noise_{};  // variances after the filter: angular, linear acceleration
   double mass_kg_ = 0.0;
   std::size_t held_ = 0;
 };
@@ -270,8 +374,15 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   const std::size_t coordinates = robot.facts.joint.size();
   equations.columns = robot.regressor.columns() + kJointColumns * static_cast<Index>(coordinates);
   equations.channels.resize(robot.regressor.channels().size());
+  equations.sensor_noise.resize(equations.channels.size());
   equations.motors.resize(coordinates);
   equations.travel_rad.resize(coordinates, 0.0);
+  equations.rotor_doubt_kg_m2.resize(coordinates, 0.0);
+  for (std::size_t c = 0; c < coordinates; ++c) {
+    if (recording.voltage_hold_known || !robot.facts.rigid[c]) continue;
+    equations.rotor_doubt_kg_m2[c] =
+        kUnknownHold * robot.facts.damping_Nms_rad[c] * robot.facts.control_period_s / kSpreads;
+  }
   equations.first_of_log.push_back(equations.time_s.size());
   Writer writer(recording, filter, robot, equations);
   for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();

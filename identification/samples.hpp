@@ -22,6 +22,7 @@ struct RobotFacts {
   std::vector<double> rotor_kg_m2;      ///< as described, on the link side
   std::vector<double> torque_per_A;     ///< on the link side; 0: not known
   std::vector<double> damping_Nms_rad;  ///< of the actuator, back-EMF included
+  double control_period_s = 0.0;        ///< of the boards; 0: not known
   std::vector<double> max_torque_Nm, max_velocity_rad_s;
   int imu_link = -1;                        ///< in tree.links; -1: none
   std::size_t imu_channel = 0;              ///< first of its channels
@@ -73,11 +74,17 @@ struct MotorInstant {
 
 /// All equations of a log, or of several.
 struct Equations {
-  std::vector<double> time_s;                     ///< of each instant
-  std::vector<std::size_t> first_of_log;          ///< instant
-  std::vector<ChannelRows> channels;              ///< as the regressor's
+  std::vector<double> time_s;             ///< of each instant
+  std::vector<std::size_t> first_of_log;  ///< instant
+  std::vector<ChannelRows> channels;      ///< as the regressor's
+  /// By how much the noise of the IMU moves X and y of a channel: rows whose sum of squares is
+  /// what that noise adds to the rows' own, on average. Empty of a fixed base.
+  std::vector<ChannelRows> sensor_noise;
   std::vector<std::vector<MotorInstant>> motors;  ///< per coordinate
   std::vector<double> travel_rad;                 ///< per coordinate: range of its position
+  /// Per coordinate: standard deviation of what an unknown hold of the motor's voltage adds to a
+  /// rigid drive's rotor [kg m^2]; 0 of simulated logs.
+  std::vector<double> rotor_doubt_kg_m2;
   Eigen::Index columns = 0;
   double usable_s = 0.0;  ///< time that the instants stand for
   double held_s = 0.0;    ///< of them: something else than the feet holds the base, as it seems

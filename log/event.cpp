@@ -100,8 +100,11 @@ std::string text_of(const Event& event, bool has_joint) {
     case EventKind::kTooLate:
     case EventKind::kOwnerLost: return "";
     case EventKind::kCollision: {
-      char torque[48];
-      std::snprintf(torque, sizeof torque, ": an external torque of %.1f Nm", 1e-3 * event.code);
+      const bool force = !has_joint && event.value >= -3.0F;  // -1 to -6: of the base
+      char torque[64];
+      std::snprintf(torque, sizeof torque, "%s: an external %s of %.1f %s",
+                    has_joint ? "" : " of the base", force ? "force" : "torque", 1e-3 * event.code,
+                    force ? "N" : "Nm");
       return torque;
     }
     case EventKind::kHomingFailed:

@@ -22,6 +22,7 @@ enum class MotionSource : std::uint8_t {
 // What a replay (docs/import.md) puts before a recording, which its report has to know.
 inline constexpr double kReplayApproach_s = 3.0;  ///< to its first place, unless it says other
 inline constexpr double kReplayRunUp_s = 0.5;     ///< in which its joints get their first speed
+inline constexpr double kReplaySlowest = 0.01, kReplayFastest = 10.0;  ///< times as recorded
 
 /// Which motion of a log is wanted.
 struct MotionRequest {

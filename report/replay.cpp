@@ -37,6 +37,7 @@ std::optional<Played> played(const RunData& run, const RunData& recording) {
           parameters.text_or("data_sha256", "") != recording.data_sha256) {
         continue;
       }
+      if (parameters.number_or("speed", 1.0) != 1.0) return std::nullopt;  // another motion
       Played found;
       const std::string source = parameters.text_or("source", "");
       if (source == "command") found.request.source = log::MotionSource::kCommand;

@@ -17,10 +17,10 @@ struct Replay {
   double from_s = 0.0, to_s = 0.0;  ///< what is played, of the recording's time
 };
 
-/// Empty: `run` does not play `recording`, by the data_sha256 that its experiment names; or its
-/// references are not the recording's anywhere. They are looked for where approach_s puts them, and
-/// then in every later cycle: a run-up may be longer, and commands delayed.
-/// Errors: as log::read_joint_motion().
+/// Empty: `run` does not play `recording`, by the data_sha256 that its experiment names; it plays
+/// it at another speed; or its references are not the recording's anywhere. They are looked for
+/// where approach_s puts them, and then in every later cycle: a run-up may be longer, and commands
+/// delayed. Errors: as log::read_joint_motion().
 [[nodiscard]] Result<std::optional<Replay>> find_replay(const RunData& run,
                                                         const RunData& recording);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/nearest.hpp"
+#include "estimation/collision.hpp"
 #include "estimation/site_wrenches.hpp"
 
 namespace tandem::runtime {
@@ -54,7 +55,18 @@ CollisionConfig read_collision(TomlTable table, const hal::RobotConfig& robot) {
   }
   std::vector<std::string> joints;
   for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint.name);
+  joints.insert(joints.end(), estimation::kBaseChannels.begin(), estimation::kBaseChannels.end());
   (void)limits.holds_only(joints);
+  for (const char* channel : estimation::kBaseChannels) {
+    if (robot.joint_index(channel) >= 0 || !limits.has(channel)) continue;
+    const double limit = limits.number(channel, {1e-3, 1e5});
+    if (robot.model.floating_base) {
+      collision.thresholds.push_back({channel, limit});
+    } else {
+      limits.error(channel, "the base does not float: nothing is felt there",
+                   "remove it; a joint's threshold has the joint's name");
+    }
+  }
   if (table.has("threshold_Nm") && collision.thresholds.empty()) {
     table.error("threshold_Nm", "no joint has a threshold, so nothing is watched",
                 "take what `tandem log thresholds` prints of free motion");

@@ -28,7 +28,8 @@ enum class FaultSource : std::uint8_t {
   kStray,          ///< a controller wrote what it had not claimed; `index` joint, `code` controller
   kNotHomed,       ///< controllers waited for a joint that was not homed; `code`: its HomingError
   kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
-  kCollision,      ///< something pushes a joint; `code` is its external torque [mNm or mN]
+  kCollision,  ///< something pushes a joint; `code` is its external torque [mNm or mN]; a floating
+               ///< base: `index` is -1 - k, k of estimation::kBaseChannels
 };
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.

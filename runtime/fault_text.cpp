@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "estimation/collision.hpp"
 #include "hal/remote_command.hpp"
 
 namespace tandem::runtime {
@@ -31,7 +32,13 @@ std::string owner_text(hal::OwnerLoss loss) {
 /// "12.3 Nm"
 std::string in_units(const FaultRecord& record, const FaultContext& about) {
   const auto joint = static_cast<std::size_t>(record.index);
-  char text[32];
+  char text[64];
+  if (record.index < 0) {  // the base
+    const int channel = -1 - record.index;
+    std::snprintf(text, sizeof text, "%.1f %s (%s)", 1e-3 * record.code, channel < 3 ? "N" : "Nm",
+                  estimation::kBaseChannels[static_cast<std::size_t>(channel)]);
+    return text;
+  }
   std::snprintf(text, sizeof text, "%.1f %s", 1e-3 * record.code,
                 about.robot.joints[joint].slides ? "N" : "Nm");
   return text;
@@ -70,7 +77,9 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
       return emergency_text(static_cast<EmergencyInput>(record.code));
     case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
     case FaultSource::kCollision:
-      return "collision: an external torque of " + in_units(record, about);
+      return std::string("collision: an external ") +
+             (record.index < 0 && record.index > -4 ? "force" : "torque") + " of " +
+             in_units(record, about);
     case FaultSource::kFall:
       return fall_text({static_cast<FallKind>(record.code), record.index}, about.config.fall);
   }
@@ -87,6 +96,10 @@ void name_it(const FaultRecord& record, const FaultContext& about, Fault& fault)
     case FaultSource::kStray:
     case FaultSource::kCollision:
     case FaultSource::kNotHomed:
+      if (record.index < 0) {
+        fault.joint = "base";
+        break;
+      }
       fault.joint = about.robot.joints[index].name;
       fault.board = about.robot.joints[index].board;
       break;

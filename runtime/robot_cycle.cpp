@@ -118,7 +118,9 @@ void RobotCycle::check_collisions() noexcept TANDEM_RT {
   const auto found = estimator_->collision();
   if (!found) return;
   const double thousandths = std::clamp(1e3 * std::abs(found->torque_Nm), 0.0, 4e9);
-  fault({.index = static_cast<std::int32_t>(found->joint),
+  const auto joints = static_cast<std::int32_t>(estimator_->image().joints());
+  const auto channel = static_cast<std::int32_t>(found->joint);
+  fault({.index = channel < joints ? channel : joints - 1 - channel,
          .code = static_cast<std::uint32_t>(thousandths),
          .source = FaultSource::kCollision,
          .category = estimator_->reaction()});

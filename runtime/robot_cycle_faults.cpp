@@ -46,8 +46,9 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   record.time_ns = time_.time_ns;
   if (record.source != FaultSource::kEmergencyStop) {
     const bool of_sensor = record.source == FaultSource::kSensorLost;
-    log_.event(time_, event_of(record.source), of_joint ? record.index : -1, record.code,
-               of_sensor ? static_cast<float>(record.index) : 0.0F);
+    const bool of_base = record.source == FaultSource::kCollision && record.index < 0;
+    log_.event(time_, event_of(record.source), of_joint && !of_base ? record.index : -1,
+               record.code, of_sensor || of_base ? static_cast<float>(record.index) : 0.0F);
   }
   if (record.category == StopCategory::kCategory2 && !run_.in(RunPhase::kRetreating) &&
       !retreat()) {

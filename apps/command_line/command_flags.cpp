@@ -127,6 +127,7 @@ const char kLogReplayExamples[] = R"(Examples:
   tandem log replay runs/ur5e-q.mcap --robot config/ur5e/robot.toml --out q.toml --source state
   tandem log replay run.mcap --robot robot.toml --out r.toml --from 2 --to 5 --joints elbow,wrist
   tandem log replay squat.mcap --robot config/coman/robot.toml --out again.toml --torque
+  tandem log replay fast.mcap --robot robot.toml --out slow.toml --speed 0.5
 The experiment is an ordinary one with the controller `recorded_motion`: `tandem check replay.toml`
 (docs/import.md, docs/controllers.md).
 
@@ -493,6 +494,10 @@ static void add_replay_flags(CLI::App& replay, LogOptions& o) {
       ->delimiter(',');
   replay.add_option("--from", o.begin_s, "Of the log's time [s] (default: the controllers' start)");
   replay.add_option("--to", o.end_s, "Of the log's time [s] (default: the controllers' end)");
+  replay
+      .add_option("--speed", o.speed,
+                  "Times as fast as recorded, 0.01 to 10 (default: 1): 0.5 takes twice as long")
+      ->check(CLI::Range(0.01, 10.0));  // log::kReplaySlowest, kReplayFastest
   replay.add_flag("--torque", o.torque, "Play the torques, too, as feed-forward");
   replay.add_option("--posture", o.posture,
                     "Start posture (default: the recording's, or the robot's first)");

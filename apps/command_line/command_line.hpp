@@ -218,6 +218,7 @@ struct LogOptions {
   std::string posture;                   ///< replay: to start from; empty: the recording's
   std::vector<std::string> joints;       ///< replay: that are led; empty: all
   std::optional<double> begin_s, end_s;  ///< replay: of the log's time
+  double speed = 1.0;                    ///< replay: times as fast as recorded
   bool torque = false;                   ///< replay: torques as feed-forward
   std::string json;
 };

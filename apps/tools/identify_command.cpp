@@ -34,15 +34,19 @@ Json links_json(const Identification& result) {
     links[link.name] = {{"mass_kg",
                          {{"value", link.identified.mass_kg},
                           {"ci95", number(link.mass_ci95)},
-                          {"identifiable", link.mass_identifiable}}},
+                          {"identifiable", link.mass_identifiable},
+                          {"seen", identification::to_string(link.mass_seen)}}},
                         {"com_m",
                          {{"value", numbers(link.identified.com_m)},
                           {"ci95", numbers(link.com_ci95)},
-                          {"identifiable", link.com_identifiable}}},
+                          {"identifiable", link.com_identifiable},
+                          {"seen", identification::to_string(link.com_seen)}}},
                         {"inertia_kg_m2",
                          {{"value", numbers(moments)},
                           {"ci95", numbers(link.inertia_ci95)},
-                          {"identifiable", link.inertia_identifiable}}}};
+                          {"identifiable", link.inertia_identifiable},
+                          {"seen", identification::to_string(link.inertia_seen)}}},
+                        {"base_parameters", link.base_parameters}};
   }
   return links;
 }
@@ -56,18 +60,20 @@ Json joints_json(const Identification& result) {
   };
   Json joints = Json::object();
   for (const identification::JointResult& joint : result.joints) {
-    joints[joint.name] = {{"viscous_Nms_rad", known(joint.viscous_Nms_rad)},
-                          {"coulomb_Nm", known(joint.coulomb_Nm)},
-                          {"rotor_inertia_kg_m2", known(joint.rotor_inertia_kg_m2)},
-                          {"offset_Nm", known(joint.offset_Nm)},
-                          {"ci95",
-                           {{"viscous_Nms_rad", interval(joint.viscous_Nms_rad)},
-                            {"coulomb_Nm", interval(joint.coulomb_Nm)},
-                            {"rotor_inertia_kg_m2", interval(joint.rotor_inertia_kg_m2)},
-                            {"offset_Nm", interval(joint.offset_Nm)}}},
-                          {"rms_Nm", number(joint.rms_Nm)},
-                          {"relative_error", number(joint.relative_error)},
-                          {"described_relative_error", number(joint.described_relative_error)}};
+    joints[joint.name] = {
+        {"viscous_Nms_rad", known(joint.viscous_Nms_rad)},
+        {"coulomb_Nm", known(joint.coulomb_Nm)},
+        {"rotor_inertia_kg_m2", known(joint.rotor_inertia_kg_m2)},
+        {"offset_Nm", known(joint.offset_Nm)},
+        {"rotor_from", joint.rotor_inertia_kg_m2.identifiable ? "data" : "description"},
+        {"ci95",
+         {{"viscous_Nms_rad", interval(joint.viscous_Nms_rad)},
+          {"coulomb_Nm", interval(joint.coulomb_Nm)},
+          {"rotor_inertia_kg_m2", interval(joint.rotor_inertia_kg_m2)},
+          {"offset_Nm", interval(joint.offset_Nm)}}},
+        {"rms_Nm", number(joint.rms_Nm)},
+        {"relative_error", number(joint.relative_error)},
+        {"described_relative_error", number(joint.described_relative_error)}};
   }
   return joints;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -64,14 +65,31 @@ report::PageTable joints_table(const Identification& result) {
   return table;
 }
 
+/// Names of the known base parameters that a link's numbers are in; empty when all are known.
+std::string sums_of(const LinkResult& link, const Identification& result) {
+  using identification::Seen;
+  const bool sums = (!link.mass_identifiable && link.mass_seen == Seen::kInSums) ||
+                    (!link.com_identifiable && link.com_seen == Seen::kInSums) ||
+                    (!link.inertia_identifiable && link.inertia_seen == Seen::kInSums);
+  std::string names;
+  for (const std::string& name : link.base_parameters) {
+    const auto base = std::ranges::find(result.base, name, &identification::BaseParameter::name);
+    if (!sums || base == result.base.end() || !base->estimate.identifiable) continue;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  return names;
+}
+
 report::PageTable links_table(const Identification& result) {
   report::PageTable table{
       "Links",
-      "In the axes of each link, with 95 % intervals from the data alone; Δ: difference from the "
-      "description. (d): the data alone do not determine it, the value follows from the "
-      "description and from physical consistency.",
+      "In the axes of each link, with 95 % intervals from the data and from a description that is "
+      "doubted; Δ: difference from the description. (d): the data alone do not determine it, the "
+      "value follows from the description and from physical consistency. Most such numbers are no "
+      "fault of the log: the robot's joints show them only in sums with those of other links. The "
+      "last column has the known sums: the next table has their values.",
       {"link", "mass [kg]", "Δ mass [kg]", "com [mm]", "Δ com [mm]", "Ixx Iyy Izz [g m2]",
-       "Δ [g m2]"},
+       "Δ [g m2]", "in sums only"},
       {}};
   for (const LinkResult& link : result.links) {
     const auto mark = [](bool identifiable) { return identifiable ? "" : " (d)"; };
@@ -87,8 +105,8 @@ report::PageTable links_table(const Identification& result) {
                           fmt::format("{:+.4f}", now.mass_kg - was.mass_kg),
                           three(now.com_m, 1e3) + mark(link.com_identifiable),
                           three(Eigen::Vector3d(now.com_m - was.com_m), 1e3),
-                          three(moments, 1e3) + mark(link.inertia_identifiable),
-                          three(change, 1e3)});
+                          three(moments, 1e3) + mark(link.inertia_identifiable), three(change, 1e3),
+                          sums_of(link, result)});
   }
   return table;
 }

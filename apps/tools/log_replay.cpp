@@ -130,7 +130,12 @@ Result<Replay> plan(const LogOptions& options) {
   auto motion = log::read_joint_motion(*file, request);
   if (!motion) return std::unexpected(with_options(motion.error()));
   replay.motion = std::move(*motion);
-  const auto made = MotionPlan::make(replay.motion, replay.robot, replay.joints, kCycle_ns);
+  if (request.torque && options.speed > 1.0) {
+    return fail("--torque plays the torques of a slower motion",
+                "leave --torque out, or play it not faster than recorded: --speed 1");
+  }
+  const auto made =
+      MotionPlan::make(replay.motion, replay.robot, replay.joints, kCycle_ns, options.speed);
   if (!made) {
     return std::unexpected(
         Error{made.error().message, made.error().hint, options.log, 0, made.error().key});
@@ -167,6 +172,7 @@ std::string experiment_text(const Replay& replay, const LogOptions& options) {
       replay.posture.empty() ? "" : "posture = " + quoted(replay.posture) + "\n", replay.duration_s,
       quoted(relative_path(options.output, options.log)), replay.data_sha256,
       log::to_string(replay.motion.source), replay.approach_s);
+  if (options.speed != 1.0) text += fmt::format("speed = {}\n", options.speed);
   if (options.torque) text += "torque = true\n";
   if (options.begin_s) text += fmt::format("from_s = {:.9g}\n", *options.begin_s);
   if (options.end_s) text += fmt::format("to_s = {:.9g}\n", *options.end_s);
@@ -185,6 +191,9 @@ void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out
   facts.add("plays", fmt::format("{:.3f} to {:.3f} s of {}",
                                  static_cast<double>(replay.motion.begin_ns) * 1e-9,
                                  static_cast<double>(replay.motion.end_ns) * 1e-9, options.log));
+  if (options.speed != 1.0) {
+    facts.add("speed", fmt::format("{:.4g} times as fast as recorded", options.speed));
+  }
   facts.add("references", commanded ? "the recorded commands (--source state: what was measured)"
                                     : "what was measured of the joints");
   const std::size_t held = replay.robot.joints.size() - replay.joints.size();
@@ -211,6 +220,7 @@ Json replay_json(const Replay& replay, const LogOptions& options) {
   json["from_ns"] = replay.motion.begin_ns;
   json["to_ns"] = replay.motion.end_ns;
   json["joints"] = replay.request.joints;
+  json["speed"] = options.speed;
   json["torque"] = options.torque;
   json["posture"] = replay.posture;
   json["lead_in_s"] = replay.approach_s + log::kReplayRunUp_s;

@@ -45,8 +45,8 @@ Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths
     if (!file) return std::unexpected(file.error());
     const auto [twin, is_new] = seen.emplace(file->data_sha256(), path);
     if (!is_new) return std::unexpected(log::same_data(path, twin->second));
-    if (joints.empty()) joints = file->info().joints;
-    if (file->info().joints != joints) {
+    if (joints.empty()) joints = felt_channels(*file);
+    if (felt_channels(*file) != joints) {
       return std::unexpected(
           Error{"the logs are of different robots", "learn from one robot's runs", path, 0, {}});
     }

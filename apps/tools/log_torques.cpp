@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimation/collision.hpp"
 #include "hal/fault_kind.hpp"
 #include "log/event.hpp"
 
@@ -11,6 +12,7 @@ namespace tandem::apps {
 namespace {
 
 constexpr const char* kField = "external_torque_nm";
+constexpr const char* kBase = "external_base_wrench";
 
 std::unexpected<Error> log_error(const log::LogFile& file, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), file.path(), 0, {}});
@@ -55,6 +57,15 @@ std::vector<double> ExternalTorques::at(std::size_t row) const {
   return all;
 }
 
+std::vector<std::string> felt_channels(const log::LogFile& file) {
+  std::vector<std::string> names = file.info().joints;
+  const log::Topic* topic = file.find("/tandem/estimate");
+  const hal::Field* field = topic == nullptr ? nullptr : topic->layout.find(kBase);
+  if (field != nullptr && field->count == estimation::kBaseChannels.size())
+    names.insert(names.end(), estimation::kBaseChannels.begin(), estimation::kBaseChannels.end());
+  return names;
+}
+
 Result<ExternalTorques> read_external_torques(const log::LogFile& file, double from_s) {
   const std::vector<std::string>& joints = file.info().joints;
   const log::Topic* topic = file.find("/tandem/estimate");
@@ -65,6 +76,8 @@ Result<ExternalTorques> read_external_torques(const log::LogFile& file, double f
   }
   std::vector<log::Column> columns;
   for (std::size_t j = 0; j < joints.size(); ++j) columns.push_back({kField, j});
+  const std::vector<std::string> names = felt_channels(file);
+  for (std::size_t k = 0; joints.size() + k < names.size(); ++k) columns.push_back({kBase, k});
   auto table = file.read("/tandem/estimate", columns);
   if (!table) return std::unexpected(table.error());
   Result<Span> span = under_control(file);
@@ -77,11 +90,11 @@ Result<ExternalTorques> read_external_torques(const log::LogFile& file, double f
   ExternalTorques all{.time_s = {table->time_s.begin() + first, table->time_s.begin() + last},
                       .torque_Nm = {},
                       .push_s = std::move(span->push_s)};
-  for (std::size_t j = 0; j < joints.size(); ++j) {
+  for (std::size_t j = 0; j < names.size(); ++j) {
     const auto begin = table->columns[j].begin();
     all.torque_Nm.emplace_back(begin + first, begin + last);
     if (!std::ranges::all_of(all.torque_Nm[j], [](double t) { return std::isfinite(t); })) {
-      return log_error(file, "the external torque of " + joints[j] + " is not finite",
+      return log_error(file, "the external torque of " + names[j] + " is not finite",
                        "record the run again");
     }
   }

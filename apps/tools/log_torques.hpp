@@ -11,13 +11,17 @@ namespace tandem::apps {
 
 struct ExternalTorques {
   std::vector<double> time_s;
-  std::vector<std::vector<double>> torque_Nm;  ///< by joint, as long as time_s
+  std::vector<std::vector<double>> torque_Nm;  ///< by felt_channels(), as long as time_s
   std::vector<double> push_s;                  ///< when an injected push began
   /// Rows before the first push: motion that touched nothing.
   [[nodiscard]] std::size_t free_rows() const;
   /// Of all joints. @param row  of time_s
   [[nodiscard]] std::vector<double> at(std::size_t row) const;
 };
+
+/// What of the robot has thresholds: its joints and, of a log with the base's external wrench,
+/// estimation::kBaseChannels.
+[[nodiscard]] std::vector<std::string> felt_channels(const log::LogFile& file);
 
 /// From the bring-up, or `from_s` of the log's time, to the controllers' end, a request to stop, or
 /// the first fault; but a collision, which may have been warned of only.

@@ -156,6 +156,36 @@ unit = "rad"
             std::string::npos);
 }
 
+// What takes twice as long is twice as slow, in the cycle and in the measured motion.
+TEST_F(LogReplay, PlaysAtHalfTheSpeed) {
+  const std::string run = play(recording_, "--speed 0.5");
+  EXPECT_EQ(json("replay.json")["speed"].get<double>(), 0.5);
+  const log::Table recorded = columns(recording_, "/tandem/command");
+  const log::Table played = columns(run, "/tandem/command");
+  const double from_s = 1e-9 * json("replay.json")["from_ns"].get<double>();
+  const double to_s = 1e-9 * json("replay.json")["to_ns"].get<double>();
+  const double begin_s = start_of(played) + kLead_s;
+  double most = 0.0;
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < recorded.time_s.size(); ++i) {
+    if (recorded.time_s[i] < from_s - 1e-9 || recorded.time_s[i] > to_s + 1e-9) continue;
+    const double time_s = begin_s + 2.0 * (recorded.time_s[i] - from_s);
+    const auto row = std::ranges::lower_bound(played.time_s, time_s - 1e-9) - played.time_s.begin();
+    if (static_cast<std::size_t>(row) >= played.time_s.size()) break;
+    for (std::size_t j = 0; j < 2; ++j) {
+      most = std::max(most, std::abs(recorded.columns[j][i] -
+                                     played.columns[j][static_cast<std::size_t>(row)]));
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 1000U);
+  EXPECT_EQ(most, 0.0) << "every second cycle has the recording's own numbers";
+  const Outcome report = tandem("report " + recording_ + " " + run + " -o both");
+  ASSERT_EQ(report.status, 0) << report.err;
+  EXPECT_EQ(read_text(folder_ / "both/report.html").find("so that the replay lies over"),
+            std::string::npos);
+}
+
 TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   const std::string to = " --robot robot.toml --out replay.toml";
   const auto refused = [&](const std::string& arguments, const std::string& why) {
@@ -171,6 +201,8 @@ TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   refused(recording_ + to + " --from 3 --to 3.0001", "has fewer than two samples from 3.000 s");
   refused(recording_ + to + " --joints elbow", "the robot has no joint 'elbow'");
   refused(recording_ + to + " --joints joint1,joint1", "joint 'joint1' stands twice");
+  refused(recording_ + to + " --speed 10", "joint 'joint");
+  refused(recording_ + to + " --speed 2 --torque", "--torque plays the torques of a slower motion");
   refused(recording_ + to + " --posture high", "the robot has no posture 'high'");
   refused(recording_ + " --robot " TANDEM_SOURCE_DIR "/config/ur5e/robot.toml --out replay.toml",
           "is a recording of another robot");

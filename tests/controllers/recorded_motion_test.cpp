@@ -177,6 +177,51 @@ TEST_F(RecordedMotion, PutsOtherPeriodsOnTheRunsCycles) {
   }
 }
 
+TEST_F(RecordedMotion, PlaysSlowerAndFasterThanItWasRecorded) {
+  const std::string path = record();
+  for (const double times : {0.5, 1.25, 0.37}) {
+    test::Harness run(hal::test::fake_robot(), "recorded_motion",
+                      "log = '" + path + "'\nspeed = " + std::to_string(times) + "\n");
+    ASSERT_EQ(run.problem(), "") << times;
+    run.start();
+    ASSERT_EQ(run.run(kLead_s), Code::kOk);
+    double last = wanted(1, 0.0);
+    int cycles = 0;
+    for (double t = 0.0; t <= 1.0; t = ++cycles * 1e-3 * times) {
+      ASSERT_EQ(run.step(), Code::kOk);
+      const double now = run.command.position_rad()[1];
+      ASSERT_NEAR(now, wanted(1, t), 1e-6) << times << " " << t;
+      ASSERT_NEAR(run.command.velocity_rad_s()[1], times * speed(1, t), 1e-5) << times << " " << t;
+      // The velocity is that of the positions played: their difference, half a cycle before.
+      if (cycles > 0) {
+        ASSERT_NEAR((now - last) * 1e3, times * speed(1, t - 0.5e-3 * times), 1e-3) << times;
+      }
+      last = now;
+    }
+    EXPECT_EQ(cycles, static_cast<int>(std::floor(1.0 / (1e-3 * times) + 1e-6)) + 1);
+    ASSERT_EQ(run.run(1.0), Code::kOk);
+    EXPECT_NEAR(run.command.position_rad()[1], wanted(1, 1.0), 1e-5) << times;
+    EXPECT_EQ(run.command.velocity_rad_s()[1], 0.0);
+  }
+}
+
+TEST_F(RecordedMotion, RefusesASpeedThatAJointHasNot) {
+  const std::string path = record();
+  EXPECT_EQ(problem(path, "speed = 4.0\n"),
+            "experiment.toml:1: log: LOG: joint 'elbow' would move with 2.0103 rad/s at 0.524 s "
+            "of the recording, its limits are -2 and 2 (play it slower (speed), leave it out of "
+            "`joints`, play another stretch with from_s and to_s, or correct the limits of "
+            "robot.toml)");
+  for (const char* outside : {"0.0", "-1.0", "0.009", "10.1", "nan", "'fast'"}) {
+    EXPECT_NE(problem(path, std::string("speed = ") + outside + "\n"), "") << outside;
+  }
+  EXPECT_NE(problem(path, "speed = 1.1\ntorque = true\n")
+                .find("torque: the recorded torques are those of a slower motion"),
+            std::string::npos)
+      << problem(path, "speed = 1.1\ntorque = true\n");
+  EXPECT_EQ(problem(path, "speed = 0.9\ntorque = true\n"), "");
+}
+
 TEST_F(RecordedMotion, RunsUpToARecordingThatBeginsAndEndsInMotion) {
   const std::string path = record();
   test::Harness run(hal::test::fake_robot(), "recorded_motion",

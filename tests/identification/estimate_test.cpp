@@ -1,5 +1,5 @@
 // Identification of recordings whose truth is known: parameters, and whether the intervals hold
-// what they promise. TANDEM_IDENTIFY_SEEDS=100: the whole proof of the latter.
+// what they promise. TANDEM_IDENTIFY_SEEDS=1000: the whole proof of the latter.
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -93,7 +93,7 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
   std::string name;
   for (const auto& [parameter, times] : inside) {
     const double share = static_cast<double>(times) / seeds;
-    if (share < 0.92 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
+    if (share < 0.93 && seeds >= 100) std::printf("%s %.0f %%\n", parameter.c_str(), 100.0 * share);
     if (share < worst) name = parameter;
     worst = std::min(worst, share);
   }
@@ -103,9 +103,10 @@ TEST(Identify, IntervalsHoldTheTruthAsOftenAsTheySay) {
               inside.size(), 100.0 * share, name.c_str(), 100.0 * worst);
   EXPECT_GT(share, 0.90);
   EXPECT_LT(share, 0.995);  // intervals that are too wide are wrong, too
-  // Of 69 exact intervals one is below 90 of 100 by chance (a binomial's 1.2 %), none below 86.
-  if (seeds >= 100) {
-    EXPECT_GE(worst, 0.86) << name;
+  // Of 1,000 seeds an exact interval holds 950, give or take 7: not one may be under 900. (Of 100
+  // seeds one of 69 exact intervals is under 90 by chance alone.)
+  if (seeds >= 1000) {
+    EXPECT_GE(worst, 0.90) << name;
   }
 }
 
@@ -276,6 +277,72 @@ TEST(Identify, RefusesARobotThatStands) {
   }
 }
 
+// A link's mass moves with those that it carries: only sums with them are in any torque.
+TEST(Identify, SaysWhatNoLogCanShowByItself) {
+  const Arm panda = arm("panda");
+  const Recording recording =
+      synthetic_recording(panda.tree, wide_series(panda, 3), panda_reality(), 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  std::size_t sums = 0;
+  for (const LinkResult& link : result->links) {
+    if (!link.changed) continue;
+    EXPECT_NE(link.mass_seen, Seen::kAlone) << link.name;
+    EXPECT_NE(link.inertia_seen, Seen::kAlone) << link.name;
+    sums += link.inertia_seen == Seen::kInSums ? 1 : 0;
+    for (const std::string& name : link.base_parameters) {
+      const auto base = std::ranges::find(result->base, name, &BaseParameter::name);
+      ASSERT_NE(base, result->base.end()) << name;
+      EXPECT_TRUE(std::ranges::any_of(base->terms, [&](const auto& term) {
+        return term.first.starts_with(link.name + ".");
+      })) << name;
+    }
+  }
+  EXPECT_GE(sums, 6U);
+}
+
+// The first joint's rotor is one sum with the inertia that it turns: where it does not move, it is
+// as described, and that is said.
+TEST(Identify, SaysWhichRotorsAreAssumed) {
+  const Arm panda = arm("panda");
+  const Recording recording =
+      synthetic_recording(panda.tree, reduced(panda, 0.0, 1), panda_reality(), 1);
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  const auto note = std::ranges::find_if(result->remarks, [](const std::string& one) {
+    return one.find("rotors: their inertia is assumed") != std::string::npos;
+  });
+  ASSERT_NE(note, result->remarks.end());
+  for (const JointResult& joint : result->joints) {
+    EXPECT_EQ(note->find(joint.name) != std::string::npos, !joint.rotor_inertia_kg_m2.identifiable)
+        << joint.name;
+  }
+  EXPECT_NE(note->find("panda_joint5"), std::string::npos);
+}
+
+// The same log, of a simulation and of something else: as far as the hold of a voltage goes, only
+// the rotors are doubted more, and no value changes.
+TEST(Identify, DoubtsRotorsWhereTheHoldOfAVoltageIsNotKnown) {
+  const Arm panda = arm("panda");
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), panda_reality(), 1);
+  const auto known = identify({recording}, panda.robot, panda.tree);
+  recording.voltage_hold_known = false;
+  const auto unknown = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(known && unknown);
+  for (std::size_t i = 0; i < known->base.size(); ++i) {
+    const BaseParameter& a = known->base[i];
+    const BaseParameter& b = unknown->base[i];
+    double doubt = 0.0;  // 0.75 ms of 165 or 26 Nms/rad
+    for (const auto& [term, factor] : a.terms)
+      if (term.ends_with("rotor_inertia_kg_m2"))
+        doubt = 0.75e-3 * std::abs(factor) * (term[11] < '5' ? 165.0 : 26.0);
+    EXPECT_NEAR(b.estimate.value, a.estimate.value, 1e-2 * a.estimate.ci95 + 1e-3 * doubt)
+        << a.name;
+    EXPECT_NEAR(b.estimate.ci95, std::hypot(a.estimate.ci95, 1.02 * doubt), 0.03 * b.estimate.ci95)
+        << a.name;
+  }
+}
+
 TEST(Identify, SaysWhichJointsDoNotMove) {
   const Arm panda = arm("panda");
   const Recording recording =
@@ -302,6 +369,118 @@ TEST(Identify, RefusesALogThatIsTooShort) {
   const auto result = identify({recording}, panda.robot, panda.tree);
   ASSERT_FALSE(result);
   EXPECT_NE(result.error().message.find("too short to identify anything"), std::string::npos);
+}
+
+/// Two parameters, 1 and 2, in `channels` equations an instant; the first column is measured with
+/// noise, and all channels have a part of their error in common.
+struct Plain {
+  Equations equations;
+  Prior prior{Eigen::VectorXd::Zero(2), 1e-4 * Eigen::MatrixXd::Identity(2, 2)};
+  BaseParameters base{{0, 1}, Eigen::MatrixXd::Identity(2, 2)};
+
+  Plain(int channels, double column_noise, double common, std::uint64_t seed) {
+    constexpr std::size_t kInstants = 500;
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    equations.columns = 2;
+    equations.first_of_log = {0};
+    equations.channels.resize(static_cast<std::size_t>(channels));
+    equations.sensor_noise.resize(equations.channels.size());
+    for (std::size_t i = 0; i < kInstants; ++i) {
+      const double shared = common * normal(random);
+      const Eigen::Vector2d true_x(normal(random), normal(random));
+      for (std::size_t c = 0; c < equations.channels.size(); ++c) {
+        const double y = true_x.dot(Eigen::Vector2d(1.0, 2.0)) + shared + 0.1 * normal(random);
+        const Eigen::Vector2d x = true_x + Eigen::Vector2d(column_noise * normal(random), 0.0);
+        equations.channels[c].append(x, y, y, i);
+        equations.sensor_noise[c].append(Eigen::Vector2d(column_noise, 0.0), 0.0, 0.0, i);
+      }
+      equations.time_s.push_back(0.05 * static_cast<double>(i));
+    }
+  }
+  [[nodiscard]] DataEstimate estimate() const {
+    return estimate_from_data(equations, std::vector<bool>(equations.time_s.size(), true), prior,
+                              base);
+  }
+};
+
+double interval(const DataEstimate& data, Eigen::Index k) {
+  return data.quantile * std::sqrt(data.covariance(k, k));
+}
+
+// Noise of 0.7 in a column of 1 makes its parameter 1 / (1 + 0.49) of what it is.
+TEST(EstimateFromData, TakesAwayWhatNoiseInTheColumnsDoes) {
+  int inside = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    Plain plain(2, 0.7, 0.0, seed);
+    const DataEstimate data = plain.estimate();
+    inside += std::abs(data.mean[0] - 1.0) <= interval(data, 0) ? 1 : 0;
+    if (seed > 3) continue;
+    EXPECT_NEAR(data.mean[0], 1.0, 0.15);
+    plain.equations.sensor_noise.clear();
+    EXPECT_NEAR(plain.estimate().mean[0], 0.67, 0.1) << "what nobody tells of";
+  }
+  EXPECT_GE(inside, 88);
+  EXPECT_LT(inside, 100);
+}
+
+// The weight of every channel for itself takes a common error for 20 independent ones: intervals
+// that are sqrt(20) too narrow held 37 of 100.
+TEST(EstimateFromData, CountsAnErrorThatChannelsHaveInCommonOnce) {
+  int inside = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const DataEstimate data = Plain(20, 0.0, 1.0, seed).estimate();
+    inside += std::abs(data.mean[1] - 2.0) <= interval(data, 1) ? 1 : 0;
+  }
+  EXPECT_GE(inside, 88);
+}
+
+// Of noise alone there is no information, whatever the sums say.
+TEST(EstimateFromData, SaysNothingOfAColumnThatIsNoise) {
+  Plain plain(2, 0.0, 0.0, 1);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (ChannelRows& channel : plain.equations.channels)
+    for (Eigen::Index i = 0; i < channel.rows(); ++i) channel.X(i, 0) = normal(random);
+  for (ChannelRows& channel : plain.equations.sensor_noise)
+    for (Eigen::Index i = 0; i < channel.rows(); ++i) channel.X(i, 0) = 1.0;
+  const DataEstimate data = plain.estimate();
+  EXPECT_GT(interval(data, 0), 1.0);
+  EXPECT_TRUE(data.mean.allFinite());
+  EXPECT_LE(std::abs(data.mean[1] - 2.0), interval(data, 1));
+}
+
+// What the rows of sensor_noise say is what noise of the IMU adds to the equations' squares.
+TEST(AddEquations, KnowWhatTheNoiseOfTheImuAdds) {
+  const Arm coman = stiff_coman();
+  const auto squares = [&](const Recording& recording, double& noise) {
+    auto robot = make_identified_robot(coman.tree, coman.robot);
+    Equations equations;
+    EXPECT_TRUE(add_equations(recording, 10.0, *robot, equations));
+    double sum = 0.0;
+    for (std::size_t c = 0; c < equations.channels.size(); ++c) {
+      const ChannelRows& rows = equations.channels[c];
+      const ChannelRows& added = equations.sensor_noise[c];
+      sum += rows.X.topRows(rows.rows()).squaredNorm();
+      noise += added.X.topRows(added.rows()).squaredNorm();
+    }
+    return sum;
+  };
+  Recording recording = carried_by_feet(coman, 1.0);
+  double none = 0.0, said = 0.0;
+  const double clean = squares(recording, none);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  std::size_t channel = 0;
+  for (const hal::SensorConfig& sensor : coman.robot.sensors) {
+    for (std::size_t i = 4; sensor.type == hal::SensorType::kImu && i < 7; ++i)
+      for (double& one : recording.sensor[channel + i]) one += 0.05 * normal(random);
+    channel += sensor.channels();
+  }
+  const double noisy = squares(recording, said);
+  EXPECT_LT(none, 1e-6 * clean);
+  EXPECT_GT(noisy - clean, 1e-3 * clean);
+  EXPECT_NEAR(said, noisy - clean, 0.3 * (noisy - clean));
 }
 
 TEST(LongRunVariance, OfAMovingAverageIsThatOfItsMean) {

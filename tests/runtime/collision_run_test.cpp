@@ -56,5 +56,49 @@ TEST_P(Collision, IsFoundSoonAndNotWithoutOne) {
   }
 }
 
+// Up along the leg: no joint feels half of its threshold, and the base feels all of it.
+TEST(Collision, ThatNoJointFeelsIsFoundAtTheBase) {
+  estimation::EstimationConfig config = observer_of("coman");
+  config.collision.emplace();
+  for (const auto& [joint, torque_Nm] : {std::pair{"LHipYaw", 0.9}, {"LHipSag", 2.0}})
+    config.collision->thresholds.push_back({joint, torque_Nm});
+  for (const char* channel : estimation::kBaseChannels)
+    config.collision->thresholds.push_back({channel, 12.0});
+  EstimatedRun run("coman", "squat", {.estimation = config});
+  const sim::Fault push =
+      push_on(run.experiment->robot, "LHipYaw", {-9.0, 2.0, 49.0}, 3.0, 0.2, {0.0, 0.0, -0.1});
+  ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
+  while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
+  }
+  ASSERT_TRUE(run.cycle->faults().empty()) << run.cycle->faults()[0].text;
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(run.cycle->step());
+  EXPECT_EQ(run.estimate().base_collided()[0], 1);
+  for (const std::uint8_t joint : run.estimate().collided()) EXPECT_EQ(joint, 0);
+  ASSERT_FALSE(run.cycle->faults().empty());
+  EXPECT_EQ(run.cycle->faults()[0].joint, "base");
+  EXPECT_NE(run.cycle->faults()[0].text.find("N (base_force_"), std::string::npos)
+      << run.cycle->faults()[0].text;
+  for (int i = 0; i < 200; ++i) ASSERT_TRUE(run.cycle->step());
+  EXPECT_EQ(run.estimate().base_collided()[0], 0) << "the push is over";
+}
+
+// The wrench on the base is the force, in its frame, whatever is pushed.
+TEST(Push, OnAHumanoidIsTheBasesExternalForce) {
+  EstimatedRun run("coman", "squat", {.noise = false, .estimation = observer_of("coman")});
+  const std::array<double, 3> force_N{20.0, -15.0, 30.0};
+  ASSERT_EQ(run.backend->robot().inject(
+                push_on(run.experiment->robot, "LShLat", force_N, 3.0, 0.5, {0.0, 0.0, -0.1})),
+            Code::kOk);
+  while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
+  }
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 400; ++i) {
+    ASSERT_TRUE(run.cycle->step());
+    const auto wrench = run.estimate().external_base_wrench();
+    if (i >= 200) mean += Eigen::Vector3d(wrench[0], wrench[1], wrench[2]) / 200.0;
+  }
+  EXPECT_NEAR((mean - Eigen::Vector3d(force_N.data())).norm(), 0.0, 6.0) << mean.transpose();
+}
+
 }  // namespace
 }  // namespace tandem::runtime

@@ -49,7 +49,16 @@ inline estimation::EstimationConfig observer_of(const std::string& robot) {
   return config;
 }
 
-/// Calls `see(external torques)` in each cycle of a run that touches nothing.
+/// What a threshold is learned for: of each joint, and of a floating base.
+inline std::vector<double> felt(const EstimatedRun& run) {
+  const auto joints = run.estimate().external_torque_Nm();
+  const auto base = run.estimate().external_base_wrench();
+  std::vector<double> all(joints.begin(), joints.end());
+  all.insert(all.end(), base.begin(), base.end());
+  return all;
+}
+
+/// Calls `see(felt)` in each cycle of a run that touches nothing.
 template <typename See>
 void free_motion(const Subject& s, std::uint64_t seed, See&& see) {
   EstimatedRun run(s.robot, s.experiment, {.seed = seed, .estimation = observer_of(s.robot)});
@@ -57,8 +66,7 @@ void free_motion(const Subject& s, std::uint64_t seed, See&& see) {
   const double begin = run.time_s();
   while (run.time_s() < begin + s.from_s && run.cycle->step()) {
   }
-  while (run.time_s() < begin + s.free_s && run.cycle->step())
-    see(run.estimate().external_torque_Nm());
+  while (run.time_s() < begin + s.free_s && run.cycle->step()) see(felt(run));
   EXPECT_TRUE(run.cycle->faults().empty());
 }
 
@@ -85,7 +93,7 @@ inline std::vector<double> learned(const Subject& s, const std::vector<std::uint
   return thresholds;
 }
 
-/// Calls `see(external torques)` in each of the 200 cycles of a push at a place, in a seeded
+/// Calls `see(felt)` in each of the 200 cycles of a push at a place, in a seeded
 /// direction and at a seeded time of the motion.
 template <typename See>
 void pushed(const Subject& s, std::size_t place, double force_N, std::uint64_t seed, See&& see) {
@@ -101,8 +109,8 @@ void pushed(const Subject& s, std::size_t place, double force_N, std::uint64_t s
   ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
   while (run.cycle->step() && run.backend->robot().faults()[0].active == 0) {
   }
-  see(run.estimate().external_torque_Nm());
-  for (int i = 1; i < 200 && run.cycle->step(); ++i) see(run.estimate().external_torque_Nm());
+  see(felt(run));
+  for (int i = 1; i < 200 && run.cycle->step(); ++i) see(felt(run));
 }
 
 }  // namespace tandem::runtime

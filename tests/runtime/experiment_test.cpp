@@ -298,6 +298,7 @@ TEST(Experiment, RefusesWhatCannotBeEstimated) {
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbw = 1}", "did you mean 'elbow'?"))
       << "the robot's joints are known, not those that the table has";
   EXPECT_TRUE(has("[estimation.collision]\nreaction = 'warn'", "threshold_Nm"));
+  EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {base_force_x = 9}", "does not float"));
   EXPECT_TRUE(has("[estimation.collision]\nthreshold_Nm = {elbow = -1}", "elbow"));
   auto sited = robot();
   sited.model.sites.push_back({});

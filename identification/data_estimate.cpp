@@ -1,0 +1,289 @@
+// Everything is quadratic in the parameters, so the rows are needed for residuals only.
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "identification/estimate.hpp"
+
+namespace tandem::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kFaint = 1e-2;  // weight of the description where the data decide alone
+// Of a channel's mean square: errors of the model and of timing, which no length of a log averages.
+constexpr double kModelError = 3e-6;
+constexpr double kLeast = 0.1;  // of a residual's mean square: its long-run variance
+constexpr int kReweightings = 4;
+
+/// Rows of one channel that are used, as matrices of their own.
+struct Used {
+  MatrixXd X;
+  VectorXd y;
+  std::vector<std::size_t> instant;
+};
+
+Used used_rows(const ChannelRows& rows, const std::vector<bool>& used, Index columns) {
+  Used out;
+  for (const std::size_t at : rows.instant)
+    if (used[at]) out.instant.push_back(at);
+  out.X.resize(static_cast<Index>(out.instant.size()), columns);
+  out.y.resize(static_cast<Index>(out.instant.size()));
+  Index to = 0;
+  for (Index row = 0; row < rows.rows(); ++row) {
+    if (!used[rows.instant[static_cast<std::size_t>(row)]]) continue;
+    out.X.row(to) = rows.X.row(row);
+    out.y[to++] = rows.y[row];
+  }
+  return out;
+}
+
+/// X^T X and X^T y of the columns that a channel has anything in.
+struct Normal {
+  MatrixXd gram;
+  VectorXd target;
+};
+
+Normal normal_of(const Used& rows) {
+  Normal normal{MatrixXd::Zero(rows.X.cols(), rows.X.cols()), VectorXd::Zero(rows.X.cols())};
+  if (rows.y.size() == 0) return normal;  // no log has this channel
+  normal.gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.X.transpose());
+  normal.gram = MatrixXd(normal.gram.selfadjointView<Eigen::Lower>());
+  normal.target = rows.X.transpose() * rows.y;
+  return normal;
+}
+
+/// The weighted least squares of all channels, and what its result varies by.
+class LeastSquares {
+ public:
+  LeastSquares(const Equations& equations, const std::vector<bool>& used, const Prior& prior)
+      : equations_(equations), prior_(prior), unit_(prior.metric), columns_(equations.columns) {
+    double total = 0.0;
+    for (const ChannelRows& channel : equations.channels) {
+      rows_.push_back(used_rows(channel, used, columns_));
+      normals_.push_back(normal_of(rows_.back()));
+      const auto n = static_cast<double>(std::max<Index>(1, rows_.back().y.size()));
+      total += n;
+      noise_.push_back(std::max(1e-4 * rows_.back().y.squaredNorm() / n, 1e-12));
+      free_.push_back(n);
+    }
+    const double mean = total / static_cast<double>(std::max<std::size_t>(1, rows_.size()));
+    lags_ = lags_of(mean);
+    quantile_ = quantile95(mean, lags_);
+    for (const ChannelRows& channel : equations.sensor_noise)
+      added_.push_back(used_rows(channel, used, columns_));
+  }
+
+  [[nodiscard]] double quantile() const { return quantile_; }
+
+  /// In units of the prior everything is of the order of one.
+  [[nodiscard]] MatrixXd scaled(const MatrixXd& A) const {
+    const MatrixXd half = unit_.matrixL().solve(A);
+    return unit_.matrixL().solve(half.transpose());
+  }
+  [[nodiscard]] MatrixXd in_units(const MatrixXd& A) const {
+    const MatrixXd half = unit_.matrixU().solve(A);
+    return unit_.matrixU().solve(half.transpose());
+  }
+  /// The inverse of scaled information, the description believed by `weight`.
+  [[nodiscard]] MatrixXd covariance(const MatrixXd& information, double weight) const {
+    MatrixXd A = scaled(information);
+    A.diagonal().array() += weight;
+    return in_units(A.ldlt().solve(MatrixXd::Identity(columns_, columns_)));
+  }
+
+  /// The parameters by information and target, the description believed by kFaint.
+  [[nodiscard]] VectorXd solved(const MatrixXd& information, const VectorXd& target) const {
+    MatrixXd A = scaled(information);
+    A.diagonal().array() += kFaint;
+    const VectorXd right = unit_.matrixL().solve(target - information * prior_.mean);
+    return prior_.mean + unit_.matrixU().solve(A.ldlt().solve(right));
+  }
+
+  /// Sums over the channels, each over its noise.
+  [[nodiscard]] Normal sums() const {
+    Normal sum{MatrixXd::Zero(columns_, columns_), VectorXd::Zero(columns_)};
+    for (std::size_t c = 0; c < rows_.size(); ++c) {
+      sum.gram += normals_[c].gram / noise_[c];
+      sum.target += normals_[c].target / noise_[c];
+    }
+    return sum;
+  }
+
+  /// Noise and freedom of every channel from its residuals.
+  void weigh(const MatrixXd& information, const VectorXd& mean) {
+    MatrixXd A = scaled(information);
+    A.diagonal().array() += kFaint;
+    const MatrixXd inverse = in_units(A.ldlt().solve(MatrixXd::Identity(columns_, columns_)));
+    for (std::size_t c = 0; c < rows_.size(); ++c) {
+      if (rows_[c].y.size() == 0) continue;
+      const VectorXd residual = rows_[c].y - rows_[c].X * mean;
+      const auto n = static_cast<double>(rows_[c].y.size());
+      // A channel's share of the freedom that the fit has used up: of slow errors, which count up
+      // to lags + 1 times in the long-run variance.
+      const double spent = inverse.cwiseProduct(normals_[c].gram).sum() / noise_[c];
+      free_[c] = std::max(0.2 * n, n - 0.5 * (lags_ + 1.0) * spent);
+      noise_[c] =
+          model_error(c) + long_run_variance(residual, rows_[c].instant, lags_) * n / free_[c];
+    }
+  }
+
+  /// Without what the sensors' noise adds: noise in X makes information of nothing, and parameters
+  /// too small (errors in variables). Its mean is known, and taken away.
+  [[nodiscard]] Normal without_noise(const Normal& sum) const {
+    Normal less = sum;
+    for (std::size_t c = 0; c < added_.size(); ++c) {
+      if (added_[c].y.size() == 0) continue;
+      const MatrixXd half = added_[c].X / std::sqrt(noise_[c]);
+      less.gram -= half.transpose() * half;
+      less.target -= added_[c].X.transpose() * added_[c].y / noise_[c];
+    }
+    return less;
+  }
+
+  /// Covariance of the right side: one sensor's noise is in many channels at an instant, and a
+  /// channel's may be another one in every log. The long-run covariance of the channels' residuals
+  /// in each log says how they go together.
+  [[nodiscard]] MatrixXd scores(const VectorXd& mean) const {
+    MatrixXd sum = MatrixXd::Zero(columns_, columns_);
+    const std::size_t logs = equations_.first_of_log.size();
+    for (std::size_t l = 0; l < logs; ++l) {
+      const std::size_t begin = equations_.first_of_log[l];
+      const std::size_t end =
+          l + 1 < logs ? equations_.first_of_log[l + 1] : equations_.time_s.size();
+      const MatrixXd half = weighted_half(mean, begin, end);
+      MatrixXd Z(static_cast<Index>(end - begin), columns_);
+      for (Index k = 0; k < half.cols(); ++k) {
+        if (half.col(k).isZero(0.0)) continue;
+        Z.setZero();
+        for (std::size_t c = 0; c < rows_.size(); ++c) {
+          const double factor = half(static_cast<Index>(c), k);
+          for (std::size_t i = 0; factor != 0.0 && i < rows_[c].instant.size(); ++i) {
+            const std::size_t at = rows_[c].instant[i];
+            if (at < begin || at >= end) continue;
+            Z.row(static_cast<Index>(at - begin)) += factor * rows_[c].X.row(static_cast<Index>(i));
+          }
+        }
+        sum.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
+      }
+    }
+    return sum.selfadjointView<Eigen::Lower>();
+  }
+
+ private:
+  [[nodiscard]] double model_error(std::size_t c) const {
+    const auto n = static_cast<double>(std::max<Index>(1, rows_[c].y.size()));
+    return kModelError * rows_[c].y.squaredNorm() / n + 1e-14;
+  }
+
+  /// H with H H^T = W S W: S of the residuals at instants `begin` to `end`, W their weights.
+  [[nodiscard]] MatrixXd weighted_half(const VectorXd& mean, std::size_t begin,
+                                       std::size_t end) const {
+    const auto channels = static_cast<Index>(rows_.size());
+    MatrixXd R = MatrixXd::Zero(static_cast<Index>(end - begin), channels);
+    VectorXd count = VectorXd::Zero(channels);
+    for (std::size_t c = 0; c < rows_.size(); ++c) {
+      if (rows_[c].y.size() == 0) continue;
+      const VectorXd residual = rows_[c].y - rows_[c].X * mean;
+      for (std::size_t i = 0; i < rows_[c].instant.size(); ++i) {
+        const std::size_t at = rows_[c].instant[i];
+        if (at < begin || at >= end) continue;
+        R(static_cast<Index>(at - begin), static_cast<Index>(c)) = residual[static_cast<Index>(i)];
+        count[static_cast<Index>(c)] += 1.0;
+      }
+    }
+    MatrixXd S = long_run_covariance(R, lags_);
+    VectorXd weight = VectorXd::Zero(channels);
+    for (Index c = 0; c < channels; ++c) {
+      if (count[c] == 0.0) continue;
+      const auto k = static_cast<std::size_t>(c);
+      const double inflated = static_cast<double>(rows_[k].y.size()) / free_[k];
+      weight[c] = std::sqrt(inflated / count[c]) / noise_[k];
+      S(c, c) = std::max(S(c, c), kLeast * R.col(c).squaredNorm());
+      S(c, c) += model_error(k) * count[c] / inflated;
+    }
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(weight.asDiagonal() * S *
+                                                         weight.asDiagonal());
+    return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
+
+  const Equations& equations_;
+  const Prior& prior_;
+  Eigen::LLT<MatrixXd> unit_;
+  Index columns_;
+  std::vector<Used> rows_, added_;
+  std::vector<Normal> normals_;
+  std::vector<double> noise_, free_;
+  int lags_ = 0;
+  double quantile_ = 0.0;
+};
+
+/// Adds the rotors' doubt to the covariance that `information` is the inverse of.
+void doubt_rotors(const Equations& equations, MatrixXd& information, VectorXd& target) {
+  std::vector<Index> rotors;
+  std::vector<double> precision;
+  const auto joints = static_cast<Index>(equations.rotor_doubt_kg_m2.size());
+  for (Index c = 0; c < joints; ++c) {
+    const double doubt = equations.rotor_doubt_kg_m2[static_cast<std::size_t>(c)];
+    if (!(doubt > 0.0)) continue;
+    rotors.push_back(equations.columns + kJointColumns * (c - joints) +
+                     static_cast<Index>(JointColumn::kRotor));
+    precision.push_back(1.0 / (doubt * doubt));
+  }
+  if (rotors.empty()) return;
+  MatrixXd inner = information(rotors, rotors);
+  for (std::size_t i = 0; i < rotors.size(); ++i)
+    inner(static_cast<Index>(i), static_cast<Index>(i)) += precision[i];
+  const MatrixXd cross = information(Eigen::all, rotors);
+  const Eigen::LLT<MatrixXd> solver(inner);
+  target -= cross * solver.solve(VectorXd(target(rotors)));
+  information -= cross * solver.solve(MatrixXd(cross.transpose()));
+}
+
+}  // namespace
+
+MatrixXd long_run_covariance(const MatrixXd& residuals, int lags) {
+  const Index n = residuals.rows();
+  MatrixXd sum = residuals.transpose() * residuals;
+  for (Index lag = 1; lag <= std::min<Index>(lags, n - 1); ++lag) {
+    const MatrixXd product = residuals.bottomRows(n - lag).transpose() * residuals.topRows(n - lag);
+    const double weight = 1.0 - static_cast<double>(lag) / (static_cast<double>(lags) + 1.0);
+    sum += weight * (product + product.transpose());
+  }
+  return sum;
+}
+
+DataEstimate estimate_from_data(const Equations& equations, const std::vector<bool>& used,
+                                const Prior& prior, const BaseParameters& base) {
+  LeastSquares squares(equations, used, prior);
+  DataEstimate out;
+  out.quantile = squares.quantile();
+  Normal sum = squares.sums();
+  for (int round = 1; round < kReweightings; ++round) {
+    squares.weigh(sum.gram, squares.solved(sum.gram, sum.target));
+    sum = squares.sums();
+  }
+  // A p = b without the noise in A; b varies by B. That is information A B^-1 A, and A may even be
+  // indefinite where noise is all there is.
+  const Normal less = squares.without_noise(sum);
+  const VectorXd mean = squares.solved(less.gram, less.target);
+  const Eigen::LLT<MatrixXd> spread(squares.scores(mean) + kFaint * prior.metric);
+  out.information = less.gram * spread.solve(less.gram);
+  out.information = 0.5 * (out.information + MatrixXd(out.information.transpose()));
+  out.target = less.gram * spread.solve(less.target);
+  doubt_rotors(equations, out.information, out.target);
+  out.mean = squares.solved(out.information, out.target);
+  out.covariance = squares.covariance(out.information, kFaint);
+  out.link_covariance = squares.covariance(out.information, kBelieved);
+  MatrixXd gram(base.count(), base.count());
+  for (Index i = 0; i < base.count(); ++i)
+    for (Index k = 0; k < base.count(); ++k)
+      gram(i, k) = sum.gram(base.independent[i], base.independent[k]);
+  out.condition = condition_number(gram);
+  return out;
+}
+
+}  // namespace tandem::identification
