@@ -2,12 +2,13 @@
 
 #include <algorithm>
 
+#include "hal/remote/playout.hpp"
+
 namespace tandem::remote {
 namespace {
 
 constexpr std::uint64_t kDriftCycles = 100;       // between two corrections of the numbers by one
-constexpr std::uint64_t kMostLeftOut = 1000;      // numbers, in one cycle of the loop
-constexpr std::uint64_t kMostCatchUp = 20;        // cycles of the twin in one of the loop
+constexpr std::uint64_t kMostTwinCycles = 20;         // cycles of the twin in one of the loop
 constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
 
 }  // namespace
@@ -25,9 +26,17 @@ LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend>
       arrived_(description.shape()),
       sent_(description.shape()),
       twin_command_(description.shape()),
+      twin_goal_(description.shape()),
       prediction_(description.joints.size(),
                   cycles_in(config.playout_ns + 2 * delay_ns + kPast_ns, period_ns),
-                  config.correction_ns, period_ns) {}
+                  config.correction_ns, period_ns) {
+  twin_now_.period_ns = period_ns;
+}
+
+std::string LiveLink::status_text() const {
+  if (twin_failed_) return "the predicted robot failed: " + twin_->status_text();
+  return robot_->status_text();
+}
 
 void LiveLink::exchange(const hal::CycleTime& time) noexcept {
   while (linked_) {
@@ -46,15 +55,15 @@ void LiveLink::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   arrived_.assign(robot_state_);
   arrived_cycle_ = robot_->cycle();
   number_ = arrived_cycle_ - std::min(arrived_cycle_, delay_cycles_);
-  kept_ = number_ - 1;
+  next_kept_ = number_;
   led_ = count_ = 0;
   drift_ = 0;
   (void)robot_->command_in_force(sent_);
   sent_.cycle()[0] = number_;
-  prediction_.start(number_);
+  prediction_.start();
   if (!twin_) return;
   prediction_.assume(robot_state_, twin_state_);
-  if (twin_side_) twin_side_->start(time, twin_state_, twin_command_);
+  if (twin_side_) twin_side_->start(twin_now_, twin_state_, twin_command_);
 }
 
 /// The number of this cycle's command. Once in a while it is brought nearer to the robot's cycle
@@ -68,13 +77,6 @@ void LiveLink::count_on(const hal::CycleTime& time) noexcept TANDEM_RT {
   if (++count_ < kDriftCycles) return;
   if (led_ > 0) drift_ = least_lead_ > 0 ? -1 : (least_lead_ < 0 ? 1 : 0);
   led_ = count_ = 0;
-}
-
-/// Of numbers that were left out, too: the robot interpolates.
-void LiveLink::keep_twin() noexcept TANDEM_RT {
-  if (!twin_) return;
-  if (kept_ + kMostLeftOut < number_) kept_ = number_ - kMostLeftOut;
-  while (kept_ < number_) prediction_.keep(++kept_, twin_state_);
 }
 
 /// What came over the real link crosses the declared network; what has, is taken, the newest last.
@@ -92,7 +94,7 @@ void LiveLink::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
-      prediction_.correct(arrived_, head.source, number_, head.cycle - arrived_cycle_);
+      prediction_.correct(arrived_, head.source, head.cycle - arrived_cycle_);
     }
     const auto lead = static_cast<std::int64_t>(number_ - head.cycle);
     least_lead_ = led_ == 0 ? lead : std::min(least_lead_, lead);
@@ -107,8 +109,11 @@ Code LiveLink::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   Code code = robot_->read(time, robot_state_);
   if (code == Code::kTimeout) code = Code::kOk;  // no state came since the last cycle
   if (twin_) {
-    const Code twin = twin_->read(time, twin_state_);
-    if (code == Code::kOk) code = twin;
+    const Code twin = read_twin();
+    if (code == Code::kOk && twin != Code::kOk) {
+      code = twin;
+      twin_failed_ = twin_failed_ || !ended_;
+    }
   }
   if (linked_) {
     count_on(time);
@@ -120,7 +125,7 @@ Code LiveLink::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
     state.assign(robot_state_);
     return code;
   }
-  keep_twin();
+  while (twin_ && next_kept_ + late_ <= number_) prediction_.keep(next_kept_++, twin_state_);
   carry_state(time);
   state.assign(twin_ ? twin_state_ : arrived_);
   if (twin_) prediction_.show(arrived_, state);
@@ -129,17 +134,35 @@ Code LiveLink::read(const hal::CycleTime& time, hal::StateImage& state) noexcept
   return code;
 }
 
-/// Cycles that the loop left out are the twin's as well.
-void LiveLink::move_twin(const hal::CommandImage& command,
+/// Its boards would take a gap in the loop's time for a silent master.
+Code LiveLink::read_twin() noexcept TANDEM_RT {
+  const Code code = twin_->read(twin_now_, twin_state_);
+  ++twin_now_.cycle;
+  twin_now_.time_ns += twin_now_.period_ns;
+  return code;
+}
+
+void LiveLink::lead_twin(const hal::CommandImage& command,
                          const hal::ParameterImage& parameters) noexcept TANDEM_RT {
   twin_command_.assign(command);
-  if (linked_ && twin_side_) (void)twin_side_->update(now_, twin_state_, twin_command_);
-  for (std::uint64_t i = 0; i < std::min(late_, kMostCatchUp); ++i) {
-    (void)twin_->write(twin_command_, parameters);
-    (void)twin_->read(now_, twin_state_);
-  }
-  late_ = 0;
+  if (linked_ && twin_side_) (void)twin_side_->update(twin_now_, twin_state_, twin_command_);
   (void)twin_->write(twin_command_, parameters);
+}
+
+/// Cycles that the loop left out are the twin's as well: it is led to the command as the robot is,
+/// which interpolates. Of a long gap it goes through the beginning alone.
+void LiveLink::move_twin(const hal::CommandImage& command,
+                         const hal::ParameterImage& parameters) noexcept TANDEM_RT {
+  for (std::uint64_t left = late_; left > 0 && late_ - left < kMostTwinCycles; --left) {
+    move_towards(twin_goal_, command, 1.0 / static_cast<double>(left + 1));
+    lead_twin(twin_goal_, parameters);
+    (void)read_twin();
+    prediction_.keep(next_kept_++, twin_state_);
+  }
+  if (late_ > 0) next_kept_ = number_ + 1;
+  late_ = 0;
+  twin_goal_.assign(command);
+  lead_twin(twin_goal_, parameters);
 }
 
 Code LiveLink::write(const hal::CommandImage& command,
@@ -157,6 +180,11 @@ Code LiveLink::write(const hal::CommandImage& command,
 
 void LiveLink::last_command(const hal::CommandImage& command) noexcept TANDEM_RT {
   robot_->last_command(linked_ ? sent_ : command);
+}
+
+void LiveLink::reset() noexcept TANDEM_RT {
+  twin_failed_ = false;
+  OperatorEnd::reset();
 }
 
 TeleFigures LiveLink::figures() const noexcept {

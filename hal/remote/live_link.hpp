@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "hal/remote/image_network.hpp"
@@ -24,6 +25,9 @@ namespace tandem::remote {
 /// - The two clocks differ. The numbers follow the robot's clock: at most once in 100 cycles one is
 ///   left out, for which the robot interpolates, or given twice, of which the robot takes the
 ///   first.
+/// - The loop may be late by as long as play-out and lease bear: the numbers go on with the clock,
+///   the robot interpolates or holds, and the twin makes the cycles up. The twin has a clock of its
+///   own, without gaps.
 /// - The declared networks lie before the real link. Bring-up, stops, resets, gains and shut-down
 ///   cross the real link alone.
 class LiveLink final : public OperatorEnd {
@@ -36,6 +40,7 @@ class LiveLink final : public OperatorEnd {
   LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot, End twin,
            const TeleConfig& config, std::int64_t delay_ns, std::int64_t period_ns);
 
+  [[nodiscard]] std::string status_text() const override;
   /// Sends what has crossed the declared network.
   void exchange(const hal::CycleTime& time) noexcept override;
   [[nodiscard]] Code read(const hal::CycleTime& time,
@@ -43,6 +48,7 @@ class LiveLink final : public OperatorEnd {
   [[nodiscard]] Code write(const hal::CommandImage& command,
                            const hal::ParameterImage& parameters) noexcept TANDEM_RT override;
   void last_command(const hal::CommandImage& command) noexcept TANDEM_RT override;
+  void reset() noexcept TANDEM_RT override;
   [[nodiscard]] bool archive(Archive& /*ar*/) override { return false; }
 
   [[nodiscard]] TeleFigures figures() const noexcept override;
@@ -50,7 +56,9 @@ class LiveLink final : public OperatorEnd {
  private:
   void begin_link(const hal::CycleTime& time) noexcept TANDEM_RT;
   void count_on(const hal::CycleTime& time) noexcept TANDEM_RT;
-  void keep_twin() noexcept TANDEM_RT;
+  [[nodiscard]] Code read_twin() noexcept TANDEM_RT;
+  void lead_twin(const hal::CommandImage& command,
+                 const hal::ParameterImage& parameters) noexcept TANDEM_RT;
   void carry_state(const hal::CycleTime& time) noexcept TANDEM_RT;
   void move_twin(const hal::CommandImage& command,
                  const hal::ParameterImage& parameters) noexcept TANDEM_RT;
@@ -60,12 +68,13 @@ class LiveLink final : public OperatorEnd {
   std::uint64_t delay_cycles_;
   ImageNetwork up_, down_;
   hal::StateImage robot_state_, twin_state_, arrived_;
-  hal::CommandImage sent_, twin_command_;
+  hal::CommandImage sent_, twin_command_, twin_goal_;
   Prediction prediction_;
-  hal::CycleTime now_;
+  bool twin_failed_ = false;  // and not the robot
+  hal::CycleTime now_, twin_now_;
   std::int64_t linked_ns_ = 0;
   std::uint64_t number_ = 0;           // of the next command
-  std::uint64_t kept_ = 0;             // the newest number whose twin is kept
+  std::uint64_t next_kept_ = 0;        // the first number whose twin is not kept
   std::uint64_t late_ = 0;             // cycles that the loop left out before this one
   std::int64_t least_lead_ = 0;        // of the numbers before the robot's cycles, lately
   std::uint64_t led_ = 0, count_ = 0;  // states and cycles, lately

@@ -15,6 +15,16 @@ double min_jerk(double s) noexcept { return s * s * s * (10.0 + s * (6.0 * s - 1
 
 }  // namespace
 
+void move_towards(hal::CommandImage& command, const hal::CommandImage& goal,
+                  double share) noexcept TANDEM_RT {
+  const auto move = [share](std::span<double> values, std::span<const double> to) {
+    for (std::size_t j = 0; j < values.size(); ++j) values[j] += share * (to[j] - values[j]);
+  };
+  move(command.position_rad(), goal.position_rad());
+  move(command.velocity_rad_s(), goal.velocity_rad_s());
+  move(command.torque_Nm(), goal.torque_Nm());
+}
+
 Playout::Playout(const hal::Robot& robot, std::uint64_t delay_cycles, std::uint64_t brake_cycles,
                  std::int64_t period_ns)
     : delay_(delay_cycles),
@@ -50,15 +60,8 @@ void Playout::take(std::uint64_t cycle, const hal::CommandImage& command) noexce
 /// Fills the place of `wanted`, whose command is missing, from those before and after it.
 void Playout::bridge(std::uint64_t wanted, std::uint64_t next) noexcept TANDEM_RT {
   hal::CommandImage& out = buffer_[wanted % buffer_.size()];
-  const hal::CommandImage& to = at(next);
   out.assign(at(wanted - 1));
-  const double share = 1.0 / static_cast<double>(next - wanted + 1);  // from the cycle before
-  const auto between = [share](std::span<double> values, std::span<const double> goal) {
-    for (std::size_t j = 0; j < values.size(); ++j) values[j] += share * (goal[j] - values[j]);
-  };
-  between(out.position_rad(), to.position_rad());
-  between(out.velocity_rad_s(), to.velocity_rad_s());
-  between(out.torque_Nm(), to.torque_Nm());
+  move_towards(out, at(next), 1.0 / static_cast<double>(next - wanted + 1));
   given_[wanted % given_.size()] = wanted + 1;
 }
 

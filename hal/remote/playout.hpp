@@ -13,6 +13,11 @@
 
 namespace tandem::remote {
 
+/// Brings the references of `command` nearer to those of `goal`: positions, velocities, torques.
+/// @param share  of the difference that is left
+void move_towards(hal::CommandImage& command, const hal::CommandImage& goal,
+                  double share) noexcept TANDEM_RT;
+
 /// Plays each command a fixed number of cycles after the one that it was given in.
 class Playout {
  public:

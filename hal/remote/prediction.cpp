@@ -11,11 +11,12 @@ Prediction::Prediction(std::size_t joints, std::uint64_t past_commands, std::int
       past_commands_(past_commands),
       correction_ns_(correction_ns),
       period_ns_(period_ns),
+      kept_(past_commands),
       past_(past_commands * 3 * joints),
       correction_(3 * joints) {}
 
-void Prediction::start(std::uint64_t number) noexcept TANDEM_RT {
-  first_ = number;
+void Prediction::start() noexcept TANDEM_RT {
+  std::ranges::fill(kept_, std::uint64_t{0});
   std::ranges::fill(correction_, 0.0);
 }
 
@@ -28,16 +29,17 @@ void Prediction::assume(const hal::StateImage& robot,
 }
 
 void Prediction::keep(std::uint64_t number, const hal::StateImage& twin) noexcept TANDEM_RT {
+  kept_[number % past_commands_] = number + 1;
   double* to = past(number);
   std::ranges::copy(twin.position_rad(), to);
   std::ranges::copy(twin.velocity_rad_s(), to + joints_);
   std::ranges::copy(twin.torque_Nm(), to + 2 * joints_);
 }
 
-void Prediction::correct(const hal::StateImage& arrived, std::uint64_t number, std::uint64_t now,
+void Prediction::correct(const hal::StateImage& arrived, std::uint64_t number,
                          std::uint64_t passed) noexcept TANDEM_RT {
   const std::uint64_t same = number + 1;  // the twin was read after that command
-  if (same < first_ || same > now || now - same >= past_commands_) return;
+  if (kept_[same % past_commands_] != same + 1) return;
   ++compared_;
   const double passed_ns = static_cast<double>(passed) * static_cast<double>(period_ns_);
   const double share =

@@ -23,16 +23,16 @@ class Prediction {
   Prediction(std::size_t joints, std::uint64_t past_commands, std::int64_t correction_ns,
              std::int64_t period_ns);
 
-  /// From the command of this number on; nothing is corrected yet.
-  void start(std::uint64_t number) noexcept TANDEM_RT;
+  /// Nothing is kept, and nothing is corrected yet.
+  void start() noexcept TANDEM_RT;
   /// Positions and torques of the robot are what they are, whatever the twin's.
   void assume(const hal::StateImage& robot, const hal::StateImage& twin) noexcept TANDEM_RT;
   /// The twin's state before it is given the command of this number.
   void keep(std::uint64_t number, const hal::StateImage& twin) noexcept TANDEM_RT;
   /// A state of the robot has come, under the command `number`.
-  /// @param now     the number of the command that the operator gives next
+  /// Nothing happens when the twin's state under it is not kept.
   /// @param passed  cycles of the robot since the state that came before
-  void correct(const hal::StateImage& arrived, std::uint64_t number, std::uint64_t now,
+  void correct(const hal::StateImage& arrived, std::uint64_t number,
                std::uint64_t passed) noexcept TANDEM_RT;
   /// Adds the correction to the twin's positions, velocities and torques in `state`, and shows the
   /// faults and drive states of the state that came last.
@@ -40,7 +40,7 @@ class Prediction {
 
   [[nodiscard]] std::uint64_t compared() const noexcept { return compared_; }
   [[nodiscard]] double worst_rad() const noexcept { return worst_rad_; }
-  void archive(Archive& ar) { ar(compared_, first_, past_, correction_, worst_rad_); }
+  void archive(Archive& ar) { ar(compared_, kept_, past_, correction_, worst_rad_); }
 
  private:
   [[nodiscard]] double* past(std::uint64_t number) noexcept {
@@ -51,9 +51,9 @@ class Prediction {
   std::uint64_t past_commands_;
   std::int64_t correction_ns_, period_ns_;
   std::uint64_t compared_ = 0;
-  std::uint64_t first_ = 0;         // number of the first command
-  std::vector<double> past_;        // the twin's positions, velocities, torques by command
-  std::vector<double> correction_;  // the same, added to the twin
+  std::vector<std::uint64_t> kept_;  // 1 + the number of the command that each place is of
+  std::vector<double> past_;         // the twin's positions, velocities, torques by command
+  std::vector<double> correction_;   // the same, added to the twin
   double worst_rad_ = 0.0;
 };
 

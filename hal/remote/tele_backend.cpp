@@ -45,7 +45,7 @@ void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   arrived_.assign(robot_state_);
   playout_.start(time.cycle, robot_command_);
   limits_.follow(robot_command_);
-  prediction_.start(time.cycle);
+  prediction_.start();
   if (robot_side_) robot_side_->start(time, robot_state_, robot_command_);
   if (twin_ && twin_side_) twin_side_->start(time, twin_state_, twin_command_);
 }
@@ -63,7 +63,7 @@ void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
-      prediction_.correct(arrived_, head.source, time.cycle, head.cycle - arrived_cycle_);
+      prediction_.correct(arrived_, head.source, head.cycle - arrived_cycle_);
     }
     arrived_cycle_ = head.cycle;
     heard_cycle_ = time.cycle;

@@ -27,6 +27,37 @@ ServerConfig robots_end() {
   return config;
 }
 
+/// Fails when its time does not go on by one period at a time, as the boards of a simulated robot
+/// do.
+class StrictTwin final : public runtime::test::FirstOrderRobot {
+ public:
+  using FirstOrderRobot::FirstOrderRobot;
+  Code read(const hal::CycleTime& time, hal::StateImage& state) noexcept override {
+    const bool goes_on = reads_++ == 0 || time.time_ns == last_ns_ + kPeriod_ns;
+    last_ns_ = time.time_ns;
+    const Code code = FirstOrderRobot::read(time, state);
+    return goes_on ? code : Code::kFault;
+  }
+
+ private:
+  std::uint64_t reads_ = 0;
+  std::int64_t last_ns_ = 0;
+};
+
+/// Oversleeps once.
+class PausedClock final : public rt::Clock {
+ public:
+  std::uint64_t paused_sleep = 0;  // 0: none
+  std::int64_t now_ns() noexcept override { return clock_.now_ns(); }
+  void sleep_until(std::int64_t deadline_ns) noexcept override {
+    clock_.sleep_until(deadline_ns + (++sleeps_ == paused_sleep ? 30 * kPeriod_ns : 0));
+  }
+
+ private:
+  rt::WallClock clock_;
+  std::uint64_t sleeps_ = 0;
+};
+
 /// An operator's loop with a sine on joint 0.
 class Operator {
  public:
@@ -45,7 +76,7 @@ class Operator {
     config.playout_ns = 150'000'000;
     config.outages = std::move(outages);
     OperatorEnd::End twin;
-    if (predict) twin.robot = std::make_unique<runtime::test::FirstOrderRobot>(robot);
+    if (predict) twin.robot = std::make_unique<StrictTwin>(robot);
     link = std::make_unique<LiveLink>(hal::robot_of(robot), std::move(*made), std::move(twin),
                                       config, 100'000'000, kPeriod_ns);
     EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
@@ -79,7 +110,7 @@ class Operator {
   runtime::ControllerHost host;
   Record record;
   std::unique_ptr<LiveLink> link;
-  rt::WallClock clock;
+  PausedClock clock;
   std::unique_ptr<RobotCycle> cycle;
 };
 
@@ -104,6 +135,20 @@ TEST(LiveLink, TheOperatorSeesThePredictedRobot) {
   RecordProperty("last_state_rad", std::to_string(errors[1]));
   EXPECT_GT(errors[1], 4.0 * errors[0]);
   EXPECT_GT(errors[1], 0.02) << "the robot moves";
+}
+
+/// The twin makes up what the operator's loop has left out, in a time of its own.
+TEST(LiveLink, APauseOfTheOperatorsProcessEndsNothing) {
+  Served served(robots_end(), real_time());
+  served.begin();
+  Operator one(true, 1200);
+  one.clock.paused_sleep = 700;
+  one.cycle->run();
+  served.end();
+  EXPECT_GE(one.cycle->loop().skipped, 20U);
+  for (const runtime::Fault& fault : one.cycle->faults()) ADD_FAILURE() << fault.text;
+  for (const runtime::Fault& fault : served.cycle->faults()) ADD_FAILURE() << fault.text;
+  EXPECT_LT(one.link->figures().worst_prediction_rad, 0.05);
 }
 
 /// Half a percent is a hundred times what quartz has.
