@@ -45,6 +45,8 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::kHomingRequested: return "homing requested";
     case EventKind::kHomed: return "homed";
     case EventKind::kHomingFailed: return "homing failed";
+    case EventKind::kLinkLost: return "link lost";
+    case EventKind::kLinkBack: return "link back";
   }
   return "?";
 }
@@ -99,6 +101,8 @@ std::string text_of(const Event& event, bool has_joint) {
     case EventKind::kBringUpFailed:
     case EventKind::kTooLate:
     case EventKind::kOwnerLost: return "";
+    case EventKind::kLinkLost:
+      return event.code == 1 ? ": the robot follows no command" : ": no state comes";
     case EventKind::kCollision: {
       const bool force = !has_joint && event.value >= -3.0F;  // -1 to -6: of the base
       char torque[64];

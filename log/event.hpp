@@ -46,6 +46,8 @@ enum class EventKind : std::uint8_t {
   kHomingRequested,      ///< on request: a drive looks for its joint's place
   kHomed,                ///< it has found it
   kHomingFailed,         ///< `code`: its hal::HomingError
+  kLinkLost,             ///< to a robot far away; `code`: its hal::LinkLoss
+  kLinkBack,             ///< the robot follows commands again
 };
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.

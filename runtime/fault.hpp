@@ -30,6 +30,7 @@ enum class FaultSource : std::uint8_t {
   kFall,           ///< the robot fell; `code` is a FallKind, `index` its thousandths
   kCollision,  ///< something pushes a joint; `code` is its external torque [mNm or mN]; a floating
                ///< base: `index` is -1 - k, k of estimation::kBaseChannels
+  kLink,       ///< the link to a robot far away; `code` is a hal::LinkLoss
 };
 
 /// Where an emergency stop came from. That of a board's input is a fault of its drives.

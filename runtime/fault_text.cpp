@@ -29,6 +29,11 @@ std::string owner_text(hal::OwnerLoss loss) {
   return {};
 }
 
+std::string link_text(hal::LinkLoss loss) {
+  if (loss == hal::LinkLoss::kStates) return "the link is lost: no state of the robot comes";
+  return "the link is lost: states of the robot come, but it follows no command";
+}
+
 /// "12.3 Nm"
 std::string in_units(const FaultRecord& record, const FaultContext& about) {
   const auto joint = static_cast<std::size_t>(record.index);
@@ -76,6 +81,7 @@ std::string text_of(const FaultRecord& record, const FaultContext& about) {
     case FaultSource::kEmergencyStop:
       return emergency_text(static_cast<EmergencyInput>(record.code));
     case FaultSource::kOwner: return owner_text(static_cast<hal::OwnerLoss>(record.code));
+    case FaultSource::kLink: return link_text(static_cast<hal::LinkLoss>(record.code));
     case FaultSource::kCollision:
       return std::string("collision: an external ") +
              (record.index < 0 && record.index > -4 ? "force" : "torque") + " of " +

@@ -62,6 +62,21 @@ std::optional<FaultRecord> FaultWatch::next_sensor(
   return std::nullopt;
 }
 
+std::optional<FaultRecord> FaultWatch::lost_link() noexcept TANDEM_RT {
+  const hal::LinkLoss loss = backend_->link_loss();
+  if (link_lost_ || loss == hal::LinkLoss::kNone) return std::nullopt;
+  link_lost_ = true;
+  return FaultRecord{.code = static_cast<std::uint32_t>(loss),
+                     .source = FaultSource::kLink,
+                     .category = hal::StopCategory::kWarn};
+}
+
+bool FaultWatch::link_is_back() noexcept TANDEM_RT {
+  if (!link_lost_ || backend_->link_loss() != hal::LinkLoss::kNone) return false;
+  link_lost_ = false;
+  return true;
+}
+
 std::optional<FaultRecord> FaultWatch::fall(const hal::TruthImage& truth) noexcept TANDEM_RT {
   const Fall found = fall_.look(truth);
   if (found.kind == FallKind::kNone) return std::nullopt;
@@ -90,6 +105,7 @@ bool FaultWatch::is_there(const FaultRecord& record) const noexcept TANDEM_RT {
     case FaultSource::kDrive:
     case FaultSource::kJointLost: return joint_told_[index] != 0;
     case FaultSource::kSensorLost: return sensor_told_[index] != 0;
+    case FaultSource::kLink: return link_lost_;
     default: return false;
   }
 }

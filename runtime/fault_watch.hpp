@@ -33,6 +33,11 @@ class FaultWatch {
   [[nodiscard]] std::optional<FaultRecord> next_sensor(
       const hal::StateImage& state) noexcept TANDEM_RT;
 
+  /// The link to a robot far away is lost: a warning, for the robot brakes and holds by itself.
+  [[nodiscard]] std::optional<FaultRecord> lost_link() noexcept TANDEM_RT;
+  /// Whether it is back, after that.
+  [[nodiscard]] bool link_is_back() noexcept TANDEM_RT;
+
   /// A robot with feet that has fallen. For cycles in which controllers run: what has been stopped
   /// may lie as it likes.
   [[nodiscard]] std::optional<FaultRecord> fall(const hal::TruthImage& truth) noexcept TANDEM_RT;
@@ -48,13 +53,14 @@ class FaultWatch {
                             std::size_t joint) const noexcept TANDEM_RT;
   /// The joint alone was reset, and is well: reported again when it falls ill.
   void forget(std::size_t joint) noexcept TANDEM_RT;
-  /// Whether the cause of `record` is still there. Only joints and sensors can be looked at.
+  /// Whether the cause of `record` is still there. Only joints, sensors and a link can be
+  /// looked at.
   [[nodiscard]] bool is_there(const FaultRecord& record) const noexcept TANDEM_RT;
 
   [[nodiscard]] std::size_t joints() const noexcept { return joint_told_.size(); }
   [[nodiscard]] std::size_t sensors() const noexcept { return sensor_told_.size(); }
   [[nodiscard]] const FallLimits& fall_limits() const noexcept { return fall_.limits(); }
-  void archive(Archive& ar) { ar(joint_told_, sensor_told_, joint_in_fault_, fall_); }
+  void archive(Archive& ar) { ar(joint_told_, sensor_told_, joint_in_fault_, link_lost_, fall_); }
 
  private:
   const hal::RobotConfig* robot_;
@@ -62,7 +68,7 @@ class FaultWatch {
   std::uint32_t lost_after_cycles_;
   FallWatch fall_;
   std::vector<std::uint8_t> joint_told_, sensor_told_;
-  bool joint_in_fault_ = false;
+  bool joint_in_fault_ = false, link_lost_ = false;
 };
 
 }  // namespace tandem::runtime

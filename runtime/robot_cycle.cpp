@@ -106,6 +106,7 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
     if (const auto found = watch_.fall(*truth_)) fault(*found);
   }
   check_collisions();
+  check_link();
   check_backend(read_code_);
   advance_phase();
   watch_drive_resets();

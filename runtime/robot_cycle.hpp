@@ -119,6 +119,7 @@ class RobotCycle {
   void show_snapshot() noexcept;
   void check_backend(Code code) noexcept TANDEM_RT;
   void check_collisions() noexcept TANDEM_RT;
+  void check_link() noexcept TANDEM_RT;
   [[nodiscard]] const hal::EstimateImage* estimate() const noexcept TANDEM_RT;
   void advance_phase() noexcept TANDEM_RT;
   void run_controllers() noexcept TANDEM_RT;

@@ -30,6 +30,7 @@ EventKind event_of(FaultSource source) noexcept TANDEM_RT {
     case FaultSource::kStray: return EventKind::kUnclaimed;
     case FaultSource::kFall: return EventKind::kFell;
     case FaultSource::kCollision: return EventKind::kCollision;
+    case FaultSource::kLink: return EventKind::kLinkLost;
     default: return EventKind::kFault;
   }
 }
@@ -56,6 +57,18 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
   }
   faults_.note(record);
   react(record.category);
+}
+
+/// A link that is back needs no reset: the robot has returned to the commands by itself.
+void RobotCycle::check_link() noexcept TANDEM_RT {
+  if (!run_.controllers_run()) return;
+  if (const auto lost = watch_.lost_link()) fault(*lost);
+  if (!watch_.link_is_back()) return;
+  event(EventKind::kLinkBack);
+  for (std::size_t i = 0; i < faults_.size(); ++i) {
+    const bool latched = faults_.cleared_ns(i) == FaultLog::kLatched;
+    if (latched && faults_[i].source == FaultSource::kLink) faults_.clear(i, time_.time_ns);
+  }
 }
 
 void RobotCycle::react(StopCategory category) noexcept TANDEM_RT {

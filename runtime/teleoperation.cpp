@@ -81,6 +81,7 @@ std::optional<Teleoperation> read_teleoperation(TomlTable& root) {
   const double playout_s =
       config.up.delay_s + kPlayoutJitters * config.up.jitter_s + kPlayoutMargin_s;
   config.playout_ns = ns(table.number_or("playout_s", playout_s, {0.0, 60.0}));
+  config.unanswered_ns += ns(config.down.delay_s + kPlayoutJitters * config.down.jitter_s);
   config.correction_ns = ns(table.number_or("correction_s", 0.5, {0.001, 60.0}));
   config.brake_ns = ns(table.number_or("brake_s", 0.25, {0.001, 10.0}));
   if (static_cast<double>(config.playout_ns) * 1e-9 < config.up.delay_s) {

@@ -65,9 +65,10 @@ class HomingNote {
   std::vector<hal::HomingError> failures_;  // by joint: of its last homing
 };
 
-/// Prints each fault when it happens, for a run that waits for its reset.
+/// Prints each warning when it happens; in a run that waits for its reset each fault, too.
 class FaultNotes {
  public:
+  explicit FaultNotes(bool waits) : waits_(waits) {}
   void look(const runtime::RobotCycle& cycle) {
     if (cycle.fault_log().size() <= told_) return;
     const std::vector<runtime::Fault> faults = cycle.faults();
@@ -76,6 +77,7 @@ class FaultNotes {
     for (; told_ < faults.size(); ++told_) {
       const runtime::Fault& fault = faults[told_];
       const bool warns = fault.category == hal::StopCategory::kWarn;
+      if (!warns && !waits_) continue;
       stopped = stopped || !warns;
       fmt::print(stderr, "{}{}: {:.3f} s: {}{}{}\n", clear, warns ? "warning" : "fault",
                  fault.time_s, fault.joint, fault.joint.empty() ? "" : ": ", fault.text);
@@ -86,6 +88,7 @@ class FaultNotes {
   }
 
  private:
+  bool waits_;
   std::size_t told_ = 0;
 };
 
@@ -142,7 +145,7 @@ void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition
   const runtime::Progress& progress = cycle.progress();
   ProgressBar bar(out, static_cast<double>(e.cycles()) * period_s);
   BusWatch buses(c.open_buses(), stderr);
-  FaultNotes faults;
+  FaultNotes faults(waits);
   HomingNote homing;
   bool logged = recorder != nullptr;
   while (!loop.done() && !guard.gave_up()) {
@@ -152,7 +155,7 @@ void watch(runtime::RobotCycle& cycle, const LoopThread& loop, const Composition
     }
     if (!quiet) buses.look();
     if (!quiet) homing.look(cycle, e.robot);
-    if (waits && !quiet) faults.look(cycle);
+    if (!quiet) faults.look(cycle);
     if (!quiet) {
       bar.update(static_cast<double>(progress.running_cycles.load()) * period_s,
                  progress_note(cycle));

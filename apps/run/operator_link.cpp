@@ -110,7 +110,8 @@ Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> 
   }
   auto link = std::make_unique<remote::LiveLink>(
       hal::robot_of(e.robot), std::move(robot), std::move(twin), config,
-      e.teleoperation->real ? 0 : delay_ns, e.loop.period_ns);
+      e.teleoperation->real ? 0 : delay_ns,
+      runtime::playout_cycles(*e.teleoperation, e.loop.period_ns), e.loop.period_ns);
   c.tele = link.get();
   c.backend = std::move(link);
   return {};

@@ -286,9 +286,11 @@ void add_link_facts(const remote::OperatorEnd* link, double period_s, Facts& fac
               fmt::format("{:.3f} s, {}", static_cast<double>(figures.starved_cycles) * period_s,
                           counted(figures.holds, "time")));
   }
-  facts.add(
-      "without a state",
-      fmt::format("{:.3f} s at most", static_cast<double>(figures.most_silent_cycles) * period_s));
+  const auto at_most = [period_s](std::uint64_t cycles) {
+    return fmt::format("{:.3f} s at most", static_cast<double>(cycles) * period_s);
+  };
+  facts.add("without a state", at_most(figures.most_silent_cycles));
+  facts.add("without a newer command in force", at_most(figures.most_unanswered_cycles));
 }
 
 Json link_json(const remote::OperatorEnd* link) {
@@ -306,6 +308,8 @@ Json link_json(const remote::OperatorEnd* link) {
   json["holds"] = figures.robot_end ? Json(figures.holds) : Json(nullptr);
   json["silent_cycles"] = figures.silent_cycles;
   json["most_silent_cycles"] = figures.most_silent_cycles;
+  json["unanswered_cycles"] = figures.unanswered_cycles;
+  json["most_unanswered_cycles"] = figures.most_unanswered_cycles;
   json["clock_cycles"] = figures.clock_cycles;
   json["compared"] = figures.compared;
   json["worst_prediction_rad"] = nullptr;

@@ -8,17 +8,19 @@ namespace tandem::remote {
 namespace {
 
 constexpr std::uint64_t kDriftCycles = 100;       // between two corrections of the numbers by one
-constexpr std::uint64_t kMostTwinCycles = 20;         // cycles of the twin in one of the loop
+constexpr std::uint64_t kMostTwinCycles = 20;     // cycles of the twin in one of the loop
 constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
 
 }  // namespace
 
 LiveLink::LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot, End twin,
-                   const TeleConfig& config, std::int64_t delay_ns, std::int64_t period_ns)
-    : OperatorEnd(*robot, std::move(twin)),
+                   const TeleConfig& config, std::int64_t delay_ns, std::uint64_t playout_cycles,
+                   std::int64_t period_ns)
+    : OperatorEnd(*robot, std::move(twin), cycles_in(config.unanswered_ns, period_ns)),
       robot_(std::move(robot)),
       config_(config),
       delay_cycles_(cycles_in(delay_ns, period_ns)),
+      playout_cycles_(playout_cycles),
       up_(config.up, config.seed, hal::CommandImage(description.shape()).bytes().size()),
       down_(config.down, config.seed + 1, hal::StateImage(description.shape()).bytes().size()),
       robot_state_(description.shape()),
@@ -51,7 +53,7 @@ void LiveLink::exchange(const hal::CycleTime& time) noexcept {
 void LiveLink::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   linked_ = true;
   linked_ns_ = time.time_ns;
-  heard_cycle_ = time.cycle;
+  answers_.start(time.cycle);
   arrived_.assign(robot_state_);
   arrived_cycle_ = robot_->cycle();
   number_ = arrived_cycle_ - std::min(arrived_cycle_, delay_cycles_);
@@ -71,6 +73,7 @@ void LiveLink::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
 void LiveLink::count_on(const hal::CycleTime& time) noexcept TANDEM_RT {
   const std::uint64_t passed = time.cycle - now_.cycle;
   late_ = passed - 1;
+  answers_.left_out(late_);
   number_ = static_cast<std::uint64_t>(static_cast<std::int64_t>(number_ + passed) + drift_);
   drifted_ += drift_;
   drift_ = 0;
@@ -94,15 +97,16 @@ void LiveLink::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
-      prediction_.correct(arrived_, head.source, head.cycle - arrived_cycle_);
+      const std::uint64_t due = head.cycle - 1 - std::min(head.cycle - 1, playout_cycles_);
+      prediction_.correct(arrived_, due, head.cycle - arrived_cycle_);
     }
     const auto lead = static_cast<std::int64_t>(number_ - head.cycle);
     least_lead_ = led_ == 0 ? lead : std::min(least_lead_, lead);
     ++led_;
     arrived_cycle_ = head.cycle;
-    heard_cycle_ = time.cycle;
+    if (!ended_) answers_.take(head.source, time.cycle);
   }
-  most_silent_ = std::max(most_silent_, time.cycle - heard_cycle_);
+  if (!ended_) answers_.count(time.cycle);
 }
 
 Code LiveLink::read(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
@@ -191,8 +195,10 @@ TeleFigures LiveLink::figures() const noexcept {
   return {.up = up_.counts(),
           .down = down_.counts(),
           .robot_end = false,
-          .silent_cycles = linked_ ? now_.cycle - heard_cycle_ : 0,
-          .most_silent_cycles = most_silent_,
+          .silent_cycles = answers_.silent(),
+          .most_silent_cycles = answers_.most_silent(),
+          .unanswered_cycles = answers_.unanswered(),
+          .most_unanswered_cycles = answers_.most_unanswered(),
           .clock_cycles = drifted_,
           .compared = prediction_.compared(),
           .worst_prediction_rad = prediction_.worst_rad()};

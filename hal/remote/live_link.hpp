@@ -20,8 +20,8 @@ namespace tandem::remote {
 /// another process (Server with a Playout).
 ///
 /// - Commands are numbered by the robot's cycle that the operator sees when it gives them. A state
-///   of the robot says the number of the command that the joints follow: it is compared with the
-///   twin under that one.
+///   of the robot is compared with the twin under the command that was due then, whether the robot
+///   had got it or not.
 /// - The two clocks differ. The numbers follow the robot's clock: at most once in 100 cycles one is
 ///   left out, for which the robot interpolates, or given twice, of which the robot takes the
 ///   first.
@@ -37,8 +37,10 @@ class LiveLink final : public OperatorEnd {
   /// @param config   its networks are what is added to the real link
   /// @param delay_ns of states that are on their way: the numbers begin so much before the robot's
   /// cycle
+  /// @param playout_cycles  from a command's number to the robot's cycle in which it takes effect
   LiveLink(const hal::Robot& description, std::unique_ptr<RemoteBackend> robot, End twin,
-           const TeleConfig& config, std::int64_t delay_ns, std::int64_t period_ns);
+           const TeleConfig& config, std::int64_t delay_ns, std::uint64_t playout_cycles,
+           std::int64_t period_ns);
 
   [[nodiscard]] std::string status_text() const override;
   /// Sends what has crossed the declared network.
@@ -65,7 +67,7 @@ class LiveLink final : public OperatorEnd {
 
   std::unique_ptr<RemoteBackend> robot_;
   TeleConfig config_;
-  std::uint64_t delay_cycles_;
+  std::uint64_t delay_cycles_, playout_cycles_;
   ImageNetwork up_, down_;
   hal::StateImage robot_state_, twin_state_, arrived_;
   hal::CommandImage sent_, twin_command_, twin_goal_;
@@ -80,7 +82,7 @@ class LiveLink final : public OperatorEnd {
   std::uint64_t led_ = 0, count_ = 0;  // states and cycles, lately
   std::int64_t drift_ = 0;             // what the next number is corrected by
   std::int64_t drifted_ = 0;           // all of it
-  std::uint64_t arrived_cycle_ = 0, heard_cycle_ = 0, most_silent_ = 0;
+  std::uint64_t arrived_cycle_ = 0;
 };
 
 }  // namespace tandem::remote

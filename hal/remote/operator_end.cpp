@@ -4,8 +4,11 @@
 
 namespace tandem::remote {
 
-OperatorEnd::OperatorEnd(hal::Backend& robot, End twin)
-    : ForwardingBackend(robot), twin_(std::move(twin.robot)), twin_side_(std::move(twin.side)) {}
+OperatorEnd::OperatorEnd(hal::Backend& robot, End twin, std::uint64_t unanswered_cycles)
+    : ForwardingBackend(robot),
+      twin_(std::move(twin.robot)),
+      twin_side_(std::move(twin.side)),
+      answers_(unanswered_cycles) {}
 
 hal::Phase OperatorEnd::phase() const noexcept {
   const hal::Phase phase = to().phase();

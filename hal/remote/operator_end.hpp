@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/forwarding_backend.hpp"
+#include "hal/remote/answers.hpp"
 #include "hal/remote/network.hpp"
 #include "hal/remote/robot_side.hpp"
 
@@ -28,6 +29,8 @@ struct TeleConfig {
   std::int64_t playout_ns = 0;  ///< a command takes effect so long after it was given
   std::int64_t correction_ns = 500'000'000;  ///< time constant of the prediction's correction
   std::int64_t brake_ns = 250'000'000;       ///< in which the robot stops when commands end
+  /// Of a robot that shows no newer command in force: the link is lost. It is reported.
+  std::int64_t unanswered_ns = 1'000'000'000;
   std::vector<Outage> outages;
 
   [[nodiscard]] bool is_cut(std::int64_t since_ns) const noexcept TANDEM_RT {
@@ -46,6 +49,9 @@ struct TeleFigures {
   std::uint64_t holds = 0;               ///< how often that began
   std::uint64_t silent_cycles = 0;       ///< since the newest state came, until now
   std::uint64_t most_silent_cycles = 0;  ///< the longest time without one, the first included
+  /// The same, since a state came that showed a newer command in force.
+  std::uint64_t unanswered_cycles = 0;
+  std::uint64_t most_unanswered_cycles = 0;
   /// By which the numbers of commands followed the robot's clock: negative when it is the slower
   /// one. 0 in simulated time.
   std::int64_t clock_cycles = 0;
@@ -75,6 +81,9 @@ class OperatorEnd : public hal::ForwardingBackend {
   /// Nothing is homed over the link: a command is on its way for too long.
   bool home(std::size_t /*joint*/) noexcept TANDEM_RT override { return false; }
   [[nodiscard]] bool shut_down() noexcept TANDEM_RT override;
+  [[nodiscard]] hal::LinkLoss link_loss() const noexcept TANDEM_RT override {
+    return linked_ ? answers_.loss() : hal::LinkLoss::kNone;
+  }
 
   /// What a run's table, JSON and report ask.
   [[nodiscard]] virtual TeleFigures figures() const noexcept = 0;
@@ -82,11 +91,13 @@ class OperatorEnd : public hal::ForwardingBackend {
  protected:
   /// @param robot  outlives it
   /// @param twin   without a robot: nothing is predicted
-  OperatorEnd(hal::Backend& robot, End twin);
+  /// @param unanswered_cycles  after which the link is lost
+  OperatorEnd(hal::Backend& robot, End twin, std::uint64_t unanswered_cycles);
 
   std::unique_ptr<hal::Backend> twin_;
   std::unique_ptr<RobotSide> twin_side_;
   bool linked_ = false;
+  Answers answers_;
   bool ended_ = false;  // the robot follows no command any more: it says nothing of the model
 };
 

@@ -12,7 +12,8 @@
 namespace tandem::remote {
 
 /// The twin is under every command at once, the robot under the same one later. What the twin was
-/// under a command is kept until the robot's state under it comes. The difference of the two passes
+/// under a command is kept until a state of the robot comes at which it was due there. The
+/// difference of the two passes
 /// a low pass, and is added to the twin from then on. Commands are known by their numbers, which
 /// grow.
 class Prediction {
@@ -29,7 +30,7 @@ class Prediction {
   void assume(const hal::StateImage& robot, const hal::StateImage& twin) noexcept TANDEM_RT;
   /// The twin's state before it is given the command of this number.
   void keep(std::uint64_t number, const hal::StateImage& twin) noexcept TANDEM_RT;
-  /// A state of the robot has come, under the command `number`.
+  /// A state of the robot has come, which the command `number` was due at.
   /// Nothing happens when the twin's state under it is not kept.
   /// @param passed  cycles of the robot since the state that came before
   void correct(const hal::StateImage& arrived, std::uint64_t number,

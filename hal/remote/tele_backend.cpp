@@ -19,7 +19,7 @@ std::uint64_t round_trip_cycles(const TeleConfig& config, std::int64_t period_ns
 
 TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
                          const TeleConfig& config, std::int64_t period_ns)
-    : OperatorEnd(*robot.robot, std::move(twin)),
+    : OperatorEnd(*robot.robot, std::move(twin), cycles_in(config.unanswered_ns, period_ns)),
       robot_(std::move(robot.robot)),
       robot_side_(std::move(robot.side)),
       config_(config),
@@ -34,6 +34,7 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
       robot_command_(description.shape()),
       twin_command_(description.shape()),
       received_(description.shape()),
+      playout_cycles_(cycles_in(config.playout_ns, period_ns)),
       prediction_(description.joints.size(), round_trip_cycles(config, period_ns),
                   config.correction_ns, period_ns) {}
 
@@ -41,7 +42,8 @@ TeleBackend::TeleBackend(const hal::Robot& description, End robot, End twin,
 void TeleBackend::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   linked_ = true;
   linked_ns_ = time.time_ns;
-  arrived_cycle_ = heard_cycle_ = time.cycle;
+  arrived_cycle_ = time.cycle;
+  answers_.start(time.cycle);
   arrived_.assign(robot_state_);
   playout_.start(time.cycle, robot_command_);
   limits_.follow(robot_command_);
@@ -63,12 +65,13 @@ void TeleBackend::carry_state(const hal::CycleTime& time) noexcept TANDEM_RT {
     if (head.cycle <= arrived_cycle_) continue;  // overtaken, or twice
     std::ranges::copy(image, arrived_.bytes().begin());
     if (twin_ && !ended_) {
-      prediction_.correct(arrived_, head.source, head.cycle - arrived_cycle_);
+      const std::uint64_t due = head.cycle - 1 - std::min(head.cycle - 1, playout_cycles_);
+      prediction_.correct(arrived_, due, head.cycle - arrived_cycle_);
     }
     arrived_cycle_ = head.cycle;
-    heard_cycle_ = time.cycle;
+    if (!ended_) answers_.take(head.source, time.cycle);
   }
-  most_silent_ = std::max(most_silent_, time.cycle - heard_cycle_);
+  if (!ended_) answers_.count(time.cycle);
 }
 
 void TeleBackend::show(const hal::CycleTime& time, hal::StateImage& state) noexcept TANDEM_RT {
@@ -141,7 +144,7 @@ bool TeleBackend::archive(Archive& ar) {
   if (robot_side_) robot_side_->archive(ar);
   if (twin_ && twin_side_) twin_side_->archive(ar);
   ar(up_, down_, playout_, limits_, robot_state_, twin_state_, arrived_, robot_command_, linked_,
-     ended_, now_, linked_ns_, arrived_cycle_, heard_cycle_, most_silent_, prediction_);
+     ended_, now_, linked_ns_, arrived_cycle_, answers_, prediction_);
   return true;
 }
 
@@ -150,8 +153,10 @@ TeleFigures TeleBackend::figures() const noexcept {
           .down = down_.counts(),
           .starved_cycles = playout_.starved_cycles(),
           .holds = playout_.holds(),
-          .silent_cycles = linked_ ? now_.cycle - heard_cycle_ : 0,
-          .most_silent_cycles = most_silent_,
+          .silent_cycles = answers_.silent(),
+          .most_silent_cycles = answers_.most_silent(),
+          .unanswered_cycles = answers_.unanswered(),
+          .most_unanswered_cycles = answers_.most_unanswered(),
           .compared = prediction_.compared(),
           .worst_prediction_rad = prediction_.worst_rad()};
 }

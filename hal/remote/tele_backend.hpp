@@ -24,7 +24,8 @@ namespace tandem::remote {
 ///   their joints by its own state. Range and rate limits apply at the robot once more.
 /// - States cross `down`. With `predict` the operator's loop sees the twin, a robot of the same
 ///   description that follows each command at once. It is corrected by what arrives: the low-passed
-///   difference of a state and of what the twin was when it had been given the same commands.
+///   difference of a state and of what the twin was under the command that was due at the robot
+///   then: under the same one, or the robot has not got it.
 /// - Bring-up, stops, resets and shut-down do not cross the network.
 class TeleBackend final : public OperatorEnd {
  public:
@@ -61,8 +62,7 @@ class TeleBackend final : public OperatorEnd {
   hal::CycleTime now_;
   std::int64_t linked_ns_ = 0;       // when it began
   std::uint64_t arrived_cycle_ = 0;  // of the newest state that the operator has
-  std::uint64_t heard_cycle_ = 0;    // in which it came
-  std::uint64_t most_silent_ = 0;
+  std::uint64_t playout_cycles_;
   Prediction prediction_;
 };
 

@@ -75,10 +75,37 @@ TEST_F(TeleoperationRun, OverALinkThatDiesSaysSo) {
   EXPECT_TRUE(json("run.json")["teleoperation"]["worst_prediction_rad"].is_null());
   EXPECT_EQ(json("run.json")["warnings"].size(), 1U);
   const Outcome outage = run("[[teleoperation.outage]]\nfrom_s = 0.5\nto_s = 2.5\n");
-  EXPECT_EQ(outage.err.find("no state"), std::string::npos) << "it came back: " << outage.err;
+  EXPECT_EQ(outage.status, 0) << outage.err;
+  EXPECT_EQ(json("run.json")["warnings"].size(), 0U) << "it came back";
+  const auto lost = json("run.json")["fault_log"];
+  ASSERT_EQ(lost.size(), 1U);
+  EXPECT_EQ(lost[0]["category"], "warn");
+  EXPECT_FALSE(lost[0]["latched"].get<bool>()) << "it came back";
   const auto link = json("run.json")["teleoperation"];
   EXPECT_NEAR(link["most_silent_cycles"].get<int>(), 2000, 2);
   EXPECT_GT(link["compared"].get<int>(), 900);
+}
+
+/// States come all the time, so that only they tell that the robot follows nothing.
+TEST_F(TeleoperationRun, WhoseCommandsNeverArriveSaysSoAndShowsTheRobot) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  const std::string link =
+      "[teleoperation.up]\ndelay_s = 0.25\nloss = 1.0\n[teleoperation.down]\ndelay_s = 0.25\n";
+  write_text(folder_ / "operated.toml", plain.substr(0, at) + link + plain.substr(at));
+  const Outcome run = tandem("run operated.toml --duration 6 --no-log --json run.json");
+  EXPECT_EQ(run.status, 1) << "the link is lost at the end";
+  const auto log = json("run.json")["fault_log"];
+  ASSERT_EQ(log.size(), 1U);
+  EXPECT_EQ(log[0]["cause"],
+            "the link is lost: states of the robot come, but it follows no command");
+  EXPECT_EQ(log[0]["category"], "warn");
+  EXPECT_TRUE(log[0]["latched"].get<bool>());
+  EXPECT_LT(log[0]["time_s"].get<double>(), 2.1) << "of the run, which settles first";
+  const auto figures = json("run.json")["teleoperation"];
+  EXPECT_GT(figures["compared"].get<int>(), 5000);
+  EXPECT_GT(figures["worst_prediction_rad"].get<double>(), 0.1) << "the robot never moved";
+  EXPECT_GT(figures["most_unanswered_cycles"].get<int>(), 4000);
 }
 
 /// One file for both ends: the server's has play-out, the operator's the prediction.

@@ -78,7 +78,7 @@ class Operator {
     OperatorEnd::End twin;
     if (predict) twin.robot = std::make_unique<StrictTwin>(robot);
     link = std::make_unique<LiveLink>(hal::robot_of(robot), std::move(*made), std::move(twin),
-                                      config, 100'000'000, kPeriod_ns);
+                                      config, 100'000'000, kPlayout, kPeriod_ns);
     EXPECT_TRUE(host.add("sine", std::make_shared<runtime::test::Sine>(std::vector<std::size_t>{0}),
                          runtime::test::parameters("amplitude_rad = 0.2")));
     runtime::CycleConfig wanted = real_time(running);

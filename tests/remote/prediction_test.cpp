@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "hal/remote/answers.hpp"
+
 namespace tandem::remote {
 namespace {
 
@@ -38,6 +40,34 @@ TEST(Prediction, AStateUnderACommandWhoseTwinIsNotKnownCorrectsNothing) {
   prediction.start();
   prediction.correct(at(9.0), 24, 1);  // of the link before
   EXPECT_EQ(prediction.compared(), 0U);
+}
+
+TEST(Answers, TellStatesThatShowNoNewerCommandFromSilence) {
+  using hal::LinkLoss;
+  Answers answers(100);
+  answers.start(1000);
+  for (std::uint64_t cycle = 1000; cycle <= 1400; ++cycle) {
+    if (cycle <= 1100 || cycle > 1300)
+      answers.take(std::min<std::uint64_t>(cycle - 300, 750), cycle);
+    answers.count(cycle);
+    if (cycle == 1150) EXPECT_EQ(answers.loss(), LinkLoss::kNone);
+    if (cycle == 1200) EXPECT_EQ(answers.loss(), LinkLoss::kStates);
+    if (cycle == 1400) EXPECT_EQ(answers.loss(), LinkLoss::kCommands);
+  }
+  EXPECT_EQ(answers.most_silent(), 200U);
+  EXPECT_EQ(answers.most_unanswered(), 350U) << "since command 750 was seen in force";
+  answers.take(751, 1401);
+  answers.count(1401);
+  EXPECT_EQ(answers.loss(), LinkLoss::kNone);
+}
+
+TEST(Answers, ALoopThatStoodBlamesNobody) {
+  Answers answers(100);
+  answers.start(0);
+  answers.left_out(5000);
+  answers.count(5050);
+  EXPECT_EQ(answers.loss(), hal::LinkLoss::kNone);
+  EXPECT_EQ(answers.silent(), 50U);
 }
 
 }  // namespace

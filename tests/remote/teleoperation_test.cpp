@@ -129,7 +129,7 @@ class Operated {
       row.height_m = far_->truth().base_position_m()[2];
       rows.push_back(std::move(row));
     }
-    EXPECT_TRUE(cycle->faults().empty());
+    for (const runtime::Fault& fault : cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;
   }
 
   /// RMS distance of the hand, in the base's frame, from where it was led [m].
