@@ -5,6 +5,7 @@
 
 namespace tandem::runtime {
 
+using hal::StopCategory;
 using log::EventKind;
 
 RobotCycle::~RobotCycle() {
@@ -46,7 +47,9 @@ void RobotCycle::follow_owner() noexcept TANDEM_RT {
   const hal::RemoteCommand wish = owner_.port->exchange(port_view());
   owner_.controller->follow(wish);
   if (wish.gains != nullptr) take_gains(*wish.gains);
-  if (wish.stop != hal::StopCategory::kWarn) {
+  // An owner that stops because the run ends here asks for what is being done, unless for more.
+  const bool stops_already = run_.in(RunPhase::kShutDown) && wish.stop >= StopCategory::kCategory1;
+  if (wish.stop != StopCategory::kWarn && !stops_already) {
     fault({.source = FaultSource::kOwner, .category = wish.stop});
   }
   if (wish.loss != hal::OwnerLoss::kNone && !run_.in(RunPhase::kShutDown)) {  // else it may leave

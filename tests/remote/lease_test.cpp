@@ -376,6 +376,26 @@ TEST_F(LinkInCycles, AFloodOfTheOwnersIsItsNewestCommand) {
   EXPECT_NEAR(reference_rad(), 0.201, 1e-9);
 }
 
+/// It reacts to the end that the server has announced. That is not the end's cause.
+TEST_F(LinkInCycles, AStopInTheShutDownIsNoFault) {
+  step_with(0.1);
+  served.backend.shut_down_cycles = 100;
+  served.cycle->inbox().end_run();
+  step();
+  ASSERT_EQ(served.phase(), RunPhase::kShutDown);
+  const auto ask = [this](hal::StopCategory category, std::uint32_t stops) {
+    auto stop = sample();
+    stop.stops = stops;
+    stop.stop = static_cast<std::uint8_t>(category);
+    expect(Verdict::kTaken, stop);
+    step();
+  };
+  ask(hal::StopCategory::kCategory1, 1);
+  EXPECT_TRUE(served.cycle->faults().empty());
+  ask(hal::StopCategory::kCategory0, 2);
+  EXPECT_EQ(served.cycle->faults().size(), 1U) << "this is more than the shut-down does";
+}
+
 TEST(Connect, TellsWhoHasTheRobotAndWhatDiffers) {
   Served served({}, {.loop = {.rate = 1.0}});
   served.begin();
