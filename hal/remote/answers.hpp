@@ -26,6 +26,7 @@ class Answers {
   void left_out(std::uint64_t cycles) noexcept TANDEM_RT {
     heard_ += cycles;
     answered_ += cycles;
+    now_ += cycles;
   }
   /// A state has come, of the robot under the command `number`.
   void take(std::uint64_t number, std::uint64_t cycle) noexcept TANDEM_RT {

@@ -2,6 +2,7 @@
 // Layer: hal/remote.  Thread: any; revoke() and owner() are fit for the loop.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <mutex>
@@ -47,6 +48,25 @@ class Lease {
   std::atomic<std::uint64_t> given_{0};
   mutable std::mutex mutex_;  // of the name
   std::string name_;
+};
+
+/// How long somebody has been silent while the one who listens was awake. A process that was
+/// stopped has heard nobody meanwhile: that is no silence of the others.
+class Silence {
+ public:
+  /// @param heard_ns  when somebody was heard last
+  /// @param most_ns   of the time since the call before that counts
+  /// @return [ns] since the first call with this `heard_ns`
+  std::int64_t of(std::int64_t heard_ns, std::int64_t now_ns,
+                  std::int64_t most_ns) noexcept TANDEM_RT {
+    silent_ns_ = heard_ns == heard_ns_ ? silent_ns_ + std::min(now_ns - looked_ns_, most_ns) : 0;
+    heard_ns_ = heard_ns;
+    looked_ns_ = now_ns;
+    return silent_ns_;
+  }
+
+ private:
+  std::int64_t heard_ns_ = 0, looked_ns_ = 0, silent_ns_ = 0;
 };
 
 /// What becomes of a command that arrives.

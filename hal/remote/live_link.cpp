@@ -1,15 +1,25 @@
 #include "hal/remote/live_link.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "hal/remote/playout.hpp"
 
 namespace tandem::remote {
 namespace {
 
-constexpr std::uint64_t kDriftCycles = 100;       // between two corrections of the numbers by one
+constexpr std::uint64_t kDriftCycles = 100;       // after which the numbers are corrected
+constexpr std::uint64_t kDriftPace = 4;           // cycles from one correction by one to the next
+constexpr std::int64_t kJump = 20;                // cycles that no drift and jitter explain
 constexpr std::uint64_t kMostTwinCycles = 20;     // cycles of the twin in one of the loop
 constexpr std::int64_t kPast_ns = 2'000'000'000;  // beyond the declared delays
+
+/// By how much the numbers are to be corrected that were `lead` before the robot's cycles.
+std::int64_t correction(std::int64_t lead) noexcept TANDEM_RT {
+  constexpr auto kMost = static_cast<std::int64_t>(kDriftCycles / kDriftPace);
+  const std::int64_t most = std::abs(lead) > kJump ? kMost : 1;
+  return -std::clamp(lead, -most, most);
+}
 
 }  // namespace
 
@@ -59,7 +69,7 @@ void LiveLink::begin_link(const hal::CycleTime& time) noexcept TANDEM_RT {
   number_ = arrived_cycle_ - std::min(arrived_cycle_, delay_cycles_);
   next_kept_ = number_;
   led_ = count_ = 0;
-  drift_ = 0;
+  owed_ = 0;
   (void)robot_->command_in_force(sent_);
   sent_.cycle()[0] = number_;
   prediction_.start();
@@ -74,11 +84,12 @@ void LiveLink::count_on(const hal::CycleTime& time) noexcept TANDEM_RT {
   const std::uint64_t passed = time.cycle - now_.cycle;
   late_ = passed - 1;
   answers_.left_out(late_);
-  number_ = static_cast<std::uint64_t>(static_cast<std::int64_t>(number_ + passed) + drift_);
-  drifted_ += drift_;
-  drift_ = 0;
+  const std::int64_t step = count_ % kDriftPace == 0 ? std::clamp<std::int64_t>(owed_, -1, 1) : 0;
+  number_ = static_cast<std::uint64_t>(static_cast<std::int64_t>(number_ + passed) + step);
+  drifted_ += step;
+  owed_ -= step;
   if (++count_ < kDriftCycles) return;
-  if (led_ > 0) drift_ = least_lead_ > 0 ? -1 : (least_lead_ < 0 ? 1 : 0);
+  if (led_ > 0) owed_ = correction(least_lead_);
   led_ = count_ = 0;
 }
 

@@ -22,9 +22,9 @@ namespace tandem::remote {
 /// - Commands are numbered by the robot's cycle that the operator sees when it gives them. A state
 ///   of the robot is compared with the twin under the command that was due then, whether the robot
 ///   had got it or not.
-/// - The two clocks differ. The numbers follow the robot's clock: at most once in 100 cycles one is
-///   left out, for which the robot interpolates, or given twice, of which the robot takes the
-///   first.
+/// - The two clocks differ. The numbers follow the robot's clock: once in 100 cycles one is left
+///   out, for which the robot interpolates, or given twice, of which the robot takes the first.
+///   When the robot's clock has jumped it is up to every fourth.
 /// - The loop may be late by as long as play-out and lease bear: the numbers go on with the clock,
 ///   the robot interpolates or holds, and the twin makes the cycles up. The twin has a clock of its
 ///   own, without gaps.
@@ -80,8 +80,8 @@ class LiveLink final : public OperatorEnd {
   std::uint64_t late_ = 0;             // cycles that the loop left out before this one
   std::int64_t least_lead_ = 0;        // of the numbers before the robot's cycles, lately
   std::uint64_t led_ = 0, count_ = 0;  // states and cycles, lately
-  std::int64_t drift_ = 0;             // what the next number is corrected by
-  std::int64_t drifted_ = 0;           // all of it
+  std::int64_t owed_ = 0;              // what the next numbers are to be corrected by
+  std::int64_t drifted_ = 0;           // what they were
   std::uint64_t arrived_cycle_ = 0;
 };
 

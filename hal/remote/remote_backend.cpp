@@ -26,9 +26,9 @@ bool RemoteBackend::there() noexcept {
   }
   // One more state comes after `done`, whatever is heard of the lease meanwhile.
   if (fresh_ || (!left_in_ && (ending_ || lost_))) return true;
-  const std::int64_t silent_ns =
-      clock_ns(CLOCK_MONOTONIC) - heard_ns_.load(std::memory_order_relaxed);
-  if (static_cast<double>(silent_ns) * 1e-9 > config_.server_timeout_s) gone_ = true;
+  const auto timeout_ns = static_cast<std::int64_t>(config_.server_timeout_s * 1e9);
+  const std::int64_t heard_ns = heard_ns_.load(std::memory_order_relaxed);
+  if (silence_.of(heard_ns, clock_ns(CLOCK_MONOTONIC), timeout_ns / 4) > timeout_ns) gone_ = true;
   return gone_ || (config_.interrupted && config_.interrupted());
 }
 

@@ -15,6 +15,7 @@
 #include "base/result.hpp"
 #include "base/triple_buffer.hpp"
 #include "hal/backend.hpp"
+#include "hal/remote/lease.hpp"
 #include "hal/remote/link.hpp"
 #include "rt/histogram.hpp"
 
@@ -152,6 +153,7 @@ class RemoteBackend final : public hal::Backend {
   TripleBuffer<Seen> newest_;
 
   // The loop's.
+  Silence silence_;  // of the server
   bool fresh_ = false, first_ = true, pending_ = false, live_ = false, done_ = false;
   std::uint64_t cycles_ahead_ = 0;  // of this loop, the server's count is
   std::int64_t ahead_ns_ = 0;

@@ -208,9 +208,9 @@ bool Server::unpack(const tandem_msgs::LinkCommand& sample) {
   return true;
 }
 
-OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) const noexcept TANDEM_RT {
-  const std::int64_t now = clock_ns(CLOCK_MONOTONIC);
-  if (now - lease_.heard_ns() > ns(config_.lease_timeout_s)) return OwnerLoss::kSilent;
+OwnerLoss Server::loss_of(const hal::PortView& view, std::uint64_t owner) noexcept TANDEM_RT {
+  const std::int64_t now = clock_ns(CLOCK_MONOTONIC), lease = ns(config_.lease_timeout_s);
+  if (silence_.of(lease_.heard_ns(), now, lease / 4) > lease) return OwnerLoss::kSilent;
   const Taken& taken = newest_.front();
   if (config_.lockstep) {
     const bool there = taken.client == owner && taken.cycle == view.time.cycle;

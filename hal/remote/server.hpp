@@ -128,7 +128,7 @@ class Server final : public hal::RemoteCommandPort {
   void keep_for_playout(const Taken& taken);
   void note_stops(const tandem_msgs::LinkCommand& sample);
   [[nodiscard]] hal::OwnerLoss loss_of(const hal::PortView& view,
-                                       std::uint64_t owner) const noexcept TANDEM_RT;
+                                       std::uint64_t owner) noexcept TANDEM_RT;
   void play(const hal::PortView& view, bool begins, hal::RemoteCommand& wish) noexcept TANDEM_RT;
   void measure(const hal::PortView& view, const Taken& taken) noexcept TANDEM_RT;
 
@@ -166,6 +166,7 @@ class Server final : public hal::RemoteCommandPort {
   std::uint64_t played_cycle_ = 0;
   hal::CommandImage played_, received_;
   std::int64_t answered_ns_ = 0, waits_since_ns_ = 0;
+  Silence silence_;  // of the owner
   rt::Histogram age_, age_cycles_;
 
   // The sending thread's.

@@ -23,6 +23,20 @@ TEST(Lease, HasOneOwnerAtATime) {
   EXPECT_EQ(lease.given(), 2U);
 }
 
+/// A process that was stopped does not blame those whom it did not hear meanwhile.
+TEST(Silence, CountsTheTimeInWhichTheListenerWasAwake) {
+  constexpr std::int64_t kMost = 250;
+  Silence silence;
+  std::int64_t now = 1000;
+  EXPECT_EQ(silence.of(1000, now, kMost), 0);
+  for (; now < 1500; ++now) EXPECT_EQ(silence.of(1000, now, kMost), now - 1000);
+  EXPECT_EQ(silence.of(1000, now, kMost), 500);
+  now += 100'000;  // it stood
+  EXPECT_EQ(silence.of(1000, now, kMost), 500 + kMost);
+  EXPECT_EQ(silence.of(now, now + 1, kMost), 0) << "heard";
+  EXPECT_EQ(silence.of(now, now + 101, kMost), 100);
+}
+
 TEST(TripleBuffer, GivesWhatWasPublishedLast) {
   TripleBuffer<int> box(0);
   EXPECT_FALSE(box.refresh());

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -50,6 +51,40 @@ inline std::unique_ptr<dds::Participant> participant(const std::string& node) {
   EXPECT_TRUE(made) << made.error().to_string();
   return std::move(*made);
 }
+
+/// The system's, in which a loop can be made to oversleep.
+class SleepyClock final : public rt::Clock {
+ public:
+  /// Called by the loop that sleeps, in its `count`th sleep. Before it begins.
+  void at_sleep(std::uint64_t count, std::function<void()> call) {
+    count_ = count;
+    call_ = std::move(call);
+  }
+  /// The next sleep takes so much longer. For any thread.
+  void oversleep(std::int64_t by_ns) { oversleep_ns_ = by_ns; }
+
+  std::int64_t now_ns() noexcept override { return clock_.now_ns(); }
+  void sleep_until(std::int64_t deadline_ns) noexcept override {
+    clock_.sleep_until(deadline_ns + longer());
+  }
+  void sleep_until_rung(std::int64_t deadline_ns, const rt::Doorbell& bell,
+                        std::uint32_t seen) noexcept override {
+    const std::int64_t longer_ns = longer();
+    if (longer_ns > 0) return clock_.sleep_until(deadline_ns + longer_ns);
+    clock_.sleep_until_rung(deadline_ns, bell, seen);
+  }
+
+ private:
+  std::int64_t longer() {
+    if (++sleeps_ == count_) call_();
+    return oversleep_ns_.exchange(0);
+  }
+
+  rt::WallClock clock_;
+  std::uint64_t sleeps_ = 0, count_ = 0;
+  std::function<void()> call_;
+  std::atomic<std::int64_t> oversleep_ns_{0};
+};
 
 /// What a run was, cycle by cycle; the room for it is there before.
 class Record final : public hal::CycleObserver {
@@ -127,7 +162,7 @@ class Served {
   hal::RobotConfig robot;
   runtime::test::FirstOrderRobot backend;
   runtime::ControllerHost host;
-  rt::WallClock clock;
+  SleepyClock clock;
   std::unique_ptr<dds::Participant> participant_;
   std::unique_ptr<Server> server;
   std::shared_ptr<runtime::OwnerController> owner;

@@ -44,20 +44,6 @@ class StrictTwin final : public runtime::test::FirstOrderRobot {
   std::int64_t last_ns_ = 0;
 };
 
-/// Oversleeps once.
-class PausedClock final : public rt::Clock {
- public:
-  std::uint64_t paused_sleep = 0;  // 0: none
-  std::int64_t now_ns() noexcept override { return clock_.now_ns(); }
-  void sleep_until(std::int64_t deadline_ns) noexcept override {
-    clock_.sleep_until(deadline_ns + (++sleeps_ == paused_sleep ? 30 * kPeriod_ns : 0));
-  }
-
- private:
-  rt::WallClock clock_;
-  std::uint64_t sleeps_ = 0;
-};
-
 /// An operator's loop with a sine on joint 0.
 class Operator {
  public:
@@ -110,7 +96,7 @@ class Operator {
   runtime::ControllerHost host;
   Record record;
   std::unique_ptr<LiveLink> link;
-  PausedClock clock;
+  SleepyClock clock;
   std::unique_ptr<RobotCycle> cycle;
 };
 
@@ -142,13 +128,27 @@ TEST(LiveLink, APauseOfTheOperatorsProcessEndsNothing) {
   Served served(robots_end(), real_time());
   served.begin();
   Operator one(true, 1200);
-  one.clock.paused_sleep = 700;
+  one.clock.at_sleep(700, [&one] { one.clock.oversleep(30 * kPeriod_ns); });
   one.cycle->run();
   served.end();
   EXPECT_GE(one.cycle->loop().skipped, 20U);
   for (const runtime::Fault& fault : one.cycle->faults()) ADD_FAILURE() << fault.text;
   for (const runtime::Fault& fault : served.cycle->faults()) ADD_FAILURE() << fault.text;
   EXPECT_LT(one.link->figures().worst_prediction_rad, 0.05);
+}
+
+/// The process of a simulated robot stood, and its clock with it.
+TEST(LiveLink, TheNumbersFollowAJumpOfTheRobotsClock) {
+  Served served(robots_end(), real_time());
+  served.begin();
+  Operator one(true, 2000);
+  one.clock.at_sleep(500, [&served] { served.clock.oversleep(150 * kPeriod_ns); });
+  one.cycle->run();
+  served.end();
+  for (const runtime::Fault& fault : one.cycle->faults()) EXPECT_FALSE(fault.latched) << fault.text;
+  EXPECT_TRUE(served.cycle->faults().empty());
+  EXPECT_LT(one.link->figures().clock_cycles, -100);
+  EXPECT_LT(one.link->figures().unanswered_cycles, 500U) << "the robot follows again";
 }
 
 /// Half a percent is a hundred times what quartz has.
