@@ -457,6 +457,8 @@ Diagnostics connect_remote(Composition& c) {
                            std::filesystem::path(e.file).filename().string(), ::getpid()),
        .lockstep = e.hal.lockstep,
        .own_pace = own_pace,
+       .playout_cycles =
+           own_pace ? runtime::playout_cycles(*e.teleoperation, e.loop.period_ns) + 1 : 0,
        .before_asking = [&c] { have_admitted(*c.participant); },
        .interrupted = [] { return rt::stop_requested(); },
        .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});

@@ -22,9 +22,11 @@
 namespace tandem::remote {
 
 struct ClientConfig {
-  std::string name;                          ///< for people: "tandem run squat.toml, process 312"
-  bool lockstep = false;                     ///< must be the server's
-  bool own_pace = false;                     ///< the loop waits for no state; not in lockstep
+  std::string name;       ///< for people: "tandem run squat.toml, process 312"
+  bool lockstep = false;  ///< must be the server's
+  bool own_pace = false;  ///< the loop waits for no state; not in lockstep
+  /// From a command's number to the state that shows it, as the server has it; 0: no play-out.
+  std::uint64_t playout_cycles = 0;
   std::uint64_t server = 0;                  ///< Server::number(); 0: the only one there is
   double connect_timeout_s = 10;             ///< for a server to be found, and to give the lease
   double server_timeout_s = 3;               ///< a server that is not heard for so long is gone
@@ -41,7 +43,9 @@ class RemoteBackend final : public hal::Backend {
   /// Finds the server, compares robots, takes the lease.
   /// Errors: what DDS refuses; no server in time, or several while none is named; another robot
   /// (what differs is named); in lockstep and the server not, or the other way round; owned by
-  /// somebody else, who is named.
+  /// somebody else, who is named; another play-out, or none. A server that stands sends no state,
+  /// which says the last: then it is found with the first one, and the server is as one that is
+  /// gone.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                                       const hal::Robot& robot,
                                                                       const Identity& identity,
@@ -78,6 +82,8 @@ class RemoteBackend final : public hal::Backend {
   [[nodiscard]] const rt::Histogram& turn_around() const noexcept { return turn_around_; }
 
   // With own_pace.
+  /// Before the first exchange(): where the robot stands. False: the server has sent no state yet.
+  [[nodiscard]] bool first_state(hal::StateImage& state);
   /// Sends a command whose cycle() is its number; exchange() then has none to send. May block.
   void post(const hal::CommandImage& command) noexcept;
   /// A state has come in this cycle.
@@ -120,6 +126,8 @@ class RemoteBackend final : public hal::Backend {
   RemoteBackend(Endpoints endpoints, const hal::Robot& robot, ClientConfig config);
   [[nodiscard]] Status find_server(const Identity& identity);
   [[nodiscard]] Status take_lease();
+  [[nodiscard]] Status same_playout();
+  [[nodiscard]] std::string playout_difference() const;
   void ask(Action action);
   void renew();
   void take_told();
@@ -144,6 +152,8 @@ class RemoteBackend final : public hal::Backend {
   std::uint64_t told_count_ = 0;
   bool several_ = false;  // servers were heard before one was chosen
   bool closing_ = false;
+  bool seen_ = false;                           // a state
+  std::optional<std::uint64_t> other_playout_;  // than this one's: the server's
   std::optional<std::uint64_t> left_in_;  // in lockstep: the server's cycle that `done` answers
   // Written by DDS' threads, read by any.
   std::atomic<std::uint64_t> run_{0};

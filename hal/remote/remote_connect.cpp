@@ -15,6 +15,8 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 using hal::StopCategory;
 constexpr double kLongestLease_s = 1e9;  // that a clock can count
+/// For the first state, of a server that is connected: in lockstep and paused it sends none.
+constexpr auto kFirstState = std::chrono::milliseconds(500);
 constexpr auto kAgain = std::chrono::milliseconds(100);
 /// For a second server, of which each is heard ten times a second.
 constexpr auto kLookAround = std::chrono::milliseconds(300);
@@ -95,6 +97,7 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
       config));
   if (Status found = made->find_server(identity); !found) return std::unexpected(found.error());
   if (Status leased = made->take_lease(); !leased) return std::unexpected(leased.error());
+  if (Status same = made->same_playout(); !same) return std::unexpected(same.error());
   return made;
 }
 
@@ -122,7 +125,7 @@ RemoteBackend::~RemoteBackend() {
   if (renewing_.joinable()) renewing_.join();
   on_told_.reset();
   on_states_.reset();
-  if (!leased_ || gone_) return;
+  if (!leased_ || (gone_ && !other_playout_)) return;
   ask(Action::kRelease);
   dds_wait_for_acks(endpoints_.requests.endpoint().get(), DDS_MSECS(500));
 }
@@ -173,7 +176,8 @@ Status RemoteBackend::take_lease() {
     if (config_.interrupted && config_.interrupted()) return interrupted();
     if (SteadyClock::now() > deadline) {
       return fail("the server gave no lease within " + seconds(config_.connect_timeout_s),
-                  "is it still running? Is this its user, on its machine? [remote] trust "
+                  "is it still running? Is this its user, on its machine, and its control socket "
+                  "where it is looked for (no --socket there)? Else [remote] trust "
                   "(docs/security.md)");
     }
     const std::uint64_t before = told_count_;
@@ -186,6 +190,34 @@ Status RemoteBackend::take_lease() {
   leased_ = true;
   renewing_ = std::thread([this] { renew(); });
   return {};
+}
+
+/// Both ends count with one play-out, or with none.
+Status RemoteBackend::same_playout() {
+  std::unique_lock lock(mutex_);
+  news_.wait_for(lock, kFirstState, [this] { return seen_ || other_playout_; });
+  if (!other_playout_) return {};
+  return fail("the server's link is not this one: " + playout_difference(),
+              "give both ends the same [teleoperation], or neither");
+}
+
+/// @pre the mutex is held
+std::string RemoteBackend::playout_difference() const {
+  const auto words = [](std::uint64_t cycles) {
+    return cycles == 0 ? std::string("no [teleoperation]")
+                       : "[teleoperation] with effects " + std::to_string(cycles) +
+                             " cycles after a command's number";
+  };
+  return "there is " + words(*other_playout_) + " there, and " + words(config_.playout_cycles) +
+         " here";
+}
+
+bool RemoteBackend::first_state(hal::StateImage& state) {
+  const std::lock_guard lock(mutex_);
+  (void)newest_.refresh();
+  if (!newest_.front().is_one) return false;
+  state.assign(newest_.front().state);
+  return true;
 }
 
 void RemoteBackend::ask(Action action) {
@@ -250,7 +282,9 @@ void RemoteBackend::take_states() {
     const std::lock_guard lock(mutex_);
     endpoints_.state.take([this](const tandem_msgs::LinkState& sample, const auto& info) {
       const bool from_it = sample.run == run_ && server_ && state_senders_.of(info) == server_;
-      if (from_it && unpack(sample)) newest_.publish();
+      if (!from_it || !unpack(sample)) return;
+      newest_.publish();
+      seen_ = true;
     });
   }
   news_.notify_all();
@@ -260,6 +294,11 @@ void RemoteBackend::take_states() {
 bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   // The server goes on by itself after `done`: its next state is this run's last.
   if (left_in_ && sample.cycle > *left_in_ + 1) return false;
+  if (sample.playout_cycles != config_.playout_cycles) {
+    other_playout_ = sample.playout_cycles;
+    gone_ = true;
+    return false;
+  }
   Seen& to = newest_.back();
   if (sample.state._length != to.state.bytes().size() ||
       sample.command._length != to.command.bytes().size() || sample.causes._length != joints_) {
@@ -287,6 +326,7 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
 
 std::string RemoteBackend::status_text() const {
   const std::lock_guard lock(mutex_);
+  if (other_playout_) return "the server's link is not this one: " + playout_difference();
   if (gone_) {
     return "no message from the server for " + seconds(config_.server_timeout_s);
   }

@@ -26,6 +26,8 @@ namespace tandem::remote {
 /// Commands take effect so many cycles after the robot's cycle that their numbers are, which is the
 /// one that their owner saw when it gave them.
 struct PlayoutConfig {
+  /// To the first state of the robot that shows it.
+  [[nodiscard]] std::uint64_t shown_after_cycles() const noexcept { return delay_cycles + 1; }
   std::uint64_t delay_cycles = 0;    ///< there and back: what comes later has no effect
   std::uint64_t brake_cycles = 250;  ///< in which references come to rest when commands end
 };

@@ -157,6 +157,7 @@ void Server::write_state(const Shown& shown, std::span<const std::byte> state,
   sample.answered_cycle = shown.answered_cycle;
   sample.answered_ns = shown.answered_ns;
   sample.source_cycle = shown.source_cycle;
+  sample.playout_cycles = config_.playout ? config_.playout->shown_after_cycles() : 0;
   sample.phase = shown.phase;
   sample.code = shown.code;
   sample.reaction = shown.reaction;

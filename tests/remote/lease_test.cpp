@@ -441,6 +441,33 @@ TEST(Connect, TellsWhoHasTheRobotAndWhatDiffers) {
   EXPECT_TRUE(next) << next.error().to_string();
 }
 
+/// Numbers and effects of commands would mean different things at the two ends.
+TEST(Connect, TellsWhenTheTwoEndsHaveDifferentPlayOuts) {
+  for (const std::uint64_t there : {0, 100}) {
+    ServerConfig server;
+    if (there > 0) server.playout = {.delay_cycles = there - 1, .brake_cycles = 50};
+    Served served(server, {.loop = {.rate = 1.0}});
+    served.begin();
+    const auto client = participant("client");
+    ClientConfig config;
+    config.own_pace = there == 0;
+    config.playout_cycles = there == 0 ? 70 : 0;
+    const auto refused = Owner::connect(*client, config, served.robot);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().message,
+              there == 0 ? "the server's link is not this one: there is no [teleoperation] there, "
+                           "and [teleoperation] with effects 70 cycles after a command's number "
+                           "here"
+                         : "the server's link is not this one: there is [teleoperation] with "
+                           "effects 100 cycles after a command's number there, and no "
+                           "[teleoperation] here");
+    EXPECT_TRUE(eventually([&] { return served.server->lease().owner() == 0; }));
+    config.playout_cycles = there;
+    const auto same = Owner::connect(*client, config, served.robot);
+    EXPECT_TRUE(same) << same.error().to_string();
+  }
+}
+
 TEST(Connect, RefusesToChooseBetweenServersUnlessOneIsNamed) {
   Served served({}, {.loop = {.rate = 1.0}});
   Served other({}, {.loop = {.rate = 1.0}});
