@@ -1,6 +1,10 @@
 #include "apps/run/operator_link.hpp"
 
+#include <fmt/core.h>
+
+#include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
@@ -69,30 +73,69 @@ std::expected<remote::OperatorEnd::End, Diagnostics> twin_of(const Composition& 
 
 }  // namespace
 
-Diagnostics put_link_between(Composition& c) {
+std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
+    const Composition& c, std::unique_ptr<hal::Backend> robot) {
   const runtime::Experiment& e = c.experiment;
-  if (!e.teleoperation) return {};
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
   auto side = robot_side_of(c);
-  if (!side) return side.error();
-  if (auto shared = shared_joint(c, side->get()); !shared.empty()) return shared;
-  remote::OperatorEnd::End robot{std::move(c.backend), std::move(*side)};
+  if (!side) return std::unexpected(side.error());
+  if (auto shared = shared_joint(c, side->get()); !shared.empty()) return std::unexpected(shared);
   remote::OperatorEnd::End twin;
   if (config.predict) {
     auto made = twin_of(c);
-    if (!made) return made.error();
+    if (!made) return std::unexpected(made.error());
     twin = std::move(*made);
   }
-  auto link = std::make_unique<remote::TeleBackend>(hal::robot_of(e.robot), std::move(robot),
-                                                    std::move(twin), config, e.loop.period_ns);
-  c.tele = link.get();
-  c.backend = std::move(link);
+  return std::make_unique<remote::TeleBackend>(
+      hal::robot_of(e.robot), remote::OperatorEnd::End{std::move(robot), std::move(*side)},
+      std::move(twin), config, e.loop.period_ns);
+}
+
+Diagnostics put_link_between(Composition& c) {
+  if (!c.experiment.teleoperation) return {};
+  auto link = link_to(c, std::move(c.backend));
+  if (!link) return link.error();
+  c.tele = link->get();
+  c.backend = std::move(*link);
   return {};
 }
 
+namespace {
+
+/// Where the robot stands when that is not where the experiment begins.
+void warn_elsewhere(Composition& c, remote::RemoteBackend& robot) {
+  constexpr double kElsewhere_rad = 0.05;  // or m: more than a robot sags under its weight
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  const runtime::Experiment& e = c.experiment;
+  const hal::PostureConfig* posture = e.robot.posture(e.posture);
+  hal::StateImage state(e.robot.shape());
+  if (posture == nullptr || !robot.first_state(state)) return;
+  std::size_t most = 0;
+  const auto away = [&](std::size_t joint) {
+    return std::abs(state.position_rad()[joint] - posture->position_rad[joint]);
+  };
+  for (std::size_t j = 1; j < e.robot.joints.size(); ++j) {
+    if (away(j) > away(most)) most = j;
+  }
+  if (away(most) <= kElsewhere_rad) return;
+  const hal::JointConfig& joint = e.robot.joints[most];
+  c.warnings.push_back(
+      {.message = fmt::format("the robot does not stand in the posture '{}': {} is {} away, and "
+                              "more may be. The controllers will lead it from where it is",
+                              e.posture, joint.name,
+                              joint.slides ? fmt::format("{:.3f} m", away(most))
+                                           : fmt::format("{:.1f} deg", away(most) * kDegrees)),
+       .hint = "take it there first (tandem joint move at the server), or see that its way is free",
+       .file = e.file,
+       .key = "posture"});
+}
+
+}  // namespace
+
 Diagnostics operate_live(Composition& c, std::unique_ptr<remote::RemoteBackend> robot) {
   const runtime::Experiment& e = c.experiment;
+  warn_elsewhere(c, *robot);
   remote::TeleConfig config = e.teleoperation->link;
   config.seed = e.seed;
   const auto delay_ns = static_cast<std::int64_t>(1e9 * config.down.delay_s);

@@ -2,6 +2,8 @@
 // Layer: apps/run.  Thread: main.
 #pragma once
 
+#include <expected>
+#include <memory>
 #include <string>
 
 #include "apps/run/composition.hpp"
@@ -18,12 +20,18 @@ namespace tandem::apps {
 /// simulated.
 [[nodiscard]] Diagnostics put_link_between(Composition& c);
 
+/// A TeleBackend before `robot`, with a twin and the robot's own controllers. Errors as
+/// put_link_between()'s. @pre the experiment has [teleoperation]
+[[nodiscard]] std::expected<std::unique_ptr<remote::OperatorEnd>, Diagnostics> link_to(
+    const Composition& c, std::unique_ptr<hal::Backend> robot);
+
 /// [[teleoperation.robot_controller]], for the robot's end; null: there are none.
 /// Errors: plugins and parameters.
 [[nodiscard]] std::expected<std::unique_ptr<runtime::LocalControllers>, Diagnostics> robot_side_of(
     const Composition& c);
 
-/// In real time: the backend becomes a LiveLink to `robot`, with a twin. Errors as
+/// In real time: the backend becomes a LiveLink to `robot`, with a twin. A robot that stands
+/// elsewhere than where the experiment begins is one of the composition's warnings. Errors as
 /// put_link_between()'s.
 [[nodiscard]] Diagnostics operate_live(Composition& c,
                                        std::unique_ptr<remote::RemoteBackend> robot);

@@ -10,6 +10,7 @@
 
 #include "apps/control/fault_table.hpp"
 #include "apps/control/rate_limit.hpp"
+#include "apps/run/operator_link.hpp"
 #include "base/clock_ns.hpp"
 #include "base/counted.hpp"
 #include "hal/config/capabilities.hpp"
@@ -28,7 +29,8 @@ struct RunFork final : internal_model::Fork {
   rt::WallClock clock;
   std::unique_ptr<runtime::ControllerHost> controllers;
   std::unique_ptr<estimation::Estimator> estimator;  // as the run's, or null
-  std::unique_ptr<sim::SimRobot> robot;
+  std::unique_ptr<hal::Backend> backend;
+  sim::SimRobot* robot = nullptr;  // the backend, or behind its link
   std::unique_ptr<runtime::RobotCycle> own;
 };
 
@@ -129,8 +131,14 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
   auto robot = sim::SimRobot::create(beside ? e.parallel->robot : e.robot,
                                      (beside ? c.parallel_kernels : c.kernels).get(), sim);
   if (!robot) return std::unexpected(robot.error());
-  fork->robot = std::move(*robot);
+  fork->robot = robot->get();
   fork->truth = &fork->robot->truth();
+  fork->backend = std::move(*robot);
+  if (c.tele != nullptr && !beside) {  // the operator's loop: its link and its robot
+    auto link = link_to(c, std::move(fork->backend));
+    if (!link) return std::unexpected(link.error().front());
+    fork->backend = std::move(*link);
+  }
   runtime::CycleConfig ahead = config;
   ahead.loop.pacing = rt::Pacing::kSimulated;
   ahead.loop.rate = 0.0;
@@ -139,7 +147,7 @@ Result<std::unique_ptr<internal_model::Fork>> make_fork(const Composition& c,
   const bool run_has_truth = c.sim != nullptr && e.sim.ground_truth;
   fork->own = std::make_unique<runtime::RobotCycle>(
       runtime::CycleParts{.robot = e.robot,
-                          .backend = *fork->robot,
+                          .backend = *fork->backend,
                           .controllers = *fork->controllers,
                           .clock = fork->clock,
                           .truth = run_has_truth ? fork->truth : nullptr,

@@ -102,7 +102,7 @@ std::string served_text(const runtime::Experiment& e) {
                      e.remote.lockstep ? "in lockstep, " : "");
 }
 
-/// Boards have clocks of their own.
+/// Boards have clocks of their own, and so has the robot of a server.
 Status check_pace(const Composition& c, const RunOptions& options) {
   const bool simulated = c.backend->pace() == hal::Pace::kSimulatedClock;
   if (options.serves && c.experiment.teleoperation && simulated &&
@@ -110,6 +110,14 @@ Status check_pace(const Composition& c, const RunOptions& options) {
     return fail("a robot behind a link keeps real time, as its operator does", "add --realtime");
   }
   if (simulated) return {};
+  if (c.remote != nullptr) {
+    if (!options.start_paused && options.rate.value_or(1.0) == 1.0) return {};
+    const bool own = c.backend->pace() == hal::Pace::kWallClock;
+    return fail(own ? "the operator's end of a link keeps real time, as the robot's does"
+                    : "the server gives the pace",
+                own ? "leave --rate and --start-paused out"
+                    : "give --rate and --start-paused to `tandem serve`");
+  }
   if (options.start_paused) {
     return fail("boards on a bus keep real time, which cannot be paused",
                 "leave --start-paused out, or add --lockstep for emulated boards");
@@ -406,11 +414,12 @@ Exit run_command(const RunOptions& options) {
   const auto composition = compose(options.experiment, overrides);
   if (!composition) return refuse(composition.error());
   warn_of_inertias((*composition)->experiment);
-  print_warnings((*composition)->warnings);
+  print_warnings(std::exchange((*composition)->warnings, {}));
   rt::install_stop_signals();  // not before: Ctrl-C ends the building of kernels
   outlive_files();
   if (const Diagnostics errors = connect(**composition, options.record_frames); !errors.empty())
     return refuse(errors);
+  print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
   return Session(**composition, options).run();
 }

@@ -157,6 +157,21 @@ TEST_F(Predict, AnswersWithTheLastCycleAndNoMoreRowsThanAClientReads) {
   EXPECT_EQ(end(), 0);
 }
 
+/// The copy has the link, the twin and the robot of the run.
+TEST_F(Predict, OfAnOperatorsRunIsWhatItsLoopWillSee) {
+  edit("hold.toml", "[[controller]]",
+       "[teleoperation.up]\ndelay_s = 0.1\njitter_s = 0.01\n[teleoperation.down]\n"
+       "delay_s = 0.1\nloss = 0.1\n[[controller]]");
+  begin("");
+  const Outcome outcome = to_run("predict --horizon 0.5 --json -");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto answer = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(answer["end"], "horizon");
+  EXPECT_EQ(answer["cycles"], 500);
+  EXPECT_TRUE(answer["faults"].empty());
+  EXPECT_EQ(end(), 0);
+}
+
 TEST_F(Predict, OfARunThatIsPausedSaysSo) {
   begin("");
   EXPECT_EQ(to_run("clock pause").status, 0);

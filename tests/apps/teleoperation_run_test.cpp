@@ -148,6 +148,32 @@ TEST_F(TeleoperationRun, IsNoRecordingToIdentifyFrom) {
   EXPECT_NE(found.err.find("what a tele-operator saw"), std::string::npos) << found.err;
 }
 
+/// As after another operator. And a rate is refused for the reason that there is.
+TEST_F(TeleoperationRun, TellsAnOperatorThatTheRobotStandsElsewhere) {
+  const std::string plain = read_text(folder_ / "trajectory.toml");
+  const std::size_t at = plain.find("[[controller]]");
+  write_text(folder_ / "served.toml", plain.substr(0, at) +
+                                          "[remote]\nlease_timeout_s = 30.0\n[teleoperation]\n" +
+                                          plain.substr(at));
+  write_text(folder_ / "other.toml", read_text(folder_ / "robot.toml"));
+  edit("other.toml", "joint1 = 0.5", "joint1 = 0.3");
+  write_text(folder_ / "operated.toml", read_text(folder_ / "served.toml"));
+  edit("operated.toml", "\"robot.toml\"", "\"other.toml\"");
+  const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
+  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const std::string run = program + "run operated.toml" + domain + " --hal dds --no-log -q ";
+  const std::string both = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
+                           domain + " --realtime --once --no-log -q 2>serve.err & " + run +
+                           "--rate 0.5 2>rate.err; " + run +
+                           "--duration 0.3 --realtime --no-socket 2>owner.err; wait; } </dev/null";
+  ASSERT_EQ(std::system(both.c_str()), 0);
+  const std::string told = read_text(folder_ / "owner.err"), rate = read_text(folder_ / "rate.err");
+  EXPECT_NE(told.find("the robot does not stand in the posture 'ready': joint1 is 11."),
+            std::string::npos)
+      << told;
+  EXPECT_NE(rate.find("the operator's end of a link keeps real time"), std::string::npos) << rate;
+}
+
 TEST_F(TeleoperationRun, NeedsRealTimeAtBothEnds) {
   const std::string plain = read_text(folder_ / "trajectory.toml");
   const std::size_t at = plain.find("[[controller]]");
