@@ -109,7 +109,7 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
   Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
   const std::vector<int> feet = feet_of_wrenches(run, kernels);
   const bool ground_known = run.motion_known() || run.robot.contact.feet.empty();
-  for (std::size_t row = 0; row < run.rows_before_fault(); row += stride) {
+  for (std::size_t row = 0; row < run.rows_before_stop(); row += stride) {
     add_row(run, row, kernels, *order, *loops, motion);
     if (ground_known) motion.wrenches.push_back(ground_wrenches(run, feet, row));
     curve.x.push_back(run.time_s[row]);

@@ -21,18 +21,20 @@
 namespace tandem::report {
 namespace {
 
-/// What, which joint, when: of the first few, which the others mostly follow from.
+/// What, which joint, when: of the first few, which the others mostly follow from, and of the stop.
 void add_faults(const RunData& run, const std::string& side, Facts& facts) {
-  constexpr std::size_t kMost = 5;
-  for (std::size_t i = 0; i < std::min(kMost, run.faults.size()); ++i) {
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < run.faults.size(); ++i) {
     const RunFault& fault = run.faults[i];
+    if (i >= kFaultsShown && &fault != run.stop()) {
+      ++more;
+      continue;
+    }
     facts.emplace_back("fault" + side,
                        fmt::format("{}{}{}, at {:.3f} s", fault.joint,
                                    fault.joint.empty() ? "" : ": ", fault.text, fault.time_s));
   }
-  if (run.faults.size() > kMost) {
-    facts.emplace_back("fault" + side, fmt::format("{} more", run.faults.size() - kMost));
-  }
+  if (more > 0) facts.emplace_back("fault" + side, fmt::format("{} more", more));
 }
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
@@ -51,7 +53,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   const double start_s = run.time_s.front();
   const double ran_s =
-      run.controllers_ran ? run.time_s[run.rows_before_fault() - 1] - start_s : 0.0;
+      run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   if (run.controllers_ran) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
@@ -71,7 +73,7 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
                   "and the largest measured torque. The worst first.",
                   {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
                   {}};
-  if (!run.faults.empty()) table.caption += " Until the first fault.";
+  if (run.stop() != nullptr) table.caption += " Until the fault that stopped it.";
   const std::vector<Tracking> joints = run.tracking();
   const bool all_slide = !joints.empty() && std::ranges::all_of(joints, &Tracking::slides);
   const bool mixed = !all_slide && std::ranges::any_of(joints, &Tracking::slides);

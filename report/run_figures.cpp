@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "report/logged_torque.hpp"
 #include "report/posture.hpp"
@@ -81,17 +82,24 @@ std::string side_of(std::size_t index, const OtherRuns& others) {
 constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
 static_assert(std::size(kOthers) == kMostOthers);
 
-/// What every figure over time has: its axis, and where runs ended in a fault. A fault's spike may
-/// be there before the loop knows of the fault: it does not widen the plots.
+/// What every figure over time has: its axis, and where runs had faults. The spike of one that
+/// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   constexpr double kSpike_s = 0.02;
   figure.x_label = "time since the first SYNC [s]";
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
-    if (one.faults.empty()) continue;
-    const double fault_s = one.faults.front().time_s + one.drawn_later_s;
-    figure.marks.push_back({"fault" + side_of(i, others), fault_s});
-    figure.range_until_x = std::min(figure.range_until_x, fault_s - kSpike_s);
+    const RunFault* const stop = one.stop();
+    std::string reported = "fault, reported" + side_of(i, others);
+    for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
+      const RunFault& fault = one.faults[f];
+      if (fault.stops || (stop != nullptr && fault.time_s > stop->time_s)) continue;
+      figure.marks.push_back({std::exchange(reported, ""), fault.time_s + one.drawn_later_s});
+    }
+    if (stop == nullptr) continue;
+    const double stop_s = stop->time_s + one.drawn_later_s;
+    figure.marks.push_back({"fault" + side_of(i, others), stop_s});
+    figure.range_until_x = std::min(figure.range_until_x, stop_s - kSpike_s);
   }
 }
 
@@ -264,7 +272,7 @@ bool squats(const RunData& run) {
   if (!run.truth() || !run.robot.model.floating_base) return false;
   const auto first = run.base[2].begin();
   const auto [low, high] =
-      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_fault()));
+      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_stop()));
   return *high - *low > 0.02 * std::abs(*first);
 }
 
@@ -274,7 +282,7 @@ bool squats(const RunData& run) {
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
   const bool base = squats(run);
   std::vector<double> depth = base ? run.base[2] : run.position_rad[at(joint)];
-  depth.resize(run.rows_before_fault());
+  depth.resize(run.rows_before_stop());
   const std::size_t last = depth.size() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
@@ -294,7 +302,7 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const bool moves = base || std::abs(turn - start) > kMoves;
   if (suffix.empty() && moves) add("half way", half);
   if (moves) add(base ? "lowest" : "farthest", lowest);
-  if (suffix.empty()) add(run.faults.empty() ? "end" : "fault", last);
+  if (suffix.empty()) add(run.stop() == nullptr ? "end" : "fault", last);
   return samples;
 }
 

@@ -222,7 +222,7 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
   }
   run.reference_rad.assign(8, {0.0, 0.0, 0.0, 0.0});
   run.faults = {{1.30, "panda_finger_joint1", "a short circuit"}, {1.40, "", "more"}};
-  EXPECT_EQ(run.rows_before_fault(), 2U);
+  EXPECT_EQ(run.rows_before_stop(), 2U);
   for (const Tracking& one : run.tracking()) {
     EXPECT_EQ(one.max_rad, 0.0);
     EXPECT_EQ(one.max_torque_Nm, 0.0);
@@ -236,6 +236,22 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
     EXPECT_EQ(figure.curves[0].x, run.time_s) << "what followed is drawn";
   }
   EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
+}
+
+// It had been taken for the run's end.
+TEST_F(Gripper, AFaultThatIsOnlyReportedEndsNothing) {
+  run.time_s = {1.25, 1.30, 1.35, 1.40};
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm}) {
+    columns->assign(8, {0.0, 0.0, 9.0, 9.0});
+  }
+  run.faults = {{1.30, "panda_finger_joint1", "collision", false}, {1.35, "", "collision", false}};
+  EXPECT_EQ(run.rows_before_stop(), 4U);
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  ASSERT_EQ(figures[0].marks.size(), 2U);
+  EXPECT_EQ(figures[0].marks[0].label, "fault, reported");
+  EXPECT_EQ(figures[0].marks[1].x, 1.35);
+  EXPECT_EQ(figures[0].range_until_x, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(figures[2].notes.back().text, "1.40 s");
 }
 
 TEST_F(Gripper, TellsWhichJointsSlide) {
