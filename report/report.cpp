@@ -281,6 +281,8 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   if (!wrenches) return std::unexpected(wrenches.error());
   figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
                  std::make_move_iterator(wrenches->end()));
+  for (Figure& figure : figures)
+    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
   if (const Status s = write_page(page, figures, folder); !s) {

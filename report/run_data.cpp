@@ -9,6 +9,7 @@
 #include "base/toml_reader.hpp"
 #include "log/run_window.hpp"
 #include "model/urdf.hpp"
+#include "report/figure.hpp"
 
 namespace tandem::report {
 namespace {
@@ -408,7 +409,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   if (const Status s = read_truth(*file, kTruth, window, run); !s)
     return std::unexpected(s.error());
   if (const Status s = read_estimate(*file, window, run); !s) return std::unexpected(s.error());
-  run.step_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.rows() - 1);
+  run.step_s = std::max(1e-9, usual_step(run.time_s));
   return run;
 }
 

@@ -64,7 +64,7 @@ struct RunData {
 
   double settle_s = 0.0;         ///< from bring-up to the controllers' start
   bool controllers_ran = true;   ///< false: the rows are those in which they were waited for
-  double step_s = 0.0;           ///< between rows
+  double step_s = 0.0;           ///< between rows, where none is missing
   std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
   double drawn_later_s = 0.0;    ///< added to all times of this run in the figures
   bool drawn_as_replay = false;  ///< so that a replay lies over its recording

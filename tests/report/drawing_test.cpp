@@ -72,6 +72,33 @@ TEST(Decimation, LeavesAShortCurveAsItIs) {
   EXPECT_EQ(decimated(curve, 500).y, curve.y);
 }
 
+// There had been a straight line from the last sample to the next.
+TEST(Gaps, EndALineWhereSamplesAreMissing) {
+  Figure figure = ramp("gap");
+  for (std::size_t i = 50; i < 101; ++i) figure.curves[0].x[i] += 0.045;
+  break_at_gaps(figure);
+  ASSERT_EQ(figure.curves[0].x.size(), 102U);
+  EXPECT_TRUE(std::isnan(figure.curves[0].y[50]));
+  break_at_gaps(figure = ramp("whole"));
+  EXPECT_EQ(figure.curves[0].x.size(), 101U);
+}
+
+TEST(Decimation, KeepsGaps) {
+  Curve curve{"gaps", CurveStyle::kMeasured, {}, {}};
+  for (int i = 0; i < 10'000; ++i) {
+    curve.x.push_back(i);
+    curve.y.push_back(i == 3000 || i == 3005 || i >= 9000 ? NAN : i);
+  }
+  const Curve small = decimated(curve, 500);
+  EXPECT_LE(small.x.size(), 505U);
+  EXPECT_EQ(std::ranges::count_if(small.y, [](double y) { return std::isnan(y); }), 3);
+  for (std::size_t i = 1; i < small.x.size(); ++i) {
+    const bool over = small.x[i - 1] < 3000 && small.x[i] > 3000;
+    EXPECT_FALSE(over) << small.x[i - 1] << " is joined to " << small.x[i];
+  }
+  EXPECT_NEAR(*std::ranges::max_element(small.x), 9000, 1);
+}
+
 TEST(Script, BreaksALineWhereASampleIsMissing) {
   Figure figure = ramp("gap");
   figure.curves[0].y[1] = std::numeric_limits<double>::quiet_NaN();

@@ -105,6 +105,27 @@ TEST_F(TurningLinkage, NeedsTheTorqueThatItsEnergyTells) {
   }
 }
 
+// Accelerations had been differenced over the gap.
+TEST_F(TurningLinkage, HasNoTorqueWhereSamplesAreMissing) {
+  const auto cut = [](std::vector<double>& values) {
+    values.erase(values.begin() + kRows / 3, values.begin() + kRows / 2);
+  };
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm,
+                           &run.reference_rad, &run.base, &run.passive_rad, &run.loop_error}) {
+    for (std::vector<double>& column : *columns) cut(column);
+  }
+  // It turns faster before it: a difference over the gap is a brake.
+  for (std::size_t row = 0; row < kRows / 3; ++row) run.velocity_rad_s[0][row] *= 2.0;
+  cut(run.time_s);
+  const Result<Curve> curve = inverse_dynamics_curve(run, 0, *robot.kernels.get());
+  ASSERT_TRUE(curve.has_value()) << curve.error().to_string();
+  ASSERT_EQ(curve->y.size(), run.rows() + 1);
+  EXPECT_TRUE(std::isnan(curve->y[kRows / 3]));
+  const std::size_t missing = kRows / 2 - kRows / 3;
+  for (std::size_t i = kRows / 3 + 1; i + 20 < curve->y.size(); ++i)
+    EXPECT_NEAR(curve->y[i], torque_Nm[i - 1 + missing], 0.004) << "at " << curve->x[i] << " s";
+}
+
 TEST_F(TurningLinkage, WithoutTruthSaysWhyThereIsNoInverseDynamics) {
   run.base.clear();
   run.passive_rad.clear();
