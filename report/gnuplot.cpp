@@ -217,6 +217,29 @@ std::string read_text(const std::string& file) {
   return text;
 }
 
+/// gnuplot says nothing of a full disk.
+Status check_whole(const std::string& file, std::string_view end) {
+  const std::string text = read_text(file);
+  const std::size_t last = text.find_last_not_of("\r\n");
+  if (text.substr(0, last + 1).ends_with(end)) return {};
+  return std::unexpected(Error{"gnuplot could not write the whole picture",
+                               "check the folder's permissions, the disk's free space and the "
+                               "limit on the size of files (ulimit -f)",
+                               file,
+                               0,
+                               {}});
+}
+
+Status check_pictures(std::span<const Figure> figures, const std::string& folder) {
+  constexpr std::string_view kPngEnd = "IEND\xAE\x42\x60\x82";
+  for (const Figure& figure : figures) {
+    const std::string file = folder + "/" + figure.name;
+    if (Status whole = check_whole(file + ".svg", "</svg>"); !whole) return whole;
+    if (Status whole = check_whole(file + ".png", kPngEnd); !whole) return whole;
+  }
+  return check_whole(folder + "/overview.png", kPngEnd);
+}
+
 }  // namespace
 
 std::string gnuplot_script(std::span<const Figure> figures, const std::string& folder) {
@@ -247,7 +270,11 @@ Status draw(std::span<const Figure> figures, const std::string& folder) {
   // Absolute: gnuplot takes a name that begins with | for a command.
   const std::string path = std::filesystem::absolute(folder).string();
   Status drawn = run_gnuplot(gnuplot_script(figures, path), complaints);
-  if (!drawn && drawn.error().hint.empty()) drawn.error().hint = read_text(complaints);
+  if (!drawn && drawn.error().hint.empty()) {
+    drawn.error().hint = read_text(complaints);
+    drawn.error().file = folder;
+  }
+  if (drawn) drawn = check_pictures(figures, folder);
   std::error_code ignored;
   std::filesystem::remove(complaints, ignored);
   return drawn;
