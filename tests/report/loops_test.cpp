@@ -259,6 +259,19 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
   EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
 }
 
+// They had been those of its own log, beside an axis that has the first one's.
+TEST_F(Gripper, TimesOfAShiftedRunsPosturesAreThoseOfTheAxis) {
+  RunData later = run;
+  for (double& time_s : later.time_s) time_s += 5.0;
+  later.drawn_later_s = -5.0;
+  const Figure posture = figures_of(run, {&later}, nullptr).back();
+  std::vector<std::string> times;
+  for (std::size_t i = 1; i < posture.notes.size(); i += 2) times.push_back(posture.notes[i].text);
+  ASSERT_EQ(times.size() % 2, 0U);
+  const std::size_t each = times.size() / 2;
+  for (std::size_t i = 0; i < each; ++i) EXPECT_EQ(times[i], times[each + i]);
+}
+
 // It had been taken for the run's end.
 TEST_F(Gripper, AFaultThatIsOnlyReportedEndsNothing) {
   run.time_s = {1.25, 1.30, 1.35, 1.40};
