@@ -31,6 +31,12 @@ void add_extremes(const Curve& curve, std::size_t begin, std::size_t end, std::s
 
 }  // namespace
 
+void drop_empty_curves(Figure& figure) {
+  std::erase_if(figure.curves, [](const Curve& curve) {
+    return std::ranges::none_of(curve.y, [](double y) { return std::isfinite(y); });
+  });
+}
+
 double usual_step(std::span<const double> x) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < x.size(); ++i) steps.push_back(x[i] - x[i - 1]);

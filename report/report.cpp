@@ -54,10 +54,12 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   const double start_s = run.time_s.front();
   const double ran_s =
       run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
-  if (run.controllers_ran) {
+  const bool imported = run.info.hal == "import";
+  if (run.controllers_ran && !imported) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
-  facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", ran_s));
+  facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
+                     fmt::format("{:.3f} s", ran_s));
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
@@ -122,7 +124,8 @@ PageTable feet_table(const RunData& run, const std::string& side) {
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
-  page.tables.push_back(tracking_table(run, side));
+  PageTable tracking = tracking_table(run, side);
+  if (!tracking.rows.empty()) page.tables.push_back(std::move(tracking));
   PageTable feet = feet_table(run, side);
   if (!feet.rows.empty()) page.tables.push_back(std::move(feet));
   PageTable loops = loops_table(run, side);
@@ -164,9 +167,13 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
       others.empty()
           ? fmt::format("{}: {}", run.info.robot, std::filesystem::path(run.path).stem().string())
           : fmt::format("{}: {} runs", run.info.robot, others.size() == 1 ? "two" : "three");
-  page.lead = "Times count from the run's first SYNC, as in the log.";
-  page.lead += run.controllers_ran
-                   ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
+  const bool imported = run.info.hal == "import";
+  page.lead = imported ? "Times count from the recording's start, as in the log."
+                       : "Times count from the run's first SYNC, as in the log.";
+  if (!imported)
+    page.lead +=
+        run.controllers_ran
+            ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
                    : " The run ended before its controllers started.";
   add_facts(run, others.empty() ? "" : " A", page.facts);
   page.tables = replays;

@@ -63,6 +63,10 @@ std::vector<int> widest_joints(const RunData& run) {
   return order;
 }
 
+bool has_numbers(const std::vector<double>& values) {
+  return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
+}
+
 bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
@@ -86,7 +90,7 @@ static_assert(std::size(kOthers) == kMostOthers);
 /// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   constexpr double kSpike_s = 0.02;
-  figure.x_label = "time since the first SYNC [s]";
+  figure.x_label = time_label(run);
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
     const RunFault* const stop = one.stop();
@@ -108,7 +112,8 @@ Figure position_figure(const RunData& run, const OtherRuns& others, const Subjec
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "joint_position";
-  figure.title = name + ": position against its reference";
+  figure.title = name + (has_numbers(run.reference_rad[joint]) ? ": position against its reference"
+                                                               : ": position");
   add_time(run, others, figure);
   const bool slides = run.slides(joint);
   const double factor = slides ? kMillimetres : kDegrees;
@@ -237,7 +242,8 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   Figure figure;
   const bool slides = run.slides(joint);
   figure.name = "joint_torque";
-  figure.title = name + (slides ? ": force, measured" : ": torque, measured");
+  const char* const measured = has_numbers(run.torque_Nm[joint]) ? ", measured" : "";
+  figure.title = name + (slides ? ": force" : ": torque") + measured;
   add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
   figure.curves.push_back(curve_of(run, "measured" + side_of(0, others), CurveStyle::kMeasured,
@@ -251,7 +257,7 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   if (!computed) {
     figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
-    figure.title += " and by inverse dynamics";
+    figure.title += *measured != 0 ? " and by inverse dynamics" : " by inverse dynamics";
     figure.curves.push_back(std::move(*computed));
   }
   return figure;
@@ -328,6 +334,11 @@ Subjects subjects_of(const RunData& run) {
   return subjects;
 }
 
+std::string time_label(const RunData& run) {
+  return run.info.hal == "import" ? "time since the recording's start [s]"
+                                  : "time since the first SYNC [s]";
+}
+
 std::vector<double> vertical_force(const RunData& run, int sensor) {
   const hal::SensorConfig& config = run.robot.sensors[at(sensor)];
   const std::size_t first = run.first_channel(at(sensor));
@@ -361,6 +372,8 @@ std::vector<Figure> figures_of(const RunData& run, const OtherRuns& others,
     samples.insert(samples.end(), more.begin(), more.end());
   }
   figures.push_back(posture_figure(run.tree, run.robot, samples));
+  for (Figure& figure : figures) drop_empty_curves(figure);
+  std::erase_if(figures, [](const Figure& figure) { return figure.curves.empty(); });
   return figures;
 }
 

@@ -259,6 +259,26 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
   EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
 }
 
+// An empty frame had been drawn, and "against its reference" stood above none.
+TEST_F(Gripper, OfARecordingOnlyWhatItHasIsDrawnAndNamed) {
+  run.info.hal = "import";
+  run.robot.sensors = {{}};
+  run.robot.sensors[0].name = "flange";
+  run.robot.sensors[0].type = hal::SensorType::kForceTorque;
+  run.robot.sensors[0].link = "panda_link8";
+  const std::vector<double> none(run.rows(), std::numeric_limits<double>::quiet_NaN());
+  run.sensor.assign(run.robot.sensors[0].channels(), none);
+  run.reference_rad.assign(run.position_rad.size(), none);
+  std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  ASSERT_EQ(figures.size(), 3U) << "position, torque, posture";
+  EXPECT_TRUE(figures[0].title.ends_with(": position")) << figures[0].title;
+  EXPECT_EQ(figures[0].curves.size(), 1U);
+  EXPECT_EQ(figures[0].x_label, "time since the recording's start [s]");
+  run.torque_Nm.assign(run.position_rad.size(), none);
+  figures = figures_of(run, {}, nullptr);
+  EXPECT_EQ(figures.size(), 2U) << "position, posture";
+}
+
 // They had been those of its own log, beside an axis that has the first one's.
 TEST_F(Gripper, TimesOfAShiftedRunsPosturesAreThoseOfTheAxis) {
   RunData later = run;
