@@ -68,8 +68,13 @@ struct Figure {
                                                                    ///< follows a fault, does not
                                                                    ///< widen the range of y
   bool log_axes = false;    ///< both logarithmic; only what is positive is drawn
+  double zero_x = 0.0;      ///< of log_axes: where on x the number 0 stands; 0: nowhere
+  bool points = false;      ///< a point at each sample
   bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
 };
+
+/// Removes curves without a number: what a log lacks, as the references of a recording.
+void drop_empty_curves(Figure& figure);
 
 /// The usual distance between neighbours: the median. 0 of less than two.
 [[nodiscard]] double usual_step(std::span<const double> x);

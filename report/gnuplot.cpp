@@ -88,9 +88,10 @@ std::string plot_command(const Figure& figure, std::size_t index) {
   };
   for (std::size_t i = 0; i < figure.curves.size(); ++i) {
     const Curve& curve = figure.curves[i];
-    const bool stick = curve.style >= CurveStyle::kStick;
-    add(fmt::format("{} using 1:2 with {} ls {}", block_name(index, i),
-                    stick ? "linespoints" : "lines", line_style(curve.style)),
+    const bool points = figure.points || curve.style >= CurveStyle::kStick;
+    add(fmt::format("{} using 1:2 with {} ls {}{}", block_name(index, i),
+                    points ? "linespoints" : "lines", line_style(curve.style),
+                    figure.points ? " pt 7 ps 0.7" : ""),
         curve.label);
   }
   for (const Level& level : figure.levels) {
@@ -102,11 +103,24 @@ std::string plot_command(const Figure& figure, std::size_t index) {
   return out + "\n";
 }
 
+/// `set xtics` of chosen numbers. @param zero  where "0" stands; 0: nowhere
+std::string ticks_text(const char* axis, const std::vector<double>& ticks, double zero) {
+  std::string numbers = zero > 0.0 ? fmt::format("\"0\" {:.6g}", zero) : "";
+  for (const double tick : ticks)
+    numbers += fmt::format("{}{:.6g}", numbers.empty() ? "" : ", ", tick);
+  return fmt::format(
+      "set format {0} '%g'\nset {0}tics nomirror ({1}) textcolor rgb '#3a424c'\n", axis, numbers);
+}
+
 std::string axes_text(const Figure& figure, const Axes& axes) {
   std::string out = fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\n",
                                 axes.x.low, axes.x.high, axes.y.low, axes.y.high);
-  out += figure.log_axes ? "set logscale xy\n" : "unset logscale\n";
-  if (figure.log_axes || axes.step == 0.0) {
+  if (figure.log_axes) {
+    return out + "set logscale xy\n" + ticks_text("x", axes.x_ticks, figure.zero_x) +
+           ticks_text("y", axes.y_ticks, 0.0);
+  }
+  out += "unset logscale\n";
+  if (axes.step == 0.0) {
     out += "set format y '%g'\nset ytics nomirror autofreq\n";
   } else {
     out += fmt::format("set format y '%.{}f'\nset ytics nomirror {:.12g},{:.12g},{:.12g}\n",

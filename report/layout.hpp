@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "report/figure.hpp"
 
@@ -28,6 +29,7 @@ struct Axes {
   double step = 0.0;       ///< between numbers of y; 0: gnuplot chooses
   double lowest = 0.0;     ///< of the numbers of y
   int decimals = 0;        ///< of them
+  std::vector<double> x_ticks, y_ticks;  ///< of logarithmic axes, some four or more
   std::size_t widest = 7;  ///< characters of the longest one
 };
 
