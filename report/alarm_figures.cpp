@@ -50,8 +50,7 @@ std::vector<Figure> alarm_figures(const std::string& name, const std::string& ti
     figure.zero_x = none;
     for (std::size_t c = 0; c < std::min(curves.size(), std::size(kStyles)); ++c)
       figure.curves.push_back(
-          drawn(curves[c], kStyles[c], worst ? curves[c].worst_ms : curves[c].median_ms,
-                none));
+          drawn(curves[c], kStyles[c], worst ? curves[c].worst_ms : curves[c].median_ms, none));
   }
   return figures;
 }

@@ -1,5 +1,5 @@
-// Curves broken where samples are missing, and thinned to what a plot can show, with each interval's
-// extremes kept.
+// Curves broken where samples are missing, and thinned to what a plot can show, with each
+// interval's extremes kept.
 #include "report/figure.hpp"
 
 #include <algorithm>

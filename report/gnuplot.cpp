@@ -108,8 +108,8 @@ std::string ticks_text(const char* axis, const std::vector<double>& ticks, doubl
   std::string numbers = zero > 0.0 ? fmt::format("\"0\" {:.6g}", zero) : "";
   for (const double tick : ticks)
     numbers += fmt::format("{}{:.6g}", numbers.empty() ? "" : ", ", tick);
-  return fmt::format(
-      "set format {0} '%g'\nset {0}tics nomirror ({1}) textcolor rgb '#3a424c'\n", axis, numbers);
+  return fmt::format("set format {0} '%g'\nset {0}tics nomirror ({1}) textcolor rgb '#3a424c'\n",
+                     axis, numbers);
 }
 
 std::string axes_text(const Figure& figure, const Axes& axes) {

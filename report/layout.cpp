@@ -22,7 +22,10 @@ std::size_t length(const std::string& text) {
 /// Numbers along a logarithmic axis: powers of ten; more of each decade where these are few.
 std::vector<double> log_ticks(double low, double high) {
   static const std::vector<double> kSteps[] = {
-      {1}, {1, 2, 5}, {1, 1.5, 2, 3, 4, 5, 7}, {1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 6, 7, 8, 9}};
+      {1},
+      {1, 2, 5},
+      {1, 1.5, 2, 3, 4, 5, 7},
+      {1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 6, 7, 8, 9}};
   std::vector<double> ticks;
   for (const std::vector<double>& steps : kSteps) {
     ticks.clear();

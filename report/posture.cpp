@@ -378,7 +378,7 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
   const auto moved = [&](std::size_t s) {
     return row.middle_m[s] - 0.5 * (extents[s].across_m.low + extents[s].across_m.high);
   };
-  const double begin_m = -moved(0) - samples[0].base.p.x();  // the first one's base is at 0
+  const double begin_m = -moved(0) - samples[0].base.p.x();     // the first one's base is at 0
   for (const double edge_m : {begin_m, begin_m + row.end_m}) {  // the outer texts are inside, too
     sticks.trunk.x.push_back(edge_m);
     sticks.trunk.y.push_back(kGap);

@@ -15,8 +15,8 @@ namespace tandem::report {
 /// One moment of a run. Joints stand in the process image's order, the passive ones behind them,
 /// unless nobody knows where those are.
 struct PostureSample {
-  std::string label;  ///< "lowest"
-  double time_s = 0.0;  ///< as the figures over time have it
+  std::string label;      ///< "lowest"
+  double time_s = 0.0;    ///< as the figures over time have it
   model::Placement base;  ///< of the root link in W
   std::vector<double> position_rad;
 };

@@ -52,8 +52,7 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   const double start_s = run.time_s.front();
-  const double ran_s =
-      run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
+  const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
   const bool imported = run.info.hal == "import";
   if (run.controllers_ran && !imported) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
@@ -171,10 +170,9 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
   page.lead = imported ? "Times count from the recording's start, as in the log."
                        : "Times count from the run's first SYNC, as in the log.";
   if (!imported)
-    page.lead +=
-        run.controllers_ran
-            ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
-                   : " The run ended before its controllers started.";
+    page.lead += run.controllers_ran
+                     ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
+                     : " The run ended before its controllers started.";
   add_facts(run, others.empty() ? "" : " A", page.facts);
   page.tables = replays;
   add_tables(run, others.empty() ? "" : " A", page);

@@ -292,9 +292,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const std::size_t last = depth.size() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back(
-        {what + suffix, run.time_s[row] + run.drawn_later_s, run.base_placement(row),
-         run.positions(row)});
+    samples.push_back({what + suffix, run.time_s[row] + run.drawn_later_s, run.base_placement(row),
+                       run.positions(row)});
   };
   const double start = depth.front();
   const auto far = std::ranges::max_element(

@@ -124,9 +124,8 @@ Exit log_import_command(const LogOptions& options) {
   const Result<std::string> output = output_of(options, robot->config.name);
   if (!output) return refuse(output.error());
   Draft draft = Draft::file(*output);
-  auto summary =
-      log::import_log({options.files, options.map, draft.path()}, robot->config,
-                      info_of(*robot, options.robot), text_of(robot->config.model.urdf));
+  auto summary = log::import_log({options.files, options.map, draft.path()}, robot->config,
+                                 info_of(*robot, options.robot), text_of(robot->config.model.urdf));
   if (!summary) {
     for (Error& error : summary.error()) error = draft.placed(std::move(error));
     return refuse(summary.error());

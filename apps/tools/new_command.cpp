@@ -262,9 +262,8 @@ Diagnostics run(const NewOptions& options) {
   Json json = to_json(*robot, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
   Kept kept;
-  if (Status done = draft->place([&kept](const fs::path& old, const fs::path& next) {
-        return keep(old, next, kept);
-      });
+  if (Status done = draft->place(
+          [&kept](const fs::path& old, const fs::path& next) { return keep(old, next, kept); });
       !done) {
     return {done.error()};
   }
