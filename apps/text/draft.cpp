@@ -54,7 +54,8 @@ void on_end(int signal) {
 void remember(const std::string& path) {
   const bool fits = path.size() < sizeof drafted;
   for (const int signal : kEnds) {
-    struct sigaction now{}, next{};
+    using Action = struct sigaction;
+    Action now{}, next{};
     ::sigaction(signal, nullptr, &now);
     const bool ours = now.sa_handler == on_end;
     if (!ours && now.sa_handler != SIG_DFL) continue;  // ignored, or somebody waits for it
@@ -108,8 +109,8 @@ Result<Draft> Draft::folder(const std::string& final) {
   fs::path whole = fs::absolute(final).lexically_normal();
   if (!whole.has_filename()) whole = whole.parent_path();  // a slash at the end
   if (fs::exists(whole, problem) && !fs::is_directory(whole, problem)) {
-    return std::unexpected(Error{
-        "this is a file, and a folder is needed", "name another folder", final, 0, {}});
+    return std::unexpected(
+        Error{"this is a file, and a folder is needed", "name another folder", final, 0, {}});
   }
   fs::path root = whole / suffix(), path = root;
   if (!fs::exists(whole, problem)) {
@@ -130,7 +131,9 @@ Draft Draft::file(const std::string& final) {
   std::error_code problem;
   const fs::path place(final);
   const fs::file_status there = fs::symlink_status(place, problem);
-  if (fs::exists(there) && !fs::is_regular_file(there)) return {final, {}, final};  // as /dev/null
+  const std::string folder = place.has_parent_path() ? place.parent_path().string() : ".";
+  const bool beside = fs::is_regular_file(there) && ::access(folder.c_str(), W_OK) == 0;
+  if (fs::exists(there) && !beside) return {final, {}, final};  // as /dev/null
   fs::path draft = place.parent_path() / place.stem();
   draft += suffix() + place.extension().string();
   return {final, draft, draft.string()};

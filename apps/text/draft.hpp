@@ -18,7 +18,8 @@ class Draft {
   /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
   /// is there. Errors: it is a file; the folder cannot be made.
   [[nodiscard]] static Result<Draft> folder(const std::string& final);
-  /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors.
+  /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors. What
+  /// is no regular file, or in a folder that nothing may be added to, is its own draft.
   [[nodiscard]] static Draft file(const std::string& final);
 
   ~Draft();

@@ -68,6 +68,12 @@ TEST_F(HalfMade, ImportedLogIsRemovedAtTheLimitOfFileSizes) {
                  {"in.mcap", "File too large"}, "ulimit -f 20;");
 }
 
+TEST_F(HalfMade, TableIsRemovedAtTheLimitOfFileSizesAndOfAWrongTopic) {
+  expect_nothing("log csv " + log_ + " -o a.csv", {"a.csv", "writing the CSV failed"},
+                 "ulimit -f 20;");
+  expect_nothing("log csv " + log_ + " --topic nonsense -o a.csv", {"nonsense"});
+}
+
 // It had status 0 and a note, and left what gnuplot had made.
 TEST_F(HalfMade, PicturesAreRemovedAtTheLimitOfFileSizes) {
   expect_nothing("report " + log_ + " -o made", {"made"}, "ulimit -f 20;");
