@@ -1,6 +1,9 @@
 // The program `tandem`: reads its command line and calls the command.
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <chrono>
-#include <filesystem>
+#include <csignal>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -30,7 +33,9 @@ std::string json_argument(int argc, const char* const* argv) {
 
 /// Simulates an experiment in a process of its own. @return what ended it early; empty: nothing
 tandem::Result<std::string> tried_in_simulation(const std::string& experiment) {
-  const std::string heard = experiment + ".trial";
+  // In memory: an interrupt leaves no file.
+  const int memory = ::memfd_create("trial", MFD_CLOEXEC);
+  const std::string heard = "/proc/self/fd/" + std::to_string(memory);
   auto child = tandem::apps::ChildProcess::start(
       {"/proc/self/exe", "run", experiment, "--hal", "sim", "--quiet", "--no-log"}, heard);
   if (!child) return std::unexpected(child.error());
@@ -38,8 +43,7 @@ tandem::Result<std::string> tried_in_simulation(const std::string& experiment) {
   std::string line, last = "it ended with status " + std::to_string(*child->poll());
   for (std::ifstream in(heard); std::getline(in, line);)
     if (!line.empty()) last = line;
-  std::error_code ignored;
-  std::filesystem::remove(heard, ignored);
+  ::close(memory);
   return *child->poll() == 0 ? std::string() : last;
 }
 
@@ -52,6 +56,7 @@ struct Overloaded : F... {
 
 int main(int argc, char** argv) {
   using namespace tandem::apps;
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
   const Command command = parse_command_line(argc, argv);
   if (!std::holds_alternative<Exit>(command)) {  // before it does anything
     if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {

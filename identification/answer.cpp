@@ -247,6 +247,9 @@ class Answer {
     double ours = 0.0, theirs = 0.0, all = 0.0;
     for (Index i = 0; i < rows.rows(); ++i) {
       const std::size_t at = rows.instant[static_cast<std::size_t>(i)];
+      const std::vector<std::size_t>& logs = equations_.first_of_log;
+      while (out.first_of_log.size() < logs.size() && at >= logs[out.first_of_log.size()])
+        out.first_of_log.push_back(out.time_s.size());
       if (!split_.held[at]) continue;
       const double given = rows.measured[i] - rows.y[i];
       const double identified = given + rows.X.row(i).dot(possible_);

@@ -72,6 +72,7 @@ struct JointResult {
          described_relative_error = kUnknown;  ///< of the description alone
   // On the held-out data:
   std::vector<double> time_s, measured_Nm, described_Nm, identified_Nm;
+  std::vector<std::size_t> first_of_log;  ///< where each log's part begins; it may be empty
 };
 
 /// One combination of parameters that the robot's motion shows.

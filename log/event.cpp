@@ -57,6 +57,8 @@ bool is_fault(EventKind kind) noexcept {
          (kind >= EventKind::kFeedbackLost && kind <= EventKind::kFell);
 }
 
+bool is_stop(const Event& event) noexcept { return is_fault(event.kind) && event.reported == 0; }
+
 namespace {
 
 /// `before` and the name at `index`; empty where there is none.
@@ -134,9 +136,7 @@ std::string text_of(const Event& event, bool has_joint) {
   return code;
 }
 
-}  // namespace
-
-std::string describe(const Event& event, const EventNames& names) {
+std::string what_happened(const Event& event, const EventNames& names) {
   std::string text = to_string(event.kind);
   if (event.kind == EventKind::kInjected) {
     text += " " + std::string(hal::to_string(static_cast<hal::FaultKind>(event.code)));
@@ -154,6 +154,12 @@ std::string describe(const Event& event, const EventNames& names) {
   return text + text_of(event, has_joint);
 }
 
+}  // namespace
+
+std::string describe(const Event& event, const EventNames& names) {
+  return what_happened(event, names) + (event.reported != 0 ? ", reported" : "");
+}
+
 const std::string& event_schema() {
   static const std::string text =
       "uint64 cycle\n"
@@ -161,6 +167,7 @@ const std::string& event_schema() {
       "uint32 code  # a drive's CiA 402 error code, the loop's Code, a count, a unit\n"
       "int32 joint  # index in the image, -1: none\n"
       "uint8 kind  # EventKind\n"
+      "uint8 reported  # 1: a fault that stops nothing\n"
       "string text\n";
   return text;
 }
@@ -172,6 +179,7 @@ void encode_event(const Event& event, std::string_view text, Bytes& out) {
   cdr.number(event.code);
   cdr.number(static_cast<std::uint32_t>(event.joint));
   cdr.number(static_cast<std::uint8_t>(event.kind));
+  cdr.number(event.reported);
   cdr.text(text);
 }
 
@@ -183,7 +191,8 @@ Result<EventText> decode_event(std::span<const std::byte> body) {
   found.event.code = in.number<std::uint32_t>();
   found.event.joint = static_cast<std::int32_t>(in.number<std::uint32_t>());
   found.event.kind = static_cast<EventKind>(in.number<std::uint8_t>());
-  in.take(3);
+  found.event.reported = in.number<std::uint8_t>();  // 0, too, in logs without this field
+  in.take(2);
   found.text = in.text();
   if (!in.ok() || found.text.empty()) return fail("an event's message is too short");
   found.text.pop_back();  // CDR strings end with a zero

@@ -52,6 +52,9 @@ enum class EventKind : std::uint8_t {
 [[nodiscard]] const char* to_string(EventKind kind) noexcept;
 /// Whether it is a fault, of whatever, or an emergency stop.
 [[nodiscard]] bool is_fault(EventKind kind) noexcept;
+struct Event;
+/// Whether it is a fault that stops the robot.
+[[nodiscard]] bool is_stop(const Event& event) noexcept;
 
 /// Plain data: it crosses the ring as bytes.
 struct Event {
@@ -61,7 +64,8 @@ struct Event {
   std::int32_t joint = -1;  ///< index in the image; -1: none
   EventKind kind = EventKind::kStarted;
   hal::FaultTarget target = hal::FaultTarget::kNone;  ///< of an injected fault
-  std::uint8_t padding[2] = {};
+  std::uint8_t reported = 0;                          ///< 1: a fault that stops nothing
+  std::uint8_t padding = 0;
   /// Of a motion: its target. Of a lost sensor, and of an injected fault's board, sensor or bus:
   /// its index. In the log's text.
   float value = 0.0F;

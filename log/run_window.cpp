@@ -35,7 +35,8 @@ RunWindow run_window(const std::vector<EventText>& events, double settle_s) {
     const bool end = one.event.kind == EventKind::kControllersDone ||
                      one.event.kind == EventKind::kStopRequested;
     if (end) window.end_s = std::min(window.end_s, time_s + kHalfNanosecond);
-    if (is_fault(one.event.kind) && time_s < window.fault_s) window.fault_s = time_s;
+    if (is_fault(one.event.kind)) window.fault_s = std::min(window.fault_s, time_s);
+    if (is_stop(one.event)) window.stop_s = std::min(window.stop_s, time_s);
   }
   return window;
 }

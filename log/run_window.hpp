@@ -16,7 +16,8 @@ struct RunWindow {
   double bring_up_s = -1e300;  ///< its end
   double begin_s = -1e300;     ///< of the controllers
   double end_s = 1e300;        ///< of the controllers
-  double fault_s = 1e300;      ///< the first
+  double fault_s = 1e300;      ///< the first, also one that was only reported
+  double stop_s = 1e300;       ///< the first fault that stopped the robot
 };
 
 /// How long every joint was held before the controllers started, as the experiment says or by

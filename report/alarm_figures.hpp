@@ -13,7 +13,7 @@ namespace tandem::report {
 /// Pushes of one kind: a point for each threshold, all of equal length.
 struct AlarmCurve {
   std::string label;                    ///< "50 N"
-  std::vector<double> alarms_per_hour;  ///< counted; drawn where it is above 0, and 3600 at most
+  std::vector<double> alarms_per_hour;  ///< counted; 0 stands at the left end
   std::vector<double> median_ms;        ///< not finite: fewer than half were found
   std::vector<double> worst_ms;         ///< not finite: one was not found
 };

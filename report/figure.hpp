@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -67,11 +68,28 @@ struct Figure {
                                                                    ///< follows a fault, does not
                                                                    ///< widen the range of y
   bool log_axes = false;    ///< both logarithmic; only what is positive is drawn
+  double zero_x = 0.0;      ///< of log_axes: where on x the number 0 stands; 0: nowhere
+  bool points = false;      ///< a point at each sample
   bool equal_axes = false;  ///< one metre is as long across as it is up; no numbers across
 };
 
-/// The curve with at most `most` points: the extremes of each run of samples are kept, so that
-/// no peak is lost.
+/// Removes curves without a number: what a log lacks, as the references of a recording.
+void drop_empty_curves(Figure& figure);
+
+/// The usual distance between neighbours: the median. 0 of less than two.
+[[nodiscard]] double usual_step(std::span<const double> x);
+
+/// A step of so many usual ones is a gap: samples are missing there.
+inline constexpr double kGapSteps = 5.0;
+
+/// Where stretches without a missing sample begin: 0, and behind every gap or step back.
+[[nodiscard]] std::vector<std::size_t> stretches(std::span<const double> x);
+
+/// Puts a NaN into every curve where samples are missing, by stretches(): its line ends there.
+void break_at_gaps(Figure& figure);
+
+/// The curve with some `most` points: the extremes of each run of samples are kept, so that no peak
+/// is lost, and its gaps.
 [[nodiscard]] Curve decimated(const Curve& curve, std::size_t most);
 
 }  // namespace tandem::report

@@ -88,9 +88,10 @@ std::string plot_command(const Figure& figure, std::size_t index) {
   };
   for (std::size_t i = 0; i < figure.curves.size(); ++i) {
     const Curve& curve = figure.curves[i];
-    const bool stick = curve.style >= CurveStyle::kStick;
-    add(fmt::format("{} using 1:2 with {} ls {}", block_name(index, i),
-                    stick ? "linespoints" : "lines", line_style(curve.style)),
+    const bool points = figure.points || curve.style >= CurveStyle::kStick;
+    add(fmt::format("{} using 1:2 with {} ls {}{}", block_name(index, i),
+                    points ? "linespoints" : "lines", line_style(curve.style),
+                    figure.points ? " pt 7 ps 0.7" : ""),
         curve.label);
   }
   for (const Level& level : figure.levels) {
@@ -102,11 +103,24 @@ std::string plot_command(const Figure& figure, std::size_t index) {
   return out + "\n";
 }
 
+/// `set xtics` of chosen numbers. @param zero  where "0" stands; 0: nowhere
+std::string ticks_text(const char* axis, const std::vector<double>& ticks, double zero) {
+  std::string numbers = zero > 0.0 ? fmt::format("\"0\" {:.6g}", zero) : "";
+  for (const double tick : ticks)
+    numbers += fmt::format("{}{:.6g}", numbers.empty() ? "" : ", ", tick);
+  return fmt::format("set format {0} '%g'\nset {0}tics nomirror ({1}) textcolor rgb '#3a424c'\n",
+                     axis, numbers);
+}
+
 std::string axes_text(const Figure& figure, const Axes& axes) {
   std::string out = fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\n",
                                 axes.x.low, axes.x.high, axes.y.low, axes.y.high);
-  out += figure.log_axes ? "set logscale xy\n" : "unset logscale\n";
-  if (figure.log_axes || axes.step == 0.0) {
+  if (figure.log_axes) {
+    return out + "set logscale xy\n" + ticks_text("x", axes.x_ticks, figure.zero_x) +
+           ticks_text("y", axes.y_ticks, 0.0);
+  }
+  out += "unset logscale\n";
+  if (axes.step == 0.0) {
     out += "set format y '%g'\nset ytics nomirror autofreq\n";
   } else {
     out += fmt::format("set format y '%.{}f'\nset ytics nomirror {:.12g},{:.12g},{:.12g}\n",
@@ -217,6 +231,29 @@ std::string read_text(const std::string& file) {
   return text;
 }
 
+/// gnuplot says nothing of a full disk.
+Status check_whole(const std::string& file, std::string_view end) {
+  const std::string text = read_text(file);
+  const std::size_t last = text.find_last_not_of("\r\n");
+  if (text.substr(0, last + 1).ends_with(end)) return {};
+  return std::unexpected(Error{"gnuplot could not write the whole picture",
+                               "check the folder's permissions, the disk's free space and the "
+                               "limit on the size of files (ulimit -f)",
+                               file,
+                               0,
+                               {}});
+}
+
+Status check_pictures(std::span<const Figure> figures, const std::string& folder) {
+  constexpr std::string_view kPngEnd = "IEND\xAE\x42\x60\x82";
+  for (const Figure& figure : figures) {
+    const std::string file = folder + "/" + figure.name;
+    if (Status whole = check_whole(file + ".svg", "</svg>"); !whole) return whole;
+    if (Status whole = check_whole(file + ".png", kPngEnd); !whole) return whole;
+  }
+  return check_whole(folder + "/overview.png", kPngEnd);
+}
+
 }  // namespace
 
 std::string gnuplot_script(std::span<const Figure> figures, const std::string& folder) {
@@ -247,7 +284,11 @@ Status draw(std::span<const Figure> figures, const std::string& folder) {
   // Absolute: gnuplot takes a name that begins with | for a command.
   const std::string path = std::filesystem::absolute(folder).string();
   Status drawn = run_gnuplot(gnuplot_script(figures, path), complaints);
-  if (!drawn && drawn.error().hint.empty()) drawn.error().hint = read_text(complaints);
+  if (!drawn && drawn.error().hint.empty()) {
+    drawn.error().hint = read_text(complaints);
+    drawn.error().file = folder;
+  }
+  if (drawn) drawn = check_pictures(figures, folder);
   std::error_code ignored;
   std::filesystem::remove(complaints, ignored);
   return drawn;

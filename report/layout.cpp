@@ -19,6 +19,25 @@ std::size_t length(const std::string& text) {
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
+/// Numbers along a logarithmic axis: powers of ten; more of each decade where these are few.
+std::vector<double> log_ticks(double low, double high) {
+  static const std::vector<double> kSteps[] = {
+      {1},
+      {1, 2, 5},
+      {1, 1.5, 2, 3, 4, 5, 7},
+      {1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 6, 7, 8, 9}};
+  std::vector<double> ticks;
+  for (const std::vector<double>& steps : kSteps) {
+    ticks.clear();
+    for (double power = std::pow(10.0, std::floor(std::log10(low))); power < high; power *= 10.0) {
+      for (const double step : steps)
+        if (power * step >= low && power * step <= high) ticks.push_back(power * step);
+    }
+    if (ticks.size() >= 4) break;
+  }
+  return ticks;
+}
+
 /// Both axes logarithmic: half as much again beyond the positive values.
 Axes log_axes(const Figure& figure) {
   Axes axes;
@@ -31,6 +50,11 @@ Axes log_axes(const Figure& figure) {
   if (!(axes.y.low <= axes.y.high)) axes.y = {1.0, 10.0};
   axes.x = {axes.x.low / 1.5, axes.x.high * 1.5};
   axes.y = {axes.y.low / 1.5, axes.y.high * 1.5};
+  // Beside the place of 0 there is no other number.
+  axes.x_ticks = log_ticks(std::max(axes.x.low, 2.0 * figure.zero_x), axes.x.high);
+  axes.y_ticks = log_ticks(axes.y.low, axes.y.high);
+  for (const double tick : axes.y_ticks)
+    axes.widest = std::max(axes.widest, fmt::format("{:g}", tick).size());
   return axes;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "report/figure.hpp"
 
@@ -25,10 +26,11 @@ struct Extent {
 struct Axes {
   Extent x, y;
   double lowest_drawn = -std::numeric_limits<double>::infinity();  ///< no numbers below it
-  double step = 0.0;       ///< between numbers of y; 0: gnuplot chooses
-  double lowest = 0.0;     ///< of the numbers of y
-  int decimals = 0;        ///< of them
-  std::size_t widest = 7;  ///< characters of the longest one
+  double step = 0.0;                     ///< between numbers of y; 0: gnuplot chooses
+  double lowest = 0.0;                   ///< of the numbers of y
+  int decimals = 0;                      ///< of them
+  std::vector<double> x_ticks, y_ticks;  ///< of logarithmic axes, some four or more
+  std::size_t widest = 7;                ///< characters of the longest one
 };
 
 /// A part of a picture, in pixels from the picture's lower left corner.

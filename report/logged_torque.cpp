@@ -1,9 +1,11 @@
-// Maps a log's joints, feet and passive joints to the kernels, and subtracts what closed loops
-// carry.
+// Maps a log's joints, feet and passive joints to the kernels, stretch by stretch between missing
+// samples, and subtracts what closed loops carry.
 #include "report/logged_torque.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
+#include <span>
 
 #include "model/closed_loops.hpp"
 #include "report/inverse_dynamics.hpp"
@@ -12,6 +14,7 @@ namespace tandem::report {
 namespace {
 
 constexpr double kMotionStep_s = 0.005;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t index_of(int index) { return static_cast<std::size_t>(index); }
 
@@ -94,6 +97,24 @@ void add_row(const RunData& run, std::size_t row, const tandem_kernels& kernels,
   motion.sensors.push_back(std::move(sensors));
 }
 
+/// The rows [begin, end), between which none is missing, a few milliseconds apart.
+/// @param times  get those of the motion's rows
+Motion motion_of(const RunData& run, std::size_t begin, std::size_t end,
+                 const tandem_kernels& kernels, const std::vector<std::size_t>& order,
+                 model::ClosedLoops& loops, std::vector<double>& times) {
+  const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
+  const std::vector<int> feet = feet_of_wrenches(run, kernels);
+  const bool ground_known = run.motion_known() || run.robot.contact.feet.empty();
+  Motion motion;
+  motion.step_s = run.step_s * static_cast<double>(stride);
+  for (std::size_t row = begin; row < end; row += stride) {
+    add_row(run, row, kernels, order, loops, motion);
+    if (ground_known) motion.wrenches.push_back(ground_wrenches(run, feet, row));
+    times.push_back(run.time_s[row]);
+  }
+  return motion;
+}
+
 }  // namespace
 
 Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem_kernels& kernels) {
@@ -103,27 +124,29 @@ Result<Curve> inverse_dynamics_curve(const RunData& run, int joint, const tandem
     return fail("the log lacks the base's motion");
   Result<model::ClosedLoops> loops = loops_of(run, kernels);
   if (!loops) return std::unexpected(loops.error());
-  const auto stride = static_cast<std::size_t>(std::max(1.0, kMotionStep_s / run.step_s));
-  Motion motion;
-  motion.step_s = run.step_s * static_cast<double>(stride);
-  Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
-  const std::vector<int> feet = feet_of_wrenches(run, kernels);
-  const bool ground_known = run.motion_known() || run.robot.contact.feet.empty();
-  for (std::size_t row = 0; row < run.rows_before_fault(); row += stride) {
-    add_row(run, row, kernels, *order, *loops, motion);
-    if (ground_known) motion.wrenches.push_back(ground_wrenches(run, feet, row));
-    curve.x.push_back(run.time_s[row]);
-  }
-  if (!wrenches_known(kernels, motion)) return fail("the log lacks the ground's forces");
   const auto place = std::ranges::find(*order, index_of(joint)) - order->begin();
   const std::size_t wanted =
       (kernels.floating_base != 0 ? 6U : 0U) + static_cast<std::size_t>(place);
-  std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);
-  for (std::size_t row = 0; row < torques.size(); ++row) {
-    loops->move(motion.q[row].data(), motion.v[row].data());
-    loops->differentiate(motion.q[row].data());
-    loops->carry_passive(torques[row].data());
-    curve.y.push_back(torques[row][wanted]);
+  const std::span<const double> times(run.time_s.data(), run.rows_before_stop());
+  std::vector<std::size_t> ends = stretches(times);
+  ends.push_back(times.size());
+  Curve curve{"inverse dynamics", CurveStyle::kComputed, {}, {}};
+  for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
+    const Motion motion = motion_of(run, ends[i], ends[i + 1], kernels, *order, *loops, curve.x);
+    if (!wrenches_known(kernels, motion)) return fail("the log lacks the ground's forces");
+    std::vector<std::vector<double>> torques = inverse_dynamics(kernels, motion);
+    const bool has_rates = torques.size() > 1;
+    if (i > 0) {
+      const auto at = static_cast<std::ptrdiff_t>(curve.y.size());
+      curve.x.insert(curve.x.begin() + at, run.time_s[ends[i]]);
+      curve.y.push_back(kUnknown);
+    }
+    for (std::size_t row = 0; row < torques.size(); ++row) {
+      loops->move(motion.q[row].data(), motion.v[row].data());
+      loops->differentiate(motion.q[row].data());
+      loops->carry_passive(torques[row].data());
+      curve.y.push_back(has_rates ? torques[row][wanted] : kUnknown);
+    }
   }
   return curve;
 }

@@ -9,7 +9,8 @@
 
 namespace tandem::report {
 
-/// The torque [Nm] of one joint by inverse dynamics of the logged motion, as a curve over time.
+/// The torque [Nm] of one joint by inverse dynamics of the logged motion, as a curve over time,
+/// with a NaN where samples are missing: nothing is differenced over a gap.
 /// The ground's forces are those that the feet's sensors measured; feet without one take them from
 /// the log's truth. The forces in closed loops are those that leave no torque at passive joints.
 ///

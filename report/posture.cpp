@@ -14,6 +14,7 @@
 
 #include "model/ahead.hpp"
 #include "model/placements.hpp"
+#include "report/layout.hpp"
 
 namespace tandem::report {
 namespace {
@@ -69,8 +70,8 @@ std::vector<Limb> limbs_of(const model::Tree& tree, const hal::RobotConfig& robo
   return limbs;
 }
 
-void add_point(Curve& curve, const Eigen::Vector3d& point, double shift_m) {
-  curve.x.push_back(point.x() + shift_m);
+void add_point(Curve& curve, const Eigen::Vector3d& point) {
+  curve.x.push_back(point.x());
   curve.y.push_back(point.z());
 }
 
@@ -138,7 +139,7 @@ std::vector<LoopLine> loops_of(const model::Tree& tree, const hal::RobotConfig& 
   return lines;
 }
 
-/// Every body's origin, and what is drawn beyond the last ones.
+/// Every body's origin, the feet's points and the loops'.
 std::vector<Eigen::Vector3d> drawn_points(const model::Tree& tree, const hal::RobotConfig& robot,
                                           std::span<const model::Placement> bodies) {
   std::vector<Eigen::Vector3d> points;
@@ -152,51 +153,15 @@ std::vector<Eigen::Vector3d> drawn_points(const model::Tree& tree, const hal::Ro
   return points;
 }
 
-struct Spread {
-  double low_m = 0.0, high_m = 0.0;  ///< heights of the figures
-  double middle_m = 0.0;             ///< of all figures, ahead of their bases
-  double pitch_m = 0.0;              ///< from one figure to the next, so that none touch
-  double line_m = 0.0;               ///< between lines of text below
-};
-
-Spread spread(const model::Tree& tree, const hal::RobotConfig& robot,
-              std::span<const PostureSample> samples) {
-  constexpr double kAspect = 1.9;  // of the drawing: width over height
-  Spread out;
-  if (!robot.contact.feet.empty()) out.low_m = out.high_m = robot.contact.height_m;
-  double widest = 0.0;
-  double left = 1e300;
-  double right = -1e300;
-  for (const PostureSample& sample : samples) {
-    double hind = 1e300;
-    double fore = -1e300;
-    for (const Eigen::Vector3d& point :
-         drawn_points(tree, robot, body_placements(tree, robot, sample))) {
-      hind = std::min(hind, point.x() - sample.base.p.x());
-      fore = std::max(fore, point.x() - sample.base.p.x());
-      out.low_m = std::min(out.low_m, point.z());
-      out.high_m = std::max(out.high_m, point.z());
-    }
-    widest = std::max(widest, fore - hind);
-    left = std::min(left, hind);
-    right = std::max(right, fore);
-  }
-  out.middle_m = 0.5 * (left + right);
-  out.pitch_m = std::max(0.6 * (out.high_m - out.low_m), 1.2 * widest);
-  const double across_m = out.pitch_m * static_cast<double>(samples.size());
-  out.line_m = 0.095 * std::max(out.high_m - out.low_m, across_m / kAspect);
-  return out;
-}
-
 /// The feet as lines from the last joint to the hindmost and on to the foremost contact point.
 void add_feet(Curve& curve, std::span<const FootPoints> feet,
-              std::span<const model::Placement> bodies, double shift_m) {
+              std::span<const model::Placement> bodies) {
   for (const FootPoints& foot : feet) {
     const auto [heel, toe] = std::ranges::minmax_element(
         foot.points_m, {}, [](const Eigen::Vector3d& p) { return p.x(); });
-    add_point(curve, bodies[foot.body].p, shift_m);
-    add_point(curve, *heel, shift_m);
-    add_point(curve, *toe, shift_m);
+    add_point(curve, bodies[foot.body].p);
+    add_point(curve, *heel);
+    add_point(curve, *toe);
     curve.x.push_back(kGap);
     curve.y.push_back(kGap);
   }
@@ -210,6 +175,53 @@ struct Sticks {
   Curve legs{"legs", CurveStyle::kStick, {}, {}};
 };
 
+/// What one figure takes, across and up.
+struct Extents {
+  Extent across_m, up_m;
+};
+
+Extents extents_of(const Sticks& sticks) {
+  Extents out;
+  for (const Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {
+    for (const double x : curve->x) out.across_m.include(x);
+    for (const double z : curve->y) out.up_m.include(z);
+  }
+  return out;
+}
+
+/// Where figures and their texts stand beside each other.
+struct Row {
+  std::vector<double> middle_m;  ///< of each figure
+  double end_m = 0.0;            ///< of the last one; the first begins at 0
+  double line_m = 0.0;           ///< between lines of text below
+};
+
+/// Each gets what it takes and a margin, but not so little that thin ones crowd, or that the texts
+/// below it, a seventh of the whole across, touch the next ones.
+Row row_of(std::span<const Extents> figures, double height_m) {
+  constexpr double kAspect = 1.9;  // of the drawing: width over height
+  constexpr double kMargin = 1.2, kThin = 0.6;
+  const double text = std::min(0.14, 0.9 / static_cast<double>(figures.size()));
+  Row row;
+  for (int i = 0; i < 50; ++i) {  // until the texts' share of the whole has settled
+    const double least_m = std::max(kThin * height_m, text * row.end_m);
+    row.middle_m.clear();
+    row.end_m = 0.0;
+    for (const Extents& one : figures) {
+      const double wide_m = std::max(least_m, kMargin * (one.across_m.high - one.across_m.low));
+      row.middle_m.push_back(row.end_m + 0.5 * wide_m);
+      row.end_m += wide_m;
+    }
+  }
+  row.line_m = 0.095 * std::max(height_m, row.end_m / kAspect);
+  return row;
+}
+
+void append(const Curve& from, double shift_m, Curve& to) {
+  for (const double x : from.x) to.x.push_back(x + shift_m);
+  to.y.insert(to.y.end(), from.y.begin(), from.y.end());
+}
+
 void end_line(Curve& curve) {
   curve.x.push_back(kGap);
   curve.y.push_back(kGap);
@@ -217,36 +229,35 @@ void end_line(Curve& curve) {
 
 /// One figure. A limb ends at its last body's foot, its loops or else its centre of mass.
 void add_figure(Sticks& sticks, std::span<const Limb> limbs, const model::Tree& tree,
-                const hal::RobotConfig& robot, std::span<const model::Placement> bodies,
-                double shift_m) {
+                const hal::RobotConfig& robot, std::span<const model::Placement> bodies) {
   const std::vector<LoopLine> loops = loops_of(tree, robot, bodies);
   const bool legged = !robot.contact.feet.empty();
   for (const Limb& limb : limbs) {
     Curve& curve = limb.leg ? sticks.legs : (limb.trunk || !legged ? sticks.trunk : sticks.others);
     if (limb.leg) {  // as far as the hip it is trunk
       for (int i = 0; i < 2; ++i) {
-        add_point(sticks.trunk, bodies[static_cast<std::size_t>(limb.bodies[i])].p, shift_m);
+        add_point(sticks.trunk, bodies[static_cast<std::size_t>(limb.bodies[i])].p);
       }
       end_line(sticks.trunk);
     }
     for (const int body : std::span(limb.bodies).subspan(limb.leg ? 1 : 0)) {
-      add_point(curve, bodies[static_cast<std::size_t>(body)].p, shift_m);
+      add_point(curve, bodies[static_cast<std::size_t>(body)].p);
     }
     const auto tip = static_cast<std::size_t>(limb.bodies.back());
     const bool goes_on = std::ranges::any_of(loops, [tip](const LoopLine& loop) {
       return loop.bodies[0] == tip || loop.bodies[1] == tip;
     });
     if (!limb.leg && !goes_on) {
-      add_point(curve, bodies[tip].R * tree.bodies[tip].inertia.com_m + bodies[tip].p, shift_m);
+      add_point(curve, bodies[tip].R * tree.bodies[tip].inertia.com_m + bodies[tip].p);
     }
     end_line(curve);
   }
   for (const LoopLine& loop : loops) {
     Curve& curve = loop.leg ? sticks.legs : sticks.trunk;
-    for (const Eigen::Vector3d& point : loop.points_m) add_point(curve, point, shift_m);
+    for (const Eigen::Vector3d& point : loop.points_m) add_point(curve, point);
     end_line(curve);
   }
-  add_feet(sticks.legs, feet_of(tree, robot, bodies), bodies, shift_m);
+  add_feet(sticks.legs, feet_of(tree, robot, bodies), bodies);
 }
 
 /// Whether there is more to see from the front than from the side: by how far the bodies' centres
@@ -353,13 +364,34 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
     std::erase_if(limb.bodies, [&](int body) { return unknown[static_cast<std::size_t>(body)]; });
   }
   std::erase_if(limbs, [](const Limb& limb) { return limb.bodies.size() < 2; });
-  const auto [low, high, middle_m, pitch_m, line_m] = spread(tree, robot, samples);
+  std::vector<Sticks> drawn;
+  std::vector<Extents> extents;
+  Extent up_m;
+  if (legged) up_m.include(robot.contact.height_m);
+  for (const PostureSample& sample : samples) {
+    add_figure(drawn.emplace_back(""), limbs, tree, robot, body_placements(tree, robot, sample));
+    extents.push_back(extents_of(drawn.back()));
+    up_m.include(extents.back().up_m.low);
+    up_m.include(extents.back().up_m.high);
+  }
+  const Row row = row_of(extents, up_m.high - up_m.low);
+  const auto moved = [&](std::size_t s) {
+    return row.middle_m[s] - 0.5 * (extents[s].across_m.low + extents[s].across_m.high);
+  };
+  const double begin_m = -moved(0) - samples[0].base.p.x();     // the first one's base is at 0
+  for (const double edge_m : {begin_m, begin_m + row.end_m}) {  // the outer texts are inside, too
+    sticks.trunk.x.push_back(edge_m);
+    sticks.trunk.y.push_back(kGap);
+  }
   for (std::size_t s = 0; s < samples.size(); ++s) {
-    const double shift_m = static_cast<double>(s) * pitch_m - samples[s].base.p.x();
-    add_figure(sticks, limbs, tree, robot, body_placements(tree, robot, samples[s]), shift_m);
-    const double x = static_cast<double>(s) * pitch_m + middle_m;
-    figure.notes.push_back({samples[s].label, x, low - line_m});
-    figure.notes.push_back({fmt::format("{:.2f} s", samples[s].time_s), x, low - 2.0 * line_m});
+    const double shift_m = moved(s) + begin_m;
+    append(drawn[s].others, shift_m, sticks.others);
+    append(drawn[s].trunk, shift_m, sticks.trunk);
+    append(drawn[s].legs, shift_m, sticks.legs);
+    const double x = begin_m + row.middle_m[s];
+    figure.notes.push_back({samples[s].label, x, up_m.low - row.line_m});
+    figure.notes.push_back(
+        {fmt::format("{:.2f} s", samples[s].time_s), x, up_m.low - 2.0 * row.line_m});
   }
   if (legged) figure.levels.push_back({"ground", robot.contact.height_m});
   for (Curve* curve : {&sticks.others, &sticks.trunk, &sticks.legs}) {

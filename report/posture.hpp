@@ -15,14 +15,15 @@ namespace tandem::report {
 /// One moment of a run. Joints stand in the process image's order, the passive ones behind them,
 /// unless nobody knows where those are.
 struct PostureSample {
-  std::string label;  ///< "lowest"
-  double time_s = 0.0;
+  std::string label;      ///< "lowest"
+  double time_s = 0.0;    ///< as the figures over time have it
   model::Placement base;  ///< of the root link in W
   std::vector<double> position_rad;
 };
 
 /// The side view from the robot's right, ahead to the right (model::direction_ahead() of its feet)
-/// and z up, of several moments beside each other: legs (what
+/// and z up, of several moments beside each other, none of which touches
+/// another or the texts below: legs (what
 /// carries a contact's site) blue, the trunk dark, everything else light. A robot without feet is
 /// dark as a whole, and if it moves more to its sides than ahead, it is seen from the front, y to
 /// the right. Closed loops are drawn over their sites, with a rod between them if there is one;

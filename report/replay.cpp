@@ -52,14 +52,21 @@ std::optional<Played> played(const RunData& run, const RunData& recording) {
   return std::nullopt;
 }
 
-/// A signal of a run at a time; NaN outside.
+/// Whether the run's samples around a time are missing.
+bool in_gap(const RunData& run, double time_s) {
+  const auto after = std::ranges::upper_bound(run.time_s, time_s + 1e-9);
+  if (after == run.time_s.begin() || after == run.time_s.end()) return false;
+  return *after - *(after - 1) > kGapSteps * run.step_s && time_s - *(after - 1) > 1e-9;
+}
+
+/// A signal of a run at a time; NaN outside and in its gaps.
 double value_at(const RunData& run, const std::vector<double>& values, double time_s) {
   const auto after = std::ranges::upper_bound(run.time_s, time_s + 1e-9);
   if (after == run.time_s.begin()) return std::numeric_limits<double>::quiet_NaN();
   const auto row = static_cast<std::size_t>(after - run.time_s.begin()) - 1;
   const double since = time_s - run.time_s[row];
   if (std::abs(since) < 1e-9) return values[row];
-  if (row + 1 == run.rows()) return std::numeric_limits<double>::quiet_NaN();
+  if (row + 1 == run.rows() || in_gap(run, time_s)) return std::numeric_limits<double>::quiet_NaN();
   const double step = run.time_s[row + 1] - run.time_s[row];
   return values[row] + (values[row + 1] - values[row]) * since / step;
 }
@@ -77,6 +84,7 @@ double probe_distance(const RunData& run, const log::JointMotion& motion,
       const std::size_t i = probe * (samples - 1) / (kProbes - 1);
       const double time_s = static_cast<double>(track.time_ns[i]) * 1e-9 + later_s;
       if (time_s > run.time_s.back()) break;  // it was ended before
+      if (in_gap(run, time_s)) continue;
       const double off =
           value_at(run, run.reference_rad[joints[k]], time_s) - track.position_rad[i];
       if (!(std::abs(off) < least)) return kNever;

@@ -21,18 +21,20 @@
 namespace tandem::report {
 namespace {
 
-/// What, which joint, when: of the first few, which the others mostly follow from.
+/// What, which joint, when: of the first few, which the others mostly follow from, and of the stop.
 void add_faults(const RunData& run, const std::string& side, Facts& facts) {
-  constexpr std::size_t kMost = 5;
-  for (std::size_t i = 0; i < std::min(kMost, run.faults.size()); ++i) {
+  std::size_t more = 0;
+  for (std::size_t i = 0; i < run.faults.size(); ++i) {
     const RunFault& fault = run.faults[i];
+    if (i >= kFaultsShown && &fault != run.stop()) {
+      ++more;
+      continue;
+    }
     facts.emplace_back("fault" + side,
                        fmt::format("{}{}{}, at {:.3f} s", fault.joint,
                                    fault.joint.empty() ? "" : ": ", fault.text, fault.time_s));
   }
-  if (run.faults.size() > kMost) {
-    facts.emplace_back("fault" + side, fmt::format("{} more", run.faults.size() - kMost));
-  }
+  if (more > 0) facts.emplace_back("fault" + side, fmt::format("{} more", more));
 }
 
 void add_facts(const RunData& run, const std::string& side, Facts& facts) {
@@ -50,12 +52,13 @@ void add_facts(const RunData& run, const std::string& side, Facts& facts) {
   facts.emplace_back("period" + side,
                      fmt::format("{} us", static_cast<double>(run.info.period_ns) * 1e-3));
   const double start_s = run.time_s.front();
-  const double ran_s =
-      run.controllers_ran ? run.time_s[run.rows_before_fault() - 1] - start_s : 0.0;
-  if (run.controllers_ran) {
+  const double ran_s = run.controllers_ran ? run.time_s[run.rows_before_stop() - 1] - start_s : 0.0;
+  const bool imported = run.info.hal == "import";
+  if (run.controllers_ran && !imported) {
     facts.emplace_back("controllers started" + side, fmt::format("{:.3f} s", start_s));
   }
-  facts.emplace_back("controllers ran" + side, fmt::format("{:.3f} s", ran_s));
+  facts.emplace_back((imported ? "recorded" : "controllers ran") + side,
+                     fmt::format("{:.3f} s", ran_s));
   if (!run.info.engine.empty()) facts.emplace_back("engine" + side, run.info.engine);
   facts.emplace_back("kernels" + side, run.info.kernel_variant);
   facts.emplace_back("tandem" + side, run.info.version);
@@ -71,7 +74,7 @@ PageTable tracking_table(const RunData& run, const std::string& side) {
                   "and the largest measured torque. The worst first.",
                   {"joint", "rms [deg]", "max [deg]", "max torque [Nm]"},
                   {}};
-  if (!run.faults.empty()) table.caption += " Until the first fault.";
+  if (run.stop() != nullptr) table.caption += " Until the fault that stopped it.";
   const std::vector<Tracking> joints = run.tracking();
   const bool all_slide = !joints.empty() && std::ranges::all_of(joints, &Tracking::slides);
   const bool mixed = !all_slide && std::ranges::any_of(joints, &Tracking::slides);
@@ -120,7 +123,8 @@ PageTable feet_table(const RunData& run, const std::string& side) {
 }
 
 void add_tables(const RunData& run, const std::string& side, Page& page) {
-  page.tables.push_back(tracking_table(run, side));
+  PageTable tracking = tracking_table(run, side);
+  if (!tracking.rows.empty()) page.tables.push_back(std::move(tracking));
   PageTable feet = feet_table(run, side);
   if (!feet.rows.empty()) page.tables.push_back(std::move(feet));
   PageTable loops = loops_table(run, side);
@@ -162,10 +166,13 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
       others.empty()
           ? fmt::format("{}: {}", run.info.robot, std::filesystem::path(run.path).stem().string())
           : fmt::format("{}: {} runs", run.info.robot, others.size() == 1 ? "two" : "three");
-  page.lead = "Times count from the run's first SYNC, as in the log.";
-  page.lead += run.controllers_ran
-                   ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
-                   : " The run ended before its controllers started.";
+  const bool imported = run.info.hal == "import";
+  page.lead = imported ? "Times count from the recording's start, as in the log."
+                       : "Times count from the run's first SYNC, as in the log.";
+  if (!imported)
+    page.lead += run.controllers_ran
+                     ? fmt::format(" The controllers started at {:.3f} s.", run.time_s.front())
+                     : " The run ended before its controllers started.";
   add_facts(run, others.empty() ? "" : " A", page.facts);
   page.tables = replays;
   add_tables(run, others.empty() ? "" : " A", page);
@@ -279,6 +286,8 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
   if (!wrenches) return std::unexpected(wrenches.error());
   figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
                  std::make_move_iterator(wrenches->end()));
+  for (Figure& figure : figures)
+    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
   if (const Status s = write_page(page, figures, folder); !s) {

@@ -9,6 +9,7 @@
 #include "base/toml_reader.hpp"
 #include "log/run_window.hpp"
 #include "model/urdf.hpp"
+#include "report/figure.hpp"
 
 namespace tandem::report {
 namespace {
@@ -119,8 +120,8 @@ void crop(log::Table& table, double begin_s, double end_s) {
   for (std::vector<double>& column : table.columns) cut(column);
 }
 
-/// How long the plots go on after a fault: a quarter of the time before it, but not for ever.
-double after_fault_s(double before_s) { return std::clamp(0.25 * before_s, 0.1, 1.0); }
+/// How long the plots go on after a stop: a quarter of the time before it, but not for ever.
+double after_stop_s(double before_s) { return std::clamp(0.25 * before_s, 0.1, 1.0); }
 
 std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
                                 const std::vector<std::string>& joints,
@@ -129,12 +130,12 @@ std::vector<RunFault> faults_of(const std::vector<log::EventText>& events,
   std::vector<RunFault> faults;
   for (const auto& [event, text] : events) {
     if (!log::is_fault(event.kind)) continue;
-    RunFault fault{static_cast<double>(event.time_ns) * 1e-9, {}, text};
+    RunFault fault{static_cast<double>(event.time_ns) * 1e-9, {}, text, log::is_stop(event)};
     const auto joint = static_cast<std::size_t>(event.joint);
     const bool of_drive = event.joint >= 0 && joint < joints.size();
     if (of_drive && event.code >= kFirstErrorCode && error_text) {
       fault.joint = joints[joint];
-      fault.text = error_text(event.code);
+      fault.text = error_text(event.code) + (fault.stops ? "" : ", reported");
     }
     faults.push_back(std::move(fault));
   }
@@ -170,10 +171,10 @@ Status read_state(const log::LogFile& file, log::RunWindow& window, RunData& run
   auto table = state_columns(file, kState, run);
   if (!table) return std::unexpected(table.error());
   const double end_s = table->time_s.empty() ? 0.0 : std::min(window.end_s, table->time_s.back());
-  run.controllers_ran = std::min(end_s, window.fault_s) > window.begin_s;
+  run.controllers_ran = std::min(end_s, window.stop_s) > window.begin_s;
   if (!run.controllers_ran) window.begin_s = window.bring_up_s;
-  const double ran_s = window.fault_s - std::max(window.begin_s, 0.0);
-  window.end_s = std::min(window.end_s, window.fault_s + after_fault_s(ran_s));
+  const double ran_s = window.stop_s - std::max(window.begin_s, 0.0);
+  window.end_s = std::min(window.end_s, window.stop_s + after_stop_s(ran_s));
   window.end_s = std::max(window.end_s, window.begin_s);
   return read_rows(*table, window, run);
 }
@@ -276,10 +277,15 @@ Status read_estimate(const log::LogFile& file, const log::RunWindow& window, Run
 
 }  // namespace
 
-std::size_t RunData::rows_before_fault() const {
-  if (faults.empty()) return rows();
+const RunFault* RunData::stop() const {
+  const auto first = std::ranges::find(faults, true, &RunFault::stops);
+  return first == faults.end() ? nullptr : &*first;
+}
+
+std::size_t RunData::rows_before_stop() const {
+  if (stop() == nullptr) return rows();
   constexpr double kHalfNanosecond = 0.5e-9;
-  const auto after = std::ranges::upper_bound(time_s, faults.front().time_s + kHalfNanosecond);
+  const auto after = std::ranges::upper_bound(time_s, stop()->time_s + kHalfNanosecond);
   return std::max<std::size_t>(1, static_cast<std::size_t>(after - time_s.begin()));
 }
 
@@ -311,7 +317,7 @@ bool RunData::slides(std::size_t joint) const {
 
 std::vector<Tracking> RunData::tracking() const {
   std::vector<Tracking> all;
-  const std::size_t until = rows_before_fault();
+  const std::size_t until = rows_before_stop();
   for (std::size_t j = 0; j < position_rad.size(); ++j) {
     Tracking one{robot.joints[j].name, slides(j), 0.0, 0.0, 0.0};
     std::size_t samples = 0;
@@ -333,7 +339,7 @@ std::vector<Tracking> RunData::tracking() const {
 
 std::vector<FootFigures> RunData::feet() const {
   std::vector<FootFigures> all;
-  const std::size_t until = rows_before_fault();
+  const std::size_t until = rows_before_stop();
   for (std::size_t i = 0; truth() && i < robot.contact.feet.size(); ++i) {
     FootFigures one{.name = robot.contact.feet[i].site};
     const std::vector<double>& up_N = foot_force_N[3 * i + 2];
@@ -403,7 +409,7 @@ Result<RunData> read_run(const std::string& path, const ErrorText& error_text) {
   if (const Status s = read_truth(*file, kTruth, window, run); !s)
     return std::unexpected(s.error());
   if (const Status s = read_estimate(*file, window, run); !s) return std::unexpected(s.error());
-  run.step_s = (run.time_s.back() - run.time_s.front()) / static_cast<double>(run.rows() - 1);
+  run.step_s = std::max(1e-9, usual_step(run.time_s));
   return run;
 }
 

@@ -35,12 +35,16 @@ struct FootFigures {
   double slip_m = 0.0;  ///< farthest, level, from where it last touched down
 };
 
-/// What stopped a run, by its log's events.
+/// What stopped or disturbed a run, by its log's events.
 struct RunFault {
   double time_s = 0.0;  ///< since the first SYNC
   std::string joint;    ///< empty: nobody's
   std::string text;     ///< one sentence, without `joint`
+  bool stops = true;    ///< false: it was reported, and the run went on
 };
+
+/// Of a run's faults, in the page and as lines in its figures.
+inline constexpr std::size_t kFaultsShown = 5;
 
 /// A drive's error code in words.
 using ErrorText = std::function<std::string(std::uint32_t code)>;
@@ -60,7 +64,7 @@ struct RunData {
 
   double settle_s = 0.0;         ///< from bring-up to the controllers' start
   bool controllers_ran = true;   ///< false: the rows are those in which they were waited for
-  double step_s = 0.0;           ///< between rows
+  double step_s = 0.0;           ///< between rows, where none is missing
   std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
   double drawn_later_s = 0.0;    ///< added to all times of this run in the figures
   bool drawn_as_replay = false;  ///< so that a replay lies over its recording
@@ -79,8 +83,10 @@ struct RunData {
   Columns passive_rad;      ///< [passive joint][row]; empty: unknown (close_passive.hpp)
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
-  /// Rows until the first fault, its cycle included; the others show what followed. At least 1.
-  [[nodiscard]] std::size_t rows_before_fault() const;
+  /// The fault that stopped the run; null: none did.
+  [[nodiscard]] const RunFault* stop() const;
+  /// Rows until stop(), its cycle included; the others show what followed. At least 1.
+  [[nodiscard]] std::size_t rows_before_stop() const;
   /// First channel of sensor `index` in `sensor`.
   [[nodiscard]] std::size_t first_channel(std::size_t index) const;
   /// The root link in W; upright at the origin when nobody knows.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "report/logged_torque.hpp"
 #include "report/posture.hpp"
@@ -62,6 +63,10 @@ std::vector<int> widest_joints(const RunData& run) {
   return order;
 }
 
+bool has_numbers(const std::vector<double>& values) {
+  return std::ranges::any_of(values, [](double value) { return std::isfinite(value); });
+}
+
 bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
@@ -81,17 +86,24 @@ std::string side_of(std::size_t index, const OtherRuns& others) {
 constexpr CurveStyle kOthers[] = {CurveStyle::kSecond, CurveStyle::kFourth};
 static_assert(std::size(kOthers) == kMostOthers);
 
-/// What every figure over time has: its axis, and where runs ended in a fault. A fault's spike may
-/// be there before the loop knows of the fault: it does not widen the plots.
+/// What every figure over time has: its axis, and where runs had faults. The spike of one that
+/// stopped a run may be there before the loop knows of the fault: it does not widen the plots.
 void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
   constexpr double kSpike_s = 0.02;
-  figure.x_label = "time since the first SYNC [s]";
+  figure.x_label = time_label(run);
   for (std::size_t i = 0; i <= others.size(); ++i) {
     const RunData& one = i == 0 ? run : *others[i - 1];
-    if (one.faults.empty()) continue;
-    const double fault_s = one.faults.front().time_s + one.drawn_later_s;
-    figure.marks.push_back({"fault" + side_of(i, others), fault_s});
-    figure.range_until_x = std::min(figure.range_until_x, fault_s - kSpike_s);
+    const RunFault* const stop = one.stop();
+    std::string reported = "fault, reported" + side_of(i, others);
+    for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
+      const RunFault& fault = one.faults[f];
+      if (fault.stops || (stop != nullptr && fault.time_s > stop->time_s)) continue;
+      figure.marks.push_back({std::exchange(reported, ""), fault.time_s + one.drawn_later_s});
+    }
+    if (stop == nullptr) continue;
+    const double stop_s = stop->time_s + one.drawn_later_s;
+    figure.marks.push_back({"fault" + side_of(i, others), stop_s});
+    figure.range_until_x = std::min(figure.range_until_x, stop_s - kSpike_s);
   }
 }
 
@@ -100,7 +112,8 @@ Figure position_figure(const RunData& run, const OtherRuns& others, const Subjec
   const std::string& name = run.robot.joints[joint].name;
   Figure figure;
   figure.name = "joint_position";
-  figure.title = name + ": position against its reference";
+  figure.title = name + (has_numbers(run.reference_rad[joint]) ? ": position against its reference"
+                                                               : ": position");
   add_time(run, others, figure);
   const bool slides = run.slides(joint);
   const double factor = slides ? kMillimetres : kDegrees;
@@ -229,7 +242,8 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   Figure figure;
   const bool slides = run.slides(joint);
   figure.name = "joint_torque";
-  figure.title = name + (slides ? ": force, measured" : ": torque, measured");
+  const char* const measured = has_numbers(run.torque_Nm[joint]) ? ", measured" : "";
+  figure.title = name + (slides ? ": force" : ": torque") + measured;
   add_time(run, others, figure);
   figure.y_label = slides ? "force [N]" : "torque [Nm]";
   figure.curves.push_back(curve_of(run, "measured" + side_of(0, others), CurveStyle::kMeasured,
@@ -243,7 +257,7 @@ Figure torque_figure(const RunData& run, const OtherRuns& others, const Subjects
   if (!computed) {
     figure.title += " (no inverse dynamics: " + computed.error().message + ")";
   } else {
-    figure.title += " and by inverse dynamics";
+    figure.title += *measured != 0 ? " and by inverse dynamics" : " by inverse dynamics";
     figure.curves.push_back(std::move(*computed));
   }
   return figure;
@@ -264,7 +278,7 @@ bool squats(const RunData& run) {
   if (!run.truth() || !run.robot.model.floating_base) return false;
   const auto first = run.base[2].begin();
   const auto [low, high] =
-      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_fault()));
+      std::minmax_element(first, first + static_cast<std::ptrdiff_t>(run.rows_before_stop()));
   return *high - *low > 0.02 * std::abs(*first);
 }
 
@@ -274,12 +288,12 @@ bool squats(const RunData& run) {
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
   const bool base = squats(run);
   std::vector<double> depth = base ? run.base[2] : run.position_rad[at(joint)];
-  depth.resize(run.rows_before_fault());
+  depth.resize(run.rows_before_stop());
   const std::size_t last = depth.size() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back(
-        {what + suffix, run.time_s[row], run.base_placement(row), run.positions(row)});
+    samples.push_back({what + suffix, run.time_s[row] + run.drawn_later_s, run.base_placement(row),
+                       run.positions(row)});
   };
   const double start = depth.front();
   const auto far = std::ranges::max_element(
@@ -294,7 +308,7 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const bool moves = base || std::abs(turn - start) > kMoves;
   if (suffix.empty() && moves) add("half way", half);
   if (moves) add(base ? "lowest" : "farthest", lowest);
-  if (suffix.empty()) add(run.faults.empty() ? "end" : "fault", last);
+  if (suffix.empty()) add(run.stop() == nullptr ? "end" : "fault", last);
   return samples;
 }
 
@@ -317,6 +331,11 @@ Subjects subjects_of(const RunData& run) {
         first ? subjects.foot_sensors.begin() : subjects.foot_sensors.end(), static_cast<int>(i));
   }
   return subjects;
+}
+
+std::string time_label(const RunData& run) {
+  return run.info.hal == "import" ? "time since the recording's start [s]"
+                                  : "time since the first SYNC [s]";
 }
 
 std::vector<double> vertical_force(const RunData& run, int sensor) {
@@ -352,6 +371,8 @@ std::vector<Figure> figures_of(const RunData& run, const OtherRuns& others,
     samples.insert(samples.end(), more.begin(), more.end());
   }
   figures.push_back(posture_figure(run.tree, run.robot, samples));
+  for (Figure& figure : figures) drop_empty_curves(figure);
+  std::erase_if(figures, [](const Figure& figure) { return figure.curves.empty(); });
   return figures;
 }
 

@@ -3,6 +3,7 @@
 // Layer: report.  Thread: non-RT only.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "model/kernels.h"
@@ -29,8 +30,12 @@ inline constexpr std::size_t kMostOthers = 2;
 
 /// @param kernels  of the run's robot, for the torque that inverse dynamics gives; null: without.
 /// @param others   laid over `run`; kMostOthers at most
+/// @return those that have something to draw; the posture is the last one
 [[nodiscard]] std::vector<Figure> figures_of(const RunData& run, const OtherRuns& others,
                                              const tandem_kernels* kernels);
+
+/// What the times of a run's log count from, as a label.
+[[nodiscard]] std::string time_label(const RunData& run);
 
 /// Upward force [N] that a six-axis sensor measured, turned into the world by the run's posture.
 [[nodiscard]] std::vector<double> vertical_force(const RunData& run, int sensor);

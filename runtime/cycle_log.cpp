@@ -21,13 +21,14 @@ CycleLog::CycleLog(log::Recorder* recorder, const hal::StateImage& state,
 }
 
 void CycleLog::event(const hal::CycleTime& time, log::EventKind kind, std::int32_t joint,
-                     std::uint32_t code, float value) noexcept TANDEM_RT {
+                     std::uint32_t code, float value, bool reported) noexcept TANDEM_RT {
   if (recorder_ == nullptr) return;
   recorder_->push(log::Event{.cycle = time.cycle,
                              .time_ns = time.time_ns,
                              .code = code,
                              .joint = joint,
                              .kind = kind,
+                             .reported = static_cast<std::uint8_t>(reported ? 1 : 0),
                              .value = value});
 }
 

@@ -49,7 +49,8 @@ void RobotCycle::fault(FaultRecord record) noexcept TANDEM_RT {
     const bool of_sensor = record.source == FaultSource::kSensorLost;
     const bool of_base = record.source == FaultSource::kCollision && record.index < 0;
     log_.event(time_, event_of(record.source), of_joint && !of_base ? record.index : -1,
-               record.code, of_sensor || of_base ? static_cast<float>(record.index) : 0.0F);
+               record.code, of_sensor || of_base ? static_cast<float>(record.index) : 0.0F,
+               record.category == StopCategory::kWarn);
   }
   if (record.category == StopCategory::kCategory2 && !run_.in(RunPhase::kRetreating) &&
       !retreat()) {

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "apps/text/draft.hpp"
 #include "rt/stop_signal.hpp"
 
 namespace tandem::apps {
@@ -95,12 +96,19 @@ void outlive_files() {
 }
 
 Status write_file(const std::filesystem::path& file, const std::string& text) {
+  errno = 0;
   std::ofstream out(file, std::ios::binary);
+  const bool opened = out.is_open();
   out << text;
   out.close();
   if (out) return {};
-  return std::unexpected(Error{"the file cannot be written",
-                               "name a file in a folder that is there, and that you may write to",
+  const std::string reason = errno == 0 ? "" : std::string(": ") + std::strerror(errno);
+  std::error_code ignored;
+  if (opened && std::filesystem::is_regular_file(file, ignored))
+    std::filesystem::remove(file, ignored);
+  return std::unexpected(Error{"the file cannot be written" + reason,
+                               "name a file in a folder that is there, that you may write to, and "
+                               "whose disk has space",
                                file.string(),
                                0,
                                {}});
@@ -129,9 +137,13 @@ Status check_writable(const std::string& file) {
                                  0,
                                  {}});
   }
+  std::error_code ignored;
+  const bool there = std::filesystem::exists(file, ignored);
   errno = 0;
   const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
-  return out ? Status{} : std::unexpected(json_error(file));
+  if (!out) return std::unexpected(json_error(file));
+  if (!there) std::filesystem::remove(file, ignored);
+  return {};
 }
 
 std::string json_text(const Json& value, int indent) {
@@ -148,10 +160,10 @@ Status write_json(const std::string& file, const Json& value) {
     std::fflush(stdout);
     return {};
   }
-  errno = 0;
-  std::ofstream out(file, std::ios::binary);
-  out << text << std::flush;
-  return out ? Status{} : std::unexpected(json_error(file));
+  Draft draft = Draft::file(file);
+  const Status written = write_file(draft.path(), text);
+  if (!written) return std::unexpected(draft.placed(written.error()));
+  return draft.place();
 }
 
 Json errors_json(const Diagnostics& errors) {

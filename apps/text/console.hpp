@@ -49,7 +49,8 @@ void outlive_files();
 /// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 
-/// @pre the folder of `file`, which is one of those given by -o, is there
+/// Writes a new file, or over an old one, and removes it when not all of it could be written: give
+/// it a Draft's path. @pre its folder is there
 [[nodiscard]] Status write_file(const std::filesystem::path& file, const std::string& text);
 
 /// An error when a file is there that does not begin as what would be written over it.

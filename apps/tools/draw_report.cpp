@@ -4,6 +4,7 @@
 
 #include "apps/robot/kernel_store.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "hal/ethercat-can/drive_master.hpp"
 #include "report/page.hpp"
 
@@ -40,7 +41,15 @@ Result<report::ReportFiles> draw_report(const std::string& log,
       !lost) {
     return std::unexpected(lost.error());
   }
-  return report::make_report(log, others, folder, find, hal::can::DriveMaster::error_text);
+  Result<Draft> draft = Draft::folder(folder);
+  if (!draft) return std::unexpected(draft.error());
+  auto files =
+      report::make_report(log, others, draft->path(), find, hal::can::DriveMaster::error_text);
+  if (!files) return std::unexpected(draft->placed(files.error()));
+  if (const Status placed = draft->place(); !placed) return std::unexpected(placed.error());
+  files->page = draft->placed(files->page);
+  for (std::string& image : files->images) image = draft->placed(image);
+  return files;
 }
 
 }  // namespace tandem::apps

@@ -12,7 +12,7 @@ namespace tandem::apps {
 
 /// @param others  up to two more logs, laid over the first
 /// @param output  folder to write; empty: beside `log`, named after the logs
-/// Errors: report::make_report()'s.
+/// Errors: report::make_report()'s, which leave nothing half made.
 [[nodiscard]] Result<report::ReportFiles> draw_report(const std::string& log,
                                                       const std::vector<std::string>& others,
                                                       const std::string& output);

@@ -7,6 +7,7 @@
 #include "apps/robot/robot_files.hpp"
 #include "apps/robot/wrong_kind.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/eds_files.hpp"
 #include "apps/tools/eds_show.hpp"
@@ -26,12 +27,13 @@ Diagnostics write_sheets(const EdsOptions& options, std::vector<EdsFile>& files)
     return {made.error()};
   }
   files = std::move(*made);
-  std::error_code problem;  // which the first file meets too
-  std::filesystem::create_directories(options.output, problem);
+  Result<Draft> draft = Draft::folder(options.output);
+  if (!draft) return {draft.error()};
   for (const EdsFile& file : files) {
-    const Status written = write_file(std::filesystem::path(options.output) / file.name, file.text);
-    if (!written) return {written.error()};
+    const Status written = write_file(std::filesystem::path(draft->path()) / file.name, file.text);
+    if (!written) return {draft->placed(written.error())};
   }
+  if (const Status placed = draft->place(); !placed) return {placed.error()};
   return {};
 }
 

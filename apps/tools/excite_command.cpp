@@ -7,6 +7,7 @@
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
@@ -114,8 +115,9 @@ struct Found {
   std::string refused;  // what ended the last trial that failed
 };
 
+/// @param file  to write it to; its robot's path is from options.output
 Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
-                     const std::string& posture, const Trial& trial) {
+                     const std::string& posture, const std::string& file, const Trial& trial) {
   identification::ExciteRequest request{.posture = posture,
                                         .joints = options.joints,
                                         .period_s = options.period_s,
@@ -132,9 +134,9 @@ Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
     found.excitation = std::move(*result);
     found.share = request.share;
     const std::string text = experiment_text(found.excitation, options, robot.config, posture);
-    if (const Status s = write_file(options.output, text); !s) return std::unexpected(s.error());
+    if (const Status s = write_file(file, text); !s) return std::unexpected(s.error());
     if (!robot.tree.floating_base || options.output == "-") return found;
-    auto end = trial(options.output);
+    auto end = trial(file);
     if (!end) return std::unexpected(end.error());
     if (end->empty()) return found;
     found.refused = std::move(*end);
@@ -172,12 +174,14 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
   if (posture.empty() && !robot->config.postures.empty())
     posture = robot->config.postures.front().name;
   if (options.tries <= 0) options.tries = robot->config.joints.size() > 12 ? 60 : 300;
-  const auto found = search(*robot, options, posture, trial);
+  Draft draft = Draft::file(options.output);
+  const auto found = search(*robot, options, posture, draft.path(), trial);
   if (!found) {
-    Error error = found.error();
+    Error error = draft.placed(found.error());
     if (error.file.empty()) error.file = options.robot;
     return refuse(error);
   }
+  if (const Status placed = draft.place(); !placed) return refuse(placed.error());
   const identification::Excitation* const result = &found->excitation;
   std::FILE* out = human_output(options.json);
   Facts facts;

@@ -2,13 +2,14 @@
 #include <fmt/core.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/identified_files.hpp"
 #include "apps/tools/identify_page.hpp"
+#include "base/process.hpp"
 #include "identification/identify.hpp"
 
 namespace tandem::apps {
@@ -159,30 +160,25 @@ Exit identify_command(const IdentifyOptions& options) {
   const auto result = identification::identify(options.logs, robot->config, robot->tree,
                                                {.cutoff_Hz = options.cutoff_Hz});
   if (!result) return refuse(result.error());
-  std::error_code problem;
-  std::filesystem::create_directories(options.output, problem);
-  if (problem) {
-    return refuse(Error{"cannot create the folder: " + problem.message(),
-                        "name a folder that can be written with --out",
-                        options.output,
-                        0,
-                        {}});
-  }
+  Result<Draft> draft = Draft::folder(options.output);
+  if (!draft) return refuse(draft.error());
   std::FILE* out = human_output(options.json);
   print_result(out, *result);
   for (const std::string& remark : result->remarks) fmt::print(stderr, "note: {}\n", remark);
   for (const std::string& warning : result->warnings) fmt::print(stderr, "warning: {}\n", warning);
-  const auto written = write_identified(*robot, *result, options.logs, options.output);
-  if (!written) return refuse(written.error());
+  const auto written = write_identified(*robot, *result, options.logs, draft->path());
+  if (!written) return refuse(draft->placed(written.error()));
   Facts files;
   for (const std::string& note : written->notes) fmt::print(stderr, "note: {}\n", note);
-  for (const std::string& file : written->paths) files.add("written", file);
-  const auto page = write_identify_page(*result, robot->config.name, options.output);
-  if (page) {
-    files.add("report", *page);
+  for (const std::string& file : written->paths) files.add("written", draft->placed(file));
+  if (program_exists("gnuplot")) {
+    const auto page = write_identify_page(*result, robot->config.name, draft->path());
+    if (!page) return refuse(draft->placed(page.error()));
+    files.add("report", draft->placed(*page));
   } else {
-    fmt::print(stderr, "note: no report: {}\n", page.error().to_string());
+    fmt::print(stderr, "note: no report: it needs gnuplot (apt-get install gnuplot-nox)\n");
   }
+  if (const Status placed = draft->place(); !placed) return refuse(placed.error());
   files.print(out);
   if (const Status s = write_json(options.json, result_json(*result, written->notes)); !s)
     return refuse(s.error());

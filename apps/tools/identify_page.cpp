@@ -31,17 +31,34 @@ std::string percent(double part) {
   return std::isfinite(part) ? fmt::format("{:.2f}", 100.0 * part) : "-";
 }
 
+/// Times to draw: of one log its own; of several, side by side with a gap between them.
+std::vector<double> drawn_times(const JointResult& joint) {
+  std::vector<double> drawn = joint.time_s;
+  const double between_s = std::max(2.0, 2.0 * report::kGapSteps * report::usual_step(drawn));
+  for (std::size_t l = 0; joint.first_of_log.size() > 1 && l < joint.first_of_log.size(); ++l) {
+    const std::size_t begin = joint.first_of_log[l];
+    const bool last = l + 1 == joint.first_of_log.size();
+    const std::size_t end = last ? drawn.size() : joint.first_of_log[l + 1];
+    const double from_s = begin == 0 ? 0.0 : drawn[begin - 1] + between_s;
+    for (std::size_t i = begin; i < end; ++i)
+      drawn[i] = from_s + joint.time_s[i] - joint.time_s[begin];
+  }
+  return drawn;
+}
+
 report::Figure figure_of(const JointResult& joint, std::size_t index) {
+  const std::vector<double> time_s = drawn_times(joint);
   report::Figure figure{
       .name = fmt::format("joint_{:02}", index + 1),
       .title = fmt::format("{}: left over {} % by the description, {} % identified", joint.name,
                            percent(joint.described_relative_error), percent(joint.relative_error)),
-      .x_label = "time [s]",
+      .x_label = joint.first_of_log.size() > 1 ? "held-out data, log after log [s]" : "time [s]",
       .y_label = joint.slides ? "force [N]" : "torque [Nm]"};
   using report::CurveStyle;
-  figure.curves.push_back({"measured", CurveStyle::kMeasured, joint.time_s, joint.measured_Nm});
-  figure.curves.push_back({"description", CurveStyle::kThird, joint.time_s, joint.described_Nm});
-  figure.curves.push_back({"identified", CurveStyle::kComputed, joint.time_s, joint.identified_Nm});
+  figure.curves.push_back({"measured", CurveStyle::kMeasured, time_s, joint.measured_Nm});
+  figure.curves.push_back({"description", CurveStyle::kThird, time_s, joint.described_Nm});
+  figure.curves.push_back({"identified", CurveStyle::kComputed, time_s, joint.identified_Nm});
+  break_at_gaps(figure);
   for (report::Curve& curve : figure.curves) curve = report::decimated(curve, 2000);
   return figure;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "apps/text/draft.hpp"
 #include "report/alarm_figures.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
@@ -122,8 +123,8 @@ Result<std::string> write_alarm_page(const AlarmTable& table, const std::string&
     return fail("no log has a push to draw",
                 "give --against a log of a run with pushes: --scenario with a [[fault]]");
   }
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
+  Result<Draft> draft = Draft::folder(folder);
+  if (!draft) return std::unexpected(draft.error());
   std::vector<report::AlarmCurve> curves;
   for (const auto& one : table.pushed) {
     report::AlarmCurve curve{one.name, {}, {}, {}};
@@ -147,9 +148,10 @@ Result<std::string> write_alarm_page(const AlarmTable& table, const std::string&
                                 {}}}};
   for (std::size_t f = 0; f < table.factors.size(); ++f)
     page.tables[0].rows.push_back(row_of(table, f));
-  if (const Status s = report::draw(figures, folder); !s) return std::unexpected(s.error());
-  if (const Status s = report::write_page(page, figures, folder); !s)
-    return std::unexpected(s.error());
+  Status made = report::draw(figures, draft->path());
+  if (made) made = report::write_page(page, figures, draft->path());
+  if (!made) return std::unexpected(draft->placed(made.error()));
+  if (made = draft->place(); !made) return std::unexpected(made.error());
   return folder + "/report.html";
 }
 

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/log_thresholds.hpp"
 #include "base/counted.hpp"
@@ -133,12 +134,18 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
   if (Status lost = check_overwrites(options.output, "time_s", "table of Tandem's"); !lost) {
     return lost;
   }
-  std::ofstream out(options.output, std::ios::binary);
+  Draft draft = Draft::file(options.output);
+  std::ofstream out(draft.path(), std::ios::binary);
   if (!out) {
     return std::unexpected(Error{
         "cannot write this file", "name a file in a folder that exists", options.output, 0, {}});
   }
-  return log::write_csv(file, topic, options.every, out, options.fields);
+  Status written = log::write_csv(file, topic, options.every, out, options.fields);
+  out.close();
+  if (written && !out) written = fail("writing the CSV failed", "check the space on the disk");
+  if (written) return draft.place();
+  if (!out) written.error().file = options.output;
+  return written;
 }
 
 Json comparison_json(const log::Comparison& comparison) {

@@ -6,6 +6,7 @@
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "base/counted.hpp"
 #include "log/import/import_log.hpp"
@@ -122,10 +123,15 @@ Exit log_import_command(const LogOptions& options) {
   if (!robot) return refuse(robot.error());
   const Result<std::string> output = output_of(options, robot->config.name);
   if (!output) return refuse(output.error());
-  const auto summary =
-      log::import_log({options.files, options.map, *output}, robot->config,
-                      info_of(*robot, options.robot), text_of(robot->config.model.urdf));
-  if (!summary) return refuse(summary.error());
+  Draft draft = Draft::file(*output);
+  auto summary = log::import_log({options.files, options.map, draft.path()}, robot->config,
+                                 info_of(*robot, options.robot), text_of(robot->config.model.urdf));
+  if (!summary) {
+    for (Error& error : summary.error()) error = draft.placed(std::move(error));
+    return refuse(summary.error());
+  }
+  if (const Status placed = draft.place(); !placed) return refuse(placed.error());
+  summary->log.path = *output;
   print_summary(*summary, human_output(options.json));
   if (const Status written = write_json(options.json, summary_json(*summary)); !written) {
     return refuse(written.error());

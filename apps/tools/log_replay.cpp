@@ -7,6 +7,7 @@
 
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
@@ -238,9 +239,11 @@ Exit log_replay_command(const LogOptions& options) {
       !kept) {
     return refuse(kept.error());
   }
-  if (const Status s = write_file(options.output, experiment_text(*replay, options)); !s) {
-    return refuse(s.error());
+  Draft draft = Draft::file(options.output);
+  if (const Status s = write_file(draft.path(), experiment_text(*replay, options)); !s) {
+    return refuse(draft.placed(s.error()));
   }
+  if (const Status s = draft.place(); !s) return refuse(s.error());
   print_facts(*replay, options, human_output(options.json));
   if (const Status s = write_json(options.json, replay_json(*replay, options)); !s) {
     return refuse(s.error());

@@ -1,6 +1,5 @@
 // `tandem new`: the files of a robot from its URDF.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
@@ -11,6 +10,7 @@
 #include "apps/robot/bundled.hpp"
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/right_angles.hpp"
 #include "base/counted.hpp"
@@ -71,104 +71,55 @@ std::expected<scaffold::Like, Diagnostics> read_like(const std::string& name) {
   return scaffold::Like{std::move(robot->config), std::move(robot->tree)};
 }
 
-/// Writes everything into a folder beside the one that is asked for, reads it back as `tandem
-/// run` would, and puts it in place: what is wrong leaves nothing behind.
-class Folder {
- public:
-  explicit Folder(fs::path final) : final_(std::move(final)) {
-    draft_ = final_.string() + ".new-" + std::to_string(getpid());
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(draft_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
+/// Files that were there and are others now, as (name, name of the copy).
+using Kept = std::vector<std::pair<std::string, std::string>>;
 
-  Diagnostics write(const scaffold::NewRobot& robot, const std::string& urdf) {
-    std::error_code problem;
-    fs::create_directories(draft_, problem);
-    if (problem) {
-      return one("the folder cannot be made: " + problem.message(), "choose another folder with -o",
-                 final_.string());
-    }
-    const std::string copy = fs::path(urdf).filename().string();
-    for (const auto& [name, text] :
-         {std::pair{copy, text_of(urdf)},
-          {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
-          {std::string("hold.toml"), scaffold::hold_text(robot)},
-          {std::string("move.toml"), scaffold::move_text(robot)}}) {
-      if (Status written = write_file(draft_ / name, text); !written) {
-        return in_place({written.error()});
-      }
-    }
+/// Moves a file that is there, and is not what is written now, to FILE~.
+Status keep(const fs::path& old, const fs::path& next, Kept& kept) {
+  std::error_code problem;
+  if (!fs::exists(fs::symlink_status(old, problem))) return {};
+  if (fs::is_regular_file(old, problem) && text_of(old.string()) == text_of(next.string())) {
     return {};
   }
-
-  [[nodiscard]] std::expected<RobotFiles, Diagnostics> check() const {
-    auto robot = read_robot((draft_ / "robot.toml").string());
-    if (!robot) return std::unexpected(in_place(robot.error()));
-    Diagnostics errors = hal::can::check_bus_load(robot->config, kPeriod_ns);
-    if (!errors.empty()) return std::unexpected(in_place(std::move(errors)));
-    return robot;
+  fs::path copy = old.string() + "~";
+  for (int i = 2; fs::exists(fs::symlink_status(copy, problem)); ++i) {
+    copy = old.string() + "~" + std::to_string(i);
   }
+  fs::rename(old, copy, problem);
+  kept.emplace_back(old.filename().string(), copy.filename().string());
+  if (!problem) return {};
+  return std::unexpected(Error{"the file cannot be written: " + problem.message(),
+                               "choose another folder with -o",
+                               copy.string(),
+                               0,
+                               {}});
+}
 
-  /// What was there and is not what is written now stays beside it, as FILE~.
-  Status place() {
-    std::error_code problem;
-    fs::create_directories(final_, problem);
-    for (const auto& entry : fs::directory_iterator(draft_)) {
-      const fs::path file = final_ / entry.path().filename();
-      if (Status kept = keep(file, entry.path()); !kept) return kept;
-      fs::rename(entry.path(), file, problem);
-      if (problem) return failed(file, problem);
-    }
-    std::ranges::sort(kept_);
-    return {};
+/// Every error's file as it will be.
+Diagnostics placed(const Draft& draft, Diagnostics errors) {
+  for (Error& error : errors) error = draft.placed(std::move(error));
+  return errors;
+}
+
+/// Writes everything into the draft, and reads it back as `tandem run` would.
+std::expected<RobotFiles, Diagnostics> write(const scaffold::NewRobot& robot,
+                                             const std::string& urdf, const Draft& draft) {
+  const fs::path folder = draft.path();
+  const std::string copy = fs::path(urdf).filename().string();
+  for (const auto& [name, text] :
+       {std::pair{copy, text_of(urdf)},
+        {std::string("robot.toml"), scaffold::robot_text(robot, copy, copy)},
+        {std::string("hold.toml"), scaffold::hold_text(robot)},
+        {std::string("move.toml"), scaffold::move_text(robot)}}) {
+    if (Status written = write_file(folder / name, text); !written)
+      return std::unexpected(placed(draft, {written.error()}));
   }
-
-  /// Files that place() has kept, as (name, name of the copy).
-  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& kept() const {
-    return kept_;
-  }
-
- private:
-  static Status failed(const fs::path& file, const std::error_code& problem) {
-    return std::unexpected(Error{"the file cannot be written: " + problem.message(),
-                                 "choose another folder with -o",
-                                 file.string(),
-                                 0,
-                                 {}});
-  }
-
-  Status keep(const fs::path& old, const fs::path& next) {
-    std::error_code problem;
-    if (!fs::exists(fs::symlink_status(old, problem))) return {};
-    if (fs::is_regular_file(old, problem) && text_of(old.string()) == text_of(next.string())) {
-      return {};
-    }
-    fs::path copy = old.string() + "~";
-    for (int i = 2; fs::exists(fs::symlink_status(copy, problem)); ++i) {
-      copy = old.string() + "~" + std::to_string(i);
-    }
-    fs::rename(old, copy, problem);
-    if (problem) return failed(copy, problem);
-    kept_.emplace_back(old.filename().string(), copy.filename().string());
-    return {};
-  }
-
-  /// The draft is gone when the reader sees the message: it names the files that were meant.
-  [[nodiscard]] Diagnostics in_place(Diagnostics errors) const {
-    for (Error& error : errors) {
-      const fs::path file(error.file);
-      if (file.parent_path() == draft_) error.file = (final_ / file.filename()).string();
-    }
-    return errors;
-  }
-
-  fs::path final_, draft_;
-  std::vector<std::pair<std::string, std::string>> kept_;
-};
+  auto read = read_robot((folder / "robot.toml").string());
+  if (!read) return std::unexpected(placed(draft, read.error()));
+  Diagnostics errors = hal::can::check_bus_load(read->config, kPeriod_ns);
+  if (!errors.empty()) return std::unexpected(placed(draft, std::move(errors)));
+  return read;
+}
 
 Json to_json(const scaffold::NewRobot& robot, const std::string& folder) {
   Json feet = Json::array(), sensors = Json::array(), drives = Json::array();
@@ -302,18 +253,23 @@ Diagnostics run(const NewOptions& options) {
   request.like = like ? &*like : nullptr;
   const auto robot = scaffold::make_robot(request);
   if (!robot) return robot.error();
-  Folder files{fs::path(folder)};
-  if (Diagnostics errors = files.write(*robot, options.urdf); !errors.empty()) return errors;
-  const auto written = files.check();
+  Result<Draft> draft = Draft::folder(folder);
+  if (!draft) return {draft.error()};
+  const auto written = write(*robot, options.urdf, *draft);
   if (!written) return written.error();
   Facts facts;
   add_facts(*robot, facts);
   Json json = to_json(*robot, folder);
   if (Status counted = add_right_angles(*written, facts, json); !counted) return {counted.error()};
-  if (Status placed = files.place(); !placed) return {placed.error()};
+  Kept kept;
+  if (Status done = draft->place(
+          [&kept](const fs::path& old, const fs::path& next) { return keep(old, next, kept); });
+      !done) {
+    return {done.error()};
+  }
   print_warnings(robot->warnings);
   std::FILE* const out = human_output(options.json);
-  for (const auto& [old, copy] : files.kept()) {
+  for (const auto& [old, copy] : kept) {
     facts.add("kept", fmt::format("{} that was there is {} now", old, copy));
     json["kept"][old] = copy;
   }

@@ -81,6 +81,20 @@ TEST_F(Thresholds, OfOneRunTwiceAreRefused) {
   EXPECT_NE(outcome.err.find("has the same data as " + log), std::string::npos) << outcome.err;
 }
 
+// Its report had shown the run until the first collision, and a second more.
+TEST_F(Thresholds, PassedWithAWarningHideNothingOfTheRun) {
+  experiment("swing");
+  write_text(folder_ / "warned.toml",
+             read_text(folder_ / "swing.toml") +
+                 "[estimation.collision]\nreaction = \"warn\"\n"
+                 "[estimation.collision.threshold_Nm]\n\"joint1\" = 0.001\n\"joint2\" = 0.001\n");
+  EXPECT_EQ(tandem("run warned.toml --duration 3 --quiet --log . --report").status, 1);
+  const std::string page = read_text(folder_ / "double_pendulum-warned-001/report.html");
+  EXPECT_NE(page.find("<dt>controllers ran</dt><dd>3.000 s</dd>"), std::string::npos)
+      << page.substr(page.find("<h2>Run</h2>"));
+  EXPECT_NE(page.find("Nm, reported, at "), std::string::npos);
+}
+
 TEST_F(Thresholds, OfOneRunSayThatRunsDiffer) {
   experiment("swing");
   const Outcome outcome = tandem("log thresholds " + run("swing"));

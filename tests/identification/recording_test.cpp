@@ -164,6 +164,17 @@ TEST(Recording, GivesTheSameResultWithWhatLiesLeftOut) {
   ASSERT_FALSE(result->remarks.empty());
 }
 
+// Their held-out parts had been one curve.
+TEST(Recording, OfSeveralKnowWhereEachOnesHeldOutPartBegins) {
+  const auto result = identify({good(), good()}, panda().robot, panda().tree);
+  ASSERT_TRUE(result) << result.error().to_string();
+  const JointResult& joint = result->joints[1];
+  ASSERT_EQ(joint.first_of_log.size(), 2U);
+  EXPECT_EQ(joint.first_of_log[0], 0U);
+  EXPECT_EQ(joint.first_of_log[1], joint.time_s.size() / 2);
+  EXPECT_LT(joint.time_s[joint.first_of_log[1]], joint.time_s[joint.first_of_log[1] - 1]);
+}
+
 TEST(Recording, OfNumbersThatAreNoneGivesTheSameResultWithoutThem) {
   Recording whole = good(), holed = good();
   for (std::size_t at = 4000; at < 4200; ++at) {

@@ -56,6 +56,14 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   event = {.joint = 0, .kind = EventKind::kRecoveryRequested};
   EXPECT_EQ(describe(event, kNames), "recovery requested of hip");
   EXPECT_FALSE(is_fault(event.kind));
+  event = {.code = 1500, .joint = 1, .kind = EventKind::kCollision};
+  EXPECT_EQ(describe(event, kNames), "fault: collision of knee: an external torque of 1.5 Nm");
+  EXPECT_TRUE(is_stop(event));
+  event.reported = 1;
+  EXPECT_EQ(describe(event, kNames),
+            "fault: collision of knee: an external torque of 1.5 Nm, reported");
+  EXPECT_TRUE(is_fault(event.kind));
+  EXPECT_FALSE(is_stop(event));
 }
 
 TEST(Event, IsEncodedAsPlainCdr) {
@@ -74,6 +82,9 @@ TEST(Event, IsEncodedAsPlainCdr) {
   EXPECT_EQ(back->event.joint, -1);
   EXPECT_EQ(back->event.kind, EventKind::kFault);
   EXPECT_EQ(back->text, "ab");
+  EXPECT_TRUE(is_stop(back->event)) << "an older log has zeros there";
+  encode_event({.kind = EventKind::kCollision, .reported = 1}, "ab", body = {});
+  EXPECT_EQ(decode_event(body)->event.reported, 1);
 }
 
 TEST(Event, RefusesACutMessage) {

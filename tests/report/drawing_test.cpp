@@ -11,6 +11,7 @@
 #include <limits>
 #include <sstream>
 
+#include "report/alarm_figures.hpp"
 #include "report/gnuplot.hpp"
 #include "report/page.hpp"
 
@@ -72,12 +73,75 @@ TEST(Decimation, LeavesAShortCurveAsItIs) {
   EXPECT_EQ(decimated(curve, 500).y, curve.y);
 }
 
+// There had been a straight line from the last sample to the next.
+TEST(Gaps, EndALineWhereSamplesAreMissing) {
+  Figure figure = ramp("gap");
+  for (std::size_t i = 50; i < 101; ++i) figure.curves[0].x[i] += 0.045;
+  break_at_gaps(figure);
+  ASSERT_EQ(figure.curves[0].x.size(), 102U);
+  EXPECT_TRUE(std::isnan(figure.curves[0].y[50]));
+  break_at_gaps(figure = ramp("whole"));
+  EXPECT_EQ(figure.curves[0].x.size(), 101U);
+}
+
+TEST(Decimation, KeepsGaps) {
+  Curve curve{"gaps", CurveStyle::kMeasured, {}, {}};
+  for (int i = 0; i < 10'000; ++i) {
+    curve.x.push_back(i);
+    curve.y.push_back(i == 3000 || i == 3005 || i >= 9000 ? NAN : i);
+  }
+  const Curve small = decimated(curve, 500);
+  EXPECT_LE(small.x.size(), 505U);
+  EXPECT_EQ(std::ranges::count_if(small.y, [](double y) { return std::isnan(y); }), 3);
+  for (std::size_t i = 1; i < small.x.size(); ++i) {
+    const bool over = small.x[i - 1] < 3000 && small.x[i] > 3000;
+    EXPECT_FALSE(over) << small.x[i - 1] << " is joined to " << small.x[i];
+  }
+  EXPECT_NEAR(*std::ranges::max_element(small.x), 9000, 1);
+}
+
 TEST(Script, BreaksALineWhereASampleIsMissing) {
   Figure figure = ramp("gap");
   figure.curves[0].y[1] = std::numeric_limits<double>::quiet_NaN();
   const std::string script = gnuplot_script({&figure, 1}, "/tmp");
   EXPECT_NE(script.find("0 0\n\n0.02 1\n"), std::string::npos);
   EXPECT_EQ(script.find("nan"), std::string::npos);
+}
+
+/// The numbers of `set Xtics nomirror (…)`, without that of "0".
+std::vector<double> ticks_of(const std::string& script, const std::string& axis) {
+  const std::string key = "set " + axis + "tics nomirror (";
+  const std::size_t at = script.find(key) + key.size();
+  std::istringstream list(script.substr(at, script.find(')', at) - at));
+  std::vector<double> numbers;
+  for (std::string one; std::getline(list, one, ',');)
+    if (one.find('"') == std::string::npos) numbers.push_back(std::stod(one));
+  return numbers;
+}
+
+// There had been one number on each axis, and factors with many alarms, or none, were missing.
+TEST(Alarms, AreAllInThePictureBetweenReadableNumbers) {
+  const AlarmCurve curve{"push", {12477, 6954, 1840, 818, 0}, {1, 1, 1, 2, 3}, {1, 1, 2, 3, NAN}};
+  const std::vector<Figure> figures = alarm_figures("alarms", "Time", {&curve, 1});
+  const std::vector<double> x = figures[0].curves[0].x;
+  EXPECT_EQ(std::vector(x.begin(), x.end() - 1), std::vector<double>({12477, 6954, 1840, 818}));
+  EXPECT_EQ(x.back(), figures[0].zero_x);
+  EXPECT_LT(x.back(), 818 / 3.0);
+  EXPECT_TRUE(std::isnan(figures[1].curves[0].y.back()));
+  const std::string script = gnuplot_script({figures.data(), 1}, "/tmp");
+  for (const char* axis : {"x", "y"}) {
+    const std::vector<double> ticks = ticks_of(script, axis);
+    EXPECT_GE(ticks.size(), 4U) << axis;
+    EXPECT_LE(ticks.size(), 10U) << axis;
+  }
+  EXPECT_NE(script.find("(\"0\" "), std::string::npos);
+}
+
+TEST(Alarms, OfWhichNoneWasCountedAreDrawn) {
+  const AlarmCurve curve{"push", {0, 0}, {1, 2}, {1, 2}};
+  const std::vector<Figure> figures = alarm_figures("alarms", "Time", {&curve, 1});
+  EXPECT_EQ(figures[0].curves[0].x, std::vector<double>(2, figures[0].zero_x));
+  EXPECT_GT(figures[0].zero_x, 0.0);
 }
 
 TEST_F(Drawing, MakesSvgAndPngOfEachFigureAndAnOverview) {

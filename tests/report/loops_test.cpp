@@ -105,6 +105,27 @@ TEST_F(TurningLinkage, NeedsTheTorqueThatItsEnergyTells) {
   }
 }
 
+// Accelerations had been differenced over the gap.
+TEST_F(TurningLinkage, HasNoTorqueWhereSamplesAreMissing) {
+  const auto cut = [](std::vector<double>& values) {
+    values.erase(values.begin() + kRows / 3, values.begin() + kRows / 2);
+  };
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm,
+                           &run.reference_rad, &run.base, &run.passive_rad, &run.loop_error}) {
+    for (std::vector<double>& column : *columns) cut(column);
+  }
+  // It turns faster before it: a difference over the gap is a brake.
+  for (std::size_t row = 0; row < kRows / 3; ++row) run.velocity_rad_s[0][row] *= 2.0;
+  cut(run.time_s);
+  const Result<Curve> curve = inverse_dynamics_curve(run, 0, *robot.kernels.get());
+  ASSERT_TRUE(curve.has_value()) << curve.error().to_string();
+  ASSERT_EQ(curve->y.size(), run.rows() + 1);
+  EXPECT_TRUE(std::isnan(curve->y[kRows / 3]));
+  const std::size_t missing = kRows / 2 - kRows / 3;
+  for (std::size_t i = kRows / 3 + 1; i + 20 < curve->y.size(); ++i)
+    EXPECT_NEAR(curve->y[i], torque_Nm[i - 1 + missing], 0.004) << "at " << curve->x[i] << " s";
+}
+
 TEST_F(TurningLinkage, WithoutTruthSaysWhyThereIsNoInverseDynamics) {
   run.base.clear();
   run.passive_rad.clear();
@@ -222,7 +243,7 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
   }
   run.reference_rad.assign(8, {0.0, 0.0, 0.0, 0.0});
   run.faults = {{1.30, "panda_finger_joint1", "a short circuit"}, {1.40, "", "more"}};
-  EXPECT_EQ(run.rows_before_fault(), 2U);
+  EXPECT_EQ(run.rows_before_stop(), 2U);
   for (const Tracking& one : run.tracking()) {
     EXPECT_EQ(one.max_rad, 0.0);
     EXPECT_EQ(one.max_torque_Nm, 0.0);
@@ -236,6 +257,55 @@ TEST_F(Gripper, OfAFaultedRunShowsTheFaultAndWhatFollowedButCountsIt) {
     EXPECT_EQ(figure.curves[0].x, run.time_s) << "what followed is drawn";
   }
   EXPECT_EQ(figures[2].notes.back().text, "1.30 s");
+}
+
+// An empty frame had been drawn, and "against its reference" stood above none.
+TEST_F(Gripper, OfARecordingOnlyWhatItHasIsDrawnAndNamed) {
+  run.info.hal = "import";
+  run.robot.sensors = {{}};
+  run.robot.sensors[0].name = "flange";
+  run.robot.sensors[0].type = hal::SensorType::kForceTorque;
+  run.robot.sensors[0].link = "panda_link8";
+  const std::vector<double> none(run.rows(), std::numeric_limits<double>::quiet_NaN());
+  run.sensor.assign(run.robot.sensors[0].channels(), none);
+  run.reference_rad.assign(run.position_rad.size(), none);
+  std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  ASSERT_EQ(figures.size(), 3U) << "position, torque, posture";
+  EXPECT_TRUE(figures[0].title.ends_with(": position")) << figures[0].title;
+  EXPECT_EQ(figures[0].curves.size(), 1U);
+  EXPECT_EQ(figures[0].x_label, "time since the recording's start [s]");
+  run.torque_Nm.assign(run.position_rad.size(), none);
+  figures = figures_of(run, {}, nullptr);
+  EXPECT_EQ(figures.size(), 2U) << "position, posture";
+}
+
+// They had been those of its own log, beside an axis that has the first one's.
+TEST_F(Gripper, TimesOfAShiftedRunsPosturesAreThoseOfTheAxis) {
+  RunData later = run;
+  for (double& time_s : later.time_s) time_s += 5.0;
+  later.drawn_later_s = -5.0;
+  const Figure posture = figures_of(run, {&later}, nullptr).back();
+  std::vector<std::string> times;
+  for (std::size_t i = 1; i < posture.notes.size(); i += 2) times.push_back(posture.notes[i].text);
+  ASSERT_EQ(times.size() % 2, 0U);
+  const std::size_t each = times.size() / 2;
+  for (std::size_t i = 0; i < each; ++i) EXPECT_EQ(times[i], times[each + i]);
+}
+
+// It had been taken for the run's end.
+TEST_F(Gripper, AFaultThatIsOnlyReportedEndsNothing) {
+  run.time_s = {1.25, 1.30, 1.35, 1.40};
+  for (Columns* columns : {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm}) {
+    columns->assign(8, {0.0, 0.0, 9.0, 9.0});
+  }
+  run.faults = {{1.30, "panda_finger_joint1", "collision", false}, {1.35, "", "collision", false}};
+  EXPECT_EQ(run.rows_before_stop(), 4U);
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  ASSERT_EQ(figures[0].marks.size(), 2U);
+  EXPECT_EQ(figures[0].marks[0].label, "fault, reported");
+  EXPECT_EQ(figures[0].marks[1].x, 1.35);
+  EXPECT_EQ(figures[0].range_until_x, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(figures[2].notes.back().text, "1.40 s");
 }
 
 TEST_F(Gripper, TellsWhichJointsSlide) {

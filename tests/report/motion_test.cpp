@@ -6,6 +6,7 @@
 
 #include "model/urdf.hpp"
 #include "report/inverse_dynamics.hpp"
+#include "report/layout.hpp"
 #include "report/posture.hpp"
 
 namespace tandem::report {
@@ -128,6 +129,41 @@ TEST(Posture, PlacesEveryBodyOfThePendulum) {
   ASSERT_EQ(figure.curves.size(), 1U);
   EXPECT_TRUE(figure.equal_axes);
   EXPECT_EQ(figure.notes.size(), 4U);
+}
+
+// One reaches to the right and the next to the left: they had crossed. What hung below the last
+// joint crossed the texts.
+TEST(Posture, OfFiguresThatReachFarBothWaysNoneTouchesAnotherOrTheTexts) {
+  const std::string folder = TANDEM_SOURCE_DIR "/config/double_pendulum/";
+  const auto robot = hal::read_robot_config(folder + "robot.toml");
+  ASSERT_TRUE(robot.has_value());
+  const auto description = model::read_urdf(robot->model.urdf, {});
+  ASSERT_TRUE(description.has_value());
+  std::vector<PostureSample> samples;
+  for (const double turn : {1.5, -1.5, 1.5, 3.1, 0.0, -1.5})
+    samples.push_back({"farthest A", 0.0, {}, {turn, 0.0}});
+  const Figure figure = posture_figure(description->tree, *robot, samples);
+  const Curve& curve = figure.curves.front();
+  std::vector<Extent> figures(1);  // a NaN ends each line; the outer edges come first
+  double lowest = 1e300;
+  for (std::size_t i = 0; i < curve.x.size(); ++i) {
+    if (std::isfinite(curve.y[i])) {
+      figures.back().include(curve.x[i]);
+      lowest = std::min(lowest, curve.y[i]);
+    } else if (figures.back().low <= figures.back().high) {
+      figures.emplace_back();
+    }
+  }
+  figures.pop_back();
+  ASSERT_EQ(figures.size(), samples.size());
+  const double across = curve.x[1] - curve.x[0];
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    EXPECT_NEAR(figure.notes[2 * i].x, 0.5 * (figures[i].low + figures[i].high), 1e-9);
+    EXPECT_LT(figure.notes[2 * i].y, lowest);
+    if (i == 0) continue;
+    EXPECT_GT(figures[i].low, figures[i - 1].high) << i;
+    EXPECT_GT(figure.notes[2 * i].x - figure.notes[2 * i - 2].x, 0.13 * across) << "texts of " << i;
+  }
 }
 
 }  // namespace

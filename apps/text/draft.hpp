@@ -1,0 +1,49 @@
+// What a command writes, beside its place until all of it is there.
+// Layer: apps/text.  Thread: main.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "base/result.hpp"
+
+namespace tandem::apps {
+
+/// A folder or file that is made under another name and moved to its place when it is whole. What
+/// is not placed is removed: by the destructor, and when SIGINT, SIGTERM or SIGHUP ends the process
+/// (unless somebody handles these signals). One at a time.
+class Draft {
+ public:
+  /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
+  /// is there. Errors: it is a file; the folder cannot be made.
+  [[nodiscard]] static Result<Draft> folder(const std::string& final);
+  /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors. What
+  /// is no regular file, or in a folder that nothing may be added to, is its own draft.
+  [[nodiscard]] static Draft file(const std::string& final);
+
+  ~Draft();
+  Draft(Draft&& other) noexcept;
+  Draft& operator=(Draft&&) = delete;
+
+  /// Where to write.
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// A path below path() as it will be: of results.
+  [[nodiscard]] std::string placed(const std::string& file) const;
+  /// An error that names what was meant: what it stands for is gone when it is read.
+  [[nodiscard]] Error placed(Error error) const;
+
+  /// Called for each file before it is moved, with its place and itself.
+  using Before = std::function<Status(const std::filesystem::path&, const std::filesystem::path&)>;
+  /// Moves everything to its place, over what is there. Errors: `before`'s; a file's.
+  [[nodiscard]] Status place(const Before& before = {});
+
+ private:
+  Draft(std::string final, std::filesystem::path root, std::string path);
+  void remove();
+  std::string final_;
+  std::filesystem::path root_;  // what is removed; empty: nothing
+  std::string path_;
+};
+
+}  // namespace tandem::apps

@@ -1,0 +1,120 @@
+// What a command could not write to its end leaves nothing behind: a full disk, the limit on the
+// size of files, a file where a folder is needed, Ctrl-C.
+#include <csignal>
+
+#include "tests/apps/bad_input.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class HalfMade : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    const Outcome run = tandem("run trajectory.toml --duration 1 --quiet --json run.json");
+    ASSERT_EQ(run.status, 0) << run.err;
+    log_ = json("run.json")["log"]["path"];
+  }
+  /// Files and folders of the test's folder, by their names.
+  [[nodiscard]] std::vector<std::string> all() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_))
+      names.push_back(entry.path().lexically_relative(folder_).string());
+    std::erase_if(names, [](const std::string& name) { return name.ends_with(".txt"); });
+    std::ranges::sort(names);
+    return names;
+  }
+  /// @param texts  all are in the one error
+  void expect_nothing(const std::string& arguments, const std::vector<std::string>& texts,
+                      const std::string& before = {}) const {
+    const auto were = all();
+    const Outcome outcome = tandem(arguments, before);
+    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.err;
+    EXPECT_EQ(error_lines(outcome.err), 1) << outcome.err;
+    for (const std::string& text : texts)
+      EXPECT_NE(outcome.err.find(text), std::string::npos) << text << "\nin: " << outcome.err;
+    EXPECT_EQ(outcome.err.find(".new-"), std::string::npos) << outcome.err;
+    EXPECT_EQ(all(), were) << arguments;
+  }
+  /// A gnuplot that does this; its folder is on the PATH of `environment()`.
+  void fake_gnuplot(const std::string& script) const {
+    std::filesystem::create_directory(folder_ / "bin");
+    write_text(folder_ / "bin/gnuplot", "#!/bin/sh\n" + script);
+    std::filesystem::permissions(folder_ / "bin/gnuplot", std::filesystem::perms::owner_all);
+  }
+  [[nodiscard]] std::string environment() const {
+    return "PATH='" + (folder_ / "bin").string() + "':$PATH";
+  }
+  std::string log_;
+};
+
+constexpr const char* kMap = R"(
+joints = ["joint1", "joint2"]
+allow_frozen = true
+[time]
+column = "time_s"
+unit = "s"
+period_s = 0.001
+[position]
+columns = "position_rad.joint{1}"
+unit = "rad"
+)";
+
+// It ended by SIGXFSZ, and left a part of a log.
+TEST_F(HalfMade, ImportedLogIsRemovedAtTheLimitOfFileSizes) {
+  write_text(folder_ / "map.toml", kMap);
+  ASSERT_EQ(tandem("log csv " + log_ + " --fields position_rad -o run.csv").status, 0);
+  expect_nothing("log import run.csv --robot robot.toml --map map.toml -o in.mcap",
+                 {"in.mcap", "File too large"}, "ulimit -f 20;");
+}
+
+TEST_F(HalfMade, TableIsRemovedAtTheLimitOfFileSizesAndOfAWrongTopic) {
+  expect_nothing("log csv " + log_ + " -o a.csv", {"a.csv", "writing the CSV failed"},
+                 "ulimit -f 20;");
+  expect_nothing("log csv " + log_ + " --topic nonsense -o a.csv", {"nonsense"});
+}
+
+// It had status 0 and a note, and left what gnuplot had made.
+TEST_F(HalfMade, PicturesAreRemovedAtTheLimitOfFileSizes) {
+  expect_nothing("report " + log_ + " -o made", {"made"}, "ulimit -f 20;");
+  expect_nothing("report " + log_, {"gnuplot"}, "ulimit -f 20;");
+  std::filesystem::create_directory(folder_ / "there");
+  write_text(folder_ / "there/mine", "");
+  expect_nothing("report " + log_ + " -o there", {"there"}, "ulimit -f 20;");
+}
+
+TEST_F(HalfMade, PicturesThatGnuplotCutAreAnError) {
+  fake_gnuplot("cat > /dev/null\n");
+  expect_nothing("report " + log_ + " -o made", {"made/", "could not write the whole picture"},
+                 environment());
+}
+
+TEST_F(HalfMade, ExperimentIsNotLeftWhereItsFolderIsMissing) {
+  expect_nothing("log replay " + log_ + " --robot robot.toml --out nowhere/x.toml",
+                 {"nowhere/x.toml", "No such file or directory"});
+}
+
+TEST_F(HalfMade, FileInPlaceOfAFolderIsNamed) {
+  write_text(folder_ / "README.md", "mine");
+  expect_nothing("report " + log_ + " -o README.md", {"README.md", "a folder is needed"});
+  EXPECT_EQ(read_text(folder_ / "README.md"), "mine");
+}
+
+// It left drawings without a page.
+TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
+  fake_gnuplot("cat > /dev/null\nkill -INT $PPID\n");
+  const auto were = all();
+  for (const char* output : {"", " -o made/of/folders", " -o ."}) {
+    const std::string command = "cd '" + folder_.string() + "' && " + environment() + " exec '" +
+                                TANDEM_BINARY_DIR "/bin/tandem' report " + log_ + output +
+                                " >out.txt 2>err.txt";
+    const int raw = std::system(("sh -c \"" + command + "\"").c_str());
+    const bool interrupted = (WIFSIGNALED(raw) && WTERMSIG(raw) == SIGINT) ||
+                             (WIFEXITED(raw) && WEXITSTATUS(raw) == 128 + SIGINT);
+    EXPECT_TRUE(interrupted) << raw << read_text(folder_ / "err.txt");
+    EXPECT_EQ(all(), were) << output;
+  }
+}
+
+}  // namespace
+}  // namespace tandem::apps
