@@ -52,8 +52,8 @@ Result<std::vector<Figure>> wrench_figures(const RunData& run) {
   const auto& times = table->time_s;
   const auto first = std::ranges::lower_bound(times, run.time_s.front()) - times.begin();
   const auto last = std::ranges::upper_bound(times, run.time_s.back()) - times.begin();
-  const auto cut = [&](std::vector<double>& values) {
-    values.assign(values.begin() + first, values.begin() + last);
+  const auto cut = [&](std::vector<double>& column) {
+    column.assign(column.begin() + first, column.begin() + last);
   };
   for (std::vector<double>& column : table->columns) cut(column);
   cut(table->time_s);

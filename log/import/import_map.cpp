@@ -316,9 +316,8 @@ class Reader {
     }
     one.scale = per_joint(table, "scale", count, 1.0);
     for (const char* key : {"scale", "counts_per_turn"}) {
-      const std::vector<double> given =
-          table.has(key) ? table.numbers_or(key, {}) : std::vector{1.0};
-      if (std::ranges::find(given, 0.0) == given.end()) continue;
+      const std::vector<double> numbers = table.numbers_or(key, {});
+      if (std::ranges::find(numbers, 0.0) == numbers.end()) continue;
       table.error(key, "is 0: every number would be lost", "give the true one");
     }
     one.offset = per_joint(table, "offset", count, 0.0);

@@ -70,7 +70,8 @@ TEST_F(DoctorLine, FindsNothingWrongWithAGoodOne) {
 }
 
 TEST_F(DoctorLine, NamesAnotherMaster) {
-  survey_ = {.strangers = 7};
+  survey_ = {};
+  survey_.strangers = 7;
   expect("eth1 master", Health::kMissing, "another one sent 7 frames", "end the other program");
   EXPECT_EQ(judge().findings.size(), 1U) << "nothing else was looked at";
 }

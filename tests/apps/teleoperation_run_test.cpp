@@ -146,6 +146,8 @@ TEST_F(TeleoperationRun, IsNoRecordingToIdentifyFrom) {
   const Outcome found = tandem("identify " + log + " --robot robot.toml --out found");
   EXPECT_EQ(found.status, 2);
   EXPECT_NE(found.err.find("what a tele-operator saw"), std::string::npos) << found.err;
+  ASSERT_EQ(tandem("report " + log + " -o page").status, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "page/report.html"));
 }
 
 /// As after another operator. And a rate is refused for the reason that there is.

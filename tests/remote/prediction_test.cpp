@@ -11,7 +11,7 @@ namespace {
 constexpr std::int64_t kCycle_ns = 1'000'000;
 
 hal::StateImage at(double position_rad) {
-  hal::StateImage state({.joints = 1});
+  hal::StateImage state({.joints = 1, .sensor_channels = {}});
   state.position_rad()[0] = position_rad;
   return state;
 }
@@ -50,9 +50,15 @@ TEST(Answers, TellStatesThatShowNoNewerCommandFromSilence) {
     if (cycle <= 1100 || cycle > 1300)
       answers.take(std::min<std::uint64_t>(cycle - 300, 750), cycle);
     answers.count(cycle);
-    if (cycle == 1150) EXPECT_EQ(answers.loss(), LinkLoss::kNone);
-    if (cycle == 1200) EXPECT_EQ(answers.loss(), LinkLoss::kStates);
-    if (cycle == 1400) EXPECT_EQ(answers.loss(), LinkLoss::kCommands);
+    if (cycle == 1150) {
+      EXPECT_EQ(answers.loss(), LinkLoss::kNone);
+    }
+    if (cycle == 1200) {
+      EXPECT_EQ(answers.loss(), LinkLoss::kStates);
+    }
+    if (cycle == 1400) {
+      EXPECT_EQ(answers.loss(), LinkLoss::kCommands);
+    }
   }
   EXPECT_EQ(answers.most_silent(), 200U);
   EXPECT_EQ(answers.most_unanswered(), 350U) << "since command 750 was seen in force";

@@ -88,7 +88,7 @@ TEST(Decimation, KeepsGaps) {
   Curve curve{"gaps", CurveStyle::kMeasured, {}, {}};
   for (int i = 0; i < 10'000; ++i) {
     curve.x.push_back(i);
-    curve.y.push_back(i == 3000 || i == 3005 || i >= 9000 ? NAN : i);
+    curve.y.push_back(i == 3000 || i == 3005 || i >= 9000 ? std::nan("") : i);
   }
   const Curve small = decimated(curve, 500);
   EXPECT_LE(small.x.size(), 505U);
