@@ -85,7 +85,7 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   if (config.observer) facts.add("estimates", "external torques of the joints");
   if (config.collision)
     facts.add("estimates",
-              "collisions, of " + counted(config.collision->thresholds.size(), "joint"));
+              "collisions, by " + counted(config.collision->thresholds.size(), "threshold"));
   for (const estimation::WrenchConfig& wrench : config.wrenches) {
     const auto site = std::ranges::find(e.robot.model.sites, wrench.site, &hal::SiteConfig::name);
     const int joints = e.tree == nullptr || site == e.robot.model.sites.end()

@@ -89,7 +89,6 @@ bool is_terminal(std::FILE* out) {
 
 void outlive_files() {
   std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
   std::fflush(stdout);
   stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
   stderr = lasting(STDERR_FILENO, _IONBF);

@@ -34,9 +34,8 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] bool is_terminal(std::FILE* out);
 
 /// From now on no file ends the process in the middle of a cycle. When a pipe's reader or the
-/// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()). A
-/// file that reaches the limit on its size (`ulimit -f`) is an error of its writer, as a full disk
-/// is. Call it before other threads print.
+/// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()).
+/// Call it before other threads print.
 void outlive_files();
 
 /// Whether `file` can be written, found out before a run: an error that names it when not.

@@ -12,10 +12,9 @@
 namespace tandem::remote {
 
 /// The twin is under every command at once, the robot under the same one later. What the twin was
-/// under a command is kept until a state of the robot comes at which it was due there. The
-/// difference of the two passes
-/// a low pass, and is added to the twin from then on. Commands are known by their numbers, which
-/// grow.
+/// under a command is kept until the state of the robot comes in which that command was due. The
+/// difference of the two passes a low pass, and is added to the twin from then on. Commands are
+/// known by their numbers, which grow.
 class Prediction {
  public:
   /// @param past_commands  of which the twin's states are kept; states of the robot under older

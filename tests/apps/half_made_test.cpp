@@ -48,17 +48,7 @@ class HalfMade : public Program {
   std::string log_;
 };
 
-constexpr const char* kMap = R"(
-joints = ["joint1", "joint2"]
-allow_frozen = true
-[time]
-column = "time_s"
-unit = "s"
-period_s = 0.001
-[position]
-columns = "position_rad.joint{1}"
-unit = "rad"
-)";
+const std::string kMap = csv_map("allow_frozen = true");
 
 // It ended by SIGXFSZ, and left a part of a log.
 TEST_F(HalfMade, ImportedLogIsRemovedAtTheLimitOfFileSizes) {

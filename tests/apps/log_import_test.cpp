@@ -5,23 +5,13 @@
 namespace tandem::apps {
 namespace {
 
-const char kMap[] = R"(
-joints = ["joint1", "joint2"]
-allow_frozen = true
-[time]
-column = "time_s"
-unit = "s"
-period_s = 0.001
-[position]
-columns = "position_rad.joint{1}"
-unit = "rad"
-[velocity]
+const std::string kMap = csv_map("allow_frozen = true", R"([velocity]
 columns = "velocity_rad_s.joint{1}"
 unit = "rad/s"
 [torque]
 columns = "torque_nm.joint{1}"
 unit = "Nm"
-)";
+)");
 
 class LogImport : public Program {
  protected:

@@ -80,4 +80,19 @@ class Program : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
+/// A map for `tandem log import` of what `tandem log csv` writes of the double pendulum's state.
+/// @param top     keys before the tables
+/// @param tables  after [position]
+inline std::string csv_map(const std::string& top, const std::string& tables = {}) {
+  return "joints = [\"joint1\", \"joint2\"]\n" + top + R"(
+[time]
+column = "time_s"
+unit = "s"
+period_s = 0.001
+[position]
+columns = "position_rad.joint{1}"
+unit = "rad"
+)" + tables;
+}
+
 }  // namespace tandem::apps
