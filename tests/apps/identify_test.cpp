@@ -128,7 +128,8 @@ TEST_F(Identify, HoldsTheTruthOfASimulatedArm) {
     EXPECT_GE(times, 90) << name;
     all += times;
   }
-  std::printf("simulated arm, 100 seeds: inside %.1f %%\n", 1.0 * all / static_cast<double>(held.size()));
+  std::printf("simulated arm, 100 seeds: inside %.1f %%\n",
+              1.0 * all / static_cast<double>(held.size()));
 }
 
 const std::string kMap = csv_map(R"(exclude = ["invalid"])", R"([torque]
