@@ -64,7 +64,7 @@ void check_topics(const log::LogFile& file) {
 void check_run(const std::string& path) {
   const auto run = report::read_run(path);
   if (!good(run)) return;
-  require(run->rows() >= 2 && run->rows_before_fault() >= 1);
+  require(run->rows() >= 2 && run->rows_before_stop() >= 1);
   for (const auto* columns : {&run->position_rad, &run->reference_rad, &run->base}) {
     for (const auto& column : *columns) require(column.size() == run->rows());
   }
