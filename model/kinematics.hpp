@@ -50,41 +50,67 @@ template <class S>
 [[nodiscard]] Vec3<S> to_parent(const JointTransform<S>& t, const Vec3<S>& v) {
   return rotate(t.joint->in_parent.R, t.joint->prismatic ? v : rotate(t.turn, v));
 }
-/// Inertias (moments or articulated) seen from the parent's frame.
+
+/// The joint's motion alone: from the body's frame to the one that it has at position zero, whose
+/// z axis is the same. Inertias (moments or articulated) and forces.
 template <class S, template <class> class Inertial>
-[[nodiscard]] Inertial<S> to_parent(const JointTransform<S>& t, Inertial<S> x) {
-  if (t.joint->prismatic) {
-    shift(x, 2, t.slide);
-  } else {
-    x = turned(t.turn, x);
-  }
+[[nodiscard]] Inertial<S> moved_back(const JointTransform<S>& t, Inertial<S> x) {
+  if (!t.joint->prismatic) return turned(t.turn, x);
+  shift(x, 2, t.slide);
+  return x;
+}
+template <class S>
+[[nodiscard]] Force<S> moved_back(const JointTransform<S>& t, const Force<S>& x) {
+  if (!t.joint->prismatic) return {rotate(t.turn, x.f), rotate(t.turn, x.n)};
+  return {x.f, {x.n[0] - t.slide * x.f[1], x.n[1] + t.slide * x.f[0], x.n[2]}};
+}
+/// The rest: from there to the parent's frame.
+template <class S, template <class> class Inertial>
+[[nodiscard]] Inertial<S> fixed_to_parent(const JointTransform<S>& t, Inertial<S> x) {
   x = turned(t.joint->in_parent.R, x);
   for (int axis = 0; axis < 3; ++axis)
     if (const double p = t.joint->in_parent.p[axis]; p != 0.0) shift(x, axis, p);
   return x;
 }
 template <class S>
-[[nodiscard]] Force<S> to_parent(const JointTransform<S>& t, const Force<S>& x) {
-  Vec3<S> n = x.n;
-  if (t.joint->prismatic) {
-    n[0] -= t.slide * x.f[1];
-    n[1] += t.slide * x.f[0];
-  }
-  const Vec3<S> f = to_parent(t, x.f);
-  return {f, to_parent(t, n) + cross(t.joint->in_parent.p, f)};
+[[nodiscard]] Force<S> fixed_to_parent(const JointTransform<S>& t, const Force<S>& x) {
+  const auto& [R, p] = t.joint->in_parent;
+  const Vec3<S> f = rotate(R, x.f);
+  return {f, rotate(R, x.n) + cross(p, f)};
 }
+/// Both.
+template <class S, template <class> class Quantity>
+[[nodiscard]] Quantity<S> to_parent(const JointTransform<S>& t, const Quantity<S>& x) {
+  return fixed_to_parent(t, moved_back(t, x));
+}
+
 /// The body's angular and linear quantity (of its origin) from its parent's, with the joint at
-/// rest: velocities, or accelerations where no velocity matters.
+/// rest: velocities, or accelerations where no velocity matters. First with the joint at position
+/// zero, then at its own.
+template <class S>
+void carry_to_zero(const JointTransform<S>& t, Vec3<S>& angular, Vec3<S>& linear) {
+  const auto& [R, p] = t.joint->in_parent;
+  linear = rotate_back(R, linear - cross(p, angular));
+  angular = rotate_back(R, angular);
+}
+template <class S>
+void move(const JointTransform<S>& t, Vec3<S>& angular, Vec3<S>& linear) {
+  if (t.joint->prismatic) {
+    linear[0] += t.slide * angular[1];
+    linear[1] -= t.slide * angular[0];
+    return;
+  }
+  linear = rotate(t.turn.inverse(), linear);
+  angular = rotate(t.turn.inverse(), angular);
+}
+
 template <class S>
 void carry_down(const JointTransform<S>& t, const Vec3<S>& angular, const Vec3<S>& linear,
                 Vec3<S>& body_angular, Vec3<S>& body_linear) {
-  const auto& [R, p] = t.joint->in_parent;
-  body_angular = to_child(t, angular);
-  body_linear = to_child(t, linear - cross(p, angular));
-  if (t.joint->prismatic) {
-    body_linear[0] += t.slide * body_angular[1];
-    body_linear[1] -= t.slide * body_angular[0];
-  }
+  body_angular = angular;
+  body_linear = linear;
+  carry_to_zero(t, body_angular, body_linear);
+  move(t, body_angular, body_linear);
 }
 
 /// [alpha x] + [omega x]^2: the acceleration of a point r of the body is a + U r.
@@ -201,8 +227,9 @@ template <class S>
     const int j = (i + 1) % 3;
     const int k = (i + 2) % 3;
     result.f[i] = body.a[i] * x.m + U[i][i] * x.h[i] + U[i][j] * x.h[j] + U[i][k] * x.h[k];
-    result.n[i] = U[k][i] * J(i, j) - U[j][i] * J(i, k) + U[k][j] * J(j, j) - U[j][k] * J(k, k) +
-                  (U[k][k] - U[j][j]) * J(j, k) + body.a[k] * x.h[j] - body.a[j] * x.h[k];
+    const S diagonal = U[k][j] * J(j, j) - U[j][k] * J(k, k);  // one product if U(j, k) = U(k, j)
+    result.n[i] = diagonal + U[k][i] * J(i, j) - U[j][i] * J(i, k) + (U[k][k] - U[j][j]) * J(j, k) +
+                  body.a[k] * x.h[j] - body.a[j] * x.h[k];
   }
   return result;
 }
