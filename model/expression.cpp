@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cmath>
 
 namespace tandem::model {
@@ -37,6 +36,18 @@ bool cancels(const Expr& sum, const Expr& term, Expr& left) {
     return true;
   }
   return false;
+}
+
+// x and k of k x.
+bool is_multiple(const Expr& product, std::uint32_t& x, double& k) {
+  if (product.is_constant()) return false;
+  const Node& node = node_of(product);
+  if (node.op != Op::kMul) return false;
+  const Node& factor = product.graph()->nodes()[node.b];
+  if (factor.op != Op::kConstant) return false;
+  x = node.a;
+  k = product.negative() ? -factor.value : factor.value;
+  return true;
 }
 
 }  // namespace
@@ -84,6 +95,10 @@ Expr operator+(const Expr& a, const Expr& b) {
   Expr left;
   if (cancels(a, b, left) || cancels(b, a, left)) return left;
   Graph* graph = graph_of(a, b);
+  std::uint32_t of_a = 0, of_b = 0;
+  double ka = 0.0, kb = 0.0;
+  if (is_multiple(a, of_a, ka) && is_multiple(b, of_b, kb) && of_a == of_b)
+    return Expr(graph, of_a, false) * Expr(ka + kb);
   Expr x = graph->as_node(a);
   Expr y = graph->as_node(b);
   if (x.node() == y.node() && x.negative() != y.negative()) return 0.0;
@@ -123,8 +138,12 @@ Expr operator/(const Expr& a, const Expr& b) {
 
 Expr sqrt(const Expr& a) {
   if (a.is_constant()) return std::sqrt(a.value());
-  assert(!a.negative());
-  return make(a.graph(), Op::kSqrt, a.node(), 0, false);
+  std::uint32_t operand = a.node();
+  if (a.negative()) {  // as a node: 0 - a
+    const std::uint32_t zero = a.graph()->as_node(0.0).node();
+    operand = a.graph()->intern({.op = Op::kSub, .a = zero, .b = operand});
+  }
+  return make(a.graph(), Op::kSqrt, operand, 0, false);
 }
 
 Expr sin(const Expr& a) {
