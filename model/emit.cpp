@@ -10,6 +10,7 @@
 #include <set>
 
 #include "model/lanes.hpp"
+#include "model/sums.hpp"
 
 namespace tandem::model {
 namespace {
@@ -519,9 +520,13 @@ TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
   return result;
 }
 
-EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
+EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
                           std::uint32_t part_operations) {
-  return Emitter(graph, kernel, lanes, part_operations, 1).run();
+  Graph ordered;
+  OrderedSums sums = ordered_sums(graph, kernel.outputs, pair_lanes(graph, kernel, m), ordered);
+  const TracedKernel same{kernel.shape, std::move(sums.outputs)};
+  const Lanes lanes = pair_lanes(ordered, same, m, sums.second_of);
+  return Emitter(ordered, same, lanes, part_operations, 1).run();
 }
 
 EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel, std::uint32_t states,

@@ -16,8 +16,6 @@ struct TracedKernel {
   std::vector<Expr> outputs;  ///< the output arrays, one after another
 };
 
-struct Lanes;
-
 /// Runs the kernel's algorithm over expressions in `graph`.
 [[nodiscard]] TracedKernel trace_kernel(Kernel kernel, const Mechanism& m, Graph& graph);
 
@@ -37,10 +35,13 @@ struct EmittedKernel {
   OperationCount count;
 };
 
+/// Sums in the order in which their terms become known, what two limbs do alike as operations on
+/// vectors of two.
+///
+/// @param m                what the kernel was traced of.
 /// @param part_operations  a part is closed once it holds this many additions and products.
-/// @param lanes            what is written as operations on vectors of two.
 [[nodiscard]] EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel,
-                                        const Lanes& lanes, std::uint32_t part_operations);
+                                        const Mechanism& m, std::uint32_t part_operations);
 
 /// The same kernel for four or eight states at once, as "NAME_four" or "NAME_eight": each number is
 /// a vector of as many.

@@ -11,7 +11,6 @@
 #include "base/quoting.hpp"
 #include "model/emit.hpp"
 #include "model/kernel_sources.hpp"
-#include "model/lanes.hpp"
 #include "model/solve_source.hpp"
 
 namespace tandem::model {
@@ -250,7 +249,7 @@ OperationCount times(OperationCount count, std::uint32_t n) {
 }
 
 EmittedKernel emit(const Graph& graph, const TracedKernel& kernel, const Mechanism& m) {
-  return emit_kernel(graph, kernel, pair_lanes(graph, kernel, m), kPartOperations);
+  return emit_kernel(graph, kernel, m, kPartOperations);
 }
 
 // The mass matrix column by column.

@@ -194,9 +194,11 @@ bool is_sum(Op op) { return op == Op::kAdd || op == Op::kSub; }
 
 class Pairing {
  public:
-  Pairing(const Graph& graph, const TracedKernel& kernel, const Mechanism& m)
+  Pairing(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
+          std::span<const std::uint32_t> wanted)
       : nodes_(graph.nodes()),
         kernel_(kernel),
+        wanted_(wanted),
         elements_(m),
         live_(live_nodes(graph, kernel.outputs)),
         side_(nodes_.size(), Side::kTrunk) {
@@ -330,7 +332,9 @@ class Pairing {
     const std::vector<std::uint32_t>& own = first_.at(own_key(i));
     const std::vector<std::uint32_t>& others = found->second;
     std::uint32_t best = kNone;
-    if (own.size() == others.size()) {
+    if (!wanted_.empty() && std::ranges::count(others, wanted_[i]) != 0) {
+      best = wanted_[i];
+    } else if (own.size() == others.size()) {
       best = others[static_cast<std::size_t>(std::ranges::find(own, i) - own.begin())];
     } else {
       best = nearest(constant_of(i), others);
@@ -422,6 +426,7 @@ class Pairing {
 
   std::span<const Node> nodes_;
   const TracedKernel& kernel_;
+  std::span<const std::uint32_t> wanted_;
   Elements elements_;
   std::vector<bool> live_;
   std::vector<Side> side_;
@@ -433,8 +438,9 @@ class Pairing {
 
 }  // namespace
 
-Lanes pair_lanes(const Graph& graph, const TracedKernel& kernel, const Mechanism& m) {
-  Lanes lanes = Pairing(graph, kernel, m).run();
+Lanes pair_lanes(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
+                 std::span<const std::uint32_t> wanted) {
+  Lanes lanes = Pairing(graph, kernel, m, wanted).run();
   const OperationCount all = count_operations(graph, kernel.outputs);
   const std::uint32_t operations = all.add + all.mul + all.div + all.sqrt;
   return lanes.operations < kLeastShare * operations ? Lanes{} : lanes;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "model/emit.hpp"
@@ -37,6 +38,10 @@ struct Lanes {
 /// cosines of angles, and operations of which each operand is a pair as well, a constant, or the
 /// same node of the trunk for both limbs. No pair at all where they are fewer than 5 % of the
 /// operations, which does not pay: so a robot without such limbs gets scalar kernels.
-[[nodiscard]] Lanes pair_lanes(const Graph& graph, const TracedKernel& kernel, const Mechanism& m);
+///
+/// @param wanted  per node of a first limb the one to prefer as its partner, where it is known; may
+///                be empty.
+[[nodiscard]] Lanes pair_lanes(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
+                               std::span<const std::uint32_t> wanted = {});
 
 }  // namespace tandem::model

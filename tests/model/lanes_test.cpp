@@ -109,7 +109,7 @@ struct Kernels {
   EmittedKernel emit(Kernel kernel) const {
     Graph graph;
     const TracedKernel traced = trace_kernel(kernel, m, graph);
-    return emit_kernel(graph, traced, pair_lanes(graph, traced, m), 500);
+    return emit_kernel(graph, traced, m, 500);
   }
   // Instructions left, of each operation without lanes.
   double left(Kernel kernel) const {

@@ -282,8 +282,8 @@ TEST(Mimic, RobotsWithoutFollowersKeepTheArticulatedBodyAlgorithmToTheLastOperat
   }
   std::vector<std::vector<Expr>> out{std::vector<Expr>(static_cast<std::size_t>(m.nv()))};
   run_tree_kernel<Expr>(Kernel::kForwardDynamics, m, in, out);
-  EXPECT_EQ(emit_kernel(graph, kernel, {}, 500).parts,
-            emit_kernel(tree_graph, {kernel.shape, out[0]}, {}, 500).parts);
+  EXPECT_EQ(emit_kernel(graph, kernel, m, 500).parts,
+            emit_kernel(tree_graph, {kernel.shape, out[0]}, m, 500).parts);
 }
 
 TEST(Mimic, AFollowersMassIsEnoughForItsLeader) {

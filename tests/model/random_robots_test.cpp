@@ -6,6 +6,8 @@
 
 #include "model/emit.hpp"
 #include "model/kernel_check.hpp"
+#include "model/lanes.hpp"
+#include "model/sums.hpp"
 #include "model/symmetric_eigen.hpp"
 #include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
@@ -48,7 +50,10 @@ struct RandomTree {
 Arrays generated(Kernel kernel, const Mechanism& m, const Arrays& in) {
   Graph graph;
   const TracedKernel traced = trace_kernel(kernel, m, graph);
-  const Array all = evaluate(graph, traced.outputs, in);
+  Graph ordered;
+  const OrderedSums sums =
+      ordered_sums(graph, traced.outputs, pair_lanes(graph, traced, m), ordered);
+  const Array all = evaluate(ordered, sums.outputs, in);
   Arrays out;
   auto next = all.begin();
   for (const KernelArray& array : traced.shape.outputs) {
