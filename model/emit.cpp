@@ -286,7 +286,7 @@ class Emitter {
     const std::uint32_t other = lanes_.second(i);
     const Node& x = nodes_[i];
     const Node& y = nodes_[other];
-    const bool swapped = x.op != Op::kDiv && !corresponds(x.a, y.a);
+    const bool swapped = lanes_.swapped[other];
     const std::uint32_t a = swapped ? y.b : y.a;
     const std::uint32_t b = swapped ? y.a : y.b;
     const bool minus = lanes_.minus[i];
@@ -303,10 +303,6 @@ class Emitter {
     const bool minus_b = a_is_free ? held_minus(x.b, b) : minus != held_a;
     const bool minus_a = minus != minus_b;
     return vector(x.a, a, minus_a) + (x.op == Op::kDiv ? " / " : " * ") + vector(x.b, b, minus_b);
-  }
-  bool corresponds(std::uint32_t first, std::uint32_t second) const {
-    if (nodes_[first].op == Op::kConstant) return nodes_[second].op == Op::kConstant;
-    return lanes_.second(first) == second || (lanes_.second(first) == kNowhere && first == second);
   }
   // Not held as a vector: it is made where it is used, with either sign.
   bool is_free(std::uint32_t first, std::uint32_t second) const {

@@ -8,7 +8,6 @@
 #include <bit>
 #include <cmath>
 #include <map>
-#include <optional>
 
 namespace tandem::model {
 namespace {
@@ -18,6 +17,9 @@ constexpr std::uint32_t kNone = Lanes::kNone;
 // Of a kernel's operations in pairs: what is gathered from fewer of them into vectors costs as much
 // as the pairs save.
 constexpr double kLeastShare = 0.05;
+
+// Constants that are the same but for the digits of a description differ by less.
+constexpr double kLastDigits = 1e-6;
 
 enum class Side : std::uint8_t { kTrunk, kFirst, kSecond };
 
@@ -190,6 +192,8 @@ class Parities {
   std::uint32_t variables_ = 0;
 };
 
+const std::vector<std::uint32_t> kNoOperand{0};  // no second operand
+
 bool is_sum(Op op) { return op == Op::kAdd || op == Op::kSub; }
 
 class Pairing {
@@ -201,10 +205,14 @@ class Pairing {
         wanted_(wanted),
         elements_(m),
         live_(live_nodes(graph, kernel.outputs)),
-        side_(nodes_.size(), Side::kTrunk) {
+        side_(nodes_.size(), Side::kTrunk),
+        common_(nodes_.size(), false),
+        others_(nodes_.size()) {
     lanes_.second_of.assign(nodes_.size(), kNone);
     lanes_.first_of.assign(nodes_.size(), kNone);
     lanes_.minus.assign(nodes_.size(), false);
+    lanes_.like_of.assign(nodes_.size(), kNone);
+    lanes_.swapped.assign(nodes_.size(), false);
   }
 
   Lanes run() {
@@ -249,6 +257,7 @@ class Pairing {
     }
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const std::uint8_t limbs = from[i] & 3;
+      common_[i] = limbs == 0;
       if (limbs == 1 || limbs == 2) {
         side_[i] = limbs == 1 ? Side::kFirst : Side::kSecond;
       } else if (is_operation(nodes_[i].op) && (to[i] == 1 || to[i] == 2)) {
@@ -305,11 +314,14 @@ class Pairing {
     }
   }
 
-  std::optional<std::uint32_t> image_of_first(std::uint32_t i) const {
-    if (nodes_[i].op == Op::kConstant) return kNone;
-    if (lanes_.second_of[i] != kNone) return lanes_.second_of[i];
-    if (side_[i] == Side::kTrunk) return i;
-    return std::nullopt;
+  // What may stand for an operand of a first limb in the second: its partner first. What two first
+  // limbs have in common, as they are equal, may be two nodes of the second limbs, which are not.
+  std::vector<std::uint32_t> images_of_first(std::uint32_t i) const {
+    if (nodes_[i].op == Op::kConstant) return {kNone};
+    std::vector<std::uint32_t> images = others_[i];
+    if (lanes_.second_of[i] != kNone) images.insert(images.begin(), lanes_.second_of[i]);
+    if (side_[i] == Side::kTrunk) images.insert(images.begin(), i);
+    return images;
   }
   double constant_of(std::uint32_t i) const {
     const Node& node = nodes_[i];
@@ -318,30 +330,50 @@ class Pairing {
     return 0.0;
   }
 
-  // Of several that differ in their constant alone: as the limbs are built alike, the algorithm
-  // makes them in the same order. Where it makes more of them for one limb than for the other, as
-  // some are equal, the one with the nearest constant.
   void find_partner(std::uint32_t i) {
     const Node& node = nodes_[i];
     if (!is_operation(node.op)) return;
-    const auto a = image_of_first(node.a);
-    const auto b = is_binary(node.op) ? image_of_first(node.b) : 0;
-    if (!a || !b) return;
-    const auto found = second_.find(key(node.op, *a, *b));
-    if (found == second_.end()) return;
-    const std::vector<std::uint32_t>& own = first_.at(own_key(i));
-    const std::vector<std::uint32_t>& others = found->second;
-    std::uint32_t best = kNone;
-    if (!wanted_.empty() && std::ranges::count(others, wanted_[i]) != 0) {
-      best = wanted_[i];
-    } else if (own.size() == others.size()) {
-      best = others[static_cast<std::size_t>(std::ranges::find(own, i) - own.begin())];
-    } else {
-      best = nearest(constant_of(i), others);
+    for (const std::uint32_t a : images_of_first(node.a)) {
+      for (const std::uint32_t b : is_binary(node.op) ? images_of_first(node.b) : kNoOperand) {
+        const auto found = second_.find(key(node.op, a, b));
+        if (found == second_.end()) continue;
+        const std::uint32_t best = lanes_.second_of[i] == kNone ? choose(i, found->second) : kNone;
+        if (best != kNone && lanes_.first_of[best] == kNone) {
+          pair(i, best);
+          make_alike(i, best, a);
+          if (node.op != Op::kSin && node.op != Op::kCos) ++lanes_.operations;
+        }
+        if (!common_[i]) {
+          if (lanes_.second_of[i] != kNone) return;
+          continue;
+        }
+        for (const std::uint32_t other : found->second) {
+          if (other == lanes_.second_of[i] || !rounds_alike(constant_of(i), constant_of(other)))
+            continue;
+          others_[i].push_back(other);
+          if (lanes_.like_of[other] == kNone) make_alike(i, other, a);
+        }
+      }
     }
-    if (best == kNone || lanes_.first_of[best] != kNone) return;
-    pair(i, best);
-    if (node.op != Op::kSin && node.op != Op::kCos) ++lanes_.operations;
+  }
+  static bool rounds_alike(double a, double b) {
+    return std::abs(a - b) <= kLastDigits * std::max({std::abs(a), std::abs(b), 0.01});
+  }
+  // `a`: the operand of the second that is like the first operand of the first.
+  void make_alike(std::uint32_t first, std::uint32_t second, std::uint32_t a) {
+    lanes_.like_of[second] = first;
+    const Node& node = nodes_[second];
+    lanes_.swapped[second] = is_binary(node.op) && node.op != Op::kDiv && no_constant(node.a) != a;
+  }
+
+  // Of several that differ in their constant alone: as the limbs are built alike, the algorithm
+  // makes them in the same order. Where it makes more of them for one limb than for the other, as
+  // some are equal, the one with the nearest constant.
+  std::uint32_t choose(std::uint32_t i, const std::vector<std::uint32_t>& others) const {
+    if (!wanted_.empty() && std::ranges::count(others, wanted_[i]) != 0) return wanted_[i];
+    const std::vector<std::uint32_t>& own = first_.at(own_key(i));
+    if (own.size() != others.size()) return nearest(constant_of(i), others);
+    return others[static_cast<std::size_t>(std::ranges::find(own, i) - own.begin())];
   }
 
   // Of those that are not paired yet; kNone: all are.
@@ -363,10 +395,14 @@ class Pairing {
   std::array<std::array<std::uint32_t, 2>, 2> operands(std::uint32_t i) const {
     const Node& x = nodes_[i];
     const Node& y = nodes_[lanes_.second_of[i]];
-    const auto a = image_of_first(x.a);
-    const bool straight = x.op == Op::kDiv || no_constant(y.a) == *a;
-    return straight ? std::array{std::array{x.a, y.a}, std::array{x.b, y.b}}
-                    : std::array{std::array{x.a, y.b}, std::array{x.b, y.a}};
+    return lanes_.swapped[lanes_.second_of[i]]
+               ? std::array{std::array{x.a, y.b}, std::array{x.b, y.a}}
+               : std::array{std::array{x.a, y.a}, std::array{x.b, y.b}};
+  }
+  // A vector that is made where it is used, with either sign.
+  bool is_free(std::uint32_t first, std::uint32_t second) const {
+    return nodes_[first].op == Op::kConstant ||
+           (first != second && lanes_.second_of[first] != second);
   }
 
   // The sign of a vector's lane 1 as a sum of variables.
@@ -398,17 +434,17 @@ class Pairing {
     const Op first_op = nodes_[i].op;
     const Op second_op = nodes_[lanes_.second_of[i]].op;
     const auto pairs = operands(i);
-    const bool swapped = pairs[0][1] != nodes_[lanes_.second_of[i]].a;
+    const bool swapped = lanes_.swapped[lanes_.second_of[i]];
     Parities::Row own;
     bool has_own = false;
     for (std::size_t k = 0; k < 2; ++k) {
       const auto [x, y] = pairs[k];
-      const bool constant = nodes_[x].op == Op::kConstant;
-      if (!is_sum(first_op)) {  // a constant's sign is free
-        Parities::add(own, constant ? Parities::variable(parities_.new_variable()) : sign_of(x));
+      const bool free = is_free(x, y);
+      if (!is_sum(first_op)) {
+        Parities::add(own, free ? Parities::variable(parities_.new_variable()) : sign_of(x));
         continue;
       }
-      if (constant) continue;
+      if (free) continue;
       const bool first_minus = k == 1 && first_op == Op::kSub;
       const bool second_minus = (k == 1) != swapped && second_op == Op::kSub;
       Parities::Row sign = sign_of(x);
@@ -430,6 +466,8 @@ class Pairing {
   Elements elements_;
   std::vector<bool> live_;
   std::vector<Side> side_;
+  std::vector<bool> common_;                        // depends on no limb
+  std::vector<std::vector<std::uint32_t>> others_;  // of such a node: more of the second limbs
   std::map<Key, std::vector<std::uint32_t>> first_, second_;  // operations of each limb
   Parities parities_;
   std::map<std::uint32_t, Parities::Row> sign_;  // of pairs, and of what both limbs share

@@ -22,11 +22,19 @@ struct Lanes {
   std::vector<std::uint32_t> second_of;  ///< per node; may be empty: no pairs
   std::vector<std::uint32_t> first_of;   ///< the same
   std::vector<bool> minus;               ///< per node of a first limb
-  std::uint32_t operations = 0;          ///< on vectors, each of two nodes
+  /// Per node of a second limb: that of the first which it is like. Its partner, but where two
+  /// first limbs share what is two nodes of the second limbs.
+  std::vector<std::uint32_t> like_of;
+  std::vector<bool> swapped;     ///< per node of a second limb: its operands the other way round
+  std::uint32_t operations = 0;  ///< on vectors, each of two nodes
 
   /// The partner of a node of a first limb; kNone: it is none, or has none.
   [[nodiscard]] std::uint32_t second(std::uint32_t first) const {
     return second_of.empty() ? kNone : second_of[first];
+  }
+  /// What a node of a second limb is like; kNone: it is none, or like none.
+  [[nodiscard]] std::uint32_t like(std::uint32_t second) const {
+    return like_of.empty() ? kNone : like_of[second];
   }
   /// The partner of a node of a second limb; kNone: it is none, or has none.
   [[nodiscard]] std::uint32_t first(std::uint32_t second) const {
@@ -35,9 +43,10 @@ struct Lanes {
 };
 
 /// Pairs what can be paired of the nodes that the kernel's outputs depend on: inputs, sines and
-/// cosines of angles, and operations of which each operand is a pair as well, a constant, or the
-/// same node of the trunk for both limbs. No pair at all where they are fewer than 5 % of the
-/// operations, which does not pay: so a robot without such limbs gets scalar kernels.
+/// cosines of angles, and operations of which each operand is a pair as well, a constant, the same
+/// node of the trunk for both limbs, or what each limb makes of the trunk alone. No pair at all
+/// where they are fewer than 5 % of the operations, which does not pay: so a robot without such
+/// limbs gets scalar kernels.
 ///
 /// @param wanted  per node of a first limb the one to prefer as its partner, where it is known; may
 ///                be empty.

@@ -2,6 +2,9 @@
 #include "model/sums.hpp"
 
 #include <algorithm>
+#include <array>
+#include <numeric>
+#include <utility>
 
 namespace tandem::model {
 namespace {
@@ -70,13 +73,13 @@ class Ordering {
   }
 
   // A sum or a product that one sum alone uses: no node of its own, but a part of that. What is
-  // one of a pair is no part of a sum that is not.
+  // alike in two limbs is no part of a sum that is not.
   bool is_part(std::uint32_t i) const {
     return uses_[i] == 1 && is_sum(from_[user_[i]]) && (is_sum(from_[i]) || is_product(i)) &&
-           (partner(i) == Lanes::kNone) == (partner(user_[i]) == Lanes::kNone);
+           (alike(i) == Lanes::kNone) == (alike(user_[i]) == Lanes::kNone);
   }
-  std::uint32_t partner(std::uint32_t i) const {
-    return lanes_.second(i) != Lanes::kNone ? lanes_.second(i) : lanes_.first(i);
+  std::uint32_t alike(std::uint32_t i) const {
+    return lanes_.second(i) != Lanes::kNone ? lanes_.second(i) : lanes_.like(i);
   }
   bool is_product(std::uint32_t i) const { return from_[i].op == Op::kMul; }
 
@@ -118,10 +121,13 @@ class Ordering {
     return x;
   }
 
+  // The same places for a pair.
   void collect(std::uint32_t i, bool negative, std::vector<Term>& terms) const {
     const Node& node = from_[i];
-    for (const auto& [operand, minus] :
-         {std::pair(node.a, negative), {node.b, negative != (node.op == Op::kSub)}}) {
+    std::array operands{std::pair(node.a, negative),
+                        std::pair(node.b, negative != (node.op == Op::kSub))};
+    if (lanes_.like(i) != Lanes::kNone && lanes_.swapped[i]) std::swap(operands[0], operands[1]);
+    for (const auto& [operand, minus] : operands) {
       if (is_part(operand) && is_sum(from_[operand])) {
         collect(operand, minus, terms);
       } else if (is_part(operand)) {
@@ -133,27 +139,21 @@ class Ordering {
     }
   }
 
-  // By when they are known, or as those of the partner's sum were.
+  // By when they are known, or as those of a sum were that it is like.
   std::vector<Term> sorted_terms(std::uint32_t i) {
     std::vector<Term> terms;
     collect(i, false, terms);
-    if (const std::uint32_t other = partner(i); other != Lanes::kNone && !order_[other].empty()) {
-      std::vector<Term> left = terms;
-      std::vector<Term> same;
-      for (const std::uint32_t node : order_[other]) {
-        const auto term = std::ranges::find_if(left, [&](const Term& t) {
-          if (from_[node].op == Op::kConstant) return from_[t.node].op == Op::kConstant;
-          return t.node == (partner(node) == Lanes::kNone ? node : partner(node));
-        });
-        if (term == left.end()) break;
-        same.push_back(*term);
-        left.erase(term);
-      }
-      if (left.empty()) return same;
+    const std::uint32_t other = alike(i);
+    if (other != Lanes::kNone && order_[other].size() == terms.size()) {
+      order_[i] = order_[other];
+    } else {
+      order_[i].resize(terms.size());
+      std::iota(order_[i].begin(), order_[i].end(), std::size_t{0});
+      std::ranges::stable_sort(order_[i], {}, [&](std::size_t k) { return terms[k].known; });
     }
-    std::ranges::stable_sort(terms, {}, &Term::known);
-    for (const Term& term : terms) order_[i].push_back(term.node);
-    return terms;
+    std::vector<Term> sorted;
+    for (const std::size_t k : order_[i]) sorted.push_back(terms[k]);
+    return sorted;
   }
 
   Expr sum(std::uint32_t i) {
@@ -183,9 +183,9 @@ class Ordering {
   std::vector<bool> live_;
   std::vector<std::uint32_t> uses_, user_;  // the last user
   std::vector<Expr> image_;
-  std::vector<std::vector<std::uint32_t>> order_;  // of a sum's terms
-  std::vector<std::vector<std::uint32_t>> made_;   // nodes of `to`, of one of `from`
-  std::vector<int> known_;                         // per node of `to`, in cycles
+  std::vector<std::vector<std::size_t>> order_;   // of a sum's terms
+  std::vector<std::vector<std::uint32_t>> made_;  // nodes of `to`, of one of `from`
+  std::vector<int> known_;                        // per node of `to`, in cycles
 };
 
 }  // namespace
