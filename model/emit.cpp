@@ -416,19 +416,26 @@ class Emitter {
       if (cleared_.contains(out.name))
         body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
                 "[i] = " + constant(0.0) + ";\n";
-    for (std::size_t k = 0; k < angles_.size(); ++k) {
-      const std::string value = early(angles_[k].node);
-      body += "  w[" + std::to_string(k) +
-              "] = " + (angles_[k].minus ? "-(" + value + ")" : value) + ";\n";
+    std::vector<std::string> angles;
+    for (const Angle& angle : angles_)
+      angles.push_back(angle.minus ? "-(" + early(angle.node) + ")" : early(angle.node));
+    angles.resize(table_, "0.0");
+    for (std::size_t k = 0; k < table_; k += states_ == 1 ? 4 : 1) {
+      const std::string at = std::to_string(k);
+      if (states_ == 1)  // as vectors, as they are read
+        body += "  put(w + " + at + ", four{" + angles[k] + ", " + angles[k + 1] + ", " +
+                angles[k + 2] + ", " + angles[k + 3] + "});\n";
+      else
+        body += "  w[" + at + "] = " + angles[k] + ";\n";
     }
-    for (std::size_t k = angles_.size(); k < table_; ++k)
-      body += "  w[" + std::to_string(k) + "] = 0.0;\n";
     const auto doubles = [&](std::uint32_t at) {
       const std::string from = "w + " + std::to_string(at);
       return states_ == 1 ? from : "reinterpret_cast<double*>(" + from + ")";
     };
     if (!angles_.empty())
-      body += "  sines_and_cosines(" + std::to_string(states_ * table_) + ", " + doubles(0) + ", " +
+      body += std::string("  sines_and_cosines<") +
+              (states_ == 8 ? "eight, eight_bits" : "four, four_bits") + ">(" +
+              std::to_string(states_ * table_) + ", " + doubles(0) + ", " +
               doubles(table_) + ", " + doubles(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
