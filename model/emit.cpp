@@ -435,8 +435,8 @@ class Emitter {
     if (!angles_.empty())
       body += std::string("  sines_and_cosines<") +
               (states_ == 8 ? "eight, eight_bits" : "four, four_bits") + ">(" +
-              std::to_string(states_ * table_) + ", " + doubles(0) + ", " +
-              doubles(table_) + ", " + doubles(2 * table_) + ");\n";
+              std::to_string(states_ * table_) + ", " + doubles(0) + ", " + doubles(table_) + ", " +
+              doubles(2 * table_) + ");\n";
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
     result_.entry = "void " + name_ + "(" + result_.parameters + ") {\n" + body + "}\n";
