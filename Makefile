@@ -49,7 +49,7 @@ test-all: test
 	@scripts/install-dependencies engines
 	@cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel $(JOBS)
 	@build/release/bin/engines_test --gtest_brief=1
-	@TANDEM_ROBOTS=10000 build/release/bin/model_test --gtest_filter='*RandomRobots*' --gtest_brief=1
+	@TANDEM_ROBOTS=10000 TANDEM_MIRRORED=30 build/release/bin/model_test --gtest_filter='*RandomRobots*:Lanes.*' --gtest_brief=1
 	@TANDEM_DERIVATIVES_ALL=1 build/release/bin/model_test --gtest_filter='Derivatives.OfAHumanoid*' --gtest_brief=1
 	@TANDEM_SEEDS=200 build/release/bin/estimation_test --gtest_filter='ContactFilter.*' --gtest_brief=1
 	@TANDEM_LONG_RUNS=1 TANDEM_FREE_HOURS=1 TANDEM_COLLISION_FIGURES=build/collisions build/release/bin/estimation_run_test --gtest_brief=1

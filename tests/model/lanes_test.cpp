@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "model/kernel_build.hpp"
 #include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
@@ -126,9 +128,10 @@ TEST(Lanes, HoldTheLimbsOfTheRobotsThatHaveThem) {
   const Kernels walkman("walkman");
   EXPECT_LT(walkman.left(Kernel::kForwardDynamics), 0.60);
   EXPECT_LT(walkman.left(Kernel::kMassMatrix), 0.57);
-  EXPECT_LT(Kernels("anymal_c").left(Kernel::kForwardDynamics), 0.63);
+  // Two legs share what the other two round apart.
+  EXPECT_LT(Kernels("anymal_c").left(Kernel::kForwardDynamics), 0.57);
   const Kernels icub("icub");  // axes of one limb are off by 1e-9 rad
-  EXPECT_LT(icub.left(Kernel::kForwardDynamics), 0.72);
+  EXPECT_LT(icub.left(Kernel::kForwardDynamics), 0.68);
   EXPECT_LT(icub.left(Kernel::kMassMatrix), 0.70);
 }
 
@@ -161,7 +164,9 @@ TEST(Lanes, HaveTheSignsThatTheirUsesNeed) {
 // Builds the library, which compares every kernel with the algorithms on the described frames.
 TEST(Lanes, ComputeWhatTheDescriptionsOfRandomMirroredRobotsSay) {
   const test::ScratchFolder folder;
-  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+  const char* robots = std::getenv("TANDEM_MIRRORED");
+  const std::uint64_t count = robots == nullptr ? 3 : std::strtoull(robots, nullptr, 10);
+  for (std::uint64_t seed = 0; seed < count; ++seed) {
     const std::string library = folder / ("random" + std::to_string(seed) + ".so");
     const auto built = build_kernels(
         with_its_mirror(seed, kLimb), {},
