@@ -146,7 +146,7 @@ std::string states_source(const KernelShape& shape, int step) {
   for (const KernelArray& array : shape.outputs) add(array, true);
   std::string text;
   if (step > 1) text += fmt::format("  if (states == {}) return {}({});\n", step, call, given);
-  text += fmt::format("  for (; s + {0} <= states; s += {0}) {{\n", step);
+  text += fmt::format("  for (; s + {0} <= states - states % 4; s += {0}) {{\n", step);
   return text + arrays + in + "    " + call + "(" + own + ");\n" + out + "  }\n";
 }
 

@@ -3,6 +3,8 @@
 // Layer: model.  Thread: one; one robot at a time, for the C interface has no place for `this`.
 #pragma once
 
+#include <algorithm>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,8 +23,8 @@ class InterpretedKernels {
     kernels_.floating_base = mechanism_.floating_base ? 1 : 0;
     kernels_.robot = name_.c_str();
     kernels_.variant = kernels_.description_hash = "";
-    kernels_.nq = static_cast<std::uint32_t>(mechanism_.nq());
-    kernels_.nv = static_cast<std::uint32_t>(mechanism_.nv());
+    kernels_.nq = static_cast<std::uint32_t>(mechanism_.kernel_nq());
+    kernels_.nv = static_cast<std::uint32_t>(mechanism_.kernel_nv());
     kernels_.joint_names = list(mechanism_.joint_names, kernels_.joints);
     kernels_.site_names = list(mechanism_.site_names, kernels_.sites);
     kernels_.wrench_names = list(mechanism_.wrench_names, kernels_.wrenches);
@@ -60,33 +62,55 @@ class InterpretedKernels {
   static std::size_t nv() { return static_cast<std::size_t>(m().nv()); }
   static std::size_t sites() { return m().sites.size(); }
 
+  // Followers have no coordinate, so that the tree's algorithms are not the kernels then.
+  static bool follow() { return m().has_followers(); }
+  static void run(Kernel kernel, std::initializer_list<In> in, std::initializer_list<double*> to) {
+    const KernelShape shape = kernel_shape(kernel, m());
+    std::vector<std::vector<double>> inputs, outputs;
+    for (std::size_t k = 0; k < in.size(); ++k)
+      inputs.emplace_back(in.begin()[k], in.begin()[k] + shape.inputs[k].size);
+    for (const KernelArray& array : shape.outputs)
+      outputs.emplace_back(static_cast<std::size_t>(array.size), 0.0);
+    run_kernel<double>(kernel, m(), inputs, outputs);
+    for (std::size_t k = 0; k < to.size(); ++k) std::ranges::copy(outputs[k], to.begin()[k]);
+  }
+
   void set_functions() {
     kernels_.forward_dynamics = [](In a, In b, In c, In d, double* r) {
+      if (follow()) return run(Kernel::kForwardDynamics, {a, b, c, d}, {r});
       Aba<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
     };
     kernels_.inverse_dynamics = [](In a, In b, In c, In d, double* r) {
+      if (follow()) return run(Kernel::kInverseDynamics, {a, b, c, d}, {r});
       Rnea<double>(m(), q(a), v(b), v(c), f(d), out(r, nv())).run();
     };
     kernels_.mass_matrix = [](In a, double* r) {
+      if (follow()) return run(Kernel::kMassMatrix, {a}, {r});
       Crba<double>(m(), q(a), out(r, nv() * nv())).run();
     };
     kernels_.bias = [](In a, In b, double* r) {
+      if (follow()) return run(Kernel::kBias, {a, b}, {r});
       Rnea<double>(m(), q(a), v(b), {}, {}, out(r, nv())).run();
     };
     kernels_.generalised_momentum = [](In a, In b, In c, double* p, double* r) {
+      if (follow()) return run(Kernel::kGeneralisedMomentum, {a, b, c}, {p, r});
       GeneralisedMomentum<double>(m(), q(a), v(b), f(c), out(p, nv()), out(r, nv())).run();
     };
     kernels_.center_of_mass = [](In a, In b, double* c, double* cdot, double* J) {
+      if (follow()) return run(Kernel::kCenterOfMass, {a, b}, {c, cdot, J});
       CenterOfMass<double>(m(), q(a), v(b), out(c, 3), out(cdot, 3), out(J, 3 * nv())).run();
     };
     kernels_.site_motion = [](In a, In b, In c, double* pose, double* twist, double* acc) {
+      if (follow()) return run(Kernel::kSiteMotion, {a, b, c}, {pose, twist, acc});
       site_motion<double>(m(), q(a), v(b), v(c), out(pose, 12 * sites()), out(twist, 6 * sites()),
                           out(acc, 6 * sites()));
     };
     kernels_.site_jacobians = [](In a, double* J) {
+      if (follow()) return run(Kernel::kSiteJacobians, {a}, {J});
       site_jacobians<double>(m(), q(a), out(J, 6 * nv() * sites()));
     };
     kernels_.sensor_wrenches = [](In a, In b, In c, In d, double* r) {
+      if (follow()) return run(Kernel::kSensorWrenches, {a, b, c, d}, {r});
       SensorWrenches<double>(m(), q(a), v(b), v(c), f(d), out(r, 6 * m().sensors.size())).run();
     };
   }

@@ -166,8 +166,11 @@ std::vector<DriveSize> size_drives(const model::Tree& tree,
         size.joints.push_back(joints[end]);
       }
       size.actuator = motor(effort, velocity, slides);
-      size.actuator.name = fmt::format("drive_{:.3g}{}", rounded(effort, 2), slides ? "N" : "Nm");
-      std::ranges::replace(size.actuator.name, '.', '_');
+      size.actuator.name = fmt::format("drive_{:.6g}{}", rounded(effort, 2), slides ? "N" : "Nm");
+      const auto is_no_key = [](char c) {
+        return c == '.' || c == '+';
+      };  // of TOML, without quotes
+      std::ranges::replace_if(size.actuator.name, is_no_key, '_');
       size.remark = fmt::format("{:.3g} {} at {:.3g} {}", effort, slides ? "N" : "Nm", velocity,
                                 slides ? "m/s" : "rad/s");
       std::ranges::sort(size.joints);

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "model/emit.hpp"
+#include "model/interpreted_kernels.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_library.hpp"
 #include "model/lanes.hpp"
@@ -263,6 +264,24 @@ TEST_P(Followers, LeaveThePassiveRobotItsEnergy) {
   }
   EXPECT_GT(relative_error(v, start.v), 1e-3);
   EXPECT_NEAR(energy(), before, 1e-8 * std::abs(before));
+}
+
+// Where nothing is compiled: what `tandem check` says of weak drives comes from them.
+TEST_P(Followers, AreNoCoordinatesOfInterpretedKernels) {
+  const Coupled robot(GetParam());
+  const Mechanism& m = robot.follows;
+  const State s(m, 8);
+  const InterpretedKernels kernels(m);
+  ASSERT_EQ(kernels.get()->nv, static_cast<std::uint32_t>(m.kernel_nv()));
+  ASSERT_EQ(kernels.get()->nv - kernels.get()->joints, m.floating_base ? 6u : 0u);
+  Array h(kernels.get()->nv), M(h.size() * h.size()), tau(h.size());
+  kernels.get()->bias(s.q.data(), s.v.data(), h.data());
+  kernels.get()->mass_matrix(s.q.data(), M.data());
+  kernels.get()->inverse_dynamics(s.q.data(), s.v.data(), s.vdot.data(), s.wrench.data(),
+                                  tau.data());
+  EXPECT_EQ(h, evaluate_kernel(Kernel::kBias, m, {s.q, s.v})[0]);
+  EXPECT_EQ(M, evaluate_kernel(Kernel::kMassMatrix, m, {s.q})[0]);
+  EXPECT_EQ(tau, evaluate_kernel(Kernel::kInverseDynamics, m, {s.q, s.v, s.vdot, s.wrench})[0]);
 }
 
 INSTANTIATE_TEST_SUITE_P(Robots, Followers, testing::ValuesIn(kCoupledRobots),

@@ -65,13 +65,28 @@ double RandomRobot::angle() {
   return uniform(-3.0, 3.0);
 }
 
+// Numbers are drawn in statements of their own: compilers evaluate arguments in different orders.
+Eigen::Vector3d RandomRobot::direction() {
+  const double z = uniform(0.1, 1.0);
+  const double y = uniform(-1.0, 1.0);
+  return {uniform(-1.0, 1.0), y, z};
+}
+
+std::string RandomRobot::origin() {
+  const std::string yaw = rounded(angle());
+  const std::string pitch = rounded(angle());
+  const std::string roll = rounded(angle());
+  return fmt::format("<origin xyz=\"{}\" rpy=\"{} {} {}\"/>", offset(), roll, pitch, yaw);
+}
+
 std::string RandomRobot::axis() {
-  Vector3d v = Vector3d::Unit(pick(3)) * (chance(0.5) ? 1.0 : -1.0);
+  const double sign = chance(0.5) ? 1.0 : -1.0;
+  Vector3d v = sign * Vector3d::Unit(pick(3));
   if (chance(options_.near_parallel)) {
     v = Vector3d::UnitZ();  // of the parent's, if that is the usual one and nothing turns between
     if (chance(0.7)) v[pick(2)] = std::pow(10.0, -uniform(4.0, 16.0));
   } else if (chance(0.3)) {
-    v = Vector3d(uniform(-1.0, 1.0), uniform(-1.0, 1.0), uniform(0.1, 1.0));
+    v = direction();
   }
   return text(v);
 }
@@ -97,26 +112,23 @@ void RandomRobot::add_link(const std::string& name, bool massless) {
   for (double& s : second) s = 0.2 * size * size * std::pow(10.0, uniform(-2.0, 0.0));
   Matrix3d R = Matrix3d::Identity();
   if (chance(0.5)) {
-    R = Eigen::AngleAxisd(uniform(-3.0, 3.0),
-                          Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(0.1, 1)).normalized())
-            .toRotationMatrix();
+    const Vector3d about = direction().normalized();
+    R = Eigen::AngleAxisd(uniform(-3.0, 3.0), about).toRotationMatrix();
   }
   const Matrix3d J = mass * R * second.asDiagonal() * R.transpose();
   const Matrix3d I = J.trace() * Matrix3d::Identity() - J;
   urdf_ += fmt::format(
-      "<link name=\"{}\"><inertial><origin xyz=\"{}\" rpy=\"{} {} {}\"/><mass value=\"{:.9g}\"/>"
+      "<link name=\"{}\"><inertial>{}<mass value=\"{:.9g}\"/>"
       "<inertia ixx=\"{:.15g}\" ixy=\"{:.15g}\" ixz=\"{:.15g}\" iyy=\"{:.15g}\" iyz=\"{:.15g}\" "
       "izz=\"{:.15g}\"/></inertial></link>\n",
-      name, offset(), rounded(angle()), rounded(angle()), rounded(angle()), mass, I(0, 0), I(0, 1),
-      I(0, 2), I(1, 1), I(1, 2), I(2, 2));
+      name, origin(), mass, I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2));
 }
 
 void RandomRobot::add_joint(int index, const std::string& type, const std::string& parent,
                             const std::string& child) {
-  urdf_ += fmt::format(
-      "<joint name=\"joint{}\" type=\"{}\"><parent link=\"{}\"/><child link=\"{}\"/>"
-      "<origin xyz=\"{}\" rpy=\"{} {} {}\"/>",
-      index, type, parent, child, offset(), rounded(angle()), rounded(angle()), rounded(angle()));
+  urdf_ +=
+      fmt::format("<joint name=\"joint{}\" type=\"{}\"><parent link=\"{}\"/><child link=\"{}\"/>{}",
+                  index, type, parent, child, origin());
   if (type != "fixed") urdf_ += "<axis xyz=\"" + axis() + "\"/>";
   if (type == "revolute" || type == "prismatic")
     urdf_ += "<limit lower=\"-3\" upper=\"3\" effort=\"100\" velocity=\"10\"/>";

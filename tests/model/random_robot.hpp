@@ -1,6 +1,7 @@
 // Random URDFs, as odd as those that strangers bring: seeded, the same text on every machine.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -32,6 +33,8 @@ class RandomRobot {
   [[nodiscard]] int pick(int count);
   [[nodiscard]] double angle();
   [[nodiscard]] std::string rounded(double value);
+  [[nodiscard]] Eigen::Vector3d direction();
+  [[nodiscard]] std::string origin();  ///< the element
   [[nodiscard]] std::string axis();
   [[nodiscard]] std::string offset();
   void add_link(const std::string& name, bool massless);

@@ -88,6 +88,17 @@ TEST(Drives, AreFewForJointsThatNeedNearlyTheSame) {
   EXPECT_EQ(sizes[0].actuator.name, "drive_100Nm");
 }
 
+/// 1e+03 is no name in TOML: a URDF with effort="1000" could not become a robot.
+TEST(Drives, OfAThousandHaveANameThatTomlTakes) {
+  for (const auto& [effort, name] :
+       {std::pair(995.0, "drive_1000Nm"), {1200.0, "drive_1200Nm"}, {3e6, "drive_3e_06Nm"}}) {
+    model::Tree tree;
+    tree.joints.resize(1);
+    const std::vector<JointLimits> limits{{.effort = effort, .velocity = 4.0, .range = {}}};
+    EXPECT_EQ(size_drives(tree, limits)[0].actuator.name, name);
+  }
+}
+
 /// A waist of 30 Nm that carries a trunk: gains for its inertia alone made one count of the encoder
 /// ask for half its effort, and it chattered between both limits.
 TEST(Drives, DoNotChatterUnderALoadThatIsHeavyForThem) {
