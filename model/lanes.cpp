@@ -18,6 +18,8 @@ constexpr std::uint32_t kNone = Lanes::kNone;
 // as the pairs save.
 constexpr double kLeastShare = 0.05;
 
+constexpr std::size_t kMostLikes = 3;  // a quadruped has four legs
+
 // Constants that are the same but for the digits of a description differ by less.
 constexpr double kLastDigits = 1e-6;
 
@@ -219,8 +221,10 @@ class Pairing {
     find_sides();
     pair_inputs();
     list_operations();
-    for (std::uint32_t i = 0; i < nodes_.size(); ++i)
+    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
       if (live_[i] && side_[i] == Side::kFirst) find_partner(i);
+      if (live_[i] && side_[i] == Side::kTrunk && common_[i]) find_likes(i);
+    }
     choose_signs();
     return std::move(lanes_);
   }
@@ -309,7 +313,11 @@ class Pairing {
   }
   void list_operations() {
     for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
-      if (!live_[i] || side_[i] == Side::kTrunk || !is_operation(nodes_[i].op)) continue;
+      if (!live_[i] || !is_operation(nodes_[i].op)) continue;
+      if (side_[i] == Side::kTrunk) {
+        if (common_[i]) trunk_[own_key(i)].push_back(i);
+        continue;
+      }
       (side_[i] == Side::kFirst ? first_ : second_)[own_key(i)].push_back(i);
     }
   }
@@ -356,6 +364,23 @@ class Pairing {
       }
     }
   }
+  // Of what limbs of both sides share: a first limb may share with one second limb what its partner
+  // shares with another first one, as a quadruped's legs do across.
+  void find_likes(std::uint32_t i) {
+    const Node& node = nodes_[i];
+    if (!is_operation(node.op)) return;
+    for (const std::uint32_t a : images_of_first(node.a)) {
+      for (const std::uint32_t b : is_binary(node.op) ? images_of_first(node.b) : kNoOperand) {
+        const auto found = trunk_.find(key(node.op, a, b));
+        if (found == trunk_.end()) continue;
+        for (const std::uint32_t other : found->second)
+          if (other != i && others_[i].size() < kMostLikes &&
+              rounds_alike(constant_of(i), constant_of(other)))
+            others_[i].push_back(other);
+      }
+    }
+  }
+
   static bool rounds_alike(double a, double b) {
     return std::abs(a - b) <= kLastDigits * std::max({std::abs(a), std::abs(b), 0.01});
   }
@@ -469,6 +494,7 @@ class Pairing {
   std::vector<bool> common_;                        // depends on no limb
   std::vector<std::vector<std::uint32_t>> others_;  // of such a node: more of the second limbs
   std::map<Key, std::vector<std::uint32_t>> first_, second_;  // operations of each limb
+  std::map<Key, std::vector<std::uint32_t>> trunk_;           // of those that depend on none
   Parities parities_;
   std::map<std::uint32_t, Parities::Row> sign_;  // of pairs, and of what both limbs share
   Lanes lanes_;
