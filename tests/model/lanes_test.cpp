@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <cstdlib>
 
 #include "model/kernel_build.hpp"
@@ -133,6 +135,48 @@ TEST(Lanes, HoldTheLimbsOfTheRobotsThatHaveThem) {
   const Kernels icub("icub");  // axes of one limb are off by 1e-9 rad
   EXPECT_LT(icub.left(Kernel::kForwardDynamics), 0.68);
   EXPECT_LT(icub.left(Kernel::kMassMatrix), 0.70);
+}
+
+// A body on four legs that are equal but for signs, to the last digit.
+Tree equal_legs() {
+  std::string urdf = R"(<robot name="legs"><link name="base"><inertial><mass value="20"/>
+      <inertia ixx="0.5" iyy="1.1" izz="1.3" ixy="0" ixz="0" iyz="0"/></inertial></link>)";
+  const auto body = [](const std::string& name, double mass, double x, double y, double z) {
+    return fmt::format(R"(<link name="{}"><inertial><origin xyz="{} {} {}"/><mass value="{}"/>
+        <inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/></inertial></link>)",
+                       name, x, y, z, mass, 0.011 * mass, 0.012 * mass, 0.005 * mass);
+  };
+  const auto joint = [](const std::string& name, const std::string& parent, const char* axis,
+                        const std::string& origin) {
+    return fmt::format(R"(<joint name="{0}_joint" type="revolute"><parent link="{1}"/>
+        <child link="{0}"/><origin {2}/><axis xyz="{3}"/>
+        <limit lower="-3" upper="3" effort="40" velocity="20"/></joint>)",
+                       name, parent, origin, axis);
+  };
+  for (const int front : {1, -1}) {
+    for (const int left : {1, -1}) {
+      const std::string leg = fmt::format("{}_{}", front > 0 ? "front" : "hind", left);
+      urdf += body(leg + "_hip", 1.2, 0.02 * front, 0.03 * left, 0.001) +
+              body(leg + "_thigh", 2.1, 0.01, 0.02 * left, -0.1) +
+              body(leg + "_shank", 0.4, 0.015, 0.0, -0.14) +
+              joint(leg + "_hip", "base", "1 0 0",
+                    fmt::format(R"(xyz="{} {} 0.02" rpy="0 0 {}")", 0.31 * front, 0.11 * left,
+                                0.5 * front * left)) +
+              joint(leg + "_thigh", leg + "_hip", "0 1 0",
+                    fmt::format(R"(xyz="{} {} 0")", 0.05 * front, 0.08 * left)) +
+              joint(leg + "_shank", leg + "_thigh", "0 1 0", R"(xyz="0 0 -0.29")");
+    }
+  }
+  auto read = parse_urdf(urdf + "</robot>", "legs.urdf", {.floating_base = true});
+  if (!read) throw std::runtime_error(read.error().front().to_string());
+  return std::move(read->tree);
+}
+
+TEST(Lanes, HoldLegsThatAreEqualAndShareAcross) {
+  const Kernels legs(*make_mechanism(equal_legs(), {}));
+  ASSERT_EQ(legs.m.limbs.size(), 2u);
+  EXPECT_LT(legs.left(Kernel::kForwardDynamics), 0.60);
+  EXPECT_LT(legs.left(Kernel::kInverseDynamics), 0.60);
 }
 
 bool has(const EmittedKernel& kernel, const std::string& word) {
