@@ -365,7 +365,7 @@ Result<OperationCount> count_kernel(Kernel kernel, const Tree& tree, const Model
   const Result<Mechanism> mechanism = make_mechanism(tree, spec);
   if (!mechanism) return std::unexpected(mechanism.error());
   Graph graph;
-  return count_operations(graph, trace_kernel(kernel, *mechanism, graph).outputs);
+  return emit(graph, trace_kernel(kernel, *mechanism, graph), *mechanism).count;
 }
 
 }  // namespace tandem::model
