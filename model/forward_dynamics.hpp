@@ -67,7 +67,7 @@ class Aba {
   };
   struct JointState {
     JointTransform<S> transform;
-    Force<S> U_over_D;  // the articulated inertia's column of the joint, in that frame
+    Force<S> U_over_D;  // the articulated inertia's column of the joint, at its position zero
     S u_over_D = 0.0;
     S reference = 0.0;  // vdot of the reference motion
   };

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <map>
+
+#include "model/parities.hpp"
 
 namespace tandem::model {
 namespace {
@@ -131,69 +132,6 @@ class Elements {
   std::vector<int> partner_;  // per body of a first limb
 };
 
-/// A system of linear equations over {0, 1}: each row is a sum of variables that is 0, or 1 where
-/// its first bit is set.
-class Parities {
- public:
-  using Row = std::vector<std::uint64_t>;
-
-  static void add(Row& row, const Row& other) {
-    if (row.size() < other.size()) row.resize(other.size());
-    for (std::size_t k = 0; k < other.size(); ++k) row[k] ^= other[k];
-  }
-  static Row variable(std::uint32_t number) {
-    Row row(number / 64 + 1);
-    row[number / 64] = std::uint64_t{1} << number % 64;
-    return row;
-  }
-  [[nodiscard]] std::uint32_t new_variable() { return ++variables_; }
-  /// The constant 1.
-  static Row one() { return {1}; }
-
-  /// @return false: it contradicts the others, and is left out
-  bool require_zero(Row row) {
-    while (const std::uint32_t last = last_variable(row)) {
-      const auto known = rows_.find(last);
-      if (known == rows_.end()) {
-        rows_.emplace(last, std::move(row));
-        return true;
-      }
-      add(row, known->second);
-    }
-    return row.empty() || (row[0] & 1) == 0;
-  }
-  /// Variables that no equation determines are 0.
-  void solve() {
-    value_.assign(variables_ + 1, false);
-    value_[0] = true;
-    for (const auto& [last, row] : rows_) {  // each has smaller variables beside its own
-      value_[last] = false;
-      value_[last] = sum(row);
-    }
-  }
-  [[nodiscard]] bool sum(const Row& row) const {
-    bool result = false;
-    for (std::size_t k = 0; k < row.size(); ++k)
-      for (std::uint64_t bits = row[k]; bits != 0; bits &= bits - 1)
-        result ^= value_[64 * k + static_cast<std::size_t>(std::countr_zero(bits))];
-    return result;
-  }
-
- private:
-  /// 0: it has none.
-  static std::uint32_t last_variable(const Row& row) {
-    for (std::size_t k = row.size(); k-- > 0;) {
-      const std::uint64_t bits = k == 0 ? row[0] & ~std::uint64_t{1} : row[k];
-      if (bits != 0) return static_cast<std::uint32_t>(64 * k + 63 - std::countl_zero(bits));
-    }
-    return 0;
-  }
-
-  std::map<std::uint32_t, Row> rows_;  // by their last variable
-  std::vector<bool> value_;
-  std::uint32_t variables_ = 0;
-};
-
 const std::vector<std::uint32_t> kNoOperand{0};  // no second operand
 
 bool is_sum(Op op) { return op == Op::kAdd || op == Op::kSub; }
@@ -231,6 +169,7 @@ class Pairing {
 
  private:
   using Key = std::array<std::uint32_t, 3>;
+  using Operations = std::map<Key, std::vector<std::uint32_t>>;
 
   // A node belongs to a limb when it depends on that limb's inputs and not on the other's, when
   // only that limb's outputs depend on it, or when only nodes of that limb use it.
@@ -338,50 +277,53 @@ class Pairing {
     return 0.0;
   }
 
-  void find_partner(std::uint32_t i) {
+  // Calls act(a, those of `operations`) for what does the same to what stands for node i's
+  // operands, `a` for the first.
+  template <class Act>
+  void for_matches(std::uint32_t i, const Operations& operations, const Act& act) const {
     const Node& node = nodes_[i];
     if (!is_operation(node.op)) return;
     for (const std::uint32_t a : images_of_first(node.a)) {
       for (const std::uint32_t b : is_binary(node.op) ? images_of_first(node.b) : kNoOperand) {
-        const auto found = second_.find(key(node.op, a, b));
-        if (found == second_.end()) continue;
-        const std::uint32_t best = lanes_.second_of[i] == kNone ? choose(i, found->second) : kNone;
-        if (best != kNone && lanes_.first_of[best] == kNone) {
-          pair(i, best);
-          make_alike(i, best, a);
-          if (node.op != Op::kSin && node.op != Op::kCos) ++lanes_.operations;
-        }
-        if (!common_[i]) {
-          if (lanes_.second_of[i] != kNone) return;
-          continue;
-        }
-        for (const std::uint32_t other : found->second) {
-          if (other == lanes_.second_of[i] || !rounds_alike(constant_of(i), constant_of(other)))
-            continue;
-          others_[i].push_back(other);
-          if (lanes_.like_of[other] == kNone) make_alike(i, other, a);
-        }
-      }
-    }
-  }
-  // Of what limbs of both sides share: a first limb may share with one second limb what its partner
-  // shares with another first one, as a quadruped's legs do across.
-  void find_likes(std::uint32_t i) {
-    const Node& node = nodes_[i];
-    if (!is_operation(node.op)) return;
-    for (const std::uint32_t a : images_of_first(node.a)) {
-      for (const std::uint32_t b : is_binary(node.op) ? images_of_first(node.b) : kNoOperand) {
-        const auto found = trunk_.find(key(node.op, a, b));
-        if (found == trunk_.end()) continue;
-        for (const std::uint32_t other : found->second)
-          if (other != i && others_[i].size() < kMostLikes &&
-              rounds_alike(constant_of(i), constant_of(other)))
-            others_[i].push_back(other);
+        const auto found = operations.find(key(node.op, a, b));
+        if (found != operations.end()) act(a, found->second);
       }
     }
   }
 
-  static bool rounds_alike(double a, double b) {
+  void find_partner(std::uint32_t i) {
+    for_matches(i, second_, [&](std::uint32_t a, const std::vector<std::uint32_t>& matches) {
+      if (lanes_.second_of[i] == kNone) {
+        const std::uint32_t best = choose(i, matches);
+        if (best != kNone && lanes_.first_of[best] == kNone) {
+          pair(i, best);
+          make_alike(i, best, a);
+          const Op op = nodes_[i].op;
+          if (op != Op::kSin && op != Op::kCos) ++lanes_.operations;
+        }
+      }
+      if (!common_[i]) return;
+      for (const std::uint32_t other : matches) {
+        if (other == lanes_.second_of[i] || !rounds_alike(i, other)) continue;
+        others_[i].push_back(other);
+        if (lanes_.like_of[other] == kNone) make_alike(i, other, a);
+      }
+    });
+  }
+  // Of what limbs of both sides share: a first limb may share with one second limb what its partner
+  // shares with another first one, as a quadruped's legs do across.
+  void find_likes(std::uint32_t i) {
+    for_matches(i, trunk_, [&](std::uint32_t, const std::vector<std::uint32_t>& matches) {
+      for (const std::uint32_t other : matches)
+        if (other != i && others_[i].size() < kMostLikes && rounds_alike(i, other))
+          others_[i].push_back(other);
+    });
+  }
+
+  // Two operations with the same constant, but for its last digits.
+  bool rounds_alike(std::uint32_t i, std::uint32_t other) const {
+    const double a = constant_of(i);
+    const double b = constant_of(other);
     return std::abs(a - b) <= kLastDigits * std::max({std::abs(a), std::abs(b), 0.01});
   }
   // `a`: the operand of the second that is like the first operand of the first.
@@ -493,8 +435,8 @@ class Pairing {
   std::vector<Side> side_;
   std::vector<bool> common_;                        // depends on no limb
   std::vector<std::vector<std::uint32_t>> others_;  // of such a node: more of the second limbs
-  std::map<Key, std::vector<std::uint32_t>> first_, second_;  // operations of each limb
-  std::map<Key, std::vector<std::uint32_t>> trunk_;           // of those that depend on none
+  Operations first_, second_;                       // of each limb
+  Operations trunk_;                                // that depend on no limb, and belong to none
   Parities parities_;
   std::map<std::uint32_t, Parities::Row> sign_;  // of pairs, and of what both limbs share
   Lanes lanes_;

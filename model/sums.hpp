@@ -18,8 +18,8 @@ struct OrderedSums {
 
 /// The same values in another graph, where each sum of several terms adds first what is known
 /// first, so that what everything else waits for is waited for once. When a term is known follows
-/// from the latencies of an x86-64 CPU with fused multiply-add, all operations side by side. As
-/// many operations; last bits differ. Sums that are a pair of `lanes` get the same order.
+/// from the latencies of an x86-64 CPU with fused multiply-add, all operations side by side. At
+/// most as many operations; last bits differ. Sums that are alike in two limbs get the same order.
 ///
 /// @param to  empty; receives the nodes that the results depend on.
 [[nodiscard]] OrderedSums ordered_sums(const Graph& from, std::span<const Expr> outputs,
