@@ -5,20 +5,12 @@
 #include <utility>
 
 #include "base/nearest.hpp"
-#include "base/sha256.hpp"
+#include "log/data_hash.hpp"
 #include "log/mcap_reader.hpp"
 #include "log/schema.hpp"
 
 namespace tandem::log {
 namespace {
-
-/// A message's channel and time, as the data hash takes them.
-std::array<std::byte, 10> hashed_head(const MessageView& message) {
-  std::array<std::byte, 10> head;
-  store(head.data(), message.channel);
-  store(head.data() + 2, static_cast<std::uint64_t>(message.time_ns));
-  return head;
-}
 
 Topic topic_of(const McapReader& reader, const ChannelRecord& channel) {
   Topic topic;
@@ -51,7 +43,7 @@ Result<LogFile> LogFile::open(const std::string& path) {
   LogFile log;
   log.path_ = path;
   std::map<std::uint16_t, Topic> by_channel;
-  Sha256 hash;
+  DataHash hash;
   for (;;) {
     auto message = reader->next();
     if (!message) return std::unexpected(message.error());
@@ -64,8 +56,7 @@ Result<LogFile> LogFile::open(const std::string& path) {
     }
     topic->second.last_ns = view.time_ns;
     ++topic->second.messages;
-    hash.update(hashed_head(view));
-    hash.update(view.data);
+    hash.add(view.channel, view.time_ns, view.data);
   }
   for (const auto& [id, channel] : reader->channels()) {
     if (!by_channel.contains(id)) by_channel[id] = topic_of(*reader, channel);

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -155,16 +156,16 @@ bool McapWriter::write(std::uint16_t channel, std::int64_t time_ns, std::span<co
   const auto time = static_cast<std::uint64_t>(time_ns);
   const std::size_t at = chunk_.size();
   const std::size_t content = kMessageHeaderBytes + head.size() + body.size();
-  chunk_.resize(at + kRecordHeaderBytes + content);
-  std::byte* out = chunk_.data() + at;
-  store(out, static_cast<std::uint8_t>(Opcode::kMessage));
-  store(out + 1, static_cast<std::uint64_t>(content));
-  store(out + 9, channel);
-  store(out + 11, sequence_[channel]++);
-  store(out + 15, time);
-  store(out + 23, time);
-  std::ranges::copy(head, out + 31);
-  std::ranges::copy(body, out + 31 + head.size());
+  std::array<std::byte, kRecordHeaderBytes + kMessageHeaderBytes> start;
+  store(start.data(), static_cast<std::uint8_t>(Opcode::kMessage));
+  store(start.data() + 1, static_cast<std::uint64_t>(content));
+  store(start.data() + 9, channel);
+  store(start.data() + 11, sequence_[channel]++);
+  store(start.data() + 15, time);
+  store(start.data() + 23, time);
+  append(chunk_, std::span<const std::byte>(start));
+  append(chunk_, head);
+  append(chunk_, body);
 
   chunk_start_ = chunk_has_messages_ ? std::min(chunk_start_, time) : time;
   chunk_end_ = chunk_has_messages_ ? std::max(chunk_end_, time) : time;

@@ -149,12 +149,7 @@ void Recorder::write(std::span<const std::byte> slot) {
 }
 
 void Recorder::write(Channel channel, std::int64_t time_ns, std::span<const std::byte> body) {
-  std::array<std::byte, 14> hashed;  // channel, time, CDR header; the body follows
-  store(hashed.data(), channel);
-  store(hashed.data() + 2, static_cast<std::uint64_t>(time_ns));
-  std::memcpy(hashed.data() + 10, kCdrHeader.data(), kCdrHeader.size());
-  hash_.update(hashed);
-  hash_.update(body);
+  hash_.add(channel, time_ns, kCdrHeader, body);
   if (!writer_.write(channel, time_ns, kCdrHeader, body)) {
     if (lost_++ == 0) trouble_ = writer_.error();
     failed_.store(true, std::memory_order_release);

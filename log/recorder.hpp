@@ -13,9 +13,9 @@
 
 #include "base/realtime.hpp"
 #include "base/result.hpp"
-#include "base/sha256.hpp"
 #include "base/spsc_ring.hpp"
 #include "hal/image.hpp"
+#include "log/data_hash.hpp"
 #include "log/event.hpp"
 #include "log/info.hpp"
 #include "log/mcap_writer.hpp"
@@ -37,7 +37,7 @@ struct RecordingResult {
   std::uint64_t dropped = 0;   ///< refused because the ring was full
   std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted)
   std::uint64_t bytes = 0;     ///< of the file
-  std::string data_sha256;     ///< over channel id, time and data of every message, in order
+  std::string data_sha256;     ///< DataHash of every message, in order
   std::string error;           ///< why writing failed; empty when it did not
 };
 
@@ -108,7 +108,7 @@ class Recorder {
   EventNames names_;
   McapWriter writer_;
   RobotView view_;
-  Sha256 hash_;
+  DataHash hash_;
   std::size_t largest_ = sizeof(Event);
   std::size_t ring_slots_ = 0;
   std::unique_ptr<SpscRing> ring_;
