@@ -7,10 +7,11 @@ FUZZ_RUNS ?=
 FUZZ_JOBS ?= 4
 FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames ethercat line mcap import
 
-.PHONY: demo test test-all bench unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
+.PHONY: demo robot test test-all bench unit anywhere hil sanitized rtsan asan tsan fuzz format lint tidy mutations clean help
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
+	@echo "make robot  the program for a robot PC: the fastest, in build/robot (15 minutes)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
@@ -31,6 +32,11 @@ demo:
 	@echo "  build/release/bin/tandem run config/coman/hold.toml        # another controller"
 	@echo "  build/release/bin/tandem new config/ur5e/ur5e.urdf -o runs/my_robot  # a robot from its URDF"
 	@echo 'The README says just `tandem`: export PATH="$$PWD/build/release/bin:$$PATH"'
+
+# No tests; optimised as a whole, and for the branches that runs take.
+robot:
+	@scripts/install-dependencies demo
+	@JOBS=$(JOBS) scripts/build-robot
 
 # What CI runs: all tests; some of them in strange surroundings; the tests on a real CAN stack, which
 # take one core, and beside them thirteen seconds of each fuzz target and the real-time proof. The last

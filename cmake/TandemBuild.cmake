@@ -28,13 +28,15 @@ find_package(nlohmann_json REQUIRED)
 # are its warnings of what std::string does inside (GCC bug 105651).
 add_library(tandem_options INTERFACE)
 target_compile_features(tandem_options INTERFACE cxx_std_23)
+set(TANDEM_STRING_WARNINGS "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>>")
 target_compile_options(tandem_options INTERFACE -ffp-contract=off
   "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
-  "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>>"
+  ${TANDEM_STRING_WARNINGS}
   # Nobody replaces a function of a library here, so that g++ may put one into another with -fPIC.
   "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>>"
   # g++ collects its garbage at 128 MB, which costs a twentieth of the time; a source here takes 1 GB.
   "$<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1048576>>")
+target_link_options(tandem_options INTERFACE ${TANDEM_STRING_WARNINGS})  # link-time optimisation warns, too
 target_include_directories(tandem_options INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
 target_link_libraries(tandem_options INTERFACE Threads::Threads)
 
@@ -53,6 +55,23 @@ if(TANDEM_SANITIZE)
     -fsanitize=${TANDEM_SANITIZE} -fno-omit-frame-pointer -g1)
   target_link_options(tandem_options INTERFACE -fsanitize=${TANDEM_SANITIZE})
 endif()
+
+# scripts/build-robot sets it: first "record", so that runs leave beside the objects how often each
+# branch was taken, then "use". What no run came to is optimised as it is without a profile.
+set(TANDEM_PROFILE "" CACHE STRING "g++: record a profile of what runs, or use one")
+set_property(CACHE TANDEM_PROFILE PROPERTY STRINGS "" record use)
+if(TANDEM_PROFILE AND NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  message(FATAL_ERROR "TANDEM_PROFILE is for g++ (leave it empty, or set CMAKE_CXX_COMPILER=g++)")
+elseif(TANDEM_PROFILE STREQUAL record)
+  set(TANDEM_PROFILE_OPTIONS -fprofile-generate -fprofile-update=prefer-atomic)
+elseif(TANDEM_PROFILE STREQUAL use)
+  set(TANDEM_PROFILE_OPTIONS -fprofile-use -fprofile-partial-training -Wno-missing-profile
+    -Wno-error=coverage-mismatch)
+elseif(TANDEM_PROFILE)
+  message(FATAL_ERROR "TANDEM_PROFILE is '${TANDEM_PROFILE}' (leave it empty, or say record or use)")
+endif()
+target_compile_options(tandem_options INTERFACE "$<BUILD_INTERFACE:${TANDEM_PROFILE_OPTIONS}>")
+target_link_options(tandem_options INTERFACE "$<BUILD_INTERFACE:${TANDEM_PROFILE_OPTIONS}>")
 
 # tandem_room(NAME SOURCES … LINKS …): the static library tandem_NAME of one folder.
 function(tandem_room name)
