@@ -202,7 +202,7 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
               found->refused.empty()
                   ? std::string("it runs through")
                   : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
-                                found->share, found->refused));
+                                found->share, draft.placed(found->refused)));
   }
   facts.print(out);
   const auto number = [](double value) {

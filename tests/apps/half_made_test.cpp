@@ -38,7 +38,7 @@ class HalfMade : public Program {
   }
   /// A gnuplot that does this; its folder is on the PATH of `environment()`.
   void fake_gnuplot(const std::string& script) const {
-    std::filesystem::create_directory(folder_ / "bin");
+    std::filesystem::create_directories(folder_ / "bin");
     write_text(folder_ / "bin/gnuplot", "#!/bin/sh\n" + script);
     std::filesystem::permissions(folder_ / "bin/gnuplot", std::filesystem::perms::owner_all);
   }
@@ -103,7 +103,47 @@ TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
                              (WIFEXITED(raw) && WEXITSTATUS(raw) == 128 + SIGINT);
     EXPECT_TRUE(interrupted) << raw << read_text(folder_ / "err.txt");
     EXPECT_EQ(all(), were) << output;
+    EXPECT_NE(read_text(folder_ / "err.txt").find("interrupted: nothing was written to "),
+              std::string::npos);
   }
+}
+
+// They stayed for ever.
+TEST_F(HalfMade, WhatAKilledCommandLeftIsRemovedByTheNextOfThatName) {
+  fake_gnuplot("cat > /dev/null\nkill -KILL $PPID\n");
+  std::filesystem::create_directory(folder_ / "there");
+  const auto were = all();
+  for (const char* output : {"made/of/folders", "there"}) {
+    EXPECT_NE(tandem("report " + log_ + " -o " + output, environment()).status, 0);
+    EXPECT_GT(all().size(), were.size()) << output;
+  }
+  const auto with_drafts = all();
+  EXPECT_EQ(tandem("log csv " + log_ + " -o a.csv").status, 0);
+  EXPECT_EQ(all().size(), with_drafts.size() + 1) << "those of other names stay";
+  std::filesystem::remove(folder_ / "a.csv");
+  fake_gnuplot("cat > /dev/null\n");
+  for (const char* output : {"made/of/folders", "there"})
+    EXPECT_EQ(tandem("report " + log_ + " -o " + output, environment()).status, 2);
+  EXPECT_EQ(all(), were);
+}
+
+TEST_F(HalfMade, OnlyDraftsOfItsNameWhoseProcessIsGoneAreRemoved) {
+  const std::string gone = "4194305";  // more than Linux gives
+  const std::vector<std::string> stay{"a.new-" + std::to_string(::getpid()) + ".csv",
+                                      "a.new-1.csv",
+                                      "a.new-0" + gone + ".csv",
+                                      "a.new-" + gone + "x.csv",
+                                      "a.new-.csv",
+                                      "a.new-" + gone + ".txt.mcap",
+                                      "b.new-" + gone + ".csv",
+                                      "aa.new-" + gone + ".csv"};
+  for (const std::string& name : stay) write_text(folder_ / name, "mine");
+  auto expected = all();
+  expected.emplace_back("a.csv");
+  std::ranges::sort(expected);
+  write_text(folder_ / ("a.new-" + gone + ".csv"), "left");
+  ASSERT_EQ(tandem("log csv " + log_ + " -o a.csv").status, 0);
+  EXPECT_EQ(all(), expected);
 }
 
 }  // namespace
