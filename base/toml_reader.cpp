@@ -4,12 +4,15 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include "base/nearest.hpp"
+#include "base/quoting.hpp"
 
 namespace tandem {
 
@@ -47,6 +50,42 @@ std::string number_text(double value) {
   std::ostringstream out;
   out << value;
   return out.str();
+}
+
+/// What two values that mean the same have in common.
+std::string value_text(const toml::node& node) {
+  if (const auto* text = node.as_string()) return quoted_text(text->get());
+  if (const auto* number = node.as_floating_point()) {
+    std::array<char, 32> out{};
+    const auto end = std::to_chars(out.data(), out.data() + out.size(), number->get());
+    return {out.data(), end.ptr};
+  }
+  std::ostringstream out;
+  if (const auto* list = node.as_array()) {
+    out << '[';
+    for (const toml::node& one : *list)
+      out << (&one == &list->front() ? "" : ", ") << value_text(one);
+    out << ']';
+  } else {
+    node.visit([&out](const auto& value) {
+      if constexpr (!toml::is_container<decltype(value)>) out << std::boolalpha << value.get();
+    });
+  }
+  return out.str();
+}
+
+void add_values(const toml::node& node, const std::string& key,
+                std::map<std::string, std::string>& values) {
+  if (const toml::table* table = node.as_table()) {
+    for (const auto& [name, value] : *table)
+      add_values(value, (key.empty() ? "" : key + ".") + std::string(name.str()), values);
+    return;
+  }
+  const toml::array* list = node.as_array();
+  const bool of_tables = list != nullptr && list->is_array_of_tables();
+  if (!of_tables) values[key] = value_text(node);
+  for (std::size_t i = 0; of_tables && i < list->size(); ++i)
+    add_values((*list)[i], key + "[" + std::to_string(i) + "]", values);
 }
 
 }  // namespace
@@ -404,6 +443,12 @@ std::vector<std::string> TomlTable::keys() const {
   std::vector<std::string> names;
   for (const auto& [key, node] : *table_) names.emplace_back(key.str());
   return names;
+}
+
+std::map<std::string, std::string> TomlTable::values() const {
+  std::map<std::string, std::string> all;
+  add_values(*table_, {}, all);
+  return all;
 }
 
 namespace {

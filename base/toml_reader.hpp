@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -75,6 +76,10 @@ class TomlTable {
   /// Every key of this table itself, sorted; marks none as read. For free-form maps (posture.home)
   /// and tables of tables ([actuator.NAME]).
   [[nodiscard]] std::vector<std::string> keys() const;
+  /// Every value of this table itself and of the tables in it, by its key from here on, "a.b[0].c":
+  /// for comparing two tables. Numbers are the shortest that reads the same, whether written as 12
+  /// or 12.0. Marks none as read.
+  [[nodiscard]] std::map<std::string, std::string> values() const;
 
   /// From now on the keys that this table lacks are those of `defaults`: a sub-table or list as a
   /// whole. What is wrong with one of them is reported there, and once.

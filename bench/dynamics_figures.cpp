@@ -1,10 +1,10 @@
 // The tables of docs/dynamics.md: operations and times of the bundled robots' kernels, and cost
 // against the number of joints for chains and binary trees, compilation included.
-//   dynamics_figures [FOLDER]    where libraries are built; default: a temporary one
 // Times mean something on an idle machine only: medians of nine batches, of random states.
 #include <fmt/core.h>
 #include <sys/resource.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -13,6 +13,7 @@
 #include <set>
 
 #include "hal/sim/setup.hpp"
+#include "model/generate.hpp"
 #include "model/kernel_build.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
@@ -168,11 +169,22 @@ Robot regular(const std::string& kind, int joints, int branches) {
   return {spec.robot, std::move(read->tree), spec};
 }
 
-std::set<fs::path> bundled() {
+/// The bundled robots. What several folders wire in other ways is one robot: the first one's.
+std::expected<std::vector<Robot>, Diagnostics> bundled() {
   std::set<fs::path> files;
   for (const auto& entry : fs::directory_iterator(TANDEM_CONFIG_FOLDER))
     if (fs::exists(entry.path() / "robot.toml")) files.insert(entry.path() / "robot.toml");
-  return files;
+  std::vector<Robot> robots;
+  std::set<std::string> known;
+  for (const fs::path& file : files) {
+    auto read = runtime::read_robot(file.string());
+    if (!read) return std::unexpected(read.error());
+    Robot robot{read->config.name, std::move(read->description.tree),
+                sim::model_spec(read->config)};
+    if (known.insert(model::description_hash(robot.tree, robot.spec)).second)
+      robots.push_back(std::move(robot));
+  }
+  return robots;
 }
 
 int fail_with(const Error& error) {
@@ -183,22 +195,17 @@ int fail_with(const Error& error) {
 int run(const fs::path& folder) {
   fs::create_directories(folder);
   ::setenv("CCACHE_DISABLE", "1", 1);  // what compiling costs without a cache
-  std::vector<Robot> robots;
-  for (const fs::path& file : bundled()) {
-    auto read = runtime::read_robot(file.string());
-    if (!read) return fail_with(read.error().front());
-    robots.push_back(
-        {read->config.name, std::move(read->description.tree), sim::model_spec(read->config)});
-  }
+  const auto robots = bundled();
+  if (!robots) return fail_with(robots.error().front());
   fmt::print(
       "| robot | joints | FD operations | [us] | ID operations | [us] | M operations | [us] |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- |\n");
-  for (const Robot& robot : robots)
+  for (const Robot& robot : *robots)
     if (const Status row = print_row(robot, folder, false); !row) return fail_with(row.error());
   fmt::print(
       "\n| robot | operations of ID's derivatives | time / FD | of FD's derivatives, time / FD |\n"
       "| --- | --- | --- | --- |\n");
-  for (const Robot& robot : robots)
+  for (const Robot& robot : *robots)
     if (const Status row = print_derivatives(robot, folder); !row) return fail_with(row.error());
   fmt::print(
       "\n| kind | joints | FD operations | [us] | ID operations | [us] | M operations | [us] "
@@ -215,6 +222,11 @@ int run(const fs::path& folder) {
 }  // namespace tandem::bench
 
 int main(int argc, char** argv) {
-  const auto otherwise = std::filesystem::temp_directory_path() / "tandem_dynamics_figures";
-  return tandem::bench::run(argc > 1 ? std::filesystem::path(argv[1]) : otherwise);
+  std::string folder = std::filesystem::temp_directory_path() / "tandem_dynamics_figures";
+  CLI::App app{
+      "The tables of docs/dynamics.md: operations and times of the bundled robots, and "
+      "what chains and trees cost"};
+  app.add_option("folder", folder, "where libraries are built")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  return tandem::bench::run(folder);
 }

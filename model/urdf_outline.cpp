@@ -11,6 +11,7 @@
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
 #include "model/urdf_xacro.hpp"
+#include "model/xml_reference.hpp"
 
 namespace tandem::model {
 namespace {
@@ -40,6 +41,12 @@ class Reader {
     }
     if (document_.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
       report_xml_error();
+      return std::move(out_);
+    }
+    if (const auto wrong = find_wrong_reference(text)) {
+      error(wrong->line, "",
+            "the character reference '" + wrong->text + "' stands for no character",
+            "write the character itself, in UTF-8");
       return std::move(out_);
     }
     const XMLElement* robot = document_.RootElement();

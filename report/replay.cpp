@@ -22,7 +22,7 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 /// What the run's experiment plays of this recording.
 struct Played {
   log::MotionRequest request;
-  double approach_s = 0.0;
+  double approach_s = 0.0, speed = 1.0;
 };
 
 std::optional<Played> played(const RunData& run, const RunData& recording) {
@@ -37,8 +37,8 @@ std::optional<Played> played(const RunData& run, const RunData& recording) {
           parameters.text_or("data_sha256", "") != recording.data_sha256) {
         continue;
       }
-      if (parameters.number_or("speed", 1.0) != 1.0) return std::nullopt;  // another motion
       Played found;
+      found.speed = parameters.number_or("speed", 1.0, {log::kReplaySlowest, log::kReplayFastest});
       const std::string source = parameters.text_or("source", "");
       if (source == "command") found.request.source = log::MotionSource::kCommand;
       if (source == "state") found.request.source = log::MotionSource::kState;
@@ -71,22 +71,22 @@ double value_at(const RunData& run, const std::vector<double>& values, double ti
   return values[row] + (values[row + 1] - values[row]) * since / step;
 }
 
-/// How far the run's references are from the motion at most when it begins `later_s` later; kNever
-/// where that is `least` or more, or where the run ends before half of it.
-double probe_distance(const RunData& run, const log::JointMotion& motion,
-                      const std::vector<std::size_t>& joints, double later_s, double least) {
+/// How far the run's references are from the motion at most; kNever where that is `least` or more,
+/// or where the run ends before half of it.
+double probe_distance(const RunData& run, const log::JointMotion& motion, const Replay& replay,
+                      double least) {
   double most = 0.0;
-  for (std::size_t k = 0; k < joints.size(); ++k) {
+  for (std::size_t k = 0; k < replay.joints.size(); ++k) {
     const log::JointTrack& track = motion.tracks[k];
     const std::size_t samples = track.time_ns.size();
     std::size_t compared = 0;
     for (std::size_t probe = 0; probe < kProbes; ++probe) {
       const std::size_t i = probe * (samples - 1) / (kProbes - 1);
-      const double time_s = static_cast<double>(track.time_ns[i]) * 1e-9 + later_s;
+      const double time_s = replay.run_time_s(static_cast<double>(track.time_ns[i]) * 1e-9);
       if (time_s > run.time_s.back()) break;  // it was ended before
       if (in_gap(run, time_s)) continue;
       const double off =
-          value_at(run, run.reference_rad[joints[k]], time_s) - track.position_rad[i];
+          value_at(run, run.reference_rad[replay.joints[k]], time_s) - track.position_rad[i];
       if (!(std::abs(off) < least)) return kNever;
       most = std::max(most, std::abs(off));
       ++compared;
@@ -107,7 +107,7 @@ Distance distance_of(const RunData& run, const std::vector<double>& mine, const 
   for (std::size_t row = 0; row < recording.rows(); ++row) {
     const double time_s = recording.time_s[row];
     if (time_s < replay.from_s - 1e-9 || time_s > replay.to_s + 1e-9) continue;
-    const double off = value_at(run, mine, time_s + replay.later_s) - theirs[row];
+    const double off = value_at(run, mine, replay.run_time_s(time_s)) - theirs[row];
     if (!std::isfinite(off)) continue;
     found.rms += off * off;
     found.max = std::max(found.max, std::abs(off));
@@ -134,23 +134,24 @@ Result<std::optional<Replay>> find_replay(const RunData& run, const RunData& rec
   }
   replay.from_s = static_cast<double>(motion->begin_ns) * 1e-9;
   replay.to_s = static_cast<double>(motion->end_ns) * 1e-9;
+  replay.speed = what->speed;
   const double period_s = static_cast<double>(run.info.period_ns) * 1e-9;
   const auto whole = [period_s](double time_s) { return std::ceil(time_s / period_s - 1e-6); };
   const double lead_s =
       (whole(what->approach_s) + std::round(log::kReplayRunUp_s / period_s)) * period_s;
   double best = kAlike_rad;
-  for (double begin_s = run.time_s.front() + lead_s; begin_s < run.time_s.back();
-       begin_s += period_s) {
-    const double later_s = begin_s - replay.from_s;
-    const double off = probe_distance(run, *motion, replay.joints, later_s, best);
+  std::optional<Replay> found;
+  for (replay.begin_s = run.time_s.front() + lead_s; replay.begin_s < run.time_s.back();
+       replay.begin_s += period_s) {
+    const double off = probe_distance(run, *motion, replay, best);
     if (off < best) {
       best = off;
-      replay.later_s = later_s;
+      found = replay;
     } else if (best < kSame_rad) {
       break;
     }
   }
-  return best < kAlike_rad ? std::optional(replay) : std::nullopt;
+  return found;
 }
 
 PageTable replay_table(const RunData& run, const RunData& recording, const Replay& replay) {

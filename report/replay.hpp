@@ -13,12 +13,18 @@ namespace tandem::report {
 /// A run of `recorded_motion` (docs/controllers.md).
 struct Replay {
   std::vector<std::size_t> joints;  ///< that it leads, in the image's order
-  double later_s = 0.0;             ///< time of the run minus time of the recording
+  double begin_s = 0.0;             ///< when the motion begins, of the run's time
+  double speed = 1.0;               ///< times as fast as recorded
   double from_s = 0.0, to_s = 0.0;  ///< what is played, of the recording's time
+
+  /// The run's time of a place of the recording.
+  [[nodiscard]] double run_time_s(double recorded_s) const {
+    return begin_s + (recorded_s - from_s) / speed;
+  }
 };
 
-/// Empty: `run` does not play `recording`, by the data_sha256 that its experiment names; it plays
-/// it at another speed; or its references are not the recording's anywhere. They are looked for
+/// Empty: `run` does not play `recording`, by the data_sha256 that its experiment names; or its
+/// references are not the recording's anywhere, at the experiment's speed. They are looked for
 /// where approach_s puts them, and then in every later cycle: a run-up may be longer, and commands
 /// delayed. Errors: as log::read_joint_motion().
 [[nodiscard]] Result<std::optional<Replay>> find_replay(const RunData& run,

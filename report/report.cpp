@@ -182,7 +182,9 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
     page.lead += fmt::format(",{} is {}", kSides[i + 1], others[i]->path);
   page.lead += ".";
   for (std::size_t i = 0; i < others.size(); ++i) {
-    const double later_s = others[i]->drawn_later_s;
+    const double later_s = others[i]->drawn_later_s, slower = others[i]->drawn_slower;
+    if (slower != 1.0)
+      page.lead += fmt::format(" The times of{} are multiplied by {:.4g}.", kSides[i + 1], slower);
     if (std::abs(later_s) > 0.0) {
       page.lead += fmt::format("{} is drawn {:.3f} s {}, so that {}.", kSides[i + 1],
                                std::abs(later_s), later_s > 0.0 ? "later" : "earlier",
@@ -206,7 +208,9 @@ Status align(const RunData& run, RunData& other, const std::string& side,
     const auto replay = find_replay(playing, played);
     if (!replay) return std::unexpected(replay.error());
     if (!*replay) continue;
-    other.drawn_later_s = forth ? -(*replay)->later_s : (*replay)->later_s;
+    other.drawn_slower = forth ? (*replay)->speed : 1.0 / (*replay)->speed;
+    other.drawn_later_s = forth ? (*replay)->from_s - other.drawn_slower * (*replay)->begin_s
+                                : (*replay)->begin_s - other.drawn_slower * (*replay)->from_s;
     other.drawn_as_replay = true;
     tables.push_back(replay_table(playing, played, **replay));
     tables.back().title += side;

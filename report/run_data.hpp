@@ -66,7 +66,8 @@ struct RunData {
   bool controllers_ran = true;   ///< false: the rows are those in which they were waited for
   double step_s = 0.0;           ///< between rows, where none is missing
   std::vector<double> time_s;    ///< of each row; the first is the controllers' first cycle
-  double drawn_later_s = 0.0;    ///< added to all times of this run in the figures
+  double drawn_later_s = 0.0;    ///< added to all times of this run in the figures,
+  double drawn_slower = 1.0;     ///< after they were multiplied by this
   bool drawn_as_replay = false;  ///< so that a replay lies over its recording
   std::vector<RunFault> faults;  ///< in the order of their times
   Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
@@ -83,6 +84,8 @@ struct RunData {
   Columns passive_rad;      ///< [passive joint][row]; empty: unknown (close_passive.hpp)
 
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
+  /// Where a time of this run is in the figures.
+  [[nodiscard]] double drawn(double at_s) const { return drawn_slower * at_s + drawn_later_s; }
   /// The fault that stopped the run; null: none did.
   [[nodiscard]] const RunFault* stop() const;
   /// Rows until stop(), its cycle included; the others show what followed. At least 1.

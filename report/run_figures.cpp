@@ -73,7 +73,7 @@ Curve curve_of(const RunData& run, std::string label, CurveStyle style,
                const std::vector<double>& values, double factor) {
   Curve curve{std::move(label), style, run.time_s, values};
   for (double& value : curve.y) value *= factor;
-  for (double& time_s : curve.x) time_s += run.drawn_later_s;
+  for (double& time_s : curve.x) time_s = run.drawn(time_s);
   return curve;
 }
 
@@ -98,10 +98,10 @@ void add_time(const RunData& run, const OtherRuns& others, Figure& figure) {
     for (std::size_t f = 0; f < std::min(kFaultsShown, one.faults.size()); ++f) {
       const RunFault& fault = one.faults[f];
       if (fault.stops || (stop != nullptr && fault.time_s > stop->time_s)) continue;
-      figure.marks.push_back({std::exchange(reported, ""), fault.time_s + one.drawn_later_s});
+      figure.marks.push_back({std::exchange(reported, ""), one.drawn(fault.time_s)});
     }
     if (stop == nullptr) continue;
-    const double stop_s = stop->time_s + one.drawn_later_s;
+    const double stop_s = one.drawn(stop->time_s);
     figure.marks.push_back({"fault" + side_of(i, others), stop_s});
     figure.range_until_x = std::min(figure.range_until_x, stop_s - kSpike_s);
   }
@@ -297,8 +297,8 @@ std::vector<PostureSample> moments(const RunData& run, int joint, const std::str
   const std::size_t last = depth.size() - 1;
   std::vector<PostureSample> samples;
   const auto add = [&](const char* what, std::size_t row) {
-    samples.push_back({what + suffix, run.time_s[row] + run.drawn_later_s, run.base_placement(row),
-                       run.positions(row)});
+    samples.push_back(
+        {what + suffix, run.drawn(run.time_s[row]), run.base_placement(row), run.positions(row)});
   };
   const double start = depth.front();
   const auto far = std::ranges::max_element(

@@ -1,7 +1,8 @@
-// Signal handlers that only set atomic flags. SIGINT, SIGTERM and SIGHUP keep their default action
-// for the second time, so that a run that hangs can still be ended.
+// Signal handlers that only set atomic flags. SIGINT, SIGTERM and SIGHUP get their former action
+// back for the second time, so that a run that hangs can still be ended.
 #include "rt/stop_signal.hpp"
 
+#include <array>
 #include <atomic>
 #include <csignal>
 
@@ -15,21 +16,43 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 std::atomic<bool> emergency_flag{false};
 
 extern "C" void on_emergency_signal(int) { emergency_flag.store(true, std::memory_order_relaxed); }
-extern "C" void on_stop_signal(int) { stop_flag.store(true, std::memory_order_relaxed); }
+
+struct Taken {
+  int signal;
+  struct sigaction former;
+};
+std::array<Taken, 3> taken{{{SIGINT, {}}, {SIGTERM, {}}, {SIGHUP, {}}}};
+
+extern "C" void on_stop_signal(int signal) {
+  stop_flag.store(true, std::memory_order_relaxed);
+  for (const Taken& one : taken)
+    if (one.signal == signal) ::sigaction(signal, &one.former, nullptr);
+}
 
 }  // namespace
 
 void install_stop_signals() {
   struct sigaction action {};
   action.sa_handler = on_stop_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second signal acts as usual
   sigemptyset(&action.sa_mask);
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
-  // The terminal has gone; under nohup it is to be ignored.
-  struct sigaction former {};
-  ::sigaction(SIGHUP, nullptr, &former);
-  if (former.sa_handler != SIG_IGN) ::sigaction(SIGHUP, &action, nullptr);
+  for (Taken& one : taken) {
+    struct sigaction now {};
+    ::sigaction(one.signal, nullptr, &now);
+    if (now.sa_handler == on_stop_signal) continue;
+    const bool ignored = now.sa_handler == SIG_IGN;
+    if (ignored && one.signal == SIGHUP) continue;  // the terminal has gone, under nohup
+    one.former = now;
+    if (ignored) one.former.sa_handler = SIG_DFL;  // it could not be ended
+    ::sigaction(one.signal, &action, nullptr);
+  }
+}
+
+void remove_stop_signals() {
+  for (const Taken& one : taken) {
+    struct sigaction now {};
+    ::sigaction(one.signal, nullptr, &now);
+    if (now.sa_handler == on_stop_signal) ::sigaction(one.signal, &one.former, nullptr);
+  }
 }
 
 void install_emergency_signal() {

@@ -7,9 +7,13 @@
 namespace tandem::rt {
 
 /// From now on the first SIGINT, SIGTERM or SIGHUP (unless that is ignored, as under nohup) sets
-/// the stop flag; a second one ends the process the usual way, so that a hung program can still be
-/// ended.
+/// the stop flag; a second one does what the first would have done before, so that a hung program
+/// can still be ended.
 void install_stop_signals();
+
+/// From now on the first of them does again what it would have done before: for what comes after
+/// the loop, and looks at no flag.
+void remove_stop_signals();
 
 /// True once a stop was requested, by a signal or by request_stop().
 [[nodiscard]] bool stop_requested() noexcept TANDEM_RT;

@@ -63,11 +63,16 @@ void RunStatistics::take_estimate(const hal::EstimateImage& estimate,
     external_Nm_[j] = std::max(external_Nm_[j], std::abs(estimate.external_torque_Nm()[j]));
   }
   const std::int64_t now_ns = estimate.time_ns()[0];
-  const auto norm = [](const double* v) { return std::hypot(v[0], v[1], v[2]); };
+  const auto take_wrench = [now_ns](WrenchFigures& to, const double* force, const double* moment) {
+    to.force_N.take(std::hypot(force[0], force[1], force[2]), now_ns);
+    to.moment_Nm.take(std::hypot(moment[0], moment[1], moment[2]), now_ns);
+  };
   for (std::size_t i = 0; i < wrenches_.size(); ++i) {
-    wrenches_[i].force_N.take(norm(&estimate.external_force_N()[3 * i]), now_ns);
-    wrenches_[i].moment_Nm.take(norm(&estimate.external_moment_Nm()[3 * i]), now_ns);
+    take_wrench(wrenches_[i], &estimate.external_force_N()[3 * i],
+                &estimate.external_moment_Nm()[3 * i]);
   }
+  if (const auto on_base = estimate.external_base_wrench(); !on_base.empty())
+    take_wrench(base_wrench_, on_base.data(), on_base.data() + 3);
   if (!wrenches_.empty()) unexplained_Nm_.take(estimate.unexplained_torque_Nm()[0], now_ns);
   if (!estimate.has_base()) return;
   ++base_cycles_;
@@ -130,14 +135,14 @@ std::optional<BaseFigures> RunStatistics::base() const {
 }
 
 EstimateFigures RunStatistics::estimate() const {
-  return {base_cycles_, compared_, tilt_error_rad_, height_error_m_,
-          external_Nm_, wrenches_, unexplained_Nm_};
+  return {base_cycles_, compared_,    tilt_error_rad_, height_error_m_,
+          external_Nm_, base_wrench_, wrenches_,       unexplained_Nm_};
 }
 
 void RunStatistics::archive(Archive& ar) {
   ar(errors_, limited_, cycles_, feet_, loops_, base_cycles_, compared_, tilt_error_rad_,
-     height_error_m_, external_Nm_, wrenches_, unexplained_Nm_, free_cycles_, force_sum_N_, slip_m_,
-     min_height_m_, max_height_m_, tilt_rad_);
+     height_error_m_, external_Nm_, base_wrench_, wrenches_, unexplained_Nm_, free_cycles_,
+     force_sum_N_, slip_m_, min_height_m_, max_height_m_, tilt_rad_);
 }
 
 }  // namespace tandem::runtime

@@ -45,7 +45,7 @@ struct Peak {
   }
 };
 
-/// Of the wrench at one [[estimation.wrench]]: norms of force and moment.
+/// Of the wrench at one [[estimation.wrench]], or on the base: norms of force and moment.
 struct WrenchFigures {
   Peak force_N, moment_Nm;
 };
@@ -59,6 +59,7 @@ struct EstimateFigures {
   double max_tilt_error_rad = 0.0;
   double max_height_error_m = 0.0;
   std::vector<double> max_external_Nm;  ///< of each joint, absolute; empty without an observer
+  WrenchFigures base_wrench;            ///< external, about the base's origin; 0 on a fixed base
   std::vector<WrenchFigures> wrenches;  ///< of each declared place, in their order
   Peak unexplained_Nm;                  ///< of external torques that these wrenches do not explain
 };
@@ -122,6 +123,7 @@ class RunStatistics {
   std::uint64_t base_cycles_ = 0, compared_ = 0;  // of the estimate
   double tilt_error_rad_ = 0.0, height_error_m_ = 0.0;
   std::vector<double> external_Nm_;  // of each joint: the largest
+  WrenchFigures base_wrench_;
   std::vector<WrenchFigures> wrenches_;
   Peak unexplained_Nm_;
   std::uint64_t free_cycles_ = 0;

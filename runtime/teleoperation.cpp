@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/quoting.hpp"
+
 namespace tandem::runtime {
 namespace {
 
@@ -67,6 +69,15 @@ std::uint64_t playout_cycles(const Teleoperation& t, std::int64_t period_ns) {
   const double down_s = t.link.down.delay_s + kPlayoutJitters * t.link.down.jitter_s;
   const std::int64_t all_ns = t.link.playout_ns + ns(down_s);
   return static_cast<std::uint64_t>((all_ns + period_ns - 1) / period_ns);
+}
+
+std::map<std::string, std::string> robot_controller_values(const Teleoperation& t) {
+  std::map<std::string, std::string> all;
+  for (const ControllerSpec& one : t.robot_controllers) {
+    all[one.name] = quoted_text(std::filesystem::path(one.plugin).stem().string());
+    for (const auto& [key, value] : one.parameters.values()) all[one.name + "." + key] = value;
+  }
+  return all;
 }
 
 std::optional<Teleoperation> read_teleoperation(TomlTable& root) {

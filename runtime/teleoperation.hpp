@@ -2,7 +2,9 @@
 // Layer: runtime.  Thread: non-RT only.
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/toml_reader.hpp"
@@ -22,6 +24,9 @@ struct Teleoperation {
 /// The cycles of the robot from what an operator saw to the effect of what it commanded then: down,
 /// and play-out.
 [[nodiscard]] std::uint64_t playout_cycles(const Teleoperation& t, std::int64_t period_ns);
+
+/// The robot controllers and their parameters, as remote::RobotEnd has them: by name, and by key.
+[[nodiscard]] std::map<std::string, std::string> robot_controller_values(const Teleoperation& t);
 
 /// Reads it, strictly; empty when the experiment has no such table.
 [[nodiscard]] std::optional<Teleoperation> read_teleoperation(TomlTable& root);

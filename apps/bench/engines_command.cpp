@@ -9,6 +9,7 @@
 #include "apps/bench/commands.hpp"
 #include "apps/bench/engine_page.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "report/gnuplot.hpp"
 
 namespace tandem::apps {
@@ -154,15 +155,16 @@ constexpr Scene kScenes[] = {{"accelerations", accelerations},
                              {"stand", stand},
                              {"squat", squat}};
 
-Status write_page(const EnginePage& page, const fs::path& output) {
-  const fs::path figures = output / "engines";
-  std::error_code problem;
-  fs::create_directories(figures, problem);
-  if (problem) return fail("the folder cannot be made: " + problem.message(), figures.string());
+/// @param folder  that is there
+Status write_page(const EnginePage& page, const fs::path& folder) {
   if (!page.figures().empty()) {
+    const fs::path figures = folder / "engines";
+    std::error_code problem;
+    fs::create_directory(figures, problem);
+    if (problem) return fail("the folder cannot be made: " + problem.message(), figures.string());
     if (Status drawn = report::draw(page.figures(), figures.string()); !drawn) return drawn;
   }
-  return write_file(output / "engines.md", page.text("engines"));
+  return write_file(folder / "engines.md", page.text("engines"));
 }
 
 /// Without Markdown's marks.
@@ -171,31 +173,38 @@ std::string plain(std::string text) {
   return text;
 }
 
-Status compare(const BenchOptions& options) {
+/// Measures, prints, and puts the page in place.
+Result<Json> compare(const BenchOptions& options) {
   const auto entries = engine_entries(options.engines);
   if (!entries) return std::unexpected(entries.error());
+  Result<Draft> draft = Draft::folder(options.output);
+  if (!draft) return std::unexpected(draft.error());
   EnginePage page(*entries);
   std::FILE* out = human_output(options.json);
   for (const Scene& scene : kScenes) {
     if (!options.scenes.empty() && std::ranges::count(options.scenes, scene.name) == 0) continue;
     const std::size_t before = page.verdicts().size();
     if (!options.quiet) fmt::print(stderr, "{} …\n", scene.name);
-    if (Status done = scene.run(*entries, page); !done) return done;
+    if (Status done = scene.run(*entries, page); !done) return std::unexpected(done.error());
     for (std::size_t i = before; i < page.verdicts().size() && !options.quiet; ++i)
       fmt::print(out, "  {}\n", plain(page.verdicts()[i]));
     std::fflush(out);
   }
-  if (Status written = write_page(page, options.output); !written) return written;
+  if (Status written = write_page(page, draft->path()); !written)
+    return std::unexpected(draft->placed(written.error()));
+  if (Status placed = draft->place(); !placed) return std::unexpected(placed.error());
   if (!options.quiet) fmt::print(out, "  page  {}/engines.md\n", options.output);
   Json results;
   results["results"] = page.json();
-  return write_json(options.json, results);
+  return results;
 }
 
 }  // namespace
 
 Exit bench_command(const BenchOptions& options) {
-  if (const Status done = compare(options); !done) return refuse(done.error());
+  const Result<Json> results = compare(options);
+  if (!results) return refuse(results.error());
+  if (const Status s = write_json(options.json, *results); !s) return refuse(s.error());
   return Exit::kDone;
 }
 

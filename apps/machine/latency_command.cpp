@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <thread>
 
 #include "apps/machine/child_process.hpp"
@@ -14,6 +13,7 @@
 #include "apps/machine/latency_measure.hpp"
 #include "apps/machine/latency_report.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "base/process.hpp"
 #include "rt/cpu_latency.hpp"
 #include "rt/stop_signal.hpp"
@@ -67,7 +67,8 @@ Status choose_cpus(const LatencyOptions& options, LatencyPlan& plan) {
   return {};
 }
 
-Result<LatencyPlan> plan_of(const LatencyOptions& options) {
+/// @param folder  to write to
+Result<LatencyPlan> plan_of(const LatencyOptions& options, const std::string& folder) {
   LatencyPlan plan;
   plan.period_us = options.period_us;
   plan.duration_s = options.duration_s;
@@ -87,7 +88,7 @@ Result<LatencyPlan> plan_of(const LatencyOptions& options) {
     }
   }
   plan.cyclictest = cyclictest_runs();
-  plan.folder = options.output;
+  plan.folder = folder;
   return plan;
 }
 
@@ -144,39 +145,28 @@ Result<std::vector<LatencySample>> measure(const LatencyPlan& plan,
   return samples;
 }
 
-Status make_folder(const std::string& folder) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (!problem) return {};
-  return std::unexpected(Error{.message = "cannot create the folder: " + problem.message(),
-                               .hint = "name one that can be written with -o",
-                               .file = folder,
-                               .key = {}});
-}
-
-void draw(const LatencyPlan& plan, std::span<const LatencySample> samples, std::FILE* out,
-          bool quiet) {
-  const auto files = draw_latency(plan, samples, plan.folder);
-  if (!files) {
-    note("no plots: " + files.error().to_string());
+/// Draws into the draft and puts it in place; without drawings nothing is put there.
+void draw(const LatencyPlan& plan, std::span<const LatencySample> samples, Draft& draft,
+          std::FILE* out, bool quiet) {
+  const auto files = draw_latency(plan, samples, draft.path());
+  const Status placed = files ? draft.place() : std::unexpected(draft.placed(files.error()));
+  if (!placed) {
+    note("no plots: " + placed.error().to_string());
     return;
   }
   if (quiet) return;
   Facts facts;
-  facts.add("report", files->page);
-  facts.add("plots", files->images.back());
+  facts.add("report", draft.placed(files->page));
+  facts.add("plots", draft.placed(files->images.back()));
   facts.print(out);
 }
 
-}  // namespace
-
-Exit latency_command(const LatencyOptions& options) {
-  if (const Status s = check_writable(options.json); !s) return refuse(s.error());
-  if (const Status s = make_folder(options.output); !s) return refuse(s.error());
-  const auto plan = plan_of(options);
-  if (!plan) return refuse(plan.error());
+/// Measures and prints. @param draft  of the folder of options.output
+Result<Json> measure_and_draw(const LatencyOptions& options, Draft& draft) {
+  const auto plan = plan_of(options, draft.path());
+  if (!plan) return std::unexpected(plan.error());
   const auto loads = loads_of(options);
-  if (!loads) return refuse(loads.error());
+  if (!loads) return std::unexpected(loads.error());
 
   std::FILE* out = human_output(options.json);
   if (!options.quiet) {
@@ -185,17 +175,32 @@ Exit latency_command(const LatencyOptions& options) {
                to_string(plan->mode));
   }
   rt::install_stop_signals();
-  const rt::NoCpuSleep awake;  // as cyclictest does, so that both have it in every mode
-  const auto samples = measure(*plan, *loads, out, options.quiet);
-  if (!samples) return refuse(samples.error());
+  const auto samples = [&] {
+    const rt::NoCpuSleep awake;  // as cyclictest does, so that both have it in every mode
+    return measure(*plan, *loads, out, options.quiet);
+  }();
+  rt::remove_stop_signals();  // drawing looks at no flag
+  if (!samples) return std::unexpected(draft.placed(samples.error()));
   if (!options.quiet) {
     fmt::print(out, "\n");
     print_latency(*plan, *samples, out);
   }
-  draw(*plan, *samples, out, options.quiet);
-  if (const Status s = write_json(options.json, latency_json(*plan, *samples)); !s) {
-    return refuse(s.error());
+  draw(*plan, *samples, draft, out, options.quiet);
+  return latency_json(*plan, *samples);
+}
+
+}  // namespace
+
+Exit latency_command(const LatencyOptions& options) {
+  if (const Status s = check_writable(options.json); !s) return refuse(s.error());
+  Result<Json> measured;
+  {
+    Result<Draft> draft = Draft::folder(options.output);
+    if (!draft) return refuse(draft.error());
+    measured = measure_and_draw(options, *draft);
   }
+  if (!measured) return refuse(measured.error());
+  if (const Status s = write_json(options.json, *measured); !s) return refuse(s.error());
   return Exit::kDone;
 }
 

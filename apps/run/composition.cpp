@@ -450,6 +450,11 @@ Diagnostics connect_remote(Composition& c) {
   c.participant = std::move(*participant);
   const hal::Robot robot = hal::robot_of(e.robot);
   const bool own_pace = e.teleoperation && !e.hal.lockstep;
+  remote::RobotEnd robot_end;  // in lockstep it is in this process
+  if (own_pace) {
+    robot_end = {.playout_cycles = runtime::playout_cycles(*e.teleoperation, e.loop.period_ns) + 1,
+                 .controllers = runtime::robot_controller_values(*e.teleoperation)};
+  }
   auto backend = remote::RemoteBackend::connect(
       *c.participant, robot,
       remote::identity_of(robot, c.kernels->description_hash, e.loop.period_ns),
@@ -457,8 +462,7 @@ Diagnostics connect_remote(Composition& c) {
                            std::filesystem::path(e.file).filename().string(), ::getpid()),
        .lockstep = e.hal.lockstep,
        .own_pace = own_pace,
-       .playout_cycles =
-           own_pace ? runtime::playout_cycles(*e.teleoperation, e.loop.period_ns) + 1 : 0,
+       .robot_end = robot_end,
        .before_asking = [&c] { have_admitted(*c.participant); },
        .interrupted = [] { return rt::stop_requested(); },
        .error_text = [](std::uint32_t code) { return hal::can::DriveMaster::error_text(code); }});

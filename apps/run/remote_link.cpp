@@ -61,6 +61,9 @@ Result<std::unique_ptr<remote::Server>> open_server(const Composition& c, DdsRun
        .lockstep_timeout_s = e.remote.lockstep_timeout_s,
        .on_lost = e.remote.on_lost,
        .playout = playout,
+       .robot_controllers = c.robot_side == nullptr
+                                ? std::map<std::string, std::string>{}
+                                : runtime::robot_controller_values(*e.teleoperation),
        .admits = [&admission](const remote::Sender& who) { return admission.admits(who); }});
 }
 

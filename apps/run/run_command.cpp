@@ -19,6 +19,7 @@
 #include "apps/run/run_log.hpp"
 #include "apps/run/run_summary.hpp"
 #include "apps/text/console.hpp"
+#include "apps/text/draft.hpp"
 #include "apps/tools/draw_report.hpp"
 #include "apps/transport/control_socket.hpp"
 #include "apps/transport/dds_admission.hpp"
@@ -127,10 +128,12 @@ Status check_pace(const Composition& c, const RunOptions& options) {
               "leave --rate out, or add --lockstep for emulated boards");
 }
 
-/// Draws the report and prints where it is; a report that cannot be drawn is no fault of the run.
-void add_report(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
-  if (!options.report || !summary.log) return;
-  const auto files = draw_report(summary.log->path, {}, {});
+/// Draws the report of `log` and prints where it is; one that cannot be drawn is no fault of the
+/// run. A signal ends it, and with it the program: there is nothing else to do.
+void add_report(const RunOptions& options, const std::string& log) {
+  if (!options.report || log.empty()) return;
+  rt::remove_stop_signals();
+  const auto files = draw_report(log, {}, {});
   if (!files) {
     print_errors({files.error()});
     return;
@@ -140,16 +143,18 @@ void add_report(const RunOptions& options, const RunSummary& summary, std::FILE*
   Facts facts;
   facts.add("report", files->page);
   facts.add("plots", files->images.back());
-  facts.print(out);
+  facts.print(human_output(options.json));
 }
 
 /// Writes what --trace asks for, and says how much of the run it is.
 Status add_trace(const RunOptions& options, const RunSummary& summary, std::FILE* out) {
   if (options.trace.empty()) return {};
   const runtime::RobotCycle& cycle = summary.cycle;
+  Draft draft = Draft::file(options.trace);
   const Status written = runtime::write_trace(
-      options.trace, summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
-  if (!written || options.quiet) return written;
+      draft.path(), summary.composition.experiment.robot.name, cycle.trace(), cycle.faults());
+  if (!written) return std::unexpected(draft.placed(written.error()));
+  if (const Status placed = draft.place(); !placed || options.quiet) return placed;
   const std::uint64_t all = cycle.trace().count();
   Facts facts;
   facts.add(
@@ -191,6 +196,9 @@ class Session {
     if (!times) return refuse(times.error());
     return finish(*times);
   }
+
+  /// The log's path, once it is closed; empty: there is none.
+  [[nodiscard]] const std::string& log() const { return log_; }
 
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
@@ -338,6 +346,7 @@ class Session {
     if (services_ != nullptr) summary.dds->services = services_->counts();
     if (recorder_ != nullptr) {
       summary.log = recorder_->close(result_of(c_.master));
+      log_ = summary.log->path;
     }
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     summary.faults = fault_texts(*cycle_, summary.log);
@@ -349,7 +358,6 @@ class Session {
       fmt::print(stderr, "warning: {}\n", warning);
     }
     for (const std::string& fault : summary.faults) fmt::print(stderr, "fault: {}\n", fault);
-    add_report(options_, summary, out_);
     if (const Status traced = add_trace(options_, summary, out_); !traced)
       return refuse(traced.error());
     if (const Status written = write_json(options_.json, summary.json()); !written)
@@ -363,6 +371,7 @@ class Session {
   const hal::TruthImage* truth_ = nullptr;
   std::unique_ptr<DdsRun> dds_;
   std::unique_ptr<log::Recorder> recorder_;
+  std::string log_;
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
   rt::WallClock clock_;
@@ -421,7 +430,15 @@ Exit run_command(const RunOptions& options) {
     return refuse(errors);
   print_warnings((*composition)->warnings);
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
-  return Session(**composition, options).run();
+  Exit exit = Exit::kDone;
+  std::string log;
+  {
+    Session session(**composition, options);
+    exit = session.run();
+    log = session.log();
+  }
+  add_report(options, log);
+  return exit;
 }
 
 Exit serve_command(const ServeOptions& options) {

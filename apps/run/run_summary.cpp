@@ -68,12 +68,30 @@ Json base_json(const std::optional<runtime::BaseFigures>& base) {
 
 double seconds(const runtime::Peak& peak) { return static_cast<double>(peak.time_ns) * 1e-9; }
 
+Json wrench_json(const runtime::WrenchFigures& one) {
+  return {{"max_force_N", one.force_N.value},
+          {"max_force_s", seconds(one.force_N)},
+          {"max_moment_Nm", one.moment_Nm.value},
+          {"max_moment_s", seconds(one.moment_Nm)}};
+}
+
+std::string wrench_text(const runtime::WrenchFigures& one) {
+  return fmt::format("{:.1f} N at most at {:.3f} s, {:.2f} Nm at {:.3f} s", one.force_N.value,
+                     seconds(one.force_N), one.moment_Nm.value, seconds(one.moment_Nm));
+}
+
+/// Whether what touches the base was estimated: on a floating base, once its estimate had started.
+bool has_base_wrench(const hal::EstimateImage& image, const runtime::EstimateFigures& figures) {
+  return !image.external_base_wrench().empty() && figures.base_cycles > 0;
+}
+
 /// What was estimated; null without [estimation].
 Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures) {
   if (c.estimator == nullptr) return nullptr;
   const hal::EstimateImage& image = c.estimator->image();
   Json json{{"base", nullptr},
             {"external_torque_Nm", nullptr},
+            {"external_base_wrench", nullptr},
             {"wrenches", Json::object()},
             {"unexplained_torque_Nm", nullptr}};
   if (image.estimates_base()) {
@@ -88,13 +106,10 @@ Json estimate_json(const Composition& c, const runtime::EstimateFigures& figures
   for (std::size_t j = 0; j < image.joints(); ++j) {
     json["external_torque_Nm"][c.experiment.robot.joints[j].name] = figures.max_external_Nm[j];
   }
+  if (has_base_wrench(image, figures))
+    json["external_base_wrench"] = wrench_json(figures.base_wrench);
   for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
-    const runtime::WrenchFigures& one = figures.wrenches[i];
-    json["wrenches"][c.experiment.estimation.wrenches[i].site] = {
-        {"max_force_N", one.force_N.value},
-        {"max_force_s", seconds(one.force_N)},
-        {"max_moment_Nm", one.moment_Nm.value},
-        {"max_moment_s", seconds(one.moment_Nm)}};
+    json["wrenches"][c.experiment.estimation.wrenches[i].site] = wrench_json(figures.wrenches[i]);
   }
   if (!figures.wrenches.empty()) json["unexplained_torque_Nm"] = figures.unexplained_Nm.value;
   return json;
@@ -211,11 +226,11 @@ void add_estimate_facts(const RunSummary& summary, Facts& facts) {
   const hal::JointConfig& joint = c.experiment.robot.joints[j];
   facts.add("external torque",
             fmt::format("{:.2f} {} at most ({})", *most, joint.slides ? "N" : "Nm", joint.name));
+  if (has_base_wrench(image, figures))
+    facts.add("external wrench on base", wrench_text(figures.base_wrench));
   for (std::size_t i = 0; i < figures.wrenches.size(); ++i) {
-    const runtime::WrenchFigures& one = figures.wrenches[i];
     facts.add("wrench at " + c.experiment.estimation.wrenches[i].site,
-              fmt::format("{:.1f} N at most at {:.3f} s, {:.2f} Nm at {:.3f} s", one.force_N.value,
-                          seconds(one.force_N), one.moment_Nm.value, seconds(one.moment_Nm)));
+              wrench_text(figures.wrenches[i]));
   }
   if (!figures.wrenches.empty())
     facts.add("not explained by them",

@@ -9,9 +9,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <climits>
 #include <csignal>
 #include <cstddef>
+#include <cstring>
+#include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,7 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP};
-char drafted[PATH_MAX];  // for the handler; empty: nothing
+char drafted[PATH_MAX];        // for the handler; empty: nothing
+char farewell[PATH_MAX + 64];  // what it says then
 
 /// Removes a file, or a folder with all in it. Safe in a signal handler.
 void remove_entry(int folder, const char* name) {
@@ -45,13 +50,23 @@ void remove_entry(int folder, const char* name) {
 }
 
 void on_end(int signal) {
-  if (drafted[0] != 0) remove_entry(AT_FDCWD, drafted);
+  if (drafted[0] != 0) {
+    remove_entry(AT_FDCWD, drafted);
+    (void)!::write(STDERR_FILENO, farewell, std::strlen(farewell));
+  }
   std::signal(signal, SIG_DFL);
   std::raise(signal);
 }
 
+void copy_text(const std::string& text, std::span<char> out) {
+  const std::size_t size = text.size() < out.size() ? text.size() : 0;
+  std::copy_n(text.data(), size, out.data());
+  out[size] = 0;
+}
+
 /// From now on what stands in `path` does not outlive the process. Empty: no more.
-void remember(const std::string& path) {
+/// @param final  that it is to become
+void remember(const std::string& path, const std::string& final = {}) {
   const bool fits = path.size() < sizeof drafted;
   for (const int signal : kEnds) {
     using Action = struct sigaction;
@@ -65,12 +80,40 @@ void remember(const std::string& path) {
     drafted[0] = 0;
     ::sigaction(signal, &next, nullptr);
   }
-  const std::size_t size = fits ? path.size() : 0;
-  std::copy_n(path.data(), size, drafted);
-  drafted[size] = 0;
+  copy_text("\ninterrupted: nothing was written to " + final + "\n", farewell);
+  copy_text(path, drafted);
 }
 
-std::string suffix() { return ".new-" + std::to_string(::getpid()); }
+constexpr std::string_view kMark = ".new-";
+std::string suffix() { return std::string(kMark) + std::to_string(::getpid()); }
+
+/// A process other than this one. One of another user is there, too.
+bool is_alive(pid_t process) {
+  return process != ::getpid() && (::kill(process, 0) == 0 || errno == EPERM);
+}
+
+/// Removes drafts of the same name whose process is gone: of an earlier one with our number, too.
+void remove_left(const fs::path& draft) {
+  const std::string name = draft.filename().string();
+  const std::size_t at = name.rfind(suffix());
+  const std::string begin = name.substr(0, at) + std::string(kMark);
+  const std::string end = name.substr(at + suffix().size());
+  std::error_code ignored;
+  const fs::path folder = draft.has_parent_path() ? draft.parent_path() : ".";
+  std::vector<fs::path> left;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string one = entry.path().filename().string();
+    if (one.size() <= begin.size() + end.size() || !one.starts_with(begin) || !one.ends_with(end))
+      continue;
+    const char* const last = one.data() + one.size() - end.size();
+    pid_t process = 0;
+    const auto read = std::from_chars(one.data() + begin.size(), last, process);
+    const bool ours = read.ec == std::errc{} && read.ptr == last && process > 0 &&
+                      one == begin + std::to_string(process) + end;
+    if (ours && !is_alive(process)) left.push_back(entry.path());
+  }
+  for (const fs::path& one : left) fs::remove_all(one, ignored);
+}
 
 std::unexpected<Error> problem_of(std::string what, const std::error_code& problem,
                                   const std::string& file) {
@@ -85,7 +128,7 @@ std::unexpected<Error> problem_of(std::string what, const std::error_code& probl
 
 Draft::Draft(std::string final, fs::path root, std::string path)
     : final_(std::move(final)), root_(std::move(root)), path_(std::move(path)) {
-  remember(root_.string());
+  remember(root_.string(), final_);
 }
 
 Draft::Draft(Draft&& other) noexcept
@@ -113,6 +156,7 @@ Result<Draft> Draft::folder(const std::string& final) {
         Error{"this is a file, and a folder is needed", "name another folder", final, 0, {}});
   }
   fs::path root = whole / suffix(), path = root;
+  remove_left(whole.string() + suffix());  // made when the folder was not there
   if (!fs::exists(whole, problem)) {
     fs::path first = whole;  // of what is missing
     while (first.has_relative_path() && !fs::exists(first.parent_path(), problem))
@@ -121,6 +165,7 @@ Result<Draft> Draft::folder(const std::string& final) {
     path = (root / whole.lexically_relative(first)).lexically_normal();
     if (!path.has_filename()) path = path.parent_path();
   }
+  remove_left(root);
   Draft draft(final, root, path.string());
   fs::create_directories(path, problem);
   if (problem) return problem_of("the folder cannot be made", problem, final);
@@ -136,16 +181,18 @@ Draft Draft::file(const std::string& final) {
   if (fs::exists(there) && !beside) return {final, {}, final};  // as /dev/null
   fs::path draft = place.parent_path() / place.stem();
   draft += suffix() + place.extension().string();
+  remove_left(draft);
   return {final, draft, draft.string()};
 }
 
-std::string Draft::placed(const std::string& file) const {
-  if (!file.starts_with(path_)) return file;
-  return final_ + file.substr(path_.size());
+std::string Draft::placed(std::string text) const {
+  for (std::size_t at = 0; (at = text.find(path_, at)) != std::string::npos; at += final_.size())
+    text.replace(at, path_.size(), final_);
+  return text;
 }
 
 Error Draft::placed(Error error) const {
-  error.file = placed(error.file);
+  for (std::string* text : {&error.file, &error.message, &error.hint}) *text = placed(*text);
   return error;
 }
 

@@ -10,9 +10,11 @@
 
 namespace tandem::apps {
 
-/// A folder or file that is made under another name and moved to its place when it is whole. What
-/// is not placed is removed: by the destructor, and when SIGINT, SIGTERM or SIGHUP ends the process
-/// (unless somebody handles these signals). One at a time.
+/// A folder or file that is made under another name, NAME.new-PID, and moved to its place when it
+/// is whole. What is not placed is removed: by the destructor; when SIGINT, SIGTERM or SIGHUP ends
+/// the process, with a word on standard error (unless somebody handles these signals); and after a
+/// SIGKILL by the next draft of the same name, which removes those of processes that are gone, as
+/// far as this PID namespace shows. One at a time.
 class Draft {
  public:
   /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
@@ -28,9 +30,9 @@ class Draft {
 
   /// Where to write.
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// A path below path() as it will be: of results.
-  [[nodiscard]] std::string placed(const std::string& file) const;
-  /// An error that names what was meant: what it stands for is gone when it is read.
+  /// A text, of which each path of the draft is the one that was meant: of results and messages.
+  [[nodiscard]] std::string placed(std::string text) const;
+  /// The same of file, message and hint: the draft is gone when they are read.
   [[nodiscard]] Error placed(Error error) const;
 
   /// Called for each file before it is moved, with its place and itself.

@@ -11,6 +11,7 @@
 #include "apps/tools/commands.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "identification/excite.hpp"
 #include "identification/identify.hpp"
 
@@ -30,7 +31,7 @@ std::string controller_text(const std::string& name, const identification::Serie
   std::vector<Eigen::Index> columns;
   for (std::size_t j = 0; j < all.size(); ++j) {
     if (std::ranges::find(joints, all[j]) == joints.end()) continue;
-    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", all[j]);
+    names += (names.empty() ? "" : ", ") + quoted_text(all[j]);
     columns.push_back(static_cast<Eigen::Index>(j));
   }
   std::string text = fmt::format(
@@ -80,11 +81,11 @@ std::string experiment_text(const identification::Excitation& result, const Exci
       "{}, written by `tandem excite --seed {}`.\n"
       "# Condition number {}.\n# At most {:.0f} % of a joint's way to its limits, {:.0f} % of its "
       "speed, {:.0f} % of its torque.\n"
-      "robot = \"{}\"\n{}duration_s = {:.9g}\nseed = 1\n",
+      "robot = {}\n{}duration_s = {:.9g}\nseed = 1\n",
       kExciteHead, options.seed, condition_text(result), 100.0 * result.position_share,
       100.0 * result.speed_share, 100.0 * result.torque_share,
-      relative_path(options.output, options.robot),
-      posture.empty() ? "" : fmt::format("posture = \"{}\"\n", posture),
+      quoted_text(relative_path(options.output, options.robot)),
+      posture.empty() ? "" : fmt::format("posture = {}\n", quoted_text(posture)),
       options.periods * options.period_s + 1.0);
   if (options.hung) {
     text += fmt::format(
@@ -202,7 +203,7 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
               found->refused.empty()
                   ? std::string("it runs through")
                   : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
-                                found->share, found->refused));
+                                found->share, draft.placed(found->refused)));
   }
   facts.print(out);
   const auto number = [](double value) {

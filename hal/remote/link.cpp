@@ -63,6 +63,30 @@ std::string difference(const Identity& here, const Identity& there) {
   return here == there ? "" : "its images have other fields there: another version of Tandem";
 }
 
+std::string difference(const RobotEnd& here, const RobotEnd& there) {
+  const auto playout = [](std::uint64_t cycles) {
+    return cycles == 0 ? std::string("no [teleoperation]")
+                       : "[teleoperation] with effects " + std::to_string(cycles) +
+                             " cycles after a command's number";
+  };
+  if (here.playout_cycles != there.playout_cycles) {
+    return "there is " + playout(there.playout_cycles) + " there, and " +
+           playout(here.playout_cycles) + " here";
+  }
+  std::map<std::string, std::string> all = here.controllers;
+  all.insert(there.controllers.begin(), there.controllers.end());
+  const auto value = [](const RobotEnd& end, const std::string& key) {
+    const auto found = end.controllers.find(key);
+    return found == end.controllers.end() ? std::string("not given") : found->second;
+  };
+  for (const auto& [key, ignored] : all) {
+    if (value(here, key) == value(there, key)) continue;
+    return "teleoperation.robot_controller." + key + " is " + value(there, key) + " there and " +
+           value(here, key) + " here";
+  }
+  return {};
+}
+
 dds::Qos link_qos() {
   dds::Qos qos;
   qos.reliable = true;

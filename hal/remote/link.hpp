@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,7 +27,7 @@ inline constexpr std::size_t kGainsPerJoint = 3 * hal::kPidLoops;
 /// Raised with every change of what the link's samples mean: their members, the numbers of stop
 /// categories, phases, modes, codes and causes, the images' fields. Builds before 2 say no number;
 /// they and later ones do not hear each other.
-inline constexpr std::uint32_t kLinkProtocol = 5;
+inline constexpr std::uint32_t kLinkProtocol = 6;
 
 /// What two processes must agree on before one drives the other's robot.
 struct Identity {
@@ -46,8 +47,21 @@ struct Identity {
 /// What `there` has otherwise than `here`, in words; empty: nothing. @pre one protocol
 [[nodiscard]] std::string difference(const Identity& here, const Identity& there);
 
+/// What a server does at the robot's end of a link, and its owner counts with.
+struct RobotEnd {
+  /// From a command's number to the state that shows it; 0: each command is followed at once.
+  std::uint64_t playout_cycles = 0;
+  /// Of controllers beside the owner's, with their parameters: "NAME" and "NAME.KEY", sorted.
+  std::map<std::string, std::string> controllers = {};
+
+  bool operator==(const RobotEnd&) const = default;
+};
+/// As of Identity: the play-out, or the first key that the two have otherwise.
+[[nodiscard]] std::string difference(const RobotEnd& here, const RobotEnd& there);
+
 inline constexpr const char* kServerTopic = "tandem/link/server";
 inline constexpr const char* kRequestTopic = "tandem/link/request";
+inline constexpr const char* kRobotEndTopic = "tandem/link/robot_end";
 inline constexpr const char* kStateTopic = "tandem/link/state";
 inline constexpr const char* kCommandTopic = "tandem/link/command";
 /// Late joiners get the last sample; nobody is waited for.

@@ -22,11 +22,10 @@
 namespace tandem::remote {
 
 struct ClientConfig {
-  std::string name;       ///< for people: "tandem run squat.toml, process 312"
-  bool lockstep = false;  ///< must be the server's
-  bool own_pace = false;  ///< the loop waits for no state; not in lockstep
-  /// From a command's number to the state that shows it, as the server has it; 0: no play-out.
-  std::uint64_t playout_cycles = 0;
+  std::string name;                          ///< for people: "tandem run squat.toml, process 312"
+  bool lockstep = false;                     ///< must be the server's
+  bool own_pace = false;                     ///< the loop waits for no state; not in lockstep
+  RobotEnd robot_end = {};                   ///< that the server must have
   std::uint64_t server = 0;                  ///< Server::number(); 0: the only one there is
   double connect_timeout_s = 10;             ///< for a server to be found, and to give the lease
   double server_timeout_s = 3;               ///< a server that is not heard for so long is gone
@@ -40,12 +39,10 @@ struct ClientConfig {
 /// server runs and the lease is this client's.
 class RemoteBackend final : public hal::Backend {
  public:
-  /// Finds the server, compares robots, takes the lease.
+  /// Finds the server, compares robots and the robot's ends of the link, takes the lease.
   /// Errors: what DDS refuses; no server in time, or several while none is named; another robot
   /// (what differs is named); in lockstep and the server not, or the other way round; owned by
-  /// somebody else, who is named; another play-out, or none. A server that stands sends no state,
-  /// which says the last: then it is found with the first one, and the server is as one that is
-  /// gone.
+  /// somebody else, who is named; another play-out, or other controllers at the robot's end.
   [[nodiscard]] static Result<std::unique_ptr<RemoteBackend>> connect(dds::Participant& participant,
                                                                       const hal::Robot& robot,
                                                                       const Identity& identity,
@@ -82,7 +79,8 @@ class RemoteBackend final : public hal::Backend {
   [[nodiscard]] const rt::Histogram& turn_around() const noexcept { return turn_around_; }
 
   // With own_pace.
-  /// Before the first exchange(): where the robot stands. False: the server has sent no state yet.
+  /// Before the first exchange(): where the robot stands. False: the server has sent no state
+  /// within half a second, as one whose time is paused.
   [[nodiscard]] bool first_state(hal::StateImage& state);
   /// Sends a command whose cycle() is its number; exchange() then has none to send. May block.
   void post(const hal::CommandImage& command) noexcept;
@@ -118,6 +116,7 @@ class RemoteBackend final : public hal::Backend {
   };
   struct Endpoints {
     dds::Reader<tandem_msgs::LinkServer> server;
+    dds::Reader<tandem_msgs::LinkRobotEnd> robot_end;
     dds::Reader<tandem_msgs::LinkState> state;
     dds::Writer<tandem_msgs::LinkRequest> requests;
     dds::Writer<tandem_msgs::LinkCommand> commands;
@@ -125,12 +124,12 @@ class RemoteBackend final : public hal::Backend {
 
   RemoteBackend(Endpoints endpoints, const hal::Robot& robot, ClientConfig config);
   [[nodiscard]] Status find_server(const Identity& identity);
+  [[nodiscard]] Status same_robot_end();
   [[nodiscard]] Status take_lease();
-  [[nodiscard]] Status same_playout();
-  [[nodiscard]] std::string playout_difference() const;
   void ask(Action action);
   void renew();
   void take_told();
+  void take_robot_end();
   void take_states();
   [[nodiscard]] bool unpack(const tandem_msgs::LinkState& sample);
   [[nodiscard]] bool there() noexcept;
@@ -146,14 +145,13 @@ class RemoteBackend final : public hal::Backend {
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable news_, closes_;
-  Senders server_senders_, state_senders_;
+  Senders server_senders_, robot_end_senders_, state_senders_;
   std::optional<Sender> server_;  // once it is chosen
   std::optional<Told> told_;
   std::uint64_t told_count_ = 0;
   bool several_ = false;  // servers were heard before one was chosen
   bool closing_ = false;
-  bool seen_ = false;                           // a state
-  std::optional<std::uint64_t> other_playout_;  // than this one's: the server's
+  std::optional<RobotEnd> robot_end_;     // the server's
   std::optional<std::uint64_t> left_in_;  // in lockstep: the server's cycle that `done` answers
   // Written by DDS' threads, read by any.
   std::atomic<std::uint64_t> run_{0};
@@ -181,7 +179,7 @@ class RemoteBackend final : public hal::Backend {
   rt::Histogram turn_around_;
 
   std::thread renewing_;
-  std::optional<OnData> on_told_, on_states_;  // last: they call the others
+  std::optional<OnData> on_told_, on_robot_end_, on_states_;  // last: they call the others
 };
 
 }  // namespace tandem::remote

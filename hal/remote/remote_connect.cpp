@@ -83,6 +83,9 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
   auto server =
       dds::Reader<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
   if (!server) return std::unexpected(server.error());
+  auto robot_end =
+      dds::Reader<tandem_msgs::LinkRobotEnd>::create(participant, name(kRobotEndTopic), link_qos());
+  if (!robot_end) return std::unexpected(robot_end.error());
   auto state =
       dds::Reader<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
   if (!state) return std::unexpected(state.error());
@@ -92,12 +95,13 @@ Result<std::unique_ptr<RemoteBackend>> RemoteBackend::connect(dds::Participant& 
   auto commands =
       dds::Writer<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
   if (!commands) return std::unexpected(commands.error());
-  std::unique_ptr<RemoteBackend> made(new RemoteBackend(
-      {std::move(*server), std::move(*state), std::move(*requests), std::move(*commands)}, robot,
-      config));
+  std::unique_ptr<RemoteBackend> made(
+      new RemoteBackend({std::move(*server), std::move(*robot_end), std::move(*state),
+                         std::move(*requests), std::move(*commands)},
+                        robot, config));
   if (Status found = made->find_server(identity); !found) return std::unexpected(found.error());
+  if (Status same = made->same_robot_end(); !same) return std::unexpected(same.error());
   if (Status leased = made->take_lease(); !leased) return std::unexpected(leased.error());
-  if (Status same = made->same_playout(); !same) return std::unexpected(same.error());
   return made;
 }
 
@@ -106,6 +110,7 @@ RemoteBackend::RemoteBackend(Endpoints endpoints, const hal::Robot& robot, Clien
       config_(std::move(config)),
       joints_(robot.joints.size()),
       server_senders_(endpoints_.server.endpoint().get()),
+      robot_end_senders_(endpoints_.robot_end.endpoint().get()),
       state_senders_(endpoints_.state.endpoint().get()),
       newest_(Seen{hal::StateImage(robot.shape()), hal::CommandImage(robot.shape()),
                    std::vector<std::uint8_t>(robot.joints.size())}),
@@ -124,8 +129,9 @@ RemoteBackend::~RemoteBackend() {
   closes_.notify_all();
   if (renewing_.joinable()) renewing_.join();
   on_told_.reset();
+  on_robot_end_.reset();
   on_states_.reset();
-  if (!leased_ || (gone_ && !other_playout_)) return;
+  if (!leased_ || gone_) return;
   ask(Action::kRelease);
   dds_wait_for_acks(endpoints_.requests.endpoint().get(), DDS_MSECS(500));
 }
@@ -164,6 +170,26 @@ Status RemoteBackend::find_server(const Identity& identity) {
   return {};
 }
 
+/// Both ends count with one play-out, or with none; and what is predicted is what the robot does.
+Status RemoteBackend::same_robot_end() {
+  on_robot_end_.emplace(endpoints_.robot_end.endpoint().get(), [this] { take_robot_end(); });
+  const auto deadline = in_seconds(config_.connect_timeout_s);
+  std::unique_lock lock(mutex_);
+  while (!robot_end_) {
+    if (config_.interrupted && config_.interrupted()) return interrupted();
+    if (SteadyClock::now() > deadline) {
+      return fail("the server did not describe its end of the link within " +
+                      seconds(config_.connect_timeout_s),
+                  "is it still running?");
+    }
+    news_.wait_for(lock, kAgain);
+  }
+  const std::string other = difference(config_.robot_end, *robot_end_);
+  if (other.empty()) return {};
+  return fail("the server's link is not this one: " + other,
+              "give both ends the same [teleoperation], or neither");
+}
+
 Status RemoteBackend::take_lease() {
   on_states_.emplace(endpoints_.state.endpoint().get(), [this] { take_states(); });
   const auto deadline = in_seconds(config_.connect_timeout_s);
@@ -192,31 +218,13 @@ Status RemoteBackend::take_lease() {
   return {};
 }
 
-/// Both ends count with one play-out, or with none. In lockstep neither has one.
-Status RemoteBackend::same_playout() {
-  if (config_.lockstep) return {};
-  std::unique_lock lock(mutex_);
-  news_.wait_for(lock, kFirstState, [this] { return seen_ || other_playout_; });
-  if (!other_playout_) return {};
-  return fail("the server's link is not this one: " + playout_difference(),
-              "give both ends the same [teleoperation], or neither");
-}
-
-/// @pre the mutex is held
-std::string RemoteBackend::playout_difference() const {
-  const auto words = [](std::uint64_t cycles) {
-    return cycles == 0 ? std::string("no [teleoperation]")
-                       : "[teleoperation] with effects " + std::to_string(cycles) +
-                             " cycles after a command's number";
-  };
-  return "there is " + words(*other_playout_) + " there, and " + words(config_.playout_cycles) +
-         " here";
-}
-
 bool RemoteBackend::first_state(hal::StateImage& state) {
-  const std::lock_guard lock(mutex_);
-  (void)newest_.refresh();
-  if (!newest_.front().is_one) return false;
+  std::unique_lock lock(mutex_);
+  const auto seen = [this] {
+    (void)newest_.refresh();
+    return newest_.front().is_one;
+  };
+  if (!news_.wait_for(lock, kFirstState, seen)) return false;
   state.assign(newest_.front().state);
   return true;
 }
@@ -278,6 +286,23 @@ void RemoteBackend::take_told() {
   news_.notify_all();
 }
 
+void RemoteBackend::take_robot_end() {
+  {
+    const std::lock_guard lock(mutex_);
+    endpoints_.robot_end.take([this](const tandem_msgs::LinkRobotEnd& sample, const auto& info) {
+      if (sample.run != run_ || !server_ || robot_end_senders_.of(info) != server_) return;
+      constexpr std::string_view kIs = " = ";
+      RobotEnd end{.playout_cycles = sample.playout_cycles};
+      for (const std::string& line : texts(sample.controllers)) {
+        const std::size_t at = std::min(line.find(kIs), line.size());
+        end.controllers[line.substr(0, at)] = line.substr(std::min(at + kIs.size(), line.size()));
+      }
+      robot_end_ = std::move(end);
+    });
+  }
+  news_.notify_all();
+}
+
 void RemoteBackend::take_states() {
   {
     const std::lock_guard lock(mutex_);
@@ -285,7 +310,6 @@ void RemoteBackend::take_states() {
       const bool from_it = sample.run == run_ && server_ && state_senders_.of(info) == server_;
       if (!from_it || !unpack(sample)) return;
       newest_.publish();
-      seen_ = true;
     });
   }
   news_.notify_all();
@@ -295,11 +319,6 @@ void RemoteBackend::take_states() {
 bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
   // The server goes on by itself after `done`: its next state is this run's last.
   if (left_in_ && sample.cycle > *left_in_ + 1) return false;
-  if (sample.playout_cycles != config_.playout_cycles) {
-    other_playout_ = sample.playout_cycles;
-    gone_ = true;
-    return false;
-  }
   Seen& to = newest_.back();
   if (sample.state._length != to.state.bytes().size() ||
       sample.command._length != to.command.bytes().size() || sample.causes._length != joints_) {
@@ -327,7 +346,6 @@ bool RemoteBackend::unpack(const tandem_msgs::LinkState& sample) {
 
 std::string RemoteBackend::status_text() const {
   const std::lock_guard lock(mutex_);
-  if (other_playout_) return "the server's link is not this one: " + playout_difference();
   if (gone_) {
     return "no message from the server for " + seconds(config_.server_timeout_s);
   }

@@ -29,6 +29,9 @@ Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, cons
   auto server =
       dds::Writer<tandem_msgs::LinkServer>::create(participant, name(kServerTopic), link_qos());
   if (!server) return std::unexpected(server.error());
+  auto robot_end =
+      dds::Writer<tandem_msgs::LinkRobotEnd>::create(participant, name(kRobotEndTopic), link_qos());
+  if (!robot_end) return std::unexpected(robot_end.error());
   auto state =
       dds::Writer<tandem_msgs::LinkState>::create(participant, name(kStateTopic), link_qos());
   if (!state) return std::unexpected(state.error());
@@ -38,9 +41,10 @@ Result<std::unique_ptr<Server>> Server::open(dds::Participant& participant, cons
   auto commands =
       dds::Reader<tandem_msgs::LinkCommand>::create(participant, name(kCommandTopic), link_qos());
   if (!commands) return std::unexpected(commands.error());
-  return std::unique_ptr<Server>(new Server(
-      {std::move(*server), std::move(*state), std::move(*requests), std::move(*commands)}, robot,
-      gains, std::move(identity), config));
+  return std::unique_ptr<Server>(
+      new Server({std::move(*server), std::move(*robot_end), std::move(*state),
+                  std::move(*requests), std::move(*commands)},
+                 robot, gains, std::move(identity), config));
 }
 
 Server::Server(Endpoints endpoints, const hal::Robot& robot, const hal::ParameterImage& gains,
@@ -65,6 +69,7 @@ Server::Server(Endpoints endpoints, const hal::Robot& robot, const hal::Paramete
     playout_.emplace(robot, config_.playout->delay_cycles, config_.playout->brake_cycles,
                      identity_.period_ns);
   }
+  tell_robot_end();
   on_requests_.emplace(endpoints_.requests.endpoint().get(), [this] { take_requests(); });
   on_commands_.emplace(endpoints_.commands.endpoint().get(), [this] { take_commands(); });
 }

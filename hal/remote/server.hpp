@@ -40,6 +40,8 @@ struct ServerConfig {
   double lockstep_timeout_s = 60.0;    ///< that a cycle waits for a living owner's command
   hal::StopCategory on_lost = hal::StopCategory::kWarn;  ///< kWarn: every joint is held
   std::optional<PlayoutConfig> playout = {};  ///< empty: the newest command is followed at once
+  /// That run beside the owner's, as RobotEnd has them.
+  std::map<std::string, std::string> robot_controllers = {};
   /// Whether this participant may own the robot; called on DDS' threads. Empty: everybody may.
   std::function<bool(const Sender&)> admits = {};
 };
@@ -104,6 +106,7 @@ class Server final : public hal::RemoteCommandPort {
   };
   struct Endpoints {
     dds::Writer<tandem_msgs::LinkServer> server;
+    dds::Writer<tandem_msgs::LinkRobotEnd> robot_end;
     dds::Writer<tandem_msgs::LinkState> state;
     dds::Reader<tandem_msgs::LinkRequest> requests;
     dds::Reader<tandem_msgs::LinkCommand> commands;
@@ -114,6 +117,7 @@ class Server final : public hal::RemoteCommandPort {
 
   void run();
   void tell();
+  void tell_robot_end();
   void send_shown();
   void write_state(const Shown& shown, std::span<const std::byte> state,
                    std::span<const std::byte> command, std::span<const std::uint8_t> causes);

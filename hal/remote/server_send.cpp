@@ -95,6 +95,18 @@ void Server::tell() {
   (void)endpoints_.server.write(sample);
 }
 
+void Server::tell_robot_end() {
+  std::vector<std::string> controllers;
+  for (const auto& [key, value] : config_.robot_controllers)
+    controllers.push_back(key + " = " + value);
+  const std::vector<char*> texts = pointers(controllers);
+  tandem_msgs::LinkRobotEnd sample{};
+  sample.run = run_;
+  sample.playout_cycles = config_.playout ? config_.playout->shown_after_cycles() : 0;
+  sample.controllers = lent<decltype(sample.controllers)>(std::span<char* const>(texts));
+  (void)endpoints_.robot_end.write(sample);
+}
+
 Server::Shown Server::shown_of(const hal::PortView& view) noexcept TANDEM_RT {
   cycle_.store(view.time.cycle, std::memory_order_release);
   return {.cycle = view.time.cycle,
@@ -157,7 +169,6 @@ void Server::write_state(const Shown& shown, std::span<const std::byte> state,
   sample.answered_cycle = shown.answered_cycle;
   sample.answered_ns = shown.answered_ns;
   sample.source_cycle = shown.source_cycle;
-  sample.playout_cycles = config_.playout ? config_.playout->shown_after_cycles() : 0;
   sample.phase = shown.phase;
   sample.code = shown.code;
   sample.reaction = shown.reaction;

@@ -164,6 +164,10 @@ TEST_F(EstimatedReport, DrawsTheWrenchAtEachDeclaredPlace) {
   EXPECT_GT(wrench["max_moment_Nm"].get<double>(), 0.0);
   EXPECT_GT(wrench["max_moment_s"].get<double>(), 0.0);
   EXPECT_GT(estimate["unexplained_torque_Nm"].get<double>(), 0.0);
+  EXPECT_NE((with.out + with.err).find("external wrench on base"), std::string::npos) << with.out;
+  const auto on_base = estimate["external_base_wrench"];
+  for (const char* key : {"max_force_N", "max_force_s", "max_moment_Nm", "max_moment_s"})
+    EXPECT_GT(on_base[key].get<double>(), 0.0) << key;
   const Outcome rows = tandem(
       "log csv logs/coman_hands-with-001.mcap --topic /tandem/estimate "
       "--fields external_force_n,external_moment_nm,unexplained_torque_nm");

@@ -3,6 +3,7 @@
 #include <csignal>
 
 #include "tests/apps/bad_input.hpp"
+#include "tests/support/scratch_folder.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -38,7 +39,7 @@ class HalfMade : public Program {
   }
   /// A gnuplot that does this; its folder is on the PATH of `environment()`.
   void fake_gnuplot(const std::string& script) const {
-    std::filesystem::create_directory(folder_ / "bin");
+    std::filesystem::create_directories(folder_ / "bin");
     write_text(folder_ / "bin/gnuplot", "#!/bin/sh\n" + script);
     std::filesystem::permissions(folder_ / "bin/gnuplot", std::filesystem::perms::owner_all);
   }
@@ -103,6 +104,89 @@ TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
                              (WIFEXITED(raw) && WEXITSTATUS(raw) == 128 + SIGINT);
     EXPECT_TRUE(interrupted) << raw << read_text(folder_ / "err.txt");
     EXPECT_EQ(all(), were) << output;
+    EXPECT_NE(read_text(folder_ / "err.txt").find("interrupted: nothing was written to "),
+              std::string::npos);
+  }
+}
+
+// The first Ctrl-C was ignored: the handler of the run that was over set a flag.
+TEST_F(HalfMade, ReportOfARunEndsAtTheFirstInterruptAndLeavesAllElse) {
+  fake_gnuplot("cat > /dev/null\nkill -INT $PPID\nsleep 1\n");
+  const Outcome run = tandem(
+      "run trajectory.toml --duration 1 --quiet --log runs --report --json r.json --trace t.json",
+      environment());
+  EXPECT_TRUE(run.status == -1 || run.status == 128 + SIGINT) << run.status << run.err;
+  EXPECT_NE(run.err.find("interrupted: nothing was written to runs/"), std::string::npos)
+      << run.err;
+  const std::string log = json("r.json")["log"]["path"];
+  EXPECT_EQ(tandem("log info " + log + " --json info.json").status, 0);
+  EXPECT_TRUE(json("info.json")["complete"]);
+  EXPECT_FALSE(json("t.json")["traceEvents"].empty());
+  for (const std::string& name : all()) {
+    EXPECT_EQ(name.find(".new-"), std::string::npos) << name;
+    EXPECT_EQ(name.find("report.html"), std::string::npos) << name;
+  }
+}
+
+// They stayed for ever.
+TEST_F(HalfMade, WhatAKilledCommandLeftIsRemovedByTheNextOfThatName) {
+  fake_gnuplot("cat > /dev/null\nkill -KILL $PPID\n");
+  std::filesystem::create_directory(folder_ / "there");
+  const auto were = all();
+  for (const char* output : {"made/of/folders", "there"}) {
+    EXPECT_NE(tandem("report " + log_ + " -o " + output, environment()).status, 0);
+    EXPECT_GT(all().size(), were.size()) << output;
+  }
+  const auto with_drafts = all();
+  EXPECT_EQ(tandem("log csv " + log_ + " -o a.csv").status, 0);
+  EXPECT_EQ(all().size(), with_drafts.size() + 1) << "those of other names stay";
+  std::filesystem::remove(folder_ / "a.csv");
+  fake_gnuplot("cat > /dev/null\n");
+  for (const char* output : {"made/of/folders", "there"})
+    EXPECT_EQ(tandem("report " + log_ + " -o " + output, environment()).status, 2);
+  EXPECT_EQ(all(), were);
+}
+
+TEST_F(HalfMade, OnlyDraftsOfItsNameWhoseProcessIsGoneAreRemoved) {
+  const std::string gone = "4194305";  // more than Linux gives
+  const std::vector<std::string> stay{"a.new-" + std::to_string(::getpid()) + ".csv",
+                                      "a.new-1.csv",
+                                      "a.new-0" + gone + ".csv",
+                                      "a.new-" + gone + "x.csv",
+                                      "a.new-.csv",
+                                      "a.new-" + gone + ".txt.mcap",
+                                      "b.new-" + gone + ".csv",
+                                      "aa.new-" + gone + ".csv"};
+  for (const std::string& name : stay) write_text(folder_ / name, "mine");
+  auto expected = all();
+  expected.emplace_back("a.csv");
+  std::ranges::sort(expected);
+  write_text(folder_ / ("a.new-" + gone + ".csv"), "left");
+  ASSERT_EQ(tandem("log csv " + log_ + " -o a.csv").status, 0);
+  EXPECT_EQ(all(), expected);
+}
+
+TEST_F(HalfMade, MeasurementsLeaveNothingWhenTheyCannotWrite) {
+  fake_gnuplot("cat > /dev/null\n");
+  const tandem::test::ScratchFolder scratch;
+  const std::string cache = " XDG_CACHE_HOME='" + scratch.path() + "'";
+  expect_nothing("bench engines --engines tandem --scenes box --quiet -o made",
+                 {"made/engines/", "could not write the whole picture"}, environment() + cache);
+  const auto were = all();
+  const Outcome latency =
+      tandem("latency --duration 0.1 --slices 1 --load idle --policy other --quiet -o made",
+             environment());
+  EXPECT_EQ(latency.status, 0) << latency.err;
+  EXPECT_NE(latency.err.find("no plots: made/"), std::string::npos) << latency.err;
+  EXPECT_EQ(latency.err.find(".new-"), std::string::npos) << latency.err;
+  EXPECT_EQ(all(), were);
+  fake_gnuplot("cat > /dev/null\nkill -INT $PPID\nsleep 1\n");
+  for (const char* command : {"bench engines --engines tandem --scenes box",
+                              "latency --duration 0.1 --slices 1 --load idle --policy other"}) {
+    const Outcome outcome =
+        tandem(std::string(command) + " --quiet -o made", environment() + cache);
+    EXPECT_TRUE(outcome.status == -1 || outcome.status == 128 + SIGINT) << outcome.status;
+    EXPECT_EQ(all(), were) << command;
   }
 }
 

@@ -193,6 +193,18 @@ TEST_F(Identify, OfTorquesOfTheOtherSignSaysSo) {
       << found.err;
 }
 
+// It was written between quotes as it is: no TOML.
+TEST_F(Identify, ExcitesJointsWithQuotesInTheirNames) {
+  edit("double_pendulum.urdf", "joint name=\"joint1\"", "joint name=\"joint&quot;1\"");
+  for (const char* key : {"joints = [", "names = ["})
+    edit("robot.toml", key + std::string("\"joint1\""), key + std::string("'joint\"1'"));
+  edit("robot.toml", "joint1 = 0.5", "'joint\"1' = 0.5");
+  const Outcome excited = tandem("excite robot.toml --out e.toml --tries 2");
+  ASSERT_EQ(excited.status, 0) << excited.err;
+  const Outcome check = tandem("check e.toml");
+  EXPECT_EQ(check.status, 0) << check.err;
+}
+
 TEST_F(Identify, DestroysNoFileThatItDidNotWrite) {
   const std::string robot = read_text(folder_ / "robot.toml");
   const std::string urdf = read_text(folder_ / "double_pendulum.urdf");

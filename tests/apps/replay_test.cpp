@@ -182,8 +182,28 @@ TEST_F(LogReplay, PlaysAtHalfTheSpeed) {
   EXPECT_EQ(most, 0.0) << "every second cycle has the recording's own numbers";
   const Outcome report = tandem("report " + recording_ + " " + run + " -o both");
   ASSERT_EQ(report.status, 0) << report.err;
-  EXPECT_EQ(read_text(folder_ / "both/report.html").find("so that the replay lies over"),
-            std::string::npos);
+  const std::string page = read_text(folder_ / "both/report.html");
+  char moved[128];
+  const double later_s = from_s - 0.5 * begin_s;
+  std::snprintf(moved, sizeof moved,
+                "The times of B are multiplied by 0.5. B is drawn %.3f s %s, so that the replay",
+                std::abs(later_s), later_s > 0.0 ? "later" : "earlier");
+  EXPECT_NE(page.find(moved), std::string::npos) << moved << "\n" << page.substr(0, 3000);
+  EXPECT_NE(page.find("Replay B"), std::string::npos);
+  EXPECT_NE(page.find("0.0000 deg"), std::string::npos) << "of the references";
+  ASSERT_EQ(tandem("report " + run + " " + recording_ + " -o turned").status, 0);
+  const std::string turned = read_text(folder_ / "turned/report.html");
+  EXPECT_NE(turned.find("The times of B are multiplied by 2."), std::string::npos);
+  EXPECT_NE(turned.find("0.0000 deg"), std::string::npos);
+}
+
+// Between the recording's samples the run's references lie on its cubics.
+TEST_F(LogReplay, IsFoundAtASpeedThatMeetsNoSample) {
+  const std::string run = play(recording_, "--speed 0.77");
+  ASSERT_EQ(tandem("report " + recording_ + " " + run + " -o both").status, 0);
+  const std::string page = read_text(folder_ / "both/report.html");
+  EXPECT_NE(page.find("The times of B are multiplied by 0.77. B is drawn "), std::string::npos);
+  EXPECT_NE(page.find("Replay B"), std::string::npos);
 }
 
 TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {

@@ -134,6 +134,52 @@ TEST_F(TeleoperationRun, InRealTimeTheTwoEndsAreTwoProcesses) {
   EXPECT_EQ(served["remote"]["losses"], 0);
 }
 
+/// They ran, and what the operator saw was another robot.
+TEST_F(TeleoperationRun, OtherControllersAtTheRobotsEndAreRefused) {
+  const auto experiment = [&](const std::string& at_robot) {
+    return "robot = \"robot.toml\"\nposture = \"ready\"\nduration_s = "
+           "0.3\n[remote]\nlease_timeout_s = 30.0\n"
+           "[teleoperation.up]\ndelay_s = 0.05\n" +
+           at_robot +
+           "[[controller]]\nplugin = \"hold\"\n[controller.parameters]\njoints = [\"joint1\"]\n";
+  };
+  const auto holding = [](const std::string& damping) {
+    return "[[teleoperation.robot_controller]]\nplugin = \"hold\"\n"
+           "[teleoperation.robot_controller.parameters]\njoints = [\"joint2\"]\n"
+           "link_damping_Nms_rad = " +
+           damping + "\n";
+  };
+  write_text(folder_ / "served.toml", experiment(holding("0.5")));
+  write_text(folder_ / "none.toml", experiment(""));
+  write_text(folder_ / "other.toml", experiment(holding("0.25")));
+  write_text(folder_ / "same.toml", experiment(holding("0.50   # as there")));
+  const std::string domain = " --domain " + std::to_string(dds::test::own_domain());
+  const std::string program = "'" TANDEM_BINARY_DIR "/bin/tandem' ";
+  const auto run = [&](const std::string& name) {
+    return program + "run " + name + ".toml" + domain + " --hal dds --realtime --no-log -q " +
+           "--no-socket 2>" + name + ".err; echo $? >" + name + ".status; ";
+  };
+  const std::string all = "cd '" + folder_.string() + "' && { " + program + "serve served.toml" +
+                          domain + " --realtime --once --no-log -q 2>serve.err & " + run("none") +
+                          run("other") + run("same") + "wait; } </dev/null";
+  ASSERT_EQ(std::system(all.c_str()), 0);
+  const auto told = [&](const std::string& name) { return read_text(folder_ / (name + ".err")); };
+  const auto status = [&](const std::string& name) {
+    return read_text(folder_ / (name + ".status"));
+  };
+  EXPECT_EQ(status("none"), "2\n");
+  EXPECT_NE(
+      told("none").find("teleoperation.robot_controller.hold is \"hold\" there and not given here"),
+      std::string::npos)
+      << told("none");
+  EXPECT_EQ(status("other"), "2\n");
+  EXPECT_NE(told("other").find("teleoperation.robot_controller.hold.link_damping_Nms_rad is 0.5 "
+                               "there and 0.25 here"),
+            std::string::npos)
+      << told("other");
+  EXPECT_EQ(status("same"), "0\n") << told("same") << told("serve");
+}
+
 // It was taken for measurements, of a robot that never moved.
 TEST_F(TeleoperationRun, IsNoRecordingToIdentifyFrom) {
   const std::string plain = read_text(folder_ / "trajectory.toml");

@@ -150,6 +150,19 @@ TEST(TomlReader, AMissingTableIsOneErrorOnly) {
   EXPECT_EQ(document.diagnostics().size(), 1U);
 }
 
+TEST(TomlReader, GivesEveryValueByItsKeyForComparing) {
+  const TomlDocument document = parse(
+      "whole = 12\nreal = 12.0\nthird = 0.1\nyes = true\ntext = 'a \"b\"'\nempty = []\n"
+      "list = [1, [2.50, 'c']]\n[a.b]\nday = 2026-11-25\n[[row]]\nx = 1\n[[row]]\nx = 1e-3\n");
+  const std::map<std::string, std::string> expected{
+      {"whole", "12"},           {"real", "12"},
+      {"third", "0.1"},          {"yes", "true"},
+      {"empty", "[]"},           {"text", "\"a \\\"b\\\"\""},
+      {"a.b.day", "2026-11-25"}, {"row[0].x", "1"},
+      {"row[1].x", "0.001"},     {"list", "[1, [2.5, \"c\"]]"}};
+  EXPECT_EQ(document.root().values(), expected);
+}
+
 TEST(TomlReader, AKeyRequiredOfAnOptionalTableIsAnErrorAtTheTableAbove) {
   const TomlDocument document = parse("x = 1\n[controller]\nplugin = 'squat'\n");
   TomlTable root = document.root();

@@ -167,6 +167,32 @@ TEST(Urdf, RefusesAZeroByte) {
   EXPECT_NE(errors_of(std::string("<robot\0/>", 9)).find("zero byte"), std::string::npos);
 }
 
+// They were "not UTF-8", or silently left out or taken as they are written.
+TEST(Urdf, RefusesAReferenceThatStandsForNoCharacter) {
+  for (const std::string wrong : {"&#xD800;", "&#x110000;", "&#0;", "&#x1;", "&#xFFFE;", "&#;",
+                                  "&#x;", "&#zz;", "&#65x;", "&#x-41;", "&#99999999999;"}) {
+    expect_error(with("<link name=\"tip\"/>", "<link name=\"ti" + wrong + "p\"/>"),
+                 "arm.urdf:22: the character reference '" + wrong +
+                     "' stands for no character (write the character itself, in UTF-8)");
+  }
+  EXPECT_NE(errors_of(with("<link name=\"tip\"/>", "<link name=\"ti&#65p\"/>"))
+                .find("the character reference '&#65p' stands"),
+            std::string::npos);
+}
+
+TEST(Urdf, TakesReferencesThatStandForCharacters) {
+  std::string text = with("<link name=\"tip\"/>",
+                          "<!-- &#0; --><link name=\"t&#105;&#x00000000000070;\"/><gazebo>"
+                          "<![CDATA[&#zz;]]></gazebo>");
+  const auto model = parse_urdf(text, "arm.urdf", {});
+  ASSERT_TRUE(model.has_value()) << errors_of(text);
+  EXPECT_GE(model->tree.link_index("tip"), 0);
+  text = with("name=\"arm\"", "name=\"a &#xFC; &#x1F600; m\"");
+  const auto named = parse_urdf(text, "arm.urdf", {});
+  ASSERT_TRUE(named.has_value()) << errors_of(text);
+  EXPECT_EQ(named->tree.name, "a \xC3\xBC \xF0\x9F\x98\x80 m");
+}
+
 TEST(Urdf, RefusesXacro) {
   expect_error("<robot name='x'><xacro:macro/></robot>",
                "arm.urdf:1: xacro:macro: <xacro:macro> is xacro, not URDF "

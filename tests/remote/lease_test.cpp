@@ -451,7 +451,7 @@ TEST(Connect, TellsWhenTheTwoEndsHaveDifferentPlayOuts) {
     const auto client = participant("client");
     ClientConfig config;
     config.own_pace = there == 0;
-    config.playout_cycles = there == 0 ? 70 : 0;
+    config.robot_end.playout_cycles = there == 0 ? 70 : 0;
     const auto refused = Owner::connect(*client, config, served.robot);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().message,
@@ -462,10 +462,48 @@ TEST(Connect, TellsWhenTheTwoEndsHaveDifferentPlayOuts) {
                            "effects 100 cycles after a command's number there, and no "
                            "[teleoperation] here");
     EXPECT_TRUE(eventually([&] { return served.server->lease().owner() == 0; }));
-    config.playout_cycles = there;
+    config.robot_end.playout_cycles = there;
     const auto same = Owner::connect(*client, config, served.robot);
     EXPECT_TRUE(same) << same.error().to_string();
   }
+}
+
+/// The prediction would be that of another robot; or two ends, or none, would lead a joint.
+TEST(Connect, TellsWhenTheTwoEndsHaveDifferentControllersAtTheRobot) {
+  ServerConfig server;
+  server.robot_controllers = {{"hold", "\"hold\""}, {"hold.link_damping_Nms_rad", "12"}};
+  Served served(server, {.loop = {.rate = 1.0}});
+  served.begin();
+  const auto client = participant("client");
+  ClientConfig config;
+  const auto message = [&] {
+    const auto made = Owner::connect(*client, config, served.robot);
+    return made ? std::string() : made.error().message;
+  };
+  const std::string begin = "the server's link is not this one: teleoperation.robot_controller.";
+  EXPECT_EQ(message(), begin + "hold is \"hold\" there and not given here");
+  config.robot_end.controllers = server.robot_controllers;
+  config.robot_end.controllers["hold.link_damping_Nms_rad"] = "8";
+  EXPECT_EQ(message(), begin + "hold.link_damping_Nms_rad is 12 there and 8 here");
+  config.robot_end.controllers = server.robot_controllers;
+  config.robot_end.controllers["legs"] = "\"squat\"";
+  EXPECT_EQ(message(), begin + "legs is not given there and \"squat\" here");
+  EXPECT_EQ(served.server->lease().given(), 0U) << "nobody asked for the robot";
+  config.robot_end.controllers.erase("legs");
+  EXPECT_EQ(message(), "");
+}
+
+/// A paused server sends no state; what its end is it says all the same.
+TEST(Connect, ComparesTheEndsOfAServerWhoseTimeIsPaused) {
+  ServerConfig server;
+  server.playout = {.delay_cycles = 99, .brake_cycles = 50};
+  Served served(server, {.loop = {.rate = 1.0, .start_paused = true}});
+  served.begin();
+  const auto client = participant("client");
+  const auto refused = Owner::connect(*client, {}, served.robot);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("effects 100 cycles"), std::string::npos)
+      << refused.error().message;
 }
 
 TEST(Connect, RefusesToChooseBetweenServersUnlessOneIsNamed) {

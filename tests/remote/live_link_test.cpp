@@ -54,7 +54,7 @@ class Operator {
         record(robot, 20'000) {
     ClientConfig client;
     client.own_pace = true;
-    client.playout_cycles = robots_end().playout->shown_after_cycles();
+    client.robot_end.playout_cycles = robots_end().playout->shown_after_cycles();
     auto made = Owner::connect(*participant_, client, robot);
     EXPECT_TRUE(made) << made.error().to_string();
     TeleConfig config;

@@ -282,8 +282,12 @@ TEST_F(Gripper, OfARecordingOnlyWhatItHasIsDrawnAndNamed) {
 // They had been those of its own log, beside an axis that has the first one's.
 TEST_F(Gripper, TimesOfAShiftedRunsPosturesAreThoseOfTheAxis) {
   RunData later = run;
-  for (double& time_s : later.time_s) time_s += 5.0;
-  later.drawn_later_s = -5.0;
+  for (double& time_s : later.time_s) time_s = 2.0 * time_s + 5.0;
+  later.drawn_slower = 0.5;
+  later.drawn_later_s = -2.5;
+  const Curve drawn = figures_of(run, {&later}, nullptr)[0].curves.back();
+  for (std::size_t row = 0; row < run.rows(); ++row)
+    EXPECT_NEAR(drawn.x.at(row), run.time_s[row], 1e-12);
   const Figure posture = figures_of(run, {&later}, nullptr).back();
   std::vector<std::string> times;
   for (std::size_t i = 1; i < posture.notes.size(); i += 2) times.push_back(posture.notes[i].text);

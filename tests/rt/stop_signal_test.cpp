@@ -1,6 +1,7 @@
 #include "rt/stop_signal.hpp"
 
 #include <csignal>
+#include <cstdlib>
 
 namespace tandem::rt {
 namespace {
@@ -25,6 +26,39 @@ TEST(StopSignal, LetsASecondSignalEndAHungProgram) {
         std::raise(SIGTERM);
       },
       testing::KilledBySignal(SIGTERM), "");
+}
+
+void end_with_7(int) { std::_Exit(7); }
+
+TEST(StopSignal, GivesASecondSignalToWhomTheFirstBelonged) {
+  EXPECT_EXIT(
+      {
+        std::signal(SIGINT, end_with_7);
+        install_stop_signals();
+        install_stop_signals();
+        std::raise(SIGINT);
+        std::raise(SIGINT);
+      },
+      testing::ExitedWithCode(7), "");
+}
+
+TEST(StopSignal, GivesTheFirstSignalBack) {
+  EXPECT_EXIT(
+      {
+        std::signal(SIGTERM, end_with_7);
+        install_stop_signals();
+        remove_stop_signals();
+        std::raise(SIGTERM);
+      },
+      testing::ExitedWithCode(7), "");
+  EXPECT_EXIT(
+      {
+        std::signal(SIGINT, SIG_IGN);  // as a shell starts what is in its background
+        install_stop_signals();
+        remove_stop_signals();
+        std::raise(SIGINT);
+      },
+      testing::KilledBySignal(SIGINT), "");
 }
 
 TEST(StopSignal, LeavesAClosedTerminalIgnoredUnderNohup) {

@@ -155,6 +155,10 @@ TEST_F(RunStatisticsOfTwo, GivesTheEstimatesWorstErrorsOfTiltAndHeight) {
   take_both(0.0, 1.0, 9.0);
   EXPECT_EQ(statistics_.estimate().base_cycles, 0U) << "it has not started";
   EXPECT_EQ(statistics_.estimate().max_external_Nm[1], 3.0);
+  estimate.external_base_wrench()[1] = -4.0;
+  estimate.external_base_wrench()[2] = 3.0;
+  estimate.external_base_wrench()[5] = -2.0;
+  estimate.time_ns()[0] = 7;
   estimate.base_valid()[0] = 1;
   take_both(1.2, 0.01, 0.498);
   take_both(2.5, 0.02, 0.501);
@@ -165,6 +169,9 @@ TEST_F(RunStatisticsOfTwo, GivesTheEstimatesWorstErrorsOfTiltAndHeight) {
   EXPECT_EQ(figures.compared, 2U) << "not on the hoist";
   EXPECT_NEAR(figures.max_tilt_error_rad, 0.02, 1e-12);
   EXPECT_NEAR(figures.max_height_error_m, 0.002, 1e-15);
+  EXPECT_DOUBLE_EQ(figures.base_wrench.force_N.value, 5.0);
+  EXPECT_DOUBLE_EQ(figures.base_wrench.moment_Nm.value, 2.0);
+  EXPECT_EQ(figures.base_wrench.force_N.time_ns, 7);
 }
 
 }  // namespace

@@ -67,6 +67,21 @@ keeps_order = true
   EXPECT_TRUE(one.link.down.keeps_order);
 }
 
+TEST(TeleoperationKeys, RobotControllersAreComparedByWhatTheyMean) {
+  const auto values = [](const std::string& parameters) {
+    return robot_controller_values(
+        read("[[teleoperation.robot_controller]]\nplugin = \"./lib/balance.so\"\nname = \"legs\"\n"
+             "[teleoperation.robot_controller.parameters]\n" +
+             parameters));
+  };
+  const std::map<std::string, std::string> expected{
+      {"legs", "\"balance\""}, {"legs.joints", "[\"a\", \"b\"]"}, {"legs.stiff_Nm_rad", "12"}};
+  EXPECT_EQ(values("joints = [\"a\", \"b\"]\nstiff_Nm_rad = 12.0\n"), expected);
+  EXPECT_EQ(values("stiff_Nm_rad = 12   # as before\njoints = [ \"a\",\n \"b\" ]\n"), expected);
+  EXPECT_NE(values("joints = [\"b\", \"a\"]\nstiff_Nm_rad = 12.0\n"), expected);
+  EXPECT_TRUE(robot_controller_values(read("")).empty());
+}
+
 TEST(TeleoperationKeys, WrongOnesAreNamed) {
   const auto expect = [](const std::string& text, const std::string& part) {
     const std::string error = error_of(text);
