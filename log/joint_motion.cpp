@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::int64_t kLongestHole_ns = 20'000'000;
 constexpr std::int64_t kLongestHole_cycles = 3;
-constexpr double kHalfNanosecond = 0.5e-9;
 constexpr const char* kCommand = "/tandem/command";
 constexpr const char* kState = "/tandem/state";
 constexpr const char* kOtherStretch = "play another stretch: from_s and to_s";
