@@ -255,8 +255,9 @@ class ToolPath : public Controller {
   /// The path is followed once, from the posture in which the experiment starts.
   void check_reach(ControllerSetup& setup) {
     begin(setup.start_position_rad);
-    double worst = 0.0, worst_s = 0.0;
-    for (double t_s = 0.0; t_s <= places_.back().time_s; t_s += period_s_) {
+    double worst = 0.0, worst_s = 0.0, t_s = 0.0;
+    for (std::int64_t time_ns = 0; t_s < places_.back().time_s; time_ns += setup.period_ns) {
+      t_s = static_cast<double>(time_ns) * 1e-9;  // as update() has it
       const double missed = follow(t_s);
       if (missed > worst) worst_s = t_s;
       worst = std::max(worst, missed);

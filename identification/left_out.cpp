@@ -19,11 +19,12 @@ void bridge(Signal& signal) {
     while (i < signal.size() && !std::isnan(signal[i])) ++i;
     const std::size_t hole = i;
     while (i < signal.size() && std::isnan(signal[i])) ++i;
-    if (i == signal.size() || i - hole > kBridge_samples) continue;
+    const std::size_t samples = i - hole;
+    if (i == signal.size() || samples > kBridge_samples) continue;
     const double before = signal[hole - 1];
-    const double slope = (signal[i] - before) / static_cast<double>(i - hole + 1);
-    for (std::size_t k = hole; k < i; ++k)
-      signal[k] = before + slope * static_cast<double>(k - hole + 1);
+    const double slope = (signal[i] - before) / static_cast<double>(samples + 1);
+    for (std::size_t k = 0; k < samples; ++k)
+      signal[hole + k] = before + slope * static_cast<double>(k + 1);
   }
 }
 

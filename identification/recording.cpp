@@ -214,6 +214,152 @@ Status check_torques(Recording& recording, const hal::RobotConfig& robot) {
   return {};
 }
 
+/// Where the log has what the robot has.
+struct Order {
+  std::vector<std::size_t> joints;         // per joint of the robot
+  std::vector<std::size_t> sensors;        // per sensor of the robot
+  std::vector<std::size_t> first_channel;  // per sensor of the log
+  std::size_t channels = 0;                // of the log
+};
+
+/// Errors: joints, sensors or channels of another robot.
+Result<Order> order_of(const std::string& path, const log::RunInfo& info,
+                       const hal::RobotConfig& robot) {
+  std::vector<std::string> joints, sensors, logged_sensors;
+  for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint.name);
+  for (const hal::SensorConfig& sensor : robot.sensors) sensors.push_back(sensor.name);
+  Order order;
+  for (const log::SensorInfo& sensor : info.sensors) {
+    logged_sensors.push_back(sensor.name);
+    order.first_channel.push_back(order.channels);
+    order.channels += sensor.channels;
+  }
+  auto joint_order = order_of(path, "joint", joints, info.joints);
+  if (!joint_order) return std::unexpected(joint_order.error());
+  order.joints = std::move(*joint_order);
+  auto sensor_order = order_of(path, "sensor", sensors, logged_sensors);
+  if (!sensor_order) return std::unexpected(sensor_order.error());
+  order.sensors = std::move(*sensor_order);
+  for (std::size_t s = 0; s < sensors.size(); ++s) {
+    if (info.sensors[order.sensors[s]].channels == robot.sensors[s].channels()) continue;
+    return bad_log(
+        path, "this log is of another robot: its sensor '" + sensors[s] + "' has other channels",
+        "give --robot the robot that made it");
+  }
+  return order;
+}
+
+/// Errors: no position or torque of joints; time that is none.
+Result<Columns> read_state(const std::string& path, const log::LogFile& file, const Order& order) {
+  const std::size_t n = order.joints.size();
+  auto state = Columns::read(file, kState,
+                             {{"position_rad", n},
+                              {"torque_nm", n},
+                              {"motor_position_rad", n},
+                              {"current_a", n},
+                              {"age_cycles", n},
+                              {"sensor", order.channels},
+                              {"sensor_age_cycles", order.sensors.size()}});
+  if (!state) return state;
+  for (const char* field : {"position_rad", "torque_nm"}) {
+    if (state->has(field)) continue;
+    return bad_log(path, std::string("the log lacks ") + field + " of its joints",
+                   "identification needs position and torque of every joint");
+  }
+  if (const Status s = check_time(path, state->time_s()); !s) return std::unexpected(s.error());
+  return state;
+}
+
+/// What of the run's making shows in its signals.
+void note_simulation(const log::RunInfo& info, const hal::RobotConfig& robot,
+                     Recording& recording) {
+  const SimFacts sim = sim_facts(info.configuration);
+  recording.hangs = sim.hangs;
+  recording.voltage_hold_known = info.hal == "sim";
+  if (!recording.voltage_hold_known || robot.boards.empty()) return;
+  const double hold_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
+  const double substep_s = 1e-9 * static_cast<double>(sim.substep_ns);
+  recording.voltage_hold_s = 0.5 * (hold_s + substep_s);
+  recording.voltage_hold_s2 = (hold_s * hold_s - substep_s * substep_s) / 12.0;
+}
+
+void take_signals(const Columns& state, const Grid& grid, const Order& order,
+                  const hal::RobotConfig& robot, Recording& recording) {
+  const auto joint_signal = [&](const char* field, std::size_t j) {
+    return on_grid(grid, state.time_s(), [&](std::size_t row) {
+      const double age = state.at("age_cycles", j, row);
+      return age > 0.0 ? kMissing : state.at(field, j, row);
+    });
+  };
+  for (const std::size_t j : order.joints) {
+    recording.position_rad.push_back(joint_signal("position_rad", j));
+    recording.torque_Nm.push_back(joint_signal("torque_nm", j));
+    recording.motor_position_rad.push_back(joint_signal("motor_position_rad", j));
+    recording.current_A.push_back(joint_signal("current_a", j));
+  }
+  for (std::size_t s = 0; s < order.sensors.size(); ++s) {
+    const std::size_t from = order.sensors[s];
+    for (std::size_t c = 0; c < robot.sensors[s].channels(); ++c) {
+      recording.sensor.push_back(on_grid(grid, state.time_s(), [&](std::size_t row) {
+        const double age = state.at("sensor_age_cycles", from, row);
+        return age > 0.0 ? kMissing : state.at("sensor", order.first_channel[from] + c, row);
+      }));
+    }
+  }
+}
+
+/// The commanded positions, where the log has them, of the samples in which they led.
+Status take_references(const log::LogFile& file, const Grid& grid, const Order& order,
+                       Recording& recording) {
+  const std::size_t n = order.joints.size();
+  recording.reference_rad.assign(n, Signal(recording.rows(), kMissing));
+  if (file.find(kCommand) == nullptr) return {};
+  auto command = Columns::read(file, kCommand, {{"position_rad", n}, {"mode", n}});
+  if (!command) return std::unexpected(command.error());
+  const std::vector<double>& times = command->time_s();
+  if (times.size() < grid.first + 1 || !std::ranges::is_sorted(times)) return {};
+  for (std::size_t j = 0; j < n; ++j) {
+    const std::size_t from = order.joints[j];
+    for (std::size_t k = 0, c = 0; k < recording.rows(); ++k) {
+      const double t = recording.time_s[k];
+      while (c < times.size() && times[c] < t - 0.5 * recording.period_s) ++c;
+      if (c == times.size()) break;
+      const bool led =
+          command->at("mode", from, c) == static_cast<double>(hal::ControlMode::kPosition);
+      if (led && std::abs(times[c] - t) < 0.5 * recording.period_s)
+        recording.reference_rad[j][k] = command->at("position_rad", from, c);
+    }
+  }
+  return {};
+}
+
+void remark_holes(Recording& recording) {
+  std::size_t missing = 0, longest = 0;
+  for (std::size_t k = 0, run = 0; k < recording.rows(); ++k) {
+    const bool valid = std::ranges::all_of(recording.position_rad,
+                                           [k](const Signal& s) { return !std::isnan(s[k]); });
+    run = valid ? 0 : run + 1;
+    missing += valid ? 0 : 1;
+    longest = std::max(longest, run);
+  }
+  if (missing == 0) return;
+  recording.remarks.push_back(fmt::format(
+      "{} of {} samples are missing, old or no numbers; the longest hole has {}; holes of up to "
+      "{} are bridged, the others excluded",
+      missing, recording.rows(), longest, kBridge_samples));
+}
+
+/// Takes out what lies. Errors: too little is left.
+Status exclude(Recording& recording, const hal::RobotConfig& robot) {
+  remark_holes(recording);
+  if (Status s = check_torques(recording, robot); !s) return s;
+  bridge_holes(recording);
+  exclude_frozen(recording, robot);
+  exclude_clipped(recording, robot);
+  for (Signal& current : recording.current_A) undo_holds(current);
+  return check_positions(recording, robot);
+}
+
 }  // namespace
 
 Result<Recording> read_recording(const std::string& path, const hal::RobotConfig& robot) {
@@ -227,43 +373,10 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
         "its state is what a tele-operator saw, predicted or late: nothing in it was measured",
         "identify from the log of the robot's end, `tandem serve`");
   }
-  std::vector<std::string> joints, sensors, logged_sensors;
-  for (const hal::JointConfig& joint : robot.joints) joints.push_back(joint.name);
-  for (const hal::SensorConfig& sensor : robot.sensors) sensors.push_back(sensor.name);
-  std::vector<std::size_t> first_channel;
-  std::size_t channels = 0;
-  for (const log::SensorInfo& sensor : info.sensors) {
-    logged_sensors.push_back(sensor.name);
-    first_channel.push_back(channels);
-    channels += sensor.channels;
-  }
-  const auto joint_order = order_of(path, "joint", joints, info.joints);
-  if (!joint_order) return std::unexpected(joint_order.error());
-  const auto sensor_order = order_of(path, "sensor", sensors, logged_sensors);
-  if (!sensor_order) return std::unexpected(sensor_order.error());
-  for (std::size_t s = 0; s < sensors.size(); ++s) {
-    if (info.sensors[(*sensor_order)[s]].channels == robot.sensors[s].channels()) continue;
-    return bad_log(
-        path, "this log is of another robot: its sensor '" + sensors[s] + "' has other channels",
-        "give --robot the robot that made it");
-  }
-
-  const std::size_t n = joints.size();
-  auto state = Columns::read(*file, kState,
-                             {{"position_rad", n},
-                              {"torque_nm", n},
-                              {"motor_position_rad", n},
-                              {"current_a", n},
-                              {"age_cycles", n},
-                              {"sensor", channels},
-                              {"sensor_age_cycles", sensors.size()}});
+  const auto order = order_of(path, info, robot);
+  if (!order) return std::unexpected(order.error());
+  const auto state = read_state(path, *file, *order);
   if (!state) return std::unexpected(state.error());
-  for (const char* field : {"position_rad", "torque_nm"}) {
-    if (state->has(field)) continue;
-    return bad_log(path, std::string("the log lacks ") + field + " of its joints",
-                   "identification needs position and torque of every joint");
-  }
-  if (const Status s = check_time(path, state->time_s()); !s) return std::unexpected(s.error());
   auto events = file->events();
   const log::RunWindow window = log::run_window(events ? *events : std::vector<log::EventText>{},
                                                 log::settle_time_s(info.configuration));
@@ -277,15 +390,7 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
   recording.data_sha256 = file->data_sha256();
   recording.period_s = grid->period_s;
   recording.time_s = grid->time_s;
-  const SimFacts sim = sim_facts(info.configuration);
-  recording.hangs = sim.hangs;
-  if (info.hal == "sim" && !robot.boards.empty()) {
-    const double hold_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
-    const double substep_s = 1e-9 * static_cast<double>(sim.substep_ns);
-    recording.voltage_hold_s = 0.5 * (hold_s + substep_s);
-    recording.voltage_hold_s2 = (hold_s * hold_s - substep_s * substep_s) / 12.0;
-  }
-  recording.voltage_hold_known = info.hal == "sim";
+  note_simulation(info, robot, recording);
   if (file->truncated()) {
     recording.remarks.push_back(
         fmt::format("the log is cut after {} bytes: its run was killed, or the copy is not whole; "
@@ -296,67 +401,10 @@ Result<Recording> read_recording(const std::string& path, const hal::RobotConfig
     recording.remarks.push_back(
         fmt::format("the run met a fault at {:.3f} s: what follows is not used", window.fault_s));
   }
-  const auto joint_signal = [&](const char* field, std::size_t joint) {
-    const std::size_t j = (*joint_order)[joint];
-    return on_grid(*grid, state->time_s(), [&](std::size_t row) {
-      const double age = state->at("age_cycles", j, row);
-      return age > 0.0 ? kMissing : state->at(field, j, row);
-    });
-  };
-  for (std::size_t j = 0; j < n; ++j) {
-    recording.position_rad.push_back(joint_signal("position_rad", j));
-    recording.torque_Nm.push_back(joint_signal("torque_nm", j));
-    recording.motor_position_rad.push_back(joint_signal("motor_position_rad", j));
-    recording.current_A.push_back(joint_signal("current_a", j));
-  }
-  for (std::size_t s = 0; s < sensors.size(); ++s) {
-    const std::size_t from = (*sensor_order)[s];
-    for (std::size_t c = 0; c < robot.sensors[s].channels(); ++c) {
-      recording.sensor.push_back(on_grid(*grid, state->time_s(), [&](std::size_t row) {
-        const double age = state->at("sensor_age_cycles", from, row);
-        return age > 0.0 ? kMissing : state->at("sensor", first_channel[from] + c, row);
-      }));
-    }
-  }
-  recording.reference_rad.assign(n, Signal(recording.rows(), kMissing));
-  if (file->find(kCommand) != nullptr) {
-    auto command = Columns::read(*file, kCommand, {{"position_rad", n}, {"mode", n}});
-    if (!command) return std::unexpected(command.error());
-    const std::vector<double>& times = command->time_s();
-    const bool matches = times.size() >= grid->first + 1 && std::ranges::is_sorted(times);
-    for (std::size_t j = 0; matches && j < n; ++j) {
-      const std::size_t from = (*joint_order)[j];
-      for (std::size_t k = 0, c = 0; k < recording.rows(); ++k) {
-        const double t = recording.time_s[k];
-        while (c < times.size() && times[c] < t - 0.5 * recording.period_s) ++c;
-        if (c == times.size()) break;
-        const bool led =
-            command->at("mode", from, c) == static_cast<double>(hal::ControlMode::kPosition);
-        if (led && std::abs(times[c] - t) < 0.5 * recording.period_s)
-          recording.reference_rad[j][k] = command->at("position_rad", from, c);
-      }
-    }
-  }
-  std::size_t missing = 0, longest = 0;
-  for (std::size_t k = 0, run = 0; k < recording.rows(); ++k) {
-    const bool valid = std::ranges::all_of(recording.position_rad,
-                                           [k](const Signal& s) { return !std::isnan(s[k]); });
-    run = valid ? 0 : run + 1;
-    missing += valid ? 0 : 1;
-    longest = std::max(longest, run);
-  }
-  if (missing > 0) {
-    recording.remarks.push_back(fmt::format(
-        "{} of {} samples are missing, old or no numbers; the longest hole has {}; holes of up to "
-        "{} are bridged, the others excluded",
-        missing, recording.rows(), longest, kBridge_samples));
-  }
-  if (const Status s = check_torques(recording, robot); !s) return std::unexpected(s.error());
-  bridge_holes(recording);
-  exclude_frozen(recording, robot);
-  exclude_clipped(recording, robot);
-  for (Signal& current : recording.current_A) undo_holds(current);
-  if (const Status s = check_positions(recording, robot); !s) return std::unexpected(s.error());
+  take_signals(*state, *grid, *order, robot, recording);
+  if (const Status s = take_references(*file, *grid, *order, recording); !s)
+    return std::unexpected(s.error());
+  if (const Status s = exclude(recording, robot); !s) return std::unexpected(s.error());
   return recording;
 }
 

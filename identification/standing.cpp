@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "model/placements.hpp"
 
@@ -45,6 +46,24 @@ std::vector<Vector2d> hull_of(std::vector<Vector2d> points) {
 Vector3d rotation_vector(const Eigen::Matrix3d& R) {
   const Eigen::AngleAxisd turned(R);
   return turned.angle() * turned.axis();
+}
+
+/// From force and moment of each foot, about its sole, to those of all, about the ground below the
+/// origin: (6, 6 feet). Moments count as forces at a tenth of a metre.
+MatrixXd grasp_of(std::span<const Vector3d> soles_m, double ground_m) {
+  MatrixXd grasp(6, 6 * static_cast<Index>(soles_m.size()));
+  Index column = 0;
+  for (const Vector3d& sole : soles_m) {
+    const Vector3d r = sole - Vector3d(0, 0, ground_m);
+    Eigen::Matrix3d skew;
+    skew << 0.0, -r.z(), r.y(), r.z(), 0.0, -r.x(), -r.y(), r.x(), 0.0;
+    grasp.block<3, 3>(0, column).setIdentity();
+    grasp.block<3, 3>(3, column) = skew;
+    grasp.block<3, 3>(0, column + 3).setZero();
+    grasp.block<3, 3>(3, column + 3) = 0.1 * Eigen::Matrix3d::Identity();
+    column += 6;
+  }
+  return grasp;
 }
 
 }  // namespace
@@ -166,28 +185,18 @@ Standing::Load Standing::load(const BasePose& pose, const VectorXd& q,
     out.margin_m = std::min(out.margin_m, turn(a, b, point) / (b - a).norm());
   }
   if (!(f.z() > 0.0)) out.margin_m = -std::numeric_limits<double>::infinity();
-  // Six numbers a foot, about its sole; moments count as forces at a tenth of a metre.
-  const auto feet = static_cast<Index>(standing_.size());
-  MatrixXd grasp(6, 6 * feet);
-  for (Index i = 0; i < feet; ++i) {
-    const Leg& leg = standing_[static_cast<std::size_t>(i)];
-    const Vector3d r =
-        (at[static_cast<std::size_t>(leg.body)] * leg.in_body).p - Vector3d(0, 0, ground_m_);
-    Eigen::Matrix3d skew;
-    skew << 0.0, -r.z(), r.y(), r.z(), 0.0, -r.x(), -r.y(), r.x(), 0.0;
-    grasp.block<3, 3>(0, 6 * i).setIdentity();
-    grasp.block<3, 3>(3, 6 * i) = skew;
-    grasp.block<3, 3>(0, 6 * i + 3).setZero();
-    grasp.block<3, 3>(3, 6 * i + 3) = 0.1 * Eigen::Matrix3d::Identity();
-  }
+  std::vector<Vector3d> soles;
+  for (const Leg& leg : standing_)
+    soles.push_back((at[static_cast<std::size_t>(leg.body)] * leg.in_body).p);
   VectorXd total(6);
   total << f, n;
-  const VectorXd share = grasp.completeOrthogonalDecomposition().solve(total);
+  const VectorXd share = grasp_of(soles, ground_m_).completeOrthogonalDecomposition().solve(total);
+  const auto feet = static_cast<Index>(standing_.size());
   out.foot_torque = VectorXd::Zero(q.size());
   out.least_share = std::numeric_limits<double>::infinity();
   for (Index i = 0; i < feet; ++i) {
     const Leg& leg = standing_[static_cast<std::size_t>(i)];
-    const Vector3d sole = (at[static_cast<std::size_t>(leg.body)] * leg.in_body).p;
+    const Vector3d& sole = soles[static_cast<std::size_t>(i)];
     const Vector3d force = share.segment<3>(6 * i);
     const Vector3d moment = 0.1 * share.segment<3>(6 * i + 3);
     out.least_share =

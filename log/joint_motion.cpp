@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::int64_t kLongestHole_ns = 20'000'000;
 constexpr std::int64_t kLongestHole_cycles = 3;
-constexpr double kHalfNanosecond = 0.5e-9;
 constexpr const char* kCommand = "/tandem/command";
 constexpr const char* kState = "/tandem/state";
 constexpr const char* kOtherStretch = "play another stretch: from_s and to_s";
@@ -146,15 +145,42 @@ std::string not_led(const Rows& rows, std::size_t joint, std::size_t row) {
   return stiff ? "" : "was compliant: its reference is not where it went";
 }
 
+/// The longest time that may lie between two samples.
+std::int64_t longest_hole_ns(const JointMotion& motion) {
+  return std::max(kLongestHole_ns, kLongestHole_cycles * motion.period_ns);
+}
+
+std::unexpected<Error> refuse_joint(const LogFile& file, const std::string& joint,
+                                    const std::string& what, std::int64_t time_ns,
+                                    std::string hint) {
+  return refuse(file, "joint '" + joint + "' " + what + " at " + seconds(time_ns), std::move(hint));
+}
+
+/// Whether a track goes on to the motion's end. `last_ns`: its last sample's time, or its begin.
+Status check_end(const LogFile& file, const JointTrack& track, const JointMotion& motion,
+                 std::int64_t last_ns) {
+  const std::int64_t longest_ns = longest_hole_ns(motion);
+  const bool few = track.time_ns.size() < 2;
+  if (few && motion.end_ns - motion.begin_ns <= longest_ns) {
+    return refuse(file,
+                  "joint '" + track.joint + "' has fewer than two samples from " +
+                      seconds(motion.begin_ns) + " to " + seconds(motion.end_ns),
+                  "play a longer stretch: from_s and to_s");
+  }
+  if (few || motion.end_ns - last_ns > longest_ns) {
+    return refuse_joint(file, track.joint, "has a gap: nothing of it was recorded after this time",
+                        last_ns, kOtherStretch);
+  }
+  return {};
+}
+
 /// The samples of one joint that are fresh.
 Result<JointTrack> track_of(const LogFile& file, const Rows& rows, std::size_t joint,
                             const JointMotion& motion, const MotionRequest& request) {
   JointTrack track;
   track.joint = request.joints[joint];
-  const std::int64_t longest_ns = std::max(kLongestHole_ns, kLongestHole_cycles * motion.period_ns);
   const auto wrong = [&](const std::string& what, std::int64_t time_ns, std::string hint) {
-    return refuse(file, "joint '" + track.joint + "' " + what + " at " + seconds(time_ns),
-                  std::move(hint));
+    return refuse_joint(file, track.joint, what, time_ns, std::move(hint));
   };
   const bool commanded = motion.source == MotionSource::kCommand;
   bool fast = true;
@@ -163,8 +189,8 @@ Result<JointTrack> track_of(const LogFile& file, const Rows& rows, std::size_t j
   const auto first = std::ranges::lower_bound(time_ns, motion.begin_ns) - time_ns.begin();
   for (auto row = static_cast<std::size_t>(first); row < time_ns.size(); ++row) {
     if (time_ns[row] > motion.end_ns) break;
-    if (!commanded && rows.at(joint, kAge, row) > 0.0) continue;  // said again
-    if (time_ns[row] - before_ns > longest_ns) break;             // is reported below
+    if (!commanded && rows.at(joint, kAge, row) > 0.0) continue;    // said again
+    if (time_ns[row] - before_ns > longest_hole_ns(motion)) break;  // is reported below
     before_ns = time_ns[row];
     if (commanded) {
       const std::string why = not_led(rows, joint, row);
@@ -188,15 +214,8 @@ Result<JointTrack> track_of(const LogFile& file, const Rows& rows, std::size_t j
     if (request.torque) track.torque_Nm.push_back(torque);
     fast = fast && std::isfinite(velocity);
   }
-  if (motion.end_ns - motion.begin_ns <= longest_ns && track.time_ns.size() < 2) {
-    return refuse(file,
-                  "joint '" + track.joint + "' has fewer than two samples from " +
-                      seconds(motion.begin_ns) + " to " + seconds(motion.end_ns),
-                  "play a longer stretch: from_s and to_s");
-  }
-  if (motion.end_ns - before_ns > longest_ns || track.time_ns.size() < 2) {
-    return wrong("has a gap: nothing of it was recorded after this time", before_ns, kOtherStretch);
-  }
+  if (const Status s = check_end(file, track, motion, before_ns); !s)
+    return std::unexpected(s.error());
   if (!fast) track.velocity_rad_s.clear();
   return track;
 }

@@ -25,7 +25,6 @@ double settle_time_s(const StringMap& configuration) {
 
 RunWindow run_window(const std::vector<EventText>& events, double settle_s) {
   RunWindow window;
-  constexpr double kHalfNanosecond = 0.5e-9;
   for (const EventText& one : events) {
     const double time_s = static_cast<double>(one.event.time_ns) * 1e-9;
     if (one.event.kind == EventKind::kBringUpDone) {

@@ -11,6 +11,10 @@
 
 namespace tandem::log {
 
+/// [s] A log counts whole nanoseconds: two of its times in seconds are the same one when they
+/// differ by less than this.
+inline constexpr double kHalfNanosecond = 0.5e-9;
+
 /// Times of the log [s]; what did not happen is far away.
 struct RunWindow {
   double bring_up_s = -1e300;  ///< its end

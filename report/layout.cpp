@@ -26,10 +26,13 @@ std::vector<double> log_ticks(double low, double high) {
       {1, 2, 5},
       {1, 1.5, 2, 3, 4, 5, 7},
       {1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 6, 7, 8, 9}};
+  const auto first = static_cast<int>(std::floor(std::log10(low)));
+  const auto end = static_cast<int>(std::ceil(std::log10(high)));
   std::vector<double> ticks;
   for (const std::vector<double>& steps : kSteps) {
     ticks.clear();
-    for (double power = std::pow(10.0, std::floor(std::log10(low))); power < high; power *= 10.0) {
+    for (int decade = first; decade < end; ++decade) {
+      const double power = std::pow(10.0, decade);
       for (const double step : steps)
         if (power * step >= low && power * step <= high) ticks.push_back(power * step);
     }

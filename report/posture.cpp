@@ -325,6 +325,40 @@ std::vector<bool> unknown_bodies(const model::Tree& tree, const hal::RobotConfig
   return unknown;
 }
 
+/// The limbs without bodies whose place nobody knows.
+std::vector<Limb> known_limbs(const model::Tree& tree, const hal::RobotConfig& robot,
+                              const std::vector<bool>& unknown) {
+  std::vector<Limb> limbs = limbs_of(tree, robot);
+  for (Limb& limb : limbs) {
+    std::erase_if(limb.bodies, [&](int body) { return unknown[static_cast<std::size_t>(body)]; });
+  }
+  std::erase_if(limbs, [](const Limb& limb) { return limb.bodies.size() < 2; });
+  return limbs;
+}
+
+/// The moments, turned so that W's x goes to the drawing's right: ahead or, from the front, W's y.
+std::vector<PostureSample> turned(const model::Tree& tree, const hal::RobotConfig& robot,
+                                  std::span<const PostureSample> moments, bool from_front) {
+  const Eigen::Vector3d right = from_front ? Eigen::Vector3d(Eigen::Vector3d::UnitY())
+                                           : ahead_of(tree, robot, moments.front());
+  const Eigen::AngleAxisd view(-std::atan2(right.y(), right.x()), Eigen::Vector3d::UnitZ());
+  const model::Placement turn{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
+  std::vector<PostureSample> samples(moments.begin(), moments.end());
+  for (PostureSample& sample : samples) sample.base = turn * sample.base;
+  return samples;
+}
+
+Figure empty_figure(bool from_front, bool leaves_out) {
+  Figure figure;
+  figure.name = "posture";
+  figure.title =
+      from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
+  if (leaves_out) figure.title += ", without what passive joints move";
+  figure.y_label = "z [m]";
+  figure.equal_axes = true;
+  return figure;
+}
+
 }  // namespace
 
 std::vector<model::Placement> body_placements(const model::Tree& tree,
@@ -344,26 +378,10 @@ Figure posture_figure(const model::Tree& tree, const hal::RobotConfig& configure
   if (leaves_out) robot.loops.clear();
   const bool legged = !robot.contact.feet.empty();
   const bool from_front = !legged && shows_more_from_front(tree, robot, moments);
-  std::vector<PostureSample> samples(moments.begin(), moments.end());
-  // What is drawn to the right: ahead or, from the front, W's y.
-  const Eigen::Vector3d right = from_front ? Eigen::Vector3d(Eigen::Vector3d::UnitY())
-                                           : ahead_of(tree, robot, samples.front());
-  const Eigen::AngleAxisd view(-std::atan2(right.y(), right.x()), Eigen::Vector3d::UnitZ());
-  const model::Placement turned{view.toRotationMatrix(), Eigen::Vector3d::Zero()};
-  for (PostureSample& sample : samples) sample.base = turned * sample.base;
-  Figure figure;
-  figure.name = "posture";
-  figure.title =
-      from_front ? "Posture, seen from the front" : "Posture, seen from the robot's right";
-  if (leaves_out) figure.title += ", without what passive joints move";
-  figure.y_label = "z [m]";
-  figure.equal_axes = true;
+  const std::vector<PostureSample> samples = turned(tree, robot, moments, from_front);
+  Figure figure = empty_figure(from_front, leaves_out);
   Sticks sticks(legged ? "trunk" : robot.name);
-  std::vector<Limb> limbs = limbs_of(tree, robot);
-  for (Limb& limb : limbs) {
-    std::erase_if(limb.bodies, [&](int body) { return unknown[static_cast<std::size_t>(body)]; });
-  }
-  std::erase_if(limbs, [](const Limb& limb) { return limb.bodies.size() < 2; });
+  const std::vector<Limb> limbs = known_limbs(tree, robot, unknown);
   std::vector<Sticks> drawn;
   std::vector<Extents> extents;
   Extent up_m;

@@ -139,10 +139,13 @@ Result<std::optional<Replay>> find_replay(const RunData& run, const RunData& rec
   const auto whole = [period_s](double time_s) { return std::ceil(time_s / period_s - 1e-6); };
   const double lead_s =
       (whole(what->approach_s) + std::round(log::kReplayRunUp_s / period_s)) * period_s;
+  const auto begin_s = [&](std::int64_t cycle) {
+    return run.time_s.front() + lead_s + static_cast<double>(cycle) * period_s;
+  };
   double best = kAlike_rad;
   std::optional<Replay> found;
-  for (replay.begin_s = run.time_s.front() + lead_s; replay.begin_s < run.time_s.back();
-       replay.begin_s += period_s) {
+  for (std::int64_t cycle = 0; begin_s(cycle) < run.time_s.back(); ++cycle) {
+    replay.begin_s = begin_s(cycle);
     const double off = probe_distance(run, *motion, replay, best);
     if (off < best) {
       best = off;

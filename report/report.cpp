@@ -242,6 +242,46 @@ Result<std::vector<RunData>> read_others(const RunData& run, const std::vector<s
   return others;
 }
 
+/// Why the figures lack something: no kernels or truth, or passive joints that cannot be closed,
+/// which this tries.
+std::vector<std::string> close_and_remark(const std::vector<RunData*>& all,
+                                          const tandem_kernels* kernels) {
+  const RunData& run = *all.front();
+  if (kernels == nullptr) {
+    return {
+        "no inverse dynamics: there is no kernel library that fits this log; run: "
+        "tandem model build " +
+        run.robot.file};
+  }
+  std::vector<std::string> remarks;
+  if (kernels->floating_base != 0 && !run.motion_known()) {
+    remarks.emplace_back(
+        "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
+  }
+  for (RunData* one : all) {
+    if (const Status closed = close_passive(*one, *kernels); !closed)
+      remarks.push_back("what passive joints move is not drawn: " + closed.error().message);
+  }
+  return remarks;
+}
+
+/// All figures of the report, in its order. `parallel`: the other run is the internal model.
+Result<std::vector<Figure>> draw_all(const RunData& run, const OtherRuns& others, bool parallel,
+                                     const tandem_kernels* kernels) {
+  std::vector<Figure> figures = figures_of(run, others, kernels);
+  if (parallel) {
+    for (Figure& figure : difference_figures(run, *others.front()))
+      figures.push_back(std::move(figure));
+  }
+  auto wrenches = wrench_figures(run);
+  if (!wrenches) return std::unexpected(wrenches.error());
+  figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
+                 std::make_move_iterator(wrenches->end()));
+  for (Figure& figure : figures)
+    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
+  return figures;
+}
+
 }  // namespace
 
 Result<ReportFiles> make_report(const std::string& log, const std::vector<std::string>& other_logs,
@@ -263,35 +303,13 @@ Result<ReportFiles> make_report(const std::string& log, const std::vector<std::s
 
   ReportFiles files;
   const tandem_kernels* kernels = find_kernels(*run);
-  if (kernels == nullptr) {
-    files.remarks.push_back(
-        "no inverse dynamics: there is no kernel library that fits this log; run: "
-        "tandem model build " +
-        run->robot.file);
-  } else if (kernels->floating_base != 0 && !run->motion_known()) {
-    files.remarks.push_back(
-        "no inverse dynamics: the log lacks the base's motion and the ground's forces (no truth)");
-  }
   std::vector<RunData*> all{&*run};
   for (RunData& one : *other_runs) all.push_back(&one);
-  for (RunData* one : all) {
-    if (const Status closed = kernels == nullptr ? Status{} : close_passive(*one, *kernels);
-        !closed) {
-      files.remarks.push_back("what passive joints move is not drawn: " + closed.error().message);
-    }
-  }
+  files.remarks = close_and_remark(all, kernels);
   const OtherRuns others(all.begin() + 1, all.end());
-  std::vector<Figure> figures = figures_of(*run, others, kernels);
-  if (*beside) {
-    for (Figure& figure : difference_figures(*run, *others.front()))
-      figures.push_back(std::move(figure));
-  }
-  auto wrenches = wrench_figures(*run);
-  if (!wrenches) return std::unexpected(wrenches.error());
-  figures.insert(figures.end() - 1, std::make_move_iterator(wrenches->begin()),
-                 std::make_move_iterator(wrenches->end()));
-  for (Figure& figure : figures)
-    if (!figure.equal_axes) break_at_gaps(figure);  // all but the posture are over time
+  const auto drawn = draw_all(*run, others, beside->has_value(), kernels);
+  if (!drawn) return std::unexpected(drawn.error());
+  const std::vector<Figure>& figures = *drawn;
   if (const Status s = draw(figures, folder); !s) return std::unexpected(s.error());
   const Page page = *beside ? parallel_page(*run, *others.front()) : page_of(*run, others, replays);
   if (const Status s = write_page(page, figures, folder); !s) {

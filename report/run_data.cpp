@@ -284,8 +284,7 @@ const RunFault* RunData::stop() const {
 
 std::size_t RunData::rows_before_stop() const {
   if (stop() == nullptr) return rows();
-  constexpr double kHalfNanosecond = 0.5e-9;
-  const auto after = std::ranges::upper_bound(time_s, stop()->time_s + kHalfNanosecond);
+  const auto after = std::ranges::upper_bound(time_s, stop()->time_s + log::kHalfNanosecond);
   return std::max<std::size_t>(1, static_cast<std::size_t>(after - time_s.begin()));
 }
 
@@ -375,10 +374,9 @@ Result<std::optional<RunData>> read_parallel(const RunData& run) {
     second.robot = std::move(*other);
     if (const Status s = read_description(second); !s) return std::unexpected(s.error());
   }
-  constexpr double kHalfNanosecond = 0.5e-9;
   log::RunWindow window;
-  window.begin_s = run.time_s.front() - kHalfNanosecond;
-  window.end_s = run.time_s.back() + kHalfNanosecond;
+  window.begin_s = run.time_s.front() - log::kHalfNanosecond;
+  window.end_s = run.time_s.back() + log::kHalfNanosecond;
   auto table = state_columns(*file, kParallelState, second);
   if (!table) return std::unexpected(table.error());
   if (const Status s = read_rows(*table, window, second); !s) return std::unexpected(s.error());

@@ -165,16 +165,7 @@ class Subcommands {
   std::vector<std::function<std::optional<Command>()>> choices_;
 };
 
-}  // namespace
-
-Command parse_command_line(int argc, const char* const* argv) {
-  CLI::App app{"Tandem: one controller, simulated robot and real robot in tandem.", "tandem"};
-  app.footer(kExamples);
-  app.require_subcommand(1);
-  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
-  app.get_formatter()->column_width(34);
-
-  Subcommands commands(app);
+void add_all(Subcommands& commands) {
   commands.add<RunOptions>("run", "Run an experiment");
   commands.add<ServeOptions>("serve", "Run a robot for controllers in other processes");
   commands.add<EmulateOptions>("emulate",
@@ -204,7 +195,19 @@ Command parse_command_line(int argc, const char* const* argv) {
   commands.add<DoctorOptions>("doctor", "Is this machine fit for real time?");
   commands.add<BenchOptions>("bench", "Measure this build: engines");
   commands.add<LatencyOptions>("latency", "Wake-up latency of the loop, beside cyclictest");
+}
 
+}  // namespace
+
+Command parse_command_line(int argc, const char* const* argv) {
+  CLI::App app{"Tandem: one controller, simulated robot and real robot in tandem.", "tandem"};
+  app.footer(kExamples);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "tandem " TANDEM_VERSION);
+  app.get_formatter()->column_width(34);
+
+  Subcommands commands(app);
+  add_all(commands);
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
   if (!words.empty() && words.front() == "help") {
     words.erase(words.begin());

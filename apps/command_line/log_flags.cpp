@@ -91,6 +91,37 @@ void add_replay_flags(CLI::App& replay, LogOptions& o) {
   replay.callback([&o] { o.action = LogOptions::Action::kReplay; });
 }
 
+void add_thresholds_flags(CLI::App& thresholds, LogOptions& o) {
+  thresholds.add_option("logs", o.files, "MCAP files of such runs, better three than one")
+      ->required();
+  thresholds.add_option("--against", o.against,
+                        "MCAP files of other runs, with pushes or without: count and time alarms");
+  thresholds.add_option("-o,--output", o.output, "Folder for that as a page with figures")
+      ->needs("--against")
+      ->check(is_given(kNameAFile));
+  thresholds
+      .add_option("--per-hour", o.alarms_per_hour,
+                  "False alarms per hour of all joints together (default: 1)")
+      ->check(CLI::Range(1e-6, 3600.0));
+  thresholds.add_option("--from", o.from_s, "Leave out what was before [s] (default: 0)")
+      ->check(CLI::Range(0.0, 1e6));
+  thresholds.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  thresholds.footer(kLogThresholdsExamples);
+  thresholds.callback([&o] { o.action = LogOptions::Action::kThresholds; });
+}
+
+void add_import_flags(CLI::App& taken, LogOptions& o) {
+  taken.add_option("files", o.files, "CSV tables side by side, or MCAP bags one after another")
+      ->required();
+  taken.add_option("--robot", o.robot, "The robot that was recorded: its TOML")->required();
+  taken.add_option("--map", o.map, "TOML that says what columns or topics mean")->required();
+  taken.add_option("-o,--output", o.output, "Log to write (default: runs/ROBOT-FILE.mcap)")
+      ->check(is_given(kNameAFile));
+  taken.add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
+  taken.footer(kLogImportExamples);
+  taken.callback([&o] { o.action = LogOptions::Action::kImport; });
+}
+
 }  // namespace
 
 void add_flags(CLI::App& app, LogOptions& o) {
@@ -115,35 +146,10 @@ void add_flags(CLI::App& app, LogOptions& o) {
   diff->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
   diff->footer(kLogDiffExamples);
   diff->callback([&o] { o.action = LogOptions::Action::kDiff; });
-  CLI::App* thresholds =
-      app.add_subcommand("thresholds", "Collision thresholds from runs that touched nothing");
-  thresholds->add_option("logs", o.files, "MCAP files of such runs, better three than one")
-      ->required();
-  thresholds->add_option("--against", o.against,
-                         "MCAP files of other runs, with pushes or without: count and time alarms");
-  thresholds->add_option("-o,--output", o.output, "Folder for that as a page with figures")
-      ->needs("--against")
-      ->check(is_given(kNameAFile));
-  thresholds
-      ->add_option("--per-hour", o.alarms_per_hour,
-                   "False alarms per hour of all joints together (default: 1)")
-      ->check(CLI::Range(1e-6, 3600.0));
-  thresholds->add_option("--from", o.from_s, "Leave out what was before [s] (default: 0)")
-      ->check(CLI::Range(0.0, 1e6));
-  thresholds->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  thresholds->footer(kLogThresholdsExamples);
-  thresholds->callback([&o] { o.action = LogOptions::Action::kThresholds; });
-  CLI::App* taken =
-      app.add_subcommand("import", "A recording of another program (CSV, ROS 2 bag) as a log");
-  taken->add_option("files", o.files, "CSV tables side by side, or MCAP bags one after another")
-      ->required();
-  taken->add_option("--robot", o.robot, "The robot that was recorded: its TOML")->required();
-  taken->add_option("--map", o.map, "TOML that says what columns or topics mean")->required();
-  taken->add_option("-o,--output", o.output, "Log to write (default: runs/ROBOT-FILE.mcap)")
-      ->check(is_given(kNameAFile));
-  taken->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  taken->footer(kLogImportExamples);
-  taken->callback([&o] { o.action = LogOptions::Action::kImport; });
+  add_thresholds_flags(
+      *app.add_subcommand("thresholds", "Collision thresholds from runs that touched nothing"), o);
+  add_import_flags(
+      *app.add_subcommand("import", "A recording of another program (CSV, ROS 2 bag) as a log"), o);
   add_replay_flags(*app.add_subcommand("replay", "An experiment that plays the motion of a log"),
                    o);
 }

@@ -23,6 +23,9 @@ constexpr std::array kModes{ControlMode::kIdle,   ControlMode::kPosition, Contro
 constexpr std::array kInteractions{InteractionMode::kStiff, InteractionMode::kCompliant};
 constexpr std::array kLoops{hal::PidLoop::kPosition, hal::PidLoop::kVelocity, hal::PidLoop::kTorque,
                             hal::PidLoop::kCurrent};
+const ControlKey kJoint{.name = "joint", .required = true, .doc = "its name"};
+
+using Type = ControlKey::Type;
 
 /// The run, its robot, and how far each joint goes.
 struct Run {
@@ -213,28 +216,12 @@ Result<Json> set_gains(const Run& run, const Json& request) {
   return answer;
 }
 
-}  // namespace
-
-void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
-                        const hal::RobotConfig& robot) {
-  const auto run = std::make_shared<const Run>(Run{cycle, robot, hal::joint_capabilities(robot)});
-  using Type = ControlKey::Type;
-  const ControlKey joint{.name = "joint", .required = true, .doc = "its name"};
-  registry.add("joint.list", ControlEffect::kReads,
-               "every joint: who has it, what it does, what is measured", {},
-               [run](const Json&) -> Result<Json> { return list(*run); });
-  registry.add("joint.set", ControlEffect::kChanges,
-               "mode and interaction of a joint that no active controller claims, impedance of any",
-               {joint,
-                {.name = "mode", .doc = "idle, position, velocity, torque, open_loop, current"},
-                {.name = "interaction", .doc = "stiff, compliant"},
-                {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
-                {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
-               [run](const Json& request) { return set(*run, request); });
+/// The commands by which a joint moves by itself: to a target, to its place, back into its limits.
+void add_moves(ControlRegistry& registry, const std::shared_ptr<const Run>& run) {
   registry.add(
       "joint.move", ControlEffect::kChanges,
       "moves a joint that no active controller claims, with a trapezoidal velocity profile",
-      {joint,
+      {kJoint,
        {.name = "target_rad", .type = Type::kNumber, .required = true, .doc = "m of a slide"},
        {.name = "speed_rad_s", .type = Type::kNumber, .doc = "else a quarter of its limit"},
        {.name = "acceleration_rad_s2",
@@ -243,7 +230,7 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
        {.name = "unit", .doc = "angle, length: what the joint has to be"}},
       [run](const Json& request) { return move(*run, request); });
   registry.add("joint.stop", ControlEffect::kChanges,
-               "brakes a joint that joint.move or joint.home leads", {joint},
+               "brakes a joint that joint.move or joint.home leads", {kJoint},
                [run](const Json& request) {
                  const auto name = request["joint"].get<std::string>();
                  return tell(*run, name, run->cycle.services().move_joint(name, {}));
@@ -251,22 +238,41 @@ void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
   registry.add(
       "joint.home", ControlEffect::kChanges,
       "lets the drive of a joint find the joint's place, as its `homing` in robot.toml says",
-      {joint}, [run](const Json& request) {
+      {kJoint}, [run](const Json& request) {
         const auto name = request["joint"].get<std::string>();
         return tell(*run, name, run->cycle.services().home_joint(name));
       });
   registry.add("joint.recover", ControlEffect::kChanges,
                "leads a joint that stands outside its limits back, at a twentieth of its velocity",
-               {joint}, [run](const Json& request) {
+               {kJoint}, [run](const Json& request) {
                  const auto name = request["joint"].get<std::string>();
                  return tell(*run, name, run->cycle.services().recover(name));
                });
+}
+
+}  // namespace
+
+void add_joint_commands(ControlRegistry& registry, RobotCycle& cycle,
+                        const hal::RobotConfig& robot) {
+  const auto run = std::make_shared<const Run>(Run{cycle, robot, hal::joint_capabilities(robot)});
+  registry.add("joint.list", ControlEffect::kReads,
+               "every joint: who has it, what it does, what is measured", {},
+               [run](const Json&) -> Result<Json> { return list(*run); });
+  registry.add("joint.set", ControlEffect::kChanges,
+               "mode and interaction of a joint that no active controller claims, impedance of any",
+               {kJoint,
+                {.name = "mode", .doc = "idle, position, velocity, torque, open_loop, current"},
+                {.name = "interaction", .doc = "stiff, compliant"},
+                {.name = "stiffness_Nm_rad", .type = Type::kNumber, .doc = "of the virtual spring"},
+                {.name = "damping_Nms_rad", .type = Type::kNumber, .doc = "of the virtual damper"}},
+               [run](const Json& request) { return set(*run, request); });
+  add_moves(registry, run);
   registry.add(
       "joint.reset", ControlEffect::kChanges,
-      "clears the fault of one drive; while the run is faulted nothing is enabled", {joint},
+      "clears the fault of one drive; while the run is faulted nothing is enabled", {kJoint},
       [run](const Json& request) { return reset(*run, request["joint"].get<std::string>()); });
   registry.add("joint.gains", ControlEffect::kChanges, "gains of a loop in a joint's drive, by SDO",
-               {joint,
+               {kJoint,
                 {.name = "loop", .required = true, .doc = "position, velocity, torque, current"},
                 {.name = "kp", .type = Type::kNumber, .doc = "as in [gains]; it stays if left out"},
                 {.name = "ki", .type = Type::kNumber, .doc = "the same"},

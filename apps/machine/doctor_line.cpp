@@ -142,6 +142,33 @@ Finding states(const hal::BusConfig& bus) {
           "switch the slaves off and on, or end the run that left them"};
 }
 
+/// How far the clocks are from slave `reference`. `silent`: a slave whose clock did not answer.
+Finding worst_clock(const hal::BusConfig& bus, const hal::ecat::SurveyTiming& timing,
+                    const std::vector<ClockFinding>& clocks, const std::string& reference,
+                    const std::string& silent) {
+  const ClockFinding& worst = *std::ranges::max_element(clocks, {}, &ClockFinding::difference_ns);
+  const std::string slave = slave_text(worst.slave, worst.name);
+  Finding finding{bus.interface + " clocks",
+                  Health::kOk,
+                  fmt::format("within {} ns of {}, jitter {:.0f} ns: worst {}; {} cycles of {} us",
+                              worst.difference_ns, reference, worst.jitter_ns, slave, timing.cycles,
+                              timing.period_ns / 1000),
+                  {},
+                  {}};
+  if (!silent.empty()) {
+    finding.health = Health::kMissing;
+    finding.value = silent + " was not heard";
+    finding.why = "frames are lost, or its clock cannot be read";
+    finding.mend = "look at the cables: ethtool -S " + bus.interface;
+  } else if (worst.difference_ns > hal::ecat::SlaveMaster::kSettledNs) {
+    finding.health = Health::kWarning;
+    finding.why = fmt::format("a run waits until a clock is within {} ns",
+                              hal::ecat::SlaveMaster::kSettledNs);
+    finding.mend = "replace " + slave + " or the cable before it";
+  }
+  return finding;
+}
+
 /// All clocks, and of them the worst.
 void clocks(const hal::BusConfig& bus, const std::vector<SlavePlan>& plans,
             const hal::ecat::SurveyTiming& timing, const LineSurvey& survey, LineFindings& out) {
@@ -172,29 +199,8 @@ void clocks(const hal::BusConfig& bus, const std::vector<SlavePlan>& plans,
     out.findings.push_back({name, Health::kOk, "only that of " + reference, {}, {}});
     return;
   }
-  const ClockFinding& worst =
-      *std::ranges::max_element(out.clocks, {}, &ClockFinding::difference_ns);
+  out.findings.push_back(worst_clock(bus, timing, out.clocks, reference, silent));
   const ClockFinding& last = *std::ranges::max_element(out.clocks, {}, &ClockFinding::delay_ns);
-  Finding finding{
-      name,
-      Health::kOk,
-      fmt::format("within {} ns of {}, jitter {:.0f} ns: worst {}; {} cycles of {} us",
-                  worst.difference_ns, reference, worst.jitter_ns,
-                  slave_text(worst.slave, worst.name), timing.cycles, timing.period_ns / 1000),
-      {},
-      {}};
-  if (!silent.empty()) {
-    finding.health = Health::kMissing;
-    finding.value = silent + " was not heard";
-    finding.why = "frames are lost, or its clock cannot be read";
-    finding.mend = "look at the cables: ethtool -S " + bus.interface;
-  } else if (worst.difference_ns > hal::ecat::SlaveMaster::kSettledNs) {
-    finding.health = Health::kWarning;
-    finding.why = fmt::format("a run waits until a clock is within {} ns",
-                              hal::ecat::SlaveMaster::kSettledNs);
-    finding.mend = "replace " + slave_text(worst.slave, worst.name) + " or the cable before it";
-  }
-  out.findings.push_back(std::move(finding));
   out.findings.push_back({bus.interface + " delay",
                           Health::kOk,
                           fmt::format("{} ns from {} to {}", last.delay_ns, reference,

@@ -250,6 +250,33 @@ void override_experiment(runtime::Experiment& e, const Overrides& overrides) {
   e.hal.delay_cycles = overrides.delay_cycles.value_or(e.hal.delay_cycles);
 }
 
+/// Why [teleoperation] cannot be done: empty if it can, or is not wanted.
+Diagnostics unfit_for_link(const runtime::Experiment& e, const Overrides& overrides) {
+  if (!e.teleoperation) return {};
+  if (e.hal.backend == runtime::BackendKind::kWire && !overrides.serves) {
+    return {{.message = "the link lies between two processes",
+             .hint = "run with --hal dds, and serve the robot: tandem serve " + e.file + " --hal " +
+                     e.hal.wire,
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
+  const auto homed = std::ranges::find_if(
+      e.robot.joints, [](const hal::JointConfig& joint) { return joint.homing.has_value(); });
+  if (homed != e.robot.joints.end()) {
+    return {{.message = "nothing is homed over the link, and " + homed->name + " has `homing`",
+             .hint = "leave out [teleoperation], or give the joint an absolute encoder",
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
+  if (overrides.serves && (overrides.lockstep || e.remote.lockstep)) {
+    return {{.message = "in lockstep the link is at the operator's end",
+             .hint = "leave --lockstep out, or serve the robot by an experiment without this table",
+             .file = e.file,
+             .key = "teleoperation"}};
+  }
+  return {};
+}
+
 /// Why it cannot be run, whatever the robot.
 Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
   if (e.cycles() == 0) {
@@ -280,28 +307,7 @@ Diagnostics unfit(const runtime::Experiment& e, const Overrides& overrides) {
              .file = e.file,
              .key = "hal.backend"}};
   }
-  const bool is_wire = e.hal.backend == runtime::BackendKind::kWire;
-  if (e.teleoperation && is_wire && !overrides.serves) {
-    return {{.message = "the link lies between two processes",
-             .hint = "run with --hal dds, and serve the robot: tandem serve " + e.file + " --hal " +
-                     e.hal.wire,
-             .file = e.file,
-             .key = "teleoperation"}};
-  }
-  const auto homed = std::ranges::find_if(
-      e.robot.joints, [](const hal::JointConfig& joint) { return joint.homing.has_value(); });
-  if (e.teleoperation && homed != e.robot.joints.end()) {
-    return {{.message = "nothing is homed over the link, and " + homed->name + " has `homing`",
-             .hint = "leave out [teleoperation], or give the joint an absolute encoder",
-             .file = e.file,
-             .key = "teleoperation"}};
-  }
-  if (e.teleoperation && overrides.serves && (overrides.lockstep || e.remote.lockstep)) {
-    return {{.message = "in lockstep the link is at the operator's end",
-             .hint = "leave --lockstep out, or serve the robot by an experiment without this table",
-             .file = e.file,
-             .key = "teleoperation"}};
-  }
+  if (Diagnostics link = unfit_for_link(e, overrides); !link.empty()) return link;
   if (!overrides.scenario.empty() && e.hal.backend != runtime::BackendKind::kSim) {
     return {{.message = "faults are injected on the other end of the wire",
              .hint = is_remote ? "give --scenario to `tandem serve`"

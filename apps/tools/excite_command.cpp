@@ -147,6 +147,50 @@ Result<Found> search(const RobotFiles& robot, const ExciteOptions& options,
               "give another --seed, a longer --period, or --share less");
 }
 
+Facts facts_of(const RobotFiles& robot, const ExciteOptions& options, const Found& found) {
+  const identification::Excitation& result = found.excitation;
+  Facts facts;
+  facts.add("experiment", options.output);
+  facts.add("condition number", condition_text(result));
+  facts.add("joints",
+            fmt::format("{} move, {} are held", result.joints.size(), result.still.size()));
+  facts.add("way to limits", fmt::format("{:.0f} % at most", 100.0 * result.position_share));
+  facts.add("speed", fmt::format("{:.0f} % of a limit at most", 100.0 * result.speed_share));
+  facts.add("torque", fmt::format("{:.0f} % of a limit at most", 100.0 * result.torque_share));
+  if (std::isfinite(result.room_m))
+    facts.add("self-distance", fmt::format("{:.0f} mm more than required", 1e3 * result.room_m));
+  if (options.hung) facts.add("hoist", fmt::format("lifts it {:.2f} m", result.lift_m));
+  if (robot.tree.floating_base && !options.hung)
+    facts.add("balance", fmt::format("{:.0f} mm inside the feet", 1e3 * result.margin_m));
+  if (robot.tree.floating_base && options.output != "-") {
+    facts.add("simulated",
+              found.refused.empty()
+                  ? std::string("it runs through")
+                  : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
+                                found.share, found.refused));
+  }
+  return facts;
+}
+
+Json to_json(const ExciteOptions& options, const Found& found) {
+  const identification::Excitation& result = found.excitation;
+  const auto number = [](double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+  };
+  return {{"experiment", options.output},
+          {"condition_number", number(result.condition_number)},
+          {"base_parameters", result.base_parameters},
+          {"joints", result.joints},
+          {"held", result.still},
+          {"position_share", result.position_share},
+          {"speed_share", result.speed_share},
+          {"torque_share", result.torque_share},
+          {"share", found.share},
+          {"lift_m", result.lift_m},
+          {"room_m", number(result.room_m)},
+          {"margin_m", result.margin_m}};
+}
+
 }  // namespace
 
 Exit excite_command(const ExciteOptions& given, const Trial& trial) {
@@ -176,52 +220,17 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
     posture = robot->config.postures.front().name;
   if (options.tries <= 0) options.tries = robot->config.joints.size() > 12 ? 60 : 300;
   Draft draft = Draft::file(options.output);
-  const auto found = search(*robot, options, posture, draft.path(), trial);
+  auto found = search(*robot, options, posture, draft.path(), trial);
   if (!found) {
     Error error = draft.placed(found.error());
     if (error.file.empty()) error.file = options.robot;
     return refuse(error);
   }
   if (const Status placed = draft.place(); !placed) return refuse(placed.error());
-  const identification::Excitation* const result = &found->excitation;
-  std::FILE* out = human_output(options.json);
-  Facts facts;
-  facts.add("experiment", options.output);
-  facts.add("condition number", condition_text(*result));
-  facts.add("joints",
-            fmt::format("{} move, {} are held", result->joints.size(), result->still.size()));
-  facts.add("way to limits", fmt::format("{:.0f} % at most", 100.0 * result->position_share));
-  facts.add("speed", fmt::format("{:.0f} % of a limit at most", 100.0 * result->speed_share));
-  facts.add("torque", fmt::format("{:.0f} % of a limit at most", 100.0 * result->torque_share));
-  if (std::isfinite(result->room_m))
-    facts.add("self-distance", fmt::format("{:.0f} mm more than required", 1e3 * result->room_m));
-  if (options.hung) facts.add("hoist", fmt::format("lifts it {:.2f} m", result->lift_m));
-  if (robot->tree.floating_base && !options.hung)
-    facts.add("balance", fmt::format("{:.0f} mm inside the feet", 1e3 * result->margin_m));
-  if (robot->tree.floating_base && options.output != "-") {
-    facts.add("simulated",
-              found->refused.empty()
-                  ? std::string("it runs through")
-                  : fmt::format("it runs through with --share {:.3g}; more ended with: {}",
-                                found->share, draft.placed(found->refused)));
-  }
-  facts.print(out);
-  const auto number = [](double value) {
-    return std::isfinite(value) ? Json(value) : Json(nullptr);
-  };
-  const Json json{{"experiment", options.output},
-                  {"condition_number", number(result->condition_number)},
-                  {"base_parameters", result->base_parameters},
-                  {"joints", result->joints},
-                  {"held", result->still},
-                  {"position_share", result->position_share},
-                  {"speed_share", result->speed_share},
-                  {"torque_share", result->torque_share},
-                  {"share", found->share},
-                  {"lift_m", result->lift_m},
-                  {"room_m", number(result->room_m)},
-                  {"margin_m", result->margin_m}};
-  if (const Status s = write_json(options.json, json); !s) return refuse(s.error());
+  found->refused = draft.placed(found->refused);
+  facts_of(*robot, options, *found).print(human_output(options.json));
+  if (const Status s = write_json(options.json, to_json(options, *found)); !s)
+    return refuse(s.error());
   return Exit::kDone;
 }
 

@@ -50,7 +50,7 @@ Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robo
   for (const auto& [file, text] : info.configuration) {
     const auto document = TomlDocument::parse(text, file);
     if (!file.ends_with(".toml") || !document || !document->root().has("robot")) continue;
-    const std::string posture = document->root().text_or("posture", "");
+    std::string posture = document->root().text_or("posture", "");
     if (robot.posture(posture) != nullptr) return posture;
   }
   return known.empty() ? std::string() : known.front();

@@ -224,20 +224,26 @@ Diagnostics check_input(const std::string& file) {
              "`tandem run " + file + "` runs an experiment", file);
 }
 
-Diagnostics run(const NewOptions& options) {
+/// Whether the robot may be written to `folder`.
+Diagnostics check_folder(const std::string& folder, bool force) {
   std::error_code ignored;
-  const std::string name = plain_name(fs::path(options.urdf).stem().string());
-  const std::string folder = options.output.empty() ? name : options.output;
-  if (Diagnostics wrong = check_input(options.urdf); !wrong.empty()) return wrong;
   const bool exists = fs::exists(folder, ignored);
   if (exists && !fs::is_directory(folder, ignored)) {
     return one("this is a file, and the robot needs a folder", "give another one with -o", folder);
   }
-  if (exists && !options.force) {
+  if (exists && !force) {
     return one("this exists already",
                "give another folder with -o; or --force, which keeps files that differ as FILE~",
                folder);
   }
+  return {};
+}
+
+Diagnostics run(const NewOptions& options) {
+  const std::string name = plain_name(fs::path(options.urdf).stem().string());
+  const std::string folder = options.output.empty() ? name : options.output;
+  if (Diagnostics wrong = check_input(options.urdf); !wrong.empty()) return wrong;
+  if (Diagnostics wrong = check_folder(folder, options.force); !wrong.empty()) return wrong;
   std::optional<scaffold::Like> like;
   if (!options.like.empty()) {
     auto read = read_like(options.like);

@@ -84,7 +84,7 @@ Result<std::unique_ptr<LineBus>> LineBus::create(const RobotConfig& robot, std::
       at = static_cast<std::uint8_t>(at + pdo.bytes);
     }
   }
-  auto line = ecat::LineMaster::create(link, std::move(plans));
+  auto line = ecat::LineMaster::create(link, plans);
   if (!line) return std::unexpected(line.error());
   return std::unique_ptr<LineBus>(new LineBus(link, std::move(*line), std::move(slaves), config));
 }

@@ -60,10 +60,36 @@ std::array<double, 2> home_switch_rad(const hal::JointConfig& joint) {
   return {middle, kEnd};
 }
 
+firmware::ControllerConfig controller_config(const hal::JointConfig& joint,
+                                             const hal::ActuatorConfig& actuator,
+                                             const hal::GainsConfig& gains) {
+  const double motor_constant = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+  firmware::ControllerConfig c;
+  c.position = pid(gains.position, joint.max_torque_Nm);
+  c.velocity = pid(gains.velocity, joint.max_torque_Nm);
+  c.torque = pid(gains.torque, actuator.voltage_limit_V);
+  c.current = pid(gains.current, actuator.voltage_limit_V);
+  c.torque_to_voltage_V_Nm = gains.torque_feedforward * actuator.resistance_ohm / motor_constant;
+  c.emf_compensation_Vs_rad = gains.emf_compensation * motor_constant;
+  c.resistance_ohm = actuator.resistance_ohm;
+  c.motor_constant_Nm_A = motor_constant;
+  c.spring_Nm_rad = actuator.order >= 2 ? actuator.spring_Nm_rad : 0.0;
+  c.voltage_limit_V = actuator.voltage_limit_V;
+  c.current_limit_A = actuator.current_limit_A;
+  c.torque_limit_Nm = joint.max_torque_Nm;
+  c.torque_slope_Nm_s = hal::torque_rate_Nm_s(joint);
+  c.velocity_limit_rad_s = joint.max_velocity_rad_s;
+  c.min_position_rad = joint.min_position_rad;
+  c.max_position_rad = joint.max_position_rad;
+  c.position_feedback = gains.position_feedback == hal::PositionFeedback::kMotor
+                            ? firmware::PositionFeedback::kMotor
+                            : firmware::PositionFeedback::kLink;
+  return c;
+}
+
 firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointConfig& joint) {
   const hal::ActuatorConfig& actuator = robot.actuator_of(joint);
   const hal::GainsConfig& gains = robot.gains_of(joint);
-  const double motor_constant = actuator.gear_ratio * actuator.torque_constant_Nm_A;
   firmware::AxisSetup axis;
   axis.link_counts_per_rev = joint.encoder_counts_per_rev;
   axis.motor_counts_per_rev = joint.motor_encoder_counts_per_rev;
@@ -95,26 +121,7 @@ firmware::AxisSetup axis_setup(const hal::RobotConfig& robot, const hal::JointCo
   axis.counts_from_power_on = joint.homing && joint.homing->required;
   axis.quick_stop_rad_s2 = joint.max_velocity_rad_s / kQuickestStop_s;
   axis.undervoltage_V = kUndervoltageShare * actuator.voltage_limit_V;
-  firmware::ControllerConfig& c = axis.controller;
-  c.position = pid(gains.position, joint.max_torque_Nm);
-  c.velocity = pid(gains.velocity, joint.max_torque_Nm);
-  c.torque = pid(gains.torque, actuator.voltage_limit_V);
-  c.current = pid(gains.current, actuator.voltage_limit_V);
-  c.torque_to_voltage_V_Nm = gains.torque_feedforward * actuator.resistance_ohm / motor_constant;
-  c.emf_compensation_Vs_rad = gains.emf_compensation * motor_constant;
-  c.resistance_ohm = actuator.resistance_ohm;
-  c.motor_constant_Nm_A = motor_constant;
-  c.spring_Nm_rad = actuator.order >= 2 ? actuator.spring_Nm_rad : 0.0;
-  c.voltage_limit_V = actuator.voltage_limit_V;
-  c.current_limit_A = actuator.current_limit_A;
-  c.torque_limit_Nm = joint.max_torque_Nm;
-  c.torque_slope_Nm_s = hal::torque_rate_Nm_s(joint);
-  c.velocity_limit_rad_s = joint.max_velocity_rad_s;
-  c.min_position_rad = joint.min_position_rad;
-  c.max_position_rad = joint.max_position_rad;
-  c.position_feedback = gains.position_feedback == hal::PositionFeedback::kMotor
-                            ? firmware::PositionFeedback::kMotor
-                            : firmware::PositionFeedback::kLink;
+  axis.controller = controller_config(joint, actuator, gains);
   return axis;
 }
 

@@ -36,12 +36,13 @@ std::vector<SlaveMaster> make_slaves(const std::vector<SlavePlan>& plans,
 
 }  // namespace
 
-Result<std::unique_ptr<LineMaster>> LineMaster::create(Link& link, std::vector<SlavePlan> plans) {
+Result<std::unique_ptr<LineMaster>> LineMaster::create(Link& link,
+                                                       const std::vector<SlavePlan>& plans) {
   if (const Status status = check(plans); !status) return std::unexpected(status.error());
-  return std::unique_ptr<LineMaster>(new LineMaster(link, std::move(plans)));
+  return std::unique_ptr<LineMaster>(new LineMaster(link, plans));
 }
 
-LineMaster::LineMaster(Link& link, std::vector<SlavePlan> plans)
+LineMaster::LineMaster(Link& link, const std::vector<SlavePlan>& plans)
     : link_(&link),
       image_(plans),
       slaves_(make_slaves(plans, image_)),
