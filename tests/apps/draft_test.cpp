@@ -54,7 +54,7 @@ TEST(Draft, IsNotMixedWithWhatIsLeftOfAnEarlierProcessOfItsNumber) {
 TEST(Draft, OfAFolderThatIsThereNowRemovesWhatIsLeftFromBefore) {
   const tandem::test::ScratchFolder folder;
   const std::string gone = ".new-4194305";  // more than Linux gives
-  for (const std::string left : {"page" + gone, "page/" + gone, "other" + gone})
+  for (const std::string& left : {"page" + gone, "page/" + gone, "other" + gone})
     fs::create_directories(folder / left);
   const Result<Draft> draft = Draft::folder(folder / "page/");
   ASSERT_TRUE(draft);
