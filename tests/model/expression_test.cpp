@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "model/expression.hpp"
 
 namespace tandem::model {
@@ -42,6 +44,16 @@ TEST_F(ExpressionTest, ConstantsFold) {
   EXPECT_EQ(folded.value(), 5.0);
   EXPECT_EQ(count({(x * 2.0) * 3.0}).mul, 1u);
   EXPECT_EQ(value((x * 2.0) * 3.0, 5.0, 0.0), 30.0);
+}
+
+// As a node it is a scalar among a batch's vectors, which do not compile.
+TEST_F(ExpressionTest, WhatIsLeftOfASumIsAConstantIfItIsOne) {
+  for (const Expr& left : {(x + 2.0) - x, (x - 2.0) - x, x - (x - 2.0), (2.0 - x) + x}) {
+    ASSERT_TRUE(left.is_constant());
+    EXPECT_EQ(std::abs(left.value()), 2.0);
+    EXPECT_TRUE((left * 3.0 + 1.0).is_constant());
+  }
+  EXPECT_EQ(((x - 2.0) - x).value(), -2.0);
 }
 
 TEST_F(ExpressionTest, ZerosAndOnesVanish) {

@@ -49,10 +49,11 @@ class Hangs final : public Controller {
     if (crash_ == "divide") std::raise(SIGFPE);  // as an integer's division by zero on x86
     if (crash_ == "exit") std::exit(0);
   }
-  static int fill(volatile int depth) {
+  static int fill(int depth) {
+    volatile int here = depth;
     volatile char room[4096] = {};
-    room[0] = static_cast<char>(depth);
-    return depth > 0 ? fill(depth + 1) + room[0] : 0;
+    room[0] = static_cast<char>(here);
+    return here > 0 ? fill(here + 1) + room[0] : 0;
   }
 
   void* nowhere_ = nullptr;
