@@ -22,7 +22,7 @@ bool is_zero(const Expr& a) { return a.is_constant() && a.value() == 0.0; }
 const Node& node_of(const Expr& a) { return a.graph()->nodes()[a.node()]; }
 
 // An operand of a node: a constant folds again.
-Expr operand(Graph* graph, std::uint32_t node, bool negative) {
+Expr operand_of(Graph* graph, std::uint32_t node, bool negative) {
   const Node& operand = graph->nodes()[node];
   if (operand.op != Op::kConstant) return {graph, node, negative};
   return negative ? -operand.value : operand.value;
@@ -35,11 +35,11 @@ bool cancels(const Expr& sum, const Expr& term, Expr& left) {
   if (node.op != Op::kAdd && node.op != Op::kSub) return false;
   const bool b_negative = sum.negative() != (node.op == Op::kSub);
   if (node.a == term.node() && sum.negative() != term.negative()) {
-    left = operand(sum.graph(), node.b, b_negative);
+    left = operand_of(sum.graph(), node.b, b_negative);
     return true;
   }
   if (node.b == term.node() && b_negative != term.negative()) {
-    left = operand(sum.graph(), node.a, sum.negative());
+    left = operand_of(sum.graph(), node.a, sum.negative());
     return true;
   }
   return false;
