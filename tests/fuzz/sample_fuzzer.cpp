@@ -144,7 +144,7 @@ struct Client {
 };
 
 /// The robot's end, one that may own it, and one that may not.
-struct RobotEnd {
+struct RobotsEnd {
   std::shared_ptr<dds::Domain> domain = another_domain();
   std::unique_ptr<dds::Participant> at_robot = participant(domain, "robot");
   std::unique_ptr<dds::Participant> at_owner = participant(domain, "owner");
@@ -178,6 +178,8 @@ struct OwnersEnd {
       must(Server::open(*at_robot, robot(), gains(), identity(), {.lease_timeout_s = 1e6}));
   Peer<tandem_msgs::LinkState> of_robot{*at_robot, kStateTopic};
   Peer<tandem_msgs::LinkState> of_stranger{*at_stranger, kStateTopic};
+  Peer<tandem_msgs::LinkRobotEnd> end_of_robot{*at_robot, kRobotEndTopic};
+  Peer<tandem_msgs::LinkRobotEnd> end_of_stranger{*at_stranger, kRobotEndTopic};
   std::atomic<bool> connected{false};
   std::unique_ptr<RemoteBackend> backend;
   hal::StateImage state{robot().shape()};
@@ -186,8 +188,8 @@ struct OwnersEnd {
 
 class Play {
  public:
-  Play(RobotEnd& robot_end, OwnersEnd& owners_end, Input input)
-      : end_(robot_end), owners_(owners_end), input_(input) {
+  Play(RobotsEnd& robots_end, OwnersEnd& owners_end, Input input)
+      : end_(robots_end), owners_(owners_end), input_(input) {
     exchange();                     // the first input, too, answers a cycle that there was
     client_ = 1 + end_.turn++ % 2;  // another one than before: its numbers begin anew
     request(end_.owner, Action::kAcquire, client_);
@@ -232,7 +234,10 @@ class Play {
         break;
       case 6: state(what & 8 ? owners_.of_stranger : owners_.of_robot, what & 8); break;
       case 7:
-        raw_state(what & 8, known(what, {owners_.server->number(), owners_.cycle + 1}));
+        if (what & 32)
+          raw_robot_end(what & 8, known(what, {owners_.server->number()}));
+        else
+          raw_state(what & 8, known(what, {owners_.server->number(), owners_.cycle + 1}));
         break;
     }
     const std::uint64_t owner = end_.server->lease().owner();
@@ -358,6 +363,12 @@ class Play {
     owners_.of_stranger.write_bytes(bytes, known);
   }
 
+  /// Nothing that it says after the start is of consequence, whoever says it.
+  void raw_robot_end(bool stranger, std::span<const std::uint64_t> known) {
+    auto& from = stranger ? owners_.end_of_stranger : owners_.end_of_robot;
+    from.write_bytes(input_.bytes(2 * std::size_t{input_.byte()}), known);
+  }
+
   /// The owner has seen every cycle that its server has shown: there is nothing new.
   void check_strangers_states() {
     if (!strangers_states_) return;
@@ -417,7 +428,7 @@ class Play {
     if (backend.command_in_force(in_force)) require(is_sound(in_force));
   }
 
-  RobotEnd& end_;
+  RobotsEnd& end_;
   OwnersEnd& owners_;
   Input input_;
   std::uint64_t client_ = 0;
@@ -427,8 +438,8 @@ class Play {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static RobotEnd robot_end;
+  static RobotsEnd robots_end;
   static OwnersEnd owners_end;
-  const Play play(robot_end, owners_end, Input({data, size}));
+  const Play play(robots_end, owners_end, Input({data, size}));
   return 0;
 }
