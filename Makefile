@@ -11,7 +11,7 @@ FUZZ_TARGETS ?= urdf robot experiment message request sample sheet frames etherc
 
 help:
 	@echo "make demo   install what is missing, build, and let COMAN squat (about 6 minutes the first time)"
-	@echo "make robot  the program for a robot PC: the fastest, in build/robot (15 minutes)"
+	@echo "make robot  the program for a robot PC: the fastest, in build/robot (12 minutes)"
 	@echo "make test   install what is missing, build everything, run every test"
 	@echo "make test-all  that, and the proofs that take long"
 	@echo "make bench  times this build; AGAINST=../old/build/release: beside another one"
