@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <optional>
 
 #include "apps/control/remote_gate.hpp"
@@ -132,6 +133,7 @@ Status check_pace(const Composition& c, const RunOptions& options) {
 /// run. A signal ends it, and with it the program: there is nothing else to do.
 void add_report(const RunOptions& options, const std::string& log) {
   if (!options.report || log.empty()) return;
+  std::fflush(nullptr);  // a signal that ends the program writes nothing more
   rt::remove_stop_signals();
   const auto files = draw_report(log, {}, {});
   if (!files) {

@@ -112,10 +112,11 @@ TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
 // The first Ctrl-C was ignored: the handler of the run that was over set a flag.
 TEST_F(HalfMade, ReportOfARunEndsAtTheFirstInterruptAndLeavesAllElse) {
   fake_gnuplot("cat > /dev/null\nkill -INT $PPID\nsleep 1\n");
-  const Outcome run = tandem(
-      "run trajectory.toml --duration 1 --quiet --log runs --report --json r.json --trace t.json",
-      environment());
+  const Outcome run =
+      tandem("run trajectory.toml --duration 1 --log runs --report --json r.json --trace t.json",
+             environment());
   EXPECT_TRUE(run.status == -1 || run.status == 128 + SIGINT) << run.status << run.err;
+  EXPECT_NE(run.out.find("real time"), std::string::npos) << "its table is lost: " << run.out;
   EXPECT_NE(run.err.find("interrupted: nothing was written to runs/"), std::string::npos)
       << run.err;
   const std::string log = json("r.json")["log"]["path"];
