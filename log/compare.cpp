@@ -16,7 +16,7 @@ struct Message {
   std::vector<std::byte> body;
 };
 
-/// The first element whose bytes differ.
+/// The first element whose bytes differ. @pre one does
 Difference difference_in(const hal::Layout& layout, const RunInfo& info, const Message& a,
                          std::span<const std::byte> b) {
   if (a.body.size() != b.size()) {
@@ -35,7 +35,11 @@ Difference difference_in(const hal::Layout& layout, const RunInfo& info, const M
               .b = element(field, b, i)};
     }
   }
-  return {.signal = "bytes"};
+  // Of a type whose fields have no fixed place, such as sensor_msgs/JointState.
+  const auto [in_a, in_b] = std::ranges::mismatch(a.body, b);
+  return {.signal = "byte " + std::to_string(in_a - a.body.begin()),
+          .a = std::to_integer<int>(*in_a),
+          .b = std::to_integer<int>(*in_b)};
 }
 
 Result<std::vector<Message>> messages_of(const LogFile& file, const std::string& topic) {
@@ -59,12 +63,11 @@ Result<TopicComparison> compare_topic(const LogFile& a, const LogFile& b, const 
         if (result.first || index >= all->size()) return;
         const Message& message = (*all)[index];
         if (message.time_ns == time_ns && std::ranges::equal(message.body, body)) return;
-        Difference found = difference_in(topic.layout, a.info(), message, body);
-        if (message.time_ns != time_ns) {
-          found = {.signal = "time",
-                   .a = static_cast<double>(message.time_ns) * 1e-9,
-                   .b = static_cast<double>(time_ns) * 1e-9};
-        }
+        Difference found{.signal = "time",
+                         .a = static_cast<double>(message.time_ns) * 1e-9,
+                         .b = static_cast<double>(time_ns) * 1e-9};
+        if (message.time_ns == time_ns)
+          found = difference_in(topic.layout, a.info(), message, body);
         found.message = index;
         found.time_ns = message.time_ns;
         result.first = found;

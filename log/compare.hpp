@@ -15,8 +15,9 @@ namespace tandem::log {
 struct Difference {
   std::uint64_t message = 0;  ///< of the topic, from 0
   std::int64_t time_ns = 0;   ///< of the first log's message
-  std::string signal;       ///< "position_rad.LHipSag"; "time", "length" or "bytes" without a field
-  double a = 0.0, b = 0.0;  ///< its values, or the lengths [bytes]; 0 of "bytes"
+  /// "position_rad.LHipSag"; "time", "length"; without a field "byte 56" of the body
+  std::string signal;
+  double a = 0.0, b = 0.0;  ///< its values, or the lengths [bytes]
 };
 
 struct TopicComparison {

@@ -18,7 +18,7 @@ class DataHash {
  public:
   /// @param data  with its CDR header, as in the file.
   void add(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> data) noexcept;
-  /// The same message in two pieces.
+  /// The same message in two pieces. @pre the header has four bytes at most
   void add(std::uint16_t channel, std::int64_t time_ns, std::span<const std::byte> cdr_header,
            std::span<const std::byte> body) noexcept;
   /// 64 hexadecimal digits, lower case. Ends the stream: call it once.

@@ -113,5 +113,25 @@ TEST_F(Compare, MessagesOfOtherLengthsAreShownWithTheirBytes) {
   EXPECT_EQ(first->b, 24.0);
 }
 
+// It was "bytes is 0 and 0".
+TEST_F(Compare, ByteByByteWhereNoFieldHasAFixedPlace) {
+  const auto log_of = [this](const char* name, std::uint8_t last) {
+    auto recorder = Recorder::open(folder_ / name, {.robot = name, .sensors = {}}, {});
+    const auto state = (*recorder)->add_channel("/tandem/state", "tandem/msg/State", {});
+    (*recorder)->start();
+    const std::array<std::uint8_t, 3> body{7, 7, last};
+    (*recorder)->push(state, 0, std::as_bytes(std::span(body)));
+    EXPECT_EQ((*recorder)->close().messages, 1U);
+    return LogFile::open(folder_ / name);
+  };
+  const auto result = compare(*log_of("a.mcap", 8), *log_of("b.mcap", 255));
+  ASSERT_TRUE(result);
+  const auto& first = state_of(*result).first;
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->signal, "byte 2");
+  EXPECT_EQ(first->a, 8.0);
+  EXPECT_EQ(first->b, 255.0);
+}
+
 }  // namespace
 }  // namespace tandem::log
