@@ -38,8 +38,8 @@ Difference difference_in(const hal::Layout& layout, const RunInfo& info, const M
   // Of a type whose fields have no fixed place, such as sensor_msgs/JointState.
   const auto [in_a, in_b] = std::ranges::mismatch(a.body, b);
   return {.signal = "byte " + std::to_string(in_a - a.body.begin()),
-          .a = std::to_integer<int>(*in_a),
-          .b = std::to_integer<int>(*in_b)};
+          .a = static_cast<double>(*in_a),
+          .b = static_cast<double>(*in_b)};
 }
 
 Result<std::vector<Message>> messages_of(const LogFile& file, const std::string& topic) {
