@@ -1,4 +1,4 @@
-// Little-endian numbers in a frame's bytes, spelt out: the host's byte order plays no part.
+// Little-endian numbers in a frame's bytes, whatever the host's byte order.
 // Layer: canopen.  Thread: any.
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -40,6 +41,10 @@ requires std::is_arithmetic_v<T>
 constexpr void put(std::uint8_t* out, T value) noexcept TANDEM_RT {
   using Bits = typename detail::UnsignedOf<sizeof(T)>::Type;
   const auto bits = std::bit_cast<Bits>(value);
+  if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
+    std::memcpy(out, &bits, sizeof bits);  // one store: what reads it next need not wait
+    return;
+  }
   for (std::size_t i = 0; i < sizeof(T); ++i) out[i] = static_cast<std::uint8_t>(bits >> (8 * i));
 }
 
@@ -49,6 +54,10 @@ requires std::is_arithmetic_v<T>
 [[nodiscard]] constexpr T get(const std::uint8_t* in) noexcept TANDEM_RT {
   using Bits = typename detail::UnsignedOf<sizeof(T)>::Type;
   Bits bits = 0;
+  if (!std::is_constant_evaluated() && std::endian::native == std::endian::little) {
+    std::memcpy(&bits, in, sizeof bits);
+    return std::bit_cast<T>(bits);
+  }
   for (std::size_t i = 0; i < sizeof(T); ++i) {
     bits = static_cast<Bits>(bits | static_cast<Bits>(static_cast<Bits>(in[i]) << (8 * i)));
   }

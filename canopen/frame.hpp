@@ -68,12 +68,20 @@ class FrameSink {
   explicit FrameSink(std::span<Frame> storage) noexcept : storage_(storage) {}
 
   bool push(const Frame& frame) noexcept TANDEM_RT {
+    Frame* place = next();
+    if (place == nullptr) return false;
+    *place = frame;
+    return true;
+  }
+  /// The place of a frame that is sent, for the caller to write: a frame that is made elsewhere,
+  /// byte by byte, and copied at once makes CPUs wait.
+  /// @return null: full, and a frame is counted
+  [[nodiscard]] Frame* next() noexcept TANDEM_RT {
     if (count_ == storage_.size()) {
       ++dropped_;
-      return false;
+      return nullptr;
     }
-    storage_[count_++] = frame;
-    return true;
+    return &storage_[count_++];
   }
   void clear() noexcept TANDEM_RT { count_ = 0; }
   [[nodiscard]] std::span<const Frame> frames() const noexcept { return storage_.first(count_); }

@@ -17,7 +17,7 @@ constexpr std::uint8_t kGuardToggle = 0x80;
 
 Node::Node(const NodeConfig& config, ObjectDictionary& od) : config_(config), sdo_(od, config.id) {
   add_objects(od);
-  find_rpdos();
+  find_pdos();
 }
 
 void Node::add_objects(ObjectDictionary& od) {
@@ -65,7 +65,7 @@ NodeEvents Node::take(const Frame& frame, FrameSink& out) noexcept TANDEM_RT {
   if (frame.id == cob::kSync) return on_sync();
   if (frame.id == cob::kSdoRequest + id) {
     sdo_.receive(frame, out);
-    find_rpdos();  // it may have written their identifiers
+    find_pdos();  // it may have written their identifiers
     return 0;
   }
   if ((frame.id & kFunctionMask) == cob::kHeartbeat) {
@@ -86,14 +86,18 @@ NodeEvents Node::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT 
       static_cast<NodeEvents>(watch_heartbeats(dt_ns, out) | watch_guarding(dt_ns, out));
   if (state_ != NmtState::kStopped) sdo_.process(dt_ns, out);
   if (state_ == NmtState::kOperational) {
-    for (TxPdo& pdo : tpdos_) pdo.process(dt_ns, out);
+    for (std::size_t i = 0; i < tpdos_.size(); ++i) {
+      if (tpdo_in_use_[i]) tpdos_[i].process(dt_ns, out);
+    }
   }
   return events;
 }
 
 void Node::transmit_synchronous(FrameSink& out) noexcept TANDEM_RT {
   if (state_ != NmtState::kOperational) return;
-  for (TxPdo& pdo : tpdos_) pdo.sync(out);
+  for (std::size_t i = 0; i < tpdos_.size(); ++i) {
+    if (tpdo_in_use_[i]) tpdos_[i].sync(out);
+  }
 }
 
 bool Node::answer_remote(std::uint32_t id, FrameSink& out) noexcept TANDEM_RT {
@@ -130,7 +134,7 @@ NodeEvents Node::on_sync() noexcept {
   NodeEvents events = kEventSync;
   if (state_ != NmtState::kOperational) return events;
   for (int i = 0; i < kPdosPerNode; ++i) {
-    if (!rpdos_[i].sync()) continue;
+    if (rpdo_ids_[i] == kNoCobId || !rpdos_[i].sync()) continue;
     applied_rpdos_ |= static_cast<std::uint8_t>(1u << i);
     events |= kEventRpdo;
   }
@@ -153,9 +157,11 @@ NodeEvents Node::on_rpdo(const Frame& frame, FrameSink& out) noexcept {
   return 0;
 }
 
-void Node::find_rpdos() noexcept TANDEM_RT {
-  for (std::size_t i = 0; i < rpdos_.size(); ++i)
+void Node::find_pdos() noexcept TANDEM_RT {
+  for (std::size_t i = 0; i < rpdos_.size(); ++i) {
     rpdo_ids_[i] = rpdos_[i].in_use() ? rpdos_[i].cob_id() : kNoCobId;
+    tpdo_in_use_[i] = tpdos_[i].in_use();
+  }
 }
 
 void Node::on_heartbeat(const Frame& frame) noexcept {
@@ -223,7 +229,7 @@ NodeEvents Node::enter(NmtState state) noexcept {
   if (state == NmtState::kOperational) {
     for (RxPdo& pdo : rpdos_) pdo.restart();
     for (TxPdo& pdo : tpdos_) pdo.restart();
-    find_rpdos();  // another wire than CAN may have written their identifiers
+    find_pdos();  // another wire than CAN may have written their identifiers
     return kEventOperational;
   }
   if (state != NmtState::kPreOperational) sdo_.reset();
@@ -243,7 +249,7 @@ void Node::reset_communication() noexcept TANDEM_RT {
   guarding_ = {};
   for (RxPdo& pdo : rpdos_) pdo.reset();
   for (TxPdo& pdo : tpdos_) pdo.reset();
-  find_rpdos();
+  find_pdos();
 }
 
 void Node::produce_heartbeat(std::int64_t dt_ns, FrameSink& out) noexcept {
@@ -315,7 +321,7 @@ void Node::archive(Archive& ar) {
      guarding_.silent_ns);
   for (RxPdo& pdo : rpdos_) ar(pdo);
   for (TxPdo& pdo : tpdos_) ar(pdo);
-  if (ar.reading()) find_rpdos();
+  if (ar.reading()) find_pdos();
 }
 
 }  // namespace tandem::canopen

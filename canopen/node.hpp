@@ -89,7 +89,7 @@ class Node final : private ObjectOwner {
   void clear_errors(FrameSink& out) noexcept TANDEM_RT;
 
   /// Someone else than a master has written the node's objects in the dictionary.
-  void objects_changed() noexcept TANDEM_RT { find_rpdos(); }
+  void objects_changed() noexcept TANDEM_RT { find_pdos(); }
 
   [[nodiscard]] NmtState state() const noexcept { return state_; }
   /// A monitored heartbeat, or the master's guarding, has stopped and was not heard since.
@@ -133,7 +133,7 @@ class Node final : private ObjectOwner {
       if (rpdo_ids_[static_cast<std::size_t>(i)] == id) return i;
     return -1;
   }
-  void find_rpdos() noexcept TANDEM_RT;
+  void find_pdos() noexcept TANDEM_RT;
   NodeEvents on_nmt(const Frame& frame, FrameSink& out) noexcept TANDEM_RT;
   NodeEvents on_sync() noexcept;
   NodeEvents on_rpdo(const Frame& frame, FrameSink& out) noexcept;
@@ -165,6 +165,7 @@ class Node final : private ObjectOwner {
   Guarding guarding_;
   SdoServer sdo_;
   std::array<std::uint32_t, kPdosPerNode> rpdo_ids_{};  ///< kNoCobId: not in use
+  std::array<bool, kPdosPerNode> tpdo_in_use_{};
   std::array<RxPdo, kPdosPerNode> rpdos_;
   std::array<TxPdo, kPdosPerNode> tpdos_;
 };

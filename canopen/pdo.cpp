@@ -157,12 +157,8 @@ void RxPdo::archive(Archive& ar) {
 
 void TxPdo::sync(FrameSink& out) noexcept TANDEM_RT {
   if (!in_use() || !synchronous()) return;
-  if (type_ != kSynchronousAcyclic) {
-    if (++syncs_ >= type_) send(frame(), out);
-    return;
-  }
-  const Frame now = frame();
-  if (changed(now)) send(now, out);
+  const bool due = type_ == kSynchronousAcyclic ? changed() : ++syncs_ >= type_;
+  if (due) send(out);
 }
 
 void TxPdo::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
@@ -170,31 +166,39 @@ void TxPdo::process(std::int64_t dt_ns, FrameSink& out) noexcept TANDEM_RT {
   since_sent_ns_ += dt_ns;
   if (since_sent_ns_ < inhibit_100us_ * (kNsPerMs / 10)) return;
   const bool timed = event_ms_ != 0 && since_sent_ns_ >= event_ms_ * kNsPerMs;
-  const Frame now = frame();
-  if (timed || changed(now)) send(now, out);
+  if (timed || changed()) send(out);
 }
 
 bool TxPdo::answer_remote(std::uint32_t id, FrameSink& out) const noexcept TANDEM_RT {
   const bool asked = in_use() && allows_remote() && id == cob_id();
   if (!asked || mapped_bytes() > kClassicFrameBytes) return false;
-  out.push(frame());
+  write(out);
   return true;
 }
 
-Frame TxPdo::frame() const noexcept {
-  Frame frame;
-  frame.id = cob_id();
-  frame.length = frame_length(mapped_bytes());
-  if (frame.length > kClassicFrameBytes) frame.flags = kFlagFd | kFlagBrs;
-  for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(frame.data.data());
-  return frame;
+void TxPdo::write(FrameSink& out) const noexcept {
+  Frame* frame = out.next();
+  if (frame == nullptr) return;
+  *frame = {};
+  frame->id = cob_id();
+  frame->length = frame_length(mapped_bytes());
+  if (frame->length > kClassicFrameBytes) frame->flags = kFlagFd | kFlagBrs;
+  for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(frame->data.data());
 }
 
-bool TxPdo::changed(const Frame& now) const noexcept { return !sent_ || now.data != last_; }
+bool TxPdo::changed() const noexcept {
+  if (!sent_) return true;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (copies_[i].differs(last_.data())) return true;
+  }
+  return false;
+}
 
-void TxPdo::send(const Frame& now, FrameSink& out) noexcept {
-  out.push(now);
-  if (!synchronous() || type_ == kSynchronousAcyclic) last_ = now.data;
+void TxPdo::send(FrameSink& out) noexcept {
+  write(out);
+  if (!synchronous() || type_ == kSynchronousAcyclic) {
+    for (std::size_t i = 0; i < count_; ++i) copies_[i].to_wire(last_.data());
+  }
   sent_ = true;
   syncs_ = 0;
   since_sent_ns_ = 0;

@@ -61,6 +61,12 @@ class Pdo : public ObjectOwner {
   std::uint8_t count_ = 0;
   std::uint16_t inhibit_100us_ = 0;
   std::uint16_t event_ms_ = 0;
+
+ private:
+  std::uint32_t cob_id_ = cob::kInvalid;
+  std::size_t mapped_bytes_ = 0;
+
+ protected:                                          // what every frame needs stands side by side
   std::array<PdoCopy, kMaxMappedObjects> copies_{};  ///< the mapping, compiled
 
  private:
@@ -73,8 +79,6 @@ class Pdo : public ObjectOwner {
   PdoDirection direction_ = PdoDirection::kReceive;
   std::uint16_t parameter_index_ = 0;
   std::uint32_t default_cob_id_ = cob::kInvalid;
-  std::uint32_t cob_id_ = cob::kInvalid;
-  std::size_t mapped_bytes_ = 0;
   std::size_t max_bytes_ = kMaxFrameBytes;
   std::array<std::uint32_t, kMaxMappedObjects> mapping_{};
 };
@@ -118,9 +122,9 @@ class TxPdo final : public Pdo {
   void archive(Archive& ar);
 
  private:
-  [[nodiscard]] Frame frame() const noexcept;
-  [[nodiscard]] bool changed(const Frame& now) const noexcept;
-  void send(const Frame& now, FrameSink& out) noexcept;
+  void write(FrameSink& out) const noexcept;
+  [[nodiscard]] bool changed() const noexcept;
+  void send(FrameSink& out) noexcept;
 
   bool sent_ = false;  ///< since it came into use
   std::uint8_t syncs_ = 0;

@@ -35,6 +35,16 @@ struct PdoCopy {
     }
   }
 
+  /// Whether the variable is another than in a PDO's bytes.
+  [[nodiscard]] bool differs(const std::uint8_t* pdo) const noexcept TANDEM_RT {
+    switch (size) {
+      case 1: return other<std::uint8_t>(pdo);
+      case 2: return other<std::uint16_t>(pdo);
+      case 4: return other<std::uint32_t>(pdo);
+      default: return false;
+    }
+  }
+
  private:
   template <class T>
   void write(std::uint8_t* pdo) const noexcept {
@@ -46,6 +56,12 @@ struct PdoCopy {
   void read(const std::uint8_t* pdo) const noexcept {
     const T value = get<T>(pdo + offset);
     std::memcpy(data, &value, sizeof value);
+  }
+  template <class T>
+  [[nodiscard]] bool other(const std::uint8_t* pdo) const noexcept {
+    T value;
+    std::memcpy(&value, data, sizeof value);
+    return value != get<T>(pdo + offset);
   }
 };
 

@@ -8,6 +8,18 @@ namespace tandem::firmware {
 
 using canopen::Mode;
 
+namespace {
+
+/// What is left of a decaying voltage. Halved for ever it would be a subnormal number one day, with
+/// which CPUs compute a hundred times slower; long before that it changes no other number.
+double decayed(double voltage_V, double factor) noexcept {
+  constexpr double kNothing_V = 1e-300;
+  const double left_V = voltage_V * factor;
+  return std::abs(left_V) < kNothing_V ? 0.0 : left_V;
+}
+
+}  // namespace
+
 void JointController::configure(const ControllerConfig& config,
                                 double period_s) noexcept TANDEM_RT {
   config_ = config;
@@ -55,7 +67,7 @@ double JointController::update(Action action, Mode mode, const Reference& refere
     }
   }
   terms_.transfer_V =
-      change || retuned_ ? held_V - step.voltage_V : terms_.transfer_V * transfer_decay_;
+      change || retuned_ ? held_V - step.voltage_V : decayed(terms_.transfer_V, transfer_decay_);
   retuned_ = false;
   step.voltage_V += terms_.transfer_V;
   const Saturation cut = limit_voltage(step.voltage_V, measured);

@@ -195,16 +195,17 @@ void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
       if (pdo.direction != PdoDirection::kReceive) continue;
       Frame& last = node.frames[p];
       const auto& copies = node.exchanges[p].copies;
-      if (pdo.group == PdoGroup::kCommand) {  // in every cycle
-        for (const canopen::PdoCopy& copy : copies) copy.to_wire(last.data.data());
-        (void)ports[node.plan.bus].sink.push(last);
-        continue;
-      }
-      Frame frame = last;
-      for (const canopen::PdoCopy& copy : copies) copy.to_wire(frame.data.data());
-      const bool due = node.sent[p] == 0 || frame.data != last.data;
-      if (!due || !ports[node.plan.bus].sink.push(frame)) continue;
-      last = frame;
+      const bool due = pdo.group == PdoGroup::kCommand || node.sent[p] == 0 ||
+                       std::ranges::any_of(copies, [&](const canopen::PdoCopy& copy) {
+                         return copy.differs(last.data.data());
+                       });
+      if (!due) continue;
+      Frame* frame = ports[node.plan.bus].sink.next();
+      if (frame == nullptr) continue;
+      *frame = last;
+      for (const canopen::PdoCopy& copy : copies) copy.to_wire(frame->data.data());
+      if (pdo.group == PdoGroup::kCommand) continue;  // in every cycle
+      for (const canopen::PdoCopy& copy : copies) copy.to_wire(last.data.data());
       node.sent[p] = 1;
     }
   }

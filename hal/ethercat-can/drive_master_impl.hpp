@@ -56,12 +56,13 @@ struct DriveMaster::Impl {
     int timeout_cycles;                              ///< without feedback; 0: never
     std::array<int, canopen::kPdosPerNode> tpdos{};  ///< by number - 1: index in plan.pdos, or -1
     std::vector<Exchange> exchanges;                 ///< by plan.pdos
-    std::vector<canopen::Frame> frames;              ///< by plan.pdos: the last one sent (RPDO)
-    std::vector<std::uint8_t> sent;                  ///< by plan.pdos: sent since the node's start
-    std::vector<float> channels;                     ///< a sensor's
-    std::vector<float> sample;                       ///< of them, while it is not whole; no state
-    std::size_t first_channel = 0;                   ///< of them in StateImage::sensor()
-    int next_part = 0;                               ///< of this cycle's sample
+    /// By plan.pdos: an RPDO's identifier and length, and what was sent last of parameters.
+    std::vector<canopen::Frame> frames;
+    std::vector<std::uint8_t> sent;  ///< by plan.pdos: sent since the node's start
+    std::vector<float> channels;     ///< a sensor's
+    std::vector<float> sample;       ///< of them, while it is not whole; no state
+    std::size_t first_channel = 0;   ///< of them in StateImage::sensor()
+    int next_part = 0;               ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
     std::uint32_t answers = 0;         ///< this cycle's first TPDOs
     std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them

@@ -275,6 +275,22 @@ TEST(JointController, ChangesBetweenAnyTwoModesWithoutAStepOfTheVoltage) {
   }
 }
 
+// A subnormal number changes nothing either, but CPUs are slow with it, for the rest of the run.
+TEST(JointController, ForgetsAStepOfTheVoltageAfterALongTime) {
+  ControllerConfig c = config();
+  c.transfer_time_s = 0.02;
+  JointController controller;
+  controller.configure(c, kDt);
+  controller.update(Action::kFollow, Mode::kCst, reference(), measured());
+  controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+  ASSERT_NE(controller.terms().transfer_V, 0.0);
+  for (int k = 0; k < 20'000; ++k) {
+    controller.update(Action::kFollow, Mode::kCsp, reference(), measured());
+    ASSERT_NE(std::fpclassify(controller.terms().transfer_V), FP_SUBNORMAL);
+  }
+  EXPECT_EQ(controller.terms().transfer_V, 0.0);
+}
+
 TEST(JointController, SeedsTheIntegralThatTheNewModeHas) {
   ControllerConfig c = config();
   c.transfer_time_s = 0.02;
