@@ -86,6 +86,8 @@ void add_kernels(const std::string& robot, const model::KernelLibrary& library) 
        [&k, buffers, &o](auto q, auto v, auto tau) {
          k.site_motion(q, v, tau, o.a.data(), o.b.data(), o.c.data());
        }},
+      {"site_twists",
+       [&k, buffers, &o](auto q, auto v, auto) { k.site_twists(q, v, o.a.data(), o.b.data()); }},
       {"site_jacobians",
        [&k, buffers, &o](auto q, auto, auto) { k.site_jacobians(q, o.a.data()); }},
       {"sensor_wrenches",

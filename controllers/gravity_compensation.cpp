@@ -10,6 +10,7 @@
 #include "controllers/model_map.hpp"
 #include "controllers/parameters.hpp"
 #include "controllers/support.hpp"
+#include "model/sines.hpp"
 
 namespace tandem {
 namespace {
@@ -41,13 +42,13 @@ class GravityCompensation : public Controller {
         setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
     if (const Status standing = stand(setup); !standing) return standing;
     claim_joints(setup);
+    sines_.emplace(*kernels_);
     q_.assign(kernels_->nq, 0.0);
     map_.passive_to_q(q_);
     rest_.assign(kernels_->nv, 0.0);
     tau_.assign(kernels_->nv, 0.0);
     pose_.assign(12 * kernels_->sites, 0.0);
     twist_.assign(6 * kernels_->sites, 0.0);
-    acceleration_.assign(6 * kernels_->sites, 0.0);
     J_.assign(6 * kernels_->nv * kernels_->sites, 0.0);
     return {};
   }
@@ -146,9 +147,9 @@ class GravityCompensation : public Controller {
     q_[6] = 1.0;
     if (imu_) turn_base(state.sensor_values(imu_->sensor));
     close_loops();
-    kernels_->bias(q_.data(), rest_.data(), tau_.data());
     locate();
-    kernels_->site_jacobians(q_.data(), J_.data());
+    kernels_->bias_at(sines_->data(), q_.data(), rest_.data(), tau_.data());
+    kernels_->site_jacobians_at(sines_->data(), q_.data(), J_.data());
     support_->carry(*kernels_, q_, pose_, J_, tau_);
     map_.carry_passive(tau_);
   }
@@ -162,8 +163,8 @@ class GravityCompensation : public Controller {
   }
 
   void locate() noexcept TANDEM_RT {
-    kernels_->site_motion(q_.data(), rest_.data(), rest_.data(), pose_.data(), twist_.data(),
-                          acceleration_.data());
+    sines_->take(q_.data());
+    kernels_->site_twists_at(sines_->data(), q_.data(), rest_.data(), pose_.data(), twist_.data());
   }
 
   /// The base's orientation from the IMU's: R_WB = R_WS R_BS^T.
@@ -185,6 +186,7 @@ class GravityCompensation : public Controller {
     std::size_t site = 0;
   };
   const tandem_kernels* kernels_ = nullptr;
+  std::optional<model::Sines> sines_;  // of locate()'s posture
   ModelMap map_;
   std::optional<Support> support_;  // of a floating base
   std::optional<Imu> imu_;
@@ -192,7 +194,7 @@ class GravityCompensation : public Controller {
   double ramp_s_ = 1.0;
   std::int64_t start_ns_ = 0;
   std::vector<Joint> joints_;
-  std::vector<double> q_, rest_, tau_, pose_, twist_, acceleration_, J_;
+  std::vector<double> q_, rest_, tau_, pose_, twist_, J_;
 };
 
 }  // namespace

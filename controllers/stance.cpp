@@ -41,6 +41,7 @@ Matrix3d shortest_turn(const Vector3d& from, const Vector3d& to) noexcept TANDEM
 
 Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> feet)
     : kernels_(&kernels),
+      sines_(kernels),
       map_(std::move(map)),
       feet_(std::move(feet)),
       support_(feet_),
@@ -51,7 +52,6 @@ Stance::Stance(const tandem_kernels& kernels, ModelMap map, std::vector<Foot> fe
       zero_(kernels.nv, 0.0),
       pose_(12 * kernels.sites, 0.0),
       twist_(6 * kernels.sites, 0.0),
-      acceleration_(6 * kernels.sites, 0.0),
       site_J_(6 * kernels.nv * kernels.sites, 0.0),
       com_J_(3 * kernels.nv, 0.0),
       wrench_(6 * kernels.wrenches, 0.0) {}
@@ -178,11 +178,12 @@ void Stance::level(std::size_t i, const Matrix3d& base_G) noexcept TANDEM_RT {
 }
 
 void Stance::evaluate() noexcept TANDEM_RT {
-  kernels_->site_motion(q_.data(), zero_.data(), zero_.data(), pose_.data(), twist_.data(),
-                        acceleration_.data());
-  kernels_->site_jacobians(q_.data(), site_J_.data());
-  kernels_->center_of_mass(q_.data(), zero_.data(), com_.data(), com_velocity_.data(),
-                           com_J_.data());
+  sines_.take(q_.data());
+  const double* s = sines_.data();
+  kernels_->site_twists_at(s, q_.data(), zero_.data(), pose_.data(), twist_.data());
+  kernels_->site_jacobians_at(s, q_.data(), site_J_.data());
+  kernels_->center_of_mass_at(s, q_.data(), zero_.data(), com_.data(), com_velocity_.data(),
+                              com_J_.data());
 }
 
 Vector3d Stance::middle(std::size_t foot) const noexcept TANDEM_RT {

@@ -18,6 +18,7 @@
 #include "controllers/support.hpp"
 #include "hal/robot.hpp"
 #include "model/kernels.h"
+#include "model/sines.hpp"
 
 namespace tandem {
 
@@ -108,6 +109,7 @@ class Stance {
   void advance(const Eigen::VectorXd& step, double factor) noexcept TANDEM_RT;
 
   const tandem_kernels* kernels_;
+  model::Sines sines_;
   ModelMap map_;
   std::vector<Foot> feet_;
   Support support_;
@@ -116,7 +118,7 @@ class Stance {
   std::vector<std::size_t> columns_;  // of v: the unknowns
   std::vector<std::size_t> legs_;     // of v: every joint between the base and a foot
   std::vector<double> q_, v_, tau_, zero_;
-  std::vector<double> pose_, twist_, acceleration_, site_J_, com_J_, wrench_;
+  std::vector<double> pose_, twist_, site_J_, com_J_, wrench_;
   std::array<double, 3> com_{}, com_velocity_{};
   Eigen::MatrixXd A_;
   Eigen::VectorXd error_, step_;

@@ -25,6 +25,7 @@ BaseEstimator::BaseEstimator(const tandem_kernels& kernels, const ModelJoints& j
                              const BaseConfig& config, FootSensors feet, std::size_t imu_sensor,
                              std::size_t imu_site, double step_s)
     : kernels_(&kernels),
+      sines_(kernels),
       joints_(joints),
       config_(config),
       feet_(std::move(feet)),
@@ -37,10 +38,8 @@ BaseEstimator::BaseEstimator(const tandem_kernels& kernels, const ModelJoints& j
               Vec3(kernels.gravity_m_s2), step_s),
       q_(kernels.nq),
       v_(kernels.nv),
-      rest_v_(kernels.nv),
       pose_(12 * kernels.sites),
       twist_(6 * kernels.sites),
-      acceleration_(6 * kernels.sites),
       h_(feet_.feet(), Vec3::Zero()),
       ground_(feet_.feet(), Wrench::Zero()),
       probability_(feet_.feet()),
@@ -119,8 +118,8 @@ void BaseEstimator::update(const hal::StateImage& state,
 void BaseEstimator::see_feet(const hal::StateImage& state) noexcept {
   joints_.to_model(state.position_rad(), q_.data() + 7);
   joints_.to_model(state.velocity_rad_s(), v_.data() + 6);
-  kernels_->site_motion(q_.data(), v_.data(), rest_v_.data(), pose_.data(), twist_.data(),
-                        acceleration_.data());
+  sines_.take(q_.data());
+  kernels_->site_twists_at(sines(), q_.data(), v_.data(), pose_.data(), twist_.data());
   const double* imu = pose_.data() + 12 * imu_site_;
   for (std::size_t i = 0; i < h_.size(); ++i) {
     const ConstVec3 foot(pose_.data() + 12 * feet_.site(i) + 9);

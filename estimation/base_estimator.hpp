@@ -13,6 +13,7 @@
 #include "estimation/foot_sensors.hpp"
 #include "estimation/robot_model.hpp"
 #include "hal/estimate.hpp"
+#include "model/sines.hpp"
 
 namespace tandem::estimation {
 
@@ -39,6 +40,8 @@ class BaseEstimator {
   /// One cycle: fills the base's and the feet's fields.
   void update(const hal::StateImage& state, hal::EstimateImage& out) noexcept TANDEM_RT;
 
+  /// For the kernels' _at forms at the joints' positions of the last update().
+  [[nodiscard]] const double* sines() const noexcept { return sines_.data(); }
   [[nodiscard]] bool started() const noexcept { return started_ != 0; }
   [[nodiscard]] const ContactFilter& filter() const noexcept { return filter_; }
   [[nodiscard]] const FootSensors& feet() const noexcept { return feet_; }
@@ -60,15 +63,15 @@ class BaseEstimator {
   void write(const Sample& sample, hal::EstimateImage& out) noexcept;
 
   const tandem_kernels* kernels_;
+  model::Sines sines_;
   ModelJoints joints_;
   BaseConfig config_;
   FootSensors feet_;
   std::size_t imu_sensor_, imu_site_;
   double step_s_;
   ContactFilter filter_;
-  // By site_motion with the base at W's origin.
-  std::vector<double> q_, v_, rest_v_, pose_, twist_, acceleration_;
-  std::vector<Vec3> h_;  // of each foot from the IMU, in its frame
+  std::vector<double> q_, v_, pose_, twist_;  // with the base at W's origin
+  std::vector<Vec3> h_;                       // of each foot from the IMU, in its frame
   std::vector<Wrench> ground_;
   std::vector<double> probability_;
   std::vector<std::uint8_t> standing_;

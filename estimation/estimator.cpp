@@ -47,6 +47,7 @@ Result<SiteWrenches> wrenches_of(const tandem_kernels& kernels, const Estimation
 Estimator::Estimator(const tandem_kernels& kernels, const ModelJoints& joints,
                      const hal::EstimateShape& shape)
     : kernels_(&kernels),
+      sines_(kernels),
       joints_(joints),
       image_(shape),
       q_(kernels.nq),
@@ -134,14 +135,15 @@ void Estimator::observe(const hal::StateImage& state) noexcept {
   joints_.to_model(state.position_rad(), q_.data() + (floats ? 7 : 0));
   joints_.to_model(state.velocity_rad_s(), v_.data() + (floats ? 6 : 0));
   joints_.to_model(state.torque_Nm(), tau_.data() + (floats ? 6 : 0));
-  observer_->update(q_.data(), v_.data(), tau_.data(), wrench_.data());
+  if (!base_) sines_.take(q_.data());
+  observer_->update(sines(), q_.data(), v_.data(), tau_.data(), wrench_.data());
   joints_.to_image(observer_->residual().data() + (floats ? 6 : 0), image_.external_torque_Nm());
   if (floats) std::copy_n(observer_->residual().data(), 6, image_.external_base_wrench().data());
   if (wrenches_) explain();
 }
 
 void Estimator::explain() noexcept {
-  wrenches_->solve(q_.data(), observer_->residual());
+  wrenches_->solve(sines(), q_.data(), observer_->residual());
   for (std::size_t i = 0; i < wrenches_->size(); ++i) {
     const auto wrench = wrenches_->wrench(i);
     std::copy_n(wrench.data(), 3, image_.external_force_N().data() + 3 * i);

@@ -17,6 +17,7 @@
 #include "estimation/robot_model.hpp"
 #include "estimation/site_wrenches.hpp"
 #include "hal/estimate.hpp"
+#include "model/sines.hpp"
 
 namespace tandem::estimation {
 
@@ -65,7 +66,13 @@ class Estimator {
   void observe(const hal::StateImage& state) noexcept;
   void explain() noexcept;
 
+  /// Of the joints' positions: the base's estimate has them.
+  [[nodiscard]] const double* sines() const noexcept {
+    return base_ ? base_->sines() : sines_.data();
+  }
+
   const tandem_kernels* kernels_;
+  model::Sines sines_;  // without a base
   ModelJoints joints_;
   hal::EstimateImage image_;
   std::optional<BaseEstimator> base_;

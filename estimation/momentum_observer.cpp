@@ -17,9 +17,9 @@ MomentumObserver::MomentumObserver(const tandem_kernels& kernels, double bandwid
       p_now_(kernels.nv),
       rate_now_(kernels.nv) {}
 
-void MomentumObserver::update(const double* q, const double* v, const double* tau,
-                              const double* wrench) noexcept TANDEM_RT {
-  kernels_->generalised_momentum(q, v, wrench, p_now_.data(), rate_now_.data());
+void MomentumObserver::update(const double* sines, const double* q, const double* v,
+                              const double* tau, const double* wrench) noexcept TANDEM_RT {
+  kernels_->generalised_momentum_at(sines, q, v, wrench, p_now_.data(), rate_now_.data());
   const double kept = 1.0 / (1.0 + gain_ * step_s_);
   bool finite = true;
   for (std::size_t i = 0; i < r_.size(); ++i) {

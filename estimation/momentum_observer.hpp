@@ -33,9 +33,10 @@ class MomentumObserver {
   MomentumObserver(const tandem_kernels& kernels, double bandwidth_Hz, double step_s);
 
   /// One step. After restart() the first one only notes the state.
+  /// @param sines         of q, for the kernels
   /// @param q, v, wrench  as the kernels take them; known wrenches are not external ones
   /// @param tau           (nv) of the drives; a base's six entries are 0
-  void update(const double* q, const double* v, const double* tau,
+  void update(const double* sines, const double* q, const double* v, const double* tau,
               const double* wrench) noexcept TANDEM_RT;
   /// Forgets: r is 0.
   void restart() noexcept TANDEM_RT;

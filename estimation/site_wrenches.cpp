@@ -38,8 +38,9 @@ SiteWrenches::SiteWrenches(const tandem_kernels& kernels, std::vector<std::size_
       jacobians_(6 * kernels.sites * kernels.nv),
       f_(6 * sites_.size()) {}
 
-void SiteWrenches::solve(const double* q, std::span<const double> residual) noexcept TANDEM_RT {
-  kernels_->site_jacobians(q, jacobians_.data());
+void SiteWrenches::solve(const double* sines, const double* q,
+                         std::span<const double> residual) noexcept TANDEM_RT {
+  kernels_->site_jacobians_at(sines, q, jacobians_.data());
   static_assert(kMostWrenches == 4);
   switch (sites_.size()) {  // sizes that the compiler knows: a third of the time
     case 1: return solve_for<1>(residual);

@@ -37,10 +37,12 @@ class SiteWrenches {
   [[nodiscard]] static Result<SiteWrenches> make(const tandem_kernels& kernels,
                                                  const std::vector<std::string>& sites);
 
+  /// @param sines     of q, for the kernels
   /// @param q         of the kernels
   /// @param residual  (nv) MomentumObserver::residual()
   /// @rt no allocation; O(nv (6 sites)^2 + (6 sites)^3)
-  void solve(const double* q, std::span<const double> residual) noexcept TANDEM_RT;
+  void solve(const double* sines, const double* q,
+             std::span<const double> residual) noexcept TANDEM_RT;
 
   [[nodiscard]] std::size_t size() const noexcept { return sites_.size(); }
   /// Force [N] and moment [Nm] on the robot about the site's origin, in W's axes.

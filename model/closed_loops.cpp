@@ -56,6 +56,7 @@ Result<ClosedLoops> ClosedLoops::create(const std::vector<LoopSpec>& loops,
                                         const tandem_kernels& kernels) {
   ClosedLoops result;
   result.kernels_ = &kernels;
+  result.sines_.emplace(kernels);
   for (const LoopSpec& loop : loops)
     if (Status status = result.add(loop); !status) return std::unexpected(status.error());
   const std::vector<std::string> joints = names(kernels.joint_names, kernels.joints);
@@ -101,7 +102,9 @@ Status ClosedLoops::add(const LoopSpec& spec) {
 
 void ClosedLoops::move(const double* q, const double* v) noexcept TANDEM_RT {
   if (loops_.empty()) return;
-  kernels_->site_motion(q, v, zero_.data(), pose_.data(), twist_.data(), acceleration_.data());
+  sines_->take(q);
+  kernels_->site_motion_at(sines(), q, v, zero_.data(), pose_.data(), twist_.data(),
+                           acceleration_.data());
   LoopEquation* row = rows_.data();
   for (const Loop& loop : loops_) {
     if (loop.spec.type == LoopType::kRod) {
@@ -158,7 +161,7 @@ void ClosedLoops::write_axis(const Loop& loop, LoopEquation* rows) const noexcep
 
 void ClosedLoops::differentiate(const double* q) noexcept TANDEM_RT {
   if (loops_.empty()) return;
-  kernels_->site_jacobians(q, J_.data());
+  kernels_->site_jacobians_at(sines(), q, J_.data());
   const std::size_t nv = kernels_->nv;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const LoopEquation& row = rows_[r];

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "model/kernels.h"
 #include "model/loop_spec.hpp"
 #include "model/semidefinite.hpp"
+#include "model/sines.hpp"
 
 namespace tandem::model {
 
@@ -68,6 +70,11 @@ class ClosedLoops {
   /// Evaluates A. @pre move() at the same q
   void differentiate(const double* q) noexcept TANDEM_RT;
 
+  /// For the kernels' _at forms at move()'s q; null without a loop.
+  [[nodiscard]] const double* sines() const noexcept {
+    return loops_.empty() ? nullptr : sines_->data();
+  }
+
   /// How far a loop is open, as of move() [m]; for a rod, how much too long or short.
   [[nodiscard]] double position_error_m(std::size_t loop) const noexcept TANDEM_RT;
   /// The same, by position and direction.
@@ -107,6 +114,7 @@ class ClosedLoops {
   void step_passive(double* unknown) noexcept;
 
   const tandem_kernels* kernels_ = nullptr;
+  std::optional<Sines> sines_;  // of move()'s posture
   std::vector<Loop> loops_;
   std::vector<LoopEquation> rows_;
   std::vector<std::size_t> passive_;

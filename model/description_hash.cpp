@@ -10,7 +10,7 @@ namespace tandem::model {
 namespace {
 
 // Raised whenever the same description would give kernels that compute something else.
-constexpr int kGeneratorVersion = 4;
+constexpr int kGeneratorVersion = 5;
 
 std::string text_of(const Eigen::MatrixXd& m) {
   std::string text;

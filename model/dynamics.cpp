@@ -24,6 +24,8 @@ KernelShape kernel_shape(Kernel kernel, const Mechanism& m) {
       return {"site_motion",
               {q, v, vdot},
               {{"pose", 12 * sites}, {"twist", 6 * sites}, {"acceleration", 6 * sites}}};
+    case Kernel::kSiteTwists:
+      return {"site_twists", {q, v}, {{"pose", 12 * sites}, {"twist", 6 * sites}}};
     case Kernel::kSiteJacobians: return {"site_jacobians", {q}, {{"J", 6 * sites * nv}}};
     case Kernel::kSensorWrenches:
       return {"sensor_wrenches",

@@ -22,14 +22,15 @@ enum class Kernel : std::uint8_t {
   kCentroidalMomentum,
   kEnergy,
   kSiteMotion,
+  kSiteTwists,
   kSiteJacobians,
   kSensorWrenches,
   kGeneralisedMomentum,
   kInverseDynamicsDerivatives,
   kForwardDynamicsDerivatives,
 };
-inline constexpr int kKernels = 11;     ///< in every library
-inline constexpr int kAllKernels = 13;  ///< where ModelSpec::derivatives asks for them
+inline constexpr int kKernels = 12;     ///< in every library
+inline constexpr int kAllKernels = 14;  ///< where ModelSpec::derivatives asks for them
 
 /// One array argument of a kernel.
 struct KernelArray {
@@ -61,6 +62,7 @@ void run_tree_kernel(Kernel kernel, const Mechanism& m, const std::vector<std::v
     case Kernel::kCentroidalMomentum: return centroidal_momentum<S>(m, i(0), i(1), o(0));
     case Kernel::kEnergy: return energy<S>(m, i(0), i(1), o(0));
     case Kernel::kSiteMotion: return site_motion<S>(m, i(0), i(1), i(2), o(0), o(1), o(2));
+    case Kernel::kSiteTwists: return site_twists<S>(m, i(0), i(1), o(0), o(1));
     case Kernel::kSiteJacobians: return site_jacobians<S>(m, i(0), o(0));
     case Kernel::kSensorWrenches: return SensorWrenches<S>(m, i(0), i(1), i(2), i(3), o(0)).run();
     case Kernel::kGeneralisedMomentum:
@@ -99,6 +101,7 @@ class FollowerKernels {
       case Kernel::kCentroidalMomentum:
       case Kernel::kEnergy:
       case Kernel::kSiteMotion:
+      case Kernel::kSiteTwists:
       case Kernel::kSensorWrenches: out = on_tree(kernel, in); return;
       case Kernel::kInverseDynamicsDerivatives:
         out = on_tree(kernel, in);

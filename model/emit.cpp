@@ -2,6 +2,8 @@
 // operations; what a later part needs goes through the workspace.
 #include "model/emit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <functional>
@@ -18,6 +20,7 @@ namespace {
 constexpr std::size_t kLongestInline = 96;  // characters of an expression written into another
 constexpr int kEarlyDepth = 3;    // of an angle: (multiplier * q + offset) + the frames' own offset
 constexpr int kMostZeros = 1000;  // of one output that are written one by one
+constexpr std::string_view kPosture = "q";
 constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
 
 // The shortest text that reads back as the same double, never an integer literal.
@@ -34,11 +37,12 @@ std::string literal(double value) {
 // value that a later part needs goes through the workspace w.
 class Emitter {
  public:
-  Emitter(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes,
+  Emitter(const Graph& graph, const TracedKernel& kernel, const Lanes& lanes, SineTable& sines,
           std::uint32_t part_operations, std::uint32_t states)
       : nodes_(graph.nodes()),
         kernel_(kernel),
         lanes_(lanes),
+        sines_(sines),
         part_operations_(part_operations),
         states_(states),
         number_(states == 1   ? "double"
@@ -71,6 +75,11 @@ class Emitter {
 
  private:
   void name_arguments() {
+    at_sines_ = states_ == 1 && kernel_.shape.inputs.front().name == kPosture;
+    if (at_sines_) {
+      parameters_ = "const double* __restrict s, ";
+      arguments_ = "s, ";
+    }
     for (const KernelArray& in : kernel_.shape.inputs) {
       parameters_ += "const " + array_ + "* __restrict " + in.name + ", ";
       arguments_ += in.name + ", ";
@@ -101,9 +110,10 @@ class Emitter {
     return value.is_constant() && value.value() == 0.0;
   }
 
-  // An angle that is a sum or product of inputs and constants: known before the first part.
+  // An angle that is a sum or product of positions and constants: known before the first part.
   bool is_early(std::uint32_t i, int depth = 0) const {
     const Node& node = nodes_[i];
+    if (node.op == Op::kInput) return kernel_.shape.inputs[node.a].name == kPosture;
     if (!is_operation(node.op)) return true;
     if (node.op != Op::kAdd && node.op != Op::kSub && node.op != Op::kMul) return false;
     return depth < kEarlyDepth && is_early(node.a, depth + 1) && is_early(node.b, depth + 1);
@@ -115,40 +125,36 @@ class Emitter {
 
   // Those of pairs first, side by side.
   void find_angles() {
-    std::vector<std::uint32_t> single;
-    const auto add = [&](std::uint32_t angle) {
-      angle_[angle] = static_cast<std::uint32_t>(angles_.size());
-      angles_.push_back({angle, false});
-    };
-    for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
-      if (!live_[i] || !is_trigonometric(i) || !is_early(nodes_[i].a)) continue;
-      const std::uint32_t angle = nodes_[i].a;
-      if (lanes_.first(i) != kNowhere) continue;  // with its partner
-      const std::uint32_t other = lanes_.second(i);
-      if (other == kNowhere || !is_early(nodes_[other].a)) {
-        single.push_back(angle);
-        continue;
+    for (const bool pairs : {true, false}) {
+      for (std::uint32_t i = 0; i < nodes_.size(); ++i) {
+        if (!live_[i] || !is_trigonometric(i) || !is_early(nodes_[i].a)) continue;
+        const std::uint32_t angle = nodes_[i].a, other = lanes_.second(i);
+        if (!pairs) {
+          angle_[angle] = sines_.index(early(angle));
+        } else if (other != kNowhere && is_early(nodes_[other].a)) {
+          sines_.add_pair(early(angle), early(nodes_[other].a));
+        }
       }
-      if (angle_[angle] == kNowhere) {
-        add(angle);
-        add(nodes_[other].a);
-      }
-      if (nodes_[i].op == Op::kSin && lanes_.minus[i])
-        angles_[angle_[nodes_[other].a]].minus = true;
     }
-    for (const std::uint32_t angle : single)
-      if (angle_[angle] == kNowhere) add(angle);
-    const auto angles = static_cast<std::uint32_t>(angles_.size());
-    table_ = states_ == 1 ? (angles + 3) / 4 * 4 : angles;  // whole vectors of four
-    workspace_ = 3 * table_;
+    if (states_ > 1) workspace_ = 3 * static_cast<std::uint32_t>(sines_.angles().size());
   }
 
   // Its sine or cosine was computed with all others before the first part.
   bool is_tabulated(std::uint32_t i) const {
     return is_trigonometric(i) && angle_[nodes_[i].a] != kNowhere;
   }
-  std::uint32_t place_in_table(std::uint32_t i) const {
-    return (nodes_[i].op == Op::kSin ? 1 : 2) * table_ + angle_[nodes_[i].a];
+  std::string tabulated(std::uint32_t i) const {
+    const std::uint32_t angle = angle_[nodes_[i].a];
+    const bool sine = nodes_[i].op == Op::kSin;
+    if (states_ == 1)
+      return fmt::format("s[{}]", sine ? SineTable::sine(angle) : SineTable::cosine(angle));
+    const auto angles = static_cast<std::uint32_t>(sines_.angles().size());
+    return fmt::format("w[{}]", angles + 2 * angle + (sine ? 0 : 1));
+  }
+  // Two that one vector of the table holds.
+  bool are_tabulated(std::uint32_t first, std::uint32_t second) const {
+    return is_tabulated(first) && is_tabulated(second) && lanes_.second(first) == second &&
+           SineTable::adjoin(angle_[nodes_[first].a], angle_[nodes_[second].a]);
   }
 
   void find_uses() {
@@ -229,11 +235,7 @@ class Emitter {
     if (node.op == Op::kConstant) return literal(node.value);
     if (node.op == Op::kInput)
       return kernel_.shape.inputs[node.a].name + "[" + std::to_string(node.b) + "]";
-    if (is_tabulated(i)) {
-      const std::string value = "w[" + std::to_string(place_in_table(i)) + "]";
-      const bool minus = node.op == Op::kSin && angles_[angle_[node.a]].minus;
-      return minus ? "(-" + value + ")" : value;
-    }
+    if (is_tabulated(i)) return tabulated(i);
     const std::uint32_t unit = unit_of(i);
     if (is_pair(unit)) {
       const std::uint32_t lane = unit == i ? 0 : 1;
@@ -266,12 +268,15 @@ class Emitter {
 
   // A vector of `first` and plus or minus `second`.
   std::string vector(std::uint32_t first, std::uint32_t second, bool minus) {
-    const bool paired = lanes_.second(first) == second;
-    if (paired && is_tabulated(first) && is_tabulated(second)) {
-      const std::string pair = "pair(w + " + std::to_string(place_in_table(first)) + ")";
-      const bool held = nodes_[first].op == Op::kSin && angles_[angle_[nodes_[second].a]].minus;
-      return held == minus ? pair : "flip(" + pair + ")";
+    if (are_tabulated(first, second)) {
+      const std::uint32_t angle = angle_[nodes_[first].a];
+      if (nodes_[first].op == Op::kSin)
+        return fmt::format("pair(s + {})",
+                           minus ? SineTable::flipped(angle) : SineTable::sine(angle));
+      const std::string pair = fmt::format("pair(s + {})", SineTable::cosine(angle));
+      return minus ? "flip(" + pair + ")" : pair;
     }
+    const bool paired = lanes_.second(first) == second;
     if (paired && is_pair(first)) {
       const std::string pair = part_of_[first] == part_
                                    ? "p" + std::to_string(first)
@@ -304,16 +309,13 @@ class Emitter {
     const bool minus_a = minus != minus_b;
     return vector(x.a, a, minus_a) + (x.op == Op::kDiv ? " / " : " * ") + vector(x.b, b, minus_b);
   }
-  // Not held as a vector: it is made where it is used, with either sign.
+  // With either sign: a sine, or what no vector holds and is made where it is used.
   bool is_free(std::uint32_t first, std::uint32_t second) const {
-    const bool paired = lanes_.second(first) == second;
-    return !paired || !(is_pair(first) || (is_tabulated(first) && is_tabulated(second)));
+    if (are_tabulated(first, second)) return nodes_[first].op == Op::kSin;
+    return lanes_.second(first) != second || !is_pair(first);
   }
   bool held_minus(std::uint32_t first, std::uint32_t second) const {
-    if (is_free(first, second)) return false;
-    if (is_tabulated(first))
-      return nodes_[first].op == Op::kSin && angles_[angle_[nodes_[second].a]].minus;
-    return lanes_.minus[first];
+    return !is_free(first, second) && !is_tabulated(first) && lanes_.minus[first];
   }
 
   void write_part(std::uint32_t part) {
@@ -416,30 +418,30 @@ class Emitter {
       if (cleared_.contains(out.name))
         body += "  for (int i = 0; i < " + std::to_string(out.size) + "; ++i) " + out.name +
                 "[i] = " + constant(0.0) + ";\n";
-    std::vector<std::string> angles;
-    for (const Angle& angle : angles_)
-      angles.push_back(angle.minus ? "-(" + early(angle.node) + ")" : early(angle.node));
-    angles.resize(table_, "0.0");
-    for (std::size_t k = 0; k < table_; k += states_ == 1 ? 4 : 1) {
-      const std::string at = std::to_string(k);
-      if (states_ == 1)  // as vectors, as they are read
-        body += "  put(w + " + at + ", four{" + angles[k] + ", " + angles[k + 1] + ", " +
-                angles[k + 2] + ", " + angles[k + 3] + "});\n";
-      else
-        body += "  w[" + at + "] = " + angles[k] + ";\n";
-    }
-    const auto doubles = [&](std::uint32_t at) {
-      const std::string from = "w + " + std::to_string(at);
-      return states_ == 1 ? from : "reinterpret_cast<double*>(" + from + ")";
-    };
-    if (!angles_.empty())
-      body += std::string("  sines_and_cosines<") +
-              (states_ == 8 ? "eight, eight_bits" : "four, four_bits") + ">(" +
-              std::to_string(states_ * table_) + ", " + doubles(0) + ", " + doubles(table_) + ", " +
-              doubles(2 * table_) + ");\n";
+    if (states_ > 1) body += sines_of_states();
     for (std::size_t part = 0; part < parts_.size(); ++part)
       body += "  " + name_ + "_" + std::to_string(part) + "(" + arguments_ + ");\n";
-    result_.entry = "void " + name_ + "(" + result_.parameters + ") {\n" + body + "}\n";
+    if (!at_sines_) {
+      result_.entry = "void " + name_ + "(" + result_.parameters + ") {\n" + body + "}\n";
+      return;
+    }
+    const std::string own = arguments_.substr(0, arguments_.size() - 3);  // without ", w"
+    result_.entry = fmt::format(
+        "void {0}_at(const double* s, {1}) {{\n{2}}}\n"
+        "void {0}({1}) {{\n  alignas(32) double s[sine_count];\n  sines(q, s);\n  "
+        "{0}_at({3});\n}}\n",
+        name_, result_.parameters, body, own);
+  }
+  std::string sines_of_states() const {
+    const std::vector<std::string>& angles = sines_.angles();
+    if (angles.empty()) return {};
+    std::string body;
+    for (std::size_t k = 0; k < angles.size(); ++k)
+      body += fmt::format("  w[{}] = {};\n", k, angles[k].empty() ? number_ + "{}" : angles[k]);
+    return body + fmt::format(
+                      "  sines_and_cosines<{0}, {0}_bits, 2>({1}, reinterpret_cast<double*>(w), "
+                      "reinterpret_cast<double*>(w + {2}));\n",
+                      number_, states_ * angles.size(), angles.size());
   }
   // An angle in full, its operands too: nothing is computed before it.
   std::string early(std::uint32_t i) {
@@ -455,14 +457,10 @@ class Emitter {
     }
   }
 
-  struct Angle {
-    std::uint32_t node;
-    bool minus;  // of lane 1: minus the angle, and so its sine, is what the table has
-  };
-
   std::span<const Node> nodes_;
   const TracedKernel& kernel_;
   Lanes lanes_;
+  SineTable& sines_;
   std::uint32_t part_operations_;
   std::uint32_t states_;               // at once: 1, 4 or 8
   std::string number_, array_, name_;  // types of a number and of what arguments point at
@@ -473,8 +471,7 @@ class Emitter {
   std::vector<std::string> output_names_;
   std::set<std::string> cleared_;      // outputs, mostly zeros, that a loop clears first
   std::vector<bool> cleared_outputs_;  // per output: nothing is left to write
-  std::vector<Angle> angles_;
-  std::uint32_t table_ = 0;  // angles, rounded up to whole vectors
+  bool at_sines_ = false;              // takes the table of the robot's sines
   std::vector<std::vector<std::uint32_t>> parts_;
   std::uint32_t part_ = 0;
   std::uint32_t workspace_ = 0;
@@ -524,17 +521,18 @@ TracedKernel trace_mass_times(const Mechanism& m, Graph& graph) {
 }
 
 EmittedKernel emit_kernel(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
-                          std::uint32_t part_operations) {
+                          SineTable& sines, std::uint32_t part_operations) {
   Graph ordered;
   OrderedSums sums = ordered_sums(graph, kernel.outputs, pair_lanes(graph, kernel, m), ordered);
   const TracedKernel same{kernel.shape, std::move(sums.outputs)};
   const Lanes lanes = pair_lanes(ordered, same, m, sums.second_of);
-  return Emitter(ordered, same, lanes, part_operations, 1).run();
+  return Emitter(ordered, same, lanes, sines, part_operations, 1).run();
 }
 
 EmittedKernel emit_batch(const Graph& graph, const TracedKernel& kernel, std::uint32_t states,
                          std::uint32_t part_operations) {
-  return Emitter(graph, kernel, {}, part_operations, states).run();
+  SineTable own;
+  return Emitter(graph, kernel, {}, own, part_operations, states).run();
 }
 
 }  // namespace tandem::model

@@ -38,6 +38,7 @@ constexpr std::string_view kVectors =
     R"(typedef double two __attribute__((vector_size(16), may_alias));
 typedef long long two_bits __attribute__((vector_size(16), may_alias));
 static inline two& pair(double* at) { return *reinterpret_cast<two*>(at); }
+static inline two pair(const double* at) { return *reinterpret_cast<const two*>(at); }
 static inline two flip(two x) {  // minus lane 1
   const two_bits sign = {0, static_cast<long long>(0x8000000000000000u)};
   return reinterpret_cast<two>(reinterpret_cast<two_bits>(x) ^ sign);
@@ -93,6 +94,7 @@ constexpr std::string_view kIfEightLanes = "#ifdef __AVX512F__\n";
 /// Everything that a library holds.
 struct Emitted {
   using Some = std::vector<EmittedKernel>;
+  SineTable sines;
   Some kernels;        // by number
   Some fours, eights;  // batches; may be empty
   Some derivatives;    // of inverse and forward dynamics, or none
@@ -165,11 +167,11 @@ std::string batch_source(const KernelShape& shape, bool vectors) {
 
 // The entries of one variant and its table.
 std::string variant_source(const Mechanism& m, const GeneratedKernels& result, const Emitted& all) {
-  const auto& [kernels, fours, eights, derivatives] = all;
+  const auto& [sines, kernels, fours, eights, derivatives] = all;
   std::string text{kBanner};
   text += "#include \"parts.h\"\n\nnamespace TANDEM_VARIANT {\nnamespace {\n\n";
   text += kTrigSource;
-  text += "\n";
+  text += "\n" + sines.source();
   for (const auto* some : {&kernels, &fours, &eights, &derivatives})
     for (const EmittedKernel& kernel : *some) text += all.guarded(*some, kernel.entry + "\n");
   for (const Kernel kernel : kBatches)
@@ -187,6 +189,8 @@ std::string variant_source(const Mechanism& m, const GeneratedKernels& result, c
                       m.gravity[0], m.gravity[1], m.gravity[2], result.counts.size());
   for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + ",\n";
   for (const Kernel kernel : kBatches) text += "    " + kernel_shape(kernel, m).name + "_batch,\n";
+  text += "    sine_count, sines,\n";
+  for (const EmittedKernel& kernel : kernels) text += "    " + kernel.name + "_at,\n";
   for (const EmittedKernel& kernel : derivatives) text += "    " + kernel.name + ",\n";
   return text + "};\n\n}  // namespace TANDEM_VARIANT\n";
 }
@@ -248,27 +252,33 @@ OperationCount times(OperationCount count, std::uint32_t n) {
           count.sqrt * n, count.sincos * n, count.pairs * n};
 }
 
-EmittedKernel emit(const Graph& graph, const TracedKernel& kernel, const Mechanism& m) {
-  return emit_kernel(graph, kernel, m, kPartOperations);
+EmittedKernel emit(const Graph& graph, const TracedKernel& kernel, const Mechanism& m,
+                   SineTable& sines) {
+  return emit_kernel(graph, kernel, m, sines, kPartOperations);
 }
 
 // The mass matrix column by column.
-EmittedKernel mass_matrix_by_columns(const Mechanism& m) {
+EmittedKernel mass_matrix_by_columns(const Mechanism& m, SineTable& sines) {
   Graph graph;
-  EmittedKernel kernel = emit(graph, trace_mass_times(m, graph), m);
+  EmittedKernel kernel = emit(graph, trace_mass_times(m, graph), m, sines);
   const int nv = kernel_shape(Kernel::kBias, m).outputs[0].size;
   kernel.name = kernel_shape(Kernel::kMassMatrix, m).name;
   kernel.count = times(kernel.count, static_cast<std::uint32_t>(nv));
   kernel.entry += fmt::format(R"(
-void {0}(const double* q, double* M) {{
+void {0}_at(const double* s, const double* q, double* M) {{
   double unit[{1}] = {{}};
   double column[{1}];
   for (int j = 0; j < {1}; ++j) {{
     unit[j] = 1.0;
-    mass_times(q, unit, column);
+    mass_times_at(s, q, unit, column);
     unit[j] = 0.0;
     for (int i = j; i < {1}; ++i) M[i * {1} + j] = M[j * {1} + i] = column[i];
   }}
+}}
+void {0}(const double* q, double* M) {{
+  alignas(32) double s[sine_count];
+  sines(q, s);
+  {0}_at(s, q, M);
 }}
 )",
                               kernel.name, nv);
@@ -281,11 +291,11 @@ Status add_derivatives(const Mechanism& m, Emitted& all) {
   Graph graph;
   const TracedKernel inverse = trace_kernel(Kernel::kInverseDynamicsDerivatives, m, graph);
   if (Status status = check_finite(graph, inverse); !status) return status;
-  all.derivatives.push_back(emit(graph, inverse, m));
+  all.derivatives.push_back(emit(graph, inverse, m, all.sines));
   Graph factor_graph;
   const TracedKernel factor = trace_mass_factor(inverse, m, factor_graph);
-  EmittedKernel forward =
-      emit_forward_derivatives(inverse, m, emit(factor_graph, factor, m), kPartOperations);
+  EmittedKernel forward = emit_forward_derivatives(
+      inverse, m, emit(factor_graph, factor, m, all.sines), kPartOperations);
   forward.count = forward.count + all.kernels.front().count + all.derivatives.front().count;
   all.derivatives.push_back(std::move(forward));
   return {};
@@ -330,16 +340,16 @@ Result<GeneratedKernels> generate_kernels(const Tree& tree, const ModelSpec& spe
   result.robot = spec.robot;
   result.hash = description_hash(tree, spec);
   Emitted all;
-  auto& [kernels, fours, eights, derivatives] = all;
+  auto& [sines, kernels, fours, eights, derivatives] = all;
   for (int k = 0; k < kKernels; ++k) {
     Graph graph;
     const TracedKernel kernel = trace_kernel(static_cast<Kernel>(k), *mechanism, graph);
     if (Status status = check_finite(graph, kernel); !status)
       return std::unexpected(status.error());
-    kernels.push_back(emit(graph, kernel, *mechanism));
+    kernels.push_back(emit(graph, kernel, *mechanism, sines));
     if (static_cast<Kernel>(k) == Kernel::kMassMatrix &&
         kernels.back().count.add + kernels.back().count.mul > kMostMassMatrixOperations)
-      kernels.back() = mass_matrix_by_columns(*mechanism);
+      kernels.back() = mass_matrix_by_columns(*mechanism, sines);
     result.counts.push_back({kernels.back().name, kernels.back().count});
     if (std::ranges::find(kBatches, static_cast<Kernel>(k)) != std::end(kBatches) &&
         kernels.front().count.add + kernels.front().count.mul <= kMostBatchOperations)
@@ -365,7 +375,8 @@ Result<OperationCount> count_kernel(Kernel kernel, const Tree& tree, const Model
   const Result<Mechanism> mechanism = make_mechanism(tree, spec);
   if (!mechanism) return std::unexpected(mechanism.error());
   Graph graph;
-  return emit(graph, trace_kernel(kernel, *mechanism, graph), *mechanism).count;
+  SineTable sines;
+  return emit(graph, trace_kernel(kernel, *mechanism, graph), *mechanism, sines).count;
 }
 
 }  // namespace tandem::model

@@ -32,7 +32,7 @@ class InterpretedKernels {
     kernels_.mass_kg = mechanism_.mass_kg;
     for (std::size_t i = 0; i < 3; ++i) kernels_.gravity_m_s2[i] = mechanism_.gravity[i];
     set_functions();
-    current() = &mechanism_;
+    current() = this;
   }
   ~InterpretedKernels() { current() = nullptr; }
   InterpretedKernels(const InterpretedKernels&) = delete;
@@ -48,11 +48,12 @@ class InterpretedKernels {
     count = static_cast<std::uint32_t>(names.size());
     return pointers.data();
   }
-  static const Mechanism*& current() {
-    static const Mechanism* mechanism = nullptr;
-    return mechanism;
+  static const InterpretedKernels*& current() {
+    static const InterpretedKernels* kernels = nullptr;
+    return kernels;
   }
-  static const Mechanism& m() { return *current(); }
+  static const Mechanism& m() { return current()->mechanism_; }
+  static const tandem_kernels& table() { return current()->kernels_; }
   static std::span<const double> q(In in) { return {in, static_cast<std::size_t>(m().nq())}; }
   static std::span<const double> v(In in) { return {in, static_cast<std::size_t>(m().nv())}; }
   static std::span<const double> f(In in) {
@@ -105,6 +106,10 @@ class InterpretedKernels {
       site_motion<double>(m(), q(a), v(b), v(c), out(pose, 12 * sites()), out(twist, 6 * sites()),
                           out(acc, 6 * sites()));
     };
+    kernels_.site_twists = [](In a, In b, double* pose, double* twist) {
+      if (follow()) return run(Kernel::kSiteTwists, {a, b}, {pose, twist});
+      site_twists<double>(m(), q(a), v(b), out(pose, 12 * sites()), out(twist, 6 * sites()));
+    };
     kernels_.site_jacobians = [](In a, double* J) {
       if (follow()) return run(Kernel::kSiteJacobians, {a}, {J});
       site_jacobians<double>(m(), q(a), out(J, 6 * nv() * sites()));
@@ -112,6 +117,37 @@ class InterpretedKernels {
     kernels_.sensor_wrenches = [](In a, In b, In c, In d, double* r) {
       if (follow()) return run(Kernel::kSensorWrenches, {a, b, c, d}, {r});
       SensorWrenches<double>(m(), q(a), v(b), v(c), f(d), out(r, 6 * m().sensors.size())).run();
+    };
+    set_forms_at_sines();
+  }
+
+  // Each computes its own.
+  void set_forms_at_sines() {
+    kernels_.sine_count = 1;
+    kernels_.sines = [](In, double*) {};
+    kernels_.forward_dynamics_at = [](In, In a, In b, In c, In d, double* r) {
+      table().forward_dynamics(a, b, c, d, r);
+    };
+    kernels_.inverse_dynamics_at = [](In, In a, In b, In c, In d, double* r) {
+      table().inverse_dynamics(a, b, c, d, r);
+    };
+    kernels_.mass_matrix_at = [](In, In a, double* r) { table().mass_matrix(a, r); };
+    kernels_.bias_at = [](In, In a, In b, double* r) { table().bias(a, b, r); };
+    kernels_.generalised_momentum_at = [](In, In a, In b, In c, double* p, double* r) {
+      table().generalised_momentum(a, b, c, p, r);
+    };
+    kernels_.center_of_mass_at = [](In, In a, In b, double* c, double* cdot, double* J) {
+      table().center_of_mass(a, b, c, cdot, J);
+    };
+    kernels_.site_motion_at = [](In, In a, In b, In c, double* pose, double* twist, double* acc) {
+      table().site_motion(a, b, c, pose, twist, acc);
+    };
+    kernels_.site_twists_at = [](In, In a, In b, double* pose, double* twist) {
+      table().site_twists(a, b, pose, twist);
+    };
+    kernels_.site_jacobians_at = [](In, In a, double* J) { table().site_jacobians(a, J); };
+    kernels_.sensor_wrenches_at = [](In, In a, In b, In c, In d, double* r) {
+      table().sensor_wrenches(a, b, c, d, r);
     };
   }
 

@@ -71,6 +71,7 @@ Arrays call_kernel(const tandem_kernels& k, Kernel kernel, const Mechanism& m, c
     case Kernel::kCentroidalMomentum: k.centroidal_momentum(i(0), i(1), o(0)); break;
     case Kernel::kEnergy: k.energy(i(0), i(1), o(0)); break;
     case Kernel::kSiteMotion: k.site_motion(i(0), i(1), i(2), o(0), o(1), o(2)); break;
+    case Kernel::kSiteTwists: k.site_twists(i(0), i(1), o(0), o(1)); break;
     case Kernel::kSiteJacobians: k.site_jacobians(i(0), o(0)); break;
     case Kernel::kSensorWrenches: k.sensor_wrenches(i(0), i(1), i(2), i(3), o(0)); break;
     case Kernel::kGeneralisedMomentum: k.generalised_momentum(i(0), i(1), i(2), o(0), o(1)); break;
@@ -137,6 +138,7 @@ Arrays SeededState::of(Kernel kernel) const {
     case Kernel::kBias:
     case Kernel::kCenterOfMass:
     case Kernel::kCentroidalMomentum:
+    case Kernel::kSiteTwists:
     case Kernel::kEnergy: return {q, v};
   }
   return {};

@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define TANDEM_KERNELS_ABI 5u
+#define TANDEM_KERNELS_ABI 6u
 
 /* Operations of one kernel as emitted (before the compiler). */
 typedef struct tandem_kernel_count {
@@ -68,6 +68,8 @@ typedef struct tandem_kernels {
    * angular. */
   void (*site_motion)(const double* q, const double* v, const double* vdot, double* pose,
                       double* twist, double* acceleration);
+  /* The same without accelerations, which costs less. */
+  void (*site_twists)(const double* q, const double* v, double* pose, double* twist);
   /* J(6*nv) row-major per site, one after another: twist = J v, as in site_motion */
   void (*site_jacobians)(const double* q, double* J);
   /* Per sensor six: the wrench that the child's side (away from the base) applies to the parent's
@@ -89,6 +91,31 @@ typedef struct tandem_kernels {
                                  const double* tau, const double* wrench, double* vdot);
   void (*inverse_dynamics_batch)(uint32_t states, const double* q, const double* v,
                                  const double* vdot, const double* wrench, double* tau);
+
+  /* Several kernels at one posture: sines(q, s) computes the sines and cosines of it once, and each
+   * kernel's _at form takes them and the same q. s(sine_count) is aligned to 32 bytes; how it is
+   * laid out is the library's own matter. Results are those of the forms above, bit for bit. */
+  uint32_t sine_count;
+  void (*sines)(const double* q, double* s);
+  void (*forward_dynamics_at)(const double* s, const double* q, const double* v, const double* tau,
+                              const double* wrench, double* vdot);
+  void (*inverse_dynamics_at)(const double* s, const double* q, const double* v, const double* vdot,
+                              const double* wrench, double* tau);
+  void (*mass_matrix_at)(const double* s, const double* q, double* M);
+  void (*bias_at)(const double* s, const double* q, const double* v, double* h);
+  void (*center_of_mass_at)(const double* s, const double* q, const double* v, double* c,
+                            double* cdot, double* J);
+  void (*centroidal_momentum_at)(const double* s, const double* q, const double* v, double* h);
+  void (*energy_at)(const double* s, const double* q, const double* v, double* kinetic_potential);
+  void (*site_motion_at)(const double* s, const double* q, const double* v, const double* vdot,
+                         double* pose, double* twist, double* acceleration);
+  void (*site_twists_at)(const double* s, const double* q, const double* v, double* pose,
+                         double* twist);
+  void (*site_jacobians_at)(const double* s, const double* q, double* J);
+  void (*sensor_wrenches_at)(const double* s, const double* q, const double* v, const double* vdot,
+                             const double* wrench, double* out);
+  void (*generalised_momentum_at)(const double* s, const double* q, const double* v,
+                                  const double* wrench, double* p, double* b);
 
   /* Derivatives, each nv*nv, row-major: row i, column j is that of element i to element j. The
    * columns of a floating base's q are a displacement in the order of v, in the base's own frame:

@@ -74,6 +74,15 @@ void site_motion(const Mechanism& m, std::span<const S> q, std::span<const S> v,
   }
 }
 
+/// Poses and twists as site_motion() has them.
+template <class S>
+void site_twists(const Mechanism& m, std::span<const S> q, std::span<const S> v, std::span<S> pose,
+                 std::span<S> twist) {
+  const std::vector<S> vdot(v.size(), S(0.0));
+  std::vector<S> acceleration(twist.size(), S(0.0));
+  site_motion<S>(m, q, v, vdot, pose, twist, acceleration);
+}
+
 /// J (6 x nv, row-major) per site: its twist is J v.
 template <class S>
 void site_jacobians(const Mechanism& m, std::span<const S> q, std::span<S> J) {

@@ -174,8 +174,10 @@ void {name}({parameters}) {{
   constexpr int n = {size}, base_q = {base_q}, base_v = {base_v}, width = {width};
   constexpr int at_v = n - base_q, at_tau = at_v + n - base_v, columns = at_tau + n;
   double vdot[n], L[{entries}], minus_reciprocal[n];
-  forward_dynamics(q, v, tau, wrench, vdot);
-  inverse_dynamics_derivatives(q, v, vdot, wrench, dvdot_dq, dvdot_dv, dvdot_dtau);
+  alignas(32) double s[sine_count];
+  sines(q, s);
+  forward_dynamics_at(s, q, v, tau, wrench, vdot);
+  inverse_dynamics_derivatives_at(s, q, v, vdot, wrench, dvdot_dq, dvdot_dv, dvdot_dtau);
   mass_factor(dvdot_dtau, L, minus_reciprocal);
   alignas(64) double x[n * width] = {{}};
   for (int i = 0; i < n; ++i) {{

@@ -40,17 +40,17 @@ LightJoints::LightJoints(const tandem_kernels& kernels, const Actuators& actuato
   }
 }
 
-void LightJoints::look(const tandem_kernels& kernels, const double* q, const double* v,
-                       double* forces, const double* wrench,
+void LightJoints::look(const tandem_kernels& kernels, const double* sines, const double* q,
+                       const double* v, double* forces, const double* wrench,
                        std::int64_t time_ns) noexcept TANDEM_RT {
   next_look_ns_ = time_ns + kLook_ns;
-  kernels.forward_dynamics(q, v, forces, wrench, rest_.data());
+  kernels.forward_dynamics_at(sines, q, v, forces, wrench, rest_.data());
   std::size_t halvings = 0;
   for (const Watched& watched : watched_) {
     const std::size_t at = kernels.nv - kernels.joints + watched.joint;
     const double before = forces[at];
     forces[at] += 1.0;
-    kernels.forward_dynamics(q, v, forces, wrench, pushed_.data());
+    kernels.forward_dynamics_at(sines, q, v, forces, wrench, pushed_.data());
     forces[at] = before;
     const double per_inertia = pushed_[at] - rest_[at];
     while (halvings < kHalvings && watched.need_kg_m2[halvings] * per_inertia > kTaken) ++halvings;

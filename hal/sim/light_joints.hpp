@@ -41,10 +41,11 @@ class LightJoints {
   }
   /// Finds the inertia that each watched link shows here: 1 over what a unit of torque adds to its
   /// acceleration.
+  /// @param sines   of q, for the kernels
   /// @param forces  (nv) scratch that holds the generalized forces, and does so afterwards
   /// @param wrench  the kernels' wrenches
-  void look(const tandem_kernels& kernels, const double* q, const double* v, double* forces,
-            const double* wrench, std::int64_t time_ns) noexcept TANDEM_RT;
+  void look(const tandem_kernels& kernels, const double* sines, const double* q, const double* v,
+            double* forces, const double* wrench, std::int64_t time_ns) noexcept TANDEM_RT;
   [[nodiscard]] std::int64_t step_ns(std::int64_t substep_ns) const noexcept TANDEM_RT {
     return substep_ns >> halvings_;
   }

@@ -46,7 +46,7 @@ void LoopForces::prepare(const double* q, const double* v) noexcept {
   const std::size_t n = kernels_->nv;
   const std::size_t rows = loops_.rows();
   loops_.differentiate(q);
-  kernels_->mass_matrix(q, M_.data());
+  kernels_->mass_matrix_at(loops_.sines(), q, M_.data());
   cholesky(M_, n);
   std::copy(loops_.jacobian().begin(), loops_.jacobian().end(), W_.begin());
   for (std::size_t r = 0; r < rows; ++r) {

@@ -71,6 +71,7 @@ Result<Plant> Plant::create(const PlantConfig& config) {
 
 Plant::Plant(const PlantConfig& config)
     : kernels_(config.kernels),
+      sines_(*config.kernels),
       integrator_(config.integrator),
       substep_ns_(config.substep_ns),
       release_ns_(config.release_ns),
@@ -87,7 +88,6 @@ Plant::Plant(const PlantConfig& config)
   motor_rate_.assign(3 * n, 0.0);
   pose_.assign(12 * kernels_->sites, 0.0);
   twist_.assign(6 * kernels_->sites, 0.0);
-  acceleration_.assign(6 * kernels_->sites, 0.0);
   damping_.assign(n, 0.0);
 }
 
@@ -328,6 +328,7 @@ void Plant::archive(Archive& ar) {
   ar(actuators_, contact_, bodies_, hoist_, loops_, light_, x_, tau_, applied_tau_, vdot_, wrench_,
      motor_rate_, pose_, twist_, time_ns_, held_, released_, contact_fresh_, vdot_fresh_, diverged_,
      diverged_rate_, point_forces_W_, pushes_);
+  if (ar.reading()) sines_.take(q());
   if (engine_) engine_->archive(ar);
 }
 

@@ -24,6 +24,7 @@
 #include "hal/sim/loop_forces.hpp"
 #include "hal/sim/push.hpp"
 #include "model/kernels.h"
+#include "model/sines.hpp"
 
 namespace tandem::sim {
 
@@ -152,6 +153,8 @@ class Plant {
   [[nodiscard]] const tandem_kernels& kernels() const noexcept { return *kernels_; }
   [[nodiscard]] const double* q() const noexcept { return x_.data(); }
   [[nodiscard]] const double* v() const noexcept { return x_.data() + kernels_->nq; }
+  /// For the kernels' _at forms at q(). @pre evaluate() since the last advance()
+  [[nodiscard]] const double* sines() const noexcept { return sines_.data(); }
   [[nodiscard]] const double* vdot() const noexcept { return vdot_.data(); }
   [[nodiscard]] const double* tau() const noexcept { return tau_.data(); }
   [[nodiscard]] const double* wrench() const noexcept { return wrench_.data(); }
@@ -202,6 +205,7 @@ class Plant {
   [[nodiscard]] MotorStateView motor(const double* x) const noexcept;
 
   const tandem_kernels* kernels_;
+  model::Sines sines_;  // of the last touch_ground()'s posture
   Integrator integrator_;
   std::int64_t substep_ns_, release_ns_;
   bool lifted_;  // the hoist holds the base to the end
@@ -224,9 +228,9 @@ class Plant {
   std::vector<double> tau_;     // of actuators, joint friction and hoist
   std::vector<double> forces_;  // with what else acts, where anything does
   std::vector<double> applied_tau_, vdot_, wrench_, motor_rate_;
-  std::vector<double> pose_, twist_, acceleration_;  // scratch of the sites kernel
-  std::vector<double> stage_, k1_, k2_, k3_, k4_;    // scratch of Runge-Kutta
-  std::vector<double> point_forces_W_;               // of another engine's last step
+  std::vector<double> pose_, twist_;               // of the sites
+  std::vector<double> stage_, k1_, k2_, k3_, k4_;  // scratch of Runge-Kutta
+  std::vector<double> point_forces_W_;             // of another engine's last step
   std::int64_t time_ns_ = 0;
   std::uint8_t held_ = 0, released_ = 0;
   std::uint8_t contact_fresh_ = 0, vdot_fresh_ = 0;  // evaluated at the present state

@@ -9,11 +9,12 @@
 
 namespace tandem::sim {
 
+/// Everything at x that does not need the forces.
 void Plant::touch_ground(const double* x, bool move_anchors) noexcept {
+  sines_.take(x);
   bodies_.evaluate(x, x + kernels_->nq, move_anchors);
   if (contact_.feet() == 0) return;
-  kernels_->site_motion(x, x + kernels_->nq, vdot_.data(), pose_.data(), twist_.data(),
-                        acceleration_.data());
+  kernels_->site_twists_at(sines(), x, x + kernels_->nq, pose_.data(), twist_.data());
   if (engine_) return contact_.take(pose_.data(), point_forces_W_.data(), wrench_.data());
   contact_.evaluate(pose_.data(), twist_.data(), move_anchors, wrench_.data());
 }
@@ -53,10 +54,10 @@ const std::vector<double>& Plant::with_ends_and_ground(const double* q, const do
 void Plant::accelerate(const double* q, const double* v, const double* forces) noexcept {
   if (engine_) return;  // as its last step left them
   if (loops_.none()) {
-    return kernels_->forward_dynamics(q, v, forces, wrench_.data(), vdot_.data());
+    return kernels_->forward_dynamics_at(sines(), q, v, forces, wrench_.data(), vdot_.data());
   }
   loops_.let_go(wrench_.data());
-  kernels_->forward_dynamics(q, v, forces, wrench_.data(), vdot_.data());
+  kernels_->forward_dynamics_at(sines(), q, v, forces, wrench_.data(), vdot_.data());
   loops_.constrain(q, v, vdot_.data(), wrench_.data());
 }
 
@@ -74,7 +75,7 @@ Code Plant::advance(std::int64_t duration_ns) noexcept TANDEM_RT {
     if (diverged_ >= 0) return Code::kDiverged;
     evaluate();
     if (light_.due(time_ns_)) {
-      light_.look(*kernels_, q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
+      light_.look(*kernels_, sines(), q(), v(), applied_tau_.data(), wrench_.data(), time_ns_);
     }
     const std::int64_t step_ns = std::min(duration_ns, light_.step_ns(substep_ns_));
     const double h_s = static_cast<double>(step_ns) * 1e-9;

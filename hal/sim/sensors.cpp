@@ -57,11 +57,12 @@ Result<Sensors> Sensors::create(const hal::RobotConfig& robot, const tandem_kern
 void Sensors::sample(const Plant& plant, std::span<double> channels) noexcept TANDEM_RT {
   const tandem_kernels& kernels = plant.kernels();
   if (any_force_) {
-    kernels.sensor_wrenches(plant.q(), plant.v(), plant.vdot(), plant.wrench(), wrenches_.data());
+    kernels.sensor_wrenches_at(plant.sines(), plant.q(), plant.v(), plant.vdot(), plant.wrench(),
+                               wrenches_.data());
   }
   if (any_imu_) {
-    kernels.site_motion(plant.q(), plant.v(), plant.vdot(), pose_.data(), twist_.data(),
-                        acceleration_.data());
+    kernels.site_motion_at(plant.sines(), plant.q(), plant.v(), plant.vdot(), pose_.data(),
+                           twist_.data(), acceleration_.data());
   }
   for (std::size_t s = 0; s < slots_.size(); ++s) {
     const Slot& slot = slots_[s];

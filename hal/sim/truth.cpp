@@ -15,8 +15,9 @@ void TruthFiller::fill(const Plant& plant, const hal::CycleTime& time,
     std::copy_n(plant.q() + 3, 4, truth.base_quaternion().data());
     std::copy_n(plant.v(), 6, truth.base_velocity().data());
   }
-  plant.kernels().center_of_mass(plant.q(), plant.v(), truth.center_of_mass_m().data(),
-                                 com_velocity_.data(), com_jacobian_.data());
+  plant.kernels().center_of_mass_at(plant.sines(), plant.q(), plant.v(),
+                                    truth.center_of_mass_m().data(), com_velocity_.data(),
+                                    com_jacobian_.data());
   for (std::size_t j = 0; j < plant.joints(); ++j) {
     const JointReading joint = plant.joint(j);
     truth.position_rad()[j] = joint.position_rad;

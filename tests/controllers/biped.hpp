@@ -10,6 +10,7 @@
 
 #include "hal/config/robot_config.hpp"
 #include "model/kernels.h"
+#include "tests/support/at_sines.hpp"
 
 namespace tandem::test {
 
@@ -157,6 +158,11 @@ inline void biped_inverse_dynamics(const double* q, const double*, const double*
   Eigen::Map<BipedVector>{tau} = sum;
 }
 
+inline void biped_site_twists(const double* q, const double* v, double* pose, double* twist) {
+  double acceleration[12];
+  biped_site_motion(q, v, nullptr, pose, twist, acceleration);
+}
+
 inline void biped_bias(const double* q, const double* v, double* h) {
   const std::array<double, kBipedNv> rest{};
   const std::array<double, 12> free{};
@@ -172,6 +178,7 @@ inline const tandem_kernels* biped_kernels() {
   static const std::array<const char*, 2> soles{"l_sole", "r_sole"};
   static const tandem_kernels kernels = [] {
     tandem_kernels k{};
+    k.sines = no_sines;
     k.abi = TANDEM_KERNELS_ABI;
     k.floating_base = 1;
     k.robot = "biped";
@@ -185,10 +192,16 @@ inline const tandem_kernels* biped_kernels() {
     k.wrench_names = soles.data();
     k.mass_kg = kBipedMass;
     k.site_motion = biped_site_motion;
+    k.site_motion_at = at_sines<biped_site_motion>;
+    k.site_twists_at = at_sines<biped_site_twists>;
     k.site_jacobians = biped_site_jacobians;
+    k.site_jacobians_at = at_sines<biped_site_jacobians>;
     k.center_of_mass = biped_center_of_mass;
+    k.center_of_mass_at = at_sines<biped_center_of_mass>;
     k.inverse_dynamics = biped_inverse_dynamics;
+    k.inverse_dynamics_at = at_sines<biped_inverse_dynamics>;
     k.bias = biped_bias;
+    k.bias_at = at_sines<biped_bias>;
     return k;
   }();
   return &kernels;

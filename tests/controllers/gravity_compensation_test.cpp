@@ -18,10 +18,12 @@ const tandem_kernels* pendulum() {
   static const char* const joints[] = {"upper", "lower"};
   static const tandem_kernels kernels = [] {
     tandem_kernels k{};
+    k.sines = test::no_sines;
     k.robot = "pendulum";
     k.nq = k.nv = k.joints = 2;
     k.joint_names = joints;
     k.bias = pendulum_bias;
+    k.bias_at = test::at_sines<pendulum_bias>;
     return k;
   }();
   return &kernels;

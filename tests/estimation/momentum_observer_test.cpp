@@ -46,7 +46,7 @@ struct Arm {
       for (std::size_t j = 0; j < 6; ++j) external[i] += M[6 * i + j] * push[j];
       all[i] += external[i];
     }
-    observer.update(q.data(), v.data(), tau.data(), nullptr);
+    observer.update(nullptr, q.data(), v.data(), tau.data(), nullptr);
     for (int fine = 0; fine < 4; ++fine) {
       const auto vdot = evaluate_kernel(Kernel::kForwardDynamics, mechanism, {q, v, all, {}})[0];
       for (std::size_t i = 0; i < 6; ++i) {
@@ -101,7 +101,7 @@ TEST(MomentumObserver, StartsAgainAfterNumbersThatAreNotFinite) {
   EXPECT_GT(arm.observer.residual()[0], 1.0);
   std::vector<double> bad = arm.v;
   bad[3] = std::nan("");
-  arm.observer.update(arm.q.data(), bad.data(), arm.tau.data(), nullptr);
+  arm.observer.update(nullptr, arm.q.data(), bad.data(), arm.tau.data(), nullptr);
   for (const double r : arm.observer.residual()) EXPECT_EQ(r, 0.0);
   for (int i = 0; i < 20; ++i) arm.step({2.0, 0.0, 0.0, 0.0, 0.0, 0.0});
   EXPECT_GT(arm.observer.residual()[0], 1.0);

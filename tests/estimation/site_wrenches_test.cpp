@@ -49,7 +49,7 @@ TEST(SiteWrenches, AreTheOnesThatExplainTheTorques) {
   const std::vector<double> wrench{20.0, -30.0, 10.0, 1.0, -2.0, 0.5};
   std::vector<double> residual(6, 0.0);
   arm.add(residual, 0, wrench);
-  sites->solve(arm.q.data(), residual);
+  sites->solve(nullptr, arm.q.data(), residual);
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(sites->wrench(0)[i], wrench[i], 0.05 * 30.0) << i;
   EXPECT_LT(sites->unexplained_Nm(), 0.1);
 }
@@ -60,7 +60,7 @@ TEST(SiteWrenches, SayWhatTheyDoNotExplain) {
   auto sites = SiteWrenches::make(*arm.kernels.get(), {"upper"});
   ASSERT_TRUE(sites) << sites.error().to_string();
   const std::vector<double> residual{5.0, -4.0, 3.0, 0.0, 0.0, 4.0};  // joints 3 and 6 lie beyond
-  sites->solve(arm.q.data(), residual);
+  sites->solve(nullptr, arm.q.data(), residual);
   EXPECT_NEAR(sites->unexplained_Nm(), 5.0, 0.01);
 }
 
@@ -74,7 +74,7 @@ TEST(SiteWrenches, OfAShortChainHaveZerosWhereItsJointsSeeNothing) {
   arm.add(in_plane, 0, {0.0, 3.0, -2.0, 0.0, 0.0, 0.0});
   arm.add(along, 0, {7.0, 0.0, 0.0, 0.0, 1.0, 1.0});
   for (const double torque : along) EXPECT_NEAR(torque, 0.0, 1e-12);
-  sites->solve(arm.q.data(), in_plane);
+  sites->solve(nullptr, arm.q.data(), in_plane);
   const auto f = sites->wrench(0);
   for (const std::size_t row : {0U, 4U, 5U}) EXPECT_NEAR(f[row], 0.0, 1e-12) << row;
   EXPECT_LT(sites->unexplained_Nm(), 0.01);

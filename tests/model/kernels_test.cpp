@@ -12,6 +12,7 @@
 #include "model/kernel_build.hpp"
 #include "model/kernel_check.hpp"
 #include "model/kernel_library.hpp"
+#include "model/sines.hpp"
 #include "tests/model/random_robot.hpp"
 #include "tests/model/reference.hpp"
 #include "tests/support/scratch_folder.hpp"
@@ -74,6 +75,7 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
                           {q, v},
                           {q, v},
                           {q, v, a},
+                          {q, v},
                           {q},
                           {q, v, a, wrench},
                           {q, v, wrench},
@@ -91,6 +93,43 @@ TEST_P(CompiledKernels, ComputeWhatTheAlgorithmsComputeOnDoubles) {
                 : 1e-13)
             << kernel_shape(kernel, mechanism).name;
     }
+  }
+}
+
+// One after the other with the same sines.
+TEST_P(CompiledKernels, ComputeTheSameWithSinesAtHand) {
+  const tandem_kernels& k = *library;
+  const SeededState state(mechanism, 5);
+  const double *q = state.q.data(), *v = state.v.data(), *vdot = state.vdot.data(),
+               *tau = state.tau.data(), *wrench = state.wrench.data();
+  Sines sines(k);
+  sines.take(q);
+  const double* s = sines.data();
+  for (int number = 0; number < kKernels; ++number) {
+    const auto kernel = static_cast<Kernel>(number);
+    const Arrays expected = call_kernel(k, kernel, mechanism, state.of(kernel));
+    Arrays out;
+    for (const Array& array : expected) out.emplace_back(array.size());
+    const auto o = [&](std::size_t i) { return out[i].data(); };
+    switch (kernel) {
+      case Kernel::kForwardDynamics: k.forward_dynamics_at(s, q, v, tau, wrench, o(0)); break;
+      case Kernel::kInverseDynamics: k.inverse_dynamics_at(s, q, v, vdot, wrench, o(0)); break;
+      case Kernel::kMassMatrix: k.mass_matrix_at(s, q, o(0)); break;
+      case Kernel::kBias: k.bias_at(s, q, v, o(0)); break;
+      case Kernel::kCenterOfMass: k.center_of_mass_at(s, q, v, o(0), o(1), o(2)); break;
+      case Kernel::kCentroidalMomentum: k.centroidal_momentum_at(s, q, v, o(0)); break;
+      case Kernel::kEnergy: k.energy_at(s, q, v, o(0)); break;
+      case Kernel::kSiteMotion: k.site_motion_at(s, q, v, vdot, o(0), o(1), o(2)); break;
+      case Kernel::kSiteTwists: k.site_twists_at(s, q, v, o(0), o(1)); break;
+      case Kernel::kSiteJacobians: k.site_jacobians_at(s, q, o(0)); break;
+      case Kernel::kSensorWrenches: k.sensor_wrenches_at(s, q, v, vdot, wrench, o(0)); break;
+      case Kernel::kGeneralisedMomentum:
+        k.generalised_momentum_at(s, q, v, wrench, o(0), o(1));
+        break;
+      case Kernel::kInverseDynamicsDerivatives:
+      case Kernel::kForwardDynamicsDerivatives: break;
+    }
+    EXPECT_EQ(out, expected) << kernel_shape(kernel, mechanism).name;
   }
 }
 
@@ -199,7 +238,8 @@ TEST(Kernels, SinesAndCosinesAreComputedWithVectors) {
       ++packed[function];
     }
   }
-  EXPECT_EQ(packed.size(), 4u) << "a variant each, and eight at a time";
+  // One of each variant for single calls; for batches four at a time, of the widest also eight.
+  EXPECT_EQ(packed.size(), 6u);
   for (const auto& [name, count] : packed) EXPECT_GE(count, 25) << name;
 }
 #endif

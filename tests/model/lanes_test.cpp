@@ -113,7 +113,8 @@ struct Kernels {
   EmittedKernel emit(Kernel kernel) const {
     Graph graph;
     const TracedKernel traced = trace_kernel(kernel, m, graph);
-    return emit_kernel(graph, traced, m, 500);
+    SineTable sines;
+    return emit_kernel(graph, traced, m, sines, 500);
   }
   // Instructions left, of each operation without lanes.
   double left(Kernel kernel) const {

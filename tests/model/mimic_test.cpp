@@ -301,8 +301,9 @@ TEST(Mimic, RobotsWithoutFollowersKeepTheArticulatedBodyAlgorithmToTheLastOperat
   }
   std::vector<std::vector<Expr>> out{std::vector<Expr>(static_cast<std::size_t>(m.nv()))};
   run_tree_kernel<Expr>(Kernel::kForwardDynamics, m, in, out);
-  EXPECT_EQ(emit_kernel(graph, kernel, m, 500).parts,
-            emit_kernel(tree_graph, {kernel.shape, out[0]}, m, 500).parts);
+  SineTable sines, of_tree;
+  EXPECT_EQ(emit_kernel(graph, kernel, m, sines, 500).parts,
+            emit_kernel(tree_graph, {kernel.shape, out[0]}, m, of_tree, 500).parts);
 }
 
 TEST(Mimic, AFollowersMassIsEnoughForItsLeader) {

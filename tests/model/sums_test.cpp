@@ -70,7 +70,8 @@ TEST_F(SumsTest, OfARobotAreTheSameEveryTime) {
     const std::vector<double> litter(100'000 * (round + 1), 1e300);
     Graph graph;
     const TracedKernel kernel = trace_kernel(Kernel::kForwardDynamics, m, graph);
-    const EmittedKernel emitted = emit_kernel(graph, kernel, m, 500);
+    SineTable sines;
+    const EmittedKernel emitted = emit_kernel(graph, kernel, m, sines, 500);
     if (round == 0) first = emitted.parts;
     EXPECT_EQ(emitted.parts, first);
   }

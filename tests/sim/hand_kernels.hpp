@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "model/kernels.h"
+#include "tests/support/at_sines.hpp"
 
 namespace tandem::test {
 
@@ -26,6 +27,15 @@ inline constexpr double kPendulumLength = 0.5;
 template <int tilt_deg>
 inline const double kTilted[3] = {kG* std::sin(tilt_deg* std::numbers::pi / 180.0), 0.0,
                                   -kG* std::cos(tilt_deg* std::numbers::pi / 180.0)};
+
+/// The poses and twists of a `site_motion`.
+template <void (*site_motion)(const double*, const double*, const double*, double*, double*,
+                              double*)>
+void site_twists(const double* q, const double* v, double* pose, double* twist) {
+  const double rest[6] = {};
+  double acceleration[18];
+  site_motion(q, v, rest, pose, twist, acceleration);
+}
 
 namespace block {
 
@@ -182,6 +192,7 @@ template <int tilt_deg = 0>
 const tandem_kernels* block_kernels() {
   static const tandem_kernels kernels = [] {
     tandem_kernels k{};
+    k.sines = no_sines;
     k.abi = TANDEM_KERNELS_ABI;
     k.floating_base = 1;
     k.robot = "block";
@@ -195,13 +206,21 @@ const tandem_kernels* block_kernels() {
     k.mass_kg = kBlockMass;
     for (int i = 0; i < 3; ++i) k.gravity_m_s2[i] = kTilted<tilt_deg>[i];
     k.forward_dynamics = block::forward_dynamics<tilt_deg>;
+    k.forward_dynamics_at = at_sines<block::forward_dynamics<tilt_deg>>;
     k.inverse_dynamics = block::inverse_dynamics<tilt_deg>;
+    k.inverse_dynamics_at = at_sines<block::inverse_dynamics<tilt_deg>>;
     k.site_motion = block::site_motion;
+    k.site_motion_at = at_sines<block::site_motion>;
+    k.site_twists_at = at_sines<site_twists<block::site_motion>>;
     k.mass_matrix = block::mass_matrix;
+    k.mass_matrix_at = at_sines<block::mass_matrix>;
     k.site_jacobians = block::site_jacobians;
+    k.site_jacobians_at = at_sines<block::site_jacobians>;
     k.sensor_wrenches = block::sensor_wrenches;
+    k.sensor_wrenches_at = at_sines<block::sensor_wrenches>;
     k.energy = block::energy<tilt_deg>;
     k.center_of_mass = block::center_of_mass;
+    k.center_of_mass_at = at_sines<block::center_of_mass>;
     return k;
   }();
   return &kernels;
@@ -267,6 +286,7 @@ template <int armature_g = 0, int gravity_cm = 981>
 const tandem_kernels* pendulum_kernels() {
   static const tandem_kernels kernels = [] {
     tandem_kernels k{};
+    k.sines = no_sines;
     k.abi = TANDEM_KERNELS_ABI;
     k.robot = "pendulum";
     k.nq = k.nv = k.joints = k.sites = 1;
@@ -275,13 +295,20 @@ const tandem_kernels* pendulum_kernels() {
     k.mass_kg = kPendulumMass;
     k.gravity_m_s2[2] = -gravity_cm * 0.01;
     k.forward_dynamics = pendulum::forward_dynamics<armature_g, gravity_cm>;
+    k.forward_dynamics_at = at_sines<pendulum::forward_dynamics<armature_g, gravity_cm>>;
     k.inverse_dynamics = pendulum::inverse_dynamics<armature_g, gravity_cm>;
+    k.inverse_dynamics_at = at_sines<pendulum::inverse_dynamics<armature_g, gravity_cm>>;
     k.sensors = 1;
     k.sensor_names = pendulum::kSensors;
     k.sensor_wrenches = pendulum::sensor_wrenches<gravity_cm>;
+    k.sensor_wrenches_at = at_sines<pendulum::sensor_wrenches<gravity_cm>>;
     k.mass_matrix = pendulum::mass_matrix<armature_g>;
+    k.mass_matrix_at = at_sines<pendulum::mass_matrix<armature_g>>;
     k.site_motion = pendulum::site_motion;
+    k.site_motion_at = at_sines<pendulum::site_motion>;
+    k.site_twists_at = at_sines<site_twists<pendulum::site_motion>>;
     k.center_of_mass = pendulum::center_of_mass;
+    k.center_of_mass_at = at_sines<pendulum::center_of_mass>;
     return k;
   }();
   return &kernels;

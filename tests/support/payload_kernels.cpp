@@ -32,17 +32,21 @@ PayloadKernels::PayloadKernels(const hal::RobotConfig& robot, const std::string&
     : interpreted_(mechanism_of(robot, link, in_link_m), robot.name),
       kernels_(*interpreted_.get()) {
   own = kernels_;
-  kernels_.forward_dynamics = [](auto... arrays) {
+  kernels_.forward_dynamics_at = [](auto... arrays) {
     TANDEM_OWN_SYSTEM_CALL;
-    own.forward_dynamics(arrays...);
+    own.forward_dynamics_at(arrays...);
   };
-  kernels_.site_motion = [](auto... arrays) {
+  kernels_.site_motion_at = [](auto... arrays) {
     TANDEM_OWN_SYSTEM_CALL;
-    own.site_motion(arrays...);
+    own.site_motion_at(arrays...);
   };
-  kernels_.sensor_wrenches = [](auto... arrays) {
+  kernels_.site_twists_at = [](auto... arrays) {
     TANDEM_OWN_SYSTEM_CALL;
-    own.sensor_wrenches(arrays...);
+    own.site_twists_at(arrays...);
+  };
+  kernels_.sensor_wrenches_at = [](auto... arrays) {
+    TANDEM_OWN_SYSTEM_CALL;
+    own.sensor_wrenches_at(arrays...);
   };
 }
 

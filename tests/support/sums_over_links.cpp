@@ -349,6 +349,11 @@ std::vector<std::vector<double>> SumsOverLinks::outputs(
     case Kernel::kCentroidalMomentum: return {momentum()};
     case Kernel::kEnergy: return {energy()};
     case Kernel::kSiteMotion: return site_motion(in[2]);
+    case Kernel::kSiteTwists: {
+      auto motion = site_motion(std::vector<double>(in[1].size()));
+      motion.pop_back();
+      return motion;
+    }
     case Kernel::kSiteJacobians: return {site_jacobians()};
     case Kernel::kSensorWrenches: return {sensors(in[2], in[3])};
     case Kernel::kGeneralisedMomentum: return generalised_momentum(in[2]);
