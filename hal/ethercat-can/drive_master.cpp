@@ -84,23 +84,19 @@ void DriveMaster::Impl::dispatch(Port& port, const Frame& frame,
 /// predecessor is missing, is left out, so that no sample is made of two.
 void DriveMaster::Impl::on_tpdo(Node& node, int number, const Frame& frame,
                                 std::int64_t at_ns) noexcept TANDEM_RT {
-  const int p = node.tpdos[static_cast<std::size_t>(number - 1)];
+  const Receive& pdo = node.receives[static_cast<std::size_t>(number - 1)];
   const bool listening = node.master.running() || node.master.stage() == NodeStage::kStarting;
-  if (p < 0 || !listening) return;
-  const PdoPlan& pdo = node.plan.pdos[static_cast<std::size_t>(p)];
-  if (frame.length < pdo.bytes) return;
+  if (!pdo.in_use || !listening || frame.length < pdo.bytes) return;
   if (number == 1) ++node.answers;
-  const bool sampled = pdo.group != PdoGroup::kSlowFeedback;
-  if (sampled) {
+  if (pdo.part >= 0) {
     if (pdo.part != 0 && pdo.part != node.next_part) return;
     node.next_part = pdo.part + 1;
   }
   const bool whole = node.next_part == node.plan.parts;
-  const Exchange& exchange = node.exchanges[static_cast<std::size_t>(p)];
-  for (const canopen::PdoCopy& copy : exchange.copies) copy.from_wire(frame.data.data());
-  for (const std::size_t joint : exchange.joints) joint_fresh[joint] = whole ? 1 : 0;
-  if (exchange.echo) on_echo(node, node.echo, at_ns);
-  if (pdo.group == PdoGroup::kSensor && whole) node.channels = node.sample;
+  for (const canopen::PdoCopy& copy : pdo.copies) copy.from_wire(frame.data.data());
+  for (const std::size_t joint : pdo.joints) joint_fresh[joint] = whole ? 1 : 0;
+  if (pdo.echo) on_echo(node, node.echo, at_ns);
+  if (pdo.channels && whole) node.channels = node.sample;
 }
 
 void DriveMaster::Impl::on_echo(Node& node, std::uint8_t echo,
@@ -190,23 +186,19 @@ void DriveMaster::Impl::write_pdos() noexcept TANDEM_RT {
       continue;
     }
     if (node.counters_sent < 0xFF) ++node.counters_sent;
-    for (std::size_t p = 0; p < node.plan.pdos.size(); ++p) {
-      const PdoPlan& pdo = node.plan.pdos[p];
-      if (pdo.direction != PdoDirection::kReceive) continue;
-      Frame& last = node.frames[p];
-      const auto& copies = node.exchanges[p].copies;
-      const bool due = pdo.group == PdoGroup::kCommand || node.sent[p] == 0 ||
-                       std::ranges::any_of(copies, [&](const canopen::PdoCopy& copy) {
-                         return copy.differs(last.data.data());
+    for (Send& pdo : node.sends) {
+      const bool due = pdo.in_every_cycle || pdo.sent == 0 ||
+                       std::ranges::any_of(pdo.copies, [&](const canopen::PdoCopy& copy) {
+                         return copy.differs(pdo.frame.data.data());
                        });
       if (!due) continue;
       Frame* frame = ports[node.plan.bus].sink.next();
       if (frame == nullptr) continue;
-      *frame = last;
-      for (const canopen::PdoCopy& copy : copies) copy.to_wire(frame->data.data());
-      if (pdo.group == PdoGroup::kCommand) continue;  // in every cycle
-      for (const canopen::PdoCopy& copy : copies) copy.to_wire(last.data.data());
-      node.sent[p] = 1;
+      *frame = pdo.frame;
+      for (const canopen::PdoCopy& copy : pdo.copies) copy.to_wire(frame->data.data());
+      if (pdo.in_every_cycle) continue;
+      for (const canopen::PdoCopy& copy : pdo.copies) copy.to_wire(pdo.frame.data.data());
+      pdo.sent = 1;
     }
   }
 }
@@ -383,8 +375,9 @@ void DriveMaster::Impl::archive(Archive& ar) {
   for (PidGains& gains : sent_gains) ar(gains.kp, gains.ki, gains.kd);
   for (Port& port : ports) ar(port.next_heartbeat_ns);
   for (Node& node : nodes) {
-    ar(node.master, node.frames, node.sent, node.channels, node.silent_cycles, node.doubled_cycles,
-       node.counters_sent, node.recovering, node.sending, node.next_item);
+    for (Send& pdo : node.sends) ar(pdo.frame, pdo.sent);
+    ar(node.master, node.channels, node.silent_cycles, node.doubled_cycles, node.counters_sent,
+       node.recovering, node.sending, node.next_item);
   }
 }
 

@@ -34,20 +34,9 @@ DriveMaster::Impl::Node::Node(NodePlan node_plan, std::vector<SdoStep> steps, in
     : plan(std::move(node_plan)),
       master(plan.id, plan.heartbeat_ms, plan.boot_time_ns, plan.watch, std::move(steps),
              plan.start_time_ns),
-      timeout_cycles(timeout),
-      frames(plan.pdos.size()),
-      sent(plan.pdos.size()) {
-  tpdos.fill(-1);
-  for (std::size_t p = 0; p < plan.pdos.size(); ++p) {
-    const PdoPlan& pdo = plan.pdos[p];
-    if (pdo.direction == PdoDirection::kTransmit) tpdos[pdo.number - 1] = static_cast<int>(p);
-    frames[p].id = pdo.cob_id;
-    frames[p].length = canopen::frame_length(pdo.bytes);
-    if (frames[p].length > canopen::kClassicFrameBytes) {
-      frames[p].flags = canopen::kFlagFd | canopen::kFlagBrs;
-    }
+      timeout_cycles(timeout) {
+  for (const PdoPlan& pdo : plan.pdos)
     if (pdo.group == PdoGroup::kSensor) channels.resize(channels.size() + pdo.fields.size());
-  }
   sample.resize(channels.size());
 }
 
@@ -112,18 +101,35 @@ void* DriveMaster::Impl::variable(Node& node, const PdoPlan& pdo, const MappedFi
 
 void DriveMaster::Impl::compile_exchanges(Node& node) {
   for (const PdoPlan& pdo : node.plan.pdos) {
-    Exchange& exchange = node.exchanges.emplace_back();
-    for (const MappedField& field : pdo.fields) {
-      exchange.copies.push_back(
+    std::vector<canopen::PdoCopy> copies;
+    for (const MappedField& field : pdo.fields)
+      copies.push_back(
           {.data = variable(node, pdo, field), .offset = field.offset, .size = field.size});
-      exchange.echo |= field.field == WireField::kCycleEcho;
+    if (pdo.direction == PdoDirection::kReceive) {
+      Send& send = node.sends.emplace_back();
+      send.copies = std::move(copies);
+      send.in_every_cycle = pdo.group == PdoGroup::kCommand;
+      send.frame.id = pdo.cob_id;
+      send.frame.length = canopen::frame_length(pdo.bytes);
+      if (send.frame.length > canopen::kClassicFrameBytes)
+        send.frame.flags = canopen::kFlagFd | canopen::kFlagBrs;
+      continue;
+    }
+    Receive& receive = node.receives[static_cast<std::size_t>(pdo.number - 1)];
+    receive = {.copies = std::move(copies),
+               .in_use = true,
+               .channels = pdo.group == PdoGroup::kSensor,
+               .bytes = pdo.bytes,
+               .part = pdo.group == PdoGroup::kSlowFeedback ? -1 : pdo.part};
+    for (const MappedField& field : pdo.fields) {
+      receive.echo |= field.field == WireField::kCycleEcho;
       if (pdo.group != PdoGroup::kFeedback || field.field == WireField::kCycleEcho) continue;
       const std::size_t joint = node.plan.joints[field.axis];
-      if (std::ranges::find(exchange.joints, joint) == exchange.joints.end())
-        exchange.joints.push_back(joint);
+      if (std::ranges::find(receive.joints, joint) == receive.joints.end())
+        receive.joints.push_back(joint);
     }
     // A sample of several parts is that of all axes, and its last part makes it whole.
-    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) exchange.joints = node.plan.joints;
+    if (pdo.group == PdoGroup::kFeedback && node.plan.parts > 1) receive.joints = node.plan.joints;
   }
 }
 

@@ -43,26 +43,34 @@ struct DriveMaster::Impl {
     std::int64_t heartbeat_ns = 0;
     std::int64_t next_heartbeat_ns = 0;
   };
-  /// A PDO's plan, compiled: what each frame of it does.
-  struct Exchange {
-    std::vector<canopen::PdoCopy> copies;
-    std::vector<std::size_t> joints;  ///< TPDO of a sample: whose
-    bool echo = false;                ///< TPDO: one of the copies is Node::echo
+  /// An RPDO's plan, compiled.
+  struct Send {
+    canopen::Frame frame;  ///< identifier and length; of what is sent when it changes, the last one
+    std::vector<canopen::PdoCopy> copies{};
+    bool in_every_cycle = true;
+    std::uint8_t sent = 0;  ///< since the node's start; of what is sent when it changes
+  };
+  /// A TPDO's.
+  struct Receive {
+    std::vector<canopen::PdoCopy> copies{};
+    std::vector<std::size_t> joints{};  ///< of a sample: whose
+    bool in_use = false;
+    bool echo = false;       ///< one of the copies is Node::echo
+    bool channels = false;   ///< they are a sensor's
+    std::uint8_t bytes = 0;  ///< mapped
+    int part = -1;           ///< of the NodePlan::parts of a sample; -1: of none
   };
   struct Node {
     Node(NodePlan node_plan, std::vector<SdoStep> steps, int timeout);
     NodePlan plan;
     NodeMaster master;
-    int timeout_cycles;                              ///< without feedback; 0: never
-    std::array<int, canopen::kPdosPerNode> tpdos{};  ///< by number - 1: index in plan.pdos, or -1
-    std::vector<Exchange> exchanges;                 ///< by plan.pdos
-    /// By plan.pdos: an RPDO's identifier and length, and what was sent last of parameters.
-    std::vector<canopen::Frame> frames;
-    std::vector<std::uint8_t> sent;  ///< by plan.pdos: sent since the node's start
-    std::vector<float> channels;     ///< a sensor's
-    std::vector<float> sample;       ///< of them, while it is not whole; no state
-    std::size_t first_channel = 0;   ///< of them in StateImage::sensor()
-    int next_part = 0;               ///< of this cycle's sample
+    int timeout_cycles;                                     ///< without feedback; 0: never
+    std::vector<Send> sends;                                ///< in the plan's order
+    std::array<Receive, canopen::kPdosPerNode> receives{};  ///< by number - 1
+    std::vector<float> channels;                            ///< a sensor's
+    std::vector<float> sample;      ///< of them, while it is not whole; no state
+    std::size_t first_channel = 0;  ///< of them in StateImage::sensor()
+    int next_part = 0;              ///< of this cycle's sample
     std::uint32_t silent_cycles = 0;
     std::uint32_t answers = 0;         ///< this cycle's first TPDOs
     std::uint32_t doubled_cycles = 0;  ///< in succession, with several of them

@@ -232,7 +232,7 @@ void DriveMaster::Impl::recover() noexcept TANDEM_RT {
       node.master.start(now_ns, ports[node.plan.bus].sink);
     } else if (node.master.running()) {
       node.recovering = false;
-      std::ranges::fill(node.sent, std::uint8_t{0});
+      for (Send& pdo : node.sends) pdo.sent = 0;
     } else if (node.master.stage() == NodeStage::kDown) {
       node.recovering = false;  // a new reset may try again
     }
