@@ -5,24 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "model/dynamics.hpp"
-#include "model/expression.hpp"
 #include "model/sine_table.hpp"
+#include "model/trace.hpp"
 
 namespace tandem::model {
-
-/// A kernel as expressions of its inputs.
-struct TracedKernel {
-  KernelShape shape;
-  std::vector<Expr> outputs;  ///< the output arrays, one after another
-};
-
-/// Runs the kernel's algorithm over expressions in `graph`.
-[[nodiscard]] TracedKernel trace_kernel(Kernel kernel, const Mechanism& m, Graph& graph);
-
-/// The product M(q) vdot as expressions: inverse dynamics at rest and without gravity. Its
-/// shape is that of a function "mass_times" (q, vdot -> tau).
-[[nodiscard]] TracedKernel trace_mass_times(const Mechanism& m, Graph& graph);
 
 /// A kernel as C++. `entry` calls every function of `parts` in order; they share a workspace on
 /// the stack, because compilers take far more than twice as long for a function twice as long. The

@@ -369,11 +369,6 @@ void add_parallel(Experiment& e, TomlTable& root, Diagnostics& errors) {
   if (!e.sim.noise) remove_noise(parallel.robot);
 }
 
-Diagnostics in_order(Diagnostics errors) {
-  sort_by_line(errors);
-  return errors;
-}
-
 }  // namespace
 
 std::uint64_t Experiment::cycles() const {
@@ -418,88 +413,6 @@ sim::SimRobotConfig Experiment::sim_robot_config() const {
           .tree = tree};
 }
 
-namespace {
-
-/// @param file  the robot.toml
-model::UrdfOptions urdf_options(const hal::ModelConfig& model, const std::string& file) {
-  model::UrdfOptions options{.floating_base = model.floating_base,
-                             .mimic_independent = model.mimic_independent,
-                             .lock = model.lock,
-                             .repair_inertia = model.repair_inertia,
-                             .exact_right_angles = model.exact_right_angles,
-                             .lock_lines = model.lock_lines,
-                             .overrides_file = file};
-  for (const hal::LinkConfig& link : model.links) {
-    options.links.push_back(
-        {link.name, link.mass_kg, link.com_m, link.inertia_kg_m2, link.line, link.file, link.key});
-  }
-  return options;
-}
-
-std::expected<model::UrdfModel, Diagnostics> read_description(const hal::RobotConfig& robot) {
-  return model::read_urdf(robot.model.urdf, urdf_options(robot.model, robot.file));
-}
-
-hal::RobotDescription plain(const model::UrdfModel& model) {
-  hal::RobotDescription description;
-  for (const model::Joint& joint : model.tree.joints) {
-    if (joint.follows()) {
-      const model::Joint& leader = model.tree.joints[static_cast<std::size_t>(joint.leader)];
-      const model::Range range = joint.leaders_range();
-      description.followers.push_back({joint.name, leader.name, range.lower, range.upper});
-      continue;
-    }
-    const auto note = model.limits_notes.find(joint.name);
-    description.moving_joints.push_back({joint.name, joint.lower, joint.upper, joint.velocity,
-                                         joint.effort,
-                                         note == model.limits_notes.end() ? "" : note->second,
-                                         joint.type == model::JointType::kPrismatic});
-  }
-  for (const model::Link& link : model.tree.links) {
-    description.links.push_back(link.name);
-    if (link.moving < 0 && !link.joint.empty()) description.other_joints.push_back(link.joint);
-  }
-  return description;
-}
-
-}  // namespace
-
-std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot) {
-  auto found = read_description(robot);
-  if (!found) return found;
-  Diagnostics errors = hal::complete_from_description(robot, plain(*found));
-  if (!errors.empty()) return std::unexpected(in_order(std::move(errors)));
-  for (hal::PostureConfig& posture : robot.postures) {
-    if (!std::isnan(posture.base_height_m)) continue;
-    const std::optional<Standing> touching = standing(robot, posture, found->tree);
-    posture.base_height_m = touching ? touching->base_height_m : 0.0;
-  }
-  return found;
-}
-
-std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file, bool repair) {
-  Diagnostics errors;
-  std::vector<hal::JointReference> loose;
-  hal::RobotConfig config = hal::read_robot_config(file, errors, loose);
-  config.model.repair_inertia = config.model.repair_inertia || repair;
-  if (errors.empty() && loose.empty()) {
-    auto description = complete_robot(config);
-    if (!description) return std::unexpected(description.error());
-    return CompleteRobot{std::move(config), std::move(*description)};
-  }
-  // The file is wrong by itself; what can be said of its names beside that is said too.
-  const auto description =
-      config.model.urdf.empty() ? std::unexpected(Diagnostics{}) : read_description(config);
-  const Diagnostics names = description ? hal::check_names(config, plain(*description), loose)
-                                        : hal::check_names(config, loose);
-  errors.insert(errors.end(), names.begin(), names.end());
-  errors = in_order(std::move(errors));
-  if (!description) {
-    errors.insert(errors.end(), description.error().begin(), description.error().end());
-  }
-  return std::unexpected(errors);
-}
-
 std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) {
   const auto document = TomlDocument::load(file);
   if (!document) return std::unexpected(Diagnostics{document.error()});
@@ -521,7 +434,8 @@ std::expected<Experiment, Diagnostics> read_experiment(const std::string& file) 
       }
     }
   }
-  Diagnostics errors = in_order(document->diagnostics());
+  Diagnostics errors = document->diagnostics();
+  sort_by_line(errors);
   errors.insert(errors.end(), robot_errors.begin(), robot_errors.end());
   if (!errors.empty()) return std::unexpected(errors);
   return e;
@@ -536,7 +450,9 @@ std::expected<Experiment, Diagnostics> parse_experiment(std::string_view text,
   Experiment e = read(*document, root);
   e.robot = robot;
   combine(e, root);
-  if (!document->diagnostics().empty()) return std::unexpected(in_order(document->diagnostics()));
+  Diagnostics errors = document->diagnostics();
+  sort_by_line(errors);
+  if (!errors.empty()) return std::unexpected(std::move(errors));
   return e;
 }
 

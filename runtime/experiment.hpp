@@ -21,6 +21,7 @@
 #include "rt/cyclic_loop.hpp"
 #include "rt/thread_setup.hpp"
 #include "runtime/after_stop.hpp"
+#include "runtime/complete_robot.hpp"
 #include "runtime/controller_spec.hpp"
 #include "runtime/fall_watch.hpp"
 #include "runtime/teleoperation.hpp"
@@ -153,22 +154,5 @@ struct Experiment {
 /// robot stays as it is.
 [[nodiscard]] std::expected<Experiment, Diagnostics> parse_experiment(
     std::string_view text, const std::string& file, const hal::RobotConfig& robot);
-
-/// A robot.toml with its description.
-struct CompleteRobot {
-  hal::RobotConfig config;
-  model::UrdfModel description;
-};
-
-/// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
-/// complete_robot()'s.
-/// @param repair  as if it said inertia = "repair"
-[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file,
-                                                                   bool repair = false);
-
-/// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
-/// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
-/// holds the tree and what was tolerated in it.
-[[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);
 
 }  // namespace tandem::runtime

@@ -1,0 +1,31 @@
+// A robot.toml completed by the URDF that it names.
+// Layer: runtime.  Thread: non-RT.
+#pragma once
+
+#include <expected>
+#include <string>
+
+#include "base/result.hpp"
+#include "hal/config/robot_config.hpp"
+#include "model/urdf.hpp"
+
+namespace tandem::runtime {
+
+/// A robot.toml with its description.
+struct CompleteRobot {
+  hal::RobotConfig config;
+  model::UrdfModel description;
+};
+
+/// Reads a robot.toml and its URDF. Errors: those of both at once, read_robot_config()'s and
+/// complete_robot()'s.
+/// @param repair  as if it said inertia = "repair"
+[[nodiscard]] std::expected<CompleteRobot, Diagnostics> read_robot(const std::string& file,
+                                                                   bool repair = false);
+
+/// Reads the robot's URDF and fills from it what robot.toml left out: limits, and the heights of
+/// postures that are "auto". Errors: read_urdf()'s and complete_from_description()'s. The answer
+/// holds the tree and what was tolerated in it.
+[[nodiscard]] std::expected<model::UrdfModel, Diagnostics> complete_robot(hal::RobotConfig& robot);
+
+}  // namespace tandem::runtime
