@@ -28,7 +28,7 @@ struct BaseConfig {
 
 /// [estimation.observer]
 struct ObserverConfig {
-  double bandwidth_Hz = 15.0;  ///< of the external torques: first order
+  double bandwidth_Hz = 15.0;  ///< of the external torques: a low pass of second order
 };
 
 /// [estimation.collision]

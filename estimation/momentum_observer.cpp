@@ -5,12 +5,19 @@
 #include <numbers>
 
 namespace tandem::estimation {
+namespace {
+
+/// Of a pole: its frequency over that at which two of them let 1 / sqrt(2) through.
+const double kPole = 1.0 / std::sqrt(std::numbers::sqrt2 - 1.0);
+
+}  // namespace
 
 MomentumObserver::MomentumObserver(const tandem_kernels& kernels, double bandwidth_Hz,
                                    double step_s)
     : kernels_(&kernels),
-      gain_(2.0 * std::numbers::pi * bandwidth_Hz),
+      gain_(2.0 * std::numbers::pi * kPole * bandwidth_Hz),
       step_s_(step_s),
+      residual_(kernels.nv),
       r_(kernels.nv),
       p_(kernels.nv),
       rate_(kernels.nv),
@@ -27,6 +34,7 @@ void MomentumObserver::update(const double* sines, const double* q, const double
     if (running_ != 0) {
       const double moved = p_now_[i] - p_[i] - 0.5 * step_s_ * (rate_[i] + rate_now_[i]);
       r_[i] = kept * (r_[i] + gain_ * moved);
+      residual_[i] = kept * (residual_[i] + gain_ * step_s_ * r_[i]);
     }
     finite =
         finite && std::isfinite(r_[i]) && std::isfinite(p_now_[i]) && std::isfinite(rate_now_[i]);
@@ -39,6 +47,7 @@ void MomentumObserver::update(const double* sines, const double* q, const double
 
 void MomentumObserver::restart() noexcept TANDEM_RT {
   std::ranges::fill(r_, 0.0);
+  std::ranges::fill(residual_, 0.0);
   running_ = 0;
 }
 

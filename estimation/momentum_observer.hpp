@@ -15,21 +15,25 @@ namespace tandem::estimation {
 
 /// The observer of A. De Luca and R. Mattone (2003), as in S. Haddadin, A. De Luca, A.
 /// Albu-Schäffer, "Robot collisions: a survey on detection, isolation, and identification" (TRO
-/// 2017). With p = M v and dp/dt = tau + b + tau_external, its residual is tau_external after a
-/// first-order low pass:
+/// 2017). With p = M v and dp/dt = tau + b + tau_external, its r is tau_external after a
+/// first-order low pass, and the residual is r after the same low pass once more:
 ///
-///   r = K (p - integral of (tau + b + r) dt)
+///   r = K (p - integral of (tau + b + r) dt)        residual' = K (r - residual)
+///
+/// p holds v's noise times M, of which r keeps K times what is faster than K: encoders' counts make
+/// velocities noisier the faster they change. The second low pass takes that away, for a step that
+/// arrives 3 ms later.
 ///
 /// tau is what the springs, or rigid drives, do to the links. So the motor's friction and, behind a
 /// spring, the rotor's inertia do not enter; a rigid drive's rotor is armature of the model. What
 /// is left in r of a robot that nobody touches: errors of masses, of tau, and of v, with K M times
 /// v's noise.
 ///
-/// Steps by the trapezoidal rule and the implicit Euler method in r:
+/// Steps by the trapezoidal rule and the implicit Euler method in r and in the residual:
 /// r <- (r + K (p - p_before - h (tau + b, mean of both ends))) / (1 + K h).
 class MomentumObserver {
  public:
-  /// @param bandwidth_Hz  K over 2 pi
+  /// @param bandwidth_Hz  where an oscillation passes by 1 / sqrt(2): 0.64 K over 2 pi
   MomentumObserver(const tandem_kernels& kernels, double bandwidth_Hz, double step_s);
 
   /// One step. After restart() the first one only notes the state.
@@ -41,13 +45,14 @@ class MomentumObserver {
   /// Forgets: r is 0.
   void restart() noexcept TANDEM_RT;
 
-  /// r (nv), in the kernels' order; a base's six are the wrench on it in its frame.
-  [[nodiscard]] std::span<const double> residual() const noexcept { return r_; }
-  void archive(Archive& ar) { ar(r_, p_, rate_, running_); }
+  /// (nv) in the kernels' order; a base's six are the wrench on it in its frame.
+  [[nodiscard]] std::span<const double> residual() const noexcept { return residual_; }
+  void archive(Archive& ar) { ar(residual_, r_, p_, rate_, running_); }
 
  private:
   const tandem_kernels* kernels_;
   double gain_, step_s_;
+  std::vector<double> residual_;          // r_ after a second low pass
   std::vector<double> r_, p_, rate_;      // of the last step
   std::vector<double> p_now_, rate_now_;  // scratch
   std::uint8_t running_ = 0;

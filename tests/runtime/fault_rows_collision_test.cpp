@@ -23,7 +23,7 @@ struct PushedRun : EstimatedRun {
     auto loaded = read_experiment(std::string(TANDEM_SOURCE_DIR) + "/config/" + robot +
                                   (robot == "coman" ? "/squat.toml" : "/trajectory.toml"));
     for (const hal::JointConfig& one : loaded->robot.joints)
-      config.collision->thresholds.push_back({one.name, 4.0});
+      config.collision->thresholds.push_back({one.name, 1.0});
     return {.noise = false, .estimation = config, .cycle = {.after_stop = AfterStop::kWait}};
   }
   Outcome watch() {
