@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -92,25 +93,49 @@ bool is_alive(pid_t process) {
   return process != ::getpid() && (::kill(process, 0) == 0 || errno == EPERM);
 }
 
+/// The number at the begin of `text`, as std::to_string() writes it; 0: there is none. Cuts it off.
+pid_t take_process(std::string_view& text) {
+  pid_t process = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), process);
+  const bool ours =
+      read.ec == std::errc{} && process > 0 && text.starts_with(std::to_string(process));
+  text.remove_prefix(ours ? static_cast<std::size_t>(read.ptr - text.data()) : 0);
+  return ours ? process : 0;
+}
+
+/// Whether nobody has it locked, as the writer of a folder does, in another PID namespace, too.
+bool is_free(const fs::path& draft) {
+  const int fd = ::open(draft.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (fd < 0) return errno == ENOTDIR;  // a file has no lock
+  const bool free = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
+  ::close(fd);
+  return free;
+}
+
 /// Removes drafts of the same name whose process is gone: of an earlier one with our number, too.
-void remove_left(const fs::path& draft) {
+/// @param removes  kAnyNumber: of names with other digits before the mark, too
+void remove_left(const fs::path& draft, Draft::Removes removes = Draft::Removes::kSameName) {
+  constexpr std::string_view kDigits = "0123456789";
+  const bool any_number = removes == Draft::Removes::kAnyNumber;
   const std::string name = draft.filename().string();
   const std::size_t at = name.rfind(suffix());
-  const std::string begin = name.substr(0, at) + std::string(kMark);
+  std::string begin = name.substr(0, at);
   const std::string end = name.substr(at + suffix().size());
+  if (any_number) begin.erase(begin.find_last_not_of(kDigits) + 1);
   std::error_code ignored;
   const fs::path folder = draft.has_parent_path() ? draft.parent_path() : ".";
   std::vector<fs::path> left;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string one = entry.path().filename().string();
-    if (one.size() <= begin.size() + end.size() || !one.starts_with(begin) || !one.ends_with(end))
-      continue;
-    const char* const last = one.data() + one.size() - end.size();
-    pid_t process = 0;
-    const auto read = std::from_chars(one.data() + begin.size(), last, process);
-    const bool ours = read.ec == std::errc{} && read.ptr == last && process > 0 &&
-                      one == begin + std::to_string(process) + end;
-    if (ours && !is_alive(process)) left.push_back(entry.path());
+    std::string_view rest = one;
+    if (!rest.starts_with(begin)) continue;
+    rest.remove_prefix(begin.size());
+    if (any_number) rest.remove_prefix(std::min(rest.find_first_not_of(kDigits), rest.size()));
+    if (!rest.starts_with(kMark)) continue;
+    rest.remove_prefix(kMark.size());
+    const pid_t process = take_process(rest);
+    if (process == 0 || rest != end) continue;
+    if (!is_alive(process) && is_free(entry.path())) left.push_back(entry.path());
   }
   for (const fs::path& one : left) fs::remove_all(one, ignored);
 }
@@ -134,7 +159,8 @@ Draft::Draft(std::string final, fs::path root, std::string path)
 Draft::Draft(Draft&& other) noexcept
     : final_(std::move(other.final_)),
       root_(std::exchange(other.root_, {})),
-      path_(std::move(other.path_)) {}
+      path_(std::move(other.path_)),
+      lock_(std::exchange(other.lock_, -1)) {}
 
 Draft::~Draft() {
   if (!root_.empty()) remove();
@@ -145,9 +171,15 @@ void Draft::remove() {
   fs::remove_all(root_, ignored);
   root_.clear();
   remember({});
+  if (lock_ >= 0) ::close(std::exchange(lock_, -1));
 }
 
-Result<Draft> Draft::folder(const std::string& final) {
+void Draft::lock() {
+  lock_ = ::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (lock_ >= 0) ::flock(lock_, LOCK_SH | LOCK_NB);
+}
+
+Result<Draft> Draft::folder(const std::string& final, Removes removes) {
   std::error_code problem;
   fs::path whole = fs::absolute(final).lexically_normal();
   if (!whole.has_filename()) whole = whole.parent_path();  // a slash at the end
@@ -156,7 +188,7 @@ Result<Draft> Draft::folder(const std::string& final) {
         Error{"this is a file, and a folder is needed", "name another folder", final, 0, {}});
   }
   fs::path root = whole / suffix(), path = root;
-  remove_left(whole.string() + suffix());  // made when the folder was not there
+  remove_left(whole.string() + suffix(), removes);  // made when the folder was not there
   if (!fs::exists(whole, problem)) {
     fs::path first = whole;  // of what is missing
     while (first.has_relative_path() && !fs::exists(first.parent_path(), problem))
@@ -169,6 +201,7 @@ Result<Draft> Draft::folder(const std::string& final) {
   Draft draft(final, root, path.string());
   fs::create_directories(path, problem);
   if (problem) return problem_of("the folder cannot be made", problem, final);
+  draft.lock();
   return draft;
 }
 

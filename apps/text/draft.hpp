@@ -2,6 +2,7 @@
 // Layer: apps/text.  Thread: main.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -14,12 +15,19 @@ namespace tandem::apps {
 /// is whole. What is not placed is removed: by the destructor; when SIGINT, SIGTERM or SIGHUP ends
 /// the process, with a word on standard error (unless somebody handles these signals); and after a
 /// SIGKILL by the next draft of the same name, which removes those of processes that are gone, as
-/// far as this PID namespace shows. One at a time.
+/// far as this PID namespace shows; a folder's draft is locked as long as it is written, whatever
+/// the namespace. One at a time.
 class Draft {
  public:
+  /// Which drafts of processes that are gone are removed.
+  enum class Removes : std::uint8_t {
+    kSameName,
+    kAnyNumber,  ///< of names, too, that have other digits at their end: run-001 beside run-002
+  };
   /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
   /// is there. Errors: it is a file; the folder cannot be made.
-  [[nodiscard]] static Result<Draft> folder(const std::string& final);
+  [[nodiscard]] static Result<Draft> folder(const std::string& final,
+                                            Removes removes = Removes::kSameName);
   /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors. What
   /// is no regular file, or in a folder that nothing may be added to, is its own draft.
   [[nodiscard]] static Draft file(const std::string& final);
@@ -43,9 +51,11 @@ class Draft {
  private:
   Draft(std::string final, std::filesystem::path root, std::string path);
   void remove();
+  void lock();
   std::string final_;
   std::filesystem::path root_;  // what is removed; empty: nothing
   std::string path_;
+  int lock_ = -1;  // on `root_`, if that is a folder
 };
 
 }  // namespace tandem::apps

@@ -41,7 +41,9 @@ Result<report::ReportFiles> draw_report(const std::string& log,
       !lost) {
     return std::unexpected(lost.error());
   }
-  Result<Draft> draft = Draft::folder(folder);
+  // Logs are numbered, so a later one never has the name of one whose drawing was killed.
+  Result<Draft> draft = Draft::folder(
+      folder, output.empty() ? Draft::Removes::kAnyNumber : Draft::Removes::kSameName);
   if (!draft) return std::unexpected(draft.error());
   auto files =
       report::make_report(log, others, draft->path(), find, hal::can::DriveMaster::error_text);

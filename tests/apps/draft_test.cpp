@@ -1,8 +1,13 @@
 // Drafts by themselves; what commands leave of theirs: half_made_test.cpp.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "apps/text/draft.hpp"
 #include "tests/support/scratch_folder.hpp"
@@ -61,6 +66,29 @@ TEST(Draft, OfAFolderThatIsThereNowRemovesWhatIsLeftFromBefore) {
   EXPECT_FALSE(fs::exists(folder / ("page" + gone)));
   EXPECT_FALSE(fs::exists(folder / ("page/" + gone)));
   EXPECT_TRUE(fs::exists(folder / ("other" + gone)));
+}
+
+// A run's report stayed for ever: the next run has another number.
+TEST(Draft, OfANumberedNameRemovesThoseOfOtherNumbersWhoseWriterIsGone) {
+  const tandem::test::ScratchFolder folder;
+  const std::string gone = ".new-4194305", other = ".new-4194306";  // more than Linux gives
+  const std::vector<std::string> stay{"squat-1.new-1",          "squat-004" + other,
+                                      "squat-a" + gone,         "squats-001" + gone,
+                                      "squat-001" + gone + "x", "squat-001"};
+  const std::vector<std::string> left{"squat-001" + gone, "squat-17" + gone, "squat-" + gone};
+  for (const auto* names : {&stay, &left})
+    for (const std::string& one : *names) fs::create_directories(folder / one);
+  // Its writer is none of ours to see, as in a container.
+  const int written = ::open((folder / stay[1]).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  ASSERT_EQ(::flock(written, LOCK_SH), 0);
+  const Result<Draft> draft = Draft::folder(folder / "squat-003", Draft::Removes::kAnyNumber);
+  ASSERT_TRUE(draft);
+  for (const std::string& one : stay) EXPECT_TRUE(fs::exists(folder / one)) << one;
+  for (const std::string& one : left) EXPECT_FALSE(fs::exists(folder / one)) << one;
+  const int ours = ::open(draft->path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  EXPECT_NE(::flock(ours, LOCK_EX | LOCK_NB), 0) << "a draft is locked while it is written";
+  ::close(ours);
+  ::close(written);
 }
 
 }  // namespace

@@ -148,6 +148,21 @@ TEST_F(HalfMade, WhatAKilledCommandLeftIsRemovedByTheNextOfThatName) {
   EXPECT_EQ(all(), were);
 }
 
+// The next run has another number.
+TEST_F(HalfMade, WhatAKilledReportOfARunLeftIsRemovedByTheNextRuns) {
+  const auto drafts = [this] {
+    const auto names = all();
+    return std::ranges::count_if(names, [](const auto& one) { return one.contains(".new-"); });
+  };
+  fake_gnuplot("cat > /dev/null\nkill -KILL $PPID\n");
+  const std::string run = "run trajectory.toml --duration 0.1 --log runs --report --quiet";
+  EXPECT_NE(tandem(run, environment()).status, 0);
+  EXPECT_GT(drafts(), 0);
+  fake_gnuplot("cat > /dev/null\n");
+  EXPECT_EQ(tandem(run, environment()).status, 0) << "the run is good, and its report is not";
+  EXPECT_EQ(drafts(), 0);
+}
+
 TEST_F(HalfMade, OnlyDraftsOfItsNameWhoseProcessIsGoneAreRemoved) {
   const std::string gone = "4194305";  // more than Linux gives
   const std::vector<std::string> stay{"a.new-" + std::to_string(::getpid()) + ".csv",
