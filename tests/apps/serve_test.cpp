@@ -2,10 +2,13 @@
 // follows when one of them is killed.
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
+#include <vector>
 
 #include "apps/transport/control_path.hpp"
+#include "tests/apps/background.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/support/dds_domain.hpp"
 
@@ -21,13 +24,14 @@ class Serve : public Program {
     return "'" TANDEM_SOURCE_DIR "/config/coman/squat.toml'";
   }
 
-  /// Starts `tandem ARGUMENTS` in the background; its process id.
-  [[nodiscard]] pid_t begin(const std::string& arguments, const std::string& name) const {
-    const std::string command =
-        "cd '" + folder_.string() + "' && { '" TANDEM_BINARY_DIR "/bin/tandem' " + arguments +
-        " >" + name + ".txt 2>" + name + ".err </dev/null & echo $! >" + name + ".pid; }";
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    return std::stoi(read_text(folder_ / (name + ".pid")));
+  void TearDown() override {
+    programs_.clear();
+    Program::TearDown();
+  }
+
+  /// Starts `tandem ARGUMENTS` in the background, until the test is over; its process id.
+  pid_t begin(const std::string& arguments, const std::string& name) {
+    return programs_.emplace_back(folder_, arguments, name).id();
   }
   static bool eventually(const std::function<bool()>& condition) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -37,9 +41,10 @@ class Serve : public Program {
     }
     return condition();
   }
-  /// Until the process has ended: a zombie is nobody's here, init takes it.
-  static bool ended(pid_t process) {
-    return eventually([process] { return ::kill(process, 0) != 0; });
+  /// Until the process has ended.
+  bool ended(pid_t process) {
+    const auto one = std::ranges::find(programs_, process, &Background::id);
+    return one != programs_.end() && eventually([&] { return one->ended(); });
   }
   [[nodiscard]] nlohmann::json ask(const std::string& socket, const std::string& what) const {
     const Outcome outcome = tandem("ask '{\"do\": \"" + what + "\"}' --socket " + socket);
@@ -47,7 +52,7 @@ class Serve : public Program {
   }
 
   /// The log's hash of an experiment in one process, and over DDS in lockstep.
-  void compare(const std::string& experiment, const std::string& arguments) const {
+  void compare(const std::string& experiment, const std::string& arguments) {
     const Outcome alone = tandem("run " + experiment + arguments + " --quiet --json alone.json");
     ASSERT_EQ(alone.status, 0) << alone.err;
     const pid_t server =
@@ -63,7 +68,38 @@ class Serve : public Program {
     EXPECT_GT(there["remote"]["commands"]["taken"].get<int>(), 1000);
     EXPECT_EQ(there["log"]["dropped"], 0);
   }
+
+  std::vector<Background> programs_;
 };
+
+/// Whether it is there, and is no zombie that nobody has waited for.
+bool is_running(pid_t process) {
+  const std::string stat = read_text("/proc/" + std::to_string(process) + "/stat");
+  return !stat.empty() && !stat.contains(") Z ");
+}
+
+// Servers of tests that failed stayed behind.
+TEST_F(Serve, InTheBackgroundEndsWithItsTestHoweverThatEnds) {
+  const std::string serve = "serve trajectory.toml" + domain() + " --no-log --quiet --no-socket";
+  const std::string trusting = "\n[remote]\ntrust = \"domain\"\n";
+  std::ofstream(folder_ / "trajectory.toml", std::ios::app) << trusting;
+  pid_t left = 0;
+  {
+    Background server(folder_, serve, "left");
+    left = server.id();
+    EXPECT_TRUE(is_running(left));
+  }
+  EXPECT_FALSE(is_running(left));
+  const pid_t killed = ::fork();
+  if (killed == 0) {
+    const Background server(folder_, serve, "killed");
+    std::ofstream(folder_ / "pid") << server.id() << std::endl;
+    ::raise(SIGKILL);
+  }
+  ::waitpid(killed, nullptr, 0);
+  left = std::stoi(read_text(folder_ / "pid"));
+  EXPECT_TRUE(eventually([left] { return !is_running(left); }));
+}
 
 TEST_F(Serve, InLockstepGivesTheBitsOfOneProcess) { compare("trajectory.toml", " --duration 2"); }
 
