@@ -18,6 +18,16 @@ std::string quoted_text(std::string_view text) {
   return out + '"';
 }
 
+std::string shell_word(std::string_view text) {
+  constexpr std::string_view kPlain =
+      "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ%+,-./:=@_";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string_view::npos)
+    return std::string(text);
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
 std::string xml_text(std::string_view text) {
   std::string out;
   for (const char c : text) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "base/quoting.hpp"
 #include "base/toml_reader.hpp"
 
 namespace tandem::apps {
@@ -40,16 +41,11 @@ std::vector<std::string> files_in(const std::string& folder, Takes takes) {
   return files;
 }
 
-/// As a shell takes it.
-std::string as_typed(const std::string& file) {
-  return file.contains(' ') ? "'" + file + "'" : file;
-}
-
 std::string to_type(const std::vector<std::string>& files, const std::string& command) {
   std::string text = "type: ";
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (i > 0) text += i + 1 == files.size() ? ", or: " : ", ";
-    text += command + " " + as_typed(files[i]);
+    text += command + " " + shell_word(files[i]);
   }
   return text;
 }

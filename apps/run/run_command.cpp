@@ -26,6 +26,7 @@
 #include "apps/transport/dds_admission.hpp"
 #include "apps/transport/dds_services.hpp"
 #include "base/counted.hpp"
+#include "base/quoting.hpp"
 #include "internal_model/parallel_robot.hpp"
 #include "rt/clock.hpp"
 #include "rt/cpu_latency.hpp"
@@ -131,11 +132,16 @@ Status check_pace(const Composition& c, const RunOptions& options) {
 
 /// Draws the report of `log` and prints where it is; one that cannot be drawn is no fault of the
 /// run. A signal ends it, and with it the program: there is nothing else to do.
-void add_report(const RunOptions& options, const std::string& log) {
+/// @param whole  the log has every message
+void add_report(const RunOptions& options, const std::string& log, bool whole) {
   if (!options.report || log.empty()) return;
   std::fflush(nullptr);  // a signal that ends the program writes nothing more
   rt::remove_stop_signals();
-  const auto files = draw_report(log, {}, {});
+  const auto files = draw_report(
+      log, {}, {},
+      fmt::format("the report was not drawn. The log {} is {}; `tandem report {}` draws "
+                  "its report",
+                  log, whole ? "whole" : "closed", shell_word(log)));
   if (!files) {
     print_errors({files.error()});
     return;
@@ -201,6 +207,8 @@ class Session {
 
   /// The log's path, once it is closed; empty: there is none.
   [[nodiscard]] const std::string& log() const { return log_; }
+  /// Whether it has every message.
+  [[nodiscard]] bool log_is_whole() const { return log_is_whole_; }
 
  private:
   [[nodiscard]] const runtime::Experiment& experiment() const { return c_.experiment; }
@@ -349,6 +357,7 @@ class Session {
     if (recorder_ != nullptr) {
       summary.log = recorder_->close(result_of(c_.master));
       log_ = summary.log->path;
+      log_is_whole_ = summary.log->error.empty();
     }
     if (c_.frames != nullptr) summary.frames = c_.frames->close();
     summary.faults = fault_texts(*cycle_, summary.log);
@@ -374,6 +383,7 @@ class Session {
   std::unique_ptr<DdsRun> dds_;
   std::unique_ptr<log::Recorder> recorder_;
   std::string log_;
+  bool log_is_whole_ = true;
   DdsAdmission admission_;
   std::unique_ptr<remote::Server> server_;
   rt::WallClock clock_;
@@ -434,12 +444,14 @@ Exit run_command(const RunOptions& options) {
   if (const Status paced = check_pace(**composition, options); !paced) return refuse(paced.error());
   Exit exit = Exit::kDone;
   std::string log;
+  bool whole = true;
   {
     Session session(**composition, options);
     exit = session.run();
     log = session.log();
+    whole = session.log_is_whole();
   }
-  add_report(options, log);
+  add_report(options, log, whole);
   return exit;
 }
 

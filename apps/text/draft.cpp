@@ -26,8 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP};
-char drafted[PATH_MAX];        // for the handler; empty: nothing
-char farewell[PATH_MAX + 64];  // what it says then
+char drafted[PATH_MAX];             // for the handler; empty: nothing
+char farewell[3 * PATH_MAX + 128];  // what it says then
 
 /// Removes a file, or a folder with all in it. Safe in a signal handler.
 void remove_entry(int folder, const char* name) {
@@ -66,8 +66,8 @@ void copy_text(const std::string& text, std::span<char> out) {
 }
 
 /// From now on what stands in `path` does not outlive the process. Empty: no more.
-/// @param final  that it is to become
-void remember(const std::string& path, const std::string& final = {}) {
+/// @param words  what the end then says
+void remember(const std::string& path, const std::string& words = {}) {
   const bool fits = path.size() < sizeof drafted;
   for (const int signal : kEnds) {
     using Action = struct sigaction;
@@ -81,7 +81,7 @@ void remember(const std::string& path, const std::string& final = {}) {
     drafted[0] = 0;
     ::sigaction(signal, &next, nullptr);
   }
-  copy_text("\ninterrupted: nothing was written to " + final + "\n", farewell);
+  copy_text("\ninterrupted: " + words + "\n", farewell);
   copy_text(path, drafted);
 }
 
@@ -151,9 +151,9 @@ std::unexpected<Error> problem_of(std::string what, const std::error_code& probl
 
 }  // namespace
 
-Draft::Draft(std::string final, fs::path root, std::string path)
+Draft::Draft(std::string final, fs::path root, std::string path, const std::string& interrupted)
     : final_(std::move(final)), root_(std::move(root)), path_(std::move(path)) {
-  remember(root_.string(), final_);
+  remember(root_.string(), interrupted.empty() ? "nothing was written to " + final_ : interrupted);
 }
 
 Draft::Draft(Draft&& other) noexcept
@@ -179,7 +179,8 @@ void Draft::lock() {
   if (lock_ >= 0) ::flock(lock_, LOCK_SH | LOCK_NB);
 }
 
-Result<Draft> Draft::folder(const std::string& final, Removes removes) {
+Result<Draft> Draft::folder(const std::string& final, Removes removes,
+                            const std::string& interrupted) {
   std::error_code problem;
   fs::path whole = fs::absolute(final).lexically_normal();
   if (!whole.has_filename()) whole = whole.parent_path();  // a slash at the end
@@ -198,7 +199,7 @@ Result<Draft> Draft::folder(const std::string& final, Removes removes) {
     if (!path.has_filename()) path = path.parent_path();
   }
   remove_left(root);
-  Draft draft(final, root, path.string());
+  Draft draft(final, root, path.string(), interrupted);
   fs::create_directories(path, problem);
   if (problem) return problem_of("the folder cannot be made", problem, final);
   draft.lock();

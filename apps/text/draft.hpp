@@ -26,8 +26,11 @@ class Draft {
   };
   /// Of the folder `final` and the parents that it lacks; of what is to be added to a folder that
   /// is there. Errors: it is a file; the folder cannot be made.
+  /// @param interrupted  what is said when a signal ends the process; empty: that nothing was
+  ///                     written to `final`
   [[nodiscard]] static Result<Draft> folder(const std::string& final,
-                                            Removes removes = Removes::kSameName);
+                                            Removes removes = Removes::kSameName,
+                                            const std::string& interrupted = {});
   /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors. What
   /// is no regular file, or in a folder that nothing may be added to, is its own draft.
   [[nodiscard]] static Draft file(const std::string& final);
@@ -49,7 +52,8 @@ class Draft {
   [[nodiscard]] Status place(const Before& before = {});
 
  private:
-  Draft(std::string final, std::filesystem::path root, std::string path);
+  Draft(std::string final, std::filesystem::path root, std::string path,
+        const std::string& interrupted = {});
   void remove();
   void lock();
   std::string final_;

@@ -27,7 +27,7 @@ std::string default_folder(const std::string& log, const std::vector<std::string
 
 Result<report::ReportFiles> draw_report(const std::string& log,
                                         const std::vector<std::string>& others,
-                                        const std::string& output) {
+                                        const std::string& output, const std::string& interrupted) {
   model::KernelLibrary kernels;  // lives as long as the drawing needs it
   const auto find = [&kernels](const report::RunData& run) -> const tandem_kernels* {
     auto found = find_kernels(run.info.robot, run.info.description_hash, {});
@@ -43,7 +43,7 @@ Result<report::ReportFiles> draw_report(const std::string& log,
   }
   // Logs are numbered, so a later one never has the name of one whose drawing was killed.
   Result<Draft> draft = Draft::folder(
-      folder, output.empty() ? Draft::Removes::kAnyNumber : Draft::Removes::kSameName);
+      folder, output.empty() ? Draft::Removes::kAnyNumber : Draft::Removes::kSameName, interrupted);
   if (!draft) return std::unexpected(draft.error());
   auto files =
       report::make_report(log, others, draft->path(), find, hal::can::DriveMaster::error_text);

@@ -12,9 +12,11 @@ namespace tandem::apps {
 
 /// @param others  up to two more logs, laid over the first
 /// @param output  folder to write; empty: beside `log`, named after the logs
+/// @param interrupted  what is said when a signal ends the drawing; empty: that nothing was written
 /// Errors: report::make_report()'s, which leave nothing half made.
 [[nodiscard]] Result<report::ReportFiles> draw_report(const std::string& log,
                                                       const std::vector<std::string>& others,
-                                                      const std::string& output);
+                                                      const std::string& output,
+                                                      const std::string& interrupted = {});
 
 }  // namespace tandem::apps

@@ -16,5 +16,12 @@ TEST(Quoting, EscapesWhatMeansSomethingInXml) {
   EXPECT_EQ(xml_text("a<b> & \"c\" 'd'"), "a&lt;b&gt; &amp; &quot;c&quot; 'd'");
 }
 
+TEST(Quoting, OfAWordThatAShellWouldBreak) {
+  EXPECT_EQ(shell_word("runs/coman-squat-001.mcap"), "runs/coman-squat-001.mcap");
+  EXPECT_EQ(shell_word("my robot/$a.toml"), "'my robot/$a.toml'");
+  EXPECT_EQ(shell_word("it's"), R"('it'\''s')");
+  EXPECT_EQ(shell_word(""), "''");
+}
+
 }  // namespace
 }  // namespace tandem
