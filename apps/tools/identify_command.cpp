@@ -153,6 +153,8 @@ void print_result(std::FILE* out, const Identification& result) {
 }  // namespace
 
 Exit identify_command(const IdentifyOptions& options) {
+  Result<Draft> draft = Draft::folder(options.output);  // first: an interrupt has its word
+  if (!draft) return refuse(draft.error());
   const auto robot = read_robot(options.robot);
   if (!robot) return refuse(robot.error());
   if (const Status s = check_identified(*robot, options.logs, options.output); !s)
@@ -160,8 +162,6 @@ Exit identify_command(const IdentifyOptions& options) {
   const auto result = identification::identify(options.logs, robot->config, robot->tree,
                                                {.cutoff_Hz = options.cutoff_Hz});
   if (!result) return refuse(result.error());
-  Result<Draft> draft = Draft::folder(options.output);
-  if (!draft) return refuse(draft.error());
   std::FILE* out = human_output(options.json);
   print_result(out, *result);
   for (const std::string& remark : result->remarks) fmt::print(stderr, "note: {}\n", remark);

@@ -1,8 +1,12 @@
 // What a command could not write to its end leaves nothing behind: a full disk, the limit on the
 // size of files, a file where a folder is needed, Ctrl-C.
+#include <sys/stat.h>
+
 #include <csignal>
 
+#include "tests/apps/background.hpp"
 #include "tests/apps/bad_input.hpp"
+#include "tests/support/eventually.hpp"
 #include "tests/support/scratch_folder.hpp"
 
 namespace tandem::apps {
@@ -107,6 +111,22 @@ TEST_F(HalfMade, PicturesAreRemovedAtAnInterrupt) {
     EXPECT_NE(read_text(folder_ / "err.txt").find("interrupted: nothing was written to "),
               std::string::npos);
   }
+}
+
+// It ended without a word as long as the logs were read.
+TEST_F(HalfMade, IdentificationThatIsInterruptedEarlySaysThatNothingWasWritten) {
+  ASSERT_EQ(::mkfifo((folder_ / "endless.mcap").c_str(), 0600), 0);
+  const auto were = all();
+  Background identify(folder_, "identify endless.mcap --robot robot.toml --out a/found", "early");
+  const std::string draft = "a.new-" + std::to_string(identify.id());
+  ASSERT_TRUE(tandem::test::eventually([&] { return std::filesystem::exists(folder_ / draft); }))
+      << read_text(folder_ / "early.err");
+  ASSERT_EQ(::kill(identify.id(), SIGINT), 0);
+  ASSERT_TRUE(tandem::test::eventually([&] { return identify.ended(); }));
+  EXPECT_EQ(identify.status(), 128 + SIGINT);
+  EXPECT_EQ(read_text(folder_ / "early.err"), "\ninterrupted: nothing was written to a/found\n");
+  std::filesystem::remove(folder_ / "early.err");
+  EXPECT_EQ(all(), were);
 }
 
 // The first Ctrl-C was ignored: the handler of the run that was over set a flag.
