@@ -216,7 +216,7 @@ struct LogOptions {
   std::string map;                       ///< import: what the columns or topics mean
   std::string source;                    ///< replay: "command", "state"; empty: what the log has
   std::string posture;                   ///< replay: to start from; empty: the recording's
-  std::vector<std::string> joints;       ///< replay: that are led; empty: all
+  std::vector<std::string> joints;       ///< replay: that are led, as given; empty: all
   std::optional<double> begin_s, end_s;  ///< replay: of the log's time
   double speed = 1.0;                    ///< replay: times as fast as recorded
   bool torque = false;                   ///< replay: torques as feed-forward
@@ -254,7 +254,7 @@ struct ExciteOptions {
   std::string robot;                ///< robot.toml
   std::string output;               ///< experiment; "-" for standard output
   std::string posture;              ///< start; empty: the robot's first, else every joint at 0
-  std::vector<std::string> joints;  ///< that move; empty: all that can
+  std::vector<std::string> joints;  ///< that move, as given; empty: all that can
   double period_s = 0.0;            ///< of the series; 0: 10, of a robot that hangs 3
   int periods = 0;                  ///< 0: 3, of a robot that hangs 20
   int harmonics = 5;

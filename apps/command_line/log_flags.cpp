@@ -63,6 +63,7 @@ const char kExciteExamples[] = R"(Examples:
   tandem excite config/coman/robot.toml --out hung.toml --hung         from its hoist, feet in the air
   tandem excite robot.toml --out excite.toml --seed 7 --share 0.4       gently, in another way
   tandem excite robot.toml --out excite.toml --joints elbow,wrist       the others are held
+  tandem excite robot.toml --out excite.toml --joints elbow --joints 'wrist,left'
 The experiment is an ordinary one: `tandem check excite.toml`, `tandem run excite.toml`.)";
 
 void add_replay_flags(CLI::App& replay, LogOptions& o) {
@@ -75,8 +76,9 @@ void add_replay_flags(CLI::App& replay, LogOptions& o) {
       .add_option("--source", o.source,
                   "What is played (default: the commands where the log has them)")
       ->check(CLI::IsMember({"command", "state"}));
-  replay.add_option("--joints", o.joints, "Joints that are led, by comma (default: all)")
-      ->delimiter(',');
+  replay.add_option("--joints", o.joints,
+                    "Joints that are led, by comma (default: all); may be repeated: a name that "
+                    "has a comma stands alone");
   replay.add_option("--from", o.begin_s, "Of the log's time [s] (default: the controllers' start)");
   replay.add_option("--to", o.end_s, "Of the log's time [s] (default: the controllers' end)");
   replay
@@ -179,8 +181,9 @@ void add_flags(CLI::App& app, ExciteOptions& o) {
   app.add_option("robot", o.robot, "Robot TOML")->required();
   app.add_option("--out", o.output, "Experiment to write")->required()->check(is_given(kNameAFile));
   app.add_option("--posture", o.posture, "Start posture (default: the robot's first, or all at 0)");
-  app.add_option("--joints", o.joints, "Joints that move, by comma (default: all that can)")
-      ->delimiter(',');
+  app.add_option("--joints", o.joints,
+                 "Joints that move, by comma (default: all that can); may be repeated: a name that "
+                 "has a comma stands alone");
   app.add_option("--period", o.period_s, "Seconds of a period (default: 10, with --hung 3)")
       ->check(CLI::Range(2.0, 120.0));
   app.add_option("--periods", o.periods, "Periods (default: 3, with --hung 20)")

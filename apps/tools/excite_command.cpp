@@ -9,6 +9,7 @@
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
+#include "apps/tools/listed_names.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/quoting.hpp"
@@ -215,6 +216,9 @@ Exit excite_command(const ExciteOptions& given, const Trial& trial) {
           check_overwrites(options.output, kExciteHead, "experiment of `tandem excite`");
       !s)
     return refuse(s.error());
+  std::vector<std::string> joints;
+  for (const hal::JointConfig& joint : robot->config.joints) joints.push_back(joint.name);
+  options.joints = listed_names(options.joints, joints);
   std::string posture = options.posture;
   if (posture.empty() && !robot->config.postures.empty())
     posture = robot->config.postures.front().name;

@@ -9,6 +9,7 @@
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
 #include "apps/tools/commands.hpp"
+#include "apps/tools/listed_names.hpp"
 #include "apps/tools/relative_path.hpp"
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
@@ -60,8 +61,9 @@ Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robo
 /// the recording has others, and none were chosen.
 Result<std::vector<std::size_t>> joints_of(const LogOptions& options, const hal::Robot& robot,
                                            const log::RunInfo& info) {
-  std::vector<std::string> names = options.joints, known;
+  std::vector<std::string> known;
   for (const hal::Joint& joint : robot.joints) known.push_back(joint.name);
+  std::vector<std::string> names = listed_names(options.joints, known);
   if (names.empty()) {
     names = known;
     for (const std::string& joint : info.joints) {

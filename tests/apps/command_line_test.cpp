@@ -125,5 +125,25 @@ TEST_F(CommandLine, ARunIsAskedByOneWay) {
   }
 }
 
+// The list was split at every comma.
+TEST_F(CommandLine, ListsTakeNamesWithCommasByThemselves) {
+  edit("double_pendulum.urdf", "\"joint1\"", "\"a,b\"");
+  edit("robot.toml", "\"joint1\"", "\"a,b\"");
+  edit("robot.toml", "names = [\"joint1\"", "names = [\"a,b\"");
+  edit("robot.toml", "\njoint1 = 0.5", "\n\"a,b\" = 0.5");
+  const std::string excite = "excite robot.toml --out e.toml --tries 1 --json e.json --joints ";
+  const auto moved = [&](const std::string& joints) {
+    const Outcome outcome = tandem(excite + joints);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return json("e.json")["joints"].dump();
+  };
+  EXPECT_EQ(moved("'a,b'"), R"(["a,b"])");
+  EXPECT_EQ(moved("joint2 --joints 'a,b'"), R"(["a,b","joint2"])");
+  EXPECT_EQ(moved("joint2,"), R"(["joint2"])");
+  const Outcome split = tandem(excite + "'a,b,joint2'");
+  EXPECT_EQ(split.status, 2);
+  EXPECT_NE(split.err.find("no joint 'a'"), std::string::npos) << split.err;
+}
+
 }  // namespace
 }  // namespace tandem::apps
