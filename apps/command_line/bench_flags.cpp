@@ -13,6 +13,7 @@ Engines are installed by scripts/install-dependencies engines, before CMake runs
 
 void add_flags(CLI::App& app, BenchOptions& o) {
   app.require_subcommand(1);
+  app.footer(kBenchEnginesExamples);  // its subcommand's, too
   CLI::App* engines =
       app.add_subcommand("engines", "Multibody engines on the same scenes: error against cost");
   engines
@@ -29,7 +30,6 @@ void add_flags(CLI::App& app, BenchOptions& o) {
                       "Folder of engines.md and its figures (default: runs/bench)");
   engines->add_flag("--quiet,-q", o.quiet, "Neither progress nor verdicts");
   engines->add_option("--json", o.json, kJsonHelp)->check(is_given(kNameAFile));
-  engines->footer(kBenchEnginesExamples);
 }
 
 }  // namespace tandem::apps

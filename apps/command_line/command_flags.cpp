@@ -82,6 +82,10 @@ const char kNewExamples[] = R"(Examples:
   tandem new my_robot.urdf --base fixed --force
 Every figure that is guessed is marked so in robot.toml. Rules: docs/robots.md.)";
 
+const char kModelExamples[] = R"(Examples:
+  tandem model build config/coman/robot.toml         generates and compiles the robot's kernels
+  tandem model info config/coman/robot.toml          joints, mass, operation counts and sizes)";
+
 const char kModelBuildExamples[] = R"(Examples:
   tandem model build config/coman/robot.toml
   tandem model build my_robot/robot.toml -o /tmp/my_robot.so
@@ -391,6 +395,7 @@ void add_flags(CLI::App& app, CheckOptions& o) {
 
 void add_flags(CLI::App& app, ModelOptions& o) {
   app.require_subcommand(1);
+  app.footer(kModelExamples);
   CLI::App* build = app.add_subcommand("build", "Generate and compile a robot's kernels");
   build->add_option("robot", o.robot, "Robot TOML")->required();
   build->add_option("-o,--output", o.output, "Shared library to write");

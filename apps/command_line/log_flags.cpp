@@ -4,6 +4,15 @@
 namespace tandem::apps {
 namespace {
 
+const char kLogExamples[] = R"(Examples:
+  tandem log info runs/coman-squat-001.mcap          topics, messages, time, digest
+  tandem log csv runs/coman-squat-001.mcap --fields position_rad > q.csv
+  tandem log diff runs/a.mcap runs/b.mcap            equal bit by bit, or the first difference
+  tandem log thresholds a.mcap b.mcap c.mcap         [estimation.collision] from free motion
+  tandem log import q.csv --robot config/ur5e/robot.toml --map ur5e_csv.toml
+  tandem log replay runs/ur5e-q.mcap --robot config/ur5e/robot.toml --out replay.toml
+`tandem log SUBCOMMAND --help` shows more of each.)";
+
 const char kLogInfoExamples[] = R"(Examples:
   tandem log info runs/coman-squat-001.mcap              topics, messages, time, digest
   tandem log info runs/coman-squat-001.mcap --topic truth  its fields: how many values, units)";
@@ -128,6 +137,7 @@ void add_import_flags(CLI::App& taken, LogOptions& o) {
 
 void add_flags(CLI::App& app, LogOptions& o) {
   app.require_subcommand(1);
+  app.footer(kLogExamples);
   CLI::App* info = app.add_subcommand("info", "What a log holds");
   info->add_option("log", o.log, "MCAP file")->required();
   info->add_option("--topic", o.topic, "List the fields of this topic instead, with their units");

@@ -1,4 +1,8 @@
 // Help that teaches, and messages for what was mistyped.
+#include <map>
+#include <string>
+#include <vector>
+
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {
@@ -19,6 +23,24 @@ TEST_F(CommandLine, HelpOfACommandHasExamplesOfItsOwn) {
   const Outcome outcome = tandem("model build --help");
   EXPECT_EQ(outcome.status, 0);
   EXPECT_NE(outcome.out.find("tandem model build config/coman/robot.toml"), std::string::npos);
+}
+
+// Those with subcommands had the program's examples.
+TEST_F(CommandLine, HelpOfACommandWithSubcommandsHasAnExampleOfEach) {
+  const std::map<std::string, std::vector<std::string>> subcommands{
+      {"log", {"info", "csv", "diff", "thresholds", "import", "replay"}},
+      {"model", {"build", "info"}},
+      {"bench", {"engines"}},
+      {"fault", {"show", "reset"}},
+      {"topic", {"list", "echo", "hz"}}};
+  for (const auto& [command, names] : subcommands) {
+    const Outcome outcome = tandem(command + " --help");
+    for (const std::string& name : names) {
+      const std::string example = "tandem " + command + " " + name;
+      EXPECT_NE(outcome.out.find("\n  " + example), std::string::npos) << example;
+    }
+    EXPECT_EQ(outcome.out.find("\n  tandem run config/coman/squat.toml"), std::string::npos);
+  }
 }
 
 TEST_F(CommandLine, HelpMayComeFirst) {
