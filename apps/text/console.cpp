@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <vector>
 
 #include "apps/text/draft.hpp"
 #include "rt/stop_signal.hpp"
@@ -36,7 +37,7 @@ std::string right(const std::string& text, std::size_t columns) {
 
 Error json_error(const std::string& file) {
   return {.message = std::string("cannot write the JSON: ") + std::strerror(errno),
-          .hint = "name a file in a folder that exists and can be written",
+          .hint = "name a file in a folder that can be written",
           .file = file,
           .key = {}};
 }
@@ -106,12 +107,29 @@ Status write_file(const std::filesystem::path& file, const std::string& text) {
   if (opened && std::filesystem::is_regular_file(file, ignored))
     std::filesystem::remove(file, ignored);
   return std::unexpected(Error{"the file cannot be written" + reason,
-                               "name a file in a folder that is there, that you may write to, and "
-                               "whose disk has space",
+                               "name a file in a folder that you may write to, and whose disk has "
+                               "space",
                                file.string(),
                                0,
                                {}});
 }
+
+namespace {
+
+/// Makes the folders that a file lacks, and removes them. @return why they cannot be made
+std::error_code try_folders(const std::filesystem::path& file) {
+  std::error_code problem, ignored;
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  std::vector<std::filesystem::path> missing;
+  for (auto one = folder; one.has_relative_path() && !std::filesystem::exists(one, ignored);
+       one = one.parent_path())
+    missing.push_back(one);
+  std::filesystem::create_directories(folder, problem);
+  for (const auto& one : missing) ::rmdir(one.c_str());  // unless somebody has filled it
+  return problem;
+}
+
+}  // namespace
 
 Status check_overwrites(const std::string& file, std::string_view begins, const std::string& what) {
   std::error_code ignored;
@@ -138,6 +156,12 @@ Status check_writable(const std::string& file) {
   }
   std::error_code ignored;
   const bool there = std::filesystem::exists(file, ignored);
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  if (!folder.empty() && !std::filesystem::exists(folder, ignored)) {
+    const std::error_code problem = try_folders(file);
+    errno = problem.value();
+    return problem ? std::unexpected(json_error(file)) : Status{};
+  }
   errno = 0;
   const std::ofstream out(file, std::ios::app);  // changes nothing in a file that is there
   if (!out) return std::unexpected(json_error(file));

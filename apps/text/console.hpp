@@ -38,14 +38,16 @@ using Json = nlohmann::ordered_json;
 /// Call it before other threads print.
 void outlive_files();
 
-/// Whether `file` can be written, found out before a run: an error that names it when not.
+/// Whether `file` and the folders that it lacks can be written, found out before a run: an error
+/// that names it when not. Nothing is made.
 [[nodiscard]] Status check_writable(const std::string& file);
 
 /// `value` as JSON, whatever bytes its texts hold: what is no UTF-8 becomes U+FFFD.
 /// @param indent  blanks a level; -1: all in one line
 [[nodiscard]] std::string json_text(const Json& value, int indent = -1);
 
-/// Writes `value` to `file`, "-" for standard output; does nothing when `file` is empty.
+/// Writes `value` to `file`, and makes the folders that it lacks; "-" for standard output; does
+/// nothing when `file` is empty.
 [[nodiscard]] Status write_json(const std::string& file, const Json& value);
 
 /// Writes a new file, or over an old one, and removes it when not all of it could be written: give

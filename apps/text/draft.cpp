@@ -149,6 +149,14 @@ std::unexpected<Error> problem_of(std::string what, const std::error_code& probl
                                {}});
 }
 
+/// Of a path that is not there: itself, or the first of the folders above it that are missing.
+fs::path first_missing(fs::path path) {
+  std::error_code problem;
+  while (path.has_relative_path() && !fs::exists(path.parent_path(), problem))
+    path = path.parent_path();
+  return path;
+}
+
 }  // namespace
 
 Draft::Draft(std::string final, fs::path root, std::string path, const std::string& interrupted)
@@ -191,9 +199,7 @@ Result<Draft> Draft::folder(const std::string& final, Removes removes,
   fs::path root = whole / suffix(), path = root;
   remove_left(whole.string() + suffix(), removes);  // made when the folder was not there
   if (!fs::exists(whole, problem)) {
-    fs::path first = whole;  // of what is missing
-    while (first.has_relative_path() && !fs::exists(first.parent_path(), problem))
-      first = first.parent_path();
+    const fs::path first = first_missing(whole);
     root = first.string() + suffix();
     path = (root / whole.lexically_relative(first)).lexically_normal();
     if (!path.has_filename()) path = path.parent_path();
@@ -213,6 +219,17 @@ Draft Draft::file(const std::string& final) {
   const std::string folder = place.has_parent_path() ? place.parent_path().string() : ".";
   const bool beside = fs::is_regular_file(there) && ::access(folder.c_str(), W_OK) == 0;
   if (fs::exists(there) && !beside) return {final, {}, final};  // as /dev/null
+  if (!fs::exists(folder, problem)) {
+    const fs::path whole = fs::absolute(place).lexically_normal();
+    const fs::path first = first_missing(whole);
+    const fs::path root = first.string() + suffix();
+    const fs::path path = root / whole.lexically_relative(first);
+    remove_left(root);
+    Draft in_folder(final, root, path.string());
+    fs::create_directories(path.parent_path(), problem);
+    in_folder.lock();
+    return in_folder;
+  }
   fs::path draft = place.parent_path() / place.stem();
   draft += suffix() + place.extension().string();
   remove_left(draft);
@@ -234,7 +251,7 @@ Status Draft::place(const Before& before) {
   std::error_code problem;
   if (root_.empty()) return {};
   std::vector<std::pair<fs::path, fs::path>> moves;  // from, to
-  if (fs::is_directory(root_, problem)) {
+  if (fs::is_directory(path_, problem)) {
     for (const auto& entry : fs::recursive_directory_iterator(path_)) {
       if (!entry.is_directory())
         moves.emplace_back(entry.path(), final_ / entry.path().lexically_relative(path_));

@@ -31,8 +31,9 @@ class Draft {
   [[nodiscard]] static Result<Draft> folder(const std::string& final,
                                             Removes removes = Removes::kSameName,
                                             const std::string& interrupted = {});
-  /// Of the file `final`, with the same ending. Nothing is written yet, so it has no errors. What
-  /// is no regular file, or in a folder that nothing may be added to, is its own draft.
+  /// Of the file `final`, with the same ending, and of the folders that it lacks. Nothing is
+  /// written yet, so it has no errors: who writes to path() meets them. What is no regular file, or
+  /// in a folder that nothing may be added to, is its own draft.
   [[nodiscard]] static Draft file(const std::string& final);
 
   ~Draft();

@@ -137,8 +137,11 @@ Status write_csv(const log::LogFile& file, const LogOptions& options) {
   Draft draft = Draft::file(options.output);
   std::ofstream out(draft.path(), std::ios::binary);
   if (!out) {
-    return std::unexpected(Error{
-        "cannot write this file", "name a file in a folder that exists", options.output, 0, {}});
+    return std::unexpected(Error{"cannot write this file",
+                                 "name a file in a folder that can be written",
+                                 options.output,
+                                 0,
+                                 {}});
   }
   Status written = log::write_csv(file, topic, options.every, out, options.fields);
   out.close();

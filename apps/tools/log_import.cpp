@@ -37,11 +37,8 @@ log::RunInfo info_of(const RobotFiles& robot, const std::string& file) {
 /// made.
 Result<std::string> output_of(const LogOptions& options, const std::string& robot) {
   std::string path = options.output;
-  if (path.empty()) {
-    std::error_code problem;
-    fs::create_directories("runs", problem);
+  if (path.empty())
     path = "runs/" + robot + "-" + fs::path(options.files.front()).stem().string() + ".mcap";
-  }
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return path;
   return std::unexpected(

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <filesystem>
 
 #include "base/clock_ns.hpp"
 #include "hal/ethercat-can/frame_time.hpp"
@@ -38,11 +39,14 @@ std::string candump_line(std::int64_t time_ns, const std::string& bus, const Fra
 
 Result<std::unique_ptr<FrameRecord>> FrameRecord::open(const std::string& path,
                                                        std::size_t ring_frames) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::error_code ignored;  // fopen() says it
+  if (!folder.empty()) std::filesystem::create_directories(folder, ignored);
   std::FILE* file = std::fopen(path.c_str(), "w");
   if (file == nullptr) {
     return std::unexpected(
         Error{.message = fmt::format("cannot record frames: {}", std::strerror(errno)),
-              .hint = "make the folder, or choose another file",
+              .hint = "choose a file in a folder that can be written",
               .file = path,
               .key = {}});
   }

@@ -404,8 +404,8 @@ TEST_F(BadInput, IsReportedAsJsonByEveryCommand) {
 }
 
 TEST_F(BadInput, AJsonFileThatCannotBeWrittenIsRefused) {
-  expect_refused({"nowhere/result.json"},
-                 "run hold.toml --duration 0.05 --quiet --json nowhere/result.json");
+  for (const char* file : {"robot.toml/result.json", "robot.toml/a/b.json", "/proc/nowhere/a.json"})
+    expect_refused({file}, std::string("run hold.toml --duration 0.05 --quiet --json ") + file);
 }
 
 TEST_F(BadInput, AFileThatIsNoUtf8IsRefusedInJsonToo) {

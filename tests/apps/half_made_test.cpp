@@ -84,9 +84,33 @@ TEST_F(HalfMade, PicturesThatGnuplotCutAreAnError) {
                  environment());
 }
 
-TEST_F(HalfMade, ExperimentIsNotLeftWhereItsFolderIsMissing) {
-  expect_nothing("log replay " + log_ + " --robot robot.toml --out nowhere/x.toml",
-                 {"nowhere/x.toml", "No such file or directory"});
+// `identify --out`, `report -o` and `run --log` made their folders, and files needed theirs before.
+TEST_F(HalfMade, FoldersThatAFileLacksAreMade) {
+  ASSERT_EQ(tandem("log csv " + log_ + " --fields position_rad -o c/d/run.csv").status, 0);
+  write_text(folder_ / "map.toml", kMap);
+  const std::pair<std::string, std::string> commands[]{
+      {"log replay " + log_ + " --robot robot.toml --out e/f/x.toml", "e/f/x.toml"},
+      {"excite robot.toml --tries 1 --out g/h/x.toml", "g/h/x.toml"},
+      {"log import c/d/run.csv --robot robot.toml --map map.toml -o i/j/x.mcap", "i/j/x.mcap"},
+      {"log info " + log_ + " --json k/l/x.json", "k/l/x.json"},
+      {"run hold.toml --duration 0.1 --no-log -q --trace m/n/t.json --json o/p/r.json",
+       "m/n/t.json"},
+      {"check e/f/x.toml", "e/f/x.toml"},
+      {"check g/h/x.toml --json q/x.json", "q/x.json"}};
+  for (const auto& [command, file] : commands) {
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << command << "\n" << outcome.err;
+    EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / file)) << command;
+  }
+  EXPECT_TRUE(json("o/p/r.json").is_object());
+  for (const std::string& name : all()) EXPECT_EQ(name.find(".new-"), std::string::npos) << name;
+}
+
+TEST_F(HalfMade, FoldersAreNotLeftWithoutTheirFile) {
+  expect_nothing("log replay " + log_ + " --robot robot.toml --out robot.toml/x.toml",
+                 {"robot.toml/x.toml", "cannot be written"});
+  expect_nothing("log csv " + log_ + " -o a/b/a.csv", {"a/b/a.csv", "writing the CSV failed"},
+                 "ulimit -f 20;");
 }
 
 TEST_F(HalfMade, FileInPlaceOfAFolderIsNamed) {

@@ -245,9 +245,9 @@ TEST_F(Run, WritesATraceOfItsLastCycles) {
 }
 
 TEST_F(Run, RefusesATraceThatCannotBeWrittenBeforeItRuns) {
-  const Outcome outcome = tandem("run hold.toml --trace nowhere/t.json");
+  const Outcome outcome = tandem("run hold.toml --trace robot.toml/t.json");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.err.find("nowhere/t.json"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("robot.toml/t.json"), std::string::npos) << outcome.err;
   EXPECT_FALSE(has_log());
   EXPECT_EQ(tandem("run hold.toml --trace-cycles 5").status, 2);
 }
