@@ -145,8 +145,8 @@ void print_result(std::FILE* out, const Identification& result) {
     known += one.estimate.identifiable ? 1 : 0;
   facts.add("base parameters",
             fmt::format("{} of {} known by the data", known, result.base.size()));
-  facts.add("mass", fmt::format("{:.4f} kg, described {:.4f} kg", result.identified_mass_kg,
-                                result.described_mass_kg));
+  facts.add("mass", fmt::format("{:.4f} kg, described {:.4f} kg{}", result.identified_mass_kg,
+                                result.described_mass_kg, mass_note(result)));
   facts.print(out);
 }
 

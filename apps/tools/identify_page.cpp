@@ -158,6 +158,10 @@ report::PageTable text_table(const char* title, const std::vector<std::string>& 
 
 }  // namespace
 
+std::string mass_note(const Identification& result) {
+  return result.mass_kg.identifiable ? "" : ", not known: these data do not show it";
+}
+
 Result<std::string> write_identify_page(const Identification& result, const std::string& robot,
                                         const std::string& folder) {
   std::vector<report::Figure> figures;
@@ -169,12 +173,13 @@ Result<std::string> write_identify_page(const Identification& result, const std:
   page.lead =
       "Measured torque of every joint on data that was held back, beside what the "
       "description and the identified robot say it should be.";
-  page.facts = {{"used", fmt::format("{:.1f} s", result.usable_s)},
-                {"held back", fmt::format("{:.1f} s", result.held_out_s)},
-                {"condition number", fmt::format("{:.1f}", result.condition_number)},
-                {"base parameters", std::to_string(result.base.size())},
-                {"mass described", fmt::format("{:.4f} kg", result.described_mass_kg)},
-                {"mass identified", fmt::format("{:.4f} kg", result.identified_mass_kg)}};
+  page.facts = {
+      {"used", fmt::format("{:.1f} s", result.usable_s)},
+      {"held back", fmt::format("{:.1f} s", result.held_out_s)},
+      {"condition number", fmt::format("{:.1f}", result.condition_number)},
+      {"base parameters", std::to_string(result.base.size())},
+      {"mass described", fmt::format("{:.4f} kg", result.described_mass_kg)},
+      {"mass identified", fmt::format("{:.4f} kg", result.identified_mass_kg) + mass_note(result)}};
   if (!result.warnings.empty()) page.tables.push_back(text_table("Warnings", result.warnings));
   if (!result.remarks.empty())
     page.tables.push_back(text_table("Left out, and assumed", result.remarks));

@@ -51,6 +51,10 @@ TEST_F(Identify, FindsWhatTheDescriptionGotWrongAndWritesARobotThatRuns) {
     EXPECT_LT(joint["relative_error"].get<double>(), 0.05) << name;
     EXPECT_NEAR(joint["viscous_Nms_rad"].get<double>(), 0.17 - 0.16, 0.01) << name;
   }
+  // JSON alone said that an arm's torques do not show its total mass.
+  EXPECT_FALSE(result["total_mass_kg"]["identifiable"].get<bool>());
+  for (const std::string& text : {found.out, read_text(folder_ / "found/report.html")})
+    EXPECT_NE(text.find(" kg, not known: these data do not show it"), std::string::npos) << text;
   // The moment about joint2 is what the torques show, whatever link it is put down to.
   const auto& link = result["links"]["link2"];
   const double moment =
