@@ -190,6 +190,8 @@ Page page_of(const RunData& run, const OtherRuns& others, const std::vector<Page
                                std::abs(later_s), later_s > 0.0 ? "later" : "earlier",
                                others[i]->drawn_as_replay ? "the replay lies over its recording"
                                                           : "both controllers start together");
+      if (others[i]->drawn_as_replay)
+        page.lead += fmt::format(" Only what is played is drawn of{}.", kSides[i + 1]);
     }
     add_facts(*others[i], kSides[i + 1], page.facts);
     add_tables(*others[i], kSides[i + 1], page);
@@ -212,6 +214,12 @@ Status align(const RunData& run, RunData& other, const std::string& side,
     other.drawn_later_s = forth ? (*replay)->from_s - other.drawn_slower * (*replay)->begin_s
                                 : (*replay)->begin_s - other.drawn_slower * (*replay)->from_s;
     other.drawn_as_replay = true;
+    // Its way to the first place, and what of a recording is not played, has nothing to lie over.
+    const double before_s = forth ? (*replay)->from_s : (*replay)->run_time_s((*replay)->from_s);
+    const double after_s = forth ? (*replay)->to_s : (*replay)->run_time_s((*replay)->to_s);
+    const double half_s = 0.5 * std::max(run.step_s, other.step_s);
+    other.drawn_from_s = before_s - half_s;
+    other.drawn_to_s = after_s + half_s;
     tables.push_back(replay_table(playing, played, **replay));
     tables.back().title += side;
     break;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -69,8 +70,10 @@ struct RunData {
   double drawn_later_s = 0.0;    ///< added to all times of this run in the figures,
   double drawn_slower = 1.0;     ///< after they were multiplied by this
   bool drawn_as_replay = false;  ///< so that a replay lies over its recording
-  std::vector<RunFault> faults;  ///< in the order of their times
-  Columns position_rad, velocity_rad_s, torque_Nm;  ///< [joint][row], measured
+  double drawn_from_s = -std::numeric_limits<double>::infinity();  ///< of the figures' times: only
+  double drawn_to_s = std::numeric_limits<double>::infinity();     ///< rows in these are drawn
+  std::vector<RunFault> faults;                                    ///< in the order of their times
+  Columns position_rad, velocity_rad_s, torque_Nm;                 ///< [joint][row], measured
   Columns reference_rad;    ///< [joint][row]; NaN when not under position control
   Columns sensor;           ///< [channel][row], all sensors one after another
   Columns base;             ///< [13][row]: position, quaternion xyzw, velocity of the base
@@ -86,6 +89,10 @@ struct RunData {
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
   /// Where a time of this run is in the figures.
   [[nodiscard]] double drawn(double at_s) const { return drawn_slower * at_s + drawn_later_s; }
+  /// Whether a time of this run is within those that are drawn.
+  [[nodiscard]] bool is_drawn(double at_s) const {
+    return drawn(at_s) >= drawn_from_s && drawn(at_s) <= drawn_to_s;
+  }
   /// The fault that stopped the run; null: none did.
   [[nodiscard]] const RunFault* stop() const;
   /// Rows until stop(), its cycle included; the others show what followed. At least 1.

@@ -71,9 +71,12 @@ bool legged(const RunData& run) { return !run.robot.contact.feet.empty(); }
 
 Curve curve_of(const RunData& run, std::string label, CurveStyle style,
                const std::vector<double>& values, double factor) {
-  Curve curve{std::move(label), style, run.time_s, values};
-  for (double& value : curve.y) value *= factor;
-  for (double& time_s : curve.x) time_s = run.drawn(time_s);
+  Curve curve{std::move(label), style, {}, {}};
+  for (std::size_t row = 0; row < std::min(values.size(), run.rows()); ++row) {
+    if (!run.is_drawn(run.time_s[row])) continue;
+    curve.x.push_back(run.drawn(run.time_s[row]));
+    curve.y.push_back(values[row] * factor);
+  }
   return curve;
 }
 
@@ -233,9 +236,9 @@ Figure force_figure(const RunData& run, const OtherRuns& others, const std::vect
   if (sensors.empty()) {
     figure.levels.push_back({share_text(feet), share});
   } else {
-    figure.levels.push_back(
-        {share_text(feet) + "; lower line: less the foot beyond the sensor", share});
-    figure.levels.push_back({"", share - weight_beyond_N(run, sensors.front())});
+    // No sensor feels the foot below it, so none comes to the whole share.
+    figure.levels.push_back({share_text(feet) + " without the foot beyond the sensor",
+                             share - weight_beyond_N(run, sensors.front())});
   }
   return figure;
 }
@@ -292,14 +295,22 @@ bool squats(const RunData& run) {
 /// @param suffix  behind each label, when two runs stand beside each other: then fewer moments.
 std::vector<PostureSample> moments(const RunData& run, int joint, const std::string& suffix) {
   const bool base = squats(run);
-  std::vector<double> depth = base ? run.base[2] : run.position_rad[at(joint)];
-  depth.resize(run.rows_before_stop());
-  const std::size_t last = depth.size() - 1;
+  const std::vector<double>& whole = base ? run.base[2] : run.position_rad[at(joint)];
+  std::vector<std::size_t> rows;  // that are drawn
+  std::vector<double> depth;
+  for (std::size_t row = 0; row < run.rows_before_stop(); ++row) {
+    if (!run.is_drawn(run.time_s[row])) continue;
+    rows.push_back(row);
+    depth.push_back(whole[row]);
+  }
   std::vector<PostureSample> samples;
-  const auto add = [&](const char* what, std::size_t row) {
+  if (rows.empty()) return samples;
+  const auto add = [&](const char* what, std::size_t shown) {
+    const std::size_t row = rows[shown];
     samples.push_back(
         {what + suffix, run.drawn(run.time_s[row]), run.base_placement(row), run.positions(row)});
   };
+  const std::size_t last = depth.size() - 1;
   const double start = depth.front();
   const auto far = std::ranges::max_element(
       depth, {}, [start](double value) { return std::abs(value - start); });

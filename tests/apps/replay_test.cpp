@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <regex>
 
 #include "log/log_file.hpp"
 #include "tests/apps/program.hpp"
@@ -92,6 +93,9 @@ TEST_F(LogReplay, GivesTheRecordingsReferencesAgain) {
   EXPECT_NE(page.find("3.500 s earlier, so that the replay lies over its recording"),
             std::string::npos)
       << page.substr(0, 3000);
+  EXPECT_NE(page.find("Only what is played is drawn of B."), std::string::npos);
+  EXPECT_FALSE(std::regex_search(page, std::regex("<text>-[0-9.]+ s</text>")))
+      << "a posture before the recording's first time";
   EXPECT_NE(page.find("Replay B"), std::string::npos);
   EXPECT_NE(page.find("0.0000 deg"), std::string::npos) << "of the references";
   const Outcome turned = tandem("report " + run + " " + recording_ + " -o turned");

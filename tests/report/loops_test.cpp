@@ -296,6 +296,59 @@ TEST_F(Gripper, TimesOfAShiftedRunsPosturesAreThoseOfTheAxis) {
   for (std::size_t i = 0; i < each; ++i) EXPECT_EQ(times[i], times[each + i]);
 }
 
+// A replay's way to its first place was drawn at times before the recording's first.
+TEST_F(Gripper, OfARunThatIsDrawnInPartTheRestIsNowhere) {
+  run.time_s = {1.0, 1.5, 2.0, 2.5};
+  for (Columns* columns :
+       {&run.position_rad, &run.velocity_rad_s, &run.torque_Nm, &run.reference_rad})
+    columns->assign(8, {0.0, 0.1, 0.3, 0.4});
+  RunData replay = run;
+  replay.drawn_later_s = -1.6;
+  replay.drawn_from_s = -0.15;
+  replay.drawn_to_s = 0.5;
+  const std::vector<Figure> figures = figures_of(run, {&replay}, nullptr);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const Curve& drawn = figures[f].curves[1];
+    ASSERT_EQ(drawn.x.size(), 2U);
+    EXPECT_NEAR(drawn.x[0], -0.1, 1e-12);
+    EXPECT_NEAR(drawn.x[1], 0.4, 1e-12);
+    EXPECT_NEAR(drawn.y[0], f == 0 ? 100.0 : 0.1, 1e-12);
+    EXPECT_EQ(figures[f].curves[0].x, run.time_s);
+  }
+  std::vector<std::string> notes;
+  for (const Note& note : figures.back().notes) notes.push_back(note.text);
+  const auto start = std::ranges::find(notes, "start B");
+  ASSERT_NE(start, notes.end());
+  EXPECT_EQ(*(start + 1), "-0.10 s");
+}
+
+// Half the weight stood there, too, which no sensor comes to: the curves were flat below it.
+TEST(Feet, WithSensorsHaveTheirShareOfTheWeightAboveTheFootAlone) {
+  RunData run;
+  run.robot = *hal::read_robot_config(TANDEM_SOURCE_DIR "/config/coman/robot.toml");
+  model::UrdfOptions options;
+  options.floating_base = true;
+  run.tree = model::read_urdf(TANDEM_SOURCE_DIR "/config/coman/coman.urdf", options)->tree;
+  run.step_s = 0.01;
+  run.time_s = {0.0, 0.01};
+  run.position_rad.assign(run.robot.joints.size(), {0.0, 0.0});
+  run.velocity_rad_s = run.torque_Nm = run.reference_rad = run.position_rad;
+  std::size_t channels = 0;
+  for (const hal::SensorConfig& sensor : run.robot.sensors) channels += sensor.channels();
+  run.sensor.assign(channels, {0.0, 0.0});
+  const std::vector<Figure> figures = figures_of(run, {}, nullptr);
+  const auto force = std::ranges::find(figures, "foot_force", &Figure::name);
+  ASSERT_NE(force, figures.end());
+  double mass_kg = 0.0, foot_kg = 0.0;
+  for (const model::Link& link : run.tree.links) {
+    mass_kg += link.inertia.mass_kg;
+    foot_kg += link.name == "RFoot" ? link.inertia.mass_kg : 0.0;
+  }
+  ASSERT_GT(foot_kg, 0.1);
+  ASSERT_EQ(force->levels.size(), 1U);
+  EXPECT_NEAR(force->levels[0].y, (0.5 * mass_kg - foot_kg) * 9.81, 0.01);
+}
+
 // It had been taken for the run's end.
 TEST_F(Gripper, AFaultThatIsOnlyReportedEndsNothing) {
   run.time_s = {1.25, 1.30, 1.35, 1.40};
