@@ -15,7 +15,8 @@ namespace {
 
 /// Parameters: log (relative to the experiment), data_sha256 (any), joints (all), source (the
 /// commands where the log has them), from_s, to_s (while its controllers ran), speed (1), torque
-/// (false), approach_s (3, and longer where the way is), stop_at_end (false).
+/// (false), approach_s (3, and longer where the way is), stop_at_end (false),
+/// link_damping_Nms_rad (0; or a table, of joints).
 class RecordedMotion : public Controller {
  public:
   Status configure(ControllerSetup& setup) override {
@@ -43,6 +44,7 @@ class RecordedMotion : public Controller {
       limits_.push_back(setup.robot.joints[joint]);
     }
     from_.assign(joints_.size(), {});
+    read_damping(setup);
     if (parameters.has_errors() || joints_.empty()) return {};
     if (const Status read = read_log(setup, path, sha256, request); !read) {
       const Error& error = read.error();
@@ -66,11 +68,12 @@ class RecordedMotion : public Controller {
         static_cast<std::int64_t>(std::ceil(longest_s * 1e9 / static_cast<double>(time.period_ns)));
   }
 
-  Code update(const hal::CycleTime& time, const hal::StateImage&,
+  Code update(const hal::CycleTime& time, const hal::StateImage& state,
               hal::CommandImage& command) noexcept TANDEM_RT override {
     const std::int64_t since = (time.time_ns - start_ns_) / time.period_ns;
     if (since < approach_cycles_) {
       approach(static_cast<double>(since) / static_cast<double>(approach_cycles_), time, command);
+      damp_links(state, command);
       return Code::kOk;
     }
     const std::size_t last = plan_.cycles() - 1;
@@ -80,6 +83,7 @@ class RecordedMotion : public Controller {
       command.velocity_rad_s()[joints_[k]] = plan_.velocity(k, cycle);
       command.torque_Nm()[joints_[k]] = plan_.has_torque() ? plan_.torque(k, cycle) : 0.0;
     }
+    damp_links(state, command);
     return cycle == last && stop_at_end_ ? Code::kStopped : Code::kOk;
   }
 
@@ -89,6 +93,35 @@ class RecordedMotion : public Controller {
   struct From {
     double position_rad = 0.0, torque_Nm = 0.0;
   };
+
+  /// One number for all joints, or a table with those that are damped.
+  void read_damping(ControllerSetup& setup) {
+    constexpr const char* kKey = "link_damping_Nms_rad";
+    TomlTable& parameters = setup.parameters;
+    link_damping_Nms_rad_.assign(joints_.size(), 0.0);
+    if (!parameters.has(kKey)) return;
+    if (parameters.values().contains(kKey)) {
+      std::ranges::fill(link_damping_Nms_rad_, parameters.number_or(kKey, 0.0, kNotNegative));
+      return;
+    }
+    TomlTable table = parameters.table(kKey);
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const std::string& name = setup.robot.joints[joints_[k]].name;
+      link_damping_Nms_rad_[k] = table.number_or(name, 0.0, kNotNegative);
+    }
+    table.finish();
+  }
+
+  /// On a spring the link may swing, which the motor's own loop hardly damps.
+  void damp_links(const hal::StateImage& state,
+                  hal::CommandImage& command) const noexcept TANDEM_RT {
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      if (link_damping_Nms_rad_[k] == 0.0) continue;
+      const std::size_t joint = joints_[k];
+      const double swing = state.velocity_rad_s()[joint] - command.velocity_rad_s()[joint];
+      command.torque_Nm()[joint] -= link_damping_Nms_rad_[k] * swing;
+    }
+  }
 
   /// From where the joints stood to where the plan begins, torques alike.
   void approach(double share, const hal::CycleTime& time,
@@ -133,6 +166,7 @@ class RecordedMotion : public Controller {
 
   std::vector<std::size_t> joints_;
   std::vector<hal::Joint> limits_;
+  std::vector<double> link_damping_Nms_rad_;  // by joint, as `joints_`
   MotionPlan plan_;
   double approach_s_ = 0.0, speed_ = 1.0;
   bool stop_at_end_ = false;

@@ -1,5 +1,5 @@
 // `tandem log replay`: an experiment that plays the motion of a log.
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include "apps/robot/robot_files.hpp"
 #include "apps/text/console.hpp"
 #include "apps/text/draft.hpp"
+#include "apps/tools/carried_settings.hpp"
 #include "apps/tools/commands.hpp"
 #include "apps/tools/listed_names.hpp"
 #include "apps/tools/relative_path.hpp"
@@ -30,6 +31,7 @@ struct Replay {
   std::vector<std::size_t> joints;
   log::MotionRequest request;
   log::JointMotion motion;
+  CarriedSettings carried;
   std::string data_sha256, posture;
   double approach_s = 0.0, duration_s = 0.0;
 };
@@ -48,10 +50,8 @@ Result<std::string> posture_of(const LogOptions& options, const hal::Robot& robo
                                  0,
                                  {}});
   }
-  for (const auto& [file, text] : info.configuration) {
-    const auto document = TomlDocument::parse(text, file);
-    if (!file.ends_with(".toml") || !document || !document->root().has("robot")) continue;
-    std::string posture = document->root().text_or("posture", "");
+  if (const auto experiment = experiment_of(info)) {
+    std::string posture = experiment->root().text_or("posture", "");
     if (robot.posture(posture) != nullptr) return posture;
   }
   return known.empty() ? std::string() : known.front();
@@ -115,6 +115,7 @@ Result<Replay> plan(const LogOptions& options) {
   Replay replay;
   replay.robot = hal::robot_of(files->config);
   replay.data_sha256 = file->data_sha256();
+  replay.carried = carried_settings(file->info(), *files);
   auto posture = posture_of(options, replay.robot, file->info());
   if (!posture) return std::unexpected(posture.error());
   replay.posture = std::move(*posture);
@@ -137,8 +138,8 @@ Result<Replay> plan(const LogOptions& options) {
     return fail("--torque plays the torques of a slower motion",
                 "leave --torque out, or play it not faster than recorded: --speed 1");
   }
-  const auto made =
-      MotionPlan::make(replay.motion, replay.robot, replay.joints, kCycle_ns, options.speed);
+  const auto made = MotionPlan::make(replay.motion, replay.robot, replay.joints,
+                                     replay.carried.period_ns.value_or(kCycle_ns), options.speed);
   if (!made) {
     return std::unexpected(
         Error{made.error().message, made.error().hint, options.log, 0, made.error().key});
@@ -155,26 +156,59 @@ Result<Replay> plan(const LogOptions& options) {
   return replay;
 }
 
-std::string experiment_text(const Replay& replay, const LogOptions& options) {
-  const auto quoted = [](const std::string& text) { return json_text(Json(text)); };
-  const double begin_s = static_cast<double>(replay.motion.begin_ns) * 1e-9;
-  const double end_s = static_cast<double>(replay.motion.end_ns) * 1e-9;
+std::string quoted(const std::string& text) { return json_text(Json(text)); }
+
+/// The damping of the joints that are led: one number when all have the same, else each its own.
+std::string damping_text(const Replay& replay) {
+  std::vector<double> each;
+  std::string table;
+  for (const std::string& joint : replay.request.joints) {
+    const auto found = replay.carried.damping_Nms_rad.find(joint);
+    if (found == replay.carried.damping_Nms_rad.end()) continue;
+    table += fmt::format("{}{} = {:.9g}", table.empty() ? "" : ", ", quoted(joint), found->second);
+    each.push_back(found->second);
+  }
+  if (each.empty()) return {};
+  const bool same = each.size() == replay.request.joints.size() &&
+                    std::ranges::count(each, each.front()) == std::ssize(each);
+  return "link_damping_Nms_rad = " +
+         (same ? fmt::format("{:.9g}", each.front()) : "{ " + table + " }") + "\n";
+}
+
+/// What stands before the controller.
+std::string head_text(const Replay& replay, const LogOptions& options) {
+  const CarriedSettings& carried = replay.carried;
   const double lead_s = replay.approach_s + log::kReplayRunUp_s;
-  std::string text = fmt::format(
-      "{}, written by `tandem log replay`: the joints' {} from {:.3f} to {:.3f} s.\n"
-      "# The recording begins {:.1f} s after the controllers: {:.1f} s to its first place, {:.1f} "
-      "s\n"
-      "# to its first speed. From a place farther away it takes longer: raise duration_s then.\n"
-      "robot = {}\n{}duration_s = {:.9g}\nseed = 1\n\n"
-      "[[controller]]\nplugin = \"recorded_motion\"\n[controller.parameters]\n"
-      "log = {}\ndata_sha256 = \"{}\"\nsource = \"{}\"\napproach_s = {:.9g}\n",
-      kReplayHead,
-      replay.motion.source == log::MotionSource::kCommand ? "commands" : "measured positions",
-      begin_s, end_s, lead_s, replay.approach_s, log::kReplayRunUp_s,
-      quoted(relative_path(options.output, options.robot)),
-      replay.posture.empty() ? "" : "posture = " + quoted(replay.posture) + "\n", replay.duration_s,
-      quoted(relative_path(options.output, options.log)), replay.data_sha256,
-      log::to_string(replay.motion.source), replay.approach_s);
+  return fmt::format(
+             "{}, written by `tandem log replay`: the joints' {} from {:.3f} to {:.3f} s.\n"
+             "# The recording begins {:.1f} s after the controllers: {:.1f} s to its first place, "
+             "{:.1f} s\n"
+             "# to its first speed. From a place farther away it takes longer: raise duration_s "
+             "then.\n{}"
+             "robot = {}\n{}duration_s = {:.9g}\n{}seed = {}\n",
+             kReplayHead,
+             replay.motion.source == log::MotionSource::kCommand ? "commands"
+                                                                 : "measured positions",
+             static_cast<double>(replay.motion.begin_ns) * 1e-9,
+             static_cast<double>(replay.motion.end_ns) * 1e-9, lead_s, replay.approach_s,
+             log::kReplayRunUp_s,
+             carried.keys.empty() ? "" : "# It is simulated as the recording's run was.\n",
+             quoted(relative_path(options.output, options.robot)),
+             replay.posture.empty() ? "" : "posture = " + quoted(replay.posture) + "\n",
+             replay.duration_s,
+             carried.period_ns ? fmt::format("period_ns = {}\n", *carried.period_ns) : "",
+             carried.seed) +
+         carried.tables;
+}
+
+std::string experiment_text(const Replay& replay, const LogOptions& options) {
+  std::string text = head_text(replay, options) +
+                     fmt::format(
+                         "\n[[controller]]\nplugin = \"recorded_motion\"\n[controller.parameters]\n"
+                         "log = {}\ndata_sha256 = \"{}\"\nsource = \"{}\"\napproach_s = {:.9g}\n",
+                         quoted(relative_path(options.output, options.log)), replay.data_sha256,
+                         log::to_string(replay.motion.source), replay.approach_s) +
+                     damping_text(replay);
   if (options.speed != 1.0) text += fmt::format("speed = {}\n", options.speed);
   if (options.torque) text += "torque = true\n";
   if (options.begin_s) text += fmt::format("from_s = {:.9g}\n", *options.begin_s);
@@ -207,6 +241,8 @@ void print_facts(const Replay& replay, const LogOptions& options, std::FILE* out
             fmt::format("{:.1f} s after the controllers, from {}",
                         replay.approach_s + log::kReplayRunUp_s,
                         replay.posture.empty() ? "every joint at 0" : "posture " + replay.posture));
+  if (!replay.carried.keys.empty())
+    facts.add("as recorded", fmt::format("{}", fmt::join(replay.carried.keys, ", ")));
   facts.add("next", "tandem run " + options.output);
   facts.add("", fmt::format("tandem report {} RUN, RUN being the log that this writes: one over "
                             "the other",
@@ -226,6 +262,7 @@ Json replay_json(const Replay& replay, const LogOptions& options) {
   json["speed"] = options.speed;
   json["torque"] = options.torque;
   json["posture"] = replay.posture;
+  json["carried"] = replay.carried.keys;
   json["lead_in_s"] = replay.approach_s + log::kReplayRunUp_s;
   json["duration_s"] = replay.duration_s;
   return json;

@@ -210,6 +210,49 @@ TEST_F(LogReplay, IsFoundAtASpeedThatMeetsNoSample) {
   EXPECT_NE(page.find("Replay B"), std::string::npos);
 }
 
+// A replay was simulated by another integrator, with noise, without the damping of the links.
+TEST_F(LogReplay, IsSimulatedAsTheRecordingWas) {
+  edit("trajectory.toml", "seed = 1",
+       "seed = 1\nperiod_ns = 2_000_000\nkernel_variant = \"baseline\"");
+  edit("trajectory.toml", "[controller.parameters]",
+       "[controller.parameters]\nlink_damping_Nms_rad = 0.05");
+  std::ofstream(folder_ / "trajectory.toml", std::ios::app)
+      << "\n[sim]\nengine = \"tandem\"\nintegrator = \"rk4\"\nsubstep_ns = 125_000\nnoise = false\n"
+         "hoist.release_s = 0.5\n[hal]\ndelay_cycles = 2\nlockstep = false\n"
+         "[faults]\nfall = \"allow\"\nretreat_s = 2\n[clock]\nrate = 0\n";
+  const Outcome recorded = tandem("run trajectory.toml --duration 2 --seed 7 -q --log other");
+  ASSERT_EQ(recorded.status, 0) << recorded.err;
+  const std::string log = "other/double_pendulum-trajectory-001.mcap";
+  const std::string run = play(log);
+  const nlohmann::json carried{
+      "seed",           "period_ns",           "sim.engine",     "sim.hoist.release_s",
+      "sim.integrator", "sim.noise",           "sim.substep_ns", "hal.delay_cycles",
+      "faults.fall",    "link_damping_Nms_rad"};
+  EXPECT_EQ(json("replay.json")["carried"], carried);
+  const std::string text = read_text(folder_ / "replay.toml");
+  for (const char* line :
+       {"period_ns = 2000000\nseed = 7\n",
+        "[sim]\nengine = \"tandem\"\nhoist.release_s = 0.5\nintegrator = \"rk4\"\nnoise = false\n"
+        "substep_ns = 125000\n",
+        "[hal]\ndelay_cycles = 2\n", "[faults]\nfall = \"allow\"\n",
+        "\nlink_damping_Nms_rad = 0.05\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << "in: " << text;
+  for (const char* other : {"retreat_s", "lockstep", "clock", "variant"})
+    EXPECT_EQ(text.find(other), std::string::npos) << other;
+  ASSERT_EQ(tandem("report " + log + " " + run + " -o both").status, 0);
+  const std::string page = read_text(folder_ / "both/report.html");
+  EXPECT_NE(page.find("0.0000 deg"), std::string::npos) << "of the references";
+  ASSERT_EQ(
+      tandem("log replay " + log + " --robot robot.toml --out one.toml --joints joint2").status, 0);
+  EXPECT_NE(read_text(folder_ / "one.toml").find("\nlink_damping_Nms_rad = 0.05\n"),
+            std::string::npos);
+  // A replay of the replay, too.
+  ASSERT_EQ(tandem("log replay " + run + " --robot robot.toml --out two.toml").status, 0);
+  EXPECT_NE(read_text(folder_ / "two.toml").find("[hal]\ndelay_cycles = 2\n"), std::string::npos);
+  EXPECT_NE(read_text(folder_ / "two.toml").find("\nlink_damping_Nms_rad = 0.05\n"),
+            std::string::npos);
+}
+
 TEST_F(LogReplay, RefusesWithStatus2AndWritesNothing) {
   const std::string to = " --robot robot.toml --out replay.toml";
   const auto refused = [&](const std::string& arguments, const std::string& why) {

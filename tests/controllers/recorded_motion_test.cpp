@@ -159,6 +159,33 @@ TEST_F(RecordedMotion, PlaysWhatWasMeasuredWithoutCommands) {
             "source = \"state\")");
 }
 
+TEST_F(RecordedMotion, BrakesTheSwingOfLinksOnRequest) {
+  const std::string path = record();
+  const std::string play = "log = '" + path + "'\ntorque = true\n";
+  for (const bool each : {false, true}) {
+    for (const double after_s : {0.001, kLead_s + 0.5, 6.0}) {  // on its way, playing, at the end
+      test::Harness without(hal::test::fake_robot(), "recorded_motion", play);
+      test::Harness run(hal::test::fake_robot(), "recorded_motion",
+                        play + "link_damping_Nms_rad = " + (each ? "{ wrist = 4 }\n" : "4.0\n"));
+      ASSERT_EQ(run.problem(), "");
+      without.start();
+      ASSERT_EQ(without.run(after_s), Code::kOk);
+      run.start();
+      for (std::size_t j = 0; j < 3; ++j)
+        run.state.velocity_rad_s()[j] = without.command.velocity_rad_s()[j] + 0.5;
+      ASSERT_EQ(run.run(after_s), Code::kOk);
+      for (std::size_t j = 0; j < 3; ++j) {
+        const double damped_Nm = each && j != 2 ? 0.0 : 2.0;
+        EXPECT_NEAR(run.command.torque_Nm()[j], without.command.torque_Nm()[j] - damped_Nm, 1e-9)
+            << j << " after " << after_s;
+      }
+    }
+  }
+  EXPECT_NE(problem(path, "link_damping_Nms_rad = { wirst = 4 }\n").find("wrist"),
+            std::string::npos);
+  EXPECT_NE(problem(path, "link_damping_Nms_rad = -1\n"), "");
+}
+
 TEST_F(RecordedMotion, PutsOtherPeriodsOnTheRunsCycles) {
   const std::string path = record({}, 8'000'000, 126);
   test::Harness run(hal::test::fake_robot(), "recorded_motion",
