@@ -119,6 +119,8 @@ class Answer {
         described_[joint_column(c, JointColumn::kRotor)] = robot_.facts.rotor_kg_m2[c];
   }
 
+  [[nodiscard]] const VectorXd& possible() const { return possible_; }
+
   void fill(Identification& out) {
     out.condition_number = data_.condition;
     out.usable_s = equations_.usable_s;
@@ -391,6 +393,12 @@ void answer(const hal::RobotConfig& config, const model::Tree& tree, IdentifiedR
             const Equations& equations, Identification& out) {
   const Split split = split_of(equations);
   Answer(config, tree, robot, equations, split).fill(out);
+}
+
+VectorXd fitted(const hal::RobotConfig& config, const model::Tree& tree, IdentifiedRobot& robot,
+                const Equations& equations) {
+  const Split split = split_of(equations);
+  return Answer(config, tree, robot, equations, split).possible();
 }
 
 }  // namespace tandem::identification

@@ -14,4 +14,8 @@ namespace tandem::identification {
 void answer(const hal::RobotConfig& config, const model::Tree& tree, IdentifiedRobot& robot,
             const Equations& equations, Identification& out);
 
+/// The parameters that answer() writes, all columns of the equations.
+[[nodiscard]] Eigen::VectorXd fitted(const hal::RobotConfig& config, const model::Tree& tree,
+                                     IdentifiedRobot& robot, const Equations& equations);
+
 }  // namespace tandem::identification

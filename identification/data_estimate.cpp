@@ -21,7 +21,7 @@ constexpr int kReweightings = 4;
 
 /// Rows of one channel that are used, as matrices of their own.
 struct Used {
-  MatrixXd X;
+  MatrixXd X, doubt;
   VectorXd y;
   std::vector<std::size_t> instant;
 };
@@ -32,9 +32,11 @@ Used used_rows(const ChannelRows& rows, const std::vector<bool>& used, Index col
     if (used[at]) out.instant.push_back(at);
   out.X.resize(static_cast<Index>(out.instant.size()), columns);
   out.y.resize(static_cast<Index>(out.instant.size()));
+  out.doubt = MatrixXd::Zero(out.y.size(), rows.doubt.cols());
   Index to = 0;
   for (Index row = 0; row < rows.rows(); ++row) {
     if (!used[rows.instant[static_cast<std::size_t>(row)]]) continue;
+    if (row < rows.doubt.rows()) out.doubt.row(to) = rows.doubt.row(row);
     out.X.row(to) = rows.X.row(row);
     out.y[to++] = rows.y[row];
   }
@@ -170,10 +172,23 @@ class LeastSquares {
         sum.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose());
       }
     }
-    return sum.selfadjointView<Eigen::Lower>();
+    sum = MatrixXd(sum.selfadjointView<Eigen::Lower>());
+    const MatrixXd doubts = doubt_scores();
+    return sum + doubts * doubts.transpose();
   }
 
  private:
+  /// What each doubt moves the right side by, one standard deviation of it: the same in all rows.
+  [[nodiscard]] MatrixXd doubt_scores() const {
+    MatrixXd sum;
+    for (std::size_t c = 0; c < rows_.size(); ++c) {
+      if (rows_[c].doubt.cols() == 0) continue;
+      if (sum.size() == 0) sum = MatrixXd::Zero(columns_, rows_[c].doubt.cols());
+      sum += rows_[c].X.transpose() * rows_[c].doubt / noise_[c];
+    }
+    return sum.size() == 0 ? MatrixXd(MatrixXd::Zero(columns_, 1)) : sum;
+  }
+
   [[nodiscard]] double model_error(std::size_t c) const {
     const auto n = static_cast<double>(std::max<Index>(1, rows_[c].y.size()));
     return kModelError * rows_[c].y.squaredNorm() / n + 1e-14;
@@ -221,28 +236,6 @@ class LeastSquares {
   double quantile_ = 0.0;
 };
 
-/// Adds the rotors' doubt to the covariance that `information` is the inverse of.
-void doubt_rotors(const Equations& equations, MatrixXd& information, VectorXd& target) {
-  std::vector<Index> rotors;
-  std::vector<double> precision;
-  const auto joints = static_cast<Index>(equations.rotor_doubt_kg_m2.size());
-  for (Index c = 0; c < joints; ++c) {
-    const double doubt = equations.rotor_doubt_kg_m2[static_cast<std::size_t>(c)];
-    if (!(doubt > 0.0)) continue;
-    rotors.push_back(equations.columns + kJointColumns * (c - joints) +
-                     static_cast<Index>(JointColumn::kRotor));
-    precision.push_back(1.0 / (doubt * doubt));
-  }
-  if (rotors.empty()) return;
-  MatrixXd inner = information(rotors, rotors);
-  for (std::size_t i = 0; i < rotors.size(); ++i)
-    inner(static_cast<Index>(i), static_cast<Index>(i)) += precision[i];
-  const MatrixXd cross = information(Eigen::all, rotors);
-  const Eigen::LLT<MatrixXd> solver(inner);
-  target -= cross * solver.solve(VectorXd(target(rotors)));
-  information -= cross * solver.solve(MatrixXd(cross.transpose()));
-}
-
 }  // namespace
 
 MatrixXd long_run_covariance(const MatrixXd& residuals, int lags) {
@@ -274,7 +267,6 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
   out.information = less.gram * spread.solve(less.gram);
   out.information = 0.5 * (out.information + MatrixXd(out.information.transpose()));
   out.target = less.gram * spread.solve(less.target);
-  doubt_rotors(equations, out.information, out.target);
   out.mean = squares.solved(out.information, out.target);
   out.covariance = squares.covariance(out.information, kFaint);
   out.link_covariance = squares.covariance(out.information, kBelieved);

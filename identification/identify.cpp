@@ -38,7 +38,8 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const Identifie
         "lower one loses motion",
         IdentifyOptions{}.cutoff_Hz, cutoff_Hz));
   }
-  if (std::ranges::all_of(recordings, &Recording::voltage_hold_known)) return;
+  const double hold_s = std::ranges::max(recordings, {}, &Recording::unknown_hold_s).unknown_hold_s;
+  if (!(hold_s > 0.0)) return;
   std::string names;
   for (std::size_t c = 0; c < identified.facts.joint.size(); ++c) {
     if (!identified.facts.rigid[c]) continue;
@@ -47,11 +48,19 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const Identifie
     names += (names.empty() ? "" : ", ") + joint.name;
   }
   if (names.empty()) return;
-  out.remarks.push_back(
+  if (std::ranges::any_of(recordings, &Recording::out_of_step)) {
+    out.warnings.push_back(
+        "the boards' control has another period than the log: what these joints' torques do "
+        "between two samples is not known, and no interval allows for it. Do not trust their "
+        "rotors and friction, nor what they carry; make both periods equal: " +
+        names);
+  }
+  out.remarks.push_back(fmt::format(
       "the log does not say for how long a motor's voltage was held, and in such a time the "
-      "back-EMF looks like rotor inertia: the intervals of these joints' rotors allow for a hold "
-      "of up to one control period: " +
-      names);
+      "back-EMF looks like rotor inertia, and what is sampled at its end is not the mean: the "
+      "intervals of these joints' rotors, and of what six-axis sensors measure behind them, allow "
+      "for a hold of up to {:.3g} ms: {}",
+      1e3 * hold_s, names));
 }
 
 /// A torque with the wrong sign is 200 % of itself away from every description of the robot.
@@ -124,6 +133,20 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
         "the base's equations are left out there. Of a robot that hangs on purpose the experiment "
         "should say so: [sim] hoist.lift_m",
         equations.held_s));
+  }
+  const bool rigid =
+      std::ranges::find(identified->facts.rigid, true) != identified->facts.rigid.end();
+  const bool held = std::ranges::any_of(
+      recordings, [](const Recording& recording) { return recording.voltage_hold_s > 0.0; });
+  if (rigid && held) {  // held voltages are corrected by the robot's inertia: by the one found
+    const Eigen::VectorXd found = fitted(robot, tree, *identified, equations);
+    equations = Equations{};
+    for (const Recording& recording : recordings) {
+      if (const Status s =
+              add_equations(recording, options.cutoff_Hz, *identified, equations, found);
+          !s)
+        return std::unexpected(s.error());
+    }
   }
   answer(robot, tree, *identified, equations, out);
   warn_of_signs(out);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <ranges>
 
 #include "base/counted.hpp"
 #include "base/nearest.hpp"
@@ -22,6 +23,7 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kState = "/tandem/state";
 constexpr const char* kCommand = "/tandem/command";
 constexpr double kLongestGap_s = 600.0;
+constexpr int kContinuous = 64;  // steps of a hold that stand for an integrator of higher order
 
 std::unexpected<Error> bad_log(const std::string& path, std::string message, std::string hint) {
   return std::unexpected(Error{std::move(message), std::move(hint), path, 0, {}});
@@ -162,6 +164,7 @@ Signal on_grid(const Grid& grid, const std::vector<double>& time_s, Value value)
 /// What [sim] says in the experiment that a log carries.
 struct SimFacts {
   std::int64_t substep_ns = 250'000;
+  bool semi_implicit = true;
   bool hangs = false;
 };
 SimFacts sim_facts(const log::StringMap& configuration) {
@@ -173,6 +176,8 @@ SimFacts sim_facts(const log::StringMap& configuration) {
     TomlTable root = document->root();
     TomlTable sim = root.table_or_empty("sim");
     facts.substep_ns = sim.integer_or("substep_ns", facts.substep_ns, 1, 1'000'000'000);
+    facts.semi_implicit =
+        sim.choice_or("integrator", "semi_implicit", {"semi_implicit", "rk4"}) == "semi_implicit";
     facts.hangs = sim.table_or_empty("hoist").number_or("lift_m", 0.0) > 0.0;
     break;
   }
@@ -275,12 +280,26 @@ void note_simulation(const log::RunInfo& info, const hal::RobotConfig& robot,
                      Recording& recording) {
   const SimFacts sim = sim_facts(info.configuration);
   recording.hangs = sim.hangs;
-  recording.voltage_hold_known = info.hal == "sim";
-  if (!recording.voltage_hold_known || robot.boards.empty()) return;
-  const double hold_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
+  if (robot.boards.empty()) return;
+  const auto held_ns = [](const hal::BoardConfig& board) { return board.control_period_ns; };
+  const auto [shortest_ns, longest_ns] =
+      std::ranges::minmax(robot.boards | std::views::transform(held_ns));
+  if (info.hal != "sim") {
+    recording.unknown_hold_s = 1e-9 * static_cast<double>(longest_ns);
+    return;
+  }
+  const double period_s = 1e-9 * static_cast<double>(info.period_ns);
   const double substep_s = 1e-9 * static_cast<double>(sim.substep_ns);
-  recording.voltage_hold_s = 0.5 * (hold_s + substep_s);
-  recording.voltage_hold_s2 = (hold_s * hold_s - substep_s * substep_s) / 12.0;
+  if (sim.semi_implicit) recording.velocity_lag_s = 0.5 * substep_s;
+  if (shortest_ns != info.period_ns || longest_ns != info.period_ns) {
+    recording.unknown_hold_s = std::max(period_s, 1e-9 * static_cast<double>(longest_ns));
+    recording.out_of_step = true;
+    return;
+  }
+  recording.voltage_hold_s = period_s;
+  recording.hold_steps = sim.semi_implicit
+                             ? std::max(1, static_cast<int>(std::ceil(period_s / substep_s - 1e-9)))
+                             : kContinuous;
 }
 
 void take_signals(const Columns& state, const Grid& grid, const Order& order,

@@ -27,9 +27,11 @@ struct Recording {
   std::string path;
   std::string data_sha256;  ///< of the log; empty: it is none
   double period_s = 0.0;
-  double voltage_hold_s = 0.0;             ///< see read_recording()
-  double voltage_hold_s2 = 0.0;            ///< the same
-  bool voltage_hold_known = true;          ///< false of a log that is not simulated
+  double voltage_hold_s = 0.0;             ///< see read_recording(); 0: nothing is held
+  int hold_steps = 1;                      ///< of the simulation in it
+  double velocity_lag_s = 0.0;             ///< see read_recording()
+  double unknown_hold_s = 0.0;             ///< how long another one may be; 0: none
+  bool out_of_step = false;                ///< see read_recording()
   bool hangs = false;                      ///< the whole log, from a hoist
   std::vector<double> time_s;              ///< since the log's time 0
   std::vector<Signal> position_rad;        ///< per joint, link side
@@ -44,12 +46,14 @@ struct Recording {
   [[nodiscard]] std::size_t rows() const { return time_s.size(); }
 };
 
-/// In a simulated log the voltage of a motor is held for a control period, and its torque is
-/// sampled at the end: where no spring is between, the back-EMF has by then reduced it.
-/// voltage_hold_s is the time by which that torque is late, for a rigid drive's equation, and the
-/// current behind a spring. The joint gives way to a new voltage within the hold, so its mean speed
-/// there is not the one at half of it: voltage_hold_s2 is what this takes away, over the joint's
-/// time constant (inertia over damping). Both are 0 in other logs.
+/// In a simulated log the voltage of a motor is held for voltage_hold_s, in hold_steps steps of the
+/// simulation, and everything is sampled at the end: by then a joint without a spring has given way
+/// to the back-EMF, and its torque and its acceleration are smaller than on the hold's mean
+/// (voltage_hold.hpp). velocity_lag_s: the forces at a sample are those of the velocity so long
+/// before; half a step of the semi-implicit integrator, whose positions move with new velocities.
+/// All are 0 in other logs. Those have an unknown hold of up to a control period. A simulated one
+/// is out of step where the boards' control has another period than the log: torques between two
+/// samples are not known then, and differ from those at the samples by more than the back-EMF.
 ///
 /// Reads the part of a log in which controllers ran, puts it on a grid and takes out what lies:
 /// gaps, NaN, samples that are old, signals that stand still while the robot moves, torques that

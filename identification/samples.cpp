@@ -3,13 +3,14 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "identification/low_pass.hpp"
+#include "identification/voltage_hold.hpp"
 
 namespace tandem::identification {
 namespace {
@@ -120,8 +121,6 @@ Result<IdentifiedRobot> make_identified_robot(const model::Tree& tree,
     facts.max_torque_Nm.push_back(config.max_torque_Nm);
     facts.max_velocity_rad_s.push_back(config.max_velocity_rad_s);
   }
-  if (!robot.boards.empty())
-    facts.control_period_s = 1e-9 * static_cast<double>(robot.boards.front().control_period_ns);
   facts.gravity_m_s2 = Vector3d(robot.model.gravity_m_s2.data());
   return IdentifiedRobot{std::move(*regressor), std::move(facts), tree.floating_base};
 }
@@ -131,8 +130,16 @@ namespace {
 /// What add_equations() does at one instant after the other.
 class Writer {
  public:
-  Writer(const Recording& recording, const LowPass& filter, IdentifiedRobot& robot, Equations& all)
+  Writer(const Recording& recording, const LowPass& filter, IdentifiedRobot& robot, Equations& all,
+         const Eigen::VectorXd& assumed)
       : r_(recording), filter_(filter), robot_(robot), all_(all) {
+    const auto joints = static_cast<Index>(robot.facts.joint.size());
+    assumed_ = assumed.size() > 0 ? assumed.head(described_.size()).eval() : described_;
+    rotors_ = Eigen::Map<const Eigen::VectorXd>(robot.facts.rotor_kg_m2.data(), joints);
+    for (Index c = 0; assumed.size() > 0 && c < joints; ++c)
+      if (robot.facts.rigid[static_cast<std::size_t>(c)])
+        rotors_[c] = assumed[described_.size() + kJointColumns * c +
+                             static_cast<Index>(JointColumn::kRotor)];
     for (Index i = 0; i < described_.size(); i += 10) mass_kg_ += described_[i];
     for (std::size_t c = 0; c < robot.facts.joint.size(); ++c) {
       const auto j = static_cast<std::size_t>(robot.facts.joint[c]);
@@ -146,19 +153,25 @@ class Writer {
       imu_noise_[i] = noise_of(r_.sensor[imu + kGyro]) * filter.noise(1);
       imu_noise_[i + 3] = noise_of(r_.sensor[imu + kAccelerometer]) * filter.noise(0);
     }
+    const auto& rigid = robot.facts.rigid;
+    const bool any = std::ranges::find(rigid, true) != rigid.end();
+    holds_ = hold_.seconds > 0.0 && any;
+    doubts_ = r_.unknown_hold_s > 0.0 && any;
   }
 
   void add(std::size_t at) {
     Instant now;
     read(at, now);
-    hold(now);
+    hold(at, now);
     robot_.regressor.evaluate(now, Y_, known_);
+    if (holds_) sense(at, now);
     const bool free = base_is_free();
     bool any = false;
     for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
       const Channel& channel = robot_.regressor.channels()[c];
       const auto row = static_cast<Index>(c);
       double measured = 0.0;
+      if (holds_ && !sampled_known_ && channel.kind != Channel::Kind::kJoint) continue;
       Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
       x.head(Y_.cols()) = Y_.row(row);
       if (channel.kind == Channel::Kind::kBase) {
@@ -173,6 +186,7 @@ class Writer {
       const double y = measured - known_[row];
       if (!std::isfinite(y) || !x.allFinite()) continue;
       all_.channels[c].append(x, y, measured, all_.time_s.size());
+      if (doubts_) all_.channels[c].doubt_last(doubt_.row(row));
       any = true;
     }
     if (!any) return;
@@ -200,8 +214,9 @@ class Writer {
   /// does. In the angular velocity noise is small: nothing is differentiated.
   void add_noise(std::size_t at, const Instant& now) {
     const ImuMotion imu = imu_at(at);
-    Eigen::MatrixXd moved;
-    Eigen::VectorXd known;
+    Eigen::MatrixXd moved, still;
+    Eigen::VectorXd known, known_still;
+    robot_.regressor.evaluate(now, still, known_still);
     for (std::size_t i = 0; i < imu_noise_.size(); ++i) {
       ImuMotion one = imu;
       (i < 3 ? one.al : one.a)[static_cast<Index>(i % 3)] += 1.0;
@@ -214,30 +229,50 @@ class Writer {
         if (used.empty() || used.back() != all_.time_s.size()) continue;
         const auto row = static_cast<Index>(c);
         Eigen::VectorXd x = Eigen::VectorXd::Zero(all_.columns);
-        x.head(Y_.cols()) = share * (moved.row(row) - Y_.row(row));
-        all_.sensor_noise[c].append(x, share * (known_[row] - known[row]), 0.0, all_.time_s.size());
+        x.head(Y_.cols()) = share * (moved.row(row) - still.row(row));
+        all_.sensor_noise[c].append(x, share * (known_still[row] - known[row]), 0.0,
+                                    all_.time_s.size());
       }
     }
   }
-  /// held_Nm_: what a rigid drive's torque has lost at its sample by back-EMF, since the mean of
-  /// the time in which its voltage was held. The mean speed of that time follows from the joints'
-  /// time constants, to second order: by the description's inertia about the joints.
-  void hold(Instant& now) {
+  /// held_Nm_: what a rigid drive's torque has lost at its sample to the back-EMF, by the assumed
+  /// inertia about the joints. sampled_: the accelerations there. Torques and their mean
+  /// accelerations belong to the middle of the hold, and are that much late.
+  void hold(std::size_t at, const Instant& now) {
     const auto n = static_cast<Index>(robot_.facts.joint.size());
     held_Nm_.setZero(n);
-    const bool any = std::ranges::find(robot_.facts.rigid, true) != robot_.facts.rigid.end();
-    if (!(r_.voltage_hold_s > 0.0) || !any) return;
-    Eigen::VectorXd damping(n);
+    sampled_ = now.vdot;
+    if (!holds_ && !doubts_) return;
+    Eigen::VectorXd damping = Eigen::VectorXd::Zero(n), rate = damping;
     for (Index c = 0; c < n; ++c) {
       const auto k = static_cast<std::size_t>(c);
-      damping[c] = robot_.facts.rigid[k] ? robot_.facts.damping_Nms_rad[k] : 0.0;
+      if (!robot_.facts.rigid[k]) continue;
+      damping[c] = robot_.facts.damping_Nms_rad[k];
+      rate[c] = filter_.rate(r_.torque_Nm[joint(static_cast<int>(c))], at);
     }
+    sampled_known_ = rate.allFinite();
+    if (!sampled_known_) rate.setZero();
+    respond(now);
+    const auto M = inertia_.partialPivLu();
+    if (holds_) {
+      const Eigen::VectorXd last = hold_.sampled(inertia_, damping, now.vdot);
+      sampled_ = last - hold_.lag_s() * M.solve(rate);
+      held_Nm_ = inertia_ * (now.vdot - last);
+    }
+    if (!doubts_) return;
+    const double unknown_s = kUnknownHold * r_.unknown_hold_s / kSpreads;
     const Eigen::VectorXd braked = damping.cwiseProduct(now.vdot);
-    const Eigen::VectorXd answer = joint_inertia(now).ldlt().solve(braked);
-    held_Nm_ = r_.voltage_hold_s * braked - r_.voltage_hold_s2 * damping.cwiseProduct(answer);
+    doubt_ = -unknown_s * response_ * M.solve(Eigen::MatrixXd((braked + rate).asDiagonal()));
+    for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
+      const Channel& channel = robot_.regressor.channels()[c];
+      if (channel.kind != Channel::Kind::kJoint) continue;
+      doubt_.row(static_cast<Index>(c)).setZero();
+      doubt_(static_cast<Index>(c), channel.index) = -unknown_s * braked[channel.index];
+    }
   }
-  /// Of the description with its rotors, a floating base held.
-  Eigen::MatrixXd joint_inertia(const Instant& now) {
+  /// response_: what a unit of every joint's acceleration needs in each channel, a floating base
+  /// held; inertia_: of it the joints' rows, with their rotors. By the assumed parameters.
+  void respond(const Instant& now) {
     const auto n = static_cast<Index>(robot_.facts.joint.size());
     Instant still = now;
     still.v.setZero();
@@ -245,19 +280,18 @@ class Writer {
     still.al.setZero();
     still.a.setZero();
     for (auto& wrench : still.wrenches) wrench.setZero();
-    Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n);
+    response_.resize(static_cast<Index>(robot_.regressor.channels().size()), n);
+    inertia_ = rotors_.asDiagonal();
     for (Index c = 0; c < n; ++c) {
       still.vdot = Eigen::VectorXd::Unit(n, c);
       robot_.regressor.evaluate(still, Y_, known_);
-      for (std::size_t row = 0; row < robot_.regressor.channels().size(); ++row) {
-        const Channel& channel = robot_.regressor.channels()[row];
-        if (channel.kind != Channel::Kind::kJoint) continue;
-        const auto at = static_cast<Index>(row);
-        M(channel.index, c) = Y_.row(at).dot(described_) + known_[at];
-      }
-      M(c, c) += robot_.facts.rotor_kg_m2[static_cast<std::size_t>(c)];
+      response_.col(c) = Y_ * assumed_ + known_;
     }
-    return M;
+    for (std::size_t row = 0; row < robot_.regressor.channels().size(); ++row) {
+      const Channel& channel = robot_.regressor.channels()[row];
+      if (channel.kind == Channel::Kind::kJoint)
+        inertia_.row(channel.index) += response_.row(static_cast<Index>(row));
+    }
   }
   [[nodiscard]] std::size_t joint(int coordinate) const {
     return static_cast<std::size_t>(robot_.facts.joint[static_cast<std::size_t>(coordinate)]);
@@ -272,8 +306,8 @@ class Writer {
     for (Index c = 0; c < n; ++c) {
       const Signal& position = r_.position_rad[joint(static_cast<int>(c))];
       now.q[c] = filter_.value(position, at);
-      now.v[c] = filter_.rate(position, at);
       now.vdot[c] = filter_.second_rate(position, at);
+      now.v[c] = filter_.rate(position, at) - r_.velocity_lag_s * now.vdot[c];
     }
     for (const std::size_t channel : facts.wrench_channel) {
       Eigen::Matrix<double, 6, 1> wrench;
@@ -283,9 +317,25 @@ class Writer {
     now.w.setZero();
     now.al.setZero();
     now.a = -facts.gravity_m_s2;
-    if (!robot_.floating) return;
+    if (robot_.floating) place_base(at, now);
+  }
+  /// The rows of sensors and base once more, at the sample's own accelerations.
+  void sense(std::size_t at, const Instant& now) {
+    Instant then = now;
+    then.vdot = sampled_;
+    if (robot_.floating) place_base(at, then);
+    Eigen::MatrixXd Y;
+    Eigen::VectorXd known;
+    robot_.regressor.evaluate(then, Y, known);
+    for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
+      if (robot_.regressor.channels()[c].kind == Channel::Kind::kJoint) continue;
+      Y_.row(static_cast<Index>(c)) = Y.row(static_cast<Index>(c));
+      known_[static_cast<Index>(c)] = known[static_cast<Index>(c)];
+    }
+  }
+  void place_base(std::size_t at, Instant& now) const {
     const ImuMotion imu = imu_at(at);
-    robot_.regressor.base_from_link(facts.imu_link, imu.w, imu.al, imu.a, now);
+    robot_.regressor.base_from_link(robot_.facts.imu_link, imu.w, imu.al, imu.a, now);
   }
   struct ImuMotion {
     Vector3d w, al, a;
@@ -321,12 +371,17 @@ class Writer {
     // The held voltage makes less current at the period's end than on its mean: back-EMF.
     const double damping = robot_.facts.damping_Nms_rad[c];
     const double rotor = robot_.facts.rotor_kg_m2[c];
-    const double gives_way = rotor > 0.0 ? r_.voltage_hold_s2 * damping / rotor : 0.0;
-    if (!rigid) one.drive += damping * (r_.voltage_hold_s - gives_way) * one.acceleration;
+    if (!rigid && hold_.seconds > 0.0 && rotor > 0.0)
+      one.drive += rotor * (one.acceleration - last_of_hold(rotor, damping, one.acceleration));
     one.direction = filter_.value(motor_direction_[c], at);
     const double sum =
         one.drive + one.drive_rate + one.torque + one.velocity + one.acceleration + one.direction;
     if (std::isfinite(sum) && per_A > 0.0) all_.motors[c].push_back(one);
+  }
+
+  [[nodiscard]] double last_of_hold(double inertia, double damping, double mean) const {
+    const auto one = [](double value) { return Eigen::VectorXd::Constant(1, value); };
+    return hold_.sampled(one(inertia), one(damping), one(mean))[0];
   }
 
   const Recording& r_;
@@ -337,7 +392,12 @@ class Writer {
   Eigen::MatrixXd Y_;
   Eigen::VectorXd known_;
   Eigen::VectorXd described_ = robot_.regressor.described();
-  Eigen::VectorXd held_Nm_;
+  VoltageHold hold_{r_.voltage_hold_s, r_.hold_steps};
+  bool holds_ = false, doubts_ = false;
+  bool sampled_known_ = true;         // sampled_: all torques it follows from were measured
+  Eigen::VectorXd assumed_, rotors_;  // by which a hold is corrected
+  Eigen::VectorXd held_Nm_, sampled_;
+  Eigen::MatrixXd response_, inertia_, doubt_;
   std::array<double, 6> imu_noise_{};  // variances after the filter: angular, linear acceleration
   double mass_kg_ = 0.0;
   std::size_t held_ = 0;
@@ -359,8 +419,17 @@ void ChannelRows::append(const Eigen::VectorXd& x, double value, double whole, s
   instant.push_back(at);
 }
 
+void ChannelRows::doubt_last(const Eigen::VectorXd& one_deviation) {
+  if (doubt.rows() < X.rows()) {
+    const Index before = doubt.rows();
+    doubt.conservativeResize(X.rows(), one_deviation.size());
+    doubt.bottomRows(X.rows() - before).setZero();
+  }
+  doubt.row(rows() - 1) = one_deviation.transpose();
+}
+
 Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRobot& robot,
-                     Equations& equations) {
+                     Equations& equations, const Eigen::VectorXd& assumed) {
   if (cutoff_Hz * recording.period_s > 0.2) {
     return std::unexpected(
         Error{fmt::format("a cut-off of {} Hz is too high for samples every {:.3g} ms", cutoff_Hz,
@@ -377,14 +446,8 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   equations.sensor_noise.resize(equations.channels.size());
   equations.motors.resize(coordinates);
   equations.travel_rad.resize(coordinates, 0.0);
-  equations.rotor_doubt_kg_m2.resize(coordinates, 0.0);
-  for (std::size_t c = 0; c < coordinates; ++c) {
-    if (recording.voltage_hold_known || !robot.facts.rigid[c]) continue;
-    equations.rotor_doubt_kg_m2[c] =
-        kUnknownHold * robot.facts.damping_Nms_rad[c] * robot.facts.control_period_s / kSpreads;
-  }
   equations.first_of_log.push_back(equations.time_s.size());
-  Writer writer(recording, filter, robot, equations);
+  Writer writer(recording, filter, robot, equations, assumed);
   for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();
        at += filter.stride())
     writer.add(at);

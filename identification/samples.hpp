@@ -22,7 +22,6 @@ struct RobotFacts {
   std::vector<double> rotor_kg_m2;      ///< as described, on the link side
   std::vector<double> torque_per_A;     ///< on the link side; 0: not known
   std::vector<double> damping_Nms_rad;  ///< of the actuator, back-EMF included
-  double control_period_s = 0.0;        ///< of the boards; 0: not known
   std::vector<double> max_torque_Nm, max_velocity_rad_s;
   int imu_link = -1;                        ///< in tree.links; -1: none
   std::size_t imu_channel = 0;              ///< first of its channels
@@ -57,9 +56,14 @@ struct ChannelRows {
   Eigen::VectorXd y;                 ///< without what is known
   Eigen::VectorXd measured;          ///< with it: the torque itself
   std::vector<std::size_t> instant;  ///< of each row
+  /// (rows x coordinates) What y may have of an unknown hold of each rigid drive's voltage, one
+  /// standard deviation, the same in all rows and channels. With spare rows; empty: nothing.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> doubt;
 
   [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(instant.size()); }
   void append(const Eigen::VectorXd& x, double value, double whole, std::size_t at);
+  /// Of the row that was appended last.
+  void doubt_last(const Eigen::VectorXd& one_deviation);
 };
 
 /// A motor at an instant, on the link side.
@@ -82,9 +86,6 @@ struct Equations {
   std::vector<ChannelRows> sensor_noise;
   std::vector<std::vector<MotorInstant>> motors;  ///< per coordinate
   std::vector<double> travel_rad;                 ///< per coordinate: range of its position
-  /// Per coordinate: standard deviation of what an unknown hold of the motor's voltage adds to a
-  /// rigid drive's rotor [kg m^2]; 0 of simulated logs.
-  std::vector<double> rotor_doubt_kg_m2;
   Eigen::Index columns = 0;
   double usable_s = 0.0;  ///< time that the instants stand for
   double held_s = 0.0;    ///< of them: something else than the feet holds the base, as it seems
@@ -92,8 +93,11 @@ struct Equations {
 
 /// Appends the instants of a recording.
 /// @param cutoff_Hz  of the low pass, the same for every signal
+/// @param assumed    (columns) parameters by which held voltages are corrected; empty: the
+///                   description's
 /// Errors: the cut-off is too high for the log's period.
 [[nodiscard]] Status add_equations(const Recording& recording, double cutoff_Hz,
-                                   IdentifiedRobot& robot, Equations& equations);
+                                   IdentifiedRobot& robot, Equations& equations,
+                                   const Eigen::VectorXd& assumed = {});
 
 }  // namespace tandem::identification

@@ -326,7 +326,7 @@ TEST(Identify, DoubtsRotorsWhereTheHoldOfAVoltageIsNotKnown) {
   const Arm panda = arm("panda");
   Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), panda_reality(), 1);
   const auto known = identify({recording}, panda.robot, panda.tree);
-  recording.voltage_hold_known = false;
+  recording.unknown_hold_s = 1e-3;
   const auto unknown = identify({recording}, panda.robot, panda.tree);
   ASSERT_TRUE(known && unknown);
   for (std::size_t i = 0; i < known->base.size(); ++i) {

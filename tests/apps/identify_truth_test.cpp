@@ -1,0 +1,68 @@
+// Do the intervals of tandem identify hold the robot that was simulated? Logs without noise, where
+// every error is systematic. TANDEM_IDENTIFY_ALL=1: more experiments.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/apps/program.hpp"
+
+namespace tandem::apps {
+namespace {
+
+class IdentifyTruth : public Program {
+ protected:
+  /// Excites the bundled `robot` and simulates it: into logs/`name`.
+  void record(const std::string& robot, const std::string& name, const std::string& how) const {
+    const Outcome excited = tandem("excite " + description(robot) + " --out e.toml " + how);
+    ASSERT_EQ(excited.status, 0) << excited.err;
+    const Outcome run = tandem("run e.toml --quiet --log " + name);
+    ASSERT_EQ(run.status, 0) << run.err;
+  }
+  /// Base parameters of `robot` outside of their intervals. The description is exact.
+  int outside(const std::string& robot, const std::vector<std::string>& names, int& all) const {
+    std::string logs;
+    for (const std::string& name : names)
+      for (const auto& entry : std::filesystem::directory_iterator(folder_ / name))
+        if (entry.path().extension() == ".mcap") logs += entry.path().string() + " ";
+    const Outcome found = tandem("identify " + logs + "--robot " + description(robot) +
+                                 " --out found --json found.json");
+    EXPECT_EQ(found.status, 0) << found.err;
+    int out = 0;
+    const nlohmann::json base = json("found.json")["base_parameters"];
+    for (const auto& one : base) {
+      const double off = one["value"].get<double>() - one["described"].get<double>();
+      ++all;
+      if (std::abs(off) <= one["ci95"].get<double>()) continue;
+      ++out;
+      std::printf("outside: %s by %.2f intervals\n", one["name"].get<std::string>().c_str(),
+                  off / one["ci95"].get<double>());
+    }
+    return out;
+  }
+  static std::string description(const std::string& robot) {
+    return "'" TANDEM_SOURCE_DIR "/config/" + robot + "/robot.toml'";
+  }
+};
+
+// A six-axis sensor in the flange sees the accelerations at the samples, not their means: six base
+// parameters were outside, the last link's inertia by seven intervals.
+TEST_F(IdentifyTruth, OfAnArmWithASixAxisSensorIsInsideTheIntervals) {
+  const int seeds = std::getenv("TANDEM_IDENTIFY_ALL") == nullptr ? 1 : 8;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const std::string number = std::to_string(seed);
+    record("ur5e", "log" + number, "--seed " + number);
+    int all = 0;
+    EXPECT_LE(outside("ur5e", {"log" + number}, all), 3) << "seed " << seed;
+    EXPECT_EQ(all, 61);
+    const nlohmann::json base = json("found.json")["base_parameters"];
+    for (const auto& one : base) {
+      if (one["name"] != "wrist_3_link.izz_kg_m2") continue;
+      EXPECT_NEAR(one["value"].get<double>(), 1.321e-4, 0.01e-4);
+      EXPECT_LT(one["ci95"].get<double>(), 0.02e-4);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::apps
