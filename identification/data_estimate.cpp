@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "identification/estimate.hpp"
+#include "identification/repeats.hpp"
 
 namespace tandem::identification {
 namespace {
@@ -70,8 +71,9 @@ class LeastSquares {
       const auto n = static_cast<double>(std::max<Index>(1, rows_.back().y.size()));
       total += n;
       noise_.push_back(std::max(1e-4 * rows_.back().y.squaredNorm() / n, 1e-12));
-      free_.push_back(n);
     }
+    inflated_.assign(rows_.size(), 1.0);
+    repeats_.assign(rows_.size(), 1.0);
     const double mean = total / static_cast<double>(std::max<std::size_t>(1, rows_.size()));
     lags_ = lags_of(mean);
     quantile_ = quantile95(mean, lags_);
@@ -124,13 +126,17 @@ class LeastSquares {
       if (rows_[c].y.size() == 0) continue;
       const VectorXd residual = rows_[c].y - rows_[c].X * mean;
       const auto n = static_cast<double>(rows_[c].y.size());
+      repeats_[c] = repeats(residual, rows_[c].instant);
+      const double fresh = n / repeats_[c];  // errors that come again count once
       // A channel's share of the freedom that the fit has used up: of slow errors, which count up
       // to lags + 1 times in the long-run variance.
       const double spent = inverse.cwiseProduct(normals_[c].gram).sum() / noise_[c];
-      free_[c] = std::max(0.2 * n, n - 0.5 * (lags_ + 1.0) * spent);
+      inflated_[c] =
+          repeats_[c] * fresh / std::max(0.2 * fresh, fresh - 0.5 * (lags_ + 1.0) * spent);
       noise_[c] =
-          model_error(c) + long_run_variance(residual, rows_[c].instant, lags_) * n / free_[c];
+          model_error(c) + long_run_variance(residual, rows_[c].instant, lags_) * inflated_[c];
     }
+    count_freedom();
   }
 
   /// Without what the sensors' noise adds: noise in X makes information of nothing, and parameters
@@ -189,6 +195,38 @@ class LeastSquares {
     return sum.size() == 0 ? MatrixXd(MatrixXd::Zero(columns_, 1)) : sum;
   }
 
+  /// repeat_factor() of a channel, over all logs.
+  [[nodiscard]] double repeats(const VectorXd& residual,
+                               const std::vector<std::size_t>& instant) const {
+    double sum = 0.0;
+    const auto& logs = equations_.first_of_log;
+    for (std::size_t l = 0, from = 0; l < logs.size(); ++l) {
+      const std::size_t end = l + 1 < logs.size() ? logs[l + 1] : equations_.time_s.size();
+      std::vector<double> time_s;
+      const std::size_t begin = from;
+      for (; from < instant.size() && instant[from] < end; ++from)
+        time_s.push_back(equations_.time_s[instant[from]]);
+      const double period_s = l < equations_.repeats_s.size() ? equations_.repeats_s[l] : 0.0;
+      const auto n = static_cast<Index>(from - begin);
+      double factor = 1.0;
+      if (period_s > 0.0 && n > 1) {
+        factor = repeat_factor(residual.segment(static_cast<Index>(begin), n), time_s, period_s,
+                               equations_.stride_s, lags_of(period_s / equations_.stride_s));
+      }
+      sum += factor * static_cast<double>(n);
+    }
+    return sum / static_cast<double>(std::max<std::size_t>(1, instant.size()));
+  }
+
+  /// The standard deviations in an interval, by what the channels have on average.
+  void count_freedom() {
+    double total = 0.0;
+    for (std::size_t c = 0; c < rows_.size(); ++c)
+      total += static_cast<double>(std::max<Index>(1, rows_[c].y.size())) / repeats_[c];
+    const double mean = total / static_cast<double>(std::max<std::size_t>(1, rows_.size()));
+    quantile_ = quantile95(mean, lags_of(mean));
+  }
+
   [[nodiscard]] double model_error(std::size_t c) const {
     const auto n = static_cast<double>(std::max<Index>(1, rows_[c].y.size()));
     return kModelError * rows_[c].y.squaredNorm() / n + 1e-14;
@@ -215,10 +253,9 @@ class LeastSquares {
     for (Index c = 0; c < channels; ++c) {
       if (count[c] == 0.0) continue;
       const auto k = static_cast<std::size_t>(c);
-      const double inflated = static_cast<double>(rows_[k].y.size()) / free_[k];
-      weight[c] = std::sqrt(inflated / count[c]) / noise_[k];
+      weight[c] = std::sqrt(inflated_[k] / count[c]) / noise_[k];
       S(c, c) = std::max(S(c, c), kLeast * R.col(c).squaredNorm());
-      S(c, c) += model_error(k) * count[c] / inflated;
+      S(c, c) += model_error(k) * count[c] / inflated_[k];
     }
     const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(weight.asDiagonal() * S *
                                                          weight.asDiagonal());
@@ -231,7 +268,9 @@ class LeastSquares {
   Index columns_;
   std::vector<Used> rows_, added_;
   std::vector<Normal> normals_;
-  std::vector<double> noise_, free_;
+  std::vector<double> noise_;
+  std::vector<double> inflated_;  // by what a channel's long-run variance is larger than it looks
+  std::vector<double> repeats_;   // of it: because errors come again with the motion
   int lags_ = 0;
   double quantile_ = 0.0;
 };
@@ -253,7 +292,6 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
                                 const Prior& prior, const BaseParameters& base) {
   LeastSquares squares(equations, used, prior);
   DataEstimate out;
-  out.quantile = squares.quantile();
   Normal sum = squares.sums();
   for (int round = 1; round < kReweightings; ++round) {
     squares.weigh(sum.gram, squares.solved(sum.gram, sum.target));
@@ -261,6 +299,7 @@ DataEstimate estimate_from_data(const Equations& equations, const std::vector<bo
   }
   // A p = b without the noise in A; b varies by B. That is information A B^-1 A, and A may even be
   // indefinite where noise is all there is.
+  out.quantile = squares.quantile();
   const Normal less = squares.without_noise(sum);
   const VectorXd mean = squares.solved(less.gram, less.target);
   const Eigen::LLT<MatrixXd> spread(squares.scores(mean) + kFaint * prior.metric);

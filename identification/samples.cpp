@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "identification/low_pass.hpp"
+#include "identification/repeats.hpp"
 #include "identification/voltage_hold.hpp"
 
 namespace tandem::identification {
@@ -447,6 +448,9 @@ Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRob
   equations.motors.resize(coordinates);
   equations.travel_rad.resize(coordinates, 0.0);
   equations.first_of_log.push_back(equations.time_s.size());
+  equations.stride_s = static_cast<double>(filter.stride()) * recording.period_s;
+  equations.repeats_s.push_back(
+      motion_period_s(recording.position_rad, recording.period_s, filter.stride()));
   Writer writer(recording, filter, robot, equations, assumed);
   for (std::size_t at = filter.reach(); at + filter.reach() < recording.rows();
        at += filter.stride())

@@ -80,6 +80,8 @@ struct MotorInstant {
 struct Equations {
   std::vector<double> time_s;             ///< of each instant
   std::vector<std::size_t> first_of_log;  ///< instant
+  std::vector<double> repeats_s;          ///< of each log: after which its motion repeats; 0: not
+  double stride_s = 0.0;                  ///< of instants, where none is left out
   std::vector<ChannelRows> channels;      ///< as the regressor's
   /// By how much the noise of the IMU moves X and y of a channel: rows whose sum of squares is
   /// what that noise adds to the rows' own, on average. Empty of a fixed base.

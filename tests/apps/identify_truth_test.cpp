@@ -1,5 +1,5 @@
 // Do the intervals of tandem identify hold the robot that was simulated? Logs without noise, where
-// every error is systematic. TANDEM_IDENTIFY_ALL=1: more experiments.
+// every error is systematic. TANDEM_IDENTIFY_ALL=1: more experiments, and a humanoid.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -61,6 +61,21 @@ TEST_F(IdentifyTruth, OfAnArmWithASixAxisSensorIsInsideTheIntervals) {
       EXPECT_NEAR(one["value"].get<double>(), 1.321e-4, 0.01e-4);
       EXPECT_LT(one["ci95"].get<double>(), 0.02e-4);
     }
+  }
+}
+
+// Its motions repeat 20 and 3 times, and so do the steps of its torques: intervals as if every
+// period was news held 203 of 263.
+TEST_F(IdentifyTruth, OfAHumanoidIsInsideTheIntervals) {
+  if (std::getenv("TANDEM_IDENTIFY_ALL") == nullptr) GTEST_SKIP() << "takes a minute";
+  record("coman", "hung", "--hung");
+  record("coman", "stand", "");
+  for (const std::vector<std::string>& logs :
+       {std::vector<std::string>{"hung"}, {"stand"}, {"hung", "stand"}}) {
+    int all = 0;
+    const int out = outside("coman", logs, all);
+    EXPECT_EQ(all, 292);
+    EXPECT_LE(out, 15) << logs.front() << " " << logs.size();
   }
 }
 
