@@ -22,8 +22,8 @@ constexpr int kReweightings = 4;
 
 /// Rows of one channel that are used, as matrices of their own.
 struct Used {
-  MatrixXd X, doubt;
-  VectorXd y;
+  MatrixXd X;
+  VectorXd y, doubt;
   std::vector<std::size_t> instant;
 };
 
@@ -33,11 +33,12 @@ Used used_rows(const ChannelRows& rows, const std::vector<bool>& used, Index col
     if (used[at]) out.instant.push_back(at);
   out.X.resize(static_cast<Index>(out.instant.size()), columns);
   out.y.resize(static_cast<Index>(out.instant.size()));
-  out.doubt = MatrixXd::Zero(out.y.size(), rows.doubt.cols());
+  out.doubt = VectorXd::Zero(out.y.size());
   Index to = 0;
   for (Index row = 0; row < rows.rows(); ++row) {
     if (!used[rows.instant[static_cast<std::size_t>(row)]]) continue;
-    if (row < rows.doubt.rows()) out.doubt.row(to) = rows.doubt.row(row);
+    if (static_cast<std::size_t>(row) < rows.doubt.size())
+      out.doubt[to] = rows.doubt[static_cast<std::size_t>(row)];
     out.X.row(to) = rows.X.row(row);
     out.y[to++] = rows.y[row];
   }
@@ -154,7 +155,7 @@ class LeastSquares {
 
   /// Covariance of the right side: one sensor's noise is in many channels at an instant, and a
   /// channel's may be another one in every log. The long-run covariance of the channels' residuals
-  /// in each log says how they go together.
+  /// in each log says how they go together. What is doubted is one error in all rows.
   [[nodiscard]] MatrixXd scores(const VectorXd& mean) const {
     MatrixXd sum = MatrixXd::Zero(columns_, columns_);
     const std::size_t logs = equations_.first_of_log.size();
@@ -179,22 +180,13 @@ class LeastSquares {
       }
     }
     sum = MatrixXd(sum.selfadjointView<Eigen::Lower>());
-    const MatrixXd doubts = doubt_scores();
-    return sum + doubts * doubts.transpose();
+    VectorXd doubt = VectorXd::Zero(columns_);
+    for (std::size_t c = 0; c < rows_.size(); ++c)
+      doubt += rows_[c].X.transpose() * rows_[c].doubt / noise_[c];
+    return sum + doubt * doubt.transpose();
   }
 
  private:
-  /// What each doubt moves the right side by, one standard deviation of it: the same in all rows.
-  [[nodiscard]] MatrixXd doubt_scores() const {
-    MatrixXd sum;
-    for (std::size_t c = 0; c < rows_.size(); ++c) {
-      if (rows_[c].doubt.cols() == 0) continue;
-      if (sum.size() == 0) sum = MatrixXd::Zero(columns_, rows_[c].doubt.cols());
-      sum += rows_[c].X.transpose() * rows_[c].doubt / noise_[c];
-    }
-    return sum.size() == 0 ? MatrixXd(MatrixXd::Zero(columns_, 1)) : sum;
-  }
-
   /// repeat_factor() of a channel, over all logs.
   [[nodiscard]] double repeats(const VectorXd& residual,
                                const std::vector<std::size_t>& instant) const {

@@ -187,7 +187,7 @@ class Writer {
       const double y = measured - known_[row];
       if (!std::isfinite(y) || !x.allFinite()) continue;
       all_.channels[c].append(x, y, measured, all_.time_s.size());
-      if (doubts_) all_.channels[c].doubt_last(doubt_.row(row));
+      if (doubts_) all_.channels[c].doubt_last(doubt_[row]);
       any = true;
     }
     if (!any) return;
@@ -263,12 +263,11 @@ class Writer {
     if (!doubts_) return;
     const double unknown_s = kUnknownHold * r_.unknown_hold_s / kSpreads;
     const Eigen::VectorXd braked = damping.cwiseProduct(now.vdot);
-    doubt_ = -unknown_s * response_ * M.solve(Eigen::MatrixXd((braked + rate).asDiagonal()));
+    doubt_ = -unknown_s * response_ * M.solve(braked + rate);
     for (std::size_t c = 0; c < robot_.regressor.channels().size(); ++c) {
       const Channel& channel = robot_.regressor.channels()[c];
-      if (channel.kind != Channel::Kind::kJoint) continue;
-      doubt_.row(static_cast<Index>(c)).setZero();
-      doubt_(static_cast<Index>(c), channel.index) = -unknown_s * braked[channel.index];
+      if (channel.kind == Channel::Kind::kJoint)
+        doubt_[static_cast<Index>(c)] = -unknown_s * braked[channel.index];
     }
   }
   /// response_: what a unit of every joint's acceleration needs in each channel, a floating base
@@ -398,7 +397,8 @@ class Writer {
   bool sampled_known_ = true;         // sampled_: all torques it follows from were measured
   Eigen::VectorXd assumed_, rotors_;  // by which a hold is corrected
   Eigen::VectorXd held_Nm_, sampled_;
-  Eigen::MatrixXd response_, inertia_, doubt_;
+  Eigen::MatrixXd response_, inertia_;
+  Eigen::VectorXd doubt_;              // per channel: see ChannelRows
   std::array<double, 6> imu_noise_{};  // variances after the filter: angular, linear acceleration
   double mass_kg_ = 0.0;
   std::size_t held_ = 0;
@@ -420,13 +420,9 @@ void ChannelRows::append(const Eigen::VectorXd& x, double value, double whole, s
   instant.push_back(at);
 }
 
-void ChannelRows::doubt_last(const Eigen::VectorXd& one_deviation) {
-  if (doubt.rows() < X.rows()) {
-    const Index before = doubt.rows();
-    doubt.conservativeResize(X.rows(), one_deviation.size());
-    doubt.bottomRows(X.rows() - before).setZero();
-  }
-  doubt.row(rows() - 1) = one_deviation.transpose();
+void ChannelRows::doubt_last(double one_deviation) {
+  doubt.resize(instant.size(), 0.0);
+  doubt.back() = one_deviation;
 }
 
 Status add_equations(const Recording& recording, double cutoff_Hz, IdentifiedRobot& robot,

@@ -56,14 +56,15 @@ struct ChannelRows {
   Eigen::VectorXd y;                 ///< without what is known
   Eigen::VectorXd measured;          ///< with it: the torque itself
   std::vector<std::size_t> instant;  ///< of each row
-  /// (rows x coordinates) What y may have of an unknown hold of each rigid drive's voltage, one
-  /// standard deviation, the same in all rows and channels. With spare rows; empty: nothing.
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> doubt;
+  /// What y may have of an unknown hold of the rigid drives' voltages: one standard deviation of
+  /// it, the same hold in all rows, channels and logs, for the drives of a robot are alike. Rows
+  /// beyond its end have none.
+  std::vector<double> doubt;
 
   [[nodiscard]] Eigen::Index rows() const { return static_cast<Eigen::Index>(instant.size()); }
   void append(const Eigen::VectorXd& x, double value, double whole, std::size_t at);
   /// Of the row that was appended last.
-  void doubt_last(const Eigen::VectorXd& one_deviation);
+  void doubt_last(double one_deviation);
 };
 
 /// A motor at an instant, on the link side.

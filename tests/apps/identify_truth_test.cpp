@@ -64,6 +64,28 @@ TEST_F(IdentifyTruth, OfAnArmWithASixAxisSensorIsInsideTheIntervals) {
   }
 }
 
+// What happens between two samples is not known then: rotors were 15 % off, 18 intervals.
+TEST_F(IdentifyTruth, OfALogThatIsOutOfStepWithTheBoardsHasAWarning) {
+  std::filesystem::copy(TANDEM_SOURCE_DIR "/config/ur5e", folder_ / "ur5e");
+  edit("ur5e/robot.toml", "[board_defaults]", "[board_defaults]\ncontrol_period_ns = 250000");
+  ASSERT_EQ(tandem("excite ur5e/robot.toml --out e.toml").status, 0);
+  ASSERT_EQ(tandem("run e.toml --quiet --log log").status, 0);
+  const auto log = *std::filesystem::directory_iterator(folder_ / "log");
+  const Outcome found = tandem("identify " + log.path().string() +
+                               " --robot ur5e/robot.toml --out found --json found.json");
+  ASSERT_EQ(found.status, 0) << found.err;
+  EXPECT_NE(found.err.find("warning: the boards' control has another period than the log"),
+            std::string::npos)
+      << found.err;
+  const nlohmann::json base = json("found.json")["base_parameters"];
+  for (const auto& one : base) {
+    if (one["name"].get<std::string>().find("rotor") == std::string::npos) continue;
+    EXPECT_NEAR(one["value"].get<double>(), one["described"].get<double>(),
+                one["ci95"].get<double>())
+        << one["name"];
+  }
+}
+
 // Its motions repeat 20 and 3 times, and so do the steps of its torques: intervals as if every
 // period was news held 203 of 263.
 TEST_F(IdentifyTruth, OfAHumanoidIsInsideTheIntervals) {

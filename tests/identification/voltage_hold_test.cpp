@@ -58,14 +58,14 @@ TEST(AddEquations, DoubtWhatSixAxisSensorsShowOfAnUnknownHold) {
   for (std::size_t c = 0; c < robot->regressor.channels().size(); ++c) {
     const Channel& channel = robot->regressor.channels()[c];
     const ChannelRows& rows = none.channels[c];
-    EXPECT_EQ(rows.doubt.size(), 0);
+    EXPECT_TRUE(rows.doubt.empty());
     Eigen::VectorXd corrected(rows.rows()), doubted(rows.rows());
     for (Eigen::Index i = 0; i < rows.rows(); ++i) {
       const Eigen::VectorXd change = known.channels[c].X.row(i) - rows.X.row(i);
       corrected[i] =
           change.head(described.size()).dot(described) - (known.channels[c].y[i] - rows.y[i]);
       // Three quarters of it are a 95 % interval; one step's hold is late by all of it.
-      doubted[i] = 1.96 / 0.75 * unknown.channels[c].doubt.row(i).sum();
+      doubted[i] = 1.96 / 0.75 * unknown.channels[c].doubt[static_cast<std::size_t>(i)];
     }
     if (channel.kind == Channel::Kind::kJoint) {
       EXPECT_GT(doubted.norm(), 0.0) << channel.name;
