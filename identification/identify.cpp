@@ -63,6 +63,35 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const Identifie
       1e3 * hold_s, names));
 }
 
+/// What was left out of a recording.
+void note_left_out(const Recording& recording, bool one_of_several, bool floating,
+                   Identification& out) {
+  for (const std::string& remark : recording.remarks)
+    out.remarks.push_back(one_of_several ? recording.path + ": " + remark : remark);
+  for (const LeftOut& one : recording.left_out) out.left_out.emplace_back(recording.path, one);
+  if (!recording.hangs || !floating) return;
+  out.remarks.push_back(recording.path +
+                        ": the robot hangs from a hoist, whose force is not known: the base's "
+                        "equations are left out");
+}
+
+/// Held voltages are corrected by the robot's inertia: once more by the one that was found.
+Status refine_holds(const std::vector<Recording>& recordings, const hal::RobotConfig& robot,
+                    const model::Tree& tree, const IdentifyOptions& options,
+                    IdentifiedRobot& identified, Equations& equations) {
+  const auto& rigid = identified.facts.rigid;
+  const bool held = std::ranges::any_of(
+      recordings, [](const Recording& recording) { return recording.voltage_hold_s > 0.0; });
+  if (!held || std::ranges::find(rigid, true) == rigid.end()) return {};
+  const Eigen::VectorXd found = fitted(robot, tree, identified, equations);
+  equations = Equations{};
+  for (const Recording& recording : recordings) {
+    const Status s = add_equations(recording, options.cutoff_Hz, identified, equations, found);
+    if (!s) return s;
+  }
+  return {};
+}
+
 /// A torque with the wrong sign is 200 % of itself away from every description of the robot.
 void warn_of_signs(Identification& out) {
   std::size_t opposite = 0, known = 0;
@@ -96,14 +125,7 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
   Equations equations;
   Identification out;
   for (const Recording& recording : recordings) {
-    for (const std::string& remark : recording.remarks)
-      out.remarks.push_back(recordings.size() > 1 ? recording.path + ": " + remark : remark);
-    for (const LeftOut& one : recording.left_out) out.left_out.emplace_back(recording.path, one);
-    if (recording.hangs && identified->floating) {
-      out.remarks.push_back(recording.path +
-                            ": the robot hangs from a hoist, whose force is not known: the base's "
-                            "equations are left out");
-    }
+    note_left_out(recording, recordings.size() > 1, identified->floating, out);
     if (const Status s = add_equations(recording, options.cutoff_Hz, *identified, equations); !s)
       return std::unexpected(s.error());
   }
@@ -134,20 +156,8 @@ Result<Identification> identify(const std::vector<Recording>& recordings,
         "should say so: [sim] hoist.lift_m",
         equations.held_s));
   }
-  const bool rigid =
-      std::ranges::find(identified->facts.rigid, true) != identified->facts.rigid.end();
-  const bool held = std::ranges::any_of(
-      recordings, [](const Recording& recording) { return recording.voltage_hold_s > 0.0; });
-  if (rigid && held) {  // held voltages are corrected by the robot's inertia: by the one found
-    const Eigen::VectorXd found = fitted(robot, tree, *identified, equations);
-    equations = Equations{};
-    for (const Recording& recording : recordings) {
-      if (const Status s =
-              add_equations(recording, options.cutoff_Hz, *identified, equations, found);
-          !s)
-        return std::unexpected(s.error());
-    }
-  }
+  if (const Status s = refine_holds(recordings, robot, tree, options, *identified, equations); !s)
+    return std::unexpected(s.error());
   answer(robot, tree, *identified, equations, out);
   warn_of_signs(out);
   warn_of_intervals(recordings, *identified, options.cutoff_Hz, out);
