@@ -2,13 +2,17 @@
 // kernel library's file.
 #include "base/trusted_code.hpp"
 
+#include <elf.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <span>
 #include <sstream>
+#include <string_view>
 
 #include "base/sha256.hpp"
 
@@ -119,6 +123,33 @@ Status check_trusted_folder(const std::string& folder, std::optional<uid_t> part
   return refuse(open->path.string(), open->problem + " (its mode is " + mode.str() + ")",
                 "give it to this user, and take the right to write from others: chmod go-w " +
                     open->path.string());
+}
+
+Status check_whole(const std::string& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<std::uint64_t>(std::max<std::streamoff>(0, in.tellg()));
+  Elf64_Ehdr header{};
+  in.seekg(0).read(reinterpret_cast<char*>(&header), sizeof header);
+  const std::string_view magic(reinterpret_cast<const char*>(header.e_ident), SELFMAG);
+  const bool elf = in.good() && magic == std::string_view(ELFMAG, SELFMAG) &&
+                   header.e_ident[EI_CLASS] == ELFCLASS64 &&
+                   header.e_phentsize == sizeof(Elf64_Phdr);
+  if (!elf) return refuse(path, "is no shared library", "build it again");
+  std::uint64_t needed = 0;
+  in.seekg(static_cast<std::streamoff>(header.e_phoff));
+  for (int i = 0; i < header.e_phnum; ++i) {
+    Elf64_Phdr part{};
+    in.read(reinterpret_cast<char*>(&part), sizeof part);
+    if (!in.good() || part.p_filesz > UINT64_MAX - part.p_offset) {
+      return refuse(path, "is cut, or damaged", "build it again, or wait until it is copied");
+    }
+    needed = std::max(needed, part.p_offset + part.p_filesz);
+  }
+  if (needed <= size) return {};
+  return refuse(path,
+                "is cut: " + std::to_string(size) + " of at least " + std::to_string(needed) +
+                    " bytes are there",
+                "build it again, or wait until it is copied");
 }
 
 Status seal_library(const std::string& path) {

@@ -31,6 +31,12 @@ namespace tandem {
 [[nodiscard]] Status check_trusted_folder(const std::string& folder,
                                           std::optional<uid_t> partner = {});
 
+/// Whether a library's file holds all that its own header says is to be loaded. A loader maps what
+/// is missing of a file that was cut, as one that is being copied, and its first touch ends the
+/// process.
+/// Errors: it cannot be read, is no ELF file of 64 bits, or is cut, with both sizes.
+[[nodiscard]] Status check_whole(const std::string& path);
+
 /// Adds the SHA-256 of a library's bytes behind its end, where no loader looks.
 /// Errors: the file cannot be read or written.
 [[nodiscard]] Status seal_library(const std::string& path);

@@ -137,6 +137,9 @@ Result<LoadedController> load_controller(const std::string& name,
   if (const Status mine = check_trusted_code(*file); !mine) {
     return refuse(name, *file, mine.error().message, mine.error().hint);
   }
+  if (const Status whole = check_whole(*file); !whole) {
+    return refuse(name, *file, "cannot be loaded: it " + whole.error().message, whole.error().hint);
+  }
   LoadedController loaded;
   loaded.path_ = *file;
   const Status opened = hosted_call(name, [&] { return loaded.open(name); });

@@ -210,6 +210,13 @@ class ControllerHost {
   [[nodiscard]] bool leads(std::size_t joint) const noexcept TANDEM_RT {
     return !operator_.position.check_motion_done(joint) || recovers_[joint] != 0;
   }
+  /// Whether they lead any joint.
+  [[nodiscard]] bool leads() const noexcept TANDEM_RT {
+    for (std::size_t joint = 0; joint < recovers_.size(); ++joint) {
+      if (leads(joint)) return true;
+    }
+    return false;
+  }
   /// What the joint's owner wants, which may be an operator: `command` goes over to it.
   [[nodiscard]] BumplessTransfer::Impedance wanted_impedance(
       std::size_t joint, const hal::CommandImage& command) const noexcept TANDEM_RT {

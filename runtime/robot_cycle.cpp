@@ -113,11 +113,14 @@ void RobotCycle::check(const rt::Tick& tick) noexcept TANDEM_RT {
   watch_homing();
 }
 
-/// While controllers run: a robot that lies, or that somebody holds, feels more than itself.
+/// While something moves: a robot that lies, or that somebody holds, feels more than itself. What
+/// touches it already when an operator's motion begins is no collision of that motion: it may be
+/// what the robot is to be led away from.
 void RobotCycle::check_collisions() noexcept TANDEM_RT {
-  if (estimator_ == nullptr || !run_.controllers_run()) return;
+  const bool held = run_.in(RunPhase::kHeld);
+  if (estimator_ == nullptr || !(run_.controllers_run() || held)) return;
   const auto found = estimator_->collision();
-  if (!found) return;
+  if (!found || (held && !controllers_->leads())) return;
   const double thousandths = std::clamp(1e3 * std::abs(found->torque_Nm), 0.0, 4e9);
   const auto joints = static_cast<std::int32_t>(estimator_->image().joints());
   const auto channel = static_cast<std::int32_t>(found->joint);

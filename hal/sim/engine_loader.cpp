@@ -44,6 +44,9 @@ Result<const EnginePlugin*> open(const std::string& name, const std::string& fil
   if (const Status mine = check_trusted_code(file); !mine) {
     return refuse(mine.error().message, mine.error().hint, name);
   }
+  if (const Status whole = check_whole(file); !whole) {
+    return refuse("cannot be loaded: it " + whole.error().message, whole.error().hint, name);
+  }
   void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   if (library == nullptr) {
     return refuse("cannot be loaded: " + std::string(dlerror()), "build it again", name);

@@ -44,6 +44,28 @@ TEST(PluginLoader, NamesAPathThatDoesNotExist) {
   EXPECT_EQ(loaded.error().file, "no/such.so");
 }
 
+// While it is copied, or after a full disk: the loader would map what is not there, and the first
+// touch of it end the process.
+TEST(PluginLoader, RefusesALibraryThatIsCut) {
+  const test::ScratchFolder folder;
+  std::ifstream in(test::bundled_folder()[0] + "/hold.so", std::ios::binary);
+  const std::string whole{std::istreambuf_iterator<char>(in), {}};
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{100}, std::size_t{2000}, whole.size() / 4, whole.size() / 2}) {
+    const std::string file = folder / ("cut" + std::to_string(size) + ".so");
+    std::ofstream(file, std::ios::binary) << whole.substr(0, size);
+    const auto loaded = load_controller(file, {});
+    ASSERT_FALSE(loaded.has_value()) << size;
+    const std::string text = loaded.error().to_string();
+    EXPECT_NE(text.find(size < 64 ? "is no shared library" : "is cut"), std::string::npos)
+        << size << ": " << text;
+  }
+  std::string odd = whole;
+  odd.replace(32, 8, "\xff\xff\xff\xff\xff\xff\xff\x7f");  // where its parts are listed
+  std::ofstream(folder / "odd.so", std::ios::binary) << odd;
+  EXPECT_FALSE(load_controller(folder / "odd.so", {}).has_value());
+}
+
 TEST(PluginLoader, RefusesALibraryWithoutItsEntryPoint) {
   const auto loaded = load_controller("no_entry", kBroken);
   ASSERT_FALSE(loaded.has_value());

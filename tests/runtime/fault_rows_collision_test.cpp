@@ -72,5 +72,36 @@ TEST(FaultRow, CollisionOfComanRetracts) {
     EXPECT_NE(fault.text.find("collision"), std::string::npos) << fault.text << ": it did not fall";
 }
 
+// After a reset an operator may move a joint: what it meets then is a collision, too. What touches
+// a robot that is merely held is none.
+TEST(CollisionInAnOperatorsMove, StopsTheRobot) {
+  PushedRun run("ur5e", "trajectory", "elbow_joint", {0.0, 50.0, -50.0}, 0.2,
+                hal::StopCategory::kHold);
+  const hal::RobotConfig& robot = run.experiment->robot;
+  const double moving_s = 8.0, resting_s = 6.0;
+  for (const double at_s : {resting_s, moving_s}) {
+    const auto push = push_on(robot, "elbow_joint", {0.0, 50.0, -50.0}, at_s, 0.2);
+    ASSERT_EQ(run.backend->robot().inject(push), Code::kOk);
+  }
+  run.run_to(RunPhase::kFaulted);
+  for (int i = 0; i < 500; ++i) run.cycle->step();
+  run.cycle->inbox().reset_faults();
+  run.run_to(RunPhase::kHeld);
+  const std::size_t before = run.cycle->faults().size();
+  while (run.backend->robot().faults()[1].active == 0) run.cycle->step();
+  for (int i = 0; i < 1000; ++i) run.cycle->step();
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kHeld) << "somebody touches it";
+  EXPECT_EQ(run.cycle->faults().size(), before);
+  ASSERT_TRUE(run.cycle->services().move_joint(
+      "elbow_joint", {.target_rad = 0.5, .speed_rad_s = 0.1}, RunServices::Patience{0}));
+  int cycles = 0;
+  while (run.backend->robot().faults()[2].active == 0) run.cycle->step();
+  while (run.cycle->phase() == RunPhase::kHeld && ++cycles < 200) run.cycle->step();
+  EXPECT_EQ(run.cycle->phase(), RunPhase::kFaulted);
+  EXPECT_LE(cycles, 10);
+  ASSERT_GT(run.cycle->faults().size(), before);
+  EXPECT_NE(run.cycle->faults().back().text.find("collision"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace tandem::runtime
