@@ -68,7 +68,7 @@ Result<Stretch> stretch_of(const LogFile& file, const Topic& topic, const Motion
   }
   const double first_s = static_cast<double>(topic.first_ns) * 1e-9;
   const double last_s = static_cast<double>(topic.last_ns) * 1e-9;
-  const double faultless_s = std::min(window.fault_s, last_s);
+  const double faultless_s = std::min(window.stop_s, last_s);
   const double from_s = request.from_s.value_or(std::max(window.begin_s, first_s));
   const double to_s = request.to_s.value_or(std::min(window.end_s, last_s));
   const bool ran = info.hal == "import" || window.begin_s > -1e299;

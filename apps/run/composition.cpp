@@ -76,11 +76,31 @@ void add_controllers(Composition& c, Collector& errors) {
   errors.add(c.experiment.document.diagnostics());
 }
 
+bool retreats(const Composition& c) {
+  return std::ranges::any_of(c.notes, &ControllerNote::retreats);
+}
+
+/// A collision's "retract" that no controller can carry out.
+std::optional<Error> no_retract(const Composition& c) {
+  const runtime::Experiment& e = c.experiment;
+  const bool asked =
+      e.estimation.collision && e.estimation.collision->reaction == hal::StopCategory::kCategory2;
+  if (!asked || retreats(c)) return std::nullopt;
+  TomlTable estimation = e.document.root().table_or_empty("estimation");
+  return Error{.message = fmt::format("\"retract\" will be category 1: no controller of {} can "
+                                      "bring the robot to a safe posture",
+                                      e.file),
+               .hint = "add a controller that can retreat, such as squat, or say \"hold\"",
+               .file = e.file,
+               .line = estimation.table_or_empty("collision").line("reaction"),
+               .key = "estimation.collision.reaction"};
+}
+
 /// Stops of category 2 that robot.toml asks for, and that no controller can carry out.
 std::optional<Error> no_retreat(const Composition& c) {
   using hal::StopCategory;
   const hal::RobotConfig& robot = c.experiment.robot;
-  if (std::ranges::any_of(c.notes, &ControllerNote::retreats)) return std::nullopt;
+  if (retreats(c)) return std::nullopt;
   std::vector<std::pair<int, std::string>> keys;  // by line
   if (robot.emergency_stop == StopCategory::kCategory2) {
     keys.emplace_back(robot.emergency_stop_line, "safety.emergency_stop");
@@ -434,7 +454,8 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
-  if (auto warning = no_retreat(*c)) c->warnings.push_back(std::move(*warning));
+  for (auto warning : {no_retreat(*c), no_retract(*c)})
+    if (warning) c->warnings.push_back(std::move(*warning));
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;

@@ -240,7 +240,8 @@ Fault read_fault(TomlTable& table, const Context& context) {
 
 /// As TOML takes it: a number, a boolean and what is quoted stay.
 bool is_literal(std::string_view value) {
-  if (value == "true" || value == "false" || value.starts_with('"')) return true;
+  if (value == "true" || value == "false" || value.starts_with('"') || value.starts_with('['))
+    return true;
   const bool digit = std::ranges::any_of(value, [](char c) { return c >= '0' && c <= '9'; });
   const bool number =
       value.find_first_not_of("0123456789+-._eExabcdefABCDEF") == std::string_view::npos;
@@ -291,7 +292,7 @@ std::string scenario_of_words(std::span<const std::string> words) {
   std::string text = "[[fault]]\n";
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
-    const bool toml = equals == std::string::npos || word.find_first_of(" \n") != std::string::npos;
+    const bool toml = equals == std::string::npos || word.find_first_of(" \n") < word.find('[');
     if (toml) {
       text += word + "\n";
       continue;

@@ -55,6 +55,22 @@ TEST_F(Check, GivesEveryErrorAsJsonWithFileLineKeyAndHint) {
 }
 
 /// It is category 1 then, which was first said when somebody pressed the button.
+TEST_F(Check, WarnsOfARetractThatNoControllerCanCarryOut) {
+  std::string text = read_text(folder_ / "hold.toml");
+  const auto line = std::ranges::count(text, '\n') + 4;
+  text +=
+      "\n[estimation.observer]\n[estimation.collision]\nreaction = \"retract\"\n"
+      "threshold_Nm = { joint1 = 1.0 }\n";
+  write_text(folder_ / "retract.toml", text);
+  const Outcome outcome = tandem("check retract.toml");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("retract.toml:" + std::to_string(line) +
+                             ": estimation.collision.reaction: \"retract\" will be category 1: no "
+                             "controller of retract.toml can"),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(Check, WarnsOfACategory2ThatNoControllerCanCarryOut) {
   const std::string robot = read_text(folder_ / "robot.toml");
   write_text(folder_ / "robot.toml", robot + "\n[safety]\nemergency_stop = \"category2\"\n");

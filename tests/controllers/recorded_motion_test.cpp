@@ -341,6 +341,8 @@ TEST_F(RecordedMotion, PlaysARunFromTheStartOfItsControllersAndNotPastAFault) {
             "experiment.toml:1: log: LOG: its run met a fault at 0.700 s (play what was before: "
             "to_s)");
   EXPECT_EQ(problem(path, "to_s = 0.6\n"), "");
+  events_.back().reported = 1;  // such as a collision that only warns
+  EXPECT_EQ(problem(record()), "");
 }
 
 TEST_F(RecordedMotion, RefusesCommandsThatLedNoPosition) {

@@ -151,6 +151,11 @@ TEST(Scenario, TakesTheWordsOfACommandLine) {
   const auto same = parse(scenario_of_words(toml));
   ASSERT_TRUE(same) << same.error()[0].to_string();
   EXPECT_EQ((*same)[0].cob_id, 0x181U);
+  const std::vector<std::string> list{"kind=push", "joint=swing", "force_N=[0, 0, 40]",
+                                      "for_s=0.1"};
+  const auto push = parse(scenario_of_words(list));
+  ASSERT_TRUE(push) << push.error()[0].to_string();
+  EXPECT_EQ((*push)[0].force_N[2], 40.0);
 }
 
 }  // namespace
