@@ -91,13 +91,13 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
     const int joints = e.tree == nullptr || site == e.robot.model.sites.end()
                            ? 6
                            : joints_before(*e.tree, site->link);
-    facts.add(
-        "estimates",
-        "the wrench at " + wrench.site +
-            (joints >= 6
-                 ? ""
-                 : fmt::format(": {} see at most {} of its 6 numbers, the others are shown as 0",
-                               counted(static_cast<std::size_t>(joints), "joint"), joints)));
+    facts.add("estimates",
+              "the wrench at " + wrench.site +
+                  (joints >= 6
+                       ? ""
+                       : fmt::format(": {} see at most {} of its 6 numbers, and the least wrench "
+                                     "that explains those is shown",
+                                     counted(static_cast<std::size_t>(joints), "joint"), joints)));
   }
 }
 
