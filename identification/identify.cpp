@@ -40,21 +40,22 @@ void warn_of_intervals(const std::vector<Recording>& recordings, const Identifie
   }
   const double hold_s = std::ranges::max(recordings, {}, &Recording::unknown_hold_s).unknown_hold_s;
   if (!(hold_s > 0.0)) return;
-  std::string names;
+  std::string names, rigid;  // whose rotors the data show, and all without a spring
   for (std::size_t c = 0; c < identified.facts.joint.size(); ++c) {
     if (!identified.facts.rigid[c]) continue;
     const JointResult& joint = out.joints[static_cast<std::size_t>(identified.facts.joint[c])];
+    rigid += (rigid.empty() ? "" : ", ") + joint.name;
     if (!joint.rotor_inertia_kg_m2.identifiable) continue;
     names += (names.empty() ? "" : ", ") + joint.name;
   }
-  if (names.empty()) return;
-  if (std::ranges::any_of(recordings, &Recording::out_of_step)) {
+  if (!rigid.empty() && std::ranges::any_of(recordings, &Recording::out_of_step)) {
     out.warnings.push_back(
         "the boards' control has another period than the log: what these joints' torques do "
         "between two samples is not known, and no interval allows for it. Do not trust their "
         "rotors and friction, nor what they carry; make both periods equal: " +
-        names);
+        rigid);
   }
+  if (names.empty()) return;
   out.remarks.push_back(fmt::format(
       "the log does not say for how long a motor's voltage was held, and in such a time the "
       "back-EMF looks like rotor inertia, and what is sampled at its end is not the mean: the "

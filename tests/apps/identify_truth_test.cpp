@@ -77,6 +77,8 @@ TEST_F(IdentifyTruth, OfALogThatIsOutOfStepWithTheBoardsHasAWarning) {
   EXPECT_NE(found.err.find("warning: the boards' control has another period than the log"),
             std::string::npos)
       << found.err;
+  for (const char* joint : {"shoulder_pan_joint", "elbow_joint", "wrist_3_joint"})
+    EXPECT_NE(found.err.find(joint), std::string::npos) << found.err;
   const nlohmann::json base = json("found.json")["base_parameters"];
   for (const auto& one : base) {
     if (one["name"].get<std::string>().find("rotor") == std::string::npos) continue;
