@@ -4,9 +4,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdio>
+#include <expected>
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 
 #include "apps/bench/commands.hpp"
@@ -52,19 +55,10 @@ struct Overloaded : F... {
   using F::operator()...;
 };
 
-}  // namespace
+using namespace tandem::apps;
 
-int main(int argc, char** argv) {
-  using namespace tandem::apps;
-  std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
-  const Command command = parse_command_line(argc, argv);
-  if (!std::holds_alternative<Exit>(command)) {  // before it does anything
-    if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {
-      print_errors({kept.error()});
-      return static_cast<int>(Exit::kUsage);
-    }
-  }
-  const Exit exit = std::visit(
+Exit perform(const Command& command) {
+  return std::visit(
       Overloaded{
           [](Exit done) { return done; },
           [](const RunOptions& options) { return run_command(options); },
@@ -93,6 +87,36 @@ int main(int argc, char** argv) {
           [](const BenchOptions& options) { return bench_command(options); },
       },
       command);
-  if (exit == Exit::kUsage) write_failure(json_argument(argc, argv));
+}
+
+/// perform() until it ends, or a stream that it prints to is full: fmt::print() throws then.
+/// @return what it returned, or the stream's errno: that was its end
+std::expected<Exit, int> performed(const Command& command) {
+  try {
+    return perform(command);
+  } catch (const std::system_error& error) {
+    if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) throw;
+    return std::unexpected(error.code().value());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at the limit of `ulimit -f` is its writer's error
+  const Command command = parse_command_line(argc, argv);
+  if (!std::holds_alternative<Exit>(command)) {  // before it does anything
+    if (const tandem::Status kept = check_writable(json_argument(argc, argv)); !kept) {
+      print_errors({kept.error()});
+      return static_cast<int>(Exit::kUsage);
+    }
+  }
+  const std::expected<Exit, int> done = performed(command);
+  Exit exit = done.value_or(Exit::kUsage);
+  const std::string json = json_argument(argc, argv);
+  const tandem::Status printed = flush_output(done || std::ferror(stdout) == 0 ? 0 : done.error());
+  if (!printed && done != Exit::kUsage) print_errors({printed.error()});  // else it has said why
+  if (!printed && exit == Exit::kDone) exit = Exit::kUsage;
+  if (exit == Exit::kUsage && (done || json != "-")) write_failure(json);
   return static_cast<int>(exit);
 }

@@ -1,9 +1,11 @@
 #include "apps/text/console.hpp"
 
 #include <fmt/core.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -20,6 +22,7 @@ namespace {
 
 Diagnostics reported;      // by print_errors(), for write_failure()
 bool has_written = false;  // by write_json()
+std::atomic<int> lost{0};  // errno with which the standard output was last thrown away
 
 /// Columns that a UTF-8 text takes: bytes that do not continue a character.
 std::size_t width(const std::string& text) {
@@ -53,6 +56,14 @@ bool holds_something_else(const std::string& file) {
   return begins[0] != '{' && begins != "[{" && begins != "[]";
 }
 
+bool is_full(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
+
+/// Whether nobody will read the standard output any more: a pipe's other end is closed.
+bool reader_is_gone() {
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0;
+}
+
 /// Writes all of it, or loses it: a stream that fails would throw where it is printed to.
 ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
   const int fd = *static_cast<const int*>(cookie);
@@ -60,7 +71,8 @@ ssize_t write_or_lose(void* cookie, const char* text, std::size_t size) {
     const ssize_t count = ::write(fd, text + done, size - done);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
-      rt::request_stop();
+      if (!is_full(errno)) rt::request_stop();
+      if (is_full(errno) && fd == STDOUT_FILENO) lost = errno;
       break;
     }
     done += static_cast<std::size_t>(count);
@@ -90,9 +102,20 @@ bool is_terminal(std::FILE* out) {
 
 void outlive_files() {
   std::signal(SIGPIPE, SIG_IGN);
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0 && is_full(errno)) lost = errno;
   stdout = lasting(STDOUT_FILENO, ::isatty(STDOUT_FILENO) != 0 ? _IOLBF : _IOFBF);
   stderr = lasting(STDERR_FILENO, _IONBF);
+}
+
+Status flush_output(int before) {
+  if (is_full(before)) lost = before;
+  errno = 0;
+  const bool failed = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
+  if (lost == 0 && (!failed || errno == EPIPE || reader_is_gone())) return {};
+  const int error = lost != 0 ? lost.load() : errno;
+  const std::string reason = error == 0 ? "" : std::string(": ") + std::strerror(error);
+  return fail("not all of the standard output could be written" + reason,
+              "send it where there is space");
 }
 
 Status write_file(const std::filesystem::path& file, const std::string& text) {
@@ -179,8 +202,9 @@ Status write_json(const std::string& file, const Json& value) {
   has_written = true;
   const std::string text = json_text(value, 2) + "\n";
   if (file == "-") {
-    fmt::print("{}", text);
-    std::fflush(stdout);
+    errno = 0;  // flush_output() says what is lost
+    if ((std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0) && is_full(errno))
+      lost = errno;
     return {};
   }
   Draft draft = Draft::file(file);
@@ -214,7 +238,8 @@ Json percentiles_json(const rt::Percentiles& p) {
 
 void print_errors(const Diagnostics& errors) {
   reported.insert(reported.end(), errors.begin(), errors.end());
-  for (const Error& error : errors) fmt::print(stderr, "error: {}\n", error.to_string());
+  for (const Error& error : errors)  // not fmt::print(), which throws when it cannot write
+    std::fputs(("error: " + error.to_string() + "\n").c_str(), stderr);
 }
 
 Exit refuse(const Diagnostics& errors) {
@@ -304,7 +329,7 @@ StatusLine::StatusLine(std::FILE* out)
     : out_(out), terminal_(is_terminal(out)), next_(std::chrono::steady_clock::now()) {}
 
 StatusLine::~StatusLine() {
-  if (drawn_) fmt::print(out_, "\n");
+  if (drawn_) std::fputs("\n", out_);  // which throws nothing
 }
 
 bool StatusLine::due() {

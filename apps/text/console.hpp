@@ -35,8 +35,14 @@ using Json = nlohmann::ordered_json;
 
 /// From now on no file ends the process in the middle of a cycle. When a pipe's reader or the
 /// terminal is gone, what is printed is thrown away and a stop is asked for (rt::request_stop()).
+/// Where no space is left it is thrown away only, and flush_output() says so at the end.
 /// Call it before other threads print.
 void outlive_files();
+
+/// Writes what is left of the standard output. An error when something that was printed could not
+/// be written, then or before; none when a pipe's reader has gone, who wants no more.
+/// @param before  errno of what could not be printed before; 0: not known
+[[nodiscard]] Status flush_output(int before = 0);
 
 /// Whether `file` and the folders that it lacks can be written, found out before a run: an error
 /// that names it when not. Nothing is made.

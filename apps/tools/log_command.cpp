@@ -1,6 +1,7 @@
 // `tandem log`: what a log holds, its columns as CSV, and how two logs differ.
 #include <fmt/core.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -124,7 +125,9 @@ std::string full_topic(const std::string& name) {
 Status write_csv(const log::LogFile& file, const LogOptions& options) {
   const std::string topic = full_topic(options.topic);
   if (options.output.empty()) {
-    return log::write_csv(file, topic, options.every, std::cout, options.fields);
+    errno = 0;
+    Status written = log::write_csv(file, topic, options.every, std::cout, options.fields);
+    return std::cout ? written : flush_output(errno);
   }
   std::error_code ignored;
   if (std::filesystem::equivalent(options.output, options.log, ignored)) {
