@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "apps/text/draft.hpp"
 #include "report/alarm_figures.hpp"
@@ -15,6 +16,7 @@ namespace tandem::apps {
 namespace {
 
 constexpr double kWatched_s = 0.2;
+constexpr const char* kBy = "tandem log thresholds";
 
 double period_of(const std::vector<double>& time_s) {
   return time_s.size() < 2
@@ -22,8 +24,23 @@ double period_of(const std::vector<double>& time_s) {
              : (time_s.back() - time_s.front()) / static_cast<double>(time_s.size() - 1);
 }
 
+/// What the runs are called: their logs without folder and ending, or all as given when two of
+/// them would be called the same.
+std::vector<std::string> names_of(const std::vector<NamedTorques>& runs) {
+  std::vector<std::string> names;
+  std::set<std::string> different;
+  for (const NamedTorques& run : runs) {
+    names.push_back(std::filesystem::path(run.path).stem().string());
+    different.insert(names.back());
+  }
+  if (different.size() == names.size()) return names;
+  for (std::size_t i = 0; i < runs.size(); ++i) names[i] = runs[i].path;
+  return names;
+}
+
 /// The pushes of a run; a time is that of the row in which it was found, counted from the push.
-AlarmTable::Pushes pushes_of(const NamedTorques& run, const std::vector<double>& thresholds_Nm,
+AlarmTable::Pushes pushes_of(const NamedTorques& run, const std::string& name,
+                             const std::vector<double>& thresholds_Nm,
                              const std::vector<double>& factors) {
   const ExternalTorques& t = run.torques;
   estimation::DetectionTimes times(thresholds_Nm, factors);
@@ -35,7 +52,7 @@ AlarmTable::Pushes pushes_of(const NamedTorques& run, const std::vector<double>&
     times.begin_push();
     for (; row < t.time_s.size() && t.time_s[row] < end_s; ++row) times.look(t.at(row));
   }
-  AlarmTable::Pushes all{std::filesystem::path(run.path).stem().string(), {}};
+  AlarmTable::Pushes all{name, {}};
   for (std::size_t f = 0; f < factors.size(); ++f) {
     auto summary = times.with(f);
     summary.median *= 1e3 * period_of(t.time_s);
@@ -76,7 +93,9 @@ AlarmTable alarm_table(const std::vector<NamedTorques>& runs,
   AlarmTable table;
   for (int i = 10; i <= 25; ++i) table.factors.push_back(0.05 * i);
   table.alarms.resize(table.factors.size());
-  for (const NamedTorques& run : runs) {
+  const std::vector<std::string> names = names_of(runs);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const NamedTorques& run = runs[i];
     const double period_s = period_of(run.torques.time_s);
     estimation::FalseAlarms alarms(thresholds_Nm, static_cast<std::uint32_t>(std::max(
                                                       1.0, std::round(kWatched_s / period_s))));
@@ -86,7 +105,7 @@ AlarmTable alarm_table(const std::vector<NamedTorques>& runs,
     for (std::size_t f = 0; f < table.factors.size(); ++f)
       table.alarms[f] += alarms.alarms(table.factors[f]);
     if (!run.torques.push_s.empty())
-      table.pushed.push_back(pushes_of(run, thresholds_Nm, table.factors));
+      table.pushed.push_back(pushes_of(run, names[i], thresholds_Nm, table.factors));
   }
   return table;
 }
@@ -118,13 +137,9 @@ Json alarms_json(const AlarmTable& table) {
   return json;
 }
 
-Result<std::string> write_alarm_page(const AlarmTable& table, const std::string& folder) {
-  if (table.pushed.empty()) {
-    return fail("no log has a push to draw",
-                "give --against a log of a run with pushes: --scenario with a [[fault]]");
-  }
-  Result<Draft> draft = Draft::folder(folder);
-  if (!draft) return std::unexpected(draft.error());
+namespace {
+
+std::vector<report::AlarmCurve> curves_of(const AlarmTable& table) {
   std::vector<report::AlarmCurve> curves;
   for (const auto& one : table.pushed) {
     report::AlarmCurve curve{one.name, {}, {}, {}};
@@ -135,7 +150,10 @@ Result<std::string> write_alarm_page(const AlarmTable& table, const std::string&
     }
     curves.push_back(std::move(curve));
   }
-  const auto figures = report::alarm_figures("alarms", "Time to detection", curves);
+  return curves;
+}
+
+report::Page page_of(const AlarmTable& table) {
   report::Page page{.title = "Collision thresholds",
                     .lead =
                         "False alarms of motion that touched nothing against the time until a "
@@ -145,11 +163,30 @@ Result<std::string> write_alarm_page(const AlarmTable& table, const std::string&
                                 "Of the learned thresholds. –: fewer than half of the "
                                 "pushes were found, or not all of them.",
                                 header_of(table),
-                                {}}}};
+                                {}}},
+                    .by = kBy};
   for (std::size_t f = 0; f < table.factors.size(); ++f)
     page.tables[0].rows.push_back(row_of(table, f));
+  return page;
+}
+
+}  // namespace
+
+Result<std::string> write_alarm_page(const AlarmTable& table, const std::string& folder) {
+  if (table.pushed.empty()) {
+    return fail("no log has a push to draw",
+                "give --against a log of a run with pushes: --scenario with a [[fault]]");
+  }
+  if (const Status kept = check_overwrites(folder + "/report.html", report::page_begin(kBy),
+                                           std::string("page of `") + kBy + "`");
+      !kept) {
+    return std::unexpected(kept.error());
+  }
+  Result<Draft> draft = Draft::folder(folder);
+  if (!draft) return std::unexpected(draft.error());
+  const auto figures = report::alarm_figures("alarms", "Time to detection", curves_of(table));
   Status made = report::draw(figures, draft->path());
-  if (made) made = report::write_page(page, figures, draft->path());
+  if (made) made = report::write_page(page_of(table), figures, draft->path());
   if (!made) return std::unexpected(draft->placed(made.error()));
   if (made = draft->place(); !made) return std::unexpected(made.error());
   return folder + "/report.html";

@@ -25,7 +25,7 @@ struct AlarmTable {
   double free_s = 0.0;                ///< before each run's first push, in whole blocks of 0.2 s
   std::vector<std::uint64_t> alarms;  ///< by factor: blocks with one
   struct Pushes {
-    std::string name;                                            ///< the log's, without folder
+    std::string name;  ///< the log's, without folder; with it where two are called the same
     std::vector<estimation::DetectionTimes::Summary> by_factor;  ///< times in ms
   };
   std::vector<Pushes> pushed;  ///< of logs with pushes

@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "apps/text/console.hpp"
+#include "apps/tools/carried_settings.hpp"
 #include "apps/tools/log_alarms.hpp"
 #include "apps/tools/log_torques.hpp"
+#include "base/counted.hpp"
 #include "estimation/collision.hpp"
+#include "estimation/config.hpp"
 
 namespace tandem::apps {
 namespace {
@@ -35,9 +39,69 @@ std::vector<double> largest_of(const ExternalTorques& run, std::size_t joint) {
   return largest;
 }
 
+/// What thresholds belong to: all logs have to have it in common.
+struct Origin {
+  std::string path;  ///< the first log's
+  std::string robot;
+  std::string description_hash;       ///< empty: not known
+  std::vector<std::string> channels;  ///< felt_channels()
+  std::optional<double> bandwidth_Hz;
+};
+
+Origin origin_of(const log::LogFile& file) {
+  Origin origin{.path = file.path(),
+                .robot = file.info().robot,
+                .description_hash = file.info().description_hash,
+                .channels = felt_channels(file),
+                .bandwidth_Hz = {}};
+  const std::optional<TomlDocument> experiment = experiment_of(file.info());
+  if (!experiment) return origin;
+  TomlTable estimation = experiment->root().table_or_empty("estimation");
+  if (!estimation.has("observer")) return origin;
+  origin.bandwidth_Hz = estimation.table_or_empty("observer")
+                            .number_or("bandwidth_Hz", estimation::ObserverConfig().bandwidth_Hz);
+  return origin;
+}
+
+/// An error when the logs' thresholds would be of different things.
+Status check_same(const Origin& first, const Origin& other) {
+  const auto refused = [&](const std::string& what, const std::string& value,
+                           const std::string& than, const std::string& hint) -> Status {
+    return std::unexpected(
+        Error{fmt::format("{}: {} here, {} in {}", what, value, than, first.path),
+              hint,
+              other.path,
+              0,
+              {}});
+  };
+  if (first.channels != other.channels) {
+    const auto text = [](const Origin& one) {
+      return fmt::format("{} with {}", one.robot, counted(one.channels.size(), "torque"));
+    };
+    return refused("the logs are of different robots", text(other), text(first),
+                   "thresholds are one robot's: give logs of one");
+  }
+  if (!first.description_hash.empty() && !other.description_hash.empty() &&
+      first.description_hash != other.description_hash) {
+    const auto text = [](const Origin& one) {
+      return fmt::format("{} {:.16}…", one.robot, one.description_hash);
+    };
+    return refused("the logs are of different descriptions", text(other), text(first),
+                   "external torques depend on the description: record all runs with one");
+  }
+  if (first.bandwidth_Hz && other.bandwidth_Hz && *first.bandwidth_Hz != *other.bandwidth_Hz) {
+    const auto text = [](const Origin& one) { return fmt::format("{} Hz", *one.bandwidth_Hz); };
+    return refused("[estimation.observer] bandwidth_Hz differs", text(other), text(first),
+                   "thresholds belong to a bandwidth: record all runs with the one that the "
+                   "thresholds are for");
+  }
+  return {};
+}
+
 /// All runs to learn from, or to try the thresholds on.
+/// @param origin  the first log's, if it is not known yet
 Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths, double from_s,
-                                           std::vector<std::string>& joints) {
+                                           std::optional<Origin>& origin) {
   std::vector<NamedTorques> all;
   std::map<std::string, std::string> seen;  // data's digest -> path
   for (const std::string& path : paths) {
@@ -45,11 +109,9 @@ Result<std::vector<NamedTorques>> read_all(const std::vector<std::string>& paths
     if (!file) return std::unexpected(file.error());
     const auto [twin, is_new] = seen.emplace(file->data_sha256(), path);
     if (!is_new) return std::unexpected(log::same_data(path, twin->second));
-    if (joints.empty()) joints = felt_channels(*file);
-    if (felt_channels(*file) != joints) {
-      return std::unexpected(
-          Error{"the logs are of different robots", "learn from one robot's runs", path, 0, {}});
-    }
+    if (!origin) origin = origin_of(*file);
+    if (const Status same = check_same(*origin, origin_of(*file)); !same)
+      return std::unexpected(same.error());
     Result<ExternalTorques> torques = read_external_torques(*file, from_s);
     if (!torques) return std::unexpected(torques.error());
     all.push_back({path, std::move(*torques)});
@@ -103,12 +165,13 @@ void print_learned(const std::vector<NamedTorques>& runs, const std::vector<std:
 }  // namespace
 
 Status print_thresholds(const LogOptions& options) {
-  std::vector<std::string> joints;
-  const auto runs = read_all(options.files, options.from_s, joints);
+  std::optional<Origin> origin;
+  const auto runs = read_all(options.files, options.from_s, origin);
   if (!runs) return std::unexpected(runs.error());
+  const std::vector<std::string> joints = origin ? origin->channels : std::vector<std::string>();
   const auto thresholds = learn(*runs, joints.size(), options.alarms_per_hour);
   if (!thresholds) return std::unexpected(thresholds.error());
-  const auto others = read_all(options.against, options.from_s, joints);
+  const auto others = read_all(options.against, options.from_s, origin);
   if (!others) return std::unexpected(others.error());
   const AlarmTable table = alarm_table(*others, *thresholds);
   Result<std::string> page = std::string();

@@ -12,8 +12,9 @@ namespace tandem::apps {
 /// with `output` that as a page with figures.
 /// What was before the bring-up, and after the controllers' end, the first fault or the first
 /// injected push, is not learned from.
-/// Errors: a log without external torques, of another robot, with less than 8 s of free motion;
-/// numbers that are not finite.
+/// Errors: a log without external torques, with less than 8 s of free motion; numbers that are not
+/// finite; logs of different robots, descriptions or bandwidths of the observer; a page that is
+/// there and is another's.
 [[nodiscard]] Status print_thresholds(const LogOptions& options);
 
 }  // namespace tandem::apps

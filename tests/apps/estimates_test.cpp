@@ -115,6 +115,74 @@ TEST_F(Thresholds, OfALogThatCannotTeachAreRefused) {
                  "log thresholds " + log + " --against " + log + " -o alarms");
 }
 
+/// Runs of 9 s that are pushed, or not.
+class ThresholdsOfLogs : public Thresholds {
+ protected:
+  void SetUp() override {
+    Thresholds::SetUp();
+    edit("robot.toml", "min_position_rad = -6.3\n",
+         "min_position_rad = -6.3\ntorque_noise_Nm = 0.01\n");
+    experiment("swing");
+    write_text(folder_ / "push.toml",
+               "[[fault]]\nkind = \"push\"\njoint = \"joint2\"\nforce_N = [0.0, 3.0, 0.0]\n"
+               "point_m = [0.0, 0.0, 0.1]\nafter_enabled_s = 3.0\nfor_s = 0.2\n");
+  }
+  [[nodiscard]] std::string pushed(const std::string& seed, const std::string& folder) const {
+    return run("swing", "--scenario push.toml --seed " + seed + " --log " + folder);
+  }
+};
+
+// Anybody's report.html in the folder was replaced.
+TEST_F(ThresholdsOfLogs, KeepAPageThatIsNotTheirs) {
+  const std::string command =
+      "log thresholds " + run("swing") + " --against " + pushed("2", "b") + " -o alarms";
+  std::filesystem::create_directory(folder_ / "alarms");
+  write_text(folder_ / "alarms/report.html", "<html>mine</html>\n");
+  expect_refused({"alarms/report.html", "it is no page of `tandem log thresholds`"}, command);
+  EXPECT_EQ(read_text(folder_ / "alarms/report.html"), "<html>mine</html>\n");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "alarms/alarms_median.png"));
+  std::filesystem::remove(folder_ / "alarms/report.html");
+  for (int i = 0; i < 2; ++i) {  // its own is replaced
+    const Outcome outcome = tandem(command);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+  }
+}
+
+// The second overwrote the first in the JSON.
+TEST_F(ThresholdsOfLogs, TellLogsOfOneNameApart) {
+  const std::string a = pushed("2", "A"), b = pushed("3", "B");
+  const Outcome outcome =
+      tandem("log thresholds " + run("swing") + " --against " + a + " " + b + " --json t.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto pushes = json("t.json")["against"]["factors"][0]["pushed"];
+  EXPECT_EQ(pushes.size(), 2U) << pushes;
+  for (const std::string& log : {a, b}) {
+    EXPECT_TRUE(pushes.contains(log)) << log << " in " << pushes;
+    EXPECT_NE(outcome.out.find(log + ": median"), std::string::npos) << outcome.out;
+  }
+}
+
+// Thresholds were learned from logs that have nothing in common.
+TEST_F(ThresholdsOfLogs, OfTwoBandwidthsAreRefused) {
+  const std::string first = run("swing");
+  write_text(folder_ / "fast.toml", read_text(folder_ / "swing.toml") + "bandwidth_Hz = 30.0\n");
+  const std::string fast = run("fast", "--seed 2");
+  const std::vector<std::string> texts{first, fast, "bandwidth_Hz", "30 Hz", "15 Hz", "record"};
+  expect_refused(texts, "log thresholds " + first + " " + fast);
+  expect_refused(texts, "log thresholds " + first + " --against " + fast);
+  write_text(folder_ / "same.toml", read_text(folder_ / "swing.toml") + "bandwidth_Hz = 15\n");
+  const Outcome same = tandem("log thresholds " + first + " " + run("same", "--seed 2"));
+  EXPECT_EQ(same.status, 0) << "what is not written is 15 Hz: " << same.err;
+}
+
+TEST_F(ThresholdsOfLogs, OfTwoDescriptionsAreRefused) {
+  const std::string first = run("swing");
+  edit("double_pendulum.urdf", "0.26703", "0.26803");
+  const std::string heavy = run("swing", "--seed 2");
+  expect_refused({first, heavy, "different descriptions", "double_pendulum", "record"},
+                 "log thresholds " + first + " " + heavy);
+}
+
 /// COMAN squats; its log has no truth, so that the base is the estimate's or unknown.
 class EstimatedReport : public Program {
  protected:
