@@ -250,7 +250,8 @@ Exit refuse(const Diagnostics& errors) {
 Exit refuse(const Error& error) { return refuse(Diagnostics{error}); }
 
 void print_warnings(const Diagnostics& warnings) {
-  for (const Error& warning : warnings) fmt::print(stderr, "warning: {}\n", warning.to_string());
+  for (const Error& warning : warnings)  // as above
+    std::fputs(("warning: " + warning.to_string() + "\n").c_str(), stderr);
 }
 
 namespace {

@@ -56,6 +56,13 @@ TEST_F(FullOutput, DoesNotStopARun) {
   EXPECT_EQ(with("2>/dev/full >out.txt", run + "run.json").status, 0);
 }
 
+// A warning that could not be written had ended the command.
+TEST_F(FullOutput, OfErrorsTakesNothingFromTheOther) {
+  EXPECT_EQ(with("2>/dev/full >out.txt", "check hold.toml").status, 0);
+  const std::string printed = read_text(folder_ / "out.txt");
+  EXPECT_EQ(printed, tandem("check hold.toml").out);
+}
+
 TEST_F(FullOutput, IsNotAClosedPipe) {
   const auto expect_quiet = [&](const std::string& command) {
     const std::string err = read_text(folder_ / "err.txt");
