@@ -105,6 +105,7 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
 }
 
 Status Estimator::check(const hal::Robot& robot, const EstimationConfig& config) {
+  if (config.any() && !robot.passive.empty()) return in_table(passive_joint(robot), "estimation");
   if (!config.base) return {};
   const auto imu = BaseEstimator::find_imu(robot, *config.base);
   if (!imu) return in_table(imu.error(), "estimation.base");

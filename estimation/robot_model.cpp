@@ -13,16 +13,19 @@ int index_of(const char* const* names, std::size_t count, const std::string& nam
   return -1;
 }
 
+Error passive_joint(const hal::Robot& robot) {
+  return fail("the joint '" + robot.passive.front().name +
+                  "' is passive: nothing measures its torque and position",
+              "leave [estimation] out for a robot with [[passive]] joints")
+      .error();
+}
+
 Result<ModelJoints> ModelJoints::make(const hal::Robot& robot, const tandem_kernels* kernels) {
   if (kernels == nullptr) {
     return fail("estimation needs the robot's generated model",
                 "run `tandem model build " + robot.file + "`");
   }
-  if (!robot.passive.empty()) {
-    return fail("the joint '" + robot.passive.front().name +
-                    "' is passive: nothing measures its torque and position",
-                "leave [estimation] out for a robot with [[passive]] joints");
-  }
+  if (!robot.passive.empty()) return std::unexpected(passive_joint(robot));
   ModelJoints map;
   for (const hal::Joint& joint : robot.joints) {
     const int at = index_of(kernels->joint_names, kernels->joints, joint.name);

@@ -15,6 +15,9 @@
 
 namespace tandem::estimation {
 
+/// Why a robot with passive joints has no estimates. @pre it has some
+[[nodiscard]] Error passive_joint(const hal::Robot& robot);
+
 /// Where the image's joints stand among the kernels'. Every joint of the model has a motor, so that
 /// its position, velocity and torque are measured.
 class ModelJoints {

@@ -124,13 +124,24 @@ std::optional<Error> no_retreat(const Composition& c) {
                .key = keys.front().second};
 }
 
+/// Of [estimation], with the line of its table.
+void refuse_estimation(const runtime::Experiment& e, const Error& error, Collector& errors) {
+  TomlTable root = e.document.root();
+  const std::string table = "estimation";
+  const bool of_part = error.key.starts_with(table + ".");
+  const std::string part = of_part ? error.key.substr(table.size() + 1) : "";
+  const std::string name = part.substr(0, part.find('.'));
+  errors.add(error, e.file,
+             name.empty() ? root.line(table) : root.table_or_empty(table).line(name));
+}
+
 /// What the experiment wants estimated, shown to the controllers that are added after it.
 void add_estimator(Composition& c, Collector& errors) {
   const runtime::Experiment& e = c.experiment;
   if (!e.estimation.any()) return;
   auto made = estimation::Estimator::make(hal::robot_of(e.robot), c.kernels.get(), e.estimation,
                                           e.loop.period_ns);
-  if (!made) return errors.add(made.error(), e.file, 0);
+  if (!made) return refuse_estimation(e, made.error(), errors);
   c.estimator = std::move(*made);
   c.controllers->show_estimate(&c.estimator->image());
 }
@@ -148,7 +159,7 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
       overrides.missing_kernels != MissingKernels::kTolerate) {
     if (!overrides.serves) add_controllers(c, errors);
     const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
-    if (!needs) errors.add(needs.error(), e.file, 0);
+    if (!needs) refuse_estimation(e, needs.error(), errors);
     if (!errors.empty()) return false;
     c.notes.clear();
     kernels = supply_kernels(robot, e.kernel_variant, overrides.missing_kernels);
@@ -158,7 +169,11 @@ bool add_kernels(Composition& c, const RobotFiles& robot, const Overrides& overr
     return true;
   }
   c.kernels = std::move(*kernels);
-  if (c.kernels.get() == nullptr) return true;
+  if (c.kernels.get() == nullptr) {
+    const Status needs = estimation::Estimator::check(hal::robot_of(e.robot), e.estimation);
+    if (!needs) refuse_estimation(e, needs.error(), errors);
+    return true;
+  }
   c.controllers =
       std::make_unique<runtime::ControllerHost>(e.robot, c.kernels.get(), e.loop.period_ns);
   c.controllers->start_from(start_of(e));

@@ -269,6 +269,31 @@ TEST_F(EstimatedReport, RefusesThatRobotBeforeItsKernelsAreCompiled) {
   EXPECT_EQ(refused.status, 2);
   EXPECT_NE(refused.err.find("has no force/torque sensor"), std::string::npos) << refused.err;
   EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;
+  const Outcome checked =
+      tandem("check squat.toml", "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+  EXPECT_EQ(checked.status, 2) << "it was right until the kernels were there";
+  const std::string text = read_text(folder_ / "squat.toml");
+  const auto line = std::count(text.begin(), text.end(), '\n');
+  EXPECT_NE(checked.err.find("squat.toml:" + std::to_string(line) + ": estimation.base"),
+            std::string::npos)
+      << checked.err;
+}
+
+TEST_F(EstimatedReport, RefusesPassiveJointsBeforeKernelsAreCompiled) {
+  const std::string config = TANDEM_SOURCE_DIR "/config/four_bar/";
+  for (const auto& entry : std::filesystem::directory_iterator(config))
+    std::filesystem::copy(entry, folder_ / entry.path().filename(),
+                          std::filesystem::copy_options::overwrite_existing);
+  std::string robot = read_text(folder_ / "robot.toml");
+  robot.replace(robot.find("name = \"four_bar\""), 17, "name = \"another\"");
+  write_text(folder_ / "robot.toml", robot);
+  write_text(folder_ / "hold.toml", read_text(folder_ / "hold.toml") + "\n[estimation.observer]\n");
+  for (const std::string command : {"check hold.toml", "run hold.toml --no-log"}) {
+    const Outcome refused = tandem(command, "XDG_CACHE_HOME='" + folder_.string() + "/cache'");
+    EXPECT_EQ(refused.status, 2) << command;
+    EXPECT_NE(refused.err.find("is passive"), std::string::npos) << refused.err;
+    EXPECT_EQ(refused.err.find("compiling"), std::string::npos) << refused.err;
+  }
 }
 
 }  // namespace
