@@ -108,7 +108,7 @@ std::string text_of(const Event& event, bool has_joint) {
     case EventKind::kCollision: {
       const bool force = !has_joint && event.value >= -3.0F;  // -1 to -6: of the base
       char torque[64];
-      std::snprintf(torque, sizeof torque, "%s: an external %s of %.1f %s",
+      std::snprintf(torque, sizeof torque, "%s: an external %s of %.3g %s",
                     has_joint ? "" : " of the base", force ? "force" : "torque", 1e-3 * event.code,
                     force ? "N" : "Nm");
       return torque;

@@ -40,11 +40,11 @@ std::string in_units(const FaultRecord& record, const FaultContext& about) {
   char text[64];
   if (record.index < 0) {  // the base
     const int channel = -1 - record.index;
-    std::snprintf(text, sizeof text, "%.1f %s (%s)", 1e-3 * record.code, channel < 3 ? "N" : "Nm",
+    std::snprintf(text, sizeof text, "%.3g %s (%s)", 1e-3 * record.code, channel < 3 ? "N" : "Nm",
                   estimation::kBaseChannels[static_cast<std::size_t>(channel)]);
     return text;
   }
-  std::snprintf(text, sizeof text, "%.1f %s", 1e-3 * record.code,
+  std::snprintf(text, sizeof text, "%.3g %s", 1e-3 * record.code,
                 about.robot.joints[joint].slides ? "N" : "Nm");
   return text;
 }

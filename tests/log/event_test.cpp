@@ -59,6 +59,9 @@ TEST(Event, SaysWhatHappenedInOneLine) {
   event = {.code = 1500, .joint = 1, .kind = EventKind::kCollision};
   EXPECT_EQ(describe(event, kNames), "fault: collision of knee: an external torque of 1.5 Nm");
   EXPECT_TRUE(is_stop(event));
+  event.code = 4;  // of a wrist
+  EXPECT_EQ(describe(event, kNames), "fault: collision of knee: an external torque of 0.004 Nm");
+  event.code = 1500;
   event.reported = 1;
   EXPECT_EQ(describe(event, kNames),
             "fault: collision of knee: an external torque of 1.5 Nm, reported");
