@@ -42,7 +42,7 @@ class GravityCompensation : public Controller {
         setup.parameters.choice_or("mode", "compliant", {"compliant", "torque"}) == "compliant";
     if (const Status standing = stand(setup); !standing) return standing;
     claim_joints(setup);
-    sines_.emplace(*kernels_);
+    sines_ = model::Sines(*kernels_);
     q_.assign(kernels_->nq, 0.0);
     map_.passive_to_q(q_);
     rest_.assign(kernels_->nv, 0.0);
@@ -148,8 +148,8 @@ class GravityCompensation : public Controller {
     if (imu_) turn_base(state.sensor_values(imu_->sensor));
     close_loops();
     locate();
-    kernels_->bias_at(sines_->data(), q_.data(), rest_.data(), tau_.data());
-    kernels_->site_jacobians_at(sines_->data(), q_.data(), J_.data());
+    kernels_->bias_at(sines_.data(), q_.data(), rest_.data(), tau_.data());
+    kernels_->site_jacobians_at(sines_.data(), q_.data(), J_.data());
     support_->carry(*kernels_, q_, pose_, J_, tau_);
     map_.carry_passive(tau_);
   }
@@ -163,8 +163,8 @@ class GravityCompensation : public Controller {
   }
 
   void locate() noexcept TANDEM_RT {
-    sines_->take(q_.data());
-    kernels_->site_twists_at(sines_->data(), q_.data(), rest_.data(), pose_.data(), twist_.data());
+    sines_.take(q_.data());
+    kernels_->site_twists_at(sines_.data(), q_.data(), rest_.data(), pose_.data(), twist_.data());
   }
 
   /// The base's orientation from the IMU's: R_WB = R_WS R_BS^T.
@@ -186,7 +186,7 @@ class GravityCompensation : public Controller {
     std::size_t site = 0;
   };
   const tandem_kernels* kernels_ = nullptr;
-  std::optional<model::Sines> sines_;  // of locate()'s posture
+  model::Sines sines_;  // of locate()'s posture
   ModelMap map_;
   std::optional<Support> support_;  // of a floating base
   std::optional<Imu> imu_;

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <optional>
 #include <string_view>
 
 #include "controllers/controller.hpp"
@@ -165,7 +164,7 @@ class ToolPath : public Controller {
  private:
   void allocate() {
     const std::size_t nv = kernels_->nv;
-    sines_.emplace(*kernels_);
+    sines_ = model::Sines(*kernels_);
     q_.assign(kernels_->nq, 0.0);
     zero_.assign(nv, 0.0);
     pose_.assign(12 * kernels_->sites, 0.0);
@@ -189,8 +188,8 @@ class ToolPath : public Controller {
   /// Of the references, in the base's frame.
   Eigen::Vector3d site_m() noexcept TANDEM_RT {
     map_.positions_to_q(reference_, q_);
-    sines_->take(q_.data());
-    kernels_->site_twists_at(sines_->data(), q_.data(), zero_.data(), pose_.data(), motion_.data());
+    sines_.take(q_.data());
+    kernels_->site_twists_at(sines_.data(), q_.data(), zero_.data(), pose_.data(), motion_.data());
     return Eigen::Map<const Eigen::Vector3d>(&pose_[12 * site_ + 9]);
   }
 
@@ -218,7 +217,7 @@ class ToolPath : public Controller {
   /// @return what the site missed it by before [m]
   double follow(double t_s) noexcept TANDEM_RT {
     const Eigen::Vector3d error = wanted_m(t_s) - site_m();
-    kernels_->site_jacobians_at(sines_->data(), q_.data(), jacobians_.data());
+    kernels_->site_jacobians_at(sines_.data(), q_.data(), jacobians_.data());
     const std::size_t nv = kernels_->nv;
     const double* J = &jacobians_[6 * nv * site_];
     for (std::size_t k = 0; k < joints_.size(); ++k) {
@@ -275,7 +274,7 @@ class ToolPath : public Controller {
 
   const hal::Robot* robot_ = nullptr;
   const tandem_kernels* kernels_ = nullptr;
-  std::optional<model::Sines> sines_;  // of the references
+  model::Sines sines_;  // of the references
   ModelMap map_;
   std::size_t site_ = 0;
   std::vector<std::size_t> joints_;

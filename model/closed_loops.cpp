@@ -56,7 +56,7 @@ Result<ClosedLoops> ClosedLoops::create(const std::vector<LoopSpec>& loops,
                                         const tandem_kernels& kernels) {
   ClosedLoops result;
   result.kernels_ = &kernels;
-  result.sines_.emplace(kernels);
+  result.sines_ = Sines(kernels);
   for (const LoopSpec& loop : loops)
     if (Status status = result.add(loop); !status) return std::unexpected(status.error());
   const std::vector<std::string> joints = names(kernels.joint_names, kernels.joints);
@@ -102,7 +102,7 @@ Status ClosedLoops::add(const LoopSpec& spec) {
 
 void ClosedLoops::move(const double* q, const double* v) noexcept TANDEM_RT {
   if (loops_.empty()) return;
-  sines_->take(q);
+  sines_.take(q);
   kernels_->site_motion_at(sines(), q, v, zero_.data(), pose_.data(), twist_.data(),
                            acceleration_.data());
   LoopEquation* row = rows_.data();

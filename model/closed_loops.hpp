@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -72,7 +71,7 @@ class ClosedLoops {
 
   /// For the kernels' _at forms at move()'s q; null without a loop.
   [[nodiscard]] const double* sines() const noexcept {
-    return loops_.empty() ? nullptr : sines_->data();
+    return loops_.empty() ? nullptr : sines_.data();
   }
 
   /// How far a loop is open, as of move() [m]; for a rod, how much too long or short.
@@ -114,7 +113,7 @@ class ClosedLoops {
   void step_passive(double* unknown) noexcept;
 
   const tandem_kernels* kernels_ = nullptr;
-  std::optional<Sines> sines_;  // of move()'s posture
+  Sines sines_;  // of move()'s posture
   std::vector<Loop> loops_;
   std::vector<LoopEquation> rows_;
   std::vector<std::size_t> passive_;

@@ -19,6 +19,8 @@ namespace tandem::model {
 /// ```
 class Sines {
  public:
+  /// Of no robot: only to be replaced.
+  Sines() = default;
   /// @param kernels  outlive it
   explicit Sines(const tandem_kernels& kernels)
       : kernels_(&kernels), table_(std::size_t{kernels.sine_count} / 4 + 1) {}
@@ -32,7 +34,7 @@ class Sines {
   struct alignas(32) Vector {
     double value[4] = {};
   };
-  const tandem_kernels* kernels_;
+  const tandem_kernels* kernels_ = nullptr;
   std::vector<Vector> table_;
 };
 
