@@ -22,12 +22,11 @@ namespace tandem::estimation {
 ///
 /// p holds v's noise times M, of which r keeps K times what is faster than K: encoders' counts make
 /// velocities noisier the faster they change. The second low pass takes that away, for a step that
-/// arrives 3 ms later.
+/// arrives later: 3 ms at 15 Hz.
 ///
 /// tau is what the springs, or rigid drives, do to the links. So the motor's friction and, behind a
 /// spring, the rotor's inertia do not enter; a rigid drive's rotor is armature of the model. What
-/// is left in r of a robot that nobody touches: errors of masses, of tau, and of v, with K M times
-/// v's noise.
+/// is left in the residual of a robot that nobody touches: errors of masses, of tau, and of v.
 ///
 /// Steps by the trapezoidal rule and the implicit Euler method in r and in the residual:
 /// r <- (r + K (p - p_before - h (tau + b, mean of both ends))) / (1 + K h).

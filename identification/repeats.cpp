@@ -9,6 +9,9 @@ namespace {
 // Of the variance that unrelated positions differ by.
 constexpr double kSame = 0.01, kOther = 0.3;
 
+// Of these the median is known well enough, whatever the log's length.
+constexpr std::size_t kInstants = 2000;
+
 /// Positions every `stride` samples, each joint with mean 0 and variance 1: those that move.
 std::vector<Signal> standardised(const std::vector<Signal>& position, std::size_t stride) {
   std::vector<Signal> out;
@@ -34,7 +37,8 @@ std::vector<Signal> standardised(const std::vector<Signal>& position, std::size_
 /// time, so that a rest before or after does not count.
 double difference(const std::vector<Signal>& position, std::size_t lag) {
   std::vector<double> squares;
-  for (std::size_t i = lag; i < position.front().size(); ++i) {
+  const std::size_t n = position.front().size(), hop = 1 + (n - lag) / kInstants;
+  for (std::size_t i = lag; i < n; i += hop) {
     double sum = 0.0;
     for (const Signal& one : position)
       sum += 0.5 * (one[i] - one[i - lag]) * (one[i] - one[i - lag]);
@@ -70,15 +74,19 @@ double motion_period_s(const std::vector<Signal>& position, double period_s, std
   }
   if (first > n / 2) return 0.0;
   while (first < n / 2 && difference(motion, first + 1) < difference(motion, first)) ++first;
+  // Over k periods a step is 1 / k of one. Less than half a period around, so that it stays the
+  // k-th.
+  const std::size_t around = std::min<std::size_t>(2, (first - 1) / 2);
   auto period = static_cast<double>(first);
-  const auto best_near = [&](std::size_t lag) {
+  for (std::size_t k = 2; k <= n / first; ++k) {
+    const double periods = static_cast<double>(k) * period;
+    if (periods > 0.5 * static_cast<double>(n)) break;
+    const std::size_t lag = static_cast<std::size_t>(periods) - around;
     std::size_t best = lag;
-    for (std::size_t one = lag; one <= lag + 4 && one < n; ++one)
+    for (std::size_t one = lag; one <= lag + 2 * around && one < n; ++one)
       if (difference(motion, one) < difference(motion, best)) best = one;
-    return best;
-  };
-  for (double k = 2.0; k * period <= 0.5 * static_cast<double>(n); k += 1.0)
-    period = static_cast<double>(best_near(static_cast<std::size_t>(k * period) - 2)) / k;
+    period = static_cast<double>(best) / static_cast<double>(k);
+  }
   return period * period_s * static_cast<double>(stride);
 }
 

@@ -31,6 +31,22 @@ TEST(MotionPeriod, IsNoneOfAMotionThatDoesNotRepeat) {
   EXPECT_EQ(motion_period_s({Signal(5000, 0.3)}, 1e-3, 50), 0.0);
 }
 
+// Refining went down to a period of 0 and never ended.
+TEST(MotionPeriod, OfAFewStridesIsFound) {
+  for (const double period_s : {0.1, 0.15, 0.2, 0.3}) {
+    std::vector<Signal> position(1);
+    for (int k = 0; k < 20'000; ++k)
+      position[0].push_back(std::sin(kTurn * 1e-3 * k / period_s + 0.3));
+    EXPECT_NEAR(motion_period_s(position, 1e-3, 50), period_s, 1e-9);
+  }
+}
+
+TEST(MotionPeriod, IsFoundInALongLog) {
+  std::vector<Signal> position(1);
+  for (int k = 0; k < 300'000; ++k) position[0].push_back(std::sin(kTurn * 1e-3 * k / 7.31));
+  EXPECT_NEAR(motion_period_s(position, 1e-3, 50), 7.31, 0.01);
+}
+
 /// Ten periods of 60 instants: errors that are new (0) or the same in each (1).
 struct Errors {
   Eigen::VectorXd residual{600};
