@@ -12,6 +12,7 @@
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
 #include "apps/run/operator_link.hpp"
+#include "apps/run/retreats.hpp"
 #include "controllers/plugin_loader.hpp"
 #include "hal/config/capabilities.hpp"
 #include "hal/ethercat-can/bus_load.hpp"
@@ -74,54 +75,6 @@ void add_controllers(Composition& c, Collector& errors) {
     c.notes.push_back({spec.name, doc, spec.active, retreats});
   }
   errors.add(c.experiment.document.diagnostics());
-}
-
-bool retreats(const Composition& c) {
-  return std::ranges::any_of(c.notes, &ControllerNote::retreats);
-}
-
-/// A collision's "retract" that no controller can carry out.
-std::optional<Error> no_retract(const Composition& c) {
-  const runtime::Experiment& e = c.experiment;
-  const bool asked =
-      e.estimation.collision && e.estimation.collision->reaction == hal::StopCategory::kCategory2;
-  if (!asked || retreats(c)) return std::nullopt;
-  TomlTable estimation = e.document.root().table_or_empty("estimation");
-  return Error{.message = fmt::format("\"retract\" will be category 1: no controller of {} can "
-                                      "bring the robot to a safe posture",
-                                      e.file),
-               .hint = "add a controller that can retreat, such as squat, or say \"hold\"",
-               .file = e.file,
-               .line = estimation.table_or_empty("collision").line("reaction"),
-               .key = "estimation.collision.reaction"};
-}
-
-/// Stops of category 2 that robot.toml asks for, and that no controller can carry out.
-std::optional<Error> no_retreat(const Composition& c) {
-  using hal::StopCategory;
-  const hal::RobotConfig& robot = c.experiment.robot;
-  if (retreats(c)) return std::nullopt;
-  std::vector<std::pair<int, std::string>> keys;  // by line
-  if (robot.emergency_stop == StopCategory::kCategory2) {
-    keys.emplace_back(robot.emergency_stop_line, "safety.emergency_stop");
-  }
-  for (const hal::JointConfig& joint : robot.joints) {
-    if (joint.on_fault != StopCategory::kCategory2) continue;
-    keys.emplace_back(joint.on_fault_line, "joint." + joint.name + ".on_fault");
-  }
-  if (keys.empty()) return std::nullopt;
-  std::ranges::sort(keys);
-  const std::string more =
-      keys.size() == 1 ? "" : fmt::format(", and so will {} more", keys.size() - 1);
-  return Error{.message = fmt::format("\"category2\" will be category 1{}: no controller of {} can "
-                                      "bring the robot to a safe posture",
-                                      more, c.experiment.file),
-               .hint =
-                   "add a controller that can retreat, such as squat, or say \"category1\" "
-                   "(docs/safety.md)",
-               .file = robot.file,
-               .line = keys.front().first,
-               .key = keys.front().second};
 }
 
 /// Of [estimation], with the line of its table.
@@ -469,8 +422,7 @@ std::expected<std::unique_ptr<Composition>, Diagnostics> compose(const std::stri
   if (!overrides.serves) add_controllers(*c, errors);
   add_owner(*c, errors);
   if (!errors.empty()) return errors.give();
-  for (auto warning : {no_retreat(*c), no_retract(*c)})
-    if (warning) c->warnings.push_back(std::move(*warning));
+  for (Error& warning : missing_retreats(*c)) c->warnings.push_back(std::move(warning));
   if (auto failed = add_parallel(*c, overrides); !failed.empty()) return std::unexpected(failed);
   const bool simulated = e.hal.backend == runtime::BackendKind::kSim;
   if (!simulated || c->kernels.get() == nullptr) return c;

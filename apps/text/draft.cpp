@@ -93,7 +93,8 @@ bool is_alive(pid_t process) {
   return process != ::getpid() && (::kill(process, 0) == 0 || errno == EPERM);
 }
 
-/// The number at the begin of `text`, as std::to_string() writes it; 0: there is none. Cuts it off.
+/// The number at the beginning of `text`, as std::to_string() writes it; 0: there is none. Cuts it
+/// off.
 pid_t take_process(std::string_view& text) {
   pid_t process = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), process);
