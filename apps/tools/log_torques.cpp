@@ -21,6 +21,7 @@ std::unexpected<Error> log_error(const log::LogFile& file, std::string message, 
 /// What the log's events say of it.
 struct Span {
   double begin_s = 0.0, end_s = std::numeric_limits<double>::infinity();
+  double stop_s = std::numeric_limits<double>::infinity();  ///< also by a collision
   std::vector<double> push_s;
 };
 Result<Span> under_control(const log::LogFile& file) {
@@ -39,6 +40,7 @@ Result<Span> under_control(const log::LogFile& file) {
                       event.kind == EventKind::kStopRequested ||
                       (log::is_fault(event.kind) && !found);
     if (ends) span.end_s = std::min(span.end_s, time_s);
+    if (log::is_stop(event)) span.stop_s = std::min(span.stop_s, time_s);
   }
   return span;
 }
@@ -90,6 +92,11 @@ Result<ExternalTorques> read_external_torques(const log::LogFile& file, double f
   ExternalTorques all{.time_s = {table->time_s.begin() + first, table->time_s.begin() + last},
                       .torque_Nm = {},
                       .push_s = std::move(span->push_s)};
+  std::erase_if(all.push_s, [&](double push_s) {
+    const bool seen = !all.time_s.empty() && push_s >= all.time_s.front() &&
+                      push_s <= std::min(all.time_s.back(), span->stop_s);
+    return !seen;
+  });
   for (std::size_t j = 0; j < names.size(); ++j) {
     const auto begin = table->columns[j].begin();
     all.torque_Nm.emplace_back(begin + first, begin + last);

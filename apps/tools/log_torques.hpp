@@ -12,7 +12,9 @@ namespace tandem::apps {
 struct ExternalTorques {
   std::vector<double> time_s;
   std::vector<std::vector<double>> torque_Nm;  ///< by felt_channels(), as long as time_s
-  std::vector<double> push_s;                  ///< when an injected push began
+  /// When an injected push began, while the robot moved: none after a stop, of which a collision
+  /// may be the cause.
+  std::vector<double> push_s;
   /// Rows before the first push: motion that touched nothing.
   [[nodiscard]] std::size_t free_rows() const;
   /// Of all joints. @param row  of time_s

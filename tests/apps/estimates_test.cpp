@@ -72,6 +72,36 @@ TEST_F(Thresholds, OfThreeRunsHoldInAFourthAndFindItsPushes) {
             1);
 }
 
+// The first push stopped the run; the second, of a robot that stood still or hung from its joints,
+// counted as missed.
+TEST_F(Thresholds, CountThePushesOfARunUntilItStops) {
+  edit("robot.toml", "min_position_rad = -6.3\n",
+       "min_position_rad = -6.3\ntorque_noise_Nm = 0.01\n");
+  experiment("swing");
+  const std::string free = run("swing");
+  write_text(folder_ / "stops.toml",
+             read_text(folder_ / "swing.toml") +
+                 "[estimation.collision]\nreaction = \"hold\"\n"
+                 "[estimation.collision.threshold_Nm]\n\"joint1\" = 0.5\n\"joint2\" = 0.3\n");
+  std::string pushes;
+  for (const char* after_s : {"3.0", "6.0"}) {
+    pushes += std::string("[[fault]]\nkind = \"push\"\njoint = \"joint2\"\n") +
+              "force_N = [0.0, 3.0, 0.0]\npoint_m = [0.0, 0.0, 0.1]\nfor_s = 0.2\n" +
+              "after_enabled_s = " + after_s + "\n";
+  }
+  write_text(folder_ / "pushes.toml", pushes);
+  EXPECT_EQ(tandem("run stops.toml --duration 9 --quiet --scenario pushes.toml --json stops.json")
+                .status,
+            1);
+  const std::string stopped = json("stops.json")["log"]["path"];
+  const Outcome outcome =
+      tandem("log thresholds " + free + " --json learned.json --against " + stopped);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto learned = json("learned.json");
+  for (const auto& one : learned["against"]["factors"])
+    EXPECT_EQ(one["pushed"].begin().value()["pushes"], 1) << one;
+}
+
 // Without noise every seed makes the same run: three of them were taken for three runs.
 TEST_F(Thresholds, OfOneRunTwiceAreRefused) {
   experiment("swing");
