@@ -12,6 +12,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 namespace tandem::log {
 namespace {
@@ -89,17 +90,38 @@ Status McapWriter::open(const std::string& path, const WriterOptions& options) {
   return {};
 }
 
+void McapWriter::look_at_file() {
+  struct stat found {};
+  if (failed() || ::fstat(file_, &found) != 0 || !S_ISREG(found.st_mode)) return;
+  const auto size = static_cast<std::uint64_t>(found.st_size);
+  if (found.st_nlink == 0) {
+    fail("its file was deleted during the run", 0);
+  } else if (size < offset_) {
+    fail("its file was cut to " + std::to_string(size) + " bytes during the run", size);
+  }
+}
+
+void McapWriter::fail(std::string error, std::uint64_t kept_bytes) {
+  error_ = std::move(error);
+  kept_bytes_ = kept_bytes;
+}
+
+std::uint64_t McapWriter::lost() const noexcept {
+  if (!failed()) return 0;
+  std::uint64_t kept = 0;
+  for (const Chunk& chunk : chunks_) {
+    if (chunk.offset + chunk.length <= kept_bytes_) kept += chunk.messages;
+  }
+  return statistics_.messages - kept;
+}
+
 void McapWriter::emit(std::span<const std::byte> bytes) {
   crc_ = crc(crc_, bytes);
-  struct stat found {};
-  if (!failed() && ::fstat(file_, &found) == 0 && S_ISREG(found.st_mode) && found.st_nlink == 0) {
-    deleted_ = true;
-    error_ = "its file was deleted during the run";
-  }
+  look_at_file();
   while (!bytes.empty() && !failed()) {
     const ssize_t written = ::write(file_, bytes.data(), bytes.size());
     if (written < 0) {
-      if (errno != EINTR) error_ = std::strerror(errno);
+      if (errno != EINTR) fail(std::strerror(errno), offset_);
       continue;
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
@@ -194,6 +216,8 @@ void McapWriter::finish_chunk() {
   chunk.offset = offset_;
   chunk.compressed = records.size();
   chunk.uncompressed = chunk_.size();
+  chunk.messages = statistics_.messages - chunked_messages_;
+  chunked_messages_ = statistics_.messages;
 
   Bytes head;
   append(head, chunk.start_time);
@@ -208,7 +232,7 @@ void McapWriter::finish_chunk() {
   append(record, head);
   emit(record);
   emit(records);
-  chunk.length = offset_ - chunk.offset;
+  chunk.length = record.size() + records.size();
   write_indices(chunk);
   chunks_.push_back(std::move(chunk));
   chunk_.clear();
@@ -318,15 +342,17 @@ Status McapWriter::close() {
   append(end, crc_);
   emit_record(Opcode::kDataEnd, end);
   write_summary();
+  look_at_file();
   const int closed = ::close(file_);
   file_ = -1;
-  if (closed != 0 && !failed()) error_ = std::strerror(errno);
+  if (closed != 0 && !failed()) fail(std::strerror(errno), offset_);
   if (!failed()) return {};
-  return std::unexpected(
-      Error{.message = "the log is incomplete: " + error_,
-            .hint = deleted_ ? "record the run again" : "it can be read up to where writing failed",
-            .file = path_,
-            .key = {}});
+  return std::unexpected(Error{.message = "the log is incomplete: " + error_,
+                               .hint = kept_bytes_ == 0
+                                           ? "record the run again"
+                                           : "it can be read up to where writing failed",
+                               .file = path_,
+                               .key = {}});
 }
 
 }  // namespace tandem::log

@@ -51,8 +51,8 @@ class McapWriter {
   [[nodiscard]] bool failed() const noexcept { return !error_.empty(); }
   /// "No space left on device", or empty.
   [[nodiscard]] const std::string& error() const noexcept { return error_; }
-  /// The file is in no folder any more: what was written is lost as well.
-  [[nodiscard]] bool deleted() const noexcept { return deleted_; }
+  /// Of messages(), those that are not in the file: all of them when it was deleted.
+  [[nodiscard]] std::uint64_t lost() const noexcept;
   [[nodiscard]] std::uint64_t bytes_written() const noexcept { return offset_; }
   [[nodiscard]] std::uint64_t messages() const noexcept { return statistics_.messages; }
 
@@ -64,7 +64,7 @@ class McapWriter {
   struct Chunk {  // what the summary says of a finished one
     std::uint64_t start_time = 0, end_time = 0, offset = 0, length = 0;
     std::map<std::uint16_t, std::uint64_t> index_offsets;
-    std::uint64_t index_length = 0, compressed = 0, uncompressed = 0;
+    std::uint64_t index_length = 0, compressed = 0, uncompressed = 0, messages = 0;
   };
   struct MetadataPlace {
     std::uint64_t offset, length;
@@ -75,6 +75,8 @@ class McapWriter {
     std::map<std::uint16_t, std::uint64_t> per_channel;
   };
 
+  void look_at_file();  // fails when it was deleted or cut meanwhile
+  void fail(std::string error, std::uint64_t kept_bytes);
   void emit(std::span<const std::byte> bytes);  // to the file, into the CRC
   void emit_record(Opcode opcode, const Bytes& content);
   void finish_chunk();
@@ -85,16 +87,17 @@ class McapWriter {
   [[nodiscard]] Bytes chunk_index_content(const Chunk& chunk) const;
 
   int file_ = -1;
-  bool deleted_ = false;
   std::string path_, error_;
   WriterOptions options_;
   std::uint64_t offset_ = 0;
+  std::uint64_t kept_bytes_ = 0;  // of a file that failed
   std::uint32_t crc_ = 0;
 
   Bytes chunk_;       // records of the open chunk
   Bytes compressed_;  // reused
   std::uint64_t chunk_start_ = 0, chunk_end_ = 0;
   bool chunk_has_messages_ = false;
+  std::uint64_t chunked_messages_ = 0;          // in finished chunks
   std::vector<std::vector<IndexEntry>> index_;  // by channel, of the open chunk
   std::vector<std::uint32_t> sequence_;         // by channel
 

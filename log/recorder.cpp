@@ -176,7 +176,8 @@ RecordingResult Recorder::close(const StringMap& extra) {
   map.insert(map.end(), extra.begin(), extra.end());
   writer_.add_metadata(kResultRecord, map);
   if (const Status closed = writer_.close(); !closed) result.error = closed.error().message;
-  if (writer_.deleted()) result.failed += std::exchange(result.messages, 0);
+  result.messages -= writer_.lost();
+  result.failed += writer_.lost();
   result.bytes = writer_.bytes_written();
   return result;
 }

@@ -35,7 +35,7 @@ struct RecordingResult {
   std::string path;
   std::uint64_t messages = 0;  ///< in the file
   std::uint64_t dropped = 0;   ///< refused because the ring was full
-  std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted)
+  std::uint64_t failed = 0;    ///< lost because writing failed (disk full, file deleted or cut)
   std::uint64_t bytes = 0;     ///< of the file
   std::string data_sha256;     ///< DataHash of every message, in order
   std::string error;           ///< why writing failed; empty when it did not
@@ -82,7 +82,7 @@ class Recorder {
   [[nodiscard]] std::uint64_t dropped() const noexcept {
     return ring_->dropped() + (side_ == nullptr ? 0 : side_->dropped());
   }
-  /// True once the disk refused data, or the file was deleted. Readable while recording.
+  /// True once the disk refused data, or the file was deleted or cut. Readable while recording.
   [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
   /// Why. @pre failed()
   [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }

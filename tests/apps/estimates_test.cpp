@@ -90,9 +90,9 @@ TEST_F(Thresholds, CountThePushesOfARunUntilItStops) {
               "after_enabled_s = " + after_s + "\n";
   }
   write_text(folder_ / "pushes.toml", pushes);
-  EXPECT_EQ(tandem("run stops.toml --duration 9 --quiet --scenario pushes.toml --json stops.json")
-                .status,
-            1);
+  EXPECT_EQ(
+      tandem("run stops.toml --duration 9 --quiet --scenario pushes.toml --json stops.json").status,
+      1);
   const std::string stopped = json("stops.json")["log"]["path"];
   const Outcome outcome =
       tandem("log thresholds " + free + " --json learned.json --against " + stopped);

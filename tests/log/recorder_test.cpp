@@ -137,7 +137,9 @@ TEST(Recorder, CountsWhatADiskThatFillsUpLoses) {
     setrlimit(RLIMIT_FSIZE, &limit);
     signal(SIGXFSZ, SIG_IGN);
     const RecordingResult result = record(folder / "run.mcap", 5000);
-    const bool right = result.failed > 0 && !result.error.empty() && result.dropped == 0;
+    const auto log = LogFile::open(folder / "run.mcap");
+    const bool right = result.failed > 0 && !result.error.empty() && result.dropped == 0 && log &&
+                       log->messages() == result.messages;
     _exit(right ? 0 : 1);
   }
   int status = 1;
@@ -147,6 +149,39 @@ TEST(Recorder, CountsWhatADiskThatFillsUpLoses) {
   ASSERT_TRUE(log) << log.error().to_string();
   EXPECT_TRUE(log->truncated());
   EXPECT_GT(log->messages(), 100U);
+}
+
+// Whoever emptied a log that was being written made a run without one end with status 0.
+TEST(Recorder, CountsWhatIsLostWhenItsFileIsCut) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{200'000}}) {
+    const ScratchFolder folder;
+    auto recorder = Recorder::open(folder / "run.mcap", run_info(), {});
+    ASSERT_TRUE(recorder);
+    hal::StateImage state = image();
+    const auto channel =
+        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+    (*recorder)->start();
+    for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
+      (*recorder)->wait_for_space(1);
+      fill(state, cycle);
+      (*recorder)->push(channel, state.time_ns()[0], state.bytes());
+    }
+    (*recorder)->wait_for_space(2048);
+    std::filesystem::resize_file(folder / "run.mcap", size);
+    const RecordingResult result = (*recorder)->close();
+    EXPECT_NE(result.error.find("its file was cut to " + std::to_string(size) + " bytes"),
+              std::string::npos)
+        << result.error;
+    EXPECT_EQ(result.messages + result.failed, 3000U);
+    const auto log = LogFile::open(folder / "run.mcap");
+    if (size == 0) {
+      EXPECT_EQ(result.failed, 3000U);
+      continue;
+    }
+    ASSERT_TRUE(log) << log.error().to_string();
+    EXPECT_EQ(log->messages(), result.messages);
+    EXPECT_GT(result.messages, 100U);
+  }
 }
 
 TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
