@@ -3,9 +3,8 @@
 #include <fmt/core.h>
 
 namespace tandem::apps {
-namespace {
 
-const char* reaction(hal::StopCategory category) {
+const char* reaction_text(hal::StopCategory category) {
   switch (category) {
     case hal::StopCategory::kCategory0: return "torque off";
     case hal::StopCategory::kCategory1: return "stop, torque off";
@@ -16,8 +15,6 @@ const char* reaction(hal::StopCategory category) {
   return "?";
 }
 
-}  // namespace
-
 Json faults_json(const std::vector<runtime::Fault>& faults) {
   Json list = Json::array();
   for (const runtime::Fault& fault : faults) {
@@ -27,7 +24,7 @@ Json faults_json(const std::vector<runtime::Fault>& faults) {
                     {"board", fault.board},
                     {"cause", fault.text},
                     {"category", hal::to_string(fault.category)},
-                    {"reaction", reaction(fault.category)},
+                    {"reaction", reaction_text(fault.category)},
                     {"latched", fault.latched},
                     {"cleared_s", fault.latched ? Json(nullptr) : Json(fault.cleared_s)}});
   }

@@ -10,6 +10,9 @@
 
 namespace tandem::apps {
 
+/// "every joint held".
+[[nodiscard]] const char* reaction_text(hal::StopCategory category);
+
 /// A list of objects: docs/json.md, `fault_log`.
 [[nodiscard]] Json faults_json(const std::vector<runtime::Fault>& faults);
 

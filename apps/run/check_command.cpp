@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "apps/can/bus_table.hpp"
+#include "apps/control/fault_table.hpp"
 #include "apps/robot/loop_facts.hpp"
 #include "apps/robot/start_height.hpp"
 #include "apps/robot/start_torque.hpp"
@@ -83,9 +84,11 @@ void add_estimation_facts(const runtime::Experiment& e, Facts& facts) {
   const estimation::EstimationConfig& config = e.estimation;
   if (config.base) facts.add("estimates", "the floating base");
   if (config.observer) facts.add("estimates", "external torques of the joints");
-  if (config.collision)
-    facts.add("estimates",
-              "collisions, by " + counted(config.collision->thresholds.size(), "threshold"));
+  if (config.collision) {
+    facts.add("estimates", fmt::format("collisions, by {}; reaction: {}",
+                                       counted(config.collision->thresholds.size(), "threshold"),
+                                       reaction_text(config.collision->reaction)));
+  }
   for (const estimation::WrenchConfig& wrench : config.wrenches) {
     const auto site = std::ranges::find(e.robot.model.sites, wrench.site, &hal::SiteConfig::name);
     const int joints = e.tree == nullptr || site == e.robot.model.sites.end()

@@ -69,6 +69,9 @@ TEST_F(Check, WarnsOfARetractThatNoControllerCanCarryOut) {
                              "controller of retract.toml can"),
             std::string::npos)
       << outcome.err;
+  EXPECT_NE(outcome.out.find("collisions, by 1 threshold; reaction: safe posture, stop"),
+            std::string::npos)
+      << outcome.out;
 }
 
 TEST_F(Check, WarnsOfACategory2ThatNoControllerCanCarryOut) {
