@@ -8,9 +8,11 @@
 using State = std::array<double, 4>;  // q then v
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  const auto failed = [](const char* why) { return std::fprintf(stderr, "error: %s\n", why), 2; };
+  if (argc != 2) return failed("name the kernels of the double pendulum: .../NAME_kernels.so");
   const auto kernels = tandem::model::load_kernels(argv[1]);  // refuses other files
-  if (!kernels || (*kernels)->nv != 2) return 2;
+  if (!kernels) return failed(kernels.error().to_string().c_str());
+  if ((*kernels)->nv != 2) return failed("these kernels are not the double pendulum's");
   const tandem_kernels& robot = **kernels;
   std::printf("%s, %.3f kg, kernels for %s\n", robot.robot, robot.mass_kg, robot.variant);
   const double none[2] = {};  // no torque on any joint, no wrench

@@ -11,11 +11,14 @@ using Two = std::array<double, 2>;
 using Matrix = std::array<double, 4>;  // row-major: row i has the derivatives of acceleration i
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  const auto failed = [](const char* why) { return std::fprintf(stderr, "error: %s\n", why), 2; };
+  if (argc != 2) return failed("name the kernels that `tandem model build` made");
   const auto kernels = tandem::model::load_kernels(argv[1]);
-  if (!kernels || (*kernels)->nv != 2) return 2;
+  if (!kernels) return failed(kernels.error().to_string().c_str());
   const tandem_kernels& robot = **kernels;
-  if (robot.forward_dynamics_derivatives == nullptr) return 2;  // not asked for in robot.toml
+  if (robot.nv != 2) return failed("these kernels are not the double pendulum's");
+  if (robot.forward_dynamics_derivatives == nullptr)
+    return failed("no derivatives: robot.toml needs `derivatives = true` in [model]");
   const Two q{0.5, -0.5}, v{0.3, 0.2}, tau{0.1, 0.0};
   const double* no_wrench = nullptr;  // none of its sites takes one
   Matrix by_q, by_v, by_tau;
