@@ -324,7 +324,7 @@ class Answer {
     }
     std::string assumed;
     for (const JointResult& joint : out.joints)
-      if (!joint.rotor_inertia_kg_m2.identifiable)
+      if (!joint.rotor_inertia_kg_m2.identifiable && !robot_.facts.behind_rotors)
         assumed += (assumed.empty() ? "" : ", ") + joint.name;
     if (!assumed.empty()) {
       out.remarks.push_back(
