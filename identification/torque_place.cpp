@@ -11,7 +11,8 @@ constexpr double kClear = 20.0;  // of the negative logarithm of the likelihood
 constexpr double kNone = 0.05;   // of the described rotors
 
 /// How badly the data are met when every rotor has this share of its description.
-double cost_with(double share, const DataEstimate& data, Prior prior, const IdentifiedRobot& robot) {
+double cost_with(double share, const DataEstimate& data, Prior prior,
+                 const IdentifiedRobot& robot) {
   const Eigen::Index links = robot.regressor.columns();
   for (std::size_t c = 0; c < robot.facts.joint.size(); ++c) {
     if (!robot.facts.rigid[c]) continue;
@@ -30,8 +31,7 @@ bool measured_behind_rotors(IdentifiedRobot& robot, const model::Tree& tree,
                             const Equations& equations) {
   const std::vector<bool> all(equations.time_s.size(), true);
   const Prior prior = make_prior(robot);
-  const DataEstimate data =
-      estimate_from_data(equations, all, prior, structural_base(robot, tree));
+  const DataEstimate data = estimate_from_data(equations, all, prior, structural_base(robot, tree));
   const double none = cost_with(0.0, data, prior, robot);
   const double half = cost_with(0.5, data, prior, robot);
   const double whole = cost_with(1.0, data, prior, robot);

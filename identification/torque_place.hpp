@@ -7,9 +7,9 @@
 
 namespace tandem::identification {
 
-/// Whether the torques of the drives without a spring hold nothing of the described rotors, as those
-/// of sensors between gear and link do: with the rotors taken as 0 the equations fit clearly better
-/// than with the described ones, and no share of these above 5 % fits better still.
+/// Whether the torques of the drives without a spring hold nothing of the described rotors, as
+/// those of sensors between gear and link do: with the rotors taken as 0 the equations fit clearly
+/// better than with the described ones, and no share of these above 5 % fits better still.
 /// @param equations  of all logs, whose rotors are in the links' rows
 [[nodiscard]] bool measured_behind_rotors(IdentifiedRobot& robot, const model::Tree& tree,
                                           const Equations& equations);

@@ -250,7 +250,9 @@ class Builder {
       link.joint = joint.name;
       const Placement origin = placement(joint.parent_to_joint_origin_transform);
       if (origin.p.norm() > kFarthest_m) {
-        errors_.push_back({"its origin is " + std::to_string(std::lround(origin.p.norm())) +
+        char distance[32];
+        std::snprintf(distance, sizeof distance, "%.4g", origin.p.norm());
+        errors_.push_back({std::string("its origin is ") + distance +
                                " m from its parent's frame, farther than any robot reaches",
                            "lengths are in metres", tree.file, outline_.joint_lines.at(joint.name),
                            "joint " + joint.name});
@@ -314,6 +316,23 @@ Diagnostics one_error(std::string message, std::string hint, const std::string& 
   return {Error{std::move(message), std::move(hint), file, 0, {}}};
 }
 
+/// urdfdom leaves an inertial out that it cannot read, and goes on: whatever the outline has read,
+/// the model has to have.
+Diagnostics lost_masses(const Outline& outline, const urdf::ModelInterface& model,
+                        const std::string& file) {
+  Diagnostics lost;
+  for (const OutlineLink& one : outline.links) {
+    const auto link = model.getLink(one.name);
+    const double mass_kg =
+        link == nullptr || link->inertial == nullptr ? 0.0 : link->inertial->mass;
+    if (mass_kg == one.mass_kg) continue;
+    lost.push_back({"the URDF library reads another mass than the file has",
+                    "write its <inertial> in plain decimal numbers", file, one.line,
+                    "link " + one.name});
+  }
+  return lost;
+}
+
 }  // namespace
 
 std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const std::string& file,
@@ -326,6 +345,8 @@ std::expected<UrdfModel, Diagnostics> parse_urdf(std::string_view text, const st
   }
   const auto model = parse_with_urdfdom(outline.text);
   if (!model) return std::unexpected(one_error(model.error().message, {}, file));
+  if (Diagnostics lost = lost_masses(outline, **model, file); !lost.empty())
+    return std::unexpected(std::move(lost));
   auto read = Builder(outline, options, file).run(**model);
   if (!read) return read;
   const auto shapes = collision_shapes(text);

@@ -8,8 +8,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/counted.hpp"
 #include "base/nearest.hpp"
 #include "base/utf8.hpp"
+#include "model/urdf_vocabulary.hpp"
 #include "model/urdf_xacro.hpp"
 #include "model/xml_reference.hpp"
 
@@ -20,6 +22,34 @@ using tinyxml2::XMLElement;
 
 constexpr std::size_t kMostLinks = 10'000;
 constexpr double kLargestNumber = 1e30;  // so that no product of a few overflows
+constexpr double kMostTurn_rad = 6.5;    // of an rpy: more is degrees, most likely
+constexpr double kMostWay_rad = 26.0;    // of a revolute joint: likewise, four turns
+constexpr const char* kBlanks = " \t\r\n";
+
+/// The words of a text that has numbers. urdfdom takes blanks between them only: with a tab, or a
+/// blank at the end, it leaves a link's inertial out and says nothing that is an error.
+std::vector<std::string> words_of(std::string_view text) {
+  std::vector<std::string> words;
+  std::size_t at = 0;
+  while ((at = text.find_first_not_of(kBlanks, at)) != std::string_view::npos) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
+    words.emplace_back(text.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+/// The attributes of `e` and what is in it, whose values are numbers, with one blank between them.
+void tidy_numbers(tinyxml2::XMLElement& e) {
+  for (const tinyxml2::XMLAttribute* one = e.FirstAttribute(); one != nullptr; one = one->Next()) {
+    std::string text;
+    for (const std::string& word : words_of(one->Value())) text += (text.empty() ? "" : " ") + word;
+    e.SetAttribute(one->Name(), text.c_str());
+  }
+  for (tinyxml2::XMLElement* child = e.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement())
+    tidy_numbers(*child);
+}
 
 enum class Needed : bool { kNo, kYes };
 
@@ -27,7 +57,7 @@ enum class Needed : bool { kNo, kYes };
 class Reader {
  public:
   Reader(const std::string& file, bool exact_right_angles)
-      : file_(file), exact_right_angles_(exact_right_angles) {}
+      : file_(file), exact_right_angles_(exact_right_angles), vocabulary_(file) {}
 
   Outline run(std::string_view text) {
     if (text.find('\0') != std::string_view::npos) {
@@ -56,6 +86,11 @@ class Reader {
             "name a URDF; expand xacro and convert SDF first");
       return std::move(out_);
     }
+    if (const XMLElement* second = robot->NextSiblingElement()) {
+      error(second->GetLineNum(), second->Name(), "there is a second root element",
+            "a file holds one robot: remove the other");
+      return std::move(out_);
+    }
     if (auto left = find_xacro(*robot, file_)) {
       out_.errors.push_back(std::move(*left));
       return std::move(out_);
@@ -67,6 +102,10 @@ class Reader {
  private:
   void error(int line, std::string key, std::string message, std::string hint = {}) {
     out_.errors.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
+  }
+
+  void warning(int line, std::string key, std::string message, std::string hint) {
+    out_.warnings.push_back({std::move(message), std::move(hint), file_, line, std::move(key)});
   }
 
   void report_xml_error() {
@@ -104,6 +143,7 @@ class Reader {
       error(robot.GetLineNum(), "", "the robot has more than 10000 links");
     }
     warn_of_dynamics();
+    vocabulary_.warn(out_.warnings);
     tinyxml2::XMLPrinter printer(nullptr, true);
     reduced_.Print(&printer);
     out_.text = printer.CStr();
@@ -175,22 +215,17 @@ class Reader {
   std::vector<double> numbers(const XMLElement* e, const char* name, std::size_t count,
                               const std::string& key, Needed needed) {
     if (e == nullptr) return {};
-    const std::string text = attribute(*e, name, key, needed);
-    if (text.empty()) return {};
+    const char* text = e->Attribute(name);
+    if (text == nullptr) return (void)attribute(*e, name, key, needed), std::vector<double>();
     std::vector<double> found;
-    std::size_t at = 0;
-    constexpr const char* kSpace = " \t\r\n";
-    while ((at = text.find_first_not_of(kSpace, at)) != std::string::npos) {
-      const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
-      double value = 0.0;
-      if (!number(*e, name, text.substr(at, end - at), key, value)) return {};
-      found.push_back(value);
-      at = end;
+    for (const std::string& word : words_of(text)) {
+      if (!number(*e, name, word, key, found.emplace_back())) return {};
     }
     if (found.size() == count) return found;
-    error(e->GetLineNum(), key,
-          std::string("'") + name + "' has " + std::to_string(found.size()) + " numbers",
-          "give " + std::to_string(count));
+    error(
+        e->GetLineNum(), key,
+        std::string("'") + name + "' of <" + e->Name() + "> has " + counted(found.size(), "number"),
+        "give " + std::to_string(count));
     return {};
   }
 
@@ -225,7 +260,13 @@ class Reader {
   void check_origin(const XMLElement& e, const std::string& key) {
     const XMLElement* origin = child(e, "origin", key, Needed::kNo);
     (void)numbers(origin, "xyz", 3, key, Needed::kNo);
-    (void)numbers(origin, "rpy", 3, key, Needed::kNo);
+    for (const double turn_rad : numbers(origin, "rpy", 3, key, Needed::kNo)) {
+      if (std::abs(turn_rad) <= kMostTurn_rad) continue;
+      return warning(origin->GetLineNum(), key,
+                     std::string("'rpy' of <origin> is \"") + origin->Attribute("rpy") +
+                         "\": more than a turn",
+                     "angles are in radians");
+    }
   }
 
   void read_link(const XMLElement& e, XMLElement& reduced) {
@@ -236,6 +277,7 @@ class Reader {
     XMLElement* copy = reduced_.NewElement("link");
     copy->SetAttribute("name", name.c_str());
     reduced.InsertEndChild(copy);
+    vocabulary_.look_at(e, key, out_.errors);
     const XMLElement* inertial = child(e, "inertial", key, Needed::kNo);
     if (inertial == nullptr) return;
     check_origin(*inertial, key);
@@ -246,7 +288,9 @@ class Reader {
     for (const char* moment : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
       (void)numbers(inertia, moment, 1, key, Needed::kYes);
     }
-    tinyxml2::XMLNode* cloned = copy->InsertEndChild(inertial->DeepClone(&reduced_));
+    tinyxml2::XMLElement* cloned =
+        copy->InsertEndChild(inertial->DeepClone(&reduced_))->ToElement();
+    tidy_numbers(*cloned);
     look_at_rpy(cloned->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
   }
 
@@ -255,6 +299,7 @@ class Reader {
     joint.line = e.GetLineNum();
     joint.name = name_of(e, "name", "joint");
     const std::string key = "joint " + joint.name;
+    vocabulary_.look_at(e, key, out_.errors);
     check_unique(out_.joint_lines, joint.name, e, key);
     joint.type = attribute(e, "type", key, Needed::kYes);
     check_type(joint, key);
@@ -280,7 +325,9 @@ class Reader {
     reduced.InsertEndChild(copy);
     for (const char* part : {"parent", "child", "origin", "axis"}) {
       const XMLElement* found = e.FirstChildElement(part);
-      if (found != nullptr) copy->InsertEndChild(found->DeepClone(&reduced_));
+      if (found == nullptr) continue;
+      tinyxml2::XMLElement* cloned = copy->InsertEndChild(found->DeepClone(&reduced_))->ToElement();
+      if (found->Attribute("link") == nullptr) tidy_numbers(*cloned);
     }
     look_at_rpy(copy->FirstChildElement("origin"), exact_right_angles_, out_.right_angles);
     if (joint.type != "fixed")
@@ -333,6 +380,11 @@ class Reader {
     };
     joint.lower = one("lower", 0.0);
     joint.upper = one("upper", 0.0);
+    if (joint.type == "revolute" &&
+        std::max(std::abs(joint.lower), std::abs(joint.upper)) > kMostWay_rad) {
+      warning(limit.GetLineNum(), key, "the joint's limits are more than four turns away",
+              "angles are in radians");
+    }
     const bool missing = limit.Attribute("lower") == nullptr && limit.Attribute("upper") == nullptr;
     if (joint.type != "continuous" && joint.lower >= joint.upper) {
       note(missing                     ? "lower and upper are missing"
@@ -373,6 +425,7 @@ class Reader {
   tinyxml2::XMLDocument document_;
   tinyxml2::XMLDocument reduced_;
   Outline out_;
+  Vocabulary vocabulary_;
   int damped_ = 0;  // joints with damping or friction
   int damped_line_ = 0;
 };

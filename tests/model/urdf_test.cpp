@@ -249,8 +249,99 @@ TEST(Urdf, RefusesNumbersThatAreNone) {
   expect_error(with("<mass value=\"2\"/>", "<mass value=\"2kg\"/>"),
                "arm.urdf:6: link upper: 'value' of <mass> is no number: '2kg' "
                "(write it as 1.5e-3)");
-  EXPECT_NE(errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"0 0\"")).find("'xyz' has 2 numbers (give 3)"),
+  EXPECT_NE(errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"0 0\""))
+                .find("'xyz' of <origin> has 2 numbers (give 3)"),
             std::string::npos);
+  EXPECT_NE(errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"\""))
+                .find("'xyz' of <origin> has 0 numbers (give 3)"),
+            std::string::npos);
+}
+
+// The library that interprets inertials left them out for a blank at the end, a tab or a new line,
+// and called that no error: a link, or a humanoid's torso, weighed nothing.
+TEST(Urdf, TakesAnyWhiteSpaceAroundNumbers) {
+  const auto plain = parse_urdf(kRobot, "arm.urdf", {});
+  ASSERT_TRUE(plain.has_value());
+  const auto same = [&](const std::string& text) {
+    const auto model = parse_urdf(text, "arm.urdf", {});
+    ASSERT_TRUE(model.has_value()) << text << errors_of(text);
+    EXPECT_TRUE(model->warnings.empty()) << to_text(model->warnings);
+    for (std::size_t i = 0; i < plain->tree.bodies.size(); ++i) {
+      const Inertia &one = plain->tree.bodies[i].inertia, &other = model->tree.bodies[i].inertia;
+      EXPECT_EQ(one.mass_kg, other.mass_kg) << text;
+      EXPECT_EQ(one.com_m, other.com_m) << text;
+      EXPECT_EQ(one.about_com_kg_m2, other.about_com_kg_m2) << text;
+    }
+    for (std::size_t i = 0; i < plain->tree.joints.size(); ++i) {
+      EXPECT_EQ(plain->tree.joints[i].axis, model->tree.joints[i].axis) << text;
+      EXPECT_EQ(plain->tree.joints[i].in_parent.p, model->tree.joints[i].in_parent.p) << text;
+    }
+  };
+  const std::string robot = kRobot;
+  std::size_t tried = 0;
+  for (const std::string name : {"value", "ixx", "izz", "xyz", "rpy"}) {
+    const std::string begin = " " + name + "=\"";
+    for (std::size_t at = robot.find(begin); at != std::string::npos;
+         at = robot.find(begin, at + 1)) {
+      const std::size_t from = at + begin.size(), to = robot.find('"', from);
+      const std::string value = robot.substr(from, to - from);
+      std::string tabs = value;
+      std::ranges::replace(tabs, ' ', '\t');
+      for (const std::string& written :
+           {value + " ", " " + value, value + "\n", "\r\n" + value, tabs, value + "&#9;"}) {
+        same(robot.substr(0, from) + written + robot.substr(to));
+        ++tried;
+      }
+    }
+  }
+  EXPECT_GT(tried, 50U);
+}
+
+TEST(Urdf, RefusesWhatIsMisspeltInLinksAndJoints) {
+  expect_error(with("<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 2 0\"/><axes xyz=\"0 1 0\"/>"),
+               "arm.urdf:27: joint shoulder: unknown element <axes> in <joint> (did you mean "
+               "<axis>?)");
+  const std::vector<std::array<const char*, 3>> all{
+      {"<link name=\"lower\">\n    <inertial>", "<link name=\"lower\">\n    <inertal>",
+       "unknown element <inertal> in <link> (did you mean <inertial>?)"},
+      {"<origin xyz=\"0 0 -0.5\"", "<orgin xyz=\"0 0 -0.5\"",
+       "unknown element <orgin> in <inertial> (did you mean <origin>?)"},
+      {"<origin xyz=\"0 0 -0.5\"", "<origin pos=\"0 0 -0.5\"",
+       "unknown attribute 'pos' of <origin> (a place is given by 'xyz' and 'rpy' (roll, pitch, yaw "
+       "in rad))"},
+      {"<origin xyz=\"0 0 -0.5\"", "<origin xyz=\"0 0 -0.5\" quat_xyzw=\"0 0 0 1\"",
+       "unknown attribute 'quat_xyzw' of <origin>"},
+      {"<origin xyz=\"0 0 -0.5\"", "<origin xyz=\"0 0 -0.5\" RPY=\"0 0 1\"",
+       "unknown attribute 'RPY' of <origin> (did you mean 'rpy'?)"}};
+  for (const auto& [from, to, text] : all) {
+    std::string robot = with(from, to);
+    if (const std::size_t at = robot.find("<inertal>"); at != std::string::npos)
+      robot.replace(robot.find("</inertial>", at), 11, "</inertal>");
+    EXPECT_NE(errors_of(robot).find(text), std::string::npos) << errors_of(robot);
+  }
+  EXPECT_NE(errors_of(std::string(kRobot) + "<robot name=\"b\"/>").find("a second root element"),
+            std::string::npos);
+}
+
+// What simulators and others write into links and joints is named once.
+TEST(Urdf, NamesWhatItDoesNotUse) {
+  const auto model = parse_urdf(
+      with("<axis xyz=\"0 2 0\"/>", "<axis xyz=\"0 2 0\" frame=\"a\"/><gearing/><gearing/>"),
+      "arm.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_EQ(to_text(model->warnings),
+            "arm.urdf:27: the attribute 'frame' of <axis> is not used\n"
+            "arm.urdf:27: the element <gearing> in <joint> is not used, nor in 1 more place\n");
+}
+
+TEST(Urdf, WarnsOfDegrees) {
+  const auto model = parse_urdf(with("rpy=\"0 0 0\"", "rpy=\"90 0 0\""), "arm.urdf", {});
+  ASSERT_TRUE(model.has_value());
+  EXPECT_NE(to_text(model->warnings)
+                .find("'rpy' of <origin> is \"90 0 0\": more than a turn "
+                      "(angles are in radians)"),
+            std::string::npos)
+      << to_text(model->warnings);
 }
 
 TEST(Urdf, RefusesNumbersThatAreNotFinite) {
