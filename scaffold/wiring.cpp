@@ -13,6 +13,14 @@ constexpr std::int64_t kPeriod_ns = 1'000'000;
 constexpr int kSlowEvery = 4;
 constexpr std::size_t kAxes = 2;  // of a board
 
+/// a, b, …, z, aa, ab, …
+std::string letters(std::size_t number) {
+  std::string text;
+  for (std::size_t left = number + 1; left > 0; left = (left - 1) / 26)
+    text.insert(text.begin(), static_cast<char>('a' + (left - 1) % 26));
+  return text;
+}
+
 class Wirer {
  public:
   Wirer(NewRobot& robot, std::size_t most_joints) : robot_(robot), most_(most_joints) {}
@@ -29,8 +37,7 @@ class Wirer {
       const std::size_t each = (limb.joints.size() + parts - 1) / parts;
       for (std::size_t part = 0, at = 0; part < parts; ++part) {
         const std::size_t count = std::min(each, limb.joints.size() - at);
-        add_bus(limb.name + (parts == 1 ? "" : "_" + std::string(1, static_cast<char>('a' + part))),
-                joint, count);
+        add_bus(limb.name + (parts == 1 ? "" : "_" + letters(part)), joint, count);
         for (std::size_t i = 0; i < count; ++i) {
           bus_of_body_[limb.joints[at + i] + 1] = config.buses.size() - 1;
         }

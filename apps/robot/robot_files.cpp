@@ -37,6 +37,17 @@ std::vector<model::NamedPosition> positions_of(const hal::RobotConfig& robot,
 
 }  // namespace
 
+std::optional<Error> falls_for_ever(const hal::RobotConfig& robot) {
+  const auto& gravity = robot.model.gravity_m_s2;
+  const bool pulled = std::ranges::any_of(gravity, [](double g) { return g != 0.0; });
+  if (!robot.model.floating_base || !robot.contact.feet.empty() || !pulled) return std::nullopt;
+  return Error{
+      .message = "the base floats and there is no [contact]: the simulated robot falls for ever",
+      .hint = "add [contact] with the robot's feet, or base = \"fixed\"",
+      .file = robot.file,
+      .key = "model.base"};
+}
+
 std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config) {
   auto description = runtime::complete_robot(config);
   if (!description) return std::unexpected(description.error());
@@ -51,14 +62,7 @@ std::expected<RobotFiles, Diagnostics> with_description(hal::RobotConfig config)
     if (error.file.empty()) error.file = config.file;
     return std::unexpected(Diagnostics{std::move(error)});
   }
-  if (config.model.floating_base && config.contact.feet.empty()) {
-    Error falls;
-    falls.message = "the base floats and there is no [contact]: the simulated robot falls for ever";
-    falls.hint = "add [contact] with the robot's feet, or base = \"fixed\"";
-    falls.file = config.file;
-    falls.key = "model.base";
-    description->warnings.push_back(std::move(falls));
-  }
+  if (auto warning = falls_for_ever(config)) description->warnings.push_back(std::move(*warning));
   return RobotFiles{std::move(config), std::move(description->tree), std::move(spec),
                     description->right_angles, std::move(description->warnings)};
 }

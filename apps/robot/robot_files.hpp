@@ -3,6 +3,7 @@
 #pragma once
 
 #include <expected>
+#include <optional>
 #include <string>
 
 #include "base/result.hpp"
@@ -20,6 +21,9 @@ struct RobotFiles {
   model::RightAngles right_angles;  ///< what the description has of few digits
   Diagnostics warnings;             ///< what the description's reader tolerated
 };
+
+/// A warning for a floating base that nothing carries.
+[[nodiscard]] std::optional<Error> falls_for_ever(const hal::RobotConfig& robot);
 
 /// Reads the description that `config` names, checks the two against each other, and that the
 /// robot's dynamics can be solved: model::check_regular(), with every posture.

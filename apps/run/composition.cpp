@@ -333,6 +333,7 @@ void add_description(Composition& c, const RobotFiles& robot, Collector& errors)
   if (e.hal.backend == runtime::BackendKind::kSim) {
     if (auto error = wrong_start_height(robot, e.posture)) errors.add(std::move(*error), {}, 0);
     c.warnings = buried_links(robot, e.posture);
+    if (auto warning = falls_for_ever(e.robot)) c.warnings.push_back(std::move(*warning));
     errors.add(study_loops(e.robot, robot.tree, {&e.posture, 1}).errors);
     if (const Status boards = sim::check_firmware(e.robot); !boards) {
       errors.add(boards.error(), {}, 0);

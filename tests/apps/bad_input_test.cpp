@@ -43,8 +43,10 @@ TEST_F(BadInput, OfAnotherKindIsNamedWithTheCommandThatTakesIt) {
 
 TEST_F(BadInput, AFloatingBaseWithoutGroundIsWarnedOf) {
   edit("robot.toml", "base = \"fixed\"", "base = \"floating\"");
-  const Outcome outcome = tandem("check robot.toml");
-  EXPECT_NE(outcome.err.find("falls for ever"), std::string::npos) << outcome.err;
+  for (const char* command : {"check robot.toml", "check hold.toml"}) {  // not of an experiment
+    const Outcome outcome = tandem(command);
+    EXPECT_NE(outcome.err.find("falls for ever"), std::string::npos) << command << outcome.err;
+  }
 }
 
 TEST_F(BadInput, AMissingExperimentIsRefused) {

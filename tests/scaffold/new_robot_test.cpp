@@ -191,6 +191,23 @@ TEST(NewRobot, NamesLimbsAsPeopleDo) {
   EXPECT_EQ(anymal.feet[0].points.size(), 1U) << "a ball";
 }
 
+// The twenty-seventh bus of a limb was called "arm_{".
+TEST(NewRobot, NamesMoreBusesThanThereAreLetters) {
+  std::ostringstream urdf;
+  urdf << "<robot name='chain'><link name='l0'/>";
+  for (int i = 1; i <= 220; ++i) {
+    urdf << "<link name='l" << i << "'><inertial><origin xyz='0 0 0.05'/><mass value='0.1'/>"
+         << "<inertia ixx='1e-4' ixy='0' ixz='0' iyy='1e-4' iyz='0' izz='1e-4'/></inertial></link>"
+         << "<joint name='j" << i << "' type='revolute'><parent link='l" << i - 1
+         << "'/><child link='l" << i << "'/><origin xyz='0 0 0.1'/><axis xyz='" << i % 2 << " "
+         << 1 - i % 2 << " 0'/><limit lower='-2' upper='2' effort='400' velocity='5'/></joint>";
+  }
+  const NewRobot robot = made_of(urdf.str() + "</robot>");
+  ASSERT_GT(robot.config.buses.size(), 26U);
+  EXPECT_EQ(robot.config.buses[25].name, "arm_z");
+  EXPECT_EQ(robot.config.buses[26].name, "arm_aa");
+}
+
 TEST(NewRobot, TakesTheBaseThatItIsTold) {
   const std::string urdf = path_of(kPublicRobots[5]);
   const auto fixed = make_robot({.urdf = urdf, .name = "coman", .base = Base::kFixed});
