@@ -166,6 +166,64 @@ Status check_range(const Series& series, const ImportMap& map, const hal::RobotC
   return {};
 }
 
+const ImportedColumn* column_of(const Series& series, const std::string& field, std::size_t joint) {
+  const auto found = std::ranges::find_if(series.columns, [&](const ImportedColumn& column) {
+    return !column.target.command && column.target.field == field && column.target.index == joint;
+  });
+  return found == series.columns.end() ? nullptr : &*found;
+}
+
+/// A joint's velocities over the rate of its positions, sorted: a number for each tenth of a second
+/// in which it goes 5 mrad (or mm) or more. A leap, as when an encoder begins, is in one of them.
+std::vector<double> rates_of(const Series& series, const ImportedColumn& position,
+                             const ImportedColumn& velocity) {
+  constexpr std::int64_t kStretch_ns = 100'000'000;
+  constexpr double kLeast = 5e-3;
+  std::vector<double> rates;
+  double way = 0.0, by_velocity = 0.0;
+  std::int64_t begin = series.time_ns.front();
+  for (std::size_t row = 1; row < series.rows(); ++row) {
+    const double step_s = 1e-9 * static_cast<double>(series.time_ns[row] - series.time_ns[row - 1]);
+    way += position.values[row] - position.values[row - 1];
+    by_velocity += 0.5 * step_s * (velocity.values[row] + velocity.values[row - 1]);
+    if (series.time_ns[row] - begin < kStretch_ns) continue;
+    if (std::abs(way) >= kLeast) rates.push_back(by_velocity / way);
+    way = by_velocity = 0.0;
+    begin = series.time_ns[row];
+  }
+  std::ranges::sort(rates);
+  return rates;
+}
+
+/// A velocity that is not the rate of its position: one of them has another unit, sign or column.
+Status check_rates(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+  constexpr std::size_t kFewRates = 5;
+  for (const std::size_t joint : series.joints) {
+    const ImportedColumn* position = column_of(series, "position_rad", joint);
+    const ImportedColumn* velocity = column_of(series, "velocity_rad_s", joint);
+    if (position == nullptr || velocity == nullptr) continue;
+    const std::vector<double> rates = rates_of(series, *position, *velocity);
+    const auto near = [&](double one) {  // how many are, within a factor of two
+      return std::ranges::count_if(
+          rates, [&](double rate) { return rate / one >= 0.5 && rate / one <= 2.0; });
+    };
+    const auto most = static_cast<std::ptrdiff_t>(rates.size() / 2);
+    if (rates.size() < kFewRates || near(1.0) > most) continue;
+    const double middle = rates[rates.size() / 2];
+    const std::string how = near(middle) > most
+                                ? fmt::format("is {:.3g} times the rate of its position", middle)
+                                : "is not the rate of its position";
+    return std::unexpected(
+        Error{fmt::format("the velocity of '{}' (column {}) {} (column {})",
+                          robot.joints[joint].name, velocity->name, how, position->name),
+              fmt::format("are units, signs and the order of the columns right in {}? Without its "
+                          "table of velocities the log has positions alone",
+                          map.file),
+              velocity->file, 0, velocity->name});
+  }
+  return {};
+}
+
 /// A quaternion and its negative are one rotation: neighbours get the signs that are near.
 void unwrap(Series& series) {
   for (const std::size_t first : series.quaternions) {
@@ -241,6 +299,7 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
     }
     if (Status s = check_range(series, map, robot); !s) return s;
     if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
+    if (Status s = check_rates(series, map, robot); !s) return s;
     if (Status s = check_frozen(series, map, recording.excluded); !s) return s;
     unwrap(series);
   }

@@ -146,13 +146,30 @@ counts_per_turn = [4096]
   EXPECT_EQ(read.time_s[0], 0.0);
 }
 
+// Degrees, swapped columns and an opposite sign were imported without a word.
+TEST_F(Csv, AVelocityIsTheRateOfItsPosition) {
+  const std::string file = write("a.csv", plain_rows(200));
+  const auto with = [](const std::string& line, const std::string& by) {
+    std::string map = kPlain;
+    return map.replace(map.find(line), line.size(), by);
+  };
+  EXPECT_HAS(refusal({file}, with("unit = \"rad/s\"", "unit = \"deg/s\"")),
+             "a.csv: dq1: the velocity of 'joint1' (column dq1) is 0.0175 times the rate of its "
+             "position (column q1) (are units, signs and the order of the columns right in "
+             "map.toml?");
+  EXPECT_HAS(refusal({file}, with("unit = \"rad/s\"", "unit = \"rad/s\"\nscale = [1.0, -1.0]")),
+             "the velocity of 'joint2' (column dq2) is -1 times the rate");
+  EXPECT_HAS(refusal({file}, with("\"q{1}\"", "[\"q2\", \"q1\"]")),
+             "the velocity of 'joint1' (column dq1)");
+}
+
 /// Columns of the UR10e files: t, q(6), dq(6), i(6), i_desired(6), torque_desired(6), no header.
 TEST_F(Csv, WithoutHeaderNamesItsColumnsByNumber) {
   std::string text;
   for (int i = 0; i < 20; ++i) {
     char row[200];
-    std::snprintf(row, sizeof row, "%.4f %g %g  %g %g\t%g %g 7 7\n", 0.008 * i, 0.1 * i, -0.2 * i,
-                  0.1 + 0.001 * i, 0.2 + 0.001 * i, 0.5 * i, 0.25 * i);
+    std::snprintf(row, sizeof row, "%.4f %g %g  %g %g\t%g %g 7 7\n", 0.008 * i, 0.001 * i,
+                  -0.002 * i, 0.125 + 1e-5 * i, -0.25 + 1e-5 * i, 0.5 * i, 0.25 * i);
     text += row;
   }
   const std::string map = R"(
