@@ -292,6 +292,10 @@ class Answer {
     VectorXd masses = VectorXd::Zero(equations_.columns);
     for (Index i = 0; i < links_; i += 10) masses[i] = 1.0;
     for (const LinkResult& link : out.links) {
+      const int in_tree = tree_.link_index(link.name);
+      const bool moves =
+          tree_.floating_base || tree_.links[static_cast<std::size_t>(in_tree)].body > 0;
+      if (!moves) continue;
       out.described_mass_kg += link.described.mass_kg;
       out.identified_mass_kg += link.identified.mass_kg;
     }

@@ -290,9 +290,9 @@ Status Maker::sensor(const SensorSpec& spec_of) {
   if (moving >= 0 && tree.links[frame].body == tree.joints[moving].parent) {
     sensor.through = moving;
   } else if (tree.links[frame].body != sensor.body) {
-    return fail(user + ": link '" + spec_of.frame_link + "' is on neither side of joint '" +
+    return fail(user + ": link '" + spec_of.frame_link + "' turns against both sides of joint '" +
                     spec_of.joint + "'",
-                "name a link that the joint carries, or one that carries the joint");
+                "name a link that is fixed to what the joint carries, or to what carries it");
   }
   gather_beyond(first, sensor);
   sensor.in_body = in_frame(tree.links[frame].body, tree.links[frame].in_body);

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kDefiniteTolerance = 1e-12;  // of the largest principal moment
 constexpr double kMostGyration_m = 10.0;      // radius of gyration: likewise
+constexpr double kFarthestMass_m = 20.0;      // from the link's frame: likewise
 constexpr double kMostMass_kg = 1e6;          // a slip of units or digits
 constexpr double kTriangleTolerance = 1e-6;   // rounding of the description's own digits
 
@@ -34,7 +35,10 @@ class Checker {
 
   void run() {
     const std::size_t before = errors_.size();
-    for (const Link& link : tree_.links) check_link(link);
+    for (const Link& link : tree_.links) {
+      check_place(link);
+      check_link(link);
+    }
     if (errors_.size() > before) return;
     for (std::size_t i = 0; i < tree_.bodies.size(); ++i) check_body(i);
     check_carried_mass();
@@ -42,6 +46,16 @@ class Checker {
 
  private:
   [[nodiscard]] bool fixed_to_world(int body) const { return body == 0 && !tree_.floating_base; }
+
+  void check_place(const Link& link) {
+    const double away_m = link.inertia.com_m.norm();
+    if (fixed_to_world(link.body) || !(away_m > kFarthestMass_m)) return;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", away_m);
+    errors_.push_back({std::string("the centre of mass is ") + text + " m from the link's frame",
+                       "lengths are in metres", tree_.file, line_of(link.name),
+                       "link " + link.name});
+  }
 
   void check_link(const Link& link) {
     const std::string found = inertia_problem(link.inertia);

@@ -57,6 +57,10 @@ TEST(Identify, FindsEveryBaseParameterOfAnArmWithoutNoise) {
   ASSERT_TRUE(result) << result.error().to_string();
   EXPECT_LT(result->condition_number, 1000.0);
   EXPECT_GT(result->held_out_s, 7.0);
+  double moving_kg = 0.0;  // what is fixed to the world was counted, too
+  for (std::size_t i = 1; i < panda.tree.bodies.size(); ++i)
+    moving_kg += panda.tree.bodies[i].inertia.mass_kg;
+  EXPECT_NEAR(result->described_mass_kg, moving_kg, 1e-9);
   for (const BaseParameter& base : result->base) {
     const double truth = truth_of(base, panda.tree, panda, reality);
     EXPECT_NEAR(base.estimate.value, truth, 2e-3 * (0.1 + std::abs(truth)))

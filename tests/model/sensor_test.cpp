@@ -122,7 +122,7 @@ TEST(Sensor, AndSitesThatTheDescriptionLacksAreNamed) {
   spec.sensors = {{"wrist", "wrist_3_joint", "base_link"}};
   m = make_mechanism(tree, spec);
   ASSERT_FALSE(m);
-  EXPECT_NE(m.error().message.find("neither side"), std::string::npos);
+  EXPECT_NE(m.error().message.find("turns against both sides"), std::string::npos);
   spec.sensors.clear();
   spec.sites = {{"tool", "tool00", {}, {}, false}};
   m = make_mechanism(tree, spec);

@@ -7,6 +7,14 @@ const char* const kHint =
     "(check the six moments, their signs and their reference point; inertia = \"repair\" in "
     "[model] takes the nearest possible one, and `tandem check --repair` shows it)";
 
+TEST(UrdfInertia, RefusesACentreOfMassInMillimetres) {
+  EXPECT_NE(errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"0 0 -500\""))
+                .find("arm.urdf:3: link upper: the centre of mass is 500 m from the link's frame "
+                      "(lengths are in metres)"),
+            std::string::npos)
+      << errors_of(with("xyz=\"0 0 -0.5\"", "xyz=\"0 0 -500\""));
+}
+
 TEST(UrdfInertia, RefusesANegativeMass) {
   expect_error(
       with("<mass value=\"3\"/>", "<mass value=\"-3\"/>"),
