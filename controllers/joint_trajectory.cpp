@@ -144,7 +144,7 @@ class JointTrajectory : public Controller {
     incomplete_ = incomplete_ || !each_has_one;
     positions.resize(joints_.size(), 0.0);
     table.finish();
-    if (time_s <= times_s_.back()) {
+    if (time_s > 0.0 && time_s <= times_s_.back()) {
       table.error("time_s", "is not later than the way-point before", "sort them by time");
     }
     std::vector<const hal::Joint*> beyond;

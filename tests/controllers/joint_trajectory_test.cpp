@@ -133,6 +133,10 @@ TEST(JointTrajectory, RefusesWhatTheJointsCannotDo) {
                        "[[waypoint]]\ntime_s = 1.5\nposition_rad = [1.0]\n"),
             "experiment.toml:6: waypoint[1].time_s: joint 'wrist' would need 3.75 rad/s on the "
             "way, its limit is 2 (give it 0.938 s or more after the way-point before)");
+  EXPECT_EQ(
+      problem_of("joints = ['wrist']\n[[waypoint]]\ntime_s = 0\nposition_rad = [0.0]\n").find("\n"),
+      std::string::npos)
+      << "one error for one number";
   EXPECT_EQ(problem_of("interpolation = 'qintic'\n"),
             "experiment.toml:1: interpolation: 'qintic' is not one of the choices (did you mean "
             "'quintic'?)");
