@@ -109,7 +109,7 @@ Status find_torque_place(const std::vector<Recording>& recordings, const model::
       "link: the rotors stay as described: " +
       rigid);
   identified.facts.rigid.assign(identified.facts.rigid.size(), false);
-  identified.facts.behind_rotors = true;
+  identified.facts.behind_rotors = out.behind_rotors = true;
   return make_equations(recordings, options, identified, equations);
 }
 

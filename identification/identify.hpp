@@ -88,6 +88,7 @@ struct Identification {
   std::vector<JointResult> joints;  ///< in the image's order
   std::vector<BaseParameter> base;
   double condition_number = 0.0;  ///< of the base parameters' columns, weighted, of unit length
+  bool behind_rotors = false;     ///< the torques hold nothing of rigid drives' rotors
   double usable_s = 0.0;          ///< of the logs, without what was excluded
   double held_out_s = 0.0;
   double described_mass_kg = 0.0, identified_mass_kg = 0.0;  ///< of everything that moves

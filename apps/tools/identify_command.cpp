@@ -113,6 +113,7 @@ Json result_json(const Identification& result, const std::vector<std::string>& f
           {"joints", joints_json(result)},
           {"condition_number", number(result.condition_number)},
           {"base_parameters", base_json(result)},
+          {"torques_behind_rotors", result.behind_rotors},
           {"total_mass_kg",
            {{"value", result.identified_mass_kg},
             {"ci95", number(result.mass_kg.ci95)},

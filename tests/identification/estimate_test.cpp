@@ -361,6 +361,7 @@ TEST(Identify, FindsThatTorquesWereMeasuredBehindTheRotors) {
     const bool said = std::ranges::any_of(result->remarks, [](const std::string& one) {
       return one.find("hold nothing of their rotors") != std::string::npos;
     });
+    EXPECT_EQ(result->behind_rotors, said);
     return std::pair{std::move(*result), said};
   };
   const auto [result, said] = behind(0.0, 1e-3);
