@@ -24,14 +24,19 @@ double quantile(std::span<const double> largest, double probability) {
 
 }  // namespace
 
-CollisionWatch::CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet)
-    : threshold_Nm_(std::move(threshold_Nm)), quiet_for_(threshold_Nm_.size()), quiet_(quiet) {}
+CollisionWatch::CollisionWatch(std::vector<double> threshold_Nm, std::size_t joints,
+                               std::uint32_t quiet)
+    : threshold_Nm_(std::move(threshold_Nm)),
+      quiet_for_(threshold_Nm_.size()),
+      joints_(joints),
+      quiet_(quiet) {}
 
 std::optional<CollisionWatch::Found> CollisionWatch::look(
     std::span<const double> external_torque_Nm,
     std::span<std::uint8_t> collided) noexcept TANDEM_RT {
   std::optional<Found> found;
   double worst = 0.0;
+  bool base = false;
   for (std::size_t j = 0; j < threshold_Nm_.size(); ++j) {
     const double torque = std::abs(external_torque_Nm[j]);
     const bool beyond = torque > threshold_Nm_[j];
@@ -45,7 +50,10 @@ std::optional<CollisionWatch::Found> CollisionWatch::look(
       found = Found{j, external_torque_Nm[j]};
     }
     quiet_for_[j] = quiet_;
+    base = base || j >= joints_;
   }
+  if (base)
+    std::fill(quiet_for_.begin() + static_cast<std::ptrdiff_t>(joints_), quiet_for_.end(), quiet_);
   return found;
 }
 

@@ -21,11 +21,12 @@ inline constexpr std::array<const char*, 6> kBaseChannels{"base_force_x",  "base
                                                           "base_moment_y", "base_moment_z"};
 
 /// Compares external torques with a threshold by joint; behind the joints by kBaseChannels. A joint
-/// is found once: again after its torque has been below the threshold for `quiet` cycles.
+/// is found once: again after its torque has been below the threshold for `quiet` cycles. The
+/// base's channels are one in this: whatever strikes it is in several of them.
 class CollisionWatch {
  public:
-  /// @param threshold_Nm  by joint; infinite: not watched
-  CollisionWatch(std::vector<double> threshold_Nm, std::uint32_t quiet);
+  /// @param threshold_Nm  by joint, then by channel of the base; infinite: not watched
+  CollisionWatch(std::vector<double> threshold_Nm, std::size_t joints, std::uint32_t quiet);
 
   struct Found {
     std::size_t joint = 0;  ///< or, from the number of joints on, which of kBaseChannels
@@ -45,6 +46,7 @@ class CollisionWatch {
  private:
   std::vector<double> threshold_Nm_;
   std::vector<std::uint32_t> quiet_for_;  // cycles that are left until it can be found again
+  std::size_t joints_;
   std::uint32_t quiet_;
 };
 

@@ -98,7 +98,8 @@ Result<std::unique_ptr<Estimator>> Estimator::make(const hal::Robot& robot,
     if (!limits) return in_table(limits.error(), "estimation.collision.threshold_Nm");
     made->felt_.resize(limits->size());
     made->found_.resize(limits->size());
-    made->watch_.emplace(std::move(*limits), static_cast<std::uint32_t>(kQuiet_s / step_s));
+    made->watch_.emplace(std::move(*limits), made->image_.joints(),
+                         static_cast<std::uint32_t>(kQuiet_s / step_s));
     made->reaction_ = config.collision->reaction;
   }
   return made;

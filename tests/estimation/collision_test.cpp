@@ -13,7 +13,7 @@ namespace tandem::estimation {
 namespace {
 
 TEST(CollisionWatch, FindsTheJointFurthestBeyondOnceUntilItWasQuiet) {
-  CollisionWatch watch({1.0, 10.0, std::numeric_limits<double>::infinity()}, 3);
+  CollisionWatch watch({1.0, 10.0, std::numeric_limits<double>::infinity()}, 3, 3);
   std::vector<std::uint8_t> collided(3);
   EXPECT_FALSE(watch.look(std::vector{0.9, -9.0, 1e6}, collided));
   const auto found = watch.look(std::vector{-1.5, 30.0, 1e6}, collided);
@@ -25,6 +25,21 @@ TEST(CollisionWatch, FindsTheJointFurthestBeyondOnceUntilItWasQuiet) {
   for (int quiet = 0; quiet < 3; ++quiet)
     EXPECT_FALSE(watch.look(std::vector{0.0, 0.0, 0.0}, collided));
   EXPECT_TRUE(watch.look(std::vector{2.0, 0.0, 0.0}, collided)) << "a new one";
+}
+
+// One push at the base was found three times within 6 ms, once for each channel.
+TEST(CollisionWatch, FindsTheBaseOnceInAllOfItsChannels) {
+  CollisionWatch watch({1.0, 1.0, 1.0, 1.0}, 2, 3);
+  std::vector<std::uint8_t> collided(4);
+  const auto found = watch.look(std::vector{0.0, 0.0, 2.0, 0.5}, collided);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->joint, 2U);
+  EXPECT_FALSE(watch.look(std::vector{0.0, 0.0, 2.0, 1.5}, collided)) << "its other channel";
+  EXPECT_EQ(collided, (std::vector<std::uint8_t>{0, 0, 1, 1}));
+  EXPECT_TRUE(watch.look(std::vector{1.5, 0.0, 2.0, 1.5}, collided)) << "a joint is another place";
+  for (int quiet = 0; quiet < 3; ++quiet)
+    EXPECT_FALSE(watch.look(std::vector{0.0, 0.0, 0.0, 0.0}, collided));
+  EXPECT_TRUE(watch.look(std::vector{0.0, 0.0, 0.0, 2.0}, collided));
 }
 
 // A threshold learned from ten minutes of a joint's noise: how often is it passed in 200 hours?
