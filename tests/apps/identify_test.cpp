@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "apps/tools/identified_files.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tandem::apps {
@@ -513,6 +514,21 @@ TEST_F(Identify, IsRefusedWhereLoopsAreClosed) {
   EXPECT_NE(result.err.find("closed loops and passive joints cannot be identified"),
             std::string::npos)
       << result.err;
+}
+
+// What a sensor behind the rotor sees of friction is not the motor's: it was written as if it were.
+TEST(ActuatorFigures, KeepTheMotorsFrictionThatTorquesBehindTheRotorsDoNotShow) {
+  const auto robot = hal::read_robot_config(TANDEM_SOURCE_DIR "/config/double_pendulum/robot.toml");
+  ASSERT_TRUE(robot);
+  identification::Identification result;
+  result.joints.resize(robot->joints.size());
+  for (auto& joint : result.joints) joint.viscous_Nms_rad = {0.25, 0.01, true};
+  const auto at_motors = actuator_figures(*robot, result);
+  ASSERT_EQ(at_motors.size(), 1U);
+  ASSERT_TRUE(at_motors[0].damping_Nms_rad);
+  EXPECT_GT(*at_motors[0].damping_Nms_rad, 0.25) << "with the back-EMF's share";
+  result.behind_rotors = true;
+  EXPECT_FALSE(actuator_figures(*robot, result)[0].damping_Nms_rad) << "as described";
 }
 
 }  // namespace
