@@ -31,11 +31,13 @@ Diagnostics one(std::string message, std::string hint, std::string file) {
   return {Error{std::move(message), std::move(hint), std::move(file), 0, {}}};
 }
 
-/// A name for files and TOML: letters, digits, '_' and '-'.
+/// A name for files and TOML: letters, digits, '_' and '-'; "robot" of a name in other letters.
 std::string plain_name(std::string name) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0; };
+  if (std::ranges::none_of(name, is_plain)) return "robot";
   std::ranges::replace_if(
-      name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-'; }, '_');
-  return name.empty() ? "robot" : name;
+      name, [&](unsigned char c) { return !is_plain(c) && c != '-'; }, '_');
+  return name;
 }
 
 std::vector<std::string> bundled_robots() {

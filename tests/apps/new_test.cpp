@@ -197,6 +197,13 @@ TEST_F(New, TakesOfALeadersRangeWhatItsFollowerCanKeep) {
       << point.err;
 }
 
+// It was "__________": all such names of one length were one.
+TEST_F(New, CallsARobotOfOtherLettersARobot) {
+  write_text(folder_ / "робот.urdf", two_links("b", kLimit, kLimit));
+  EXPECT_EQ(tandem("new робот.urdf --base fixed").status, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "robot/robot.toml"));
+}
+
 TEST_F(New, SaysOnceWhyABaseCannotBeAsItIsTold) {
   write_text(folder_ / "arm.urdf", two_links("b", kLimit, kLimit));
   const Outcome floating = tandem("new arm.urdf --base floating");
