@@ -26,6 +26,8 @@ constexpr double kStill_rad = 0.02;
 constexpr double kMuchLeftOver = 0.3;  // of a joint's torque: a warning
 constexpr double kNoTorque = 1e-3;     // of a joint's limit: a residual below it matters to nobody
 constexpr double kWorse = 1.2;         // times the residual of the description: a warning
+constexpr double kFelt = 5e-3;         // of a joint's limit: friction that matters
+constexpr double kFeltRotor = 0.1;     // of the described one
 
 /// Which instants train, and which are held back.
 struct Split {
@@ -213,6 +215,7 @@ class Answer {
 
   void fill_joint(std::size_t c, JointResult& out) const {
     const RobotFacts& facts = robot_.facts;
+    out.behind_rotor = !facts.behind_rotor.empty() && facts.behind_rotor[c];
     const double torque = facts.max_torque_Nm[c];
     const double viscous = torque / facts.max_velocity_rad_s[c];
     const double rotor = facts.rotor_kg_m2[c] > 0.0 ? facts.rotor_kg_m2[c] : 1e-2;
@@ -328,7 +331,7 @@ class Answer {
     }
     std::string assumed;
     for (const JointResult& joint : out.joints)
-      if (!joint.rotor_inertia_kg_m2.identifiable && !robot_.facts.behind_rotors)
+      if (!joint.rotor_inertia_kg_m2.identifiable && !joint.behind_rotor)
         assumed += (assumed.empty() ? "" : ", ") + joint.name;
     if (!assumed.empty()) {
       out.remarks.push_back(
@@ -347,7 +350,33 @@ class Answer {
           "described: " +
           unseen);
   }
+  /// Bodies are kept possible, friction and rotors are not: they show a sign that is wrong.
+  void warn_of_sign(const JointResult& joint, Identification& out) const {
+    const auto& config = config_.joints[static_cast<std::size_t>(config_.joint_index(joint.name))];
+    const double rotor = config_.actuator_of(config).inertia_kg_m2;
+    struct Named {
+      const char* name;
+      const Estimate& found;
+      double felt;  // what would matter
+      const char *turning, *sliding;
+    };
+    const double torque = kFelt * config.max_torque_Nm;
+    for (const auto& [name, found, felt, turning, sliding] :
+         {Named{"Coulomb friction", joint.link_coulomb_Nm, torque, "Nm", "N"},
+          Named{"viscous friction", joint.link_viscous_Nms_rad, torque / config.max_velocity_rad_s,
+                "Nms/rad", "Ns/m"},
+          Named{"rotor", joint.rotor_inertia_kg_m2, kFeltRotor * rotor, "kg m2", "kg"}}) {
+      if (!found.identifiable || !(found.value < -std::max(felt, found.ci95))) continue;
+      out.warnings.push_back(fmt::format(
+          "the {} of joint '{}' is {:.3g} +- {:.2g} {}, and nothing has less than none: its torque "
+          "or its position may have the other sign. Then nothing of this result is true: record or "
+          "import them with the right sign",
+          name, joint.name, found.value, found.ci95, joint.slides ? sliding : turning));
+      return;
+    }
+  }
   void warn_of(const JointResult& joint, Identification& out) const {
+    warn_of_sign(joint, out);
     if (!(joint.rms_Nm > kNoTorque * torque_of(joint.name))) return;
     const char* unit = joint.slides ? "N" : "Nm";
     if (joint.relative_error > kMuchLeftOver) {

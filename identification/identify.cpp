@@ -95,21 +95,24 @@ Status make_equations(const std::vector<Recording>& recordings, const IdentifyOp
 Status find_torque_place(const std::vector<Recording>& recordings, const model::Tree& tree,
                          const IdentifyOptions& options, IdentifiedRobot& identified,
                          Equations& equations, Identification& out) {
-  std::string rigid;
-  for (std::size_t c = 0; c < identified.facts.joint.size(); ++c) {
-    if (!identified.facts.rigid[c] || !(identified.facts.rotor_kg_m2[c] > 0.0)) continue;
-    rigid += (rigid.empty() ? "" : ", ") + identified.regressor.coordinates()[c];
-  }
   const bool recorded = std::ranges::all_of(recordings, [](const Recording& recording) {
     return recording.unknown_hold_s > 0.0 && !recording.out_of_step;
   });
-  if (rigid.empty() || !recorded || !measured_behind_rotors(identified, tree, equations)) return {};
+  RobotFacts& facts = identified.facts;
+  const bool rigid = std::ranges::find(facts.rigid, true) != facts.rigid.end();
+  if (!recorded || !rigid) return {};
+  facts.behind_rotor = measured_behind_rotors(identified, tree, equations);
+  std::string names;
+  for (std::size_t c = 0; c < facts.rigid.size(); ++c) {
+    if (!facts.behind_rotor[c]) continue;
+    facts.rigid[c] = false;
+    names += (names.empty() ? "" : ", ") + identified.regressor.coordinates()[c];
+  }
+  if (names.empty()) return {};
   out.remarks.push_back(
       "these joints' torques hold nothing of their rotors, as those of sensors between gear and "
       "link: the rotors stay as described: " +
-      rigid);
-  identified.facts.rigid.assign(identified.facts.rigid.size(), false);
-  identified.facts.behind_rotors = out.behind_rotors = true;
+      names);
   return make_equations(recordings, options, identified, equations);
 }
 

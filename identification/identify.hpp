@@ -62,6 +62,7 @@ struct JointResult {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   std::string name;
   bool slides = false;
+  bool behind_rotor = false;  ///< the torques hold nothing of the rotor, though there is no spring
   Estimate viscous_Nms_rad, coulomb_Nm, rotor_inertia_kg_m2, offset_Nm;
   Estimate link_viscous_Nms_rad, link_coulomb_Nm;  ///< the share behind the torque measurement
   Estimate motor_viscous_Nms_rad;                  ///< the share before it
@@ -88,7 +89,6 @@ struct Identification {
   std::vector<JointResult> joints;  ///< in the image's order
   std::vector<BaseParameter> base;
   double condition_number = 0.0;  ///< of the base parameters' columns, weighted, of unit length
-  bool behind_rotors = false;     ///< the torques hold nothing of rigid drives' rotors
   double usable_s = 0.0;          ///< of the logs, without what was excluded
   double held_out_s = 0.0;
   double described_mass_kg = 0.0, identified_mass_kg = 0.0;  ///< of everything that moves

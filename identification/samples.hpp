@@ -17,9 +17,10 @@ namespace tandem::identification {
 /// What of the robot's configuration identification uses, in the order of the regressor's
 /// coordinates.
 struct RobotFacts {
-  std::vector<int> joint;      ///< in the image; -1: a joint that nobody measures
-  std::vector<bool> rigid;     ///< the rotor turns with the link: its inertia is in the link's row
-  bool behind_rotors = false;  ///< measured_behind_rotors(): then no rotor is in a link's row
+  std::vector<int> joint;   ///< in the image; -1: a joint that nobody measures
+  std::vector<bool> rigid;  ///< the rotor turns with the link: its inertia is in the link's row
+  /// measured_behind_rotors(): such a drive counts as one with a spring. Empty: none is.
+  std::vector<bool> behind_rotor;
   std::vector<double> rotor_kg_m2;      ///< as described, on the link side
   std::vector<double> torque_per_A;     ///< on the link side; 0: not known
   std::vector<double> damping_Nms_rad;  ///< of the actuator, back-EMF included

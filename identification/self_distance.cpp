@@ -67,9 +67,11 @@ SelfDistance::SelfDistance(const model::Tree& tree, std::span<const double> star
   const std::vector<model::Placement> at = model::place_bodies(tree, start);
   for (std::size_t a = 0; a < capsules_.size(); ++a) {
     for (std::size_t b = a + 1; b < capsules_.size(); ++b) {
-      if (steps_between(tree, capsules_[a].body, capsules_[b].body) < 3) continue;
+      const int steps = steps_between(tree, capsules_[a].body, capsules_[b].body);
+      if (steps < 2) continue;  // they touch at their joint
       Pair pair{a, b, kRequired_m};
       const double now = distance(pair, at);
+      if (steps == 2 && now < 2.0 * kRequired_m) continue;  // wrists and hips: always near
       if (now < 2.0 * kRequired_m) pair.required_m = now - 0.01;
       pairs_.push_back(pair);
     }

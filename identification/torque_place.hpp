@@ -2,16 +2,20 @@
 // Layer: identification.  Thread: non-RT only.
 #pragma once
 
+#include <vector>
+
 #include "identification/samples.hpp"
 #include "model/tree.hpp"
 
 namespace tandem::identification {
 
-/// Whether the torques of the drives without a spring hold nothing of the described rotors, as
-/// those of sensors between gear and link do: with the rotors taken as 0 the equations fit clearly
-/// better than with the described ones, and no share of these above 5 % fits better still.
+/// Of each coordinate, whether its torques hold nothing of its described rotor, as those of a
+/// sensor between gear and link do. The data say so where they know the rotor within a fifteenth of
+/// its description and find none; where they cannot say, it is as with the other joints, if these
+/// agree. No where the drive has a spring: then the rotor is behind it.
 /// @param equations  of all logs, whose rotors are in the links' rows
-[[nodiscard]] bool measured_behind_rotors(IdentifiedRobot& robot, const model::Tree& tree,
-                                          const Equations& equations);
+[[nodiscard]] std::vector<bool> measured_behind_rotors(IdentifiedRobot& robot,
+                                                       const model::Tree& tree,
+                                                       const Equations& equations);
 
 }  // namespace tandem::identification

@@ -223,7 +223,7 @@ std::vector<ActuatorFigures> actuator_figures(const hal::RobotConfig& robot,
       if (robot.actuator_of(robot.joints[j]).name != actuator.name) continue;
       const identification::JointResult& joint = result.joints[j];
       inertia.add(joint.rotor_inertia_kg_m2);
-      const bool motors = actuator.order < 2 && !result.behind_rotors;  // torques are the motors'
+      const bool motors = actuator.order < 2 && !joint.behind_rotor;  // torques are the motors'
       friction.add(motors ? joint.viscous_Nms_rad : joint.motor_viscous_Nms_rad);
     }
     const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;

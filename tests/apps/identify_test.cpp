@@ -527,7 +527,7 @@ TEST(ActuatorFigures, KeepTheMotorsFrictionThatTorquesBehindTheRotorsDoNotShow) 
   ASSERT_EQ(at_motors.size(), 1U);
   ASSERT_TRUE(at_motors[0].damping_Nms_rad);
   EXPECT_GT(*at_motors[0].damping_Nms_rad, 0.25) << "with the back-EMF's share";
-  result.behind_rotors = true;
+  for (auto& joint : result.joints) joint.behind_rotor = true;
   EXPECT_FALSE(actuator_figures(*robot, result)[0].damping_Nms_rad) << "as described";
 }
 

@@ -361,7 +361,7 @@ TEST(Identify, FindsThatTorquesWereMeasuredBehindTheRotors) {
     const bool said = std::ranges::any_of(result->remarks, [](const std::string& one) {
       return one.find("hold nothing of their rotors") != std::string::npos;
     });
-    EXPECT_EQ(result->behind_rotors, said);
+    for (const JointResult& joint : result->joints) EXPECT_EQ(joint.behind_rotor, said);
     return std::pair{std::move(*result), said};
   };
   const auto [result, said] = behind(0.0, 1e-3);
@@ -377,8 +377,42 @@ TEST(Identify, FindsThatTorquesWereMeasuredBehindTheRotors) {
   EXPECT_GE(inside, 60U);
   for (const JointResult& joint : result.joints)
     EXPECT_FALSE(joint.rotor_inertia_kg_m2.identifiable) << joint.name;
-  for (const double share : {0.3, 1.0, 3.0}) EXPECT_FALSE(behind(share, 1e-3).second) << share;
+  for (const double share : {0.1, 0.3, 1.0, 3.0}) EXPECT_FALSE(behind(share, 1e-3).second) << share;
   EXPECT_FALSE(behind(0.0, 0.0).second) << "a simulation's torques are its motors'";
+}
+
+// Sensors in the wrist, currents in the arm: all joints were taken as the first that was found.
+TEST(Identify, FindsJointByJointWhereTorquesWereMeasured) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = 0.03;
+  for (const std::size_t joint : {4U, 5U, 6U}) reality.rotor_kg_m2[joint] = 0.0;
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  recording.unknown_hold_s = 1e-3;
+  const auto result = identify({recording}, panda.robot, panda.tree);
+  ASSERT_TRUE(result);
+  for (std::size_t j = 0; j < 7; ++j)
+    EXPECT_EQ(result->joints[j].behind_rotor, j >= 4) << result->joints[j].name;
+}
+
+// A joint whose torques have the other sign was given friction of less than none, with confidence.
+TEST(Identify, SaysThatAJointsSignIsWrong) {
+  const Arm panda = arm("panda");
+  Reality reality = panda_reality();
+  reality.torque_noise_Nm = reality.torque_quantum_Nm = 0.01;
+  reality.viscous_Nms_rad[6] = reality.coulomb_Nm[6] = 0.5;
+  Recording recording = synthetic_recording(panda.tree, wide_series(panda, 3), reality, 1);
+  const auto signs = [&] {
+    const auto result = identify({recording}, panda.robot, panda.tree);
+    EXPECT_TRUE(result);
+    std::string all;
+    for (const std::string& one : result->warnings)
+      if (one.find("other sign") != std::string::npos) all += one + "\n";
+    return all;
+  };
+  EXPECT_EQ(signs(), "");
+  for (double& torque : recording.torque_Nm[6]) torque = -torque;
+  EXPECT_EQ(signs().rfind("the Coulomb friction of joint 'panda_joint7' is -0.", 0), 0U) << signs();
 }
 
 TEST(Identify, SaysWhichJointsDoNotMove) {
