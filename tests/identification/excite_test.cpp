@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "identification/self_distance.hpp"
@@ -34,6 +35,27 @@ TEST(Excite, AnArmStaysWithinEveryLimitAndIsWellConditioned) {
   }
   EXPECT_LT(series.at(0.0).v.norm(), 1e-9);
   EXPECT_LT(series.at(0.0).acceleration.norm(), 1e-9);
+}
+
+// The forearm went through the column that the arm stands on: two joints lie between them.
+TEST(SelfDistance, SeesTheForearmInTheColumn) {
+  std::string urdf =
+      "<robot name='f'><link name='base'><inertial><origin xyz='0 0 0.2'/><mass value='5'/>"
+      "<inertia ixx='0.083' ixy='0' ixz='0' iyy='0.083' iyz='0' izz='0.033'/></inertial></link>";
+  const std::array<std::string, 4> links{"base", "a", "b", "c"};
+  for (std::size_t i = 1; i < links.size(); ++i) {
+    urdf += "<link name='" + links[i] +
+            "'><inertial><origin xyz='0.15 0 0'/><mass value='1'/><inertia ixx='0.001' ixy='0' "
+            "ixz='0' iyy='0.01' iyz='0' izz='0.01'/></inertial></link><joint name='j" +
+            links[i] + "' type='revolute'><parent link='" + links[i - 1] + "'/><child link='" +
+            links[i] + "'/><origin xyz='" + (i == 1 ? "0 0 0.4" : "0.3 0 0") +
+            "'/><axis xyz='0 1 0'/><limit lower='-3' upper='3' effort='80' velocity='3'/></joint>";
+  }
+  const auto model = model::parse_urdf(urdf + "</robot>", "f.urdf", {});
+  ASSERT_TRUE(model) << model.error().front().to_string();
+  const SelfDistance distance(model->tree, std::vector{-1.0, 0.5, 0.0});
+  EXPECT_GT(distance.room(std::vector{-1.0, 0.5, 0.0}), 0.0);
+  EXPECT_LT(distance.room(std::vector{1.35, 1.58, 0.0}), 0.0);
 }
 
 TEST(Excite, IsAFunctionOfItsSeed) {
