@@ -110,8 +110,27 @@ std::optional<Error> upward_gravity(const hal::RobotConfig& robot) {
       .key = "model.gravity_m_s2"};
 }
 
+/// Of a drive that is given its bearings' friction alone, a common slip: its motor turned many
+/// times as fast as its voltage allows.
+void warn_of_back_emf(const hal::RobotConfig& robot, Diagnostics& warnings) {
+  for (const hal::ActuatorConfig& actuator : robot.actuators) {
+    const double per_A = actuator.gear_ratio * actuator.torque_constant_Nm_A;
+    const double whole = per_A * per_A / actuator.resistance_ohm;
+    if (!(actuator.damping_Nms_rad < 0.5 * whole)) continue;
+    warnings.push_back(
+        {.message = fmt::format("is {:.3g}, and the back-EMF alone is N^2 K^2 / R = {:.3g}: the "
+                                "simulated motor has {:.2g} of its back-EMF, and no friction",
+                                actuator.damping_Nms_rad, whole, actuator.damping_Nms_rad / whole),
+         .hint = "it is friction and back-EMF together",
+         .file = robot.file,
+         .line = actuator.damping_line,
+         .key = "actuator." + actuator.name + ".damping_Nms_rad"});
+  }
+}
+
 Diagnostics start_warnings(const RobotFiles& robot, const std::string& posture) {
   Diagnostics warnings;
+  warn_of_back_emf(robot.config, warnings);
   if (auto error = upward_gravity(robot.config)) warnings.push_back(std::move(*error));
   if (auto error = too_weak_at(robot, posture)) warnings.push_back(std::move(*error));
   return warnings;

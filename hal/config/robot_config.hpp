@@ -78,6 +78,7 @@ struct ActuatorConfig {
   double continuous_current_A = 0.0;   ///< the drive's I2t limit; 0: not watched
   double thermal_time_s = 30.0;        ///< time constant of that watch
   double temperature_limit_C = 120.0;  ///< of the winding
+  int damping_line = 0;                ///< in the TOML, for messages
 };
 
 /// What its order lacks ("inductance_H must be positive"), or empty.

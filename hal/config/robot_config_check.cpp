@@ -281,6 +281,11 @@ class Completion : private Check {
       error(joint.line, key + ".rated_torque_Nm",
             "max_torque_Nm is more than 32 times the rated torque, the range of the wire",
             "raise rated_torque_Nm");
+    } else if (joint.rated_torque_Nm > 100.0 * joint.max_torque_Nm) {
+      error(joint.line, key + ".rated_torque_Nm",
+            "torques go over the wire in thousandths of it, and max_torque_Nm has less than ten "
+            "of these steps",
+            "it is in Nm, object 6076 in mNm; lower it");
     }
     check_torque_rate(joint, key + ".max_torque_rate_Nm_s");
     check_gains(joint);

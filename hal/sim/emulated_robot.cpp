@@ -81,6 +81,8 @@ std::string stiffest_of_ground(const PlantConfig& config, const Plant& plant, do
   return {};
 }
 
+constexpr std::int64_t kShortestStep_ns = 1'000;
+
 // A step that cannot be stable would show as a drive's fault, far from its cause.
 Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, const Plant& plant) {
   PlantConfig tested = config;
@@ -101,7 +103,10 @@ Status check_step(const hal::RobotConfig& robot, const PlantConfig& config, cons
   }
   return std::unexpected(
       Error{.message = std::to_string(config.substep_ns) + " ns is unstable at " + limit.place,
-            .hint = "at most " + std::to_string(at_most) + " ns in this posture",
+            .hint = at_most >= kShortestStep_ns
+                        ? "at most " + std::to_string(at_most) + " ns in this posture"
+                        : "no sub-step is short enough: are its inertia, stiffness, damping and "
+                          "inductance right?",
             .file = {},
             .key = "sim.substep_ns"});
 }

@@ -91,6 +91,20 @@ std::string place_of(const tandem_kernels& k, Eigen::Index index) {
   return (rotor ? "the motor of joint " : "joint ") + std::string(joint);
 }
 
+/// A current's own time, L / R. Semi-implicit Euler takes it implicitly; in longer steps of
+/// Runge-Kutta's it grew to its limit and stayed there, at any voltage.
+StepLimit shortest_current(const PlantConfig& config, const Plant& plant) {
+  StepLimit limit{std::numeric_limits<double>::infinity(), {}};
+  if (config.integrator != Integrator::kRungeKutta4) return limit;
+  for (std::size_t j = 0; j < plant.joints(); ++j) {
+    const ActuatorModel& m = plant.actuators().model(plant.model_index(j));
+    const double seconds = step_stretch(config.integrator) * m.inductance_H / m.resistance_ohm;
+    if (!m.current_is_state() || seconds >= limit.seconds) continue;
+    limit = {seconds, "the current of joint " + config.joints[j].name};
+  }
+  return limit;
+}
+
 }  // namespace
 
 StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
@@ -102,9 +116,8 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   add_joints(config, plant, system);
   add_passive(config, plant, system);
   add_ground(config, plant, system);
-  if (system.K.isZero(0.0) && system.D.isZero(0.0)) {
-    return {std::numeric_limits<double>::infinity(), {}};
-  }
+  const StepLimit electrical = shortest_current(config, plant);
+  if (system.K.isZero(0.0) && system.D.isZero(0.0)) return electrical;
   // With x = L^-T y the mass is the identity, and the largest eigenvalue grows with u.
   const Eigen::LLT<Matrix> L(system.M);
   const auto scaled = [&](const Matrix& A) -> Matrix {
@@ -121,7 +134,9 @@ StepLimit longest_step(const PlantConfig& config, const Plant& plant) {
   const Eigen::VectorXd mode = L.matrixU().solve(modes.rightCols(1));
   Eigen::Index most = 0;
   mode.cwiseAbs().maxCoeff(&most);
-  return {step_stretch(config.integrator) * low, place_of(k, most)};
+  const double mechanical_s = step_stretch(config.integrator) * low;
+  return electrical.seconds < mechanical_s ? electrical
+                                           : StepLimit{mechanical_s, place_of(k, most)};
 }
 
 }  // namespace tandem::sim

@@ -10,7 +10,8 @@ namespace tandem::sim {
 
 struct StepLimit {
   double seconds = 0.0;  ///< a longer sub-step is unstable; infinite without springs and dampers
-  std::string place;     ///< where: "joint RAnkLat", "the motor of joint RAnkLat"
+  std::string
+      place;  ///< where: "joint RAnkLat", "the motor of joint RAnkLat", "the current of joint …"
 };
 
 /// Linearises M x'' + D x' + K x = 0 around the plant's present posture, with the springs and

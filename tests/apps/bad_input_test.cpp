@@ -41,6 +41,21 @@ TEST_F(BadInput, OfAnotherKindIsNamedWithTheCommandThatTakesIt) {
   EXPECT_NE(urdf.err.find("tandem new"), std::string::npos) << urdf.err;
 }
 
+TEST_F(BadInput, DampingWithoutTheBackEmfIsWarnedOf) {
+  const Outcome before = tandem("check hold.toml");
+  EXPECT_EQ(before.err.find("back-EMF"), std::string::npos) << before.err;
+  const std::string text = read_text(folder_ / "robot.toml");
+  const auto at = text.find("damping_Nms_rad = ");
+  ASSERT_NE(at, std::string::npos);
+  write_text(folder_ / "robot.toml",
+             text.substr(0, at) + "damping_Nms_rad = 1e-3" + text.substr(text.find('\n', at)));
+  const Outcome outcome = tandem("check hold.toml");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("damping_Nms_rad: is 0.001, and the back-EMF alone is N^2 K^2 / R = "),
+            std::string::npos)
+      << outcome.err;
+}
+
 TEST_F(BadInput, AFloatingBaseWithoutGroundIsWarnedOf) {
   edit("robot.toml", "base = \"fixed\"", "base = \"floating\"");
   for (const char* command : {"check robot.toml", "check hold.toml"}) {  // not of an experiment

@@ -227,6 +227,11 @@ TEST_F(Completed, RefusesLimitsThatTheEncoderCannotCount) {
 TEST_F(Completed, RefusesATorqueThatTheWireCannotSay) {
   read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nrated_torque_Nm = 1"));
   EXPECT_NE(errors.find("more than 32 times the rated torque"), std::string::npos);
+  // 80 Nm in mNm, as the object has it: every torque became 0 on the wire, and nothing was said.
+  read(with("max_torque_Nm = 80", "max_torque_Nm = 80\nrated_torque_Nm = 80000"));
+  EXPECT_NE(errors.find("has less than ten of these steps (it is in Nm, object 6076 in mNm"),
+            std::string::npos)
+      << errors;
 }
 
 TEST_F(Completed, RefusesAPostureBeyondTheLimits) {
