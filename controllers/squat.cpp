@@ -220,7 +220,13 @@ class Squat : public Controller {
         reached = down;
         continue;
       }
-      if (i == 0) {
+      if (too_fast_ > 1.0) {
+        char least[32];
+        std::snprintf(least, sizeof least, "%.2g s", 1.05 * plan_.period_s * too_fast_);
+        setup.parameters.error("period_s", problem + ", " + metres(down) + " down",
+                               std::string("give at least ") + least +
+                                   ", less depth_m, or a posture with more bent knees");
+      } else if (i == 0) {
         setup.parameters.error("posture", "the robot cannot stand like this: " + problem,
                                "choose a posture with every foot on the ground and bent knees");
       } else {
@@ -247,7 +253,8 @@ class Squat : public Controller {
       if (q < joint.min_position_rad || q > joint.max_position_rad) {
         return "joint '" + joint.name + "' leaves its limits";
       }
-      if (std::abs(stance_->v()[map.v_index(j)]) > joint.max_velocity_rad_s) {
+      too_fast_ = std::abs(stance_->v()[map.v_index(j)]) / joint.max_velocity_rad_s;
+      if (too_fast_ > 1.0) {
         return "joint '" + joint.name + "' is too slow for this period";
       }
       if (std::abs(stance_->tau()[map.v_index(j)]) > joint.max_torque_Nm) {
@@ -263,6 +270,7 @@ class Squat : public Controller {
   std::int64_t start_ns_ = 0;
   std::int64_t retreat_ns_ = 0, retreats_ = 0;  // when it began; whether it has
   Retreat retreat_;
+  double too_fast_ = 0.0;              // a joint's speed over its limit, of beyond_limits()
   double height_m_ = 0.0;              // of the base above the feet at the start
   std::int64_t standing_ = 0;          // whether the start posture was found
   double link_damping_Nms_rad_ = 0.0;  // of the legs' joints

@@ -194,6 +194,12 @@ TEST(Squat, SaysHowDeepItReaches) {
                 .problem()
                 .find("is too slow for this period"),
             std::string::npos);
+  // At its start the posture was blamed, and one with more bent knees asked for.
+  const std::string fast = test::Harness(test::biped_robot(), "squat",
+                                         "depth_m = 0.05\nperiod_s = 0.02\n", test::biped_kernels())
+                               .problem();
+  EXPECT_TRUE(fast.starts_with("experiment.toml:2: period_s: joint '")) << fast;
+  EXPECT_NE(fast.find("0.000 m down (give at least "), std::string::npos) << fast;
 }
 
 TEST(Squat, RefusesARobotThatCannotSquat) {
