@@ -27,8 +27,9 @@ struct Spacing {
 /// Errors, with file and line or the sample's number: time that goes back, duplicates, gaps,
 /// columns that never change, as far as the map does not exclude them; a series of less than two
 /// samples; no period_s, with what the recording's own is, or one that is 50 times as long or as
-/// short; a position further outside of its joint's range than that is wide; a velocity that is
-/// not the rate of its position, within a factor of two, where the joint moves.
+/// short; a position further outside of its joint's range than that is wide; a position
+/// that leaps by a turn; a torque above a hundred times its joint's; a velocity that is not the
+/// rate of its position, within a factor of two, where the joint moves.
 [[nodiscard]] Status clean(Recording& recording, const ImportMap& map,
                            const hal::RobotConfig& robot);
 

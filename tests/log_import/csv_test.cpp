@@ -163,6 +163,19 @@ TEST_F(Csv, AVelocityIsTheRateOfItsPosition) {
              "the velocity of 'joint1' (column dq1)");
 }
 
+// Both were imported, and identified with confidence.
+TEST_F(Csv, AWrappedPositionAndAnImpossibleTorqueAreRefused) {
+  const auto at = [](int row, const std::string& text) {
+    return plain_rows(50, [=](int i, std::string line) { return i == row ? text : line; });
+  };
+  EXPECT_HAS(
+      refusal({write("a.csv", at(30, "0.30,-5.9877,0.955,0.955,-0.3,0.6,0.2"))}, kPlain),
+      "a.csv:32: rows: q1 leaps by 6.274 rad, a turn: 'joint1' does not (its number was kept "
+      "within a turn: let it go on (unwrap it)");
+  EXPECT_HAS(refusal({write("b.csv", at(30, "0.30,0.2955,0.955,0.955,-0.3,1e30,0.2"))}, kPlain),
+             "b.csv:32: rows: tau1 is 1e+30 Nm; 'joint1' has ");
+}
+
 /// Columns of the UR10e files: t, q(6), dq(6), i(6), i_desired(6), torque_desired(6), no header.
 TEST_F(Csv, WithoutHeaderNamesItsColumnsByNumber) {
   std::string text;
