@@ -368,8 +368,9 @@ class Answer {
           Named{"rotor", joint.rotor_inertia_kg_m2, kFeltRotor * rotor, "kg m2", "kg"}}) {
       if (!found.identifiable || !(found.value < -std::max(felt, found.ci95))) continue;
       out.warnings.push_back(fmt::format(
-          "the {} of joint '{}' is {:.3g} +- {:.2g} {}, and nothing has less than none: its torque "
-          "or its position may have the other sign. Then nothing of this result is true: record or "
+          "the {} of joint '{}' is {:.3g} +- {:.2g} {}, and none can be below zero: its torque or "
+          "its "
+          "position may have the other sign. Then nothing of this result is true: record or "
           "import them with the right sign",
           name, joint.name, found.value, found.ci95, joint.slides ? sliding : turning));
       return;

@@ -167,38 +167,43 @@ Status check_range(const Series& series, const ImportMap& map, const hal::RobotC
   return {};
 }
 
-/// A position that goes on a turn further, as an encoder's does whose number is kept within one;
-/// and torques that no joint has.
+/// Torques that no joint has.
+Status check_torques(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
+  constexpr double kMost = 100.0;  // times the joint's limit
+  for (const ImportedColumn& column : series.columns) {
+    if (column.target.command || column.target.field != "torque_nm") continue;
+    const hal::JointConfig& joint = robot.joints[column.target.index];
+    const double most = kMost * joint.max_torque_Nm;
+    for (std::size_t row = 0; row < column.values.size(); ++row) {
+      if (!(most > 0.0) || std::abs(column.values[row]) <= most) continue;
+      return std::unexpected(row_error(
+          series, row,
+          fmt::format("{} is {:.4g} {}; '{}' has {:.4g} at most", column.name, column.values[row],
+                      joint.slides ? "N" : "Nm", joint.name, joint.max_torque_Nm),
+          "is its unit right in " + map.file + "? leave a bad row out by begin_s or end_s"));
+    }
+  }
+  return {};
+}
+
+/// A position that goes on a turn further, as an encoder's does whose number is kept within one.
 Status check_leaps(const Series& series, const ImportMap& map, const hal::RobotConfig& robot) {
-  constexpr double kTurn_rad = 2.0 * std::numbers::pi, kNear_rad = 0.5, kMostTorque = 100.0;
+  constexpr double kTurn_rad = 2.0 * std::numbers::pi, kNear_rad = 0.5;
   const std::int64_t longest_step_ns = max_gap_of(series, map);
   for (const ImportedColumn& column : series.columns) {
-    if (column.target.command) continue;
-    const bool position = column.target.field == "position_rad";
-    if (!position && column.target.field != "torque_nm") continue;
+    if (column.target.command || column.target.field != "position_rad") continue;
     const hal::JointConfig& joint = robot.joints[column.target.index];
-    if (position && joint.slides) continue;
-    const double most = kMostTorque * joint.max_torque_Nm;
-    for (std::size_t row = 0; row < column.values.size(); ++row) {
-      const double now = column.values[row];
-      const bool goes_on =
-          row > 0 && series.time_ns[row] - series.time_ns[row - 1] <= longest_step_ns;
-      const double leap = goes_on ? std::abs(now - column.values[row - 1]) : 0.0;
-      if (position && std::abs(leap - kTurn_rad) < kNear_rad) {
-        return std::unexpected(row_error(
-            series, row,
-            fmt::format("{} leaps by {:.4g} rad, a turn: '{}' does not", column.name, leap,
-                        joint.name),
-            "its number was kept within a turn: let it go on (unwrap it), or leave the row out by "
-            "begin_s or end_s"));
-      }
-      if (!position && most > 0.0 && std::abs(now) > most) {
-        return std::unexpected(row_error(
-            series, row,
-            fmt::format("{} is {:.4g} {}; '{}' has {:.4g} at most", column.name, now,
-                        joint.slides ? "N" : "Nm", joint.name, joint.max_torque_Nm),
-            "is its unit right in " + map.file + "? leave a bad row out by begin_s or end_s"));
-      }
+    if (joint.slides) continue;
+    for (std::size_t row = 1; row < column.values.size(); ++row) {
+      if (series.time_ns[row] - series.time_ns[row - 1] > longest_step_ns) continue;
+      const double leap = std::abs(column.values[row] - column.values[row - 1]);
+      if (std::abs(leap - kTurn_rad) >= kNear_rad) continue;
+      return std::unexpected(
+          row_error(series, row,
+                    fmt::format("{} leaps by {:.4g} rad, a turn: '{}' does not", column.name, leap,
+                                joint.name),
+                    "its number was kept within a turn: let it go on (unwrap it), or leave the row "
+                    "out by begin_s or end_s"));
     }
   }
   return {};
@@ -337,6 +342,7 @@ Status clean(Recording& recording, const ImportMap& map, const hal::RobotConfig&
     }
     if (Status s = check_range(series, map, robot); !s) return s;
     if (Status s = check_gaps(series, map, recording.excluded); !s) return s;
+    if (Status s = check_torques(series, map, robot); !s) return s;
     if (Status s = check_leaps(series, map, robot); !s) return s;
     if (Status s = check_rates(series, map, robot); !s) return s;
     if (Status s = check_frozen(series, map, recording.excluded); !s) return s;

@@ -395,7 +395,7 @@ TEST(Identify, FindsJointByJointWhereTorquesWereMeasured) {
     EXPECT_EQ(result->joints[j].behind_rotor, j >= 4) << result->joints[j].name;
 }
 
-// A joint whose torques have the other sign was given friction of less than none, with confidence.
+// A joint whose torques have the other sign was given friction below zero, with confidence.
 TEST(Identify, SaysThatAJointsSignIsWrong) {
   const Arm panda = arm("panda");
   Reality reality = panda_reality();

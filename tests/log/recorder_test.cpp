@@ -64,6 +64,23 @@ RecordingResult record(const std::string& path, std::uint64_t cycles,
   return (*recorder)->close({{"wall_seconds", "1.5"}});
 }
 
+/// A recording of `cycles` states that goes on; its writer has taken them all.
+std::unique_ptr<Recorder> recording(const std::string& path, std::uint64_t cycles) {
+  auto recorder = Recorder::open(path, run_info(), {});
+  EXPECT_TRUE(recorder) << recorder.error().to_string();
+  hal::StateImage state = image();
+  const auto channel =
+      (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
+  (*recorder)->start();
+  for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
+    (*recorder)->wait_for_space(1);
+    fill(state, cycle);
+    (*recorder)->push(channel, state.time_ns()[0], state.bytes());
+  }
+  (*recorder)->wait_for_space(2048);
+  return std::move(*recorder);
+}
+
 TEST(Recorder, WritesEveryCycleWithoutADropWhenTheLoopMayWait) {
   const ScratchFolder folder;
   const RecordingResult result = record(folder / "run.mcap", 20'000, {.ring_slots = 64});
@@ -155,20 +172,9 @@ TEST(Recorder, CountsWhatADiskThatFillsUpLoses) {
 TEST(Recorder, CountsWhatIsLostWhenItsFileIsCut) {
   for (const std::size_t size : {std::size_t{0}, std::size_t{200'000}}) {
     const ScratchFolder folder;
-    auto recorder = Recorder::open(folder / "run.mcap", run_info(), {});
-    ASSERT_TRUE(recorder);
-    hal::StateImage state = image();
-    const auto channel =
-        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
-    (*recorder)->start();
-    for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
-      (*recorder)->wait_for_space(1);
-      fill(state, cycle);
-      (*recorder)->push(channel, state.time_ns()[0], state.bytes());
-    }
-    (*recorder)->wait_for_space(2048);
+    const auto recorder = recording(folder / "run.mcap", 3000);
     std::filesystem::resize_file(folder / "run.mcap", size);
-    const RecordingResult result = (*recorder)->close();
+    const RecordingResult result = recorder->close();
     EXPECT_NE(result.error.find("its file was cut to " + std::to_string(size) + " bytes"),
               std::string::npos)
         << result.error;
@@ -190,17 +196,7 @@ TEST(Recorder, LeavesAReadableFileWhenItIsKilled) {
   ASSERT_EQ(pipe(pipes), 0);
   const pid_t child = fork();
   if (child == 0) {
-    auto recorder = Recorder::open(folder / "run.mcap", run_info(), {});
-    hal::StateImage state = image();
-    const auto channel =
-        (*recorder)->add_channel("/tandem/state", "tandem/msg/State", state.layout());
-    (*recorder)->start();
-    for (std::uint64_t cycle = 0; cycle < 3000; ++cycle) {
-      (*recorder)->wait_for_space(1);
-      fill(state, cycle);
-      (*recorder)->push(channel, state.time_ns()[0], state.bytes());
-    }
-    (*recorder)->wait_for_space(2048);  // the writer has taken everything
+    const auto recorder = recording(folder / "run.mcap", 3000);
     (void)!::write(pipes[1], "x", 1);
     pause();
   }
